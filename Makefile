@@ -1,0 +1,47 @@
+# Everything runs in .venv, which each target sets up as far as it needs. A stamp .venv/with-EXTRA says that
+# the extension was built from the present sources and installed with that extra.
+
+PYTHON ?= python3
+BIN := .venv/bin
+SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
+
+# The bindings are compiled against the interpreter that will import them.
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+
+.PHONY: demo test check bench clean needs
+
+demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to demo/
+	$(BIN)/pdmp demo -o demo
+
+test: .venv/with-test  ## Runs every test, Rust and Python
+	cargo test --workspace
+	$(BIN)/pytest
+
+check: .venv/with-dev  ## Formatting, lints, types, and the stubs against the module
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets -- -D warnings
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/stubtest pdmp._native
+
+bench: | needs  ## Measures the core
+	cargo bench --package pdmp-core
+
+clean:  ## Removes what the targets above made
+	cargo clean
+	rm -rf .venv demo python/pdmp/_native*.so
+
+.venv/with-%: $(SOURCES) | $(BIN)/python
+	@echo 'building the extension and installing what "$*" needs: some minutes the first time'
+	$(BIN)/pip install --quiet --editable '.[$*]'
+	@touch $@
+
+$(BIN)/python: | needs
+	$(PYTHON) -m venv .venv
+
+needs:
+	@command -v cargo >/dev/null \
+		|| { echo 'missing: cargo (Rust 1.89 or newer): install it with rustup'; exit 1; }
+	@$(PYTHON) -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
+		|| { echo 'missing: Python 3.11 or newer with venv: install it, or name it: make PYTHON=python3.12'; exit 1; }

@@ -1,0 +1,416 @@
+//! The real-time loop: one step of the primitive per tick, with every command open to change.
+//!
+//! Over a tick the forcing w, the goal and the clock are known at both ends with their slopes; a cubic between them is
+//! propagated exactly ([`crate::Attractor::propagator`]). Style, rate ρ = 1/τ and goal or anchor pass critically damped
+//! filters, so that position and velocity stay continuous: ẏ = ρ(z + w), ÿ = ρ²(z′ + w′) + ρ̇(z + w).
+//!
+//! Nothing in [`Controller::step`] or in a setter allocates, locks or panics.
+
+use std::sync::Arc;
+
+use crate::attractor::{Jet, Propagator, State};
+use crate::error::{Error, Result, check_positive, check_vector};
+use crate::follower::Follower;
+use crate::model::{Complete, Conditions, Model, blend, check_amplitude, check_style, check_tau, refuse};
+use crate::phase::{Canonical, Kind, amplitude};
+
+/// A tick is divided so that the clock moves by no more than this share of the movement at once.
+const FINEST: f64 = 1.0 / 500.0;
+/// Most pieces of a tick; a longer one is still stable, only less exact.
+const MOST_PIECES: f64 = 1000.0;
+/// Longest tick, in units of τ.
+const LONGEST_TICK: f64 = 1000.0;
+/// A movement has settled within this share of its range.
+const SETTLED: f64 = 1e-3;
+
+/// Whether a movement goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// The movement goes on; a rhythmic one always does.
+    Working,
+    /// The demonstrated time is over, and position and velocity have settled on the goal.
+    Finished,
+}
+
+/// What drives one degree of freedom.
+#[derive(Clone, Copy, Debug, Default)]
+struct Drive {
+    forcing: Jet,
+    /// Goal or anchor.
+    centre: Jet,
+}
+
+/// A running primitive: a model, its commands and its state.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    model: Arc<Model>,
+    dt: f64,
+    conditions: Complete,
+    started: bool,
+    time: f64,
+    /// Clock u, or the polar phase φ in [0, 2π).
+    clock: f64,
+    /// Amplitude r; 1 where discrete.
+    r: f64,
+    style: Follower,
+    rate: Follower,
+    centre: Follower,
+    /// Basis w (J·D) and its slope at the clock.
+    basis: Vec<f64>,
+    basis_slope: Vec<f64>,
+    z: Vec<f64>,
+    /// Forcing and centre at the start of the stretch at work (D,).
+    from: Vec<Drive>,
+    propagator: Propagator,
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+    /// Distance from the goal at which each DoF has settled (D,).
+    tolerance: Vec<f64>,
+}
+
+impl Controller {
+    /// Starts a movement.
+    ///
+    /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal or anchor, both in
+    /// seconds; 0 is the paper's immediate switch, and without it a tenth of the nominal duration (discrete) or a
+    /// quarter of the nominal period (rhythmic) serves.
+    ///
+    /// # Errors
+    /// Conditions that do not fit the model, `dt` that is not positive, or a negative `transition`.
+    pub fn new(model: Arc<Model>, dt: f64, conditions: &Conditions, transition: Option<f64>) -> Result<Self> {
+        check_positive("dt", dt)?;
+        let share = if model.kind() == Kind::Discrete { 0.1 } else { 0.25 };
+        let transition = transition.unwrap_or(share * model.duration());
+        if !(transition.is_finite() && transition >= 0.0) {
+            let allowed = "must be a time in seconds, or 0 for an immediate switch";
+            return Err(Error::Range { name: "transition", value: transition, allowed });
+        }
+        let conditions = conditions.complete(&model)?;
+        let (n_dofs, n_outputs) = (model.n_dofs(), model.landscape().n_outputs());
+        let mut controller = Self {
+            dt,
+            started: false,
+            time: 0.0,
+            clock: 0.0,
+            r: 1.0,
+            style: Follower::new(&conditions.style, transition),
+            rate: Follower::new(&[1.0 / conditions.tau], transition),
+            centre: Follower::new(&conditions.centre, transition),
+            basis: vec![0.0; n_outputs],
+            basis_slope: vec![0.0; n_outputs],
+            z: vec![0.0; n_dofs],
+            from: vec![Drive::default(); n_dofs],
+            propagator: model.attractor().propagator(dt / conditions.tau),
+            position: vec![0.0; n_dofs],
+            velocity: vec![0.0; n_dofs],
+            acceleration: vec![0.0; n_dofs],
+            tolerance: vec![0.0; n_dofs],
+            conditions,
+            model,
+        };
+        controller.begin();
+        Ok(controller)
+    }
+
+    /// Starts again under other conditions.
+    ///
+    /// # Errors
+    /// As for [`Controller::new`]; the movement then goes on as it was.
+    pub fn reset(&mut self, conditions: &Conditions) -> Result<()> {
+        self.conditions = conditions.complete(&self.model)?;
+        self.begin();
+        Ok(())
+    }
+
+    fn begin(&mut self) {
+        let Self { model, conditions, .. } = self;
+        let n_dofs = model.n_dofs();
+        self.started = false;
+        (self.time, self.clock) = (0.0, 0.0);
+        self.r = conditions.amplitude;
+        self.style.jump(&conditions.style);
+        self.rate.jump(&[1.0 / conditions.tau]);
+        self.centre.jump(&conditions.centre);
+        model.landscape().evaluate(0.0, &mut self.basis, &mut self.basis_slope);
+        let widest = model.ranges().iter().fold(0.0f64, |widest, range| widest.max(*range));
+        for d in 0..n_dofs {
+            let centre = conditions.centre[d];
+            // From rest in z, or on the limit cycle of this style.
+            let (mut e, mut z) = (0.0, 0.0);
+            for (j, s) in conditions.style.iter().enumerate().filter(|_| !model.cycle.is_empty()) {
+                let cycle = model.cycle[j * n_dofs + d];
+                e += self.r * s * cycle.e;
+                z += self.r * s * cycle.z;
+            }
+            if let Some(velocity) = &conditions.velocity {
+                z = conditions.tau * velocity[d] - self.r * blend(&conditions.style, &self.basis, n_dofs, d);
+            }
+            self.position[d] = conditions.start.as_ref().map_or(centre + e, |start| start[d]);
+            self.z[d] = z;
+            self.tolerance[d] = SETTLED * model.ranges()[d].max((centre - self.position[d]).abs()).max(1e-6 * widest);
+        }
+        self.read_out();
+    }
+
+    /// One tick of the length given at the start.
+    ///
+    /// # Errors
+    /// As for [`Controller::step_by`].
+    pub fn step(&mut self) -> Result<Status> {
+        self.step_by(self.dt)
+    }
+
+    /// One tick of `dt` seconds; it may differ from tick to tick.
+    ///
+    /// # Errors
+    /// `dt` that is not positive, or longer than 1000 τ; the state then stays as it was.
+    pub fn step_by(&mut self, dt: f64) -> Result<Status> {
+        check_positive("dt", dt)?;
+        let h = self.rate.integral(dt);
+        if h > LONGEST_TICK {
+            return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
+        }
+        self.started = true;
+        // A tick of just the finest length is not divided for a rounding error.
+        let pieces = (h / (FINEST * self.model.canonical().extent()) - 1e-9).ceil().clamp(1.0, MOST_PIECES);
+        for _ in 0..pieces as u32 {
+            self.piece(dt / pieces);
+        }
+        self.time += dt;
+        self.read_out();
+        Ok(self.status())
+    }
+
+    /// Moves on by `dt` seconds, stopping at the demonstrated end, where the forcing has a kink.
+    fn piece(&mut self, dt: f64) {
+        let Canonical::Discrete { u_end, .. } = self.model.canonical() else {
+            return self.advance(dt);
+        };
+        let (left, h) = (u_end - self.clock, self.rate.integral(dt));
+        if left <= 0.0 || left >= h {
+            return self.advance(dt);
+        }
+        let before = self.rate.time_to(left, dt);
+        // What rounding left of a tick that should have ended here is not worth a piece of its own.
+        if left > 1e-9 * h {
+            self.advance(before);
+        }
+        self.clock = u_end;
+        self.model.landscape().evaluate(u_end, &mut self.basis, &mut self.basis_slope);
+        self.advance(dt - before);
+    }
+
+    fn advance(&mut self, dt: f64) {
+        let h = self.rate.integral(dt);
+        if h <= 0.0 {
+            return;
+        }
+        let moving = !self.centre.settled();
+        for d in 0..self.z.len() {
+            self.from[d] = self.drive(d);
+        }
+        self.style.advance(dt);
+        self.rate.advance(dt);
+        self.centre.advance(dt);
+        match self.model.canonical() {
+            Canonical::Discrete { u_end, .. } => {
+                let demonstrated = self.clock < u_end;
+                self.clock += h;
+                let landscape = self.model.landscape();
+                // At u_end itself the slope of the demonstrated side belongs to this piece.
+                if demonstrated {
+                    landscape.read(self.clock, &mut self.basis, &mut self.basis_slope);
+                } else {
+                    landscape.evaluate(self.clock, &mut self.basis, &mut self.basis_slope);
+                }
+            }
+            canonical @ Canonical::Rhythmic { mu } => {
+                self.clock = canonical.phase(self.clock + h);
+                self.r = amplitude(mu, self.r, self.conditions.amplitude, h);
+                self.model.landscape().evaluate(self.clock, &mut self.basis, &mut self.basis_slope);
+            }
+        }
+        if h != self.propagator.step() {
+            self.propagator = self.model.attractor().propagator(h);
+        }
+        for d in 0..self.z.len() {
+            let (from, to) = (self.from[d], self.drive(d));
+            let origin = from.centre.value;
+            let state = State { e: self.position[d] - origin, z: self.z[d] };
+            let mut next = self.propagator.advance(state, [from.forcing, to.forcing]);
+            if moving {
+                let relative = |jet: Jet| Jet { value: jet.value - origin, ..jet };
+                let moved = self.propagator.follow([relative(from.centre), relative(to.centre)]);
+                next.e += moved.e;
+                next.z += moved.z;
+            }
+            self.position[d] = origin + next.e;
+            self.z[d] = next.z;
+        }
+    }
+
+    /// What drives one DoF now, with slopes with respect to the clock.
+    fn drive(&self, d: usize) -> Drive {
+        let slope = self.centre.rate()[d] / self.rate.value()[0];
+        Drive { forcing: self.force(d), centre: Jet { value: self.centre.value()[d], slope } }
+    }
+
+    /// Forcing w of one DoF with its slope along the motion: the landscape's, the style's and the amplitude's part.
+    fn force(&self, d: usize) -> Jet {
+        let n_dofs = self.z.len();
+        let (style, rate) = (self.style.value(), self.rate.value()[0]);
+        let shape = blend(style, &self.basis, n_dofs, d);
+        let mut slope = blend(style, &self.basis_slope, n_dofs, d);
+        if !self.style.settled() {
+            slope += blend(self.style.rate(), &self.basis, n_dofs, d) / rate;
+        }
+        let growth = match self.model.canonical() {
+            Canonical::Discrete { .. } => 0.0,
+            Canonical::Rhythmic { mu } => mu * (self.conditions.amplitude - self.r),
+        };
+        Jet { value: self.r * shape, slope: self.r * slope + growth * shape }
+    }
+
+    fn read_out(&mut self) {
+        let (rate, change) = (self.rate.value()[0], self.rate.rate()[0]);
+        let attractor = self.model.attractor();
+        for d in 0..self.z.len() {
+            let w = self.force(d);
+            let state = State { e: self.position[d] - self.centre.value()[d], z: self.z[d] };
+            let flow = state.z + w.value;
+            self.velocity[d] = rate * flow;
+            self.acceleration[d] = rate * rate * (attractor.z_slope(state) + w.slope) + change * flow;
+        }
+    }
+
+    /// Whether the movement goes on.
+    pub fn status(&self) -> Status {
+        let Canonical::Discrete { u_end, .. } = self.model.canonical() else {
+            return Status::Working;
+        };
+        let tau = 1.0 / self.rate.value()[0];
+        let settled = |d: usize| {
+            (self.position[d] - self.centre.target()[d]).abs() <= self.tolerance[d]
+                && tau * self.velocity[d].abs() <= self.tolerance[d]
+        };
+        let over = self.clock >= u_end && (0..self.z.len()).all(settled);
+        if over { Status::Finished } else { Status::Working }
+    }
+
+    /// Sets the style s (J,) to go to.
+    ///
+    /// # Errors
+    /// A wrong length or a number that is not finite; the style then stays as it was.
+    pub fn set_style(&mut self, style: &[f64]) -> Result<()> {
+        check_style(style, self.model.n_styles())?;
+        self.conditions.style.copy_from_slice(style);
+        self.style.follow(style);
+        self.commanded()
+    }
+
+    /// Sets the goal g (D,) of a discrete movement.
+    ///
+    /// # Errors
+    /// A rhythmic primitive, a wrong length, or a number that is not finite; the goal then stays as it was.
+    pub fn set_goal(&mut self, goal: &[f64]) -> Result<()> {
+        refuse(self.model.kind(), "goal", self.model.kind() == Kind::Rhythmic)?;
+        self.set_centre("goal", goal)
+    }
+
+    /// Sets the anchor y_a (D,) of a rhythmic movement.
+    ///
+    /// # Errors
+    /// A discrete primitive, a wrong length, or a number that is not finite; the anchor then stays as it was.
+    pub fn set_anchor(&mut self, anchor: &[f64]) -> Result<()> {
+        refuse(self.model.kind(), "anchor", self.model.kind() == Kind::Discrete)?;
+        self.set_centre("anchor", anchor)
+    }
+
+    fn set_centre(&mut self, name: &'static str, centre: &[f64]) -> Result<()> {
+        check_vector(name, centre, self.model.n_dofs(), "DoF")?;
+        self.conditions.centre.copy_from_slice(centre);
+        self.centre.follow(centre);
+        self.commanded()
+    }
+
+    /// Sets the time constant τ, in seconds; the rate 1/τ is what passes the filter.
+    ///
+    /// # Errors
+    /// A number that is not positive, or more than a millionfold from the model's τ; τ then stays as it was.
+    pub fn set_tau(&mut self, tau: f64) -> Result<()> {
+        check_tau(tau, self.model.tau())?;
+        self.conditions.tau = tau;
+        self.rate.follow(&[1.0 / tau]);
+        self.commanded()
+    }
+
+    /// Sets the amplitude r₀ of a rhythmic movement; r follows by Eq. (4).
+    ///
+    /// # Errors
+    /// A discrete primitive, a negative number or one that is not finite; r₀ then stays as it was.
+    pub fn set_amplitude(&mut self, amplitude: f64) -> Result<()> {
+        refuse(self.model.kind(), "amplitude", self.model.kind() == Kind::Discrete)?;
+        check_amplitude(amplitude)?;
+        self.conditions.amplitude = amplitude;
+        self.commanded()
+    }
+
+    /// Commands given before the first step hold from the start.
+    fn commanded(&mut self) -> Result<()> {
+        if !self.started {
+            self.begin();
+        }
+        Ok(())
+    }
+
+    /// The model that is run.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Seconds since the start.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Phase: x in (0, 1] where discrete, φ in [0, 2π) where rhythmic.
+    pub fn phase(&self) -> f64 {
+        self.model.canonical().phase(self.clock)
+    }
+
+    /// Position y (D,), in the unit of each DoF.
+    pub fn position(&self) -> &[f64] {
+        &self.position
+    }
+
+    /// Velocity ẏ (D,), per second.
+    pub fn velocity(&self) -> &[f64] {
+        &self.velocity
+    }
+
+    /// Acceleration ÿ (D,), per second squared.
+    pub fn acceleration(&self) -> &[f64] {
+        &self.acceleration
+    }
+
+    /// Style commanded (J,).
+    pub fn style(&self) -> &[f64] {
+        &self.conditions.style
+    }
+
+    /// Goal or anchor commanded (D,).
+    pub fn centre(&self) -> &[f64] {
+        &self.conditions.centre
+    }
+
+    /// Time constant commanded, in seconds.
+    pub fn tau(&self) -> f64 {
+        self.conditions.tau
+    }
+
+    /// Amplitude r₀ commanded; 1 where discrete.
+    pub fn amplitude(&self) -> f64 {
+        self.conditions.amplitude
+    }
+}

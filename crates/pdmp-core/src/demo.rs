@@ -1,0 +1,166 @@
+//! What goes in and what comes out: demonstrations and trajectories, arrays with checked shapes.
+
+use ndarray::{Array2, ArrayView2};
+
+use crate::error::{Error, LARGEST, Result, check_finite, check_positive};
+
+/// Fewest samples that carry a cubic spline with not-a-knot ends.
+pub const LEAST_SAMPLES: usize = 4;
+
+/// When the samples of a demonstration were taken.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sampling {
+    /// At equal intervals, whose length the fit is told.
+    Unknown,
+    /// At equal intervals of `dt` seconds.
+    Uniform {
+        /// Sampling interval in seconds.
+        dt: f64,
+    },
+    /// At the given times in seconds.
+    Stamped {
+        /// Strictly increasing time stamps, in seconds.
+        time: Vec<f64>,
+    },
+}
+
+/// One recorded movement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Demonstration {
+    position: Array2<f64>,
+    sampling: Sampling,
+    goal: Option<Vec<f64>>,
+    context: Option<Vec<f64>>,
+    names: Option<Vec<String>>,
+}
+
+impl Demonstration {
+    /// A movement of positions (T, D), in the unit of each degree of freedom.
+    ///
+    /// # Errors
+    /// Fewer than four samples, no DoF, a number that is not finite or too large to be squared, an interval that is not
+    /// positive, time stamps that do not increase or are not one per sample.
+    pub fn new(position: Array2<f64>, sampling: Sampling) -> Result<Self> {
+        check_matrix("position", position.view())?;
+        let (found, n_dofs) = position.dim();
+        if n_dofs == 0 {
+            return Err(Error::Arguments("position has no DoFs: pass an array of shape (T, D) with D of at least 1"));
+        }
+        if found < LEAST_SAMPLES {
+            return Err(Error::Samples { found, least: LEAST_SAMPLES });
+        }
+        match &sampling {
+            Sampling::Unknown => {}
+            Sampling::Uniform { dt } => check_positive("dt", *dt)?,
+            Sampling::Stamped { time } => check_time(time, found)?,
+        }
+        Ok(Self { position, sampling, goal: None, context: None, names: None })
+    }
+
+    /// Sets the point attractor of this movement (D,); without it, the last sample serves.
+    ///
+    /// # Errors
+    /// A length other than D, or a number that is not finite.
+    pub fn with_goal(mut self, goal: Vec<f64>) -> Result<Self> {
+        crate::error::check_vector("goal", &goal, self.n_dofs(), "DoF")?;
+        self.goal = Some(goal);
+        Ok(self)
+    }
+
+    /// Sets the condition under which this movement was made (Q,), such as an obstacle's height.
+    ///
+    /// # Errors
+    /// No number, or one that is not finite.
+    pub fn with_context(mut self, context: Vec<f64>) -> Result<Self> {
+        if context.is_empty() {
+            return Err(Error::Arguments("context is empty: pass at least one number, or none at all"));
+        }
+        check_finite("context", &context)?;
+        self.context = Some(context);
+        Ok(self)
+    }
+
+    /// Names the degrees of freedom (D,).
+    ///
+    /// # Errors
+    /// A number of names other than D.
+    pub fn with_names(mut self, names: Vec<String>) -> Result<Self> {
+        if names.len() != self.n_dofs() {
+            let (expected, found) = (self.n_dofs(), names.len());
+            return Err(Error::Length { name: "names", expected, found, per: "DoF" });
+        }
+        self.names = Some(names);
+        Ok(self)
+    }
+
+    /// Positions (T, D).
+    pub fn position(&self) -> ArrayView2<'_, f64> {
+        self.position.view()
+    }
+
+    /// When the samples were taken.
+    pub fn sampling(&self) -> &Sampling {
+        &self.sampling
+    }
+
+    /// The point attractor given for this movement (D,).
+    pub fn goal(&self) -> Option<&[f64]> {
+        self.goal.as_deref()
+    }
+
+    /// The condition given for this movement (Q,).
+    pub fn context(&self) -> Option<&[f64]> {
+        self.context.as_deref()
+    }
+
+    /// The names given to the degrees of freedom (D,).
+    pub fn names(&self) -> Option<&[String]> {
+        self.names.as_deref()
+    }
+
+    /// Number of samples T.
+    pub fn n_samples(&self) -> usize {
+        self.position.nrows()
+    }
+
+    /// Number of degrees of freedom D.
+    pub fn n_dofs(&self) -> usize {
+        self.position.ncols()
+    }
+}
+
+/// A generated movement: row k of each array is the state at `time[k]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    /// Times (T,), in seconds from the start.
+    pub time: Vec<f64>,
+    /// Positions (T, D), in the unit of each DoF.
+    pub position: Array2<f64>,
+    /// Velocities (T, D), per second.
+    pub velocity: Array2<f64>,
+    /// Accelerations (T, D), per second squared.
+    pub acceleration: Array2<f64>,
+}
+
+/// Checks that every element of a matrix is finite and no larger than [`LARGEST`].
+pub(crate) fn check_matrix(name: &'static str, matrix: ArrayView2<f64>) -> Result<()> {
+    for ((row, column), &value) in matrix.indexed_iter() {
+        if !value.is_finite() {
+            return Err(Error::NotFiniteAt { name, row, column, value });
+        }
+        if value.abs() > LARGEST {
+            return Err(Error::Magnitude { name, row, column, value, limit: LARGEST });
+        }
+    }
+    Ok(())
+}
+
+fn check_time(time: &[f64], n_samples: usize) -> Result<()> {
+    crate::error::check_vector("time", time, n_samples, "sample")?;
+    for (index, pair) in time.windows(2).enumerate() {
+        if pair[1] <= pair[0] {
+            return Err(Error::Time { index: index + 1, time: pair[1], previous: pair[0] });
+        }
+    }
+    Ok(())
+}

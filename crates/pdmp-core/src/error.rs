@@ -1,0 +1,199 @@
+//! The one error type. Every variant carries the numbers that a user needs to mend the call, and those that can
+//! arise in a control loop hold nothing that allocates.
+
+use std::path::PathBuf;
+
+use crate::Kind;
+
+/// What can go wrong, from a bad argument to a damaged file.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// An error in one of several demonstrations.
+    #[error("demo {demo}: {source}")]
+    Demo {
+        /// Index of the demonstration, from 0.
+        demo: usize,
+        /// What is wrong with it.
+        source: Box<Error>,
+    },
+    /// An element of a vector is NaN or infinite.
+    #[error("{name}[{index}] = {value}: every number must be finite")]
+    NotFinite {
+        /// The argument.
+        name: &'static str,
+        /// Index of the element.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// An element of a matrix is NaN or infinite.
+    #[error(
+        "{name}[{row}, {column}] = {value}: every number must be finite; \
+         fill the gap or cut the row out first"
+    )]
+    NotFiniteAt {
+        /// The argument.
+        name: &'static str,
+        /// Row of the element.
+        row: usize,
+        /// Column of the element.
+        column: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A vector of the wrong length.
+    #[error("{name} has length {found}, expected {expected}: one value per {per}")]
+    Length {
+        /// The argument.
+        name: &'static str,
+        /// The length it must have.
+        expected: usize,
+        /// The length it has.
+        found: usize,
+        /// What each element belongs to.
+        per: &'static str,
+    },
+    /// A number outside its range.
+    #[error("{name} = {value}: {allowed}")]
+    Range {
+        /// The argument.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// A number so large that its square overflows.
+    #[error(
+        "{name}[{row}, {column}] = {value:e}: magnitudes above {limit:e} overflow when squared; \
+         give the data in a larger unit"
+    )]
+    Magnitude {
+        /// The argument.
+        name: &'static str,
+        /// Row of the element.
+        row: usize,
+        /// Column of the element.
+        column: usize,
+        /// Its value.
+        value: f64,
+        /// The largest magnitude that is accepted.
+        limit: f64,
+    },
+    /// Time stamps that do not increase.
+    #[error(
+        "time[{index}] = {time} s does not come after time[{before}] = {previous} s: \
+         time stamps must increase; drop repeated samples",
+        before = index - 1
+    )]
+    Time {
+        /// Index of the offending stamp.
+        index: usize,
+        /// Its value, in seconds.
+        time: f64,
+        /// The value before it, in seconds.
+        previous: f64,
+    },
+    /// Too few samples to carry a cubic.
+    #[error("position has {found} samples: at least {least} are needed; record at a higher rate")]
+    Samples {
+        /// Samples found.
+        found: usize,
+        /// Samples needed.
+        least: usize,
+    },
+    /// No demonstration at all.
+    #[error("demos is empty: pass at least one demonstration")]
+    NoDemonstrations,
+    /// Demonstrations with different numbers of degrees of freedom.
+    #[error("position has {found} DoFs, but demo 0 has {expected}: all must have the same")]
+    Dofs {
+        /// DoFs of the first demonstration.
+        expected: usize,
+        /// DoFs of this one.
+        found: usize,
+    },
+    /// A style dimension that the data cannot carry.
+    #[error("n_styles = {n_styles}: must lie between 1 and {most}, the number of {of}")]
+    Styles {
+        /// The dimension asked for.
+        n_styles: usize,
+        /// The largest possible.
+        most: usize,
+        /// What limits it.
+        of: &'static str,
+    },
+    /// An argument that the other kind of primitive has.
+    #[error("{name} does not apply to a {kind} primitive{instead}")]
+    Kind {
+        /// The argument.
+        name: &'static str,
+        /// The kind of this primitive.
+        kind: Kind,
+        /// What to use, as the end of the sentence.
+        instead: &'static str,
+    },
+    /// Arguments that are missing or exclude each other.
+    #[error("{0}")]
+    Arguments(&'static str),
+    /// The demonstrations are well formed, but learning did not succeed.
+    #[error("{0}")]
+    Fit(String),
+    /// The caller stopped a long call.
+    #[error("interrupted")]
+    Interrupted,
+    /// A model file that is damaged, foreign or of another version.
+    #[error("not a usable model file: {0}")]
+    File(String),
+    /// A file that cannot be read or written.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// The result of a call into this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// Names the demonstration in which this error arose.
+    pub fn in_demo(self, demo: usize) -> Self {
+        Error::Demo { demo, source: Box::new(self) }
+    }
+}
+
+/// Largest magnitude whose square, summed over a recording, stays finite.
+pub const LARGEST: f64 = 1e150;
+
+/// Checks that `value` has one finite number per `per`.
+pub(crate) fn check_vector(name: &'static str, value: &[f64], expected: usize, per: &'static str) -> Result<()> {
+    if value.len() != expected {
+        return Err(Error::Length { name, expected, found: value.len(), per });
+    }
+    check_finite(name, value)
+}
+
+/// Checks that every element is finite and no larger than [`LARGEST`].
+pub(crate) fn check_finite(name: &'static str, value: &[f64]) -> Result<()> {
+    for (index, &value) in value.iter().enumerate() {
+        if !value.is_finite() {
+            return Err(Error::NotFinite { name, index, value });
+        }
+        if value.abs() > LARGEST {
+            return Err(Error::Magnitude { name, row: 0, column: index, value, limit: LARGEST });
+        }
+    }
+    Ok(())
+}
+
+/// Checks that `value` is positive and finite.
+pub(crate) fn check_positive(name: &'static str, value: f64) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(Error::Range { name, value, allowed: "must be positive and finite" })
+    }
+}

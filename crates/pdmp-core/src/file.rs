@@ -1,0 +1,361 @@
+//! The model file: safetensors, with the constants as JSON beside the arrays.
+//!
+//! One metadata key holds the JSON, as several would be written in random order. A checksum over the constants and
+//! all arrays finds damage that leaves every shape intact.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io::{Read, Write};
+use std::path::Path;
+
+use ndarray::Array2;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
+use serde::{Deserialize, Serialize};
+
+use crate::attractor::Attractor;
+use crate::context::ContextMap;
+use crate::error::{Error, LARGEST, Result};
+use crate::landscape::{Landscape, MOST_CELLS};
+use crate::model::{Demonstrated, Learnt, Model};
+use crate::phase::Canonical;
+use crate::smooth::Smoothing;
+
+/// Version of the file's layout.
+const SCHEMA: u32 = 1;
+/// The metadata key.
+const KEY: &str = "pdmp";
+/// Largest file that is read, in bytes.
+const LARGEST_FILE: u64 = 1 << 32;
+/// Largest header that is read, in bytes.
+const LARGEST_HEADER: u64 = 1 << 20;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sealed {
+    schema: u32,
+    crc32: u32,
+    model: Constants,
+}
+
+/// All of a model that is not an array.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Constants {
+    canonical: Canonical,
+    tau: f64,
+    alpha_z: f64,
+    beta_z: f64,
+    names: Vec<String>,
+    nominal: usize,
+    n_samples: usize,
+    smoothing: Smoothing,
+    basis: String,
+    table_error: f64,
+    has_context: bool,
+    has_residual: bool,
+}
+
+/// An array by name: shape and elements by rows.
+type Array = (&'static str, Vec<usize>, Vec<f64>);
+
+fn matrix(name: &'static str, matrix: &Array2<f64>) -> Array {
+    (name, matrix.shape().to_vec(), matrix.iter().copied().collect())
+}
+
+fn vector(name: &'static str, vector: &[f64]) -> Array {
+    (name, vec![vector.len()], vector.to_vec())
+}
+
+impl Model {
+    /// The model as the bytes of a file.
+    ///
+    /// # Errors
+    /// A model that the format cannot hold.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let constants = Constants {
+            canonical: self.canonical(),
+            tau: self.tau,
+            alpha_z: self.attractor.alpha_z,
+            beta_z: self.attractor.beta_z,
+            names: self.names.clone(),
+            nominal: self.demonstrated.nominal,
+            n_samples: self.learnt.n_samples,
+            smoothing: self.learnt.smoothing,
+            basis: self.learnt.basis.clone(),
+            table_error: self.landscape.error(),
+            has_context: self.map.is_some(),
+            has_residual: self.map.as_ref().is_some_and(|map| map.residual.is_some()),
+        };
+        let arrays: Vec<(&str, Vec<usize>, Vec<u8>)> = self
+            .arrays()
+            .into_iter()
+            .map(|(name, shape, data)| (name, shape, data.iter().flat_map(|x| x.to_le_bytes()).collect()))
+            .collect();
+        let crc32 = checksum(&constants, arrays.iter().map(|(name, _, bytes)| (*name, bytes.as_slice())))?;
+        let sealed = Sealed { schema: SCHEMA, crc32, model: constants };
+        let json = serde_json::to_string(&sealed).map_err(|error| Error::File(error.to_string()))?;
+        let views = arrays
+            .iter()
+            .map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F64, shape.clone(), bytes)?)))
+            .collect::<std::result::Result<Vec<_>, safetensors::SafeTensorError>>()
+            .map_err(|error| Error::File(error.to_string()))?;
+        serialize(views, Some(HashMap::from([(KEY.to_string(), json)]))).map_err(|error| Error::File(error.to_string()))
+    }
+
+    fn arrays(&self) -> Vec<Array> {
+        let demonstrated = &self.demonstrated;
+        let (values, slopes) = self.landscape.knots();
+        let knots = vec![self.landscape.cells() + 1, self.n_styles(), self.n_dofs()];
+        let mut arrays = vec![
+            matrix("styles", &demonstrated.styles),
+            matrix("goals", &demonstrated.goals),
+            matrix("starts", &demonstrated.starts),
+            matrix("anchors", &demonstrated.anchors),
+            vector("durations", &demonstrated.durations),
+            vector("singular_values", &self.learnt.singular_values),
+            vector("dof_scale", &self.learnt.dof_scale),
+            vector("ranges", &self.ranges),
+            ("landscape.values", knots.clone(), values.to_vec()),
+            ("landscape.slopes", knots, slopes.to_vec()),
+        ];
+        if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
+            arrays.push(matrix("contexts", contexts));
+            arrays.push(("map.centre", vec![map.centre.len()], map.centre.to_vec()));
+            arrays.push(("map.intercept", vec![map.intercept.len()], map.intercept.to_vec()));
+            arrays.push(matrix("map.slopes", &map.slopes));
+            arrays.push(matrix("map.inverse_scatter", &map.inverse_scatter));
+            arrays.extend(map.residual.as_ref().map(|residual| matrix("map.residual", residual)));
+        }
+        arrays
+    }
+
+    /// Writes a model file. It appears whole or not at all, whatever interrupts the writing.
+    ///
+    /// # Errors
+    /// A path that cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let bytes = self.to_bytes()?;
+        let io = |source| Error::Io { path: path.to_path_buf(), source };
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut file = tempfile::Builder::new().prefix(".pdmp-").tempfile_in(folder).map_err(io)?;
+        file.write_all(&bytes).map_err(io)?;
+        file.as_file().sync_all().map_err(io)?;
+        readable(file.as_file()).map_err(io)?;
+        file.persist(path).map_err(|error| io(error.error))?;
+        Ok(())
+    }
+
+    /// Reads a model file.
+    ///
+    /// # Errors
+    /// A path that cannot be read, or a file that is not whole, not a model, or of another version.
+    pub fn load(path: &Path) -> Result<Self> {
+        let io = |source| Error::Io { path: path.to_path_buf(), source };
+        let file = fs::File::open(path).map_err(io)?;
+        let mut bytes = Vec::new();
+        file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
+        Self::from_bytes(&bytes).map_err(|error| match error {
+            Error::File(reason) => Error::File(format!("{}: {reason}", path.display())),
+            other => other,
+        })
+    }
+
+    /// Reads a model from the bytes of a file.
+    ///
+    /// # Errors
+    /// Bytes that are not whole, not a model, or of another version.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let bad = |reason: &str| Error::File(reason.to_string());
+        let header = bytes.first_chunk().map(|head| u64::from_le_bytes(*head)).ok_or(bad("shorter than a header"))?;
+        if bytes.len() as u64 > LARGEST_FILE || header > LARGEST_HEADER {
+            return Err(bad("larger than any model"));
+        }
+        let broken = |error: safetensors::SafeTensorError| Error::File(error.to_string());
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(broken)?;
+        let tensors = SafeTensors::deserialize(bytes).map_err(broken)?;
+        let entries = metadata.metadata().as_ref().ok_or(bad("no metadata"))?;
+        let json = entries.get(KEY).filter(|_| entries.len() == 1).ok_or(bad("no pdmp metadata"))?;
+        // The version is read alone first: another one may hold anything else.
+        let version: serde_json::Value = serde_json::from_str(json).map_err(|error| Error::File(error.to_string()))?;
+        match version.get("schema").and_then(serde_json::Value::as_u64) {
+            Some(found) if found == u64::from(SCHEMA) => {}
+            Some(found) => {
+                return Err(Error::File(format!("version {found}, while this library reads version {SCHEMA}")));
+            }
+            None => return Err(bad("no schema version")),
+        }
+        let Sealed { crc32, model, .. } = serde_json::from_str(json).map_err(|error| Error::File(error.to_string()))?;
+        Reader { tensors }.model(model, crc32)
+    }
+}
+
+/// Takes arrays out of a file, checking dimensions and numbers.
+struct Reader<'a> {
+    tensors: SafeTensors<'a>,
+}
+
+impl Reader<'_> {
+    fn array(&self, name: &str, shape: &[usize]) -> Result<Vec<f64>> {
+        let tensor = self.tensors.tensor(name).map_err(|_| Error::File(format!("no array {name}")))?;
+        if tensor.dtype() != Dtype::F64 || tensor.shape() != shape {
+            let (dtype, found) = (tensor.dtype(), tensor.shape());
+            return Err(Error::File(format!("{name} is {dtype:?} {found:?}, expected F64 {shape:?}")));
+        }
+        let data: Vec<f64> = tensor
+            .data()
+            .chunks_exact(8)
+            .map(|chunk| f64::from_le_bytes(chunk.try_into().unwrap_or_default()))
+            .collect();
+        match data.iter().position(|x| !(x.abs() <= LARGEST * LARGEST)) {
+            Some(index) => Err(Error::File(format!("{name} holds {} at {index}", data[index]))),
+            None => Ok(data),
+        }
+    }
+
+    fn matrix(&self, name: &str, shape: (usize, usize)) -> Result<Array2<f64>> {
+        let data = self.array(name, &[shape.0, shape.1])?;
+        Array2::from_shape_vec(shape, data).map_err(|error| Error::File(format!("{name}: {error}")))
+    }
+
+    fn positive(&self, name: &str, length: usize) -> Result<Vec<f64>> {
+        let data = self.array(name, &[length])?;
+        match data.iter().position(|x| *x <= 0.0) {
+            Some(index) => Err(Error::File(format!("{name} holds {} at {index}, not a positive number", data[index]))),
+            None => Ok(data),
+        }
+    }
+
+    fn shape<const N: usize>(&self, name: &str) -> Result<[usize; N]> {
+        let tensor = self.tensors.tensor(name).map_err(|_| Error::File(format!("no array {name}")))?;
+        tensor.shape().try_into().map_err(|_| Error::File(format!("{name} has {} axes", tensor.shape().len())))
+    }
+
+    fn model(&self, constants: Constants, crc32: u32) -> Result<Model> {
+        let bad = |reason: &str| Error::File(reason.to_string());
+        let [n_demos, n_styles] = self.shape("styles")?;
+        let [n_knots, _, n_dofs] = self.shape("landscape.values")?;
+        let [n_values] = self.shape("singular_values")?;
+        if n_demos == 0 || n_styles == 0 || n_dofs == 0 || n_values < n_styles {
+            return Err(bad("an array is empty"));
+        }
+        if !(2..=MOST_CELLS + 1).contains(&n_knots) || constants.names.len() != n_dofs {
+            return Err(bad("the landscape does not fit the rest"));
+        }
+        if constants.nominal >= n_demos || constants.n_samples < crate::LEAST_SAMPLES {
+            return Err(bad("nominal or n_samples is out of range"));
+        }
+        constants.check()?;
+
+        let (contexts, map) =
+            if constants.has_context { self.map(&constants, n_demos, n_styles, n_dofs)? } else { (None, None) };
+        let knots = |name| {
+            let data = self.array(name, &[n_knots, n_styles, n_dofs])?;
+            Array2::from_shape_vec((n_knots, n_styles * n_dofs), data).map_err(|error| Error::File(error.to_string()))
+        };
+        let landscape = Landscape::from_knots(
+            constants.canonical,
+            knots("landscape.values")?,
+            knots("landscape.slopes")?,
+            constants.table_error,
+        );
+        let demonstrated = Demonstrated {
+            styles: self.matrix("styles", (n_demos, n_styles))?,
+            goals: self.matrix("goals", (n_demos, n_dofs))?,
+            starts: self.matrix("starts", (n_demos, n_dofs))?,
+            anchors: self.matrix("anchors", (n_demos, n_dofs))?,
+            durations: self.positive("durations", n_demos)?,
+            contexts,
+            nominal: constants.nominal,
+        };
+        let singular_values = self.array("singular_values", &[n_values])?;
+        let dof_scale = self.positive("dof_scale", n_dofs)?;
+        let ranges = self.array("ranges", &[n_dofs])?;
+        if singular_values.iter().chain(&ranges).any(|x| *x < 0.0) {
+            return Err(bad("a range or singular value is negative"));
+        }
+        let attractor = Attractor { alpha_z: constants.alpha_z, beta_z: constants.beta_z };
+        let learnt = Learnt {
+            n_samples: constants.n_samples,
+            smoothing: constants.smoothing,
+            dof_scale,
+            singular_values,
+            basis: constants.basis.clone(),
+        };
+        let (tau, names) = (constants.tau, constants.names.clone());
+        let model = Model::assemble(attractor, landscape, tau, names, ranges, demonstrated, learnt, map);
+        self.verify(&constants, &model, crc32)?;
+        Ok(model)
+    }
+
+    fn map(
+        &self,
+        constants: &Constants,
+        n_demos: usize,
+        n_styles: usize,
+        n_dofs: usize,
+    ) -> Result<(Option<Array2<f64>>, Option<ContextMap>)> {
+        let [_, q] = self.shape("contexts")?;
+        let places = if matches!(constants.canonical, Canonical::Discrete { .. }) { 2 } else { 1 };
+        let p = n_styles + places * n_dofs + 1;
+        let map = ContextMap {
+            centre: self.array("map.centre", &[q])?.into(),
+            intercept: self.array("map.intercept", &[p])?.into(),
+            slopes: self.matrix("map.slopes", (p, q))?,
+            inverse_scatter: self.matrix("map.inverse_scatter", (q, q))?,
+            residual: if constants.has_residual { Some(self.matrix("map.residual", (p, p))?) } else { None },
+            n_demos,
+        };
+        Ok((Some(self.matrix("contexts", (n_demos, q))?), Some(map)))
+    }
+
+    /// Checks that the file holds the model's arrays and no others, unchanged.
+    fn verify(&self, constants: &Constants, model: &Model, crc32: u32) -> Result<()> {
+        let names: Vec<&str> = model.arrays().iter().map(|(name, ..)| *name).collect();
+        if names.len() != self.tensors.len() {
+            return Err(Error::File("arrays that do not belong to a model".to_string()));
+        }
+        let tensors: Vec<_> = names.iter().filter_map(|name| self.tensors.tensor(name).ok()).collect();
+        let found = checksum(constants, names.iter().copied().zip(tensors.iter().map(|tensor| tensor.data())))?;
+        if found == crc32 { Ok(()) } else { Err(Error::File("damaged: the checksum does not match".to_string())) }
+    }
+}
+
+impl Constants {
+    fn check(&self) -> Result<()> {
+        let (a, b) = match self.canonical {
+            Canonical::Discrete { alpha_x, u_end } => (alpha_x, u_end),
+            Canonical::Rhythmic { mu } => (mu, 1.0),
+        };
+        for (name, value) in
+            [("tau", self.tau), ("alpha_z", self.alpha_z), ("beta_z", self.beta_z), ("alpha_x or mu", a), ("u_end", b)]
+        {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::File(format!("{name} = {value} is not a positive number")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// CRC-32 of the constants and of all arrays, in the order in which a model lists them.
+fn checksum<'a>(constants: &Constants, arrays: impl Iterator<Item = (&'a str, &'a [u8])>) -> Result<u32> {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&serde_json::to_vec(constants).map_err(|error| Error::File(error.to_string()))?);
+    for (name, bytes) in arrays {
+        hasher.update(name.as_bytes());
+        hasher.update(bytes);
+    }
+    Ok(hasher.finalize())
+}
+
+/// A temporary file is its owner's alone; a model is readable like any other file.
+#[cfg(unix)]
+fn readable(file: &fs::File) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn readable(_: &fs::File) -> std::io::Result<()> {
+    Ok(())
+}

@@ -1,0 +1,348 @@
+//! Learning a primitive from demonstrations: the four steps of Section 3.2, composed.
+
+use std::f64::consts::TAU;
+
+use faer::Mat;
+use faer::linalg::solvers::SolveLstsq;
+use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, Axis};
+
+use crate::align::{Aligned, Alignment};
+use crate::attractor::Attractor;
+use crate::basis::{Basis, Domain};
+use crate::context::{self, ContextMap};
+use crate::demo::{Demonstration, check_matrix};
+use crate::error::{Error, Result, check_positive, check_vector};
+use crate::factor::{Factors, StyleCount};
+use crate::landscape::Landscape;
+use crate::model::{Demonstrated, Learnt, Model};
+use crate::phase::{Canonical, Kind};
+use crate::spline::Spline;
+
+/// The unit of each degree of freedom in the factorisation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DofScale {
+    /// As recorded: right where all DoFs have one unit.
+    Unit,
+    /// The range of each DoF, so that all weigh alike.
+    Range,
+    /// Given (D,), in the unit of each DoF.
+    Given(Vec<f64>),
+}
+
+/// Everything that can be chosen about a fit.
+#[derive(Clone, Debug)]
+pub struct FitOptions {
+    /// How demonstrations are read and aligned.
+    pub alignment: Alignment,
+    /// Conditions of the demonstrations (M, Q); otherwise those that they carry.
+    pub contexts: Option<Array2<f64>>,
+    /// Style dimension J.
+    pub styles: StyleCount,
+    /// Function approximator of the landscape.
+    pub basis: Basis,
+    /// Unit of each DoF in the factorisation.
+    pub dof_scale: DofScale,
+    /// Time constant τ in seconds, discrete; otherwise the nominal duration.
+    pub tau: Option<f64>,
+    /// α_z of the output system.
+    pub alpha_z: f64,
+    /// β_z of the output system; otherwise α_z/4, critical damping.
+    pub beta_z: Option<f64>,
+    /// α_x of the canonical system, discrete; otherwise x = 0.01 at the end of the nominal demonstration.
+    pub alpha_x: Option<f64>,
+    /// μ of the canonical system, rhythmic.
+    pub mu: f64,
+}
+
+/// Where a fit is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Steps 1 and 2, demonstration by demonstration.
+    Targets,
+    /// Step 3.
+    Factorise,
+    /// Step 4.
+    Regress,
+    /// Compiling the landscape to its table.
+    Compile,
+}
+
+impl Stage {
+    /// The name shown to a user.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Targets => "targets",
+            Stage::Factorise => "factorise",
+            Stage::Regress => "regress",
+            Stage::Compile => "compile",
+        }
+    }
+}
+
+/// Learns a primitive.
+///
+/// `proceed` is told now and then the stage and the share of it that is done; an error that it returns, such as
+/// [`Error::Interrupted`], ends the fit.
+///
+/// # Errors
+/// Demonstrations or options that do not fit together, or whatever `proceed` returns.
+pub fn fit(
+    demos: &[Demonstration],
+    options: &FitOptions,
+    proceed: &mut dyn FnMut(Stage, f64) -> Result<()>,
+) -> Result<Model> {
+    proceed(Stage::Targets, 0.0)?;
+    let aligned = options.alignment.align(demos)?;
+    let (goals, anchors) = (aligned.goals(demos), aligned.anchors());
+    let constants = Constants::of(options, &aligned)?;
+    let ranges = aligned.ranges();
+    let dof_scale = scale_of(&options.dof_scale, &ranges)?;
+    let centres = if constants.canonical.kind() == Kind::Discrete { &goals } else { &anchors };
+    let targets = constants.targets(&aligned.position, centres.view(), &dof_scale);
+
+    proceed(Stage::Factorise, 0.0)?;
+    let factors = Factors::of(targets.view())?;
+    let singular_values = factors.singular_values.clone();
+    let factors = factors.truncate(options.styles)?;
+
+    let (clock, basis_targets) = constants.by_clock(&factors.basis, &dof_scale);
+    let mut regressing = |share| proceed(Stage::Regress, share);
+    let regression = options.basis.regress(constants.domain(), &clock, basis_targets.view(), &mut regressing)?;
+
+    proceed(Stage::Compile, 0.0)?;
+    let landscape = Landscape::compile(constants.canonical, basis_targets.ncols(), regression.as_ref());
+
+    let contexts = contexts_of(demos, options.contexts.as_ref())?;
+    let starts = aligned.starts();
+    let durations = aligned.durations.clone();
+    let map = match &contexts {
+        None => None,
+        Some(contexts) => {
+            let places = [goals.view(), starts.view(), anchors.view()];
+            let outputs = context::outputs(constants.canonical.kind(), factors.styles.view(), places, &durations);
+            Some(ContextMap::fit(contexts.view(), outputs.view())?)
+        }
+    };
+    let demonstrated =
+        Demonstrated { styles: factors.styles, goals, starts, anchors, durations, contexts, nominal: aligned.nominal };
+    let learnt = Learnt {
+        n_samples: clock.len(),
+        smoothing: options.alignment.smoothing,
+        dof_scale,
+        singular_values,
+        basis: regression.describe(),
+    };
+    let names = names_of(demos)?;
+    Ok(Model::assemble(constants.attractor, landscape, constants.tau, names, ranges, demonstrated, learnt, map))
+}
+
+/// The style (J,) of a demonstration that the model was not fitted to: least squares on its target.
+///
+/// `dt` in seconds and `period` serve as in a fit.
+///
+/// # Errors
+/// A demonstration that does not fit the model.
+pub fn style_of(model: &Model, demo: &Demonstration, dt: Option<f64>, period: Option<f64>) -> Result<Vec<f64>> {
+    let n_dofs = model.n_dofs();
+    if demo.n_dofs() != n_dofs {
+        let (expected, found) = (n_dofs, demo.n_dofs());
+        return Err(Error::Length { name: "demonstration", expected, found, per: "DoF" });
+    }
+    let alignment = Alignment {
+        kind: model.kind(),
+        dt,
+        period: period.into_iter().collect(),
+        smoothing: model.learnt.smoothing,
+        nominal: None,
+        n_samples: Some(model.learnt.n_samples),
+    };
+    let demos = std::slice::from_ref(demo);
+    let aligned = alignment.align(demos)?;
+    let constants = Constants { attractor: model.attractor, canonical: model.canonical(), tau: model.tau };
+    let centres = if model.kind() == Kind::Discrete { aligned.goals(demos) } else { aligned.anchors() };
+    let scale = &model.learnt.dof_scale;
+    let target = constants.targets(&aligned.position, centres.view(), scale);
+
+    let clock = constants.clock(model.learnt.n_samples);
+    let n_outputs = model.landscape.n_outputs();
+    let mut design = Mat::zeros(target.len(), model.n_styles());
+    let (mut value, mut slope) = (vec![0.0; n_outputs], vec![0.0; n_outputs]);
+    for (c, &u) in clock.iter().enumerate() {
+        model.landscape.read(u, &mut value, &mut slope);
+        for (o, w) in value.iter().enumerate() {
+            let (j, d) = (o / n_dofs, o % n_dofs);
+            design[(c * n_dofs + d, j)] = w / scale[d];
+        }
+    }
+    // Columns of unit size: factors that carry nothing are left out instead of divided by.
+    let sizes: Vec<f64> =
+        (0..model.n_styles()).map(|j| design.col(j).iter().fold(0.0f64, |m, x| m.max(x.abs()))).collect();
+    let floor = 1e-13 * sizes.iter().fold(0.0f64, |m, s| m.max(*s));
+    let kept: Vec<usize> = (0..sizes.len()).filter(|&j| sizes[j] > floor).collect();
+    let mut style = vec![0.0; model.n_styles()];
+    if kept.is_empty() {
+        return Ok(style);
+    }
+    let scaled = Mat::from_fn(design.nrows(), kept.len(), |i, k| design[(i, kept[k])] / sizes[kept[k]]);
+    let right = Mat::from_fn(target.len(), 1, |i, _| target[[0, i]]);
+    let solution = scaled.col_piv_qr().solve_lstsq(&right);
+    for (k, &j) in kept.iter().enumerate() {
+        style[j] = solution[(k, 0)] / sizes[j];
+    }
+    Ok(style)
+}
+
+/// The constants of a primitive, and what follows from them alone.
+struct Constants {
+    attractor: Attractor,
+    canonical: Canonical,
+    tau: f64,
+}
+
+impl Constants {
+    fn of(options: &FitOptions, aligned: &Aligned) -> Result<Self> {
+        let duration = aligned.durations[aligned.nominal];
+        let attractor = Attractor { alpha_z: options.alpha_z, beta_z: options.beta_z.unwrap_or(options.alpha_z / 4.0) };
+        check_rate("alpha_z", attractor.alpha_z)?;
+        check_rate("beta_z", attractor.beta_z)?;
+        let kind = options.alignment.kind;
+        let given = |name, value: Option<f64>| match value {
+            Some(_) => Err(Error::Kind { name, kind, instead: ": leave it out" }),
+            None => Ok(()),
+        };
+        let (canonical, tau) = match kind {
+            Kind::Discrete => {
+                let tau = options.tau.unwrap_or(duration);
+                check_positive("tau", tau)?;
+                let u_end = duration / tau;
+                if !(1e-3..=1e3).contains(&u_end) {
+                    let allowed = "must lie within a thousandfold of the nominal duration";
+                    return Err(Error::Range { name: "tau", value: tau, allowed });
+                }
+                let alpha_x = options.alpha_x.unwrap_or(100f64.ln() / u_end);
+                check_rate("alpha_x", alpha_x)?;
+                (Canonical::Discrete { alpha_x, u_end }, tau)
+            }
+            Kind::Rhythmic => {
+                given("tau", options.tau)?;
+                given("alpha_x", options.alpha_x)?;
+                check_rate("mu", options.mu)?;
+                (Canonical::Rhythmic { mu: options.mu }, duration / TAU)
+            }
+        };
+        Ok(Self { attractor, canonical, tau })
+    }
+
+    fn domain(&self) -> Domain {
+        match self.canonical {
+            Canonical::Discrete { u_end, .. } => Domain::Interval { end: u_end },
+            Canonical::Rhythmic { .. } => Domain::Circle,
+        }
+    }
+
+    /// The clock at the C samples of an aligned demonstration.
+    fn clock(&self, n_samples: usize) -> Vec<f64> {
+        let steps = if self.canonical.kind() == Kind::Discrete { n_samples - 1 } else { n_samples };
+        (0..n_samples).map(|c| self.canonical.extent() * (c as f64 / steps as f64)).collect()
+    }
+
+    /// Targets F (M, C·D) of all demonstrations, in units of `dof_scale` (step 2).
+    ///
+    /// The output system does not care where a movement takes place, but for rounding: discrete demonstrations are
+    /// translated to start at 0, and a DoF that does not move has a target of exactly zero.
+    fn targets(&self, position: &Array3<f64>, centres: ArrayView2<f64>, dof_scale: &[f64]) -> Array2<f64> {
+        let (n_demos, n_samples, n_dofs) = position.dim();
+        let clock = self.clock(n_samples);
+        let h = clock[1];
+        let mut targets = Array2::zeros((n_demos, n_samples * n_dofs));
+        for (m, mut row) in targets.rows_mut().into_iter().enumerate() {
+            let origin = position.index_axis(Axis(0), m).row(0).to_owned();
+            let moved = &position.index_axis(Axis(0), m) - &origin;
+            let centre = &centres.row(m) - &origin;
+            let target = self.target(h, &clock, moved.view(), centre.view());
+            for (value, scaled) in target.rows().into_iter().flatten().zip(row.indexed_iter_mut()) {
+                *scaled.1 = value / dof_scale[scaled.0 % n_dofs];
+            }
+        }
+        targets
+    }
+
+    fn target(&self, h: f64, clock: &[f64], position: ArrayView2<f64>, centre: ArrayView1<f64>) -> Array2<f64> {
+        let periodic = self.canonical.kind() == Kind::Rhythmic;
+        let spline =
+            if periodic { Spline::periodic(clock, TAU, position) } else { Spline::not_a_knot(clock, position) };
+        self.attractor.target(h, position, spline.slopes(), centre, periodic)
+    }
+
+    /// F_basis (J, C·D) as outputs over the clock (C, J·D), in the unit of each DoF.
+    fn by_clock(&self, basis: &Array2<f64>, dof_scale: &[f64]) -> (Vec<f64>, Array2<f64>) {
+        let n_dofs = dof_scale.len();
+        let n_samples = basis.ncols() / n_dofs;
+        let outputs = Array2::from_shape_fn((n_samples, basis.nrows() * n_dofs), |(c, o)| {
+            let (j, d) = (o / n_dofs, o % n_dofs);
+            basis[[j, c * n_dofs + d]] * dof_scale[d]
+        });
+        (self.clock(n_samples), outputs)
+    }
+}
+
+/// Rates of the systems: far enough from the ends of the number range for their products.
+fn check_rate(name: &'static str, value: f64) -> Result<()> {
+    if (1e-6..=1e6).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::Range { name, value, allowed: "must lie between 1e-6 and 1e6" })
+    }
+}
+
+fn scale_of(scale: &DofScale, ranges: &[f64]) -> Result<Vec<f64>> {
+    match scale {
+        DofScale::Unit => Ok(vec![1.0; ranges.len()]),
+        // A DoF at rest has no range; it has no target to be scaled either.
+        DofScale::Range => Ok(ranges.iter().map(|&range| if range > 0.0 { range } else { 1.0 }).collect()),
+        DofScale::Given(scale) => {
+            check_vector("dof_scale", scale, ranges.len(), "DoF")?;
+            scale.iter().try_for_each(|&value| check_positive("dof_scale", value))?;
+            Ok(scale.clone())
+        }
+    }
+}
+
+/// Contexts (M, Q): those given, or those of the demonstrations if they carry any.
+fn contexts_of(demos: &[Demonstration], given: Option<&Array2<f64>>) -> Result<Option<Array2<f64>>> {
+    if let Some(contexts) = given {
+        if contexts.nrows() != demos.len() {
+            let (expected, found) = (demos.len(), contexts.nrows());
+            return Err(Error::Length { name: "contexts", expected, found, per: "demonstration" });
+        }
+        if contexts.ncols() == 0 {
+            return Err(Error::Arguments(
+                "contexts have no values: pass an array of shape (M, Q) with Q of at least 1",
+            ));
+        }
+        check_matrix("contexts", contexts.view())?;
+        return Ok(Some(contexts.clone()));
+    }
+    let Some(width) = demos.iter().find_map(|demo| demo.context()).map(<[f64]>::len) else {
+        return Ok(None);
+    };
+    let mut contexts = Array2::zeros((demos.len(), width));
+    for (m, demo) in demos.iter().enumerate() {
+        let context = demo.context().unwrap_or_default();
+        check_vector("context", context, width, "context value, as in the other demonstrations")
+            .map_err(|error| error.in_demo(m))?;
+        contexts.row_mut(m).assign(&Array1::from_vec(context.to_vec()));
+    }
+    Ok(Some(contexts))
+}
+
+/// Names of the DoFs: those of the demonstrations if they carry any, which must agree.
+fn names_of(demos: &[Demonstration]) -> Result<Vec<String>> {
+    let Some(names) = demos.iter().find_map(Demonstration::names) else {
+        return Ok((0..demos.first().map_or(0, Demonstration::n_dofs)).map(|d| format!("y{d}")).collect());
+    };
+    match demos.iter().position(|demo| demo.names().is_some_and(|other| other != names)) {
+        Some(m) => Err(Error::Arguments("names differ from those of the other demonstrations").in_demo(m)),
+        None => Ok(names.to_vec()),
+    }
+}

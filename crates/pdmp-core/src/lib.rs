@@ -1,0 +1,61 @@
+//! Parametric Dynamic Movement Primitives: one movement primitive learnt from many demonstrations.
+//!
+//! T. Matsubara, S.-H. Hyon, J. Morimoto, *Learning parametric dynamic movement primitives from multiple
+//! demonstrations*, Neural Networks 24 (2011) 493–500, [doi:10.1016/j.neunet.2011.02.004].
+//!
+//! The way of the data, which is also that of the modules:
+//!
+//! ```text
+//! demos (T_m, D) ─ align ─► (M, C, D) ─ attractor ─► F (M, C·D) ─ factor ─► S (M, J), F_basis (J, C·D)
+//!       ─ basis ─► landscape u ↦ (J, D) ─► Model ─► Controller ─ step ─► y, ẏ, ÿ
+//!                                             └─► rollout ─► Trajectory
+//! ```
+//!
+//! | paper | code | shape | unit | meaning |
+//! |---|---|---|---|---|
+//! | M, D, C, J, N | `n_demos`, `n_dofs`, `n_samples`, `n_styles`, `n_basis` | | | demonstrations, degrees of freedom, samples, style dimension, basis functions |
+//! | y, ẏ, ÿ | `position`, `velocity`, `acceleration` | (D,) | DoF unit, /s, /s² | output of the primitive |
+//! | z | `z` | (D,) | DoF unit | auxiliary state of the output system |
+//! | g, y_a | `goal`, `anchor` | (D,) | DoF unit | point attractor, centre of oscillation |
+//! | τ | `tau` | | s | time constant |
+//! | x, φ, r, r₀ | `phase`, `phase`, `r`, `amplitude` | | –, rad, –, – | phase, polar phase, amplitude and its target |
+//! | – | `u`, `clock` | | – | u̇ = 1/τ: x = exp(−α_x u), φ = u mod 2π |
+//! | s, S | `style`, `styles` | (J,), (M, J) | – | style parameter |
+//! | b(x; W), w | `basis`, `landscape` | (J, D) | DoF unit | attractor landscape per style, and the same times its gate |
+//! | U: h ↦ s | `ContextMap` | | | from a condition to style, goal, start or anchor, and duration |
+//!
+//! Time is axis 0 of every array that has a time axis.
+//!
+//! [doi:10.1016/j.neunet.2011.02.004]: https://doi.org/10.1016/j.neunet.2011.02.004
+
+mod align;
+mod attractor;
+pub mod basis;
+mod context;
+mod controller;
+mod demo;
+mod error;
+mod factor;
+mod file;
+mod fit;
+mod follower;
+mod landscape;
+mod model;
+mod phase;
+mod rollout;
+mod smooth;
+mod spline;
+
+pub use align::Alignment;
+pub use attractor::{Attractor, Jet, Propagator, State};
+pub use context::{ContextMap, Prediction};
+pub use controller::{Controller, Status};
+pub use demo::{Demonstration, LEAST_SAMPLES, Sampling, Trajectory};
+pub use error::{Error, LARGEST, Result};
+pub use factor::{Factors, StyleCount};
+pub use fit::{DofScale, FitOptions, Stage, fit, style_of};
+pub use landscape::Landscape;
+pub use model::{Conditions, Demonstrated, Learnt, Model};
+pub use phase::{Canonical, Kind};
+pub use rollout::Timing;
+pub use smooth::Smoothing;

@@ -1,0 +1,341 @@
+//! The learnt primitive: immutable, and all that a rollout or a control loop needs.
+
+use std::f64::consts::TAU;
+
+use ndarray::{Array2, ArrayView2};
+
+use crate::attractor::{Attractor, Jet, State};
+use crate::context::{ContextMap, Prediction};
+use crate::error::{Error, Result, check_positive, check_vector};
+use crate::landscape::Landscape;
+use crate::phase::{Canonical, Kind};
+use crate::smooth::Smoothing;
+
+/// What was learnt from each demonstration, in absolute coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Demonstrated {
+    /// Styles S (M, J).
+    pub styles: Array2<f64>,
+    /// Goals (M, D).
+    pub goals: Array2<f64>,
+    /// Starts (M, D).
+    pub starts: Array2<f64>,
+    /// Means (M, D), about which a cycle oscillates.
+    pub anchors: Array2<f64>,
+    /// Durations or periods (M,), in seconds.
+    pub durations: Vec<f64>,
+    /// Contexts (M, Q).
+    pub contexts: Option<Array2<f64>>,
+    /// Index of the nominal demonstration.
+    pub nominal: usize,
+}
+
+/// How the model was learnt, as far as a new demonstration must be treated alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Learnt {
+    /// Samples C of the aligned demonstrations.
+    pub n_samples: usize,
+    /// What was done about measurement noise.
+    pub smoothing: Smoothing,
+    /// Unit of each DoF in the factorisation (D,).
+    pub dof_scale: Vec<f64>,
+    /// All singular values of the targets.
+    pub singular_values: Vec<f64>,
+    /// The basis functions, in one line.
+    pub basis: String,
+}
+
+/// A parametric dynamic movement primitive.
+#[derive(Clone, Debug)]
+pub struct Model {
+    pub(crate) attractor: Attractor,
+    pub(crate) landscape: Landscape,
+    pub(crate) tau: f64,
+    pub(crate) names: Vec<String>,
+    pub(crate) ranges: Vec<f64>,
+    pub(crate) demonstrated: Demonstrated,
+    pub(crate) learnt: Learnt,
+    pub(crate) map: Option<ContextMap>,
+    /// Periodic steady state at φ = 0 of each output (J·D), per unit of style and amplitude; empty where discrete.
+    pub(crate) cycle: Vec<State>,
+}
+
+/// What a movement starts with; what is `None` is that of the nominal demonstration.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Conditions {
+    /// Style s (J,).
+    pub style: Option<Vec<f64>>,
+    /// Goal g (D,), discrete.
+    pub goal: Option<Vec<f64>>,
+    /// Anchor y_a (D,), rhythmic.
+    pub anchor: Option<Vec<f64>>,
+    /// Start position (D,); a rhythmic movement otherwise starts on its cycle.
+    pub start: Option<Vec<f64>>,
+    /// Start velocity (D,), per second; otherwise that of the demonstrations.
+    pub velocity: Option<Vec<f64>>,
+    /// Amplitude r₀, rhythmic; otherwise 1.
+    pub amplitude: Option<f64>,
+    /// Time constant τ, in seconds.
+    pub tau: Option<f64>,
+}
+
+impl Model {
+    /// Puts a model together. The shapes of its parts must agree.
+    pub(crate) fn assemble(
+        attractor: Attractor,
+        landscape: Landscape,
+        tau: f64,
+        names: Vec<String>,
+        ranges: Vec<f64>,
+        demonstrated: Demonstrated,
+        learnt: Learnt,
+        map: Option<ContextMap>,
+    ) -> Self {
+        let cycle = match landscape.canonical().kind() {
+            Kind::Discrete => Vec::new(),
+            Kind::Rhythmic => steady_cycle(attractor, &landscape),
+        };
+        Self { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle }
+    }
+
+    /// Discrete or rhythmic.
+    pub fn kind(&self) -> Kind {
+        self.canonical().kind()
+    }
+
+    /// The canonical system and its constants.
+    pub fn canonical(&self) -> Canonical {
+        self.landscape.canonical()
+    }
+
+    /// The constants of the output system.
+    pub fn attractor(&self) -> Attractor {
+        self.attractor
+    }
+
+    /// The attractor landscape, gated, per style dimension and DoF.
+    pub fn landscape(&self) -> &Landscape {
+        &self.landscape
+    }
+
+    /// Number of demonstrations M.
+    pub fn n_demos(&self) -> usize {
+        self.demonstrated.durations.len()
+    }
+
+    /// Number of degrees of freedom D.
+    pub fn n_dofs(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Dimension J of the style parameter.
+    pub fn n_styles(&self) -> usize {
+        self.demonstrated.styles.ncols()
+    }
+
+    /// Time constant τ of the nominal demonstration, in seconds.
+    pub fn tau(&self) -> f64 {
+        self.tau
+    }
+
+    /// Names of the DoFs (D,).
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Largest range of each DoF within one demonstration (D,).
+    pub fn ranges(&self) -> &[f64] {
+        &self.ranges
+    }
+
+    /// What was learnt from each demonstration.
+    pub fn demonstrated(&self) -> &Demonstrated {
+        &self.demonstrated
+    }
+
+    /// How the model was learnt.
+    pub fn learnt(&self) -> &Learnt {
+        &self.learnt
+    }
+
+    /// Duration or period of the nominal demonstration, in seconds.
+    pub fn duration(&self) -> f64 {
+        self.demonstrated.durations[self.demonstrated.nominal]
+    }
+
+    /// The movement for a context (Q,), by the linear map of Section 4.1.2.
+    ///
+    /// # Errors
+    /// A model without contexts, a context of another length, or a number that is not finite.
+    pub fn predict(&self, context: &[f64]) -> Result<Prediction> {
+        let map = self.map.as_ref().ok_or(Error::Arguments(
+            "the model knows no contexts: fit it with contexts=, or with demonstrations that carry one",
+        ))?;
+        map.predict(context, self.kind(), self.n_styles(), self.n_dofs())
+    }
+
+    /// The conditions of a prediction, with τ scaled to the predicted duration.
+    pub fn conditions(&self, prediction: &Prediction) -> Conditions {
+        Conditions {
+            style: Some(prediction.style.clone()),
+            goal: prediction.goal.clone(),
+            anchor: prediction.anchor.clone(),
+            start: prediction.start.clone(),
+            tau: Some(self.tau * prediction.duration / self.duration()),
+            ..Conditions::default()
+        }
+    }
+
+    /// Basis functions b (J, D) by rows at clock `u`: the landscape without its gate.
+    ///
+    /// # Errors
+    /// A clock that is not finite, or negative for a discrete movement.
+    pub fn basis(&self, u: f64) -> Result<Vec<f64>> {
+        let discrete = self.kind() == Kind::Discrete;
+        if !u.is_finite() || (discrete && u < 0.0) {
+            return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative if discrete" });
+        }
+        // Past the end gate and forcing fade together: b stays what it was.
+        let u = if discrete { u.min(self.canonical().extent()) } else { u };
+        let (mut value, mut slope) = (vec![0.0; self.landscape.n_outputs()], vec![0.0; self.landscape.n_outputs()]);
+        self.landscape.evaluate(u, &mut value, &mut slope);
+        if discrete {
+            let gate = self.canonical().phase(u);
+            value.iter_mut().for_each(|w| *w /= gate);
+        }
+        Ok(value)
+    }
+}
+
+impl Conditions {
+    /// Checks every number against the model, and fills in the nominal demonstration's where none is given.
+    ///
+    /// # Errors
+    /// A wrong length, a number that is not finite, τ that is not positive, or a condition of the other kind.
+    pub(crate) fn complete(&self, model: &Model) -> Result<Complete> {
+        let nominal = model.demonstrated.nominal;
+        let pick = |name, given: &Option<Vec<f64>>, matrix: &Array2<f64>| match given {
+            Some(value) => check_vector(name, value, matrix.ncols(), "DoF").map(|()| value.clone()),
+            None => Ok(matrix.row(nominal).to_vec()),
+        };
+        let kind = model.kind();
+        let demonstrated = &model.demonstrated;
+        let centre = match kind {
+            Kind::Discrete => {
+                refuse(kind, "anchor", self.anchor.is_some())?;
+                refuse(kind, "amplitude", self.amplitude.is_some())?;
+                pick("goal", &self.goal, &demonstrated.goals)?
+            }
+            Kind::Rhythmic => {
+                refuse(kind, "goal", self.goal.is_some())?;
+                pick("anchor", &self.anchor, &demonstrated.anchors)?
+            }
+        };
+        for (name, value) in [("start", &self.start), ("velocity", &self.velocity)] {
+            if let Some(value) = value {
+                check_vector(name, value, model.n_dofs(), "DoF")?;
+            }
+        }
+        let tau = self.tau.unwrap_or(model.tau);
+        check_tau(tau, model.tau)?;
+        let amplitude = self.amplitude.unwrap_or(1.0);
+        check_amplitude(amplitude)?;
+        let start = match (&self.start, kind) {
+            (None, Kind::Discrete) => Some(demonstrated.starts.row(nominal).to_vec()),
+            (start, _) => start.clone(),
+        };
+        let style = match &self.style {
+            Some(style) => check_style(style, model.n_styles()).map(|()| style.clone())?,
+            None => demonstrated.styles.row(nominal).to_vec(),
+        };
+        Ok(Complete { style, centre, start, velocity: self.velocity.clone(), amplitude, tau })
+    }
+}
+
+/// Conditions with nothing left open but a start on the cycle and a demonstrated start velocity.
+#[derive(Clone, Debug)]
+pub(crate) struct Complete {
+    pub(crate) style: Vec<f64>,
+    /// Goal or anchor.
+    pub(crate) centre: Vec<f64>,
+    pub(crate) start: Option<Vec<f64>>,
+    pub(crate) velocity: Option<Vec<f64>>,
+    pub(crate) amplitude: f64,
+    pub(crate) tau: f64,
+}
+
+/// Refuses an argument that this kind of primitive does not have.
+pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> {
+    let instead = match (kind, name) {
+        (Kind::Discrete, "anchor") => ": it moves to a goal; set goal",
+        (Kind::Rhythmic, "goal") => ": it moves about an anchor; set anchor",
+        _ => "",
+    };
+    if given { Err(Error::Kind { name, kind, instead }) } else { Ok(()) }
+}
+
+/// Checks a style (J,). Demonstrated ones are at most 1 in magnitude: the bound only keeps products finite.
+pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
+    check_vector("style", style, n_styles, "style dimension")?;
+    match style.iter().position(|s| s.abs() > 1e100) {
+        Some(column) => Err(Error::Magnitude { name: "style", row: 0, column, value: style[column], limit: 1e100 }),
+        None => Ok(()),
+    }
+}
+
+/// Checks a time constant against the model's own, in seconds.
+pub(crate) fn check_tau(tau: f64, own: f64) -> Result<()> {
+    check_positive("tau", tau)?;
+    if (1e-6..=1e6).contains(&(tau / own)) {
+        Ok(())
+    } else {
+        let allowed = "must lie within a millionfold of the model's tau";
+        Err(Error::Range { name: "tau", value: tau, allowed })
+    }
+}
+
+/// Checks an amplitude: zero is rest.
+pub(crate) fn check_amplitude(value: f64) -> Result<()> {
+    if (0.0..=crate::LARGEST).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::Range { name: "amplitude", value, allowed: "must be finite and not negative" })
+    }
+}
+
+/// The state from which one turn leads back to itself, (I − exp(2πA))⁻¹ times the response of a turn from rest.
+fn steady_cycle(attractor: Attractor, landscape: &Landscape) -> Vec<State> {
+    let (values, slopes) = landscape.knots();
+    let (n, cells) = (landscape.n_outputs(), landscape.cells());
+    let cell = attractor.propagator(TAU / cells as f64);
+    let [[a, b], [c, d]] = attractor.propagator(TAU).transition();
+    // A stable system never returns to where it was unforced: the determinant is positive.
+    let determinant = (1.0 - a) * (1.0 - d) - b * c;
+    let jet = |k: usize, o: usize| Jet { value: values[k * n + o], slope: slopes[k * n + o] };
+    let turn = |o: usize| (0..cells).fold(State::default(), |s, k| cell.advance(s, [jet(k, o), jet(k + 1, o)]));
+    (0..n)
+        .map(turn)
+        .map(|State { e, z }| State {
+            e: ((1.0 - d) * e + b * z) / determinant,
+            z: (c * e + (1.0 - a) * z) / determinant,
+        })
+        .collect()
+}
+
+/// Weighted sum of the styles' outputs (J·D) for one DoF.
+pub(crate) fn blend(style: &[f64], outputs: &[f64], n_dofs: usize, d: usize) -> f64 {
+    style.iter().enumerate().map(|(j, s)| s * outputs[j * n_dofs + d]).sum()
+}
+
+/// A view for the bindings: rows of one matrix per demonstration.
+impl Demonstrated {
+    /// Styles, goals, starts and anchors with their names, as they stand in a model file.
+    pub fn matrices(&self) -> [(&'static str, ArrayView2<'_, f64>); 4] {
+        [
+            ("styles", self.styles.view()),
+            ("goals", self.goals.view()),
+            ("starts", self.starts.view()),
+            ("anchors", self.anchors.view()),
+        ]
+    }
+}

@@ -1,0 +1,119 @@
+//! The two canonical systems in closed form.
+//!
+//! Both are driven by one clock `u` with u̇ = 1/τ. It is integrated, never computed as t/τ, so that a changed τ bends
+//! the phase and does not make it jump.
+//!
+//! - discrete (Eq. 3): τẋ = −α_x x, x(0) = 1, hence x = exp(−α_x u);
+//! - rhythmic (Eq. 4): τφ̇ = 1, hence φ = u mod 2π, and τṙ = μ(r₀ − r). The paper prints r − r₀, which diverges for
+//!   μ > 0.
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// The kind of movement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// From a start to a goal.
+    Discrete,
+    /// Around an anchor, periodically.
+    Rhythmic,
+}
+
+impl Kind {
+    /// The name used in files and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Discrete => "discrete",
+            Kind::Rhythmic => "rhythmic",
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A canonical system.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Canonical {
+    /// τẋ = −α_x x, demonstrated up to u = `u_end`.
+    Discrete {
+        /// Decay of the phase, per unit of u.
+        alpha_x: f64,
+        /// Clock at the end of the demonstrated movement, T/τ.
+        u_end: f64,
+    },
+    /// τφ̇ = 1 and τṙ = μ(r₀ − r).
+    Rhythmic {
+        /// Rate at which the amplitude follows its target, per unit of u.
+        mu: f64,
+    },
+}
+
+impl Canonical {
+    /// Which of the two it is.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Canonical::Discrete { .. } => Kind::Discrete,
+            Canonical::Rhythmic { .. } => Kind::Rhythmic,
+        }
+    }
+
+    /// Length of the demonstrated stretch of the clock: T/τ, or one turn.
+    pub fn extent(&self) -> f64 {
+        match *self {
+            Canonical::Discrete { u_end, .. } => u_end,
+            Canonical::Rhythmic { .. } => TAU,
+        }
+    }
+
+    /// The phase at clock `u`: x in (0, 1], or φ in [0, 2π).
+    pub fn phase(&self, u: f64) -> f64 {
+        match *self {
+            Canonical::Discrete { alpha_x, .. } => (-alpha_x * u).exp(),
+            Canonical::Rhythmic { .. } => u.rem_euclid(TAU),
+        }
+    }
+}
+
+/// The amplitude r after a stretch `h` of the clock: r₀ + (r − r₀)exp(−μh).
+pub(crate) fn amplitude(mu: f64, r: f64, target: f64, h: f64) -> f64 {
+    target + (r - target) * (-mu * h).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Integrates u' = f(u) over [0, 1] by RK4, independently of the closed forms.
+    fn rk4(mut y: f64, f: impl Fn(f64) -> f64) -> f64 {
+        let h = 1e-4;
+        for _ in 0..10_000 {
+            let k1 = f(y);
+            let k2 = f(y + h / 2.0 * k1);
+            let k3 = f(y + h / 2.0 * k2);
+            let k4 = f(y + h * k3);
+            y += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+        }
+        y
+    }
+
+    #[test]
+    fn x_solves_the_discrete_canonical_system() {
+        let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
+        assert_relative_eq!(canonical.phase(1.0), rk4(1.0, |x| -4.6 * x), max_relative = 1e-12);
+    }
+
+    #[test]
+    fn r_solves_the_amplitude_equation_and_converges() {
+        assert_relative_eq!(amplitude(2.5, 0.2, 1.5, 1.0), rk4(0.2, |r| 2.5 * (1.5 - r)), max_relative = 1e-12);
+        assert_relative_eq!(amplitude(2.5, 0.2, 1.5, 40.0), 1.5, max_relative = 1e-12);
+    }
+}

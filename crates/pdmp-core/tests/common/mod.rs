@@ -1,0 +1,114 @@
+//! Movements to learn from, made by formulas that the library does not contain.
+#![allow(dead_code, missing_docs)]
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use ndarray::{Array1, Array2};
+use pdmp_core::basis::{Basis, Gp, NGnet};
+use pdmp_core::{
+    Alignment, Demonstration, DofScale, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount, Timing, fit,
+};
+
+/// Minimum jerk from 0 to 1 (Flash and Hogan 1985), s in [0, 1].
+pub fn minimum_jerk(s: f64) -> f64 {
+    s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
+}
+
+/// A reach with D = 3: straight, over an obstacle of height `h`, and a DoF that ends where it starts.
+pub fn reach(h: f64, duration: f64, dt: f64) -> Demonstration {
+    let n = (duration / dt).round() as usize + 1;
+    let position = Array2::from_shape_fn((n, 3), |(c, d)| {
+        let s = c as f64 / (n - 1) as f64;
+        let bump = 64.0 * (s * (1.0 - s)).powi(3);
+        match d {
+            0 => 0.2 + 0.6 * minimum_jerk(s),
+            1 => 0.5 * minimum_jerk(s) + h * bump,
+            _ => 0.3 * h * h * bump * (0.3 + s),
+        }
+    });
+    Demonstration::new(position, Sampling::Uniform { dt }).unwrap().with_context(vec![h]).unwrap()
+}
+
+/// Reaches over obstacles of several heights and with several durations.
+pub fn reaches() -> Vec<Demonstration> {
+    [0.0, 0.15, 0.3, 0.45, 0.6].iter().map(|&h| reach(h, 0.9 + 0.3 * h, 0.01)).collect()
+}
+
+/// One cycle with D = 2 about (1, −2): a style-dependent second harmonic.
+pub fn cycle(style: f64, period: f64, n: usize) -> Demonstration {
+    let position = Array2::from_shape_fn((n, 2), |(c, d)| {
+        let phi = TAU * c as f64 / n as f64;
+        match d {
+            0 => 1.0 + style + (0.5 + style) * phi.sin() + 0.2 * style * (2.0 * phi).cos(),
+            _ => -2.0 + 0.4 * (phi + style).cos(),
+        }
+    });
+    Demonstration::new(position, Sampling::Uniform { dt: period / n as f64 }).unwrap()
+}
+
+pub fn cycles() -> Vec<Demonstration> {
+    [0.0, 0.1, 0.25, 0.4].iter().map(|&s| cycle(s, 1.0 + 0.2 * s, 120)).collect()
+}
+
+pub fn options(kind: Kind) -> FitOptions {
+    FitOptions {
+        alignment: Alignment {
+            kind,
+            dt: None,
+            period: vec![],
+            smoothing: Smoothing::Interpolate,
+            nominal: None,
+            n_samples: None,
+        },
+        contexts: None,
+        styles: StyleCount::Spectrum(0.9999),
+        basis: Basis::NGnet(NGnet::default()),
+        dof_scale: DofScale::Unit,
+        tau: None,
+        alpha_z: 25.0,
+        beta_z: None,
+        alpha_x: None,
+        mu: 1.0,
+    }
+}
+
+pub fn gp() -> Basis {
+    Basis::Gp(Gp::default())
+}
+
+pub fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model> {
+    Arc::new(fit(demos, options, &mut |_, _| Ok(())).unwrap())
+}
+
+/// All that a demonstration was learnt with: its style, goal or anchor, start and τ.
+pub fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
+    let demonstrated = model.demonstrated();
+    let row = |matrix: &Array2<f64>| Some(matrix.row(m).to_vec());
+    let discrete = model.kind() == Kind::Discrete;
+    pdmp_core::Conditions {
+        style: row(&demonstrated.styles),
+        goal: row(&demonstrated.goals).filter(|_| discrete),
+        anchor: row(&demonstrated.anchors).filter(|_| !discrete),
+        start: row(&demonstrated.starts).filter(|_| discrete),
+        tau: Some(model.tau() * demonstrated.durations[m] / model.duration()),
+        ..Default::default()
+    }
+}
+
+/// Root mean square of the reproduction's error at the demonstration's own samples, over its largest range.
+pub fn reproduction_error(model: &Arc<Model>, demos: &[Demonstration], m: usize) -> f64 {
+    let n = demos[m].n_samples();
+    let steps = if model.kind() == Kind::Discrete { n - 1 } else { n };
+    let duration = model.demonstrated().durations[m];
+    let timing = Timing { dt: duration / steps as f64, duration: Some(duration) };
+    let found = model.rollout(&conditions_of(model, m), timing).unwrap().position;
+    let shown = demos[m].position();
+    let error = (&found.slice(ndarray::s![..n, ..]) - &shown).mapv(|e| e * e).mean().unwrap().sqrt();
+    let range = shown.columns().into_iter().map(|y| max(&y.to_owned()) + max(&-y.to_owned())).fold(0.0, f64::max);
+    error / range
+}
+
+fn max(values: &Array1<f64>) -> f64 {
+    values.iter().copied().fold(f64::MIN, f64::max)
+}

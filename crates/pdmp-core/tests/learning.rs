@@ -1,0 +1,217 @@
+//! What learning from demonstrations must achieve.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::*;
+use pdmp_core::{Canonical, DofScale, Error, Kind, Sampling, StyleCount, Timing, fit, style_of};
+
+/// Targets followed by generation give every demonstration back, at its own duration, J = M.
+#[test]
+fn every_reach_is_reproduced() {
+    let demos = reaches();
+    for basis in [options(Kind::Discrete).basis, gp()] {
+        let model =
+            learn(&demos, &pdmp_core::FitOptions { basis, styles: StyleCount::Given(5), ..options(Kind::Discrete) });
+        for m in 0..demos.len() {
+            let error = reproduction_error(&model, &demos, m);
+            assert!(error <= 1e-4, "{}: {error:e}", model.learnt().basis);
+        }
+    }
+}
+
+/// The limit cycle of every demonstration is that demonstration, and a rollout starts on it.
+#[test]
+fn every_cycle_is_reproduced_without_a_transient() {
+    let demos = cycles();
+    for basis in [options(Kind::Rhythmic).basis, gp()] {
+        let model =
+            learn(&demos, &pdmp_core::FitOptions { basis, styles: StyleCount::Given(4), ..options(Kind::Rhythmic) });
+        for m in 0..demos.len() {
+            let error = reproduction_error(&model, &demos, m);
+            assert!(error <= 1e-4, "{}: {error:e}", model.learnt().basis);
+        }
+    }
+}
+
+/// Reaches that differ by one height span few dimensions, and the spectrum rule finds them.
+#[test]
+fn spectrum_rule_finds_the_intrinsic_dimension() {
+    // y is affine in (h, h²): three dimensions at the most.
+    let model = learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(5), ..options(Kind::Discrete) });
+    let sigma = &model.learnt().singular_values;
+    assert!(sigma[2] > 1e-6 * sigma[0] && sigma[3] < 1e-6 * sigma[0], "{sigma:?}");
+}
+
+/// The defaults: critical damping, x = 0.01 at the end, τ the nominal duration or the period over 2π.
+#[test]
+fn defaults_follow_from_the_nominal_demonstration() {
+    let model = learn(&reaches(), &options(Kind::Discrete));
+    assert_eq!(model.attractor().beta_z, model.attractor().alpha_z / 4.0);
+    assert_eq!(model.demonstrated().nominal, 2);
+    assert!((model.tau() - 0.99).abs() < 1e-12);
+    assert!((model.canonical().phase(1.0) - 0.01).abs() < 1e-12);
+    let model = learn(&cycles(), &options(Kind::Rhythmic));
+    assert_eq!(model.demonstrated().nominal, 1);
+    assert!((model.tau() - 1.02 / std::f64::consts::TAU).abs() < 1e-12);
+    assert_eq!(model.canonical(), Canonical::Rhythmic { mu: 1.0 });
+}
+
+/// A demonstration in other units, elsewhere, has the same styles.
+#[test]
+fn styles_do_not_depend_on_place_and_unit() {
+    let model = learn(&reaches(), &options(Kind::Discrete));
+    let moved: Vec<_> = reaches()
+        .iter()
+        .map(|demo| {
+            let position = demo.position().mapv(|y| 1000.0 * y + 250.0);
+            pdmp_core::Demonstration::new(position, demo.sampling().clone()).unwrap()
+        })
+        .collect();
+    let other = learn(&moved, &options(Kind::Discrete));
+    let difference = &model.demonstrated().styles - &other.demonstrated().styles;
+    assert!(difference.iter().all(|d| d.abs() < 1e-9));
+}
+
+/// Time stamps, however irregular, lead to the same movement as an even rate.
+#[test]
+fn own_time_stamps_are_respected() {
+    let even = reach(0.3, 1.0, 0.005);
+    let time: Vec<f64> = (0..201).map(|c| f64::from(c) / 200.0).map(|t| t + 0.1 * t * (1.0 - t)).collect();
+    let position = ndarray::Array2::from_shape_fn((201, 3), |(c, d)| {
+        let fine = reach(0.3, 1.0, 1e-5);
+        fine.position()[[(time[c] * 1e5).round() as usize, d]]
+    });
+    let time = time.iter().map(|t| 7.0 + (t * 1e5).round() * 1e-5).collect();
+    let stamped = pdmp_core::Demonstration::new(position, Sampling::Stamped { time }).unwrap();
+    let model = learn(&[even.clone()], &options(Kind::Discrete));
+    let other = learn(&[stamped], &options(Kind::Discrete));
+    let timing = Timing { dt: 0.01, duration: Some(1.0) };
+    let (a, b) =
+        (model.rollout(&Default::default(), timing).unwrap(), other.rollout(&Default::default(), timing).unwrap());
+    assert!((a.position - b.position).iter().all(|d| d.abs() < 1e-5));
+}
+
+/// A new movement lies where its style says: style_of finds the styles of the demonstrations themselves, and a movement
+/// between two lies between them.
+#[test]
+fn style_of_finds_demonstrations_again() {
+    let demos = reaches();
+    let model = learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(3), ..options(Kind::Discrete) });
+    for (m, demo) in demos.iter().enumerate() {
+        let style = style_of(&model, demo, None, None).unwrap();
+        for (j, s) in style.iter().enumerate() {
+            assert!((s - model.demonstrated().styles[[m, j]]).abs() < 2e-3, "{m} {j} {s}");
+        }
+    }
+}
+
+/// Without noise, a goal given for a demonstration takes the place of its last sample.
+#[test]
+fn given_goals_are_kept() {
+    let demos: Vec<_> = reaches().into_iter().map(|demo| demo.with_goal(vec![0.8, 0.55, 0.1]).unwrap()).collect();
+    let model = learn(&demos, &options(Kind::Discrete));
+    assert_eq!(model.demonstrated().goals.row(3).to_vec(), [0.8, 0.55, 0.1]);
+}
+
+/// A fit is reproducible bit for bit.
+#[test]
+fn fits_are_reproducible() {
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
+        let bytes = || learn(&demos, &pdmp_core::FitOptions { basis: gp(), ..options(kind) }).to_bytes().unwrap();
+        assert_eq!(bytes(), bytes());
+    }
+}
+
+/// The interruption that a caller asks for reaches it, from every stage.
+#[test]
+fn a_fit_can_be_interrupted() {
+    for stop in
+        [pdmp_core::Stage::Targets, pdmp_core::Stage::Factorise, pdmp_core::Stage::Regress, pdmp_core::Stage::Compile]
+    {
+        let mut proceed = |stage, _| if stage == stop { Err(Error::Interrupted) } else { Ok(()) };
+        let options = pdmp_core::FitOptions { basis: gp(), ..options(Kind::Discrete) };
+        assert!(matches!(fit(&reaches(), &options, &mut proceed), Err(Error::Interrupted)));
+    }
+}
+
+/// One demonstration, constant DoFs, all constant, identical, and tiny ones are learnt without a NaN.
+#[test]
+fn degenerate_demonstrations_are_learnt() {
+    let still = |value: f64| {
+        let position = ndarray::Array2::from_shape_fn((50, 2), |(_, d)| value + d as f64);
+        pdmp_core::Demonstration::new(position, Sampling::Uniform { dt: 0.02 }).unwrap()
+    };
+    let tiny = |factor: f64| {
+        let position = reach(0.3, 1.0, 0.01).position().mapv(|y| factor * y);
+        pdmp_core::Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
+    };
+    let sets = [
+        vec![reach(0.3, 1.0, 0.01)],
+        vec![still(0.7), still(0.7)],
+        vec![reach(0.3, 1.0, 0.01); 3],
+        vec![tiny(1e-150), tiny(2e-150)],
+        vec![tiny(1e149)],
+    ];
+    for demos in &sets {
+        for basis in [options(Kind::Discrete).basis, gp()] {
+            let options = pdmp_core::FitOptions { basis, ..options(Kind::Discrete) };
+            let model = learn(demos, &options);
+            for m in 0..demos.len() {
+                let timing = Timing { dt: 0.01, duration: None };
+                let found = model.rollout(&conditions_of(&model, m), timing).unwrap().position;
+                let shown = demos[m].position();
+                let size = shown.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+                for d in 0..found.ncols() {
+                    for c in 0..found.nrows().min(shown.nrows()) {
+                        assert!((found[[c, d]] - shown[[c, d]]).abs() <= 2e-4 * size, "{m} {c} {d}");
+                    }
+                }
+            }
+        }
+    }
+    let model = learn(&[still(0.7)], &options(Kind::Discrete));
+    let found = model.rollout(&Default::default(), Timing { dt: 0.01, duration: Some(3.0) }).unwrap();
+    assert!(found.position.rows().into_iter().all(|y| y.to_vec() == [0.7, 1.7]), "the model holds still");
+}
+
+/// A scale per DoF makes the factorisation see millimetres and radians alike, and leaves reproduction as it was.
+#[test]
+fn dof_scale_weighs_units_and_keeps_the_movement() {
+    let demos: Vec<_> = reaches()
+        .iter()
+        .map(|demo| {
+            let mut position = demo.position().to_owned();
+            position.column_mut(1).mapv_inplace(|y| 1e6 * y);
+            pdmp_core::Demonstration::new(position, demo.sampling().clone()).unwrap()
+        })
+        .collect();
+    let scaled =
+        pdmp_core::FitOptions { dof_scale: DofScale::Range, styles: StyleCount::Given(5), ..options(Kind::Discrete) };
+    let model = learn(&demos, &scaled);
+    for m in 0..demos.len() {
+        let timing = Timing { dt: 0.01, duration: None };
+        let found = model.rollout(&conditions_of(&model, m), timing).unwrap().position;
+        let last = found.nrows() - 1;
+        for c in 0..=last {
+            assert!((found[[c, 2]] - demos[m].position()[[c, 2]]).abs() < 1e-4);
+        }
+    }
+}
+
+/// Errors name the demonstration, the argument and the numbers.
+#[test]
+fn bad_demonstrations_are_refused_by_name() {
+    let demos = vec![
+        reach(0.0, 1.0, 0.01),
+        pdmp_core::Demonstration::new(ndarray::Array2::zeros((9, 2)), Sampling::Unknown).unwrap(),
+    ];
+    let message = |demos: &[_], options: &_| fit(demos, options, &mut |_, _| Ok(())).unwrap_err().to_string();
+    let options = options(Kind::Discrete);
+    assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
+    assert!(message(&[], &options).contains("at least one demonstration"));
+    assert!(message(&demos[1..], &options).contains("pass dt="));
+    let options = pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options };
+    assert!(message(&demos[..1], &options).contains("n_styles = 2: must lie between 1 and 1"));
+}

@@ -1,0 +1,343 @@
+//! What a running primitive must do.
+#![allow(missing_docs)]
+
+mod common;
+
+use std::sync::{Arc, LazyLock};
+
+use common::*;
+use ndarray::{Array2, array};
+use pdmp_core::{Conditions, Controller, Error, Kind, Model, Status, StyleCount, Timing};
+use proptest::prelude::*;
+
+static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
+    learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Discrete) })
+});
+static CYCLE: LazyLock<Arc<Model>> = LazyLock::new(|| {
+    learn(&cycles(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Rhythmic) })
+});
+
+fn timing(dt: f64, duration: f64) -> Timing {
+    Timing { dt, duration: Some(duration) }
+}
+
+fn controller(model: &Arc<Model>, dt: f64) -> Controller {
+    Controller::new(Arc::clone(model), dt, &Conditions::default(), None).unwrap()
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+proptest! {
+    /// The goal is reached whatever the style, the goal and the start.
+    #[test]
+    fn goal_is_reached_for_any_style(
+        style in prop::collection::vec(-2.0..2.0f64, 2),
+        goal in prop::collection::vec(-5.0..5.0f64, 3),
+        start in prop::collection::vec(-5.0..5.0f64, 3),
+    ) {
+        let conditions =
+            Conditions { style: Some(style), goal: Some(goal.clone()), start: Some(start), ..Default::default() };
+        let end = REACH.rollout(&conditions, timing(0.01, 6.0)).unwrap();
+        prop_assert!(distance(end.position.row(600).as_slice().unwrap(), &goal) < 1e-6);
+        prop_assert!(end.velocity.row(600).iter().all(|v| v.abs() < 1e-6));
+    }
+
+    /// τ scales time alone: the path stays what it was.
+    #[test]
+    fn tau_leaves_the_path(factor in 0.2..5.0f64) {
+        for model in [&*REACH, &*CYCLE] {
+            let slow = Conditions { tau: Some(factor * model.tau()), ..Default::default() };
+            let a = model.rollout(&Conditions::default(), timing(0.01, 1.5)).unwrap();
+            let b = model.rollout(&slow, timing(0.01 * factor, 1.5 * factor)).unwrap();
+            prop_assert!((&a.position - &b.position).iter().all(|d| d.abs() < 1e-9));
+            prop_assert!((&a.velocity - &b.velocity * factor).iter().all(|d| d.abs() < 1e-8));
+        }
+    }
+
+    /// r₀ scales the oscillation about its anchor.
+    #[test]
+    fn amplitude_scales_the_oscillation(amplitude in 0.0..3.0f64, anchor in prop::collection::vec(-5.0..5.0f64, 2)) {
+        let conditions = Conditions { anchor: Some(anchor.clone()), ..Default::default() };
+        let one = CYCLE.rollout(&conditions, timing(0.01, 2.0)).unwrap().position;
+        let conditions = Conditions { amplitude: Some(amplitude), ..conditions };
+        let scaled = CYCLE.rollout(&conditions, timing(0.01, 2.0)).unwrap().position;
+        for (one, scaled) in one.rows().into_iter().zip(scaled.rows()) {
+            for d in 0..2 {
+                prop_assert!((scaled[d] - anchor[d] - amplitude * (one[d] - anchor[d])).abs() < 1e-12);
+            }
+        }
+    }
+
+    /// Whatever is commanded at whatever tick of whatever length, the state stays finite.
+    #[test]
+    fn random_commands_leave_the_state_finite(commands in prop::collection::vec((0..6u8, -1e3..1e3f64, 1e-6..3.0f64), 1..60)) {
+        for model in [&*REACH, &*CYCLE] {
+            let mut controller = controller(model, 0.001);
+            for &(what, value, dt) in &commands {
+                let n = model.n_dofs();
+                let _ = match what {
+                    0 => controller.set_style(&vec![value; 2]),
+                    1 => controller.set_goal(&vec![value; n]),
+                    2 => controller.set_anchor(&vec![value; n]),
+                    3 => controller.set_tau(value.abs() + 1e-3),
+                    4 => controller.set_amplitude(value),
+                    _ => controller.set_goal(&vec![f64::NAN; n]),
+                };
+                let _ = controller.step_by(dt);
+                for values in [controller.position(), controller.velocity(), controller.acceleration()] {
+                    prop_assert!(values.iter().all(|x| x.is_finite()));
+                }
+            }
+        }
+    }
+}
+
+/// Step k of a controller is sample k of the rollout.
+#[test]
+fn rollout_is_the_repeated_step() {
+    for model in [&*REACH, &*CYCLE] {
+        let rollout = model.rollout(&Conditions::default(), timing(0.004, 2.0)).unwrap();
+        assert_eq!(rollout.time.len(), 501);
+        let mut controller = controller(model, 0.004);
+        for k in 0..=500 {
+            assert_eq!(controller.position(), rollout.position.row(k).as_slice().unwrap());
+            assert_eq!(controller.acceleration(), rollout.acceleration.row(k).as_slice().unwrap());
+            controller.step().unwrap();
+        }
+    }
+}
+
+/// The tick hardly matters: 1 kHz and 100 Hz agree, across the end and for a movement of 0.3 s too.
+#[test]
+fn tick_length_hardly_matters() {
+    for model in [&*REACH, &*CYCLE] {
+        for tau in [model.tau(), 0.3 * model.tau()] {
+            let conditions = Conditions { tau: Some(tau), ..Default::default() };
+            let fine = model.rollout(&conditions, timing(1e-4, 2.0)).unwrap().position;
+            for (dt, every, bound) in [(1e-3, 10, 1e-8), (1e-2, 100, 1e-6)] {
+                let coarse = model.rollout(&conditions, timing(dt, 2.0)).unwrap().position;
+                for (k, row) in coarse.rows().into_iter().enumerate() {
+                    let error = distance(row.as_slice().unwrap(), fine.row(k * every).as_slice().unwrap());
+                    assert!(error <= bound, "dt {dt}, sample {k}: {error:e}");
+                }
+            }
+        }
+    }
+}
+
+/// Velocity and acceleration are the derivatives of the position, also while everything is in transition.
+#[test]
+fn velocity_and_acceleration_are_derivatives() {
+    for model in [&*REACH, &*CYCLE] {
+        let dt = 1e-5;
+        let mut controller = controller(model, dt);
+        let mut samples = Vec::new();
+        for k in 0..40_000 {
+            if k == 10_000 {
+                controller.set_style(&[0.9, -0.4]).unwrap();
+                controller.set_tau(0.6 * model.tau()).unwrap();
+                let _ = controller.set_goal(&[0.1, 0.2, 0.3]);
+                let _ = controller.set_anchor(&[0.1, 0.2]);
+                let _ = controller.set_amplitude(1.7);
+            }
+            controller.step().unwrap();
+            samples.push((
+                controller.position().to_vec(),
+                controller.velocity().to_vec(),
+                controller.acceleration().to_vec(),
+            ));
+        }
+        for k in (5..39_995).filter(|k| !(9998..10_003).contains(k)) {
+            for d in 0..model.n_dofs() {
+                let velocity = (samples[k + 1].0[d] - samples[k - 1].0[d]) / (2.0 * dt);
+                let acceleration = (samples[k + 1].1[d] - samples[k - 1].1[d]) / (2.0 * dt);
+                assert!((velocity - samples[k].1[d]).abs() < 1e-5, "{k} {d} {velocity} {}", samples[k].1[d]);
+                assert!((acceleration - samples[k].2[d]).abs() < 2e-3, "{k} {d} {acceleration} {}", samples[k].2[d]);
+            }
+        }
+    }
+}
+
+/// By default a switch of everything at once bends the movement and does not break it; `transition = 0` switches at once.
+#[test]
+fn switches_are_continuous_unless_immediate() {
+    let jump = |transition| {
+        let mut controller = Controller::new(Arc::clone(&REACH), 1e-3, &Conditions::default(), transition).unwrap();
+        (0..400).for_each(|_| drop(controller.step().unwrap()));
+        let before = (controller.position().to_vec(), controller.velocity().to_vec());
+        controller.set_style(&[-0.9, 0.9]).unwrap();
+        controller.set_tau(0.4 * REACH.tau()).unwrap();
+        controller.set_goal(&[2.0, -1.0, 0.5]).unwrap();
+        controller.step_by(1e-9).unwrap();
+        (distance(controller.position(), &before.0), distance(controller.velocity(), &before.1))
+    };
+    let (position, velocity) = jump(None);
+    assert!(position < 1e-7 && velocity < 1e-6, "{position:e} {velocity:e}");
+    let (position, velocity) = jump(Some(0.0));
+    assert!(position < 1e-7 && velocity > 0.1, "{position:e} {velocity:e}");
+}
+
+/// A changed τ bends the phase and does not make it jump; far later its slope is the new 1/τ.
+#[test]
+fn phase_never_jumps() {
+    let mut controller = controller(&CYCLE, 1e-3);
+    let mut phase = controller.phase();
+    for k in 0..2000 {
+        if k % 100 == 50 {
+            controller.set_tau(CYCLE.tau() * if k % 200 == 50 { 0.3 } else { 3.0 }).unwrap();
+        }
+        controller.step().unwrap();
+        let advance = (controller.phase() - phase).rem_euclid(std::f64::consts::TAU);
+        assert!(advance > 0.0 && advance <= 1e-3 / (0.3 * CYCLE.tau()) * 1.0001);
+        phase = controller.phase();
+    }
+}
+
+/// After online changes a rhythmic movement converges to the cycle of the new style, anchor, amplitude and period.
+#[test]
+fn online_changes_converge_to_the_new_cycle() {
+    let target = Conditions {
+        style: Some(CYCLE.demonstrated().styles.row(3).to_vec()),
+        anchor: Some(vec![0.5, 0.5]),
+        amplitude: Some(1.5),
+        tau: Some(1.3 * CYCLE.tau()),
+        ..Default::default()
+    };
+    let mut controller = controller(&CYCLE, 1e-3);
+    (0..777).for_each(|_| drop(controller.step().unwrap()));
+    controller.set_style(target.style.as_ref().unwrap()).unwrap();
+    controller.set_anchor(&[0.5, 0.5]).unwrap();
+    controller.set_amplitude(1.5).unwrap();
+    controller.set_tau(1.3 * CYCLE.tau()).unwrap();
+    (0..20_000).for_each(|_| drop(controller.step().unwrap()));
+    let at = controller.phase() * 1.3 * CYCLE.tau();
+    let cycle = CYCLE.rollout(&target, timing(at, at)).unwrap();
+    assert!(distance(controller.position(), cycle.position.row(1).as_slice().unwrap()) < 1e-8);
+}
+
+/// Whatever its start, a rhythmic movement converges to its cycle.
+#[test]
+fn limit_cycle_attracts() {
+    let off = Conditions { start: Some(vec![40.0, -30.0]), ..Default::default() };
+    let (a, b) = (
+        CYCLE.rollout(&off, timing(0.01, 4.0)).unwrap(),
+        CYCLE.rollout(&Conditions::default(), timing(0.01, 4.0)).unwrap(),
+    );
+    assert_eq!(a.position.row(0).to_vec(), [40.0, -30.0]);
+    assert!((&a.position - &b.position).row(400).iter().all(|d| d.abs() < 1e-8));
+}
+
+/// A start velocity that is given is that of the first sample.
+#[test]
+fn start_velocity_is_respected() {
+    for model in [&*REACH, &*CYCLE] {
+        let velocity: Vec<f64> = (0..model.n_dofs()).map(|d| d as f64 - 0.7).collect();
+        let conditions = Conditions { velocity: Some(velocity.clone()), ..Default::default() };
+        let rollout = model.rollout(&conditions, timing(0.01, 0.1)).unwrap();
+        assert!(distance(rollout.velocity.row(0).as_slice().unwrap(), &velocity) < 1e-12);
+    }
+}
+
+/// Commands given before the first step hold from the start.
+#[test]
+fn commands_before_the_first_step_apply_at_once() {
+    let conditions = Conditions {
+        style: Some(vec![0.3, 0.2]),
+        goal: Some(vec![1.0, 2.0, 3.0]),
+        tau: Some(0.7),
+        ..Default::default()
+    };
+    let rollout = REACH.rollout(&conditions, timing(1e-3, 0.5)).unwrap();
+    let mut controller = controller(&REACH, 1e-3);
+    controller.set_style(&[0.3, 0.2]).unwrap();
+    controller.set_goal(&[1.0, 2.0, 3.0]).unwrap();
+    controller.set_tau(0.7).unwrap();
+    (0..500).for_each(|_| drop(controller.step().unwrap()));
+    assert_eq!(controller.position(), rollout.position.row(500).as_slice().unwrap());
+}
+
+/// A discrete movement finishes once, after its time, on its goal at rest; reset starts it again.
+#[test]
+fn finishes_when_settled_and_starts_again() {
+    let mut controller = controller(&REACH, 1e-3);
+    let first = controller.position().to_vec();
+    let mut ticks = 1;
+    while controller.step().unwrap() == Status::Working {
+        ticks += 1;
+        assert!(ticks < 5000);
+    }
+    assert!(f64::from(ticks) * 1e-3 >= REACH.duration() - 1e-9);
+    let goal = REACH.demonstrated().goals.row(REACH.demonstrated().nominal).to_vec();
+    assert!(distance(controller.position(), &goal) < 1e-3 && controller.velocity().iter().all(|v| v.abs() < 2e-3));
+    controller.reset(&Conditions::default()).unwrap();
+    assert_eq!((controller.position(), controller.time()), (first.as_slice(), 0.0));
+    assert_eq!(controller.step().unwrap(), Status::Working);
+}
+
+/// What is refused in the loop changes nothing.
+#[test]
+fn refused_commands_leave_the_last_good_value() {
+    let mut controller = controller(&REACH, 1e-3);
+    controller.set_goal(&[1.0, 2.0, 3.0]).unwrap();
+    for bad in [vec![f64::NAN; 3], vec![1.0; 2], vec![f64::INFINITY, 0.0, 0.0], vec![1e200; 3]] {
+        assert!(controller.set_goal(&bad).is_err());
+    }
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+        assert!(controller.set_tau(bad).is_err());
+        assert!(controller.step_by(bad).is_err());
+    }
+    assert!(matches!(controller.set_anchor(&[0.0; 3]), Err(Error::Kind { .. })));
+    assert!(matches!(controller.set_amplitude(1.0), Err(Error::Kind { .. })));
+    assert_eq!((controller.centre(), controller.tau()), ([1.0, 2.0, 3.0].as_slice(), REACH.tau()));
+}
+
+/// A batch is the rollouts one by one, and the Jacobian their derivative, for every way to start.
+#[test]
+fn batch_and_jacobian_agree_with_rollouts() {
+    let styles = array![[0.2, -0.3], [1.0, 0.0], [-2.0, 5.0]];
+    for model in [&*REACH, &*CYCLE] {
+        let given = || Some(vec![0.4; model.n_dofs()]);
+        for (start, velocity) in [(None, None), (given(), None), (None, given()), (given(), given())] {
+            let conditions = Conditions { start, velocity, tau: Some(1.4 * model.tau()), ..Default::default() };
+            let timing = timing(0.01, 1.5);
+            let (positions, velocities) = model.rollouts(styles.view(), &conditions, timing).unwrap();
+            let jacobian = model.style_jacobian(&conditions, timing).unwrap();
+            for (b, style) in styles.rows().into_iter().enumerate() {
+                let style_of = |style: Vec<f64>| Conditions { style: Some(style), ..conditions.clone() };
+                let one = model.rollout(&style_of(style.to_vec()), timing).unwrap();
+                let close = |a: &Array2<f64>, b: ndarray::ArrayView2<f64>| (a - &b).iter().all(|d| d.abs() < 1e-10);
+                assert!(close(&one.position, positions.index_axis(ndarray::Axis(0), b)));
+                assert!(close(&one.velocity, velocities.index_axis(ndarray::Axis(0), b)));
+                let moved = model.rollout(&style_of(vec![style[0], style[1] + 0.5]), timing).unwrap();
+                let slope = (&moved.position - &one.position) / 0.5;
+                assert!(close(&slope, jacobian.index_axis(ndarray::Axis(2), 1)));
+            }
+        }
+    }
+}
+
+/// The number of samples is that of the contract: a multiple of dt keeps its last sample, rounding or not.
+#[test]
+fn rollouts_have_the_stated_number_of_samples() {
+    for (dt, duration, samples) in [(0.1, 0.3, 4), (0.1, 0.35, 4), (0.01, 1.0, 101), (0.001, 2.0, 2001), (0.7, 0.0, 1)]
+    {
+        let rollout = REACH.rollout(&Conditions::default(), timing(dt, duration)).unwrap();
+        assert_eq!(rollout.time.len(), samples);
+    }
+}
+
+/// A context predicts the movement that was shown for it, at its duration.
+#[test]
+fn context_predicts_what_was_shown() {
+    // Heights alone are not linear in h² and ln T: only nearly.
+    let prediction = REACH.predict(&[0.3]).unwrap();
+    let goals = &REACH.demonstrated().goals;
+    assert!(distance(prediction.goal.as_ref().unwrap(), goals.row(2).as_slice().unwrap()) < 1e-9);
+    assert!((prediction.duration - REACH.demonstrated().durations[2]).abs() < 0.01);
+    let conditions = REACH.conditions(&prediction);
+    assert!((conditions.tau.unwrap() - prediction.duration).abs() < 1e-12);
+    assert!(matches!(CYCLE.predict(&[0.3]), Err(Error::Arguments(_))));
+    assert!(REACH.predict(&[0.3, 0.1]).is_err() && REACH.predict(&[f64::NAN]).is_err());
+}

@@ -1,0 +1,218 @@
+//! The regressors of the landscape: choices for a fit, and functions to try by themselves.
+
+use numpy::{IntoPyArray, PyArray2};
+use pdmp_core::basis::{self, Domain, GpPosterior, Kernel, Regression};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::convert::{matrix, vector};
+use crate::error::raise;
+
+/// Gaussian process regression, the paper's choice of basis functions.
+///
+/// All outputs share kernel, length and noise ratio. What is not given is found by maximising the marginal likelihood
+/// (Rasmussen and Williams 2006, Section 5.4.1).
+///
+/// Parameters
+/// ----------
+/// kernel : {"matern52", "matern32", "squared_exponential"}
+///     Covariance function of the clock; wrapped around the circle where the movement is rhythmic.
+/// length : float, optional
+///     Length scale, in units of the clock u = t / tau.
+/// noise : float, optional
+///     Ratio of noise variance to signal variance, at least 1e-10.
+///
+/// Raises
+/// ------
+/// ValueError
+///     An unknown kernel, or a number out of range.
+#[pyclass(frozen, name = "GP", module = "pdmp", from_py_object)]
+#[derive(Clone)]
+pub(crate) struct Gp(pub(crate) basis::Gp);
+
+#[pymethods]
+impl Gp {
+    #[new]
+    #[pyo3(signature = (kernel="matern52", length=None, noise=None))]
+    fn new(kernel: &str, length: Option<f64>, noise: Option<f64>) -> PyResult<Self> {
+        let kernel = Kernel::from_name(kernel).ok_or_else(|| {
+            PyValueError::new_err(format!(
+                "kernel = {kernel:?}: must be \"matern32\", \"matern52\" or \"squared_exponential\""
+            ))
+        })?;
+        basis::Gp::new(kernel, length, noise).map(Self).map_err(raise)
+    }
+
+    /// Name of the covariance function.
+    #[getter]
+    fn kernel(&self) -> &'static str {
+        self.0.kernel.name()
+    }
+
+    /// Length scale, if one was given.
+    #[getter]
+    fn length(&self) -> Option<f64> {
+        self.0.length
+    }
+
+    /// Noise ratio, if one was given.
+    #[getter]
+    fn noise(&self) -> Option<f64> {
+        self.0.noise
+    }
+
+    /// Regress targets on the clock.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, (C,)
+    ///     Increasing inputs from 0; within [0, 2π) if periodic.
+    /// targets : array_like, (C, P)
+    ///     Outputs.
+    /// periodic : bool
+    ///     Whether 2π and 0 are one.
+    ///
+    /// Returns
+    /// -------
+    /// GPRegression
+    #[pyo3(signature = (u, targets, *, periodic=false))]
+    fn regress(
+        &self,
+        py: Python<'_>,
+        u: &Bound<'_, PyAny>,
+        targets: &Bound<'_, PyAny>,
+        periodic: bool,
+    ) -> PyResult<GpRegression> {
+        let (u, targets) = (vector("u", u)?, matrix("targets", "(C, P)", targets)?);
+        let gp = &self.0;
+        let posterior = py.detach(|| gp.regress(domain(&u, periodic), &u, targets.view(), &mut |_| Ok(())));
+        posterior.map(GpRegression).map_err(raise)
+    }
+
+    fn __getnewargs__(&self) -> (&'static str, Option<f64>, Option<f64>) {
+        (self.kernel(), self.length(), self.noise())
+    }
+
+    fn __repr__(&self) -> String {
+        let number = |value: Option<f64>| value.map_or("None".to_string(), |value| value.to_string());
+        format!("pdmp.GP({:?}, length={}, noise={})", self.kernel(), number(self.length()), number(self.noise()))
+    }
+}
+
+/// A Gaussian process given data.
+#[pyclass(frozen, name = "GPRegression", module = "pdmp")]
+pub(crate) struct GpRegression(GpPosterior);
+
+#[pymethods]
+impl GpRegression {
+    /// Length scale that was used.
+    #[getter]
+    fn length(&self) -> f64 {
+        self.0.length()
+    }
+
+    /// Noise ratio that was used.
+    #[getter]
+    fn noise(&self) -> f64 {
+        self.0.noise()
+    }
+
+    /// Mean and variance (n, P) of the outputs, without their noise, at u (n,).
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        u: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let u = clock(u)?;
+        let (mean, variance) = self.0.predict(&u);
+        Ok((mean.into_pyarray(py), variance.into_pyarray(py)))
+    }
+}
+
+/// Normalised Gaussian network: weighted Gaussians on the clock that sum to one.
+///
+/// Parameters
+/// ----------
+/// n_basis : int
+///     Number of functions N, at least 2.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Too few functions.
+#[pyclass(frozen, module = "pdmp", from_py_object)]
+#[derive(Clone)]
+pub(crate) struct NGnet(pub(crate) basis::NGnet);
+
+#[pymethods]
+impl NGnet {
+    #[new]
+    #[pyo3(signature = (n_basis=50))]
+    fn new(n_basis: isize) -> PyResult<Self> {
+        // A negative number is as wrong as zero, and told alike.
+        basis::NGnet::new(n_basis.max(0).unsigned_abs()).map(Self).map_err(raise)
+    }
+
+    /// Number of functions N.
+    #[getter]
+    fn n_basis(&self) -> usize {
+        self.0.n_basis
+    }
+
+    /// Regress targets (C, P) on the clock u (C,), from 0; within [0, 2π) if periodic.
+    #[pyo3(signature = (u, targets, *, periodic=false))]
+    fn regress(&self, u: &Bound<'_, PyAny>, targets: &Bound<'_, PyAny>, periodic: bool) -> PyResult<NGnetRegression> {
+        let (u, targets) = (vector("u", u)?, matrix("targets", "(C, P)", targets)?);
+        let n_outputs = targets.ncols();
+        let regression = self.0.regress(domain(&u, periodic), &u, targets.view()).map_err(raise)?;
+        Ok(NGnetRegression { regression, n_outputs })
+    }
+
+    fn __getnewargs__(&self) -> (usize,) {
+        (self.0.n_basis,)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("pdmp.NGnet({})", self.0.n_basis)
+    }
+}
+
+/// A normalised Gaussian network given data.
+#[pyclass(frozen, module = "pdmp")]
+pub(crate) struct NGnetRegression {
+    regression: basis::NGnetRegression,
+    n_outputs: usize,
+}
+
+#[pymethods]
+impl NGnetRegression {
+    /// The outputs (n, P) at u (n,), and None: the network knows no variance.
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        u: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
+        let u = clock(u)?;
+        let mut values = ndarray::Array2::zeros((u.len(), self.n_outputs));
+        let (mut value, mut slope) = (vec![0.0; self.n_outputs], vec![0.0; self.n_outputs]);
+        for (&u, mut row) in u.iter().zip(values.rows_mut()) {
+            self.regression.evaluate(u, &mut value, &mut slope);
+            row.assign(&ndarray::aview1(&value));
+        }
+        Ok((values.into_pyarray(py), None))
+    }
+}
+
+/// Finite clock values.
+fn clock(u: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let u = vector("u", u)?;
+    match u.iter().position(|u| !u.is_finite()) {
+        Some(index) => Err(PyValueError::new_err(format!("u[{index}] = {}: every number must be finite", u[index]))),
+        None => Ok(u),
+    }
+}
+
+/// The stretch of the clock that the inputs cover; the regressors check the inputs themselves.
+fn domain(u: &[f64], periodic: bool) -> Domain {
+    if periodic { Domain::Circle } else { Domain::Interval { end: u.last().copied().unwrap_or(0.0) } }
+}

@@ -1,0 +1,246 @@
+//! The real-time loop in Python.
+
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use pdmp_core::Kind;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::convert::{to_numpy, vector};
+use crate::error::raise;
+use crate::model::Arguments;
+
+/// Whether a movement goes on (`WORKING`) or has settled on its goal (`FINISHED`).
+#[pyclass(frozen, eq, hash, module = "pdmp")]
+#[derive(PartialEq, Eq, Hash)]
+pub(crate) enum Status {
+    #[pyo3(name = "WORKING")]
+    Working,
+    #[pyo3(name = "FINISHED")]
+    Finished,
+}
+
+/// A vector that the loop writes and the user reads without a copy.
+struct Output {
+    /// Written by the controller alone; the user never sees it.
+    data: Py<PyArray1<f64>>,
+    /// A read-only view of the same memory.
+    view: Py<PyAny>,
+}
+
+impl Output {
+    fn new(py: Python<'_>, length: usize) -> PyResult<Self> {
+        let data = PyArray1::<f64>::zeros(py, length, false);
+        let view = data.call_method0("view")?;
+        view.call_method("setflags", (false,), None)?;
+        Ok(Self { data: data.unbind(), view: view.unbind() })
+    }
+
+    #[allow(unsafe_code)]
+    fn write(&self, py: Python<'_>, values: &[f64]) {
+        let data = self.data.bind(py);
+        debug_assert_eq!(data.len(), values.len());
+        // SAFETY: the array was made by `new`, one-dimensional, contiguous and as long as the movement has DoFs; it is
+        // written under the controller's exclusive borrow, and readers of its view hold no Rust reference.
+        unsafe { std::ptr::copy_nonoverlapping(values.as_ptr(), data.data(), values.len()) }
+    }
+}
+
+/// A running primitive, made by `Model.controller`.
+///
+/// `step` moves on by one tick and writes into `position`, `velocity` and `acceleration`, which are read-only views
+/// that stay valid. `goal`, `style`, `tau`, `amplitude` and `anchor` can be set at any tick; values that are refused
+/// leave the last good ones in force.
+#[pyclass(module = "pdmp")]
+pub(crate) struct Controller {
+    inner: pdmp_core::Controller,
+    position: Output,
+    velocity: Output,
+    acceleration: Output,
+    working: Py<PyAny>,
+    finished: Py<PyAny>,
+}
+
+impl Controller {
+    pub(crate) fn new(py: Python<'_>, inner: pdmp_core::Controller) -> PyResult<Self> {
+        let length = inner.position().len();
+        let status = py.get_type::<Status>();
+        let controller = Self {
+            position: Output::new(py, length)?,
+            velocity: Output::new(py, length)?,
+            acceleration: Output::new(py, length)?,
+            working: status.getattr("WORKING")?.unbind(),
+            finished: status.getattr("FINISHED")?.unbind(),
+            inner,
+        };
+        controller.publish(py);
+        Ok(controller)
+    }
+
+    fn publish(&self, py: Python<'_>) {
+        self.position.write(py, self.inner.position());
+        self.velocity.write(py, self.inner.velocity());
+        self.acceleration.write(py, self.inner.acceleration());
+    }
+
+    /// A command may hold from the start, and then changes what is shown.
+    fn command(&mut self, py: Python<'_>, result: pdmp_core::Result<()>) -> PyResult<()> {
+        self.publish(py);
+        result.map_err(raise)
+    }
+}
+
+#[pymethods]
+impl Controller {
+    /// One tick.
+    ///
+    /// Parameters
+    /// ----------
+    /// dt : float, optional
+    ///     Length of this tick in s, if it differs from the controller's.
+    ///
+    /// Returns
+    /// -------
+    /// Status
+    ///     `FINISHED` once a discrete movement's time is over and it has settled on its goal.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A tick that is not positive or longer than 1000 tau; the state then stays as it was.
+    #[pyo3(signature = (dt=None))]
+    fn step(&mut self, py: Python<'_>, dt: Option<f64>) -> PyResult<Py<PyAny>> {
+        let status = match dt {
+            None => self.inner.step(),
+            Some(dt) => self.inner.step_by(dt),
+        };
+        let status = status.map_err(raise)?;
+        self.publish(py);
+        Ok(match status {
+            pdmp_core::Status::Working => self.working.clone_ref(py),
+            pdmp_core::Status::Finished => self.finished.clone_ref(py),
+        })
+    }
+
+    /// Start again; the arguments are those of `Model.rollout`.
+    #[pyo3(signature = (*, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=None, tau=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn reset(
+        &mut self,
+        py: Python<'_>,
+        style: Option<&Bound<'_, PyAny>>,
+        goal: Option<&Bound<'_, PyAny>>,
+        start: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        anchor: Option<&Bound<'_, PyAny>>,
+        amplitude: Option<f64>,
+        tau: Option<f64>,
+    ) -> PyResult<()> {
+        let conditions = Arguments { style, goal, start, velocity, anchor, amplitude, tau }.conditions()?;
+        let result = self.inner.reset(&conditions);
+        self.command(py, result)
+    }
+
+    /// Position y (D,): a read-only view.
+    #[getter]
+    fn position(&self, py: Python<'_>) -> Py<PyAny> {
+        self.position.view.clone_ref(py)
+    }
+
+    /// Velocity (D,) per s: a read-only view.
+    #[getter]
+    fn velocity(&self, py: Python<'_>) -> Py<PyAny> {
+        self.velocity.view.clone_ref(py)
+    }
+
+    /// Acceleration (D,) per s²: a read-only view.
+    #[getter]
+    fn acceleration(&self, py: Python<'_>) -> Py<PyAny> {
+        self.acceleration.view.clone_ref(py)
+    }
+
+    /// Phase: x in (0, 1] where discrete, φ in [0, 2π) where rhythmic.
+    #[getter]
+    fn phase(&self) -> f64 {
+        self.inner.phase()
+    }
+
+    /// Time since the start in s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.inner.time()
+    }
+
+    /// Goal g (D,), discrete.
+    #[getter]
+    fn goal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        self.centre(py, Kind::Discrete, "a rhythmic primitive has no goal; it has an anchor")
+    }
+
+    #[setter]
+    fn set_goal(&mut self, py: Python<'_>, goal: &Bound<'_, PyAny>) -> PyResult<()> {
+        let result = self.inner.set_goal(&vector("goal", goal)?);
+        self.command(py, result)
+    }
+
+    /// Style s (J,).
+    #[getter]
+    fn style<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        to_numpy(py, self.inner.style())
+    }
+
+    #[setter]
+    fn set_style(&mut self, py: Python<'_>, style: &Bound<'_, PyAny>) -> PyResult<()> {
+        let result = self.inner.set_style(&vector("style", style)?);
+        self.command(py, result)
+    }
+
+    /// Anchor y_a (D,), rhythmic.
+    #[getter]
+    fn anchor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        self.centre(py, Kind::Rhythmic, "a discrete primitive has no anchor; it has a goal")
+    }
+
+    #[setter]
+    fn set_anchor(&mut self, py: Python<'_>, anchor: &Bound<'_, PyAny>) -> PyResult<()> {
+        let result = self.inner.set_anchor(&vector("anchor", anchor)?);
+        self.command(py, result)
+    }
+
+    /// Time constant in s.
+    #[getter]
+    fn tau(&self) -> f64 {
+        self.inner.tau()
+    }
+
+    #[setter]
+    fn set_tau(&mut self, py: Python<'_>, tau: f64) -> PyResult<()> {
+        let result = self.inner.set_tau(tau);
+        self.command(py, result)
+    }
+
+    /// Amplitude r₀, rhythmic; 1 where discrete.
+    #[getter]
+    fn amplitude(&self) -> f64 {
+        self.inner.amplitude()
+    }
+
+    #[setter]
+    fn set_amplitude(&mut self, py: Python<'_>, amplitude: f64) -> PyResult<()> {
+        let result = self.inner.set_amplitude(amplitude);
+        self.command(py, result)
+    }
+
+    fn __repr__(&self) -> String {
+        let model = self.inner.model();
+        format!("<pdmp.Controller: {}, {} DoFs, t = {:.4} s>", model.kind(), model.n_dofs(), self.inner.time())
+    }
+}
+
+impl Controller {
+    fn centre<'py>(&self, py: Python<'py>, kind: Kind, other: &'static str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        if self.inner.model().kind() != kind {
+            return Err(PyValueError::new_err(other));
+        }
+        Ok(to_numpy(py, self.inner.centre()))
+    }
+}

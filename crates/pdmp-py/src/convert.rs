@@ -1,0 +1,54 @@
+//! Arrays across the border: anything numpy can turn into float64 comes in, float64 goes out.
+
+use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
+use numpy::{AllowTypeChange, IntoPyArray, PyArray1, PyArrayLikeDyn};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// An array of any dimension.
+pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64>> {
+    let array = value.extract::<PyArrayLikeDyn<'_, f64, AllowTypeChange>>().map_err(|error| {
+        PyValueError::new_err(format!("{name} is not an array of numbers: {}", PyErr::from(error).value(value.py())))
+    })?;
+    Ok(array.as_array().to_owned())
+}
+
+/// A vector, (n,).
+pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let array = array(name, value)?;
+    let shape = array.shape().to_vec();
+    let vector = array
+        .into_dimensionality::<Ix1>()
+        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected one axis")))?;
+    Ok(vector.to_vec())
+}
+
+/// A vector that may be missing.
+pub(crate) fn optional(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
+    value.map(|value| vector(name, value)).transpose()
+}
+
+/// One number, or a vector.
+pub(crate) fn numbers(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
+    let Some(value) = value else { return Ok(Vec::new()) };
+    let array = array(name, value)?;
+    if array.ndim() > 1 {
+        let shape = array.shape();
+        return Err(PyValueError::new_err(format!("{name} has shape {shape:?}, expected a number or one axis")));
+    }
+    Ok(array.iter().copied().collect())
+}
+
+/// A matrix with the named axes.
+pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
+    let array = array(name, value)?;
+    let shape = array.shape().to_vec();
+    array
+        .into_dimensionality::<Ix2>()
+        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
+}
+
+/// A new numpy vector.
+pub(crate) fn to_numpy<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
+    Array1::from_vec(values.to_vec()).into_pyarray(py)
+}

@@ -1,0 +1,235 @@
+//! Learning, called from Python.
+
+use std::sync::Arc;
+
+use ndarray::{ArrayD, Axis, Ix2};
+use pdmp_core::basis::Basis;
+use pdmp_core::{Alignment, DofScale, Error, FitOptions, Kind, Sampling, Smoothing, StyleCount};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::basis::{Gp, NGnet};
+use crate::convert::{array, matrix, numbers};
+use crate::demo::Demonstration;
+use crate::error::raise;
+use crate::model::Model;
+
+/// Learn one movement primitive from several demonstrations.
+///
+/// The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets
+/// f = τẏ − z exactly, factorise F ≈ S·F_basis (Eq. 7), and regress the landscape on the phase.
+///
+/// Parameters
+/// ----------
+/// demos : sequence of Demonstration, sequence of (T, D) array_like, or (M, T, D) array_like
+///     Demonstrations of one skill; if rhythmic, each is one cycle without its end point.
+/// kind : {"discrete", "rhythmic"}
+///     From a start to a goal, or around an anchor.
+/// dt : float, optional
+///     Sampling interval in s of the demonstrations that carry none.
+/// period : float or (M,) array_like, optional
+///     Periods in s of time-stamped cycles.
+/// contexts : (M, Q) array_like, optional
+///     The condition of each demonstration; otherwise those that they carry.
+/// n_styles : int, optional
+///     Style dimension J; otherwise from `spectrum`.
+/// spectrum : float
+///     Keep the fewest singular values whose sum exceeds this share of the sum of all.
+/// basis : {"gp", "ngnet"}, GP or NGnet
+///     Function approximator of the landscape.
+/// smoothing : None, "auto" or float
+///     Interpolate, smooth by generalised cross-validation, or smooth with this cut-off in Hz.
+/// nominal : int, optional
+///     Index of the nominal demonstration; otherwise the one of median duration.
+/// n_samples : int, optional
+///     Samples C after alignment; otherwise as many as the nominal demonstration has.
+/// dof_scale : None, "range" or (D,) array_like
+///     Unit of each degree of freedom in the factorisation.
+/// tau : float, optional
+///     Time constant in s, discrete; otherwise the nominal duration.
+/// alpha_z, beta_z : float
+///     Constants of the output system; `beta_z` is `alpha_z / 4` (critical damping) unless given.
+/// alpha_x : float, optional
+///     Constant of the discrete canonical system; otherwise x = 0.01 at the end.
+/// mu : float
+///     Constant of the rhythmic canonical system.
+/// progress : callable, optional
+///     Called with the stage and the share of it that is done; an exception it raises ends the fit.
+///
+/// Returns
+/// -------
+/// Model
+///
+/// Raises
+/// ------
+/// ValueError
+///     Demonstrations or options that do not fit together.
+/// FitError
+///     Well-formed demonstrations from which nothing could be learnt.
+///
+/// References
+/// ----------
+/// Matsubara, Hyon, Morimoto, Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
+#[pyfunction]
+#[pyo3(signature = (
+    demos, *, kind="discrete", dt=None, period=None, contexts=None, n_styles=None, spectrum=0.9, basis=None,
+    smoothing=None, nominal=None, n_samples=None, dof_scale=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None,
+    mu=1.0, progress=None
+), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, n_styles=None, spectrum=0.9, \
+    basis='gp', smoothing=None, nominal=None, n_samples=None, dof_scale=None, tau=None, alpha_z=25.0, beta_z=None, \
+    alpha_x=None, mu=1.0, progress=None)")]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn fit(
+    py: Python<'_>,
+    demos: &Bound<'_, PyAny>,
+    kind: &str,
+    dt: Option<f64>,
+    period: Option<&Bound<'_, PyAny>>,
+    contexts: Option<&Bound<'_, PyAny>>,
+    n_styles: Option<isize>,
+    spectrum: f64,
+    basis: Option<&Bound<'_, PyAny>>,
+    smoothing: Option<&Bound<'_, PyAny>>,
+    nominal: Option<isize>,
+    n_samples: Option<isize>,
+    dof_scale: Option<&Bound<'_, PyAny>>,
+    tau: Option<f64>,
+    alpha_z: f64,
+    beta_z: Option<f64>,
+    alpha_x: Option<f64>,
+    mu: f64,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Model> {
+    let demos = demonstrations(demos)?;
+    let options = FitOptions {
+        alignment: Alignment {
+            kind: kind_of(kind)?,
+            dt,
+            period: numbers("period", period)?,
+            smoothing: smoothing_of(smoothing)?,
+            nominal: count("nominal", nominal)?,
+            n_samples: count("n_samples", n_samples)?,
+        },
+        contexts: contexts.map(|contexts| matrix("contexts", "(M, Q)", contexts)).transpose()?,
+        styles: count("n_styles", n_styles)?.map_or(StyleCount::Spectrum(spectrum), StyleCount::Given),
+        basis: basis_of(basis)?,
+        dof_scale: dof_scale_of(dof_scale)?,
+        tau,
+        alpha_z,
+        beta_z,
+        alpha_x,
+        mu,
+    };
+    // What ended the fit from Python's side: Ctrl-C, or an exception in `progress`.
+    let mut raised = None;
+    let model = py.detach(|| {
+        pdmp_core::fit(&demos, &options, &mut |stage, share| {
+            Python::attach(|py| {
+                py.check_signals()?;
+                progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (stage.name(), share)).map(drop))
+            })
+            .map_err(|error| {
+                raised = Some(error);
+                Error::Interrupted
+            })
+        })
+    });
+    model.map(|model| Model(Arc::new(model))).map_err(|error| raised.unwrap_or_else(|| raise(error)))
+}
+
+/// A count that must not be negative.
+fn count(name: &str, value: Option<isize>) -> PyResult<Option<usize>> {
+    value
+        .map(|value| {
+            usize::try_from(value).map_err(|_| PyValueError::new_err(format!("{name} = {value}: must not be negative")))
+        })
+        .transpose()
+}
+
+fn demonstrations(demos: &Bound<'_, PyAny>) -> PyResult<Vec<pdmp_core::Demonstration>> {
+    if demos.is_instance_of::<Demonstration>() {
+        return Err(PyValueError::new_err("demos is a single demonstration: put it into a list"));
+    }
+    if demos.hasattr("ndim")? {
+        let stack = array("demos", demos)?;
+        if stack.ndim() != 3 {
+            let shape = stack.shape();
+            let wanted = "expected (M, T, D): put a single (T, D) array into a list";
+            return Err(PyValueError::new_err(format!("demos has shape {shape:?}, {wanted}")));
+        }
+        return stack.axis_iter(Axis(0)).enumerate().map(|(m, demo)| unrated(m, demo.to_owned())).collect();
+    }
+    let items = demos.try_iter().map_err(|_| {
+        PyTypeError::new_err("demos must be a list of demonstrations or arrays, or an array of shape (M, T, D)")
+    })?;
+    items
+        .enumerate()
+        .map(|(m, item)| {
+            let item = item?;
+            match item.cast::<Demonstration>() {
+                Ok(demo) => Ok(demo.get().0.clone()),
+                Err(_) => unrated(m, array(&format!("demo {m}: position"), &item)?),
+            }
+        })
+        .collect()
+}
+
+/// A demonstration from a bare array (T, D), whose rate the fit is told.
+fn unrated(m: usize, position: ArrayD<f64>) -> PyResult<pdmp_core::Demonstration> {
+    let shape = position.shape().to_vec();
+    let position = position.into_dimensionality::<Ix2>().map_err(|_| {
+        PyValueError::new_err(format!("demo {m}: position has shape {shape:?}, expected two axes (T, D)"))
+    })?;
+    pdmp_core::Demonstration::new(position, Sampling::Unknown).map_err(|error| raise(error.in_demo(m)))
+}
+
+pub(crate) fn kind_of(kind: &str) -> PyResult<Kind> {
+    match kind {
+        "discrete" => Ok(Kind::Discrete),
+        "rhythmic" => Ok(Kind::Rhythmic),
+        _ => Err(PyValueError::new_err(format!("kind = {kind:?}: must be \"discrete\" or \"rhythmic\""))),
+    }
+}
+
+fn basis_of(basis: Option<&Bound<'_, PyAny>>) -> PyResult<Basis> {
+    let Some(basis) = basis else { return Ok(Basis::Gp(Default::default())) };
+    if let Ok(gp) = basis.cast::<Gp>() {
+        return Ok(Basis::Gp(gp.get().0.clone()));
+    }
+    if let Ok(ngnet) = basis.cast::<NGnet>() {
+        return Ok(Basis::NGnet(ngnet.get().0.clone()));
+    }
+    match basis.extract::<String>().as_deref() {
+        Ok("gp") => Ok(Basis::Gp(Default::default())),
+        Ok("ngnet") => Ok(Basis::NGnet(Default::default())),
+        _ => {
+            let wanted = "must be \"gp\", \"ngnet\", pdmp.GP(...) or pdmp.NGnet(...)";
+            Err(PyValueError::new_err(format!("basis = {}: {wanted}", basis.repr()?)))
+        }
+    }
+}
+
+fn smoothing_of(smoothing: Option<&Bound<'_, PyAny>>) -> PyResult<Smoothing> {
+    let Some(smoothing) = smoothing else { return Ok(Smoothing::Interpolate) };
+    if let Ok(hz) = smoothing.extract::<f64>() {
+        return Ok(Smoothing::CutOff { hz });
+    }
+    match smoothing.extract::<String>().as_deref() {
+        Ok("auto") => Ok(Smoothing::Auto),
+        _ => {
+            let wanted = "must be None, \"auto\" or a cut-off in Hz";
+            Err(PyValueError::new_err(format!("smoothing = {}: {wanted}", smoothing.repr()?)))
+        }
+    }
+}
+
+fn dof_scale_of(scale: Option<&Bound<'_, PyAny>>) -> PyResult<DofScale> {
+    let Some(scale) = scale else { return Ok(DofScale::Unit) };
+    match scale.extract::<String>().as_deref() {
+        Ok("range") => Ok(DofScale::Range),
+        Ok(other) => {
+            Err(PyValueError::new_err(format!("dof_scale = {other:?}: must be None, \"range\" or one number per DoF")))
+        }
+        Err(_) => crate::convert::vector("dof_scale", scale).map(DofScale::Given),
+    }
+}

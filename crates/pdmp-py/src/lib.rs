@@ -1,0 +1,34 @@
+//! Python bindings: every function converts, detaches where it is long, calls the core, and converts back.
+
+mod basis;
+mod controller;
+mod convert;
+mod demo;
+mod error;
+mod fit;
+mod model;
+
+use pyo3::prelude::*;
+
+/// The compiled half of pdmp.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("PdmpError", py.get_type::<error::PdmpError>())?;
+    module.add("FitError", py.get_type::<error::FitError>())?;
+    module.add("ModelFileError", py.get_type::<error::ModelFileError>())?;
+    module.add_class::<demo::Demonstration>()?;
+    module.add_class::<demo::Trajectory>()?;
+    module.add_class::<basis::Gp>()?;
+    module.add_class::<basis::GpRegression>()?;
+    module.add_class::<basis::NGnet>()?;
+    module.add_class::<basis::NGnetRegression>()?;
+    module.add_class::<model::Model>()?;
+    module.add_class::<model::Prediction>()?;
+    module.add_class::<controller::Status>()?;
+    module.add_class::<controller::Controller>()?;
+    module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
+    module.add_function(wrap_pyfunction!(model::load, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,544 @@
+//! The model in Python.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use ndarray::Array3;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadwriteArray3, ToPyArray};
+use pdmp_core::{Canonical, Conditions, Timing, style_of};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::controller::Controller;
+use crate::convert::{matrix, optional, to_numpy, vector};
+use crate::demo::{Demonstration, Trajectory};
+use crate::error::raise;
+
+/// A parametric dynamic movement primitive: immutable, picklable, saved by `save`.
+///
+/// Made by `fit` and `load`.
+#[pyclass(frozen, module = "pdmp")]
+pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
+
+/// Conditions from Python's arguments: what is missing is left to the model.
+pub(crate) struct Arguments<'a, 'py> {
+    pub(crate) style: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) goal: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) start: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) velocity: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) anchor: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) amplitude: Option<f64>,
+    pub(crate) tau: Option<f64>,
+}
+
+impl Arguments<'_, '_> {
+    pub(crate) fn conditions(self) -> PyResult<Conditions> {
+        Ok(Conditions {
+            style: optional("style", self.style)?,
+            goal: optional("goal", self.goal)?,
+            anchor: optional("anchor", self.anchor)?,
+            start: optional("start", self.start)?,
+            velocity: optional("velocity", self.velocity)?,
+            amplitude: self.amplitude,
+            tau: self.tau,
+        })
+    }
+
+    /// The same, with a context's prediction for what is missing.
+    fn in_context(self, model: &pdmp_core::Model, context: Option<&Bound<'_, PyAny>>) -> PyResult<Conditions> {
+        let given = self.conditions()?;
+        let Some(context) = optional("context", context)? else { return Ok(given) };
+        if given.style.is_some() {
+            return Err(PyValueError::new_err("pass style or context, not both: the context predicts the style"));
+        }
+        let predicted = model.conditions(&model.predict(&context).map_err(raise)?);
+        Ok(Conditions {
+            style: predicted.style,
+            goal: given.goal.or(predicted.goal),
+            anchor: given.anchor.or(predicted.anchor),
+            start: given.start.or(predicted.start),
+            velocity: given.velocity,
+            amplitude: given.amplitude,
+            tau: given.tau.or(predicted.tau),
+        })
+    }
+}
+
+/// Read a model file.
+///
+/// Parameters
+/// ----------
+/// path : path-like
+///     A `.safetensors` file written by `Model.save`.
+///
+/// Returns
+/// -------
+/// Model
+///
+/// Raises
+/// ------
+/// OSError
+///     A file that cannot be read.
+/// ModelFileError
+///     A file that is damaged, not a model, or of another version.
+#[pyfunction]
+pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
+    py.detach(|| pdmp_core::Model::load(&path)).map(|model| Model(Arc::new(model))).map_err(raise)
+}
+
+#[pymethods]
+impl Model {
+    /// "discrete" or "rhythmic".
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.0.kind().name()
+    }
+
+    /// Number of demonstrations M.
+    #[getter]
+    fn n_demos(&self) -> usize {
+        self.0.n_demos()
+    }
+
+    /// Number of degrees of freedom D.
+    #[getter]
+    fn n_dofs(&self) -> usize {
+        self.0.n_dofs()
+    }
+
+    /// Dimension J of the style parameter.
+    #[getter]
+    fn n_styles(&self) -> usize {
+        self.0.n_styles()
+    }
+
+    /// Time constant of the nominal demonstration in s.
+    #[getter]
+    fn tau(&self) -> f64 {
+        self.0.tau()
+    }
+
+    /// Rate of the output system.
+    #[getter]
+    fn alpha_z(&self) -> f64 {
+        self.0.attractor().alpha_z
+    }
+
+    /// Stiffness of the output system.
+    #[getter]
+    fn beta_z(&self) -> f64 {
+        self.0.attractor().beta_z
+    }
+
+    /// Rate of the discrete canonical system; None if rhythmic.
+    #[getter]
+    fn alpha_x(&self) -> Option<f64> {
+        match self.0.canonical() {
+            Canonical::Discrete { alpha_x, .. } => Some(alpha_x),
+            Canonical::Rhythmic { .. } => None,
+        }
+    }
+
+    /// Rate of the amplitude; None if discrete.
+    #[getter]
+    fn mu(&self) -> Option<f64> {
+        match self.0.canonical() {
+            Canonical::Discrete { .. } => None,
+            Canonical::Rhythmic { mu } => Some(mu),
+        }
+    }
+
+    /// Names of the degrees of freedom.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.0.names().to_vec()
+    }
+
+    /// Index of the nominal demonstration.
+    #[getter]
+    fn nominal(&self) -> usize {
+        self.0.demonstrated().nominal
+    }
+
+    /// Styles S of the demonstrations (M, J).
+    #[getter]
+    fn styles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.0.demonstrated().styles.to_pyarray(py)
+    }
+
+    /// All singular values of the targets, in decreasing order.
+    #[getter]
+    fn singular_values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        to_numpy(py, &self.0.learnt().singular_values)
+    }
+
+    /// Goals of the demonstrations (M, D).
+    #[getter]
+    fn goals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.0.demonstrated().goals.to_pyarray(py)
+    }
+
+    /// First positions of the demonstrations (M, D).
+    #[getter]
+    fn starts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.0.demonstrated().starts.to_pyarray(py)
+    }
+
+    /// Mean positions of the demonstrations (M, D), the anchors of cycles.
+    #[getter]
+    fn anchors<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.0.demonstrated().anchors.to_pyarray(py)
+    }
+
+    /// Durations or periods of the demonstrations (M,) in s.
+    #[getter]
+    fn durations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        to_numpy(py, &self.0.demonstrated().durations)
+    }
+
+    /// Contexts of the demonstrations (M, Q), if they had any.
+    #[getter]
+    fn contexts<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        self.0.demonstrated().contexts.as_ref().map(|contexts| contexts.to_pyarray(py))
+    }
+
+    /// What was chosen for the basis functions, in one line.
+    #[getter]
+    fn basis(&self) -> &str {
+        &self.0.learnt().basis
+    }
+
+    /// Bound on the error of the compiled landscape, relative to its largest value.
+    #[getter]
+    fn table_error(&self) -> f64 {
+        self.0.landscape().error()
+    }
+
+    /// The movement under constant conditions.
+    ///
+    /// τż = α_z(β_z(g − y) − z), τẏ = z + w with w = x·sᵀb (discrete) or r·sᵀb (rhythmic), propagated exactly.
+    /// What is not given is that of the nominal demonstration.
+    ///
+    /// Parameters
+    /// ----------
+    /// style : array_like, (J,), optional
+    ///     Style parameter s.
+    /// goal : array_like, (D,), optional
+    ///     Goal g, discrete.
+    /// start : array_like, (D,), optional
+    ///     Start position; a rhythmic movement otherwise starts on its cycle.
+    /// velocity : array_like, (D,), optional
+    ///     Start velocity per s; otherwise as in the demonstrations.
+    /// anchor : array_like, (D,), optional
+    ///     Anchor y_a, rhythmic.
+    /// amplitude : float, optional
+    ///     Amplitude r₀, rhythmic; 1 as demonstrated.
+    /// tau : float, optional
+    ///     Time constant in s.
+    /// dt : float
+    ///     Interval between samples in s.
+    /// duration : float, optional
+    ///     Length in s; otherwise the demonstrated duration scaled by `tau`, one period if rhythmic.
+    /// context : array_like, (Q,), optional
+    ///     Predicts style, goal, start or anchor, and tau, where they are not given.
+    ///
+    /// Returns
+    /// -------
+    /// Trajectory
+    ///     n + 1 samples, n = duration / dt rounded down.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A wrong length, a number that is not finite, or an argument of the other kind of primitive.
+    #[pyo3(signature = (
+        style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=None, tau=None, dt=0.01,
+        duration=None, context=None
+    ))]
+    #[allow(clippy::too_many_arguments)]
+    fn rollout(
+        &self,
+        py: Python<'_>,
+        style: Option<&Bound<'_, PyAny>>,
+        goal: Option<&Bound<'_, PyAny>>,
+        start: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        anchor: Option<&Bound<'_, PyAny>>,
+        amplitude: Option<f64>,
+        tau: Option<f64>,
+        dt: f64,
+        duration: Option<f64>,
+        context: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Trajectory> {
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };
+        let conditions = arguments.in_context(&self.0, context)?;
+        let trajectory = py.detach(|| self.0.rollout(&conditions, Timing { dt, duration })).map_err(raise)?;
+        Ok(Trajectory::new(py, trajectory))
+    }
+
+    /// Movements of many styles under otherwise equal conditions.
+    ///
+    /// Parameters
+    /// ----------
+    /// styles : array_like, (B, J)
+    ///     Style parameters; the other arguments are those of `rollout`.
+    /// out : tuple of two (B, T, D) float64 arrays, optional
+    ///     Where to write positions and velocities.
+    ///
+    /// Returns
+    /// -------
+    /// positions, velocities : ndarray, (B, T, D)
+    #[pyo3(signature = (
+        styles, *, goal=None, start=None, velocity=None, anchor=None, amplitude=None, tau=None, dt=0.01, duration=None,
+        out=None
+    ))]
+    #[allow(clippy::too_many_arguments, clippy::type_complexity)]
+    fn rollouts<'py>(
+        &self,
+        py: Python<'py>,
+        styles: &Bound<'py, PyAny>,
+        goal: Option<&Bound<'py, PyAny>>,
+        start: Option<&Bound<'py, PyAny>>,
+        velocity: Option<&Bound<'py, PyAny>>,
+        anchor: Option<&Bound<'py, PyAny>>,
+        amplitude: Option<f64>,
+        tau: Option<f64>,
+        dt: f64,
+        duration: Option<f64>,
+        out: Option<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)>,
+    ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)> {
+        let styles = matrix("styles", "(B, J)", styles)?;
+        let arguments = Arguments { style: None, goal, start, velocity, anchor, amplitude, tau };
+        let conditions = arguments.conditions()?;
+        let timing = Timing { dt, duration };
+        let (positions, velocities) =
+            py.detach(|| self.0.rollouts(styles.view(), &conditions, timing)).map_err(raise)?;
+        let Some((to_positions, to_velocities)) = out else {
+            return Ok((positions.into_pyarray(py), velocities.into_pyarray(py)));
+        };
+        let mut writable = [writable(&to_positions)?, writable(&to_velocities)?];
+        for (target, result) in writable.iter_mut().zip([&positions, &velocities]) {
+            write(target, result)?;
+        }
+        Ok((to_positions, to_velocities))
+    }
+
+    /// Jacobian ∂y/∂s of a rollout's positions (T, D, J): exact, and the same for every style and goal.
+    ///
+    /// Which of `start` and `velocity` are given matters, their values do not.
+    #[pyo3(signature = (dt=0.01, *, start=None, velocity=None, amplitude=None, tau=None, duration=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn style_jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        dt: f64,
+        start: Option<&Bound<'py, PyAny>>,
+        velocity: Option<&Bound<'py, PyAny>>,
+        amplitude: Option<f64>,
+        tau: Option<f64>,
+        duration: Option<f64>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let arguments = Arguments { style: None, goal: None, start, velocity, anchor: None, amplitude, tau };
+        let conditions = arguments.conditions()?;
+        let timing = Timing { dt, duration };
+        let jacobian = py.detach(|| self.0.style_jacobian(&conditions, timing)).map_err(raise)?;
+        Ok(jacobian.into_pyarray(py))
+    }
+
+    /// The style (J,) of a new demonstration: least squares on its target.
+    ///
+    /// Parameters
+    /// ----------
+    /// demonstration : Demonstration
+    ///     A movement of the same degrees of freedom.
+    /// dt, period : float, optional
+    ///     As in `fit`.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, (J,)
+    #[pyo3(signature = (demonstration, *, dt=None, period=None))]
+    fn style_of<'py>(
+        &self,
+        py: Python<'py>,
+        demonstration: &Demonstration,
+        dt: Option<f64>,
+        period: Option<f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let style = py.detach(|| style_of(&self.0, &demonstration.0, dt, period)).map_err(raise)?;
+        Ok(to_numpy(py, &style))
+    }
+
+    /// The attractor landscape b(u) of each style dimension and degree of freedom.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, (n,)
+    ///     Clock: t / tau where discrete, the phase in rad where rhythmic.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, (n, J, D)
+    fn landscape<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let u = vector("u", u)?;
+        let mut landscape = Array3::zeros((u.len(), self.0.n_styles(), self.0.n_dofs()));
+        for (&u, mut at) in u.iter().zip(landscape.outer_iter_mut()) {
+            let basis = self.0.basis(u).map_err(raise)?;
+            for (value, b) in at.iter_mut().zip(basis) {
+                *value = b;
+            }
+        }
+        Ok(landscape.into_pyarray(py))
+    }
+
+    /// The movement for a condition, by the linear map of Section 4.1.2.
+    ///
+    /// Parameters
+    /// ----------
+    /// context : array_like, (Q,)
+    ///     The condition.
+    ///
+    /// Returns
+    /// -------
+    /// Prediction
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A model fitted without contexts, a wrong length, or a number that is not finite.
+    fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
+        let prediction = self.0.predict(&vector("context", context)?).map_err(raise)?;
+        let optional = |values: Option<Vec<f64>>| values.map(|values| to_numpy(py, &values).unbind());
+        Ok(Prediction {
+            style: to_numpy(py, &prediction.style).unbind(),
+            goal: optional(prediction.goal),
+            start: optional(prediction.start),
+            anchor: optional(prediction.anchor),
+            duration: prediction.duration,
+            covariance: prediction.covariance.map(|covariance| covariance.into_pyarray(py).unbind()),
+        })
+    }
+
+    /// Write a model file. It appears whole or not at all, whatever interrupts the writing.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     Where to, by custom with the suffix `.safetensors`.
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     A path that cannot be written.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| self.0.save(&path)).map_err(raise)
+    }
+
+    /// Start a control loop.
+    ///
+    /// Parameters
+    /// ----------
+    /// dt : float
+    ///     Length of a tick in s.
+    /// style, goal, start, velocity, tau, anchor, amplitude, context
+    ///     As in `rollout`.
+    /// transition : float, optional
+    ///     Time to 99 % in s of a changed style, goal, anchor or tau; 0 switches at once. A tenth of the nominal
+    ///     duration (discrete) or a quarter of the period (rhythmic) otherwise.
+    ///
+    /// Returns
+    /// -------
+    /// Controller
+    #[pyo3(signature = (
+        dt=0.001, style=None, goal=None, start=None, velocity=None, tau=None, transition=None, *, anchor=None,
+        amplitude=None, context=None
+    ))]
+    #[allow(clippy::too_many_arguments)]
+    fn controller(
+        &self,
+        py: Python<'_>,
+        dt: f64,
+        style: Option<&Bound<'_, PyAny>>,
+        goal: Option<&Bound<'_, PyAny>>,
+        start: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        tau: Option<f64>,
+        transition: Option<f64>,
+        anchor: Option<&Bound<'_, PyAny>>,
+        amplitude: Option<f64>,
+        context: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Controller> {
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };
+        let conditions = arguments.in_context(&self.0, context)?;
+        let controller = pdmp_core::Controller::new(Arc::clone(&self.0), dt, &conditions, transition).map_err(raise)?;
+        Controller::new(py, controller)
+    }
+
+    /// The bytes of a model file.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.0.to_bytes().map_err(raise)?))
+    }
+
+    /// A model from the bytes of a model file.
+    #[staticmethod]
+    fn from_bytes(data: &[u8]) -> PyResult<Self> {
+        pdmp_core::Model::from_bytes(data).map(|model| Self(Arc::new(model))).map_err(raise)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((py.get_type::<Self>().getattr("from_bytes")?, (self.to_bytes(py)?,)))
+    }
+
+    fn __repr__(&self) -> String {
+        let model = &self.0;
+        format!(
+            "<pdmp.Model: {}, {} demonstrations, {} DoFs, {} styles, tau {:.4} s; {}>",
+            model.kind(),
+            model.n_demos(),
+            model.n_dofs(),
+            model.n_styles(),
+            model.tau(),
+            model.learnt().basis
+        )
+    }
+}
+
+/// The movement predicted for a condition; what the kind of primitive does not have is None.
+#[pyclass(frozen, get_all, module = "pdmp")]
+pub(crate) struct Prediction {
+    /// Style (J,).
+    style: Py<PyArray1<f64>>,
+    /// Goal (D,), discrete.
+    goal: Option<Py<PyArray1<f64>>>,
+    /// Start (D,), discrete.
+    start: Option<Py<PyArray1<f64>>>,
+    /// Anchor (D,), rhythmic.
+    anchor: Option<Py<PyArray1<f64>>>,
+    /// Duration or period in s.
+    duration: f64,
+    /// Covariance (P, P) of style, goal and start or anchor, and duration, in this order, for a new movement; None
+    /// where the demonstrations leave no degree of freedom to estimate it.
+    covariance: Option<Py<PyArray2<f64>>>,
+}
+
+#[pymethods]
+impl Prediction {
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("<pdmp.Prediction: style {}, duration {:.4} s>", self.style.bind(py).repr()?, self.duration))
+    }
+}
+
+fn writable<'py>(array: &Bound<'py, PyArray3<f64>>) -> PyResult<PyReadwriteArray3<'py, f64>> {
+    array.try_readwrite().map_err(|error| PyValueError::new_err(format!("out: {error}")))
+}
+
+fn write(target: &mut PyReadwriteArray3<'_, f64>, result: &Array3<f64>) -> PyResult<()> {
+    let mut target = target.as_array_mut();
+    if target.shape() != result.shape() {
+        let (found, expected) = (target.shape(), result.shape());
+        return Err(PyValueError::new_err(format!("out has shape {found:?}, expected {expected:?}")));
+    }
+    target.assign(result);
+    Ok(())
+}

@@ -1,0 +1,52 @@
+"""Parametric dynamic movement primitives: one primitive learnt from many demonstrations.
+
+From several demonstrations of one skill, `fit` learns a single dynamical system with a few style
+parameters that move between and around them. `Model.rollout` plans, `Model.controller` runs inside
+a control loop.
+
+References
+----------
+T. Matsubara, S.-H. Hyon, J. Morimoto, "Learning parametric dynamic movement primitives from
+multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
+"""
+
+from pdmp._native import (
+    GP,
+    Controller,
+    Demonstration,
+    FitError,
+    GPRegression,
+    Model,
+    ModelFileError,
+    NGnet,
+    NGnetRegression,
+    PdmpError,
+    Prediction,
+    Status,
+    Trajectory,
+    __version__,
+    fit,
+    load,
+)
+from pdmp.arguments import as_demonstrated, blend
+
+__all__ = [
+    "GP",
+    "Controller",
+    "Demonstration",
+    "FitError",
+    "GPRegression",
+    "Model",
+    "ModelFileError",
+    "NGnet",
+    "NGnetRegression",
+    "PdmpError",
+    "Prediction",
+    "Status",
+    "Trajectory",
+    "__version__",
+    "as_demonstrated",
+    "blend",
+    "fit",
+    "load",
+]

@@ -1,0 +1,311 @@
+# Types of the compiled half. Its documentation lives with the code in crates/pdmp-py: see help().
+#
+# Shapes: M demonstrations, T samples, D degrees of freedom, J style parameters, Q context values,
+# B trajectories, C samples of a regression with P outputs. Times are in s, positions in the unit of
+# each degree of freedom. Whatever numpy can turn into float64 is accepted; float64 comes back.
+
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import Any, ClassVar, Literal, TypeAlias, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_Array: TypeAlias = NDArray[np.float64]
+_Kind: TypeAlias = Literal["discrete", "rhythmic"]
+_Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
+
+__version__: str
+
+class PdmpError(Exception): ...
+class FitError(PdmpError): ...
+class ModelFileError(PdmpError): ...
+
+@final
+class Demonstration:
+    def __new__(
+        cls,
+        position: ArrayLike,  # (T, D)
+        *,
+        dt: float | None = None,
+        time: ArrayLike | None = None,  # (T,)
+        goal: ArrayLike | None = None,  # (D,)
+        context: ArrayLike | None = None,  # (Q,)
+        names: Sequence[str] | None = None,  # D of them
+    ) -> Demonstration: ...
+    @property
+    def position(self) -> _Array: ...  # (T, D)
+    @property
+    def time(self) -> _Array | None: ...  # (T,); None while the rate is unknown
+    @property
+    def dt(self) -> float | None: ...  # None unless given
+    @property
+    def goal(self) -> _Array | None: ...
+    @property
+    def context(self) -> _Array | None: ...
+    @property
+    def names(self) -> list[str] | None: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def n_dofs(self) -> int: ...
+
+def fit(
+    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,  # M of them, or (M, T, D)
+    *,
+    kind: _Kind = "discrete",
+    dt: float | None = None,
+    period: ArrayLike | None = None,  # one, or (M,)
+    contexts: ArrayLike | None = None,  # (M, Q)
+    n_styles: int | None = None,
+    spectrum: float = 0.9,
+    basis: Literal["gp", "ngnet"] | GP | NGnet = "gp",
+    smoothing: Literal["auto"] | float | None = None,
+    nominal: int | None = None,
+    n_samples: int | None = None,
+    dof_scale: Literal["range"] | ArrayLike | None = None,  # (D,)
+    tau: float | None = None,
+    alpha_z: float = 25.0,
+    beta_z: float | None = None,
+    alpha_x: float | None = None,
+    mu: float = 1.0,
+    progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
+) -> Model: ...
+def load(path: str | PathLike[str]) -> Model: ...
+
+@final
+class Model:
+    @property
+    def kind(self) -> _Kind: ...
+    @property
+    def n_demos(self) -> int: ...
+    @property
+    def n_dofs(self) -> int: ...
+    @property
+    def n_styles(self) -> int: ...
+    @property
+    def tau(self) -> float: ...
+    @property
+    def alpha_z(self) -> float: ...
+    @property
+    def beta_z(self) -> float: ...
+    @property
+    def alpha_x(self) -> float | None: ...  # None if rhythmic
+    @property
+    def mu(self) -> float | None: ...  # None if discrete
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def nominal(self) -> int: ...
+    @property
+    def styles(self) -> _Array: ...  # (M, J)
+    @property
+    def singular_values(self) -> _Array: ...  # (M,)
+    @property
+    def goals(self) -> _Array: ...  # (M, D)
+    @property
+    def starts(self) -> _Array: ...  # (M, D)
+    @property
+    def anchors(self) -> _Array: ...  # (M, D)
+    @property
+    def durations(self) -> _Array: ...  # (M,)
+    @property
+    def contexts(self) -> _Array | None: ...  # (M, Q)
+    @property
+    def basis(self) -> str: ...  # what was chosen, in one line
+    @property
+    def table_error(self) -> float: ...  # bound on the error of the compiled landscape
+    def rollout(
+        self,
+        style: ArrayLike | None = None,  # (J,)
+        *,
+        goal: ArrayLike | None = None,  # (D,), as are start, velocity and anchor
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        anchor: ArrayLike | None = None,
+        amplitude: float | None = None,
+        tau: float | None = None,
+        dt: float = 0.01,
+        duration: float | None = None,
+        context: ArrayLike | None = None,  # (Q,)
+    ) -> Trajectory: ...
+    def rollouts(
+        self,
+        styles: ArrayLike,  # (B, J)
+        *,
+        goal: ArrayLike | None = None,  # (D,), as are start, velocity and anchor
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        anchor: ArrayLike | None = None,
+        amplitude: float | None = None,
+        tau: float | None = None,
+        dt: float = 0.01,
+        duration: float | None = None,
+        out: tuple[_Array, _Array] | None = None,
+    ) -> tuple[_Array, _Array]: ...  # positions and velocities (B, T, D)
+    def style_jacobian(
+        self,
+        dt: float = 0.01,
+        *,
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        amplitude: float | None = None,
+        tau: float | None = None,
+        duration: float | None = None,
+    ) -> _Array: ...  # (T, D, J)
+    def style_of(
+        self,
+        demonstration: Demonstration,
+        *,
+        dt: float | None = None,
+        period: float | None = None,
+    ) -> _Array: ...  # (J,)
+    def landscape(self, u: ArrayLike) -> _Array: ...  # (len(u), J, D)
+    def predict(self, context: ArrayLike) -> Prediction: ...
+    def save(self, path: str | PathLike[str]) -> None: ...
+    def controller(
+        self,
+        dt: float = 0.001,
+        style: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        tau: float | None = None,
+        transition: float | None = None,
+        *,
+        anchor: ArrayLike | None = None,
+        amplitude: float | None = None,
+        context: ArrayLike | None = None,
+    ) -> Controller: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class Prediction:
+    @property
+    def style(self) -> _Array: ...  # (J,)
+    @property
+    def goal(self) -> _Array | None: ...  # (D,); None if rhythmic
+    @property
+    def start(self) -> _Array | None: ...  # (D,); None if rhythmic
+    @property
+    def anchor(self) -> _Array | None: ...  # (D,); None if discrete
+    @property
+    def duration(self) -> float: ...
+    @property
+    def covariance(self) -> _Array | None: ...  # of all of these in this order, (P, P)
+
+@final
+class Trajectory:
+    @property
+    def time(self) -> _Array: ...  # (T,)
+    @property
+    def position(self) -> _Array: ...  # (T, D)
+    @property
+    def velocity(self) -> _Array: ...  # (T, D)
+    @property
+    def acceleration(self) -> _Array: ...  # (T, D)
+
+@final
+class Status:
+    WORKING: ClassVar[Status]
+    FINISHED: ClassVar[Status]
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Controller:
+    def step(
+        self,
+        dt: float | None = None,
+        *,
+        measured: ArrayLike | None = None,  # (D,)
+        coupling: ArrayLike | None = None,  # (D,)
+    ) -> Status: ...
+    def reset(
+        self,
+        *,
+        style: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        anchor: ArrayLike | None = None,
+        amplitude: float | None = None,
+        tau: float | None = None,
+    ) -> None: ...
+    @property
+    def position(self) -> _Array: ...  # (D,), a read-only view that each step updates
+    @property
+    def velocity(self) -> _Array: ...
+    @property
+    def acceleration(self) -> _Array: ...
+    @property
+    def phase(self) -> float: ...  # x in (0, 1], or phi in [0, 2 pi)
+    @property
+    def time(self) -> float: ...
+    @property
+    def goal(self) -> _Array: ...
+    @goal.setter
+    def goal(self, goal: ArrayLike, /) -> None: ...
+    @property
+    def style(self) -> _Array: ...
+    @style.setter
+    def style(self, style: ArrayLike, /) -> None: ...
+    @property
+    def anchor(self) -> _Array: ...
+    @anchor.setter
+    def anchor(self, anchor: ArrayLike, /) -> None: ...
+    @property
+    def tau(self) -> float: ...
+    @tau.setter
+    def tau(self, tau: float, /) -> None: ...
+    @property
+    def amplitude(self) -> float: ...
+    @amplitude.setter
+    def amplitude(self, amplitude: float, /) -> None: ...
+
+@final
+class GP:
+    def __new__(
+        cls,
+        kernel: _Kernel = "matern52",
+        length: float | None = None,
+        noise: float | None = None,
+    ) -> GP: ...
+    @property
+    def kernel(self) -> _Kernel: ...
+    @property
+    def length(self) -> float | None: ...
+    @property
+    def noise(self) -> float | None: ...
+    def regress(
+        self,
+        u: ArrayLike,  # (C,)
+        targets: ArrayLike,  # (C, P)
+        *,
+        periodic: bool = False,
+    ) -> GPRegression: ...
+
+@final
+class GPRegression:
+    @property
+    def length(self) -> float: ...
+    @property
+    def noise(self) -> float: ...
+    def predict(self, u: ArrayLike) -> tuple[_Array, _Array]: ...  # mean, variance (len(u), P)
+
+@final
+class NGnet:
+    def __new__(cls, n_basis: int = 50) -> NGnet: ...
+    @property
+    def n_basis(self) -> int: ...
+    def regress(
+        self,
+        u: ArrayLike,  # (C,)
+        targets: ArrayLike,  # (C, P)
+        *,
+        periodic: bool = False,
+    ) -> NGnetRegression: ...
+
+@final
+class NGnetRegression:
+    def predict(self, u: ArrayLike) -> tuple[_Array, None]: ...  # mean (len(u), P), no variance

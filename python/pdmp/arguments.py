@@ -1,0 +1,70 @@
+"""Style, place and pace of a movement, as rollouts and controllers take them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pdmp._native import Model
+
+
+def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
+    """Return the arguments that repeat one demonstration, or the mean of several.
+
+    Parameters
+    ----------
+    model : Model
+        The primitive.
+    demos : int or sequence of int
+        Indices of demonstrations, from 0 to M - 1.
+
+    Returns
+    -------
+    dict
+        `style` (J,), `tau` [s], and `goal` and `start` (D,) of a discrete or `anchor` (D,) of a
+        rhythmic primitive, for `Model.rollout` and `Model.controller`.
+
+    Raises
+    ------
+    ValueError
+        No index, or one outside the demonstrations.
+
+    Examples
+    --------
+    >>> trajectory = model.rollout(**pdmp.as_demonstrated(model, 3))
+    """
+    rows = np.atleast_1d(np.asarray(demos))
+    if rows.size == 0:
+        raise ValueError("demos is empty: pass at least one index")
+    for row in rows:
+        if not 0 <= row < model.n_demos:
+            raise ValueError(f"demos: {row} must lie between 0 and {model.n_demos - 1}")
+    share = model.durations[rows].mean() / model.durations[model.nominal]
+    arguments = {"style": model.styles[rows].mean(axis=0), "tau": float(model.tau * share)}
+    if model.kind == "discrete":
+        arguments["goal"] = model.goals[rows].mean(axis=0)
+        arguments["start"] = model.starts[rows].mean(axis=0)
+    else:
+        arguments["anchor"] = model.anchors[rows].mean(axis=0)
+    return arguments
+
+
+def blend(a: Mapping[str, ArrayLike], b: Mapping[str, ArrayLike], share: float) -> dict[str, Any]:
+    """Return the arguments (1 - share) a + share b, name by name.
+
+    Parameters
+    ----------
+    a, b : mapping of str to array_like
+        Arguments with the same names, such as two of `as_demonstrated`, or `{"style": s}`.
+    share : float
+        0 gives `a`, 1 gives `b`; values outside [0, 1] extrapolate.
+
+    Raises
+    ------
+    ValueError
+        Names that only one of the two has.
+    """
+    if single := sorted(a.keys() ^ b.keys()):
+        raise ValueError(f"{', '.join(single)}: given for one of the two only; give it for both")
+    return {name: (1 - share) * np.asarray(a[name]) + share * np.asarray(b[name]) for name in a}

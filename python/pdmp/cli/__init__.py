@@ -1,0 +1,5 @@
+"""The command `pdmp`."""
+
+from pdmp.cli.main import main
+
+__all__ = ["main"]

@@ -1,0 +1,28 @@
+"""Progress of a long call, on standard error."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, float], None]]:
+    """Give a function that shows the stage of a fit and the share of it that is done.
+
+    A terminal shows both in place, for as long as the fit lasts; elsewhere each stage is a line.
+    """
+    live = sys.stderr.isatty()
+    stages: list[str] = []
+
+    def show(stage: str, share: float) -> None:
+        if live:
+            print(f"\r\x1b[K{stage} {share:.0%}", end="", file=sys.stderr, flush=True)
+        elif stage not in stages:
+            stages.append(stage)
+            print(stage, file=sys.stderr)
+
+    try:
+        yield show
+    finally:
+        if live:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,41 @@
+"""Tell what a model file holds.
+
+example: pdmp info reach.safetensors
+"""
+
+from argparse import ArgumentParser, Namespace
+
+import pdmp
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument("model", metavar="MODEL", help="model file")
+
+
+def run(options: Namespace) -> None:
+    """Load and print."""
+    model = pdmp.load(options.model)
+    total = model.singular_values.sum() or 1.0
+    kept = model.singular_values[: model.n_styles].sum() / total
+    constants = f"alpha_z {model.alpha_z:g}, beta_z {model.beta_z:g}"
+    if model.alpha_x is not None:
+        constants += f", alpha_x {model.alpha_x:g}"
+    if model.mu is not None:
+        constants += f", mu {model.mu:g}"
+    lines = {
+        "kind": model.kind,
+        "demonstrations": f"{model.n_demos}, nominal {model.nominal}",
+        "durations": f"{model.durations.min():g} to {model.durations.max():g} s",
+        "DoFs": f"{model.n_dofs}: {', '.join(model.names)}",
+        "styles": f"{model.n_styles}, {kept:.1%} of the singular values",
+        "singular values": " ".join(f"{value:.4g}" for value in model.singular_values),
+        "basis": f"{model.basis}; table error {model.table_error:.1e}",
+        "tau": f"{model.tau:g} s",
+        "constants": constants,
+    }
+    if model.contexts is not None:
+        low, high = model.contexts.min(axis=0), model.contexts.max(axis=0)
+        lines["contexts"] = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high, strict=True))
+    for name, text in lines.items():
+        print(f"{name:<16}{text}")

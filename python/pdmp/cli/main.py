@@ -1,0 +1,70 @@
+"""Parametric dynamic movement primitives: learn one from demonstrations, run it, look at it."""
+
+import os
+import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Sequence
+
+from pdmp._native import PdmpError, __version__
+from pdmp.cli import demo, fit, info, plot, rollout
+
+COMMANDS = {"fit": fit, "rollout": rollout, "info": info, "plot": plot, "demo": demo}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit code: 0 for success, 1 for an error, which is told in one line on standard error, and
+        130 after an interruption.
+
+    Raises
+    ------
+    SystemExit
+        With code 2 for wrong usage, with code 0 after `--help` and `--version`.
+    """
+    options = _parser().parse_args(argv)
+    try:
+        options.run(options)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        print("pdmp: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # Whoever read the output has gone; what is left of it must not raise at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except (PdmpError, ValueError, OSError, ImportError) as error:
+        print(f"pdmp: error: {_in_one_line(error)}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> ArgumentParser:
+    parser = ArgumentParser("pdmp", description=__doc__)
+    parser.add_argument("--version", action="version", version=f"pdmp {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for name, command in COMMANDS.items():
+        description = command.__doc__ or ""
+        command_parser = commands.add_parser(
+            name,
+            help=description.splitlines()[0].rstrip("."),
+            description=description,
+            formatter_class=RawDescriptionHelpFormatter,
+        )
+        command.arguments(command_parser)
+        command_parser.set_defaults(run=command.run)
+    return parser
+
+
+def _in_one_line(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split())

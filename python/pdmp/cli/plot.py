@@ -1,0 +1,48 @@
+"""Draw a model into a folder.
+
+With the demonstrations that it learnt from, they are drawn against their reproductions too.
+
+example: pdmp plot reach.safetensors recordings/ --columns q1 q2 q3 --unit rad -o figures
+"""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+import pdmp
+from pdmp import demos, plot
+from pdmp.cli import _options
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument("model", metavar="MODEL", help="model file")
+    parser.add_argument("paths", nargs="*", metavar="PATH", help="its demonstrations, as for fit")
+    parser.add_argument("-o", "--output", required=True, metavar="FOLDER", help="where to write")
+    _options.add_reading(parser)
+    parser.add_argument("--unit", default="", help="unit of the positions")
+
+
+def run(options: Namespace) -> None:
+    """Load, draw, write."""
+    model = pdmp.load(options.model)
+    first = model.styles[:, 0]
+    ends = [int(first.argmin()), int(first.argmax())]
+    figures = {
+        "spectrum": plot.spectrum(model),
+        "styles": plot.styles(model),
+        "fan": plot.fan(
+            model,
+            *(pdmp.as_demonstrated(model, end) for end in ends),
+            ends=(f"demo {ends[0]}", f"demo {ends[1]}"),
+            unit=options.unit,
+        ),
+    }
+    if model.kind == "rhythmic":
+        figures["phase_portrait"] = plot.phase_portrait(model, unit=options.unit)
+    if options.paths:
+        recordings = demos.read(options.paths, columns=options.columns, dt=options.dt)
+        figures["demonstrations"] = plot.demonstrations(model, recordings, unit=options.unit)
+    for name, figure in figures.items():
+        path = Path(options.output, f"{name}.png")
+        plot.save(figure, path)
+        print(path)

@@ -1,0 +1,67 @@
+"""The tables of the report, in Markdown."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+import pdmp
+from pdmp.demo.loop import Run
+
+
+def spectrum_table(model: pdmp.Model) -> str:
+    """Tell how much of the singular-value sum each style parameter adds, and two left out."""
+    shares = model.singular_values / model.singular_values.sum()
+    sums = shares.cumsum()
+    return _table(
+        ["singular value", "share", "sum"],
+        ([k + 1, f"{shares[k]:.1%}", f"{sums[k]:.1%}"] for k in range(model.n_styles + 2)),
+    )
+
+
+def error_table(
+    models: Sequence[pdmp.Model],
+    demos: Sequence[pdmp.Demonstration],
+    members: Mapping[str, Sequence[int]],
+) -> str:
+    """Tell the mean error of the reproductions of each shape, with each of the models."""
+    return _table(
+        ["shape", *(f"error, J = {model.n_styles}" for model in models)],
+        (
+            [
+                shape,
+                *(f"{np.mean([_error(model, demos, m) for m in rows]):.1e}" for model in models),
+            ]
+            for shape, rows in members.items()
+        ),
+    )
+
+
+def loop_table(runs: Mapping[str, Run]) -> str:
+    """Tell where each loop ended and how long its ticks took."""
+    return _table(
+        ["control loop at 1 kHz", "left to the goal", "mean tick", "worst tick"],
+        (
+            [name, f"{run.left:.1e} mm", f"{run.ticks.mean():.2f} µs", f"{run.ticks.max():.1f} µs"]
+            for name, run in runs.items()
+        ),
+    )
+
+
+def time_table(times: Mapping[str, float]) -> str:
+    """Tell how long each part took."""
+    return _table(
+        ["part", "time"], ([name, f"{1e3 * time:.1f} ms"] for name, time in times.items())
+    )
+
+
+def _error(model: pdmp.Model, demos: Sequence[pdmp.Demonstration], m: int) -> float:
+    """Return the RMSE of the reproduction of demonstration `m` over the range of its movement."""
+    position = demos[m].position
+    dt = model.durations[m] / (len(position) - 1)
+    gap = model.rollout(**pdmp.as_demonstrated(model, m), dt=dt).position - position
+    return float(np.sqrt(np.mean(gap**2)) / np.ptp(position, axis=0).max())
+
+
+def _table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)

@@ -1,0 +1,98 @@
+"""NPZ files: several demonstrations in one."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from os import PathLike
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdmp._native import Demonstration
+from pdmp.demos import _text
+from pdmp.demos._recording import demonstration
+
+
+def read_npz(
+    path: str | PathLike[str],
+    *,
+    columns: Sequence[str] | None = None,
+    dt: float | None = None,
+) -> dict[str, Demonstration]:
+    """Read the demonstrations in an NPZ file, by name ("0", "1", … where they have none).
+
+    Parameters
+    ----------
+    path : path
+        An NPZ file in one of the two layouts that `pdmp.demos` describes.
+    columns : sequence of str, optional
+        Names of the degrees of freedom to keep, in this order; all by default.
+    dt : float, optional
+        Sampling interval [s], in place of time stamps.
+
+    Raises
+    ------
+    ValueError
+        A layout other than these, a name that is missing, neither time stamps nor `dt`, or what
+        `Demonstration` refuses.
+    OSError
+        A file that cannot be read.
+    """
+    return {
+        name: demonstration(f"{path}, '{name}'", position, **given)
+        for name, position, given in recordings(Path(path), columns, dt)
+    }
+
+
+def recordings(
+    path: Path, columns: Sequence[str] | None, dt: float | None
+) -> Iterator[tuple[str, NDArray[Any], dict[str, Any]]]:
+    """Yield name, positions (T, D) and the other arguments of each demonstration in the file."""
+    arrays = _arrays(path)
+    names = [str(name) for name in arrays.pop("names")] if "names" in arrays else None
+    if columns is not None and names is None:
+        raise ValueError(f"{path}: no array 'names' to tell which columns are {', '.join(columns)}")
+    for name, position, time in _parts(path, arrays):
+        if position.ndim != 2 or (names is not None and position.shape[1] != len(names)):
+            expected = "D" if names is None else len(names)
+            raise ValueError(f"{path}, '{name}': shape {position.shape}, expected (T, {expected})")
+        if dt is None and time is None:
+            raise ValueError(f"{path}, '{name}': no time stamps: pass dt=")
+        kept = names
+        if columns is not None and names is not None:
+            kept = list(columns)
+            position = position[:, [_text.column(path, names, column) for column in kept]]
+        yield name, position, {"dt": dt, "time": time if dt is None else None, "names": kept}
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        archive = np.load(path, allow_pickle=False)
+        if isinstance(archive, np.ndarray):
+            raise ValueError("it is a single array; use numpy.savez")
+        with archive:
+            return dict(archive)
+    except (BadZipFile, EOFError, ValueError) as error:
+        raise ValueError(f"{path}: not an NPZ file of plain arrays: {error}") from None
+
+
+def _parts(
+    path: Path, arrays: dict[str, NDArray[Any]]
+) -> Iterator[tuple[str, NDArray[Any], NDArray[Any] | None]]:
+    """Yield name, positions and time stamps of each demonstration, in either layout."""
+    if "y" not in arrays or "start" not in arrays:
+        for name, position in arrays.items():
+            if not name.endswith(".t"):
+                yield name, position, arrays.get(f"{name}.t")
+        return
+    position, time = arrays["y"], arrays.get("t")
+    start = np.atleast_1d(arrays["start"]).tolist()
+    bounds = [0, *start, len(position)]
+    if len(start) < 2 or any(after < before for before, after in pairwise(bounds)):
+        raise ValueError(
+            f"{path}: 'start' must rise from 0 to at most {len(position)}, got {start}"
+        )
+    for demo, (begin, end) in enumerate(pairwise(start)):
+        yield str(demo), position[begin:end], None if time is None else time[begin:end]

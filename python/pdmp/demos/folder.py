@@ -1,0 +1,115 @@
+"""Folders with an index, and several files and folders at once."""
+
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+
+from pdmp._native import Demonstration
+from pdmp.demos import _text
+from pdmp.demos._recording import demonstration
+from pdmp.demos.archive import read_npz, recordings
+from pdmp.demos.table import read_csv
+
+
+def read(
+    paths: Iterable[str | PathLike[str]],
+    *,
+    columns: Sequence[str] | None = None,
+    dt: float | None = None,
+    context: Sequence[str] | None = None,
+) -> list[Demonstration]:
+    """Read every demonstration in CSV files, NPZ files and folders, in the order given.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Files and folders.
+    columns : sequence of str, optional
+        Names of the degrees of freedom to keep, in this order; all by default.
+    dt : float, optional
+        Sampling interval [s], in place of time stamps.
+    context : sequence of str, optional
+        Columns of the folders' index whose numbers make the context (Q,).
+
+    Raises
+    ------
+    ValueError
+        A file of another format, or what the readers of each format refuse.
+    OSError
+        A file that cannot be read.
+    """
+    demos: list[Demonstration] = []
+    for path in map(Path, paths):
+        if path.is_dir():
+            demos += read_folder(path, columns=columns, dt=dt, context=context).values()
+        elif context is not None:
+            raise ValueError(f"{path}: a context is read from the index.csv of a folder: pass one")
+        elif path.suffix.lower() == ".csv":
+            demos.append(read_csv(path, columns=columns, dt=dt))
+        elif path.suffix.lower() == ".npz":
+            demos += read_npz(path, columns=columns, dt=dt).values()
+        else:
+            raise ValueError(f"{path}: expected a .csv file, an .npz file or a folder")
+    return demos
+
+
+def read_folder(
+    path: str | PathLike[str],
+    *,
+    columns: Sequence[str] | None = None,
+    dt: float | None = None,
+    context: Sequence[str] | None = None,
+) -> dict[str, Demonstration]:
+    """Read the demonstrations that a folder's `index.csv` lists, by their ids.
+
+    Parameters
+    ----------
+    path : path
+        A folder as `pdmp.demos` describes.
+    columns : sequence of str, optional
+        Names of the degrees of freedom to keep, in this order; all by default.
+    dt : float, optional
+        Sampling interval [s], in place of time stamps.
+    context : sequence of str, optional
+        Columns of the index whose numbers make the context (Q,) of each demonstration.
+
+    Raises
+    ------
+    ValueError
+        An index without `id`, or with one twice, a context that is not a finite number, or what
+        `read_csv` and `read_npz` refuse.
+    OSError
+        A file that cannot be read.
+    """
+    path = Path(path)
+    contexts = _contexts(path / "index.csv", context or [])
+    archive = path / "demos.npz"
+    if not archive.exists():
+        return {
+            name: read_csv(path / "demos" / f"{name}.csv", columns=columns, dt=dt, context=values)
+            for name, values in contexts.items()
+        }
+    found = list(recordings(archive, columns, dt))
+    if len(found) != len(contexts):
+        raise ValueError(
+            f"{archive}: holds {len(found)} demonstrations, but index.csv lists {len(contexts)}"
+        )
+    return {
+        name: demonstration(f"{archive}, '{name}'", position, context=values, **given)
+        for (name, values), (_, position, given) in zip(contexts.items(), found, strict=True)
+    }
+
+
+def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float] | None]:
+    """Read the ids in an index, each with its context."""
+    lines = _text.rows(path)
+    _, header = next(lines)
+    name = _text.column(path, header, "id")
+    where = [_text.column(path, header, column) for column in columns]
+    contexts: dict[str, list[float] | None] = {}
+    for line, fields in lines:
+        if fields[name] in contexts:
+            raise ValueError(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
+        values = [_text.number(path, line, header[k], fields[k]) for k in where]
+        contexts[fields[name]] = values or None
+    return contexts

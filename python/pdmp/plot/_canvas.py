@@ -1,0 +1,113 @@
+"""What all figures share: a canvas, colours that the colour-blind tell apart, labelled axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from pdmp._files import replacing
+from pdmp._native import Model
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's palette, those that read best on white first.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+BLUE, ORANGE, GREY = PALETTE[0], PALETTE[1], "#B8B8B8"
+
+
+def canvas(figure: Figure | None, width: float, height: float) -> Figure:
+    """Return `figure`, or a new one of this size [inches]."""
+    if figure is not None:
+        return figure
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise ImportError("figures need matplotlib: pip install 'pdmp[plot]'") from None
+    return Figure(figsize=(width, height), layout="constrained", dpi=150)
+
+
+def gradient() -> Colormap:
+    """Return colours from blue to orange, none of them too pale on white."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("pdmp", [BLUE, PALETTE[3], ORANGE])
+
+
+def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
+    """Label the axes, and leave out the ink that says nothing."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.set_title(title)
+    axes.grid(alpha=0.25, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def dof_labels(model: Model, unit: str) -> list[str]:
+    """Return the names of the degrees of freedom, with the unit where it is known."""
+    return [f"{name} [{unit}]" if unit else name for name in model.names]
+
+
+def movement_panels(
+    model: Model, titles: Sequence[str], unit: str, figure: Figure | None
+) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure and, per title, a column of panels for `draw_movement`.
+
+    The path comes first where there are two degrees of freedom; then each of them over time.
+    """
+    has_path = model.n_dofs == 2
+    heights = [3.6] * has_path + [1.7] * model.n_dofs
+    figure = canvas(figure, max(3.2 * len(titles), 5.5), sum(heights) + 0.5)
+    grid = figure.subplots(len(heights), len(titles), squeeze=False, height_ratios=heights)
+    labels = dof_labels(model, unit)
+    for column, title in zip(grid.T, titles, strict=True):
+        if has_path:
+            dress(column[0], *labels)
+            column[0].set_aspect("equal", adjustable="datalim")
+        for axes, label in zip(column[has_path:], labels, strict=True):
+            dress(axes, "time [s]", label)
+        column[0].set_title(title)
+    return figure, [list(column) for column in grid.T]
+
+
+def draw_movement(
+    panels: Sequence[Axes], time: NDArray[Any], position: NDArray[Any], **look: Any
+) -> None:
+    """Draw positions (T, D) in a column of `movement_panels`."""
+    n_dofs = position.shape[1]
+    if len(panels) > n_dofs:
+        panels[0].plot(*position.T, **look)
+    for axes, trace in zip(panels[-n_dofs:], position.T, strict=True):
+        axes.plot(time, trace, **look)
+
+
+def legend(figure: Figure, axes: Axes) -> None:
+    """Put one entry per label of `axes` below the figure."""
+    handles, labels = axes.get_legend_handles_labels()
+    entries = dict(zip(labels, handles, strict=True))
+    figure.legend(
+        list(entries.values()),
+        list(entries),
+        loc="outside lower center",
+        ncols=len(entries),
+        frameon=False,
+    )
+
+
+def save(figure: Figure, path: str | PathLike[str]) -> None:
+    """Write a figure as PNG. The file appears when it is complete.
+
+    Raises
+    ------
+    OSError
+        A file that cannot be written.
+    """
+    with replacing(path) as draft:
+        figure.savefig(draft, format="png")

@@ -1,0 +1,136 @@
+"""Figures of movements: demonstrations against reproductions, and a fan between two styles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pdmp._native import Demonstration, Model
+from pdmp.arguments import as_demonstrated, blend
+from pdmp.plot._canvas import BLUE, GREY, draw_movement, gradient, legend, movement_panels
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SAMPLES = 500
+
+
+def demonstrations(
+    model: Model,
+    demos: Sequence[Demonstration],
+    *,
+    labels: Sequence[str] | None = None,
+    unit: str = "",
+    figure: Figure | None = None,
+) -> Figure:
+    """Draw the demonstrations and what the model makes of them, one column per label.
+
+    Rows are the degrees of freedom over time, below the path itself where there are two.
+
+    Parameters
+    ----------
+    model : Model
+        The primitive learnt from `demos`.
+    demos : sequence of Demonstration
+        The M demonstrations, in the order of the fit.
+    labels : sequence of str, optional
+        What each of the M demonstrations shows.
+    unit : str
+        Unit of the positions, such as "mm".
+    figure : matplotlib.figure.Figure, optional
+        Where to draw.
+
+    Raises
+    ------
+    ValueError
+        A number of demonstrations or labels other than M.
+    ImportError
+        matplotlib is not installed.
+    """
+    labels = [""] * len(demos) if labels is None else labels
+    for name, length in (("demos", len(demos)), ("labels", len(labels))):
+        if length != model.n_demos:
+            raise ValueError(
+                f"{name} has length {length}, expected {model.n_demos}: "
+                "one per demonstration of the fit"
+            )
+    titles = list(dict.fromkeys(labels))
+    figure, columns = movement_panels(model, titles, unit, figure)
+    for m, (demo, label) in enumerate(zip(demos, labels, strict=True)):
+        panels = columns[titles.index(label)]
+        duration = model.durations[m]
+        made = model.rollout(**as_demonstrated(model, m), dt=duration / SAMPLES)
+        if demo.time is not None:
+            time = demo.time - demo.time[0]
+        else:
+            time = np.linspace(0, duration, demo.n_samples, endpoint=model.kind == "discrete")
+        draw_movement(panels, time, demo.position, color=GREY, linewidth=3, label="demonstration")
+        draw_movement(
+            panels, made.time, made.position, color=BLUE, linewidth=0.9, label="reproduction"
+        )
+    legend(figure, columns[0][0])
+    return figure
+
+
+def fan(
+    model: Model,
+    a: Mapping[str, ArrayLike],
+    b: Mapping[str, ArrayLike],
+    *,
+    n: int = 9,
+    ends: tuple[str, str] = ("a", "b"),
+    unit: str = "",
+    figure: Figure | None = None,
+) -> Figure:
+    """Draw the movements from one style to another.
+
+    Parameters
+    ----------
+    model : Model
+        The primitive.
+    a, b : mapping of str to array_like
+        Arguments of `Model.rollout` at both ends, such as `{"style": s}` or what `as_demonstrated`
+        returns; those in between are blended.
+    n : int
+        Number of movements, at least 2.
+    ends : tuple of str
+        Names of `a` and `b`.
+    unit : str
+        Unit of the positions, such as "mm".
+    figure : matplotlib.figure.Figure, optional
+        Where to draw.
+
+    Raises
+    ------
+    ValueError
+        Fewer than two movements, or arguments that `blend` or `Model.rollout` refuses.
+    ImportError
+        matplotlib is not installed.
+    """
+    if n < 2:
+        raise ValueError(f"n = {n}: must be at least 2, the two ends")
+    shares = np.linspace(0, 1, n)
+    dt = model.durations.min() / SAMPLES
+    rollouts = [model.rollout(**blend(a, b, share), dt=dt) for share in shares]
+    figure, (panels,) = movement_panels(model, [""], unit, figure)
+    from matplotlib.cm import ScalarMappable
+
+    shade = ScalarMappable(cmap=gradient())
+    shade.set_clim(0, 1)
+    for share, made in zip(shares, rollouts, strict=True):
+        draw_movement(
+            panels,
+            made.time,
+            made.position,
+            color=shade.to_rgba(share),
+            linewidth=2.4 if share in (0, 1) else 1.2,
+            marker="o",
+            markevery=[0],
+            markersize=4,
+        )
+    bar = figure.colorbar(shade, ax=panels, ticks=[0, 0.5, 1], aspect=40)
+    bar.ax.set_yticklabels([ends[0], "half way", ends[1]])
+    return figure

@@ -1,0 +1,75 @@
+"""The phase portrait of a rhythmic primitive."""
+
+from __future__ import annotations
+
+from math import ceil, pi
+from typing import TYPE_CHECKING
+
+from pdmp._native import Model
+from pdmp.arguments import as_demonstrated
+from pdmp.plot._canvas import BLUE, GREY, canvas, dof_labels, dress, legend
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SAMPLES = 500
+PERIODS = 4
+
+
+def phase_portrait(model: Model, *, unit: str = "", figure: Figure | None = None) -> Figure:
+    """Draw velocity over position: the limit cycles, and how a movement from rest joins one.
+
+    Parameters
+    ----------
+    model : Model
+        A rhythmic primitive.
+    unit : str
+        Unit of the positions, such as "rad".
+    figure : matplotlib.figure.Figure, optional
+        Where to draw.
+
+    Raises
+    ------
+    ValueError
+        A discrete primitive.
+    ImportError
+        matplotlib is not installed.
+    """
+    if model.kind != "rhythmic":
+        raise ValueError(f"model: a {model.kind} primitive has no limit cycle: pass a rhythmic one")
+    n_columns = min(model.n_dofs, 4)
+    n_rows = ceil(model.n_dofs / n_columns)
+    figure = canvas(figure, max(3.6 * n_columns, 5.5), 3.4 * n_rows + 0.5)
+    panels = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
+    cycles = [
+        model.rollout(**as_demonstrated(model, m), dt=model.durations[m] / SAMPLES)
+        for m in range(model.n_demos)
+    ]
+    centre = model.anchors[model.nominal]
+    period = 2 * pi * model.tau
+    joining = model.rollout(
+        start=centre, velocity=0 * centre, duration=PERIODS * period, dt=period / SAMPLES
+    )
+    for dof, (axes, label) in enumerate(zip(panels, dof_labels(model, unit), strict=False)):
+        for cycle in cycles:
+            axes.plot(
+                cycle.position[:, dof],
+                cycle.velocity[:, dof],
+                color=GREY,
+                linewidth=1,
+                label="limit cycles",
+            )
+        axes.plot(
+            joining.position[:, dof],
+            joining.velocity[:, dof],
+            color=BLUE,
+            linewidth=1.4,
+            marker="o",
+            markevery=[0],
+            label="from rest",
+        )
+        dress(axes, label, f"velocity [{unit or 1}/s]")
+    for axes in panels[model.n_dofs :]:
+        axes.set_axis_off()
+    legend(figure, panels[0])
+    return figure

@@ -1,0 +1,30 @@
+"""Small families of movements that the tests learn from."""
+
+import numpy as np
+
+import pdmp
+
+DT = 0.02
+
+
+def reaches() -> list[pdmp.Demonstration]:
+    """Return five planar minimum-jerk reaches that differ in bend, goal and duration."""
+    demos = []
+    for bend in (-0.2, -0.1, 0.0, 0.1, 0.2):
+        s = np.linspace(0, 1, 61 + round(50 * bend))
+        forward = (1 + bend) * s**3 * (10 - 15 * s + 6 * s**2)
+        sideways = bend * 64 * (s * (1 - s)) ** 3
+        position = np.column_stack([forward, sideways])
+        demos.append(pdmp.Demonstration(position, dt=DT, context=[bend], names=["x", "y"]))
+    return demos
+
+
+def loops() -> list[pdmp.Demonstration]:
+    """Return three planar loops from a circle to a figure of eight, one cycle of 2 s each."""
+    phi = np.linspace(0, 2 * np.pi, 100, endpoint=False)
+    return [
+        pdmp.Demonstration(
+            np.column_stack([np.cos(phi), (1 - k) * np.sin(phi) + k * np.sin(2 * phi)]), dt=DT
+        )
+        for k in (0.0, 0.5, 1.0)
+    ]

@@ -1,0 +1,214 @@
+"""The command line does what its help says, and fails in one line with the right exit code."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import demos
+from pdmp.cli import main
+from synthetic import DT, loops, reaches
+
+COMMANDS = ["fit", "rollout", "info", "plot", "demo"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder of five reaches with their bend in the index."""
+    path = tmp_path / "recordings"
+    (path / "demos").mkdir(parents=True)
+    index = ["id,bend"]
+    for m, demo in enumerate(reaches()):
+        rows = np.column_stack([DT * np.arange(demo.n_samples), demo.position])
+        np.savetxt(path / "demos" / f"{m}.csv", rows, "%.17g", ",", header="t,x,y", comments="")
+        index.append(f"{m},{demo.context[0]}")
+    (path / "index.csv").write_text("\n".join(index))
+    return path
+
+
+@pytest.fixture
+def model_file(tmp_path: Path) -> Path:
+    """Return the file of a model of five reaches with two style parameters."""
+    path = tmp_path / "model.safetensors"
+    pdmp.fit(reaches(), n_styles=2).save(path)
+    return path
+
+
+def run(*arguments: object) -> int:
+    """Run the command line and return its exit code."""
+    return main([str(argument) for argument in arguments])
+
+
+def test_fit_learns_what_the_library_learns(folder: Path, tmp_path: Path) -> None:
+    """The model file holds the styles and contexts of the same fit made in Python."""
+    path = tmp_path / "model.safetensors"
+    assert run("fit", folder, "--context", "bend", "--styles", 2, "-o", path) == 0
+    model = pdmp.load(path)
+    expected = pdmp.fit(demos.read([folder], context=["bend"]), n_styles=2)
+    np.testing.assert_array_equal(model.styles, expected.styles)
+    np.testing.assert_array_equal(model.contexts, expected.contexts)
+
+
+def test_fit_takes_single_files(folder: Path, tmp_path: Path) -> None:
+    """CSV files are one demonstration each, with the columns that are asked for."""
+    path = tmp_path / "model.safetensors"
+    files = sorted((folder / "demos").glob("*.csv"))[:3]
+    assert run("fit", *files, "--columns", "y", "--basis", "ngnet", "-o", path) == 0
+    model = pdmp.load(path)
+    assert (model.n_demos, list(model.names)) == (3, ["y"])
+
+
+def test_fit_learns_rhythmic_ones(tmp_path: Path) -> None:
+    """The kind is handed on."""
+    archive, path = tmp_path / "loops.npz", tmp_path / "model.safetensors"
+    np.savez(archive, *[demo.position for demo in loops()])
+    assert run("fit", archive, "--kind", "rhythmic", "--dt", DT, "-o", path) == 0
+    assert pdmp.load(path).kind == "rhythmic"
+
+
+def test_fit_tells_its_progress_on_standard_error(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Standard output holds the result alone."""
+    run("fit", folder, "-o", tmp_path / "model.safetensors")
+    captured = capsys.readouterr()
+    assert captured.err
+    assert len(captured.out.splitlines()) == 1
+
+
+def test_rollout_writes_the_movement(model_file: Path, tmp_path: Path) -> None:
+    """The CSV holds, to the last bit, what the library's rollout returns."""
+    path = tmp_path / "out.csv"
+    code = run("rollout", model_file, "--style", 0.1, -0.2, "--goal", 1, 0.5, "-o", path)
+    assert code == 0
+    model = pdmp.load(model_file)
+    expected = model.rollout([0.1, -0.2], goal=[1, 0.5])
+    made = demos.read_csv(path, columns=model.names)
+    np.testing.assert_array_equal(made.position, expected.position)
+
+
+def test_rollout_repeats_a_demonstration(model_file: Path, tmp_path: Path) -> None:
+    """With --demo, style, place and duration are those of the demonstration."""
+    path = tmp_path / "out.csv"
+    assert run("rollout", model_file, "--demo", 4, "--dt", DT, "-o", path) == 0
+    made = demos.read_csv(path, columns=["x", "y"])
+    np.testing.assert_allclose(made.position[-1], reaches()[4].position[-1], atol=0.02)
+    assert made.n_samples == reaches()[4].n_samples
+
+
+def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
+    """With --context, the movement is the one that the library predicts."""
+    path = tmp_path / "out.csv"
+    assert run("rollout", model_file, "--context", 0.15, "-o", path) == 0
+    expected = pdmp.load(model_file).rollout(context=[0.15])
+    made = demos.read_csv(path, columns=["x", "y"])
+    np.testing.assert_array_equal(made.position, expected.position)
+
+
+def test_info_tells_kind_names_and_styles(
+    model_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The most asked of a model file is told, a line each."""
+    assert run("info", model_file) == 0
+    text = capsys.readouterr().out
+    for expected in (r"kind +discrete", r"DoFs +2: x, y", r"styles +2, .*%", r"demonstrations +5"):
+        assert re.search(expected, text)
+
+
+def test_plot_writes_every_figure(model_file: Path, folder: Path, tmp_path: Path) -> None:
+    """With demonstrations, they are drawn too; a discrete model has no phase portrait."""
+    figures = tmp_path / "figures"
+    assert run("plot", model_file, folder, "-o", figures) == 0
+    written = {path.name for path in figures.iterdir()}
+    assert written == {"demonstrations.png", "fan.png", "spectrum.png", "styles.png"}
+
+
+def test_plot_draws_the_phase_portrait_of_a_rhythmic_model(tmp_path: Path) -> None:
+    """A rhythmic model has its phase portrait drawn."""
+    path = tmp_path / "model.safetensors"
+    pdmp.fit(loops(), kind="rhythmic").save(path)
+    assert run("plot", path, "-o", tmp_path) == 0
+    assert (tmp_path / "phase_portrait.png").exists()
+
+
+def test_demo_writes_model_report_and_the_figures_it_shows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every figure that the report shows is there, and the tables are printed."""
+    assert run("demo", "-o", tmp_path) == 0
+    report = (tmp_path / "report.md").read_text(encoding="utf-8")
+    figures = re.findall(r"\((\w+\.png)\)", report)
+    assert len(figures) == 5
+    for name in [*figures, "model.safetensors"]:
+        assert (tmp_path / name).stat().st_size > 0
+    assert capsys.readouterr().out.strip() in report
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The help of each command ends well and shows a line to start from."""
+    with pytest.raises(SystemExit, match="0"):
+        run(command, "--help")
+    assert f"example: pdmp {command}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["dance"], ["fit"], ["rollout", "m", "--style", "1", "--demo", "0"]]
+)
+def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
+    """Usage errors are told from all others by their exit code."""
+    with pytest.raises(SystemExit, match="2"):
+        run(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["info", "none.safetensors"], "none.safetensors"),
+        (["fit", "none.csv", "-o", "m"], "none.csv: No such file"),
+        (["rollout", "{model}", "--style", "1", "-o", "o"], "style has length 1, expected 2"),
+        (["rollout", "{model}", "--demo", "9", "-o", "o"], "9 must lie between 0 and 4"),
+        (["info", "{index}"], "model file"),
+    ],
+)
+def test_errors_are_one_line_and_exit_with_1(
+    model_file: Path,
+    folder: Path,
+    arguments: list[str],
+    message: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Whatever goes wrong, one line on standard error says what, without a traceback."""
+    places = {"model": model_file, "index": folder / "index.csv"}
+    assert run(*(argument.format(**places) for argument in arguments)) == 1
+    captured = capsys.readouterr()
+    assert re.fullmatch(rf"pdmp: error: .*{message}.*\n", captured.err)
+    assert captured.out == ""
+
+
+def test_interruption_exits_with_130_and_leaves_no_file(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C during a fit ends it without a model file."""
+
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pdmp, "fit", interrupt)
+    path = tmp_path / "model.safetensors"
+    assert run("fit", folder, "-o", path) == 130
+    assert not path.exists()
+
+
+def test_reader_that_leaves_early_sees_no_traceback(model_file: Path) -> None:
+    """Output into a closed pipe ends quietly."""
+    command = [sys.executable, "-m", "pdmp", "info", str(model_file)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.close()
+    with process.stderr as errors:
+        assert errors.read() == b""
+    assert process.wait() == 1

@@ -1,0 +1,131 @@
+"""Figures show what they say, on axes that name quantity and unit."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+import pdmp
+from pdmp import plot
+from synthetic import loops, reaches
+
+
+@pytest.fixture(scope="module")
+def model() -> pdmp.Model:
+    """Return a discrete model of five reaches."""
+    return pdmp.fit(reaches(), n_styles=2)
+
+
+@pytest.fixture(scope="module")
+def rhythmic() -> pdmp.Model:
+    """Return a rhythmic model of three loops."""
+    return pdmp.fit(loops(), kind="rhythmic", n_styles=2)
+
+
+def labels_of(figure: Figure) -> set[str]:
+    """Return the labels of all axes."""
+    return {text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel())}
+
+
+def test_demonstrations_stand_beside_reproductions(model: pdmp.Model) -> None:
+    """The path panel has a line for each demonstration and one for its reproduction."""
+    figure = plot.demonstrations(model, reaches(), unit="m")
+    assert len(figure.axes[0].lines) == 2 * model.n_demos
+    assert labels_of(figure) == {"x [m]", "y [m]", "time [s]"}
+
+
+def test_demonstrations_have_a_column_per_label(model: pdmp.Model) -> None:
+    """Labels part the demonstrations, in the order in which they appear."""
+    figure = plot.demonstrations(model, reaches(), labels=["b", "b", "a", "a", "a"])
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["b", "a"]
+
+
+@pytest.mark.parametrize("n_dofs", [1, 3])
+def test_only_a_plane_has_a_path_panel(n_dofs: int) -> None:
+    """One and three degrees of freedom are drawn over time alone."""
+    demos = [demo.position[:, [0, 1, 0][:n_dofs]] for demo in reaches()]
+    figure = plot.demonstrations(
+        pdmp.fit(demos, dt=0.02), [pdmp.Demonstration(demo, dt=0.02) for demo in demos]
+    )
+    assert len(figure.axes) == n_dofs
+
+
+def test_demonstrations_must_be_those_of_the_fit(model: pdmp.Model) -> None:
+    """A demonstration too few is refused."""
+    with pytest.raises(ValueError, match="demos has length 4, expected 5"):
+        plot.demonstrations(model, reaches()[:4])
+
+
+def test_spectrum_tells_the_chosen_number_of_styles(model: pdmp.Model) -> None:
+    """The title says how many of how many singular values were kept."""
+    (axes,) = plot.spectrum(model).axes
+    assert axes.get_title().startswith("J = 2 of 5: ")
+
+
+def test_styles_are_labelled(model: pdmp.Model) -> None:
+    """Each label has its own points, as many as demonstrations carry it."""
+    axes = plot.styles(model, ["a", "a", "b", "b", "b"]).axes[0]
+    assert [len(dots.get_offsets()) for dots in axes.collections] == [2, 3]
+
+
+def test_styles_show_the_context(model: pdmp.Model) -> None:
+    """Without labels, a context of one number colours the points."""
+    assert "context" in labels_of(plot.styles(model))
+
+
+@pytest.mark.parametrize("n_styles", [1, 2, 4])
+def test_styles_of_any_dimension_can_be_drawn(n_styles: int) -> None:
+    """One dimension is drawn against the demonstrations, three or more in two planes."""
+    figure = plot.styles(pdmp.fit(reaches(), n_styles=n_styles), ["a"] * 5)
+    assert len(figure.axes) == (2 if n_styles > 2 else 1)
+
+
+def test_fan_has_a_movement_per_share(model: pdmp.Model) -> None:
+    """As many movements as asked for, and a bar that names the two ends."""
+    ends = [{"style": model.styles[m]} for m in (0, 4)]
+    figure = plot.fan(model, *ends, n=6, ends=("left", "right"), unit="m")
+    assert len(figure.axes[0].lines) == 6
+    ticks = [text.get_text() for text in figure.axes[-1].get_yticklabels()]
+    assert ticks == ["left", "half way", "right"]
+
+
+def test_fan_needs_two_ends(model: pdmp.Model) -> None:
+    """A single movement is no fan."""
+    style = {"style": model.styles[0]}
+    with pytest.raises(ValueError, match="n = 1"):
+        plot.fan(model, style, style, n=1)
+
+
+def test_phase_portrait_shows_cycles_and_how_one_is_joined(rhythmic: pdmp.Model) -> None:
+    """Each panel has the cycle of every demonstration and one movement from rest."""
+    figure = plot.phase_portrait(rhythmic, unit="m")
+    assert [len(axes.lines) for axes in figure.axes] == [rhythmic.n_demos + 1] * rhythmic.n_dofs
+    assert "velocity [m/s]" in labels_of(figure)
+
+
+def test_phase_portrait_needs_a_rhythmic_model(model: pdmp.Model) -> None:
+    """A discrete primitive has no limit cycle."""
+    with pytest.raises(ValueError, match="discrete primitive has no limit cycle"):
+        plot.phase_portrait(model)
+
+
+def test_given_figure_is_drawn_on(model: pdmp.Model) -> None:
+    """A figure that is handed in is the one that comes back."""
+    figure = Figure()
+    assert plot.spectrum(model, figure=figure) is figure
+    assert figure.axes
+
+
+def test_saved_figure_is_a_png(model: pdmp.Model, tmp_path: Path) -> None:
+    """Saving makes the folder and writes a PNG, and nothing else."""
+    plot.save(plot.spectrum(model), tmp_path / "new" / "spectrum.png")
+    (file,) = (tmp_path / "new").iterdir()
+    assert file.read_bytes().startswith(b"\x89PNG")
+
+
+def test_missing_matplotlib_is_named(model: pdmp.Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without matplotlib, the error says what to install."""
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(ImportError, match=r"pip install 'pdmp\[plot\]'"):
+        plot.spectrum(model)
