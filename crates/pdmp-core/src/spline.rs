@@ -97,6 +97,7 @@ impl Spline {
     }
 
     /// Values at the knots (n, D).
+    #[cfg(test)]
     pub(crate) fn values(&self) -> ArrayView2<'_, f64> {
         self.values.slice(s![..self.n_knots(), ..])
     }
@@ -116,6 +117,7 @@ impl Spline {
     }
 
     /// Writes the slope at `t` to `out` (D,).
+    #[cfg(test)]
     pub(crate) fn slope(&self, t: f64, out: &mut [f64]) {
         let at = self.place(t);
         for (d, out) in out.iter_mut().enumerate() {
@@ -130,6 +132,7 @@ impl Spline {
     }
 
     /// Slopes (k, D) at `times` (k,).
+    #[cfg(test)]
     pub(crate) fn sample_slopes(&self, times: &[f64]) -> Array2<f64> {
         self.tabulate(times, Self::slope)
     }
