@@ -50,7 +50,9 @@ use crate::model::Model;
 /// alpha_z, beta_z : float
 ///     Constants of the output system; `beta_z` is `alpha_z / 4` (critical damping) unless given.
 /// alpha_x : float, optional
-///     Constant of the discrete canonical system; otherwise x = 0.01 at the end.
+///     Constant of the discrete canonical system; otherwise x = 0.01 at the end. Past the end of the demonstrations
+///     the forcing fades with x: if a movement drifts off its goal there before it settles, `alpha_x = alpha_z` keeps
+///     it closest.
 /// mu : float
 ///     Constant of the rhythmic canonical system.
 /// progress : callable, optional

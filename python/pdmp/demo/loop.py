@@ -58,7 +58,8 @@ def draw_control(
 ) -> Figure:
     """Draw what each command made of the movement."""
     figure, columns = movement_panels(model, list(runs), "mm", None)
-    plain = model.rollout(**arguments, dt=DT)
+    longest = DT * max(len(run.ticks) for run in runs.values())
+    plain = model.rollout(**arguments, dt=DT, duration=longest)
     for panels, run in zip(columns, runs.values(), strict=True):
         time = DT * np.arange(len(run.position))
         at = slice(run.switch, run.switch + 1)

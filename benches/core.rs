@@ -1,0 +1,111 @@
+//! Times of the core's main parts: the stages of a fit, one tick of the controller, rollouts.
+//!
+//! `make bench` runs all; `cargo bench -p pdmp-core -- step` those whose name contains "step".
+#![allow(missing_docs)]
+
+use std::f64::consts::PI;
+use std::hint::black_box;
+use std::sync::Arc;
+
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use ndarray::Array2;
+use pdmp_core::basis::{Basis, Gp, NGnet};
+use pdmp_core::{
+    Alignment, Conditions, Controller, Demonstration, DofScale, FitOptions, Kind, Model, Sampling, Smoothing,
+    StyleCount, Timing, fit,
+};
+
+/// M movements of D = 7 that span a few dimensions, 1001 samples in one second.
+fn demonstrations(n_demos: usize) -> Vec<Demonstration> {
+    let shape = |m: usize, d: usize, s: f64| {
+        let reach = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+        let phase = m as f64 / n_demos as f64;
+        reach * (1.0 + d as f64)
+            + phase * (PI * s).sin().powi(2)
+            + phase * phase * (2.0 * PI * s).sin() * (PI * s).sin()
+    };
+    (0..n_demos)
+        .map(|m| {
+            let position = Array2::from_shape_fn((1001, 7), |(c, d)| shape(m, d, c as f64 / 1000.0));
+            Demonstration::new(position, Sampling::Uniform { dt: 1e-3 }).expect("finite")
+        })
+        .collect()
+}
+
+fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
+    FitOptions {
+        alignment: Alignment {
+            kind: Kind::Discrete,
+            dt: None,
+            period: vec![],
+            smoothing,
+            nominal: None,
+            n_samples: None,
+        },
+        contexts: None,
+        styles: StyleCount::Given(3),
+        basis,
+        dof_scale: DofScale::Unit,
+        tau: None,
+        alpha_z: 25.0,
+        beta_z: None,
+        alpha_x: None,
+        mu: 1.0,
+    }
+}
+
+fn learn(options: &FitOptions) -> Model {
+    fit(&demonstrations(20), options, &mut |_, _| Ok(())).expect("a fit")
+}
+
+fn fits(criterion: &mut Criterion) {
+    let demos = demonstrations(20);
+    let mut group = criterion.benchmark_group("fit M=20 C=1001 D=7 J=3");
+    group.sample_size(10);
+    for (name, basis, smoothing) in [
+        ("ngnet", Basis::NGnet(NGnet::default()), Smoothing::Interpolate),
+        ("ngnet, auto smoothing", Basis::NGnet(NGnet::default()), Smoothing::Auto),
+        ("gp", Basis::Gp(Gp::default()), Smoothing::Interpolate),
+    ] {
+        let options = options(basis, smoothing);
+        group.bench_function(name, |bench| bench.iter(|| fit(&demos, &options, &mut |_, _| Ok(()))));
+    }
+    group.finish();
+}
+
+fn steps(criterion: &mut Criterion) {
+    let model = Arc::new(learn(&options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate)));
+    let start = Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).expect("a controller");
+    let mut live = start.clone();
+    for goal in [[0.5; 7], [0.6; 7]] {
+        live.step().and_then(|_| live.set_goal(&goal)).expect("a goal");
+    }
+    live.set_style(&[0.3, 0.2, 0.1]).expect("a style");
+    live.set_tau(1.3).expect("a time constant");
+    let mut group = criterion.benchmark_group("100 steps D=7 J=3");
+    for (name, from) in [("commands settled", &start), ("style, goal and tau in transition", &live)] {
+        let hundred = |mut controller: Controller| {
+            for _ in 0..100 {
+                black_box(controller.step().expect("a tick"));
+            }
+            controller
+        };
+        group.bench_function(name, |bench| bench.iter_batched(|| from.clone(), hundred, BatchSize::SmallInput));
+    }
+    group.finish();
+}
+
+fn rollouts(criterion: &mut Criterion) {
+    let model = Arc::new(learn(&options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate)));
+    let timing = Timing { dt: 1e-3, duration: None };
+    let mut group = criterion.benchmark_group("rollout 1 s at 1 kHz D=7 J=3");
+    group.bench_function("one", |bench| bench.iter(|| model.rollout(&Conditions::default(), timing)));
+    let styles = Array2::from_shape_fn((100, 3), |(b, j)| (b * 3 + j) as f64 / 300.0);
+    group.bench_function("a batch of 100 styles", |bench| {
+        bench.iter(|| model.rollouts(styles.view(), &Conditions::default(), timing));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, fits, steps, rollouts);
+criterion_main!(benches);

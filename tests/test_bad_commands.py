@@ -1,0 +1,199 @@
+"""Bad arguments of movements are refused, and those given in the loop leave it as it was."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from synthetic import loops, reaches
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.fixture(scope="module")
+def discrete() -> pdmp.Model:
+    """Return a model of reaches with two styles and one context value."""
+    return pdmp.fit(reaches(), n_styles=2)
+
+
+@pytest.fixture(scope="module")
+def rhythmic() -> pdmp.Model:
+    """Return a model of loops with two styles and no context."""
+    return pdmp.fit(loops(), kind="rhythmic", n_styles=2)
+
+
+SHARED: list[tuple[dict[str, Any], str]] = [
+    ({"style": [1]}, "style has length 1, expected 2: one value per style dimension"),
+    ({"style": [[1, 2]]}, r"style has shape \[1, 2\], expected one axis"),
+    ({"style": 1.0}, r"style has shape \[\], expected one axis"),
+    ({"style": [NAN, 0]}, r"style\[0\] = NaN: every number must be finite"),
+    ({"style": [0, 1e200]}, r"style\[.*1\] = 1e200: magnitudes above .* overflow"),
+    ({"style": ["a", "b"]}, "style is not an array of numbers"),
+    ({"style": [1j, 0]}, "style is not an array of numbers"),
+    ({"start": [1]}, "start has length 1, expected 2: one value per DoF"),
+    ({"start": [0, INF]}, r"start\[1\] = inf"),
+    ({"velocity": [1, 2, 3]}, "velocity has length 3, expected 2: one value per DoF"),
+    ({"velocity": [NAN, 0]}, r"velocity\[0\] = NaN"),
+    ({"tau": 0.0}, "tau = 0: must be positive and finite"),
+    ({"tau": -1.0}, "tau = -1: must be positive and finite"),
+    ({"tau": NAN}, "tau = NaN: must be positive and finite"),
+    ({"tau": INF}, "tau = inf: must be positive and finite"),
+    ({"tau": 1e-9}, "tau = .*: must lie within a millionfold"),
+    ({"dt": 0.0}, "dt = 0: must be positive and finite"),
+    ({"dt": -0.1}, "dt = -0.1: must be positive and finite"),
+    ({"dt": NAN}, "dt = NaN: must be positive and finite"),
+]
+DISCRETE: list[tuple[dict[str, Any], str]] = [
+    *SHARED,
+    ({"goal": [1]}, "goal has length 1, expected 2: one value per DoF"),
+    ({"goal": [NAN, 0]}, r"goal\[0\] = NaN"),
+    ({"goal": [0, 1e200]}, r"goal\[.*1\] = 1e200: magnitudes above 1e150 overflow"),
+    ({"anchor": [0, 0]}, "anchor does not apply to a discrete primitive: .*; set goal"),
+    ({"amplitude": 1.0}, "amplitude does not apply to a discrete primitive"),
+    ({"context": [1, 2]}, "context has length 2, expected 1: one value per context value"),
+    ({"context": [NAN]}, r"context\[0\] = NaN"),
+    ({"context": [1e9]}, "context is so far from the demonstrations"),
+    ({"context": [0], "style": [0, 0]}, "pass style or context, not both"),
+]
+RHYTHMIC: list[tuple[dict[str, Any], str]] = [
+    *SHARED,
+    ({"anchor": [1]}, "anchor has length 1, expected 2: one value per DoF"),
+    ({"anchor": [NAN, 0]}, r"anchor\[0\] = NaN"),
+    ({"goal": [0, 0]}, "goal does not apply to a rhythmic primitive: .*; set anchor"),
+    ({"amplitude": -1.0}, "amplitude = -1: must be finite and not negative"),
+    ({"amplitude": NAN}, "amplitude = NaN"),
+    ({"context": [1]}, "the model knows no contexts: fit it with contexts="),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), DISCRETE, ids=str)
+@pytest.mark.parametrize("call", [pdmp.Model.rollout, pdmp.Model.controller])
+def test_bad_conditions_are_refused(
+    discrete: pdmp.Model, call: Callable[..., Any], given: dict[str, Any], message: str
+) -> None:
+    """Rollouts and controllers tell the argument and the number that they cannot use."""
+    with pytest.raises(ValueError, match=message):
+        call(discrete, **given)
+
+
+@pytest.mark.parametrize(("given", "message"), RHYTHMIC, ids=str)
+@pytest.mark.parametrize("call", [pdmp.Model.rollout, pdmp.Model.controller])
+def test_bad_conditions_of_a_rhythmic_one_are_refused(
+    rhythmic: pdmp.Model, call: Callable[..., Any], given: dict[str, Any], message: str
+) -> None:
+    """The same holds about an anchor."""
+    with pytest.raises(ValueError, match=message):
+        call(rhythmic, **given)
+
+
+@pytest.mark.parametrize("duration", [-1.0, NAN, INF])
+def test_impossible_durations_are_refused(discrete: pdmp.Model, duration: float) -> None:
+    """A rollout has a length."""
+    with pytest.raises(ValueError, match="duration = "):
+        discrete.rollout(duration=duration)
+
+
+@pytest.mark.parametrize("dt", [1e-300, 1e-12])
+def test_endless_rollouts_are_refused_in_one_line(discrete: pdmp.Model, dt: float) -> None:
+    """Too fine an interval is refused before memory is asked for, with a readable number."""
+    with pytest.raises(ValueError, match="dt = .*: gives more than 1e8 samples: enlarge it") as e:
+        discrete.rollout(dt=dt)
+    assert len(str(e.value)) < 120
+
+
+@pytest.mark.parametrize("transition", [-1.0, NAN, INF])
+def test_impossible_transitions_are_refused(discrete: pdmp.Model, transition: float) -> None:
+    """A transition takes some time or none."""
+    with pytest.raises(ValueError, match="transition = .*: must be a time in seconds, or 0"):
+        discrete.controller(transition=transition)
+
+
+def outputs(model: pdmp.Model) -> tuple[np.ndarray, np.ndarray]:
+    """Return arrays that fit the rollouts of a model's own styles at 0.1 s."""
+    shape = model.rollouts(model.styles, dt=0.1)[0].shape
+    return np.zeros(shape), np.zeros(shape)
+
+
+def test_outputs_of_another_shape_are_refused_before_anything_is_written(
+    discrete: pdmp.Model,
+) -> None:
+    """Both shapes are told, and neither array is touched."""
+    positions, velocities = outputs(discrete)
+    with pytest.raises(ValueError, match=r"out has shape \[5, 12, 2\], expected \[5, 13, 2\]"):
+        discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
+    assert not positions.any()
+
+
+def test_outputs_of_another_type_are_refused(discrete: pdmp.Model) -> None:
+    """Only float64 can be written in place, which the error says."""
+    positions, velocities = outputs(discrete)
+    with pytest.raises(ValueError, match="out.*float64"):
+        discrete.rollouts(discrete.styles, dt=0.1, out=(positions.astype(np.float32), velocities))
+
+
+def test_read_only_outputs_are_refused(discrete: pdmp.Model) -> None:
+    """What must not be written is not written."""
+    positions, velocities = outputs(discrete)
+    velocities.setflags(write=False)
+    with pytest.raises(ValueError, match="out.* not writeable"):
+        discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities))
+    assert not velocities.any()
+
+
+@pytest.mark.parametrize("u", [[NAN], [INF], [-0.1]])
+def test_landscape_has_no_place_for_odd_clocks(discrete: pdmp.Model, u: list[float]) -> None:
+    """A clock is finite, and a discrete one starts at zero."""
+    with pytest.raises(ValueError, match="u = .*: must be finite, and not negative"):
+        discrete.landscape(u)
+
+
+COMMANDS: list[tuple[str, str, Any]] = [
+    *[("discrete", name, bad) for name in ("goal", "style") for bad in ([NAN, 0], [0], [[0, 0]])],
+    *[("rhythmic", name, bad) for name in ("anchor", "style") for bad in ([NAN, 0], [0], [[0, 0]])],
+    *[(kind, "tau", bad) for kind in ("discrete", "rhythmic") for bad in (NAN, 0.0, -1.0, INF)],
+    *[("rhythmic", "amplitude", bad) for bad in (NAN, -1.0, INF)],
+    ("discrete", "goal", [1e200, 0]),
+    ("discrete", "goal", ["a", "b"]),
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "value"), COMMANDS, ids=str)
+def test_bad_command_leaves_the_loop_as_it_was(
+    kind: str, name: str, value: Any, request: pytest.FixtureRequest
+) -> None:
+    """The last good value stays in force, and the movement goes on as if nothing had been said."""
+    model: pdmp.Model = request.getfixturevalue(kind)
+    disturbed, undisturbed = model.controller(0.01), model.controller(0.01)
+    for k in range(80):
+        if k in (0, 40):
+            before = getattr(disturbed, name)
+            with pytest.raises(ValueError, match=name):
+                setattr(disturbed, name, value)
+            np.testing.assert_array_equal(getattr(disturbed, name), before)
+        disturbed.step()
+        undisturbed.step()
+        np.testing.assert_array_equal(disturbed.position, undisturbed.position)
+        assert np.isfinite(disturbed.position).all()
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.01, NAN, INF, 1e9])
+def test_bad_tick_leaves_the_state_as_it_was(discrete: pdmp.Model, dt: float) -> None:
+    """A tick that is refused moves nothing."""
+    controller = discrete.controller(0.01)
+    controller.step()
+    position, time = controller.position.copy(), controller.time
+    with pytest.raises(ValueError, match="dt = "):
+        controller.step(dt=dt)
+    np.testing.assert_array_equal(controller.position, position)
+    assert controller.time == time
+
+
+def test_bad_reset_leaves_the_movement_as_it_was(discrete: pdmp.Model) -> None:
+    """A reset that is refused does not start again."""
+    controller = discrete.controller(0.01)
+    controller.step()
+    with pytest.raises(ValueError, match=r"goal\[0\] = NaN"):
+        controller.reset(goal=[NAN, 0])
+    assert controller.time == 0.01
