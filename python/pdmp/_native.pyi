@@ -15,6 +15,7 @@ _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
 
+__all__: list[str]
 __version__: str
 
 class PdmpError(Exception): ...
@@ -33,6 +34,7 @@ class Demonstration:
         context: ArrayLike | None = None,  # (Q,)
         names: Sequence[str] | None = None,  # D of them
     ) -> Demonstration: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[_Array], dict[str, Any]]: ...
     @property
     def position(self) -> _Array: ...  # (T, D)
     @property
@@ -177,6 +179,9 @@ class Model:
         amplitude: float | None = None,
         context: ArrayLike | None = None,
     ) -> Controller: ...
+    def to_bytes(self) -> bytes: ...
+    @staticmethod
+    def from_bytes(data: bytes) -> Model: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final

@@ -2,11 +2,14 @@
 
 use ndarray::{Array2, Array3, Axis, s};
 
-use crate::demo::{Demonstration, LEAST_SAMPLES, Sampling};
+use crate::demo::{Demonstration, LEAST_SAMPLES, Sampling, zeros};
 use crate::error::{Error, Result, check_positive};
 use crate::phase::Kind;
 use crate::smooth::{Smoothing, smooth};
 use crate::spline::Spline;
+
+/// Most samples after alignment.
+const MOST_SAMPLES: usize = 1_000_000;
 
 /// How demonstrations are read as samples of one movement.
 #[derive(Clone, Debug)]
@@ -43,11 +46,12 @@ struct Timed {
 }
 
 impl Alignment {
-    /// Aligns all demonstrations.
+    /// Aligns all demonstrations; `proceed` is told the share that is done.
     ///
     /// # Errors
-    /// No demonstration, different DoFs, a missing rate or period, too few samples, a bad smoothing or nominal index.
-    pub(crate) fn align(&self, demos: &[Demonstration]) -> Result<Aligned> {
+    /// No demonstration, different DoFs, a missing rate or period, too few samples, a bad smoothing or nominal index, or
+    /// whatever `proceed` returns.
+    pub(crate) fn align(&self, demos: &[Demonstration], proceed: &mut dyn FnMut(f64) -> Result<()>) -> Result<Aligned> {
         let first = demos.first().ok_or(Error::NoDemonstrations)?;
         let n_dofs = first.n_dofs();
         if !(self.period.len() <= 1 || self.period.len() == demos.len()) {
@@ -65,12 +69,13 @@ impl Alignment {
         let durations: Vec<f64> = timed.iter().map(|timed| timed.duration).collect();
         let nominal = self.nominal_of(&durations)?;
         let n_samples = self.n_samples.unwrap_or(demos[nominal].n_samples());
-        if n_samples < LEAST_SAMPLES {
+        if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&n_samples) {
             let value = n_samples as f64;
-            return Err(Error::Range { name: "n_samples", value, allowed: "at least 4 samples carry a cubic spline" });
+            return Err(Error::Range { name: "n_samples", value, allowed: "must lie between 4 and 1e6" });
         }
-        let mut position = Array3::zeros((demos.len(), n_samples, n_dofs));
+        let mut position = zeros("aligned demonstrations", (demos.len(), n_samples, n_dofs))?;
         for (m, (demo, timed)) in demos.iter().zip(&timed).enumerate() {
+            proceed(m as f64 / demos.len() as f64)?;
             let resampled = self.resample(demo, timed, n_samples).map_err(|error| error.in_demo(m))?;
             position.slice_mut(s![m, .., ..]).assign(&resampled);
         }
@@ -116,6 +121,11 @@ impl Alignment {
                 return Err(Error::Range { name: "period", value: period, allowed: "must exceed the last time stamp" });
             }
             timed.duration = period;
+        }
+        // Far outside, squares of rates would leave the range of numbers.
+        if !(1e-9..=1e9).contains(&timed.duration) {
+            let allowed = "seconds from start to end must lie between 1e-9 and 1e9; check dt or time";
+            return Err(Error::Range { name: "duration", value: timed.duration, allowed });
         }
         Ok(timed)
     }

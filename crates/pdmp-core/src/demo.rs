@@ -1,6 +1,6 @@
 //! What goes in and what comes out: demonstrations and trajectories, arrays with checked shapes.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array, Array2, ArrayView2, Dimension, IntoDimension};
 
 use crate::error::{Error, LARGEST, Result, check_finite, check_positive};
 
@@ -142,6 +142,19 @@ pub struct Trajectory {
     pub acceleration: Array2<f64>,
 }
 
+/// An array of zeros, or an error where memory does not hold it.
+pub(crate) fn zeros<D: IntoDimension>(name: &'static str, shape: D) -> Result<Array<f64, D::Dim>> {
+    let shape = shape.into_dimension();
+    let numbers: f64 = shape.slice().iter().map(|&n| n as f64).product();
+    let mut data = Vec::new();
+    // An allocation may hold isize::MAX bytes.
+    if numbers * 8.0 >= isize::MAX as f64 || data.try_reserve_exact(numbers as usize).is_err() {
+        return Err(Error::Memory { name, numbers });
+    }
+    data.resize(numbers as usize, 0.0);
+    Array::from_shape_vec(shape, data).map_err(|_| Error::Memory { name, numbers })
+}
+
 /// Checks that every element of a matrix is finite and no larger than [`LARGEST`].
 pub(crate) fn check_matrix(name: &'static str, matrix: ArrayView2<f64>) -> Result<()> {
     for ((row, column), &value) in matrix.indexed_iter() {
@@ -157,8 +170,10 @@ pub(crate) fn check_matrix(name: &'static str, matrix: ArrayView2<f64>) -> Resul
 
 fn check_time(time: &[f64], n_samples: usize) -> Result<()> {
     crate::error::check_vector("time", time, n_samples, "sample")?;
+    // Stamps closer than this are one instant to a spline: slopes between them would leave the range of numbers.
+    let least = 1e-12 * (time[n_samples - 1] - time[0]).max(0.0);
     for (index, pair) in time.windows(2).enumerate() {
-        if pair[1] <= pair[0] {
+        if pair[1] - pair[0] <= least {
             return Err(Error::Time { index: index + 1, time: pair[1], previous: pair[0] });
         }
     }

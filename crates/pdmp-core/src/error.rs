@@ -1,6 +1,7 @@
 //! The one error type. Every variant carries the numbers that a user needs to mend the call, and those that can
 //! arise in a control loop hold nothing that allocates.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use crate::Kind;
@@ -17,7 +18,7 @@ pub enum Error {
         source: Box<Error>,
     },
     /// An element of a vector is NaN or infinite.
-    #[error("{name}[{index}] = {value}: every number must be finite")]
+    #[error("{name}[{index}] = {}: every number must be finite", Number(*value))]
     NotFinite {
         /// The argument.
         name: &'static str,
@@ -54,7 +55,7 @@ pub enum Error {
         per: &'static str,
     },
     /// A number outside its range.
-    #[error("{name} = {value}: {allowed}")]
+    #[error("{name} = {}: {allowed}", Number(*value))]
     Range {
         /// The argument.
         name: &'static str,
@@ -80,10 +81,30 @@ pub enum Error {
         /// The largest magnitude that is accepted.
         limit: f64,
     },
+    /// An element of a vector so large that products with it overflow.
+    #[error("{name}[{index}] = {value:e}: magnitudes above {limit:e} overflow when squared")]
+    TooLarge {
+        /// The argument.
+        name: &'static str,
+        /// Index of the element.
+        index: usize,
+        /// Its value.
+        value: f64,
+        /// The largest magnitude that is accepted.
+        limit: f64,
+    },
+    /// Arrays that do not fit into memory.
+    #[error("{name} would take {} numbers: not enough memory; ask for fewer samples", Number(*numbers))]
+    Memory {
+        /// What is asked for.
+        name: &'static str,
+        /// How many numbers it has.
+        numbers: f64,
+    },
     /// Time stamps that do not increase.
     #[error(
         "time[{index}] = {time} s does not come after time[{before}] = {previous} s: \
-         time stamps must increase; drop repeated samples",
+         time stamps must increase, by more than 1e-12 of the duration; drop repeated samples",
         before = index - 1
     )]
     Time {
@@ -155,6 +176,15 @@ pub enum Error {
     },
 }
 
+/// A number as a person would write it: whole ones plainly, very large and small ones with an exponent.
+struct Number(f64);
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.0.fract() == 0.0 && self.0.abs() < 1e9 { write!(f, "{}", self.0) } else { write!(f, "{:?}", self.0) }
+    }
+}
+
 /// The result of a call into this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -183,7 +213,7 @@ pub(crate) fn check_finite(name: &'static str, value: &[f64]) -> Result<()> {
             return Err(Error::NotFinite { name, index, value });
         }
         if value.abs() > LARGEST {
-            return Err(Error::Magnitude { name, row: 0, column: index, value, limit: LARGEST });
+            return Err(Error::TooLarge { name, index, value, limit: LARGEST });
         }
     }
     Ok(())

@@ -59,6 +59,12 @@ impl Factors {
 
         let mut styles = Array2::from_shape_fn((rows, k), |(i, j)| u[(i, j)]);
         let mut basis = Array2::from_shape_fn((k, columns), |(i, j)| sigma[i] * v[(j, i)] * scale);
+        // A target that is zero throughout stays so: a DoF at rest is not moved by what rounding leaves of it.
+        for (mut column, target) in basis.columns_mut().into_iter().zip(targets.columns()) {
+            if target.iter().all(|&f| f == 0.0) {
+                column.fill(0.0);
+            }
+        }
         for (mut style, mut row) in styles.axis_iter_mut(Axis(1)).zip(basis.axis_iter_mut(Axis(0))) {
             let peak = style.iter().fold(0.0f64, |peak, &x| if x.abs() > peak.abs() { x } else { peak });
             if peak < 0.0 {

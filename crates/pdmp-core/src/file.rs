@@ -137,7 +137,9 @@ impl Model {
         let bytes = self.to_bytes()?;
         let io = |source| Error::Io { path: path.to_path_buf(), source };
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut file = tempfile::Builder::new().prefix(".pdmp-").tempfile_in(folder).map_err(io)?;
+        // The error of a temporary file names that file; the kind of error is what matters.
+        let draft = tempfile::Builder::new().prefix(".pdmp-").tempfile_in(folder);
+        let mut file = draft.map_err(|error| io(error.kind().into()))?;
         file.write_all(&bytes).map_err(io)?;
         file.as_file().sync_all().map_err(io)?;
         readable(file.as_file()).map_err(io)?;
@@ -206,7 +208,7 @@ impl Reader<'_> {
             .chunks_exact(8)
             .map(|chunk| f64::from_le_bytes(chunk.try_into().unwrap_or_default()))
             .collect();
-        match data.iter().position(|x| !(x.abs() <= LARGEST * LARGEST)) {
+        match data.iter().position(|x| x.is_nan() || x.abs() > LARGEST * LARGEST) {
             Some(index) => Err(Error::File(format!("{name} holds {} at {index}", data[index]))),
             None => Ok(data),
         }

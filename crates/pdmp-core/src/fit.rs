@@ -91,8 +91,8 @@ pub fn fit(
     options: &FitOptions,
     proceed: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
-    proceed(Stage::Targets, 0.0)?;
-    let aligned = options.alignment.align(demos)?;
+    let aligned = options.alignment.align(demos, &mut |share| proceed(Stage::Targets, share))?;
+    let (contexts, names) = (contexts_of(demos, options.contexts.as_ref())?, names_of(demos)?);
     let (goals, anchors) = (aligned.goals(demos), aligned.anchors());
     let constants = Constants::of(options, &aligned)?;
     let ranges = aligned.ranges();
@@ -109,10 +109,10 @@ pub fn fit(
     let mut regressing = |share| proceed(Stage::Regress, share);
     let regression = options.basis.regress(constants.domain(), &clock, basis_targets.view(), &mut regressing)?;
 
-    proceed(Stage::Compile, 0.0)?;
-    let landscape = Landscape::compile(constants.canonical, basis_targets.ncols(), regression.as_ref());
+    let mut compiling = |share| proceed(Stage::Compile, share);
+    let landscape =
+        Landscape::compile(constants.canonical, basis_targets.ncols(), regression.as_ref(), &mut compiling)?;
 
-    let contexts = contexts_of(demos, options.contexts.as_ref())?;
     let starts = aligned.starts();
     let durations = aligned.durations.clone();
     let map = match &contexts {
@@ -132,7 +132,6 @@ pub fn fit(
         singular_values,
         basis: regression.describe(),
     };
-    let names = names_of(demos)?;
     Ok(Model::assemble(constants.attractor, landscape, constants.tau, names, ranges, demonstrated, learnt, map))
 }
 
@@ -157,7 +156,7 @@ pub fn style_of(model: &Model, demo: &Demonstration, dt: Option<f64>, period: Op
         n_samples: Some(model.learnt.n_samples),
     };
     let demos = std::slice::from_ref(demo);
-    let aligned = alignment.align(demos)?;
+    let aligned = alignment.align(demos, &mut |_| Ok(()))?;
     let constants = Constants { attractor: model.attractor, canonical: model.canonical(), tau: model.tau };
     let centres = if model.kind() == Kind::Discrete { aligned.goals(demos) } else { aligned.anchors() };
     let scale = &model.learnt.dof_scale;
@@ -205,6 +204,7 @@ impl Constants {
         let attractor = Attractor { alpha_z: options.alpha_z, beta_z: options.beta_z.unwrap_or(options.alpha_z / 4.0) };
         check_rate("alpha_z", attractor.alpha_z)?;
         check_rate("beta_z", attractor.beta_z)?;
+        check_rate("mu", options.mu)?;
         let kind = options.alignment.kind;
         let given = |name, value: Option<f64>| match value {
             Some(_) => Err(Error::Kind { name, kind, instead: ": leave it out" }),
@@ -226,7 +226,6 @@ impl Constants {
             Kind::Rhythmic => {
                 given("tau", options.tau)?;
                 given("alpha_x", options.alpha_x)?;
-                check_rate("mu", options.mu)?;
                 (Canonical::Rhythmic { mu: options.mu }, duration / TAU)
             }
         };
@@ -302,8 +301,12 @@ fn scale_of(scale: &DofScale, ranges: &[f64]) -> Result<Vec<f64>> {
         DofScale::Range => Ok(ranges.iter().map(|&range| if range > 0.0 { range } else { 1.0 }).collect()),
         DofScale::Given(scale) => {
             check_vector("dof_scale", scale, ranges.len(), "DoF")?;
-            scale.iter().try_for_each(|&value| check_positive("dof_scale", value))?;
-            Ok(scale.clone())
+            match scale.iter().find(|value| !(1e-100..=1e100).contains(*value)) {
+                Some(&value) => {
+                    Err(Error::Range { name: "dof_scale", value, allowed: "must lie between 1e-100 and 1e100" })
+                }
+                None => Ok(scale.clone()),
+            }
         }
     }
 }

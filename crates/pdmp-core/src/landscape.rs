@@ -5,9 +5,10 @@
 
 use std::f64::consts::TAU;
 
-use ndarray::Array2;
+use ndarray::{Array2, aview1};
 
 use crate::basis::Regression;
+use crate::error::Result;
 use crate::phase::Canonical;
 
 /// Tolerated error of the table, relative to the largest forcing.
@@ -16,6 +17,8 @@ const TOLERANCE: f64 = 1e-9;
 const FEWEST_CELLS: usize = 128;
 /// Cells beyond which a table is not refined.
 pub(crate) const MOST_CELLS: usize = 8192;
+/// Knots between two questions whether to go on.
+const PORTION: usize = 64;
 
 /// Forcing w of unit styles over the clock: discrete x·b(x; W), rhythmic b(φ; W).
 #[derive(Clone, Debug, PartialEq)]
@@ -32,15 +35,37 @@ pub struct Landscape {
 
 impl Landscape {
     /// Tabulates a regression, halving the cells until their midpoints agree.
-    pub(crate) fn compile(canonical: Canonical, n_outputs: usize, regression: &dyn Regression) -> Self {
+    ///
+    /// # Errors
+    /// Whatever `proceed` returns, which is told the share of the finest possible table that is done.
+    pub(crate) fn compile(
+        canonical: Canonical,
+        n_outputs: usize,
+        regression: &dyn Regression,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Self> {
         let extent = canonical.extent();
-        let mut knots =
-            evaluate(regression, n_outputs, (0..FEWEST_CELLS + 1).map(|k| extent * k as f64 / FEWEST_CELLS as f64));
+        let mut done = 0;
+        let mut tabulate = |n: usize, at: &dyn Fn(usize) -> f64| {
+            let (mut values, mut slopes) = (Array2::zeros((n, n_outputs)), Array2::zeros((n, n_outputs)));
+            let (mut value, mut slope) = (vec![0.0; n_outputs], vec![0.0; n_outputs]);
+            for k in 0..n {
+                if k % PORTION == 0 {
+                    proceed(done as f64 / (MOST_CELLS + 1) as f64)?;
+                }
+                regression.evaluate(at(k), &mut value, &mut slope);
+                values.row_mut(k).assign(&aview1(&value));
+                slopes.row_mut(k).assign(&aview1(&slope));
+                done += 1;
+            }
+            Ok((values, slopes))
+        };
+        let mut knots = tabulate(FEWEST_CELLS + 1, &|k| extent * k as f64 / FEWEST_CELLS as f64)?;
         loop {
             let (values, slopes) = &knots;
             let cells = values.nrows() - 1;
             let width = extent / cells as f64;
-            let middles = evaluate(regression, n_outputs, (0..cells).map(|k| width * (k as f64 + 0.5)));
+            let middles = tabulate(cells, &|k| width * (k as f64 + 0.5))?;
             let largest = values.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
             let mut error = 0.0f64;
             for ((k, o), exact) in middles.0.indexed_iter() {
@@ -56,7 +81,7 @@ impl Landscape {
                     close(&mut values);
                     close(&mut slopes);
                 }
-                return Self::from_knots(canonical, values, slopes, error);
+                return Ok(Self::from_knots(canonical, values, slopes, error));
             }
         }
     }
@@ -134,21 +159,6 @@ impl Landscape {
     }
 }
 
-fn evaluate(
-    regression: &dyn Regression,
-    n_outputs: usize,
-    clock: impl ExactSizeIterator<Item = f64>,
-) -> (Array2<f64>, Array2<f64>) {
-    let n = clock.len();
-    let (mut values, mut slopes) = (vec![0.0; n * n_outputs], vec![0.0; n * n_outputs]);
-    let rows = values.chunks_exact_mut(n_outputs).zip(slopes.chunks_exact_mut(n_outputs));
-    for (u, (value, slope)) in clock.zip(rows) {
-        regression.evaluate(u, value, slope);
-    }
-    let shape = |data| Array2::from_shape_vec((n, n_outputs), data).unwrap_or_default();
-    (shape(values), shape(slopes))
-}
-
 /// Rows of `knots` with those of `middles` between them.
 fn interleave(knots: &Array2<f64>, middles: &Array2<f64>) -> Array2<f64> {
     Array2::from_shape_fn((knots.nrows() + middles.nrows(), knots.ncols()), |(k, o)| {
@@ -190,7 +200,7 @@ mod tests {
             [(Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 }, 9.0), (Canonical::Rhythmic { mu: 1.0 }, 5.0)]
         {
             let regression = Waves(omega);
-            let table = Landscape::compile(canonical, 3, &regression);
+            let table = Landscape::compile(canonical, 3, &regression, &mut |_| Ok(())).unwrap();
             assert!(table.error() <= TOLERANCE);
             let (mut value, mut slope, mut exact, mut rise) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
             for k in 0..10_007 {
@@ -209,7 +219,7 @@ mod tests {
     #[test]
     fn forcing_fades_with_the_phase_after_the_end() {
         let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
-        let table = Landscape::compile(canonical, 1, &Waves(9.0));
+        let table = Landscape::compile(canonical, 1, &Waves(9.0), &mut |_| Ok(())).unwrap();
         let at = |u: f64| {
             let (mut value, mut slope) = ([0.0], [0.0]);
             table.evaluate(u, &mut value, &mut slope);

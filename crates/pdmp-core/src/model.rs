@@ -278,7 +278,7 @@ pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> 
 pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
     check_vector("style", style, n_styles, "style dimension")?;
     match style.iter().position(|s| s.abs() > 1e100) {
-        Some(column) => Err(Error::Magnitude { name: "style", row: 0, column, value: style[column], limit: 1e100 }),
+        Some(index) => Err(Error::TooLarge { name: "style", index, value: style[index], limit: 1e100 }),
         None => Ok(()),
     }
 }

@@ -9,13 +9,13 @@ use std::sync::Arc;
 use ndarray::{Array2, Array3, ArrayView2, Axis};
 
 use crate::controller::Controller;
-use crate::demo::{Trajectory, check_matrix};
+use crate::demo::{Trajectory, check_matrix, zeros};
 use crate::error::{Error, Result, check_positive};
-use crate::model::{Conditions, Model, check_style};
+use crate::model::{Conditions, Model, check_style, check_tau};
 use crate::phase::Kind;
 
 /// Most samples of a rollout.
-const MOST_STEPS: f64 = 1e8;
+const MOST_STEPS: f64 = 1e7;
 
 /// Times of a rollout, in seconds.
 #[derive(Clone, Copy, Debug)]
@@ -31,9 +31,12 @@ impl Timing {
     fn steps(&self, model: &Model, conditions: &Conditions) -> Result<usize> {
         check_positive("dt", self.dt)?;
         let tau = conditions.tau.unwrap_or(model.tau);
+        check_tau(tau, model.tau)?;
         let duration = match self.duration {
             Some(duration) if duration.is_finite() && duration >= 0.0 => duration,
-            Some(value) => return Err(Error::Range { name: "duration", value, allowed: "must not be negative" }),
+            Some(value) => {
+                return Err(Error::Range { name: "duration", value, allowed: "must be finite and not negative" });
+            }
             None => model.duration() * tau / model.tau,
         };
         let steps = (duration / self.dt * (1.0 + 1e-12) + 1e-9).floor();
@@ -41,7 +44,7 @@ impl Timing {
             return Err(Error::Range {
                 name: "dt",
                 value: self.dt,
-                allowed: "gives more than 1e8 samples: enlarge it",
+                allowed: "gives more than 1e7 samples: enlarge it",
             });
         }
         Ok(steps as usize)
@@ -59,9 +62,9 @@ impl Model {
         let shape = (steps + 1, self.n_dofs());
         let mut trajectory = Trajectory {
             time: (0..=steps).map(|k| k as f64 * timing.dt).collect(),
-            position: Array2::zeros(shape),
-            velocity: Array2::zeros(shape),
-            acceleration: Array2::zeros(shape),
+            position: zeros("rollout", shape)?,
+            velocity: zeros("rollout", shape)?,
+            acceleration: zeros("rollout", shape)?,
         };
         for k in 0..=steps {
             if k > 0 {
@@ -98,16 +101,16 @@ impl Model {
         let base = self.rollout(&still, timing)?;
         let responses = self.style_responses(conditions, timing)?;
         let batch = |base: &Array2<f64>, response: fn(&Trajectory) -> &Array2<f64>| {
-            let mut curves = Array3::zeros((styles.nrows(), base.nrows(), base.ncols()));
+            let mut curves = zeros("rollouts", (styles.nrows(), base.nrows(), base.ncols()))?;
             for (mut curve, style) in curves.outer_iter_mut().zip(styles.rows()) {
                 curve.assign(base);
                 for (s, trajectory) in style.iter().zip(&responses) {
                     curve.scaled_add(*s, response(trajectory));
                 }
             }
-            curves
+            Ok(curves)
         };
-        Ok((batch(&base.position, |r| &r.position), batch(&base.velocity, |r| &r.velocity)))
+        Ok((batch(&base.position, |r| &r.position)?, batch(&base.velocity, |r| &r.velocity)?))
     }
 
     /// Jacobian ∂y/∂s (T, D, J) of a rollout's positions; exact, and the same for every style.

@@ -5,7 +5,7 @@ use pdmp_core::basis::{self, Domain, GpPosterior, Kernel, Regression};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::convert::{matrix, vector};
+use crate::convert::{count, matrix, vector};
 use crate::error::raise;
 
 /// Gaussian process regression, the paper's choice of basis functions.
@@ -149,8 +149,7 @@ impl NGnet {
     #[new]
     #[pyo3(signature = (n_basis=50))]
     fn new(n_basis: isize) -> PyResult<Self> {
-        // A negative number is as wrong as zero, and told alike.
-        basis::NGnet::new(n_basis.max(0).unsigned_abs()).map(Self).map_err(raise)
+        basis::NGnet::new(count("n_basis", n_basis)?).map(Self).map_err(raise)
     }
 
     /// Number of functions N.

@@ -5,9 +5,9 @@ use pdmp_core::Kind;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::conditions::Arguments;
 use crate::convert::{to_numpy, vector};
 use crate::error::raise;
-use crate::model::Arguments;
 
 /// Whether a movement goes on (`WORKING`) or has settled on its goal (`FINISHED`).
 #[pyclass(frozen, eq, hash, module = "pdmp")]

@@ -1,12 +1,21 @@
 //! Arrays across the border: anything numpy can turn into float64 comes in, float64 goes out.
 
 use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
-use numpy::{AllowTypeChange, IntoPyArray, PyArray1, PyArrayLikeDyn};
+use numpy::{
+    AllowTypeChange, IntoPyArray, PyArray1, PyArrayDescrMethods, PyArrayLikeDyn, PyUntypedArray, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// An array of any dimension.
 pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64>> {
+    // numpy would drop imaginary parts, and read text and dates as numbers.
+    if let Ok(untyped) = value.cast::<PyUntypedArray>()
+        && !matches!(untyped.dtype().kind(), b'f' | b'i' | b'u' | b'b' | b'O')
+    {
+        let dtype = untyped.dtype();
+        return Err(PyValueError::new_err(format!("{name} has dtype {dtype}: expected real numbers")));
+    }
     let array = value.extract::<PyArrayLikeDyn<'_, f64, AllowTypeChange>>().map_err(|error| {
         PyValueError::new_err(format!("{name} is not an array of numbers: {}", PyErr::from(error).value(value.py())))
     })?;
@@ -51,4 +60,9 @@ pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResu
 /// A new numpy vector.
 pub(crate) fn to_numpy<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
     Array1::from_vec(values.to_vec()).into_pyarray(py)
+}
+
+/// A count, which cannot be negative.
+pub(crate) fn count(name: &str, value: isize) -> PyResult<usize> {
+    usize::try_from(value).map_err(|_| PyValueError::new_err(format!("{name} = {value}: must not be negative")))
 }

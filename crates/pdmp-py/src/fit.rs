@@ -9,7 +9,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::basis::{Gp, NGnet};
-use crate::convert::{array, matrix, numbers};
+use crate::convert::{array, count, matrix, numbers};
 use crate::demo::Demonstration;
 use crate::error::raise;
 use crate::model::Model;
@@ -109,11 +109,14 @@ pub(crate) fn fit(
             dt,
             period: numbers("period", period)?,
             smoothing: smoothing_of(smoothing)?,
-            nominal: count("nominal", nominal)?,
-            n_samples: count("n_samples", n_samples)?,
+            nominal: nominal.map(|n| count("nominal", n)).transpose()?,
+            n_samples: n_samples.map(|n| count("n_samples", n)).transpose()?,
         },
         contexts: contexts.map(|contexts| matrix("contexts", "(M, Q)", contexts)).transpose()?,
-        styles: count("n_styles", n_styles)?.map_or(StyleCount::Spectrum(spectrum), StyleCount::Given),
+        styles: match n_styles {
+            Some(n_styles) => StyleCount::Given(count("n_styles", n_styles)?),
+            None => StyleCount::Spectrum(spectrum),
+        },
         basis: basis_of(basis)?,
         dof_scale: dof_scale_of(dof_scale)?,
         tau,
@@ -137,15 +140,6 @@ pub(crate) fn fit(
         })
     });
     model.map(|model| Model(Arc::new(model))).map_err(|error| raised.unwrap_or_else(|| raise(error)))
-}
-
-/// A count that must not be negative.
-fn count(name: &str, value: Option<isize>) -> PyResult<Option<usize>> {
-    value
-        .map(|value| {
-            usize::try_from(value).map_err(|_| PyValueError::new_err(format!("{name} = {value}: must not be negative")))
-        })
-        .transpose()
 }
 
 fn demonstrations(demos: &Bound<'_, PyAny>) -> PyResult<Vec<pdmp_core::Demonstration>> {

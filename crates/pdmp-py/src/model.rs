@@ -4,66 +4,24 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use ndarray::Array3;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadwriteArray3, ToPyArray};
-use pdmp_core::{Canonical, Conditions, Timing, style_of};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods, ToPyArray};
+use pdmp_core::{Canonical, Timing, style_of};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::conditions::Arguments;
 use crate::controller::Controller;
-use crate::convert::{matrix, optional, to_numpy, vector};
+use crate::convert::{matrix, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
 use crate::error::raise;
+use crate::prediction::Prediction;
 
 /// A parametric dynamic movement primitive: immutable, picklable, saved by `save`.
 ///
 /// Made by `fit` and `load`.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
-
-/// Conditions from Python's arguments: what is missing is left to the model.
-pub(crate) struct Arguments<'a, 'py> {
-    pub(crate) style: Option<&'a Bound<'py, PyAny>>,
-    pub(crate) goal: Option<&'a Bound<'py, PyAny>>,
-    pub(crate) start: Option<&'a Bound<'py, PyAny>>,
-    pub(crate) velocity: Option<&'a Bound<'py, PyAny>>,
-    pub(crate) anchor: Option<&'a Bound<'py, PyAny>>,
-    pub(crate) amplitude: Option<f64>,
-    pub(crate) tau: Option<f64>,
-}
-
-impl Arguments<'_, '_> {
-    pub(crate) fn conditions(self) -> PyResult<Conditions> {
-        Ok(Conditions {
-            style: optional("style", self.style)?,
-            goal: optional("goal", self.goal)?,
-            anchor: optional("anchor", self.anchor)?,
-            start: optional("start", self.start)?,
-            velocity: optional("velocity", self.velocity)?,
-            amplitude: self.amplitude,
-            tau: self.tau,
-        })
-    }
-
-    /// The same, with a context's prediction for what is missing.
-    fn in_context(self, model: &pdmp_core::Model, context: Option<&Bound<'_, PyAny>>) -> PyResult<Conditions> {
-        let given = self.conditions()?;
-        let Some(context) = optional("context", context)? else { return Ok(given) };
-        if given.style.is_some() {
-            return Err(PyValueError::new_err("pass style or context, not both: the context predicts the style"));
-        }
-        let predicted = model.conditions(&model.predict(&context).map_err(raise)?);
-        Ok(Conditions {
-            style: predicted.style,
-            goal: given.goal.or(predicted.goal),
-            anchor: given.anchor.or(predicted.anchor),
-            start: given.start.or(predicted.start),
-            velocity: given.velocity,
-            amplitude: given.amplitude,
-            tau: given.tau.or(predicted.tau),
-        })
-    }
-}
 
 /// Read a model file.
 ///
@@ -306,7 +264,7 @@ impl Model {
         tau: Option<f64>,
         dt: f64,
         duration: Option<f64>,
-        out: Option<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)>,
+        out: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
     ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)> {
         let styles = matrix("styles", "(B, J)", styles)?;
         let arguments = Arguments { style: None, goal, start, velocity, anchor, amplitude, tau };
@@ -317,10 +275,11 @@ impl Model {
         let Some((to_positions, to_velocities)) = out else {
             return Ok((positions.into_pyarray(py), velocities.into_pyarray(py)));
         };
-        let mut writable = [writable(&to_positions)?, writable(&to_velocities)?];
-        for (target, result) in writable.iter_mut().zip([&positions, &velocities]) {
-            write(target, result)?;
-        }
+        let shape = positions.shape();
+        let (to_positions, to_velocities) = (writable(&to_positions, shape)?, writable(&to_velocities, shape)?);
+        // Both are known to fit before either is written.
+        to_positions.try_readwrite()?.as_array_mut().assign(&positions);
+        to_velocities.try_readwrite()?.as_array_mut().assign(&velocities);
         Ok((to_positions, to_velocities))
     }
 
@@ -409,15 +368,7 @@ impl Model {
     ///     A model fitted without contexts, a wrong length, or a number that is not finite.
     fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
         let prediction = self.0.predict(&vector("context", context)?).map_err(raise)?;
-        let optional = |values: Option<Vec<f64>>| values.map(|values| to_numpy(py, &values).unbind());
-        Ok(Prediction {
-            style: to_numpy(py, &prediction.style).unbind(),
-            goal: optional(prediction.goal),
-            start: optional(prediction.start),
-            anchor: optional(prediction.anchor),
-            duration: prediction.duration,
-            covariance: prediction.covariance.map(|covariance| covariance.into_pyarray(py).unbind()),
-        })
+        Ok(Prediction::new(py, prediction))
     }
 
     /// Write a model file. It appears whole or not at all, whatever interrupts the writing.
@@ -504,41 +455,13 @@ impl Model {
     }
 }
 
-/// The movement predicted for a condition; what the kind of primitive does not have is None.
-#[pyclass(frozen, get_all, module = "pdmp")]
-pub(crate) struct Prediction {
-    /// Style (J,).
-    style: Py<PyArray1<f64>>,
-    /// Goal (D,), discrete.
-    goal: Option<Py<PyArray1<f64>>>,
-    /// Start (D,), discrete.
-    start: Option<Py<PyArray1<f64>>>,
-    /// Anchor (D,), rhythmic.
-    anchor: Option<Py<PyArray1<f64>>>,
-    /// Duration or period in s.
-    duration: f64,
-    /// Covariance (P, P) of style, goal and start or anchor, and duration, in this order, for a new movement; None
-    /// where the demonstrations leave no degree of freedom to estimate it.
-    covariance: Option<Py<PyArray2<f64>>>,
-}
-
-#[pymethods]
-impl Prediction {
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("<pdmp.Prediction: style {}, duration {:.4} s>", self.style.bind(py).repr()?, self.duration))
+/// A float64 array of this shape that can be written.
+fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let wrong = |reason: String| PyValueError::new_err(format!("out: {reason}; expected float64 arrays {shape:?}"));
+    let array = out.cast::<PyArray3<f64>>().map_err(|error| wrong(error.to_string()))?;
+    if array.shape() != shape {
+        return Err(wrong(format!("shape {:?}", array.shape())));
     }
-}
-
-fn writable<'py>(array: &Bound<'py, PyArray3<f64>>) -> PyResult<PyReadwriteArray3<'py, f64>> {
-    array.try_readwrite().map_err(|error| PyValueError::new_err(format!("out: {error}")))
-}
-
-fn write(target: &mut PyReadwriteArray3<'_, f64>, result: &Array3<f64>) -> PyResult<()> {
-    let mut target = target.as_array_mut();
-    if target.shape() != result.shape() {
-        let (found, expected) = (target.shape(), result.shape());
-        return Err(PyValueError::new_err(format!("out has shape {found:?}, expected {expected:?}")));
-    }
-    target.assign(result);
-    Ok(())
+    array.try_readwrite().map_err(|error| wrong(error.to_string()))?;
+    Ok(array.clone())
 }

@@ -17,16 +17,21 @@ const LEAST_NOISE: f64 = 1e-10;
 const MOST_NOISE: f64 = 1.0;
 /// Samples that the search for hyperparameters looks at; the fit itself uses all.
 const SEARCH_SAMPLES: usize = 400;
+/// Most samples: their covariance matrix is dense.
+const MOST_SAMPLES: usize = 10_000;
 /// Points whose covariances with the samples are held in memory at once.
 const CHUNK: usize = 256;
 
 /// Gaussian process regression.
 ///
-/// The outputs are independent Gaussian processes of mean zero over the clock. They share the kernel, its length ℓ and
-/// the ratio ν of noise to signal variance, hence one matrix K = k(u, u′; ℓ) + νI, and each has its own signal variance,
-/// whose maximum-likelihood value is σ̂² = fᵀK⁻¹f/C. What is not given is found by maximising the log marginal
-/// likelihood with that value put in, Σ −C/2·ln σ̂² − ½ln|K| over the outputs that are not zero, over ν from 1e-10 to 1
-/// and ℓ from the distance of the samples to twice the extent of the clock.
+/// The P outputs are independent Gaussian processes of mean zero over the clock with one covariance σ²K,
+/// K = k(u, u′; ℓ) + νI. The signal variance has the maximum-likelihood value σ̂² = Σ fᵀK⁻¹f/(CP). Length ℓ and noise
+/// ratio ν, where not given, maximise the log marginal likelihood with that value put in, −CP/2·ln σ̂² − P/2·ln|K|,
+/// over ν from 1e-10 to 1 and ℓ from the distance of the samples to twice the extent of the clock.
+///
+/// The variance is shared because basis targets share their noise: S has orthonormal columns, so equal noise on the
+/// demonstrations is equal noise on every row of ΣVᵀ, strong or weak. With a variance each, the weak factors of real
+/// recordings, which are mostly noise, would choose the hyperparameters of the strong ones.
 ///
 /// The factorisation costs O(C³) and is shared by all outputs. The search runs it up to some two hundred times, on at
 /// most 400 samples, evenly thinned.
@@ -72,6 +77,10 @@ impl Gp {
     ) -> Result<GpPosterior> {
         super::check(domain, u, targets)?;
         self.check(domain)?;
+        if u.len() > MOST_SAMPLES {
+            let allowed = "the Gaussian process takes at most 10000; pass a smaller n_samples, or basis=\"ngnet\"";
+            return Err(Error::Range { name: "samples", value: u.len() as f64, allowed });
+        }
         let (length, mut noise) = self.hyperparameters(domain, u, targets, proceed)?;
         let covariance = Covariance::new(self.kernel, domain, length);
         let samples = Samples::new(u, targets, 1);
@@ -93,12 +102,11 @@ impl Gp {
 
         let (n_samples, n_outputs) = targets.dim();
         let unscaled = fit.factor.solve(&samples.outputs);
-        let weights = Array2::from_shape_fn((n_samples, n_outputs), |(i, o)| unscaled[(i, o)] * samples.scale[o]);
-        let deviation: Vec<f64> = fit.variances().zip(&samples.scale).map(|(v, scale)| v.sqrt() * scale).collect();
+        let weights = Array2::from_shape_fn((n_samples, n_outputs), |(i, o)| unscaled[(i, o)] * samples.scale);
+        let deviation = fit.variance().sqrt() * samples.scale;
         // What the search may leave out: that the densities are per unit of the outputs.
-        let constants = |(v, scale): (f64, &f64)| if v > 0.0 { (TAU.sqrt() * scale).ln() + 0.5 } else { 0.0 };
-        let per_sample: f64 = fit.variances().zip(&samples.scale).map(constants).sum();
-        let log_likelihood = fit.profile() - n_samples as f64 * per_sample;
+        let constant = if deviation > 0.0 { (TAU.sqrt() * samples.scale).ln() + 0.5 } else { 0.0 };
+        let log_likelihood = fit.profile() - targets.len() as f64 * constant;
         let (kernel, u, factor) = (self.kernel, samples.u, fit.factor);
         Ok(GpPosterior { kernel, covariance, length, noise, u, factor, weights, deviation, log_likelihood })
     }
@@ -159,10 +167,10 @@ impl Gp {
     }
 }
 
-/// What is regressed, every output divided by its largest magnitude.
+/// What is regressed, divided by its largest magnitude.
 struct Samples {
     u: Vec<f64>,
-    scale: Vec<f64>,
+    scale: f64,
     /// (C, outputs).
     outputs: Mat<f64>,
 }
@@ -171,8 +179,8 @@ impl Samples {
     /// Every `step`-th sample.
     fn new(u: &[f64], targets: ArrayView2<f64>, step: usize) -> Self {
         let targets = targets.slice(ndarray::s![..;step, ..]);
-        let scale = scales(targets);
-        let outputs = Mat::from_fn(targets.nrows(), targets.ncols(), |i, o| targets[[i, o]] / scale[o]);
+        let scale = scales(targets).into_iter().reduce(f64::max).unwrap_or(1.0);
+        let outputs = Mat::from_fn(targets.nrows(), targets.ncols(), |i, o| targets[[i, o]] / scale);
         Self { u: u.iter().copied().step_by(step).collect(), scale, outputs }
     }
 
@@ -206,17 +214,21 @@ struct Fit {
 }
 
 impl Fit {
-    /// σ̂² = fᵀK⁻¹f/C of each output.
-    fn variances(&self) -> impl Iterator<Item = f64> {
-        self.whitened.col_iter().map(|column| column.squared_norm_l2() / self.whitened.nrows() as f64)
+    /// σ̂² = Σ fᵀK⁻¹f/(CP).
+    fn variance(&self) -> f64 {
+        let n_values = (self.whitened.nrows() * self.whitened.ncols()) as f64;
+        self.whitened.squared_norm_l2() / n_values.max(1.0)
     }
 
-    /// Σ −C/2·ln σ̂² − ½ln|K| over the outputs that are not zero.
+    /// −CP/2·ln σ̂² − P/2·ln|K|; nothing is said by outputs that are all zero.
     fn profile(&self) -> f64 {
-        let n_samples = self.whitened.nrows();
+        let (n_samples, n_outputs) = self.whitened.shape();
+        let variance = self.variance();
+        if variance == 0.0 {
+            return 0.0;
+        }
         let half_log_determinant: f64 = (0..n_samples).map(|i| self.factor.L()[(i, i)].ln()).sum();
-        let nonzero = self.variances().filter(|&variance| variance > 0.0);
-        nonzero.map(|variance| -0.5 * n_samples as f64 * variance.ln() - half_log_determinant).sum()
+        -(n_outputs as f64) * (0.5 * n_samples as f64 * variance.ln() + half_log_determinant)
     }
 }
 
@@ -233,8 +245,8 @@ pub struct GpPosterior {
     factor: Llt<f64>,
     /// K⁻¹f, (C, outputs).
     weights: Array2<f64>,
-    /// σ̂ (outputs,).
-    deviation: Vec<f64>,
+    /// σ̂, in the unit of the outputs.
+    deviation: f64,
     log_likelihood: f64,
 }
 
@@ -249,14 +261,15 @@ impl GpPosterior {
         self.noise
     }
 
-    /// ln p(f | u, ℓ, ν, σ̂²), summed over the outputs that are not zero.
+    /// ln p(f | u, ℓ, ν, σ̂²), summed over the outputs; 0 where all are zero.
     pub fn log_likelihood(&self) -> f64 {
         self.log_likelihood
     }
 
-    /// Mean and variance of the noise-free outputs at `u` (n,), each (n, outputs): kᵀK⁻¹f and σ̂²(1 − kᵀK⁻¹k).
+    /// Mean and variance of the noise-free outputs at `u` (n,), each (n, outputs): kᵀK⁻¹f and σ̂²(1 − kᵀK⁻¹k),
+    /// the same for every output.
     pub fn predict(&self, u: &[f64]) -> (Array2<f64>, Array2<f64>) {
-        let shape = (u.len(), self.deviation.len());
+        let shape = (u.len(), self.weights.ncols());
         let (mut mean, mut variance) = (Array2::zeros(shape), Array2::zeros(shape));
         for (chunk, points) in u.chunks(CHUNK).enumerate() {
             let k = Mat::from_fn(self.u.len(), points.len(), |i, j| self.covariance.at(points[j] - self.u[i]).0);
@@ -269,9 +282,7 @@ impl GpPosterior {
                 }
                 // Rounding may take a variance of nearly zero below it.
                 let share = (1.0 - whitened.col(j).squared_norm_l2()).max(0.0);
-                for (variance, deviation) in variance.row_mut(row).iter_mut().zip(&self.deviation) {
-                    *variance = (deviation * share) * deviation;
-                }
+                variance.row_mut(row).fill(self.deviation * share * self.deviation);
             }
         }
         (mean, variance)
@@ -331,7 +342,8 @@ mod tests {
     }
 
     fn at(posterior: &GpPosterior, u: f64) -> (Vec<f64>, Vec<f64>) {
-        let mut both = (vec![f64::NAN; posterior.deviation.len()], vec![f64::NAN; posterior.deviation.len()]);
+        let empty = vec![f64::NAN; posterior.weights.ncols()];
+        let mut both = (empty.clone(), empty);
         posterior.evaluate(u, &mut both.0, &mut both.1);
         both
     }
@@ -382,10 +394,11 @@ mod tests {
             let inverse = k.clone().lu().try_inverse().unwrap();
             let cross = covariances(kernel, domain, length, &query, &u);
             let share = DMatrix::identity(6, 6) - &cross * &inverse * cross.transpose();
+            let all = DMatrix::from_fn(15, 2, |i, o| targets[[i, o]]);
+            let signal = (all.transpose() * &inverse * &all).trace() / 30.0;
             let mut log_likelihood = 0.0;
             for o in 0..2 {
                 let f = DMatrix::from_fn(15, 1, |i, _| targets[[i, o]]);
-                let signal = (f.transpose() * &inverse * &f)[(0, 0)] / 15.0;
                 let expected = &cross * &inverse * &f;
                 let density = &k * (signal * TAU);
                 let exponent = (f.transpose() * (&k * signal).lu().try_inverse().unwrap() * &f)[(0, 0)];
@@ -416,25 +429,37 @@ mod tests {
         }
 
         #[test]
-        fn outputs_of_any_magnitude_are_fitted_as_if_scaled(exponents in prop::array::uniform2(-150.0..145.0)) {
+        fn outputs_of_any_magnitude_are_fitted_as_if_scaled(exponent in -150.0..145.0) {
             let u = grid(INTERVAL, 30);
             let plain = waves(INTERVAL, &u);
-            let magnitudes = exponents.map(|e: f64| 10f64.powf(e));
+            let magnitude = 10f64.powf(exponent);
             // Output 2 is zero.
-            let scaled =
-                Array2::from_shape_fn((30, 3), |(i, o)| magnitudes.get(o).map_or(0.0, |m| m * plain[[i, o]]));
+            let scaled = Array2::from_shape_fn((30, 3), |(i, o)| if o < 2 { magnitude * plain[[i, o]] } else { 0.0 });
             let (expected, found) = (fit(&Gp::default(), INTERVAL, &u, &plain), fit(&Gp::default(), INTERVAL, &u, &scaled));
             prop_assert!((found.length() / expected.length()).ln().abs() < 0.01);
             prop_assert!((found.noise() / expected.noise()).ln().abs() < 0.01);
             for u in [-0.1, 0.0, 0.4, 1.0, 1.1] {
                 let ((value, slope), (expected, steepness)) = (at(&found, u), at(&expected, u));
                 for o in 0..2 {
-                    prop_assert!((value[o] / magnitudes[o] - expected[o]).abs() < 1e-3);
-                    prop_assert!((slope[o] / magnitudes[o] - steepness[o]).abs() < 0.1);
+                    prop_assert!((value[o] / magnitude - expected[o]).abs() < 1e-3);
+                    prop_assert!((slope[o] / magnitude - steepness[o]).abs() < 0.1);
                 }
                 prop_assert_eq!((value[2], slope[2]), (0.0, 0.0));
             }
         }
+    }
+
+    /// A weak output of nothing but noise does not make a strong, smooth one be taken for noise.
+    #[test]
+    fn weak_noise_beside_a_strong_signal_does_not_choose_for_it() {
+        let u = grid(INTERVAL, 100);
+        let noise = 1e-3 * normal(100, 8);
+        let both = ndarray::concatenate![ndarray::Axis(1), waves(INTERVAL, &u), noise];
+        let posterior = fit(&Gp::default(), INTERVAL, &u, &both);
+        for (i, &at_sample) in u.iter().enumerate() {
+            assert_abs_diff_eq!(at(&posterior, at_sample).0[0], both[[i, 0]], epsilon = 1e-2);
+        }
+        assert!(posterior.noise() < 1e-3, "{}", posterior.noise());
     }
 
     #[test]

@@ -28,7 +28,7 @@ impl Kernel {
         match self {
             Kernel::Matern32 => "matern32",
             Kernel::Matern52 => "matern52",
-            Kernel::SquaredExponential => "squared-exponential",
+            Kernel::SquaredExponential => "squared_exponential",
         }
     }
 

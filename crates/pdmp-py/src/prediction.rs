@@ -1,0 +1,45 @@
+//! The prediction of a context map in Python.
+
+use numpy::{IntoPyArray, PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::convert::to_numpy;
+
+/// The movement predicted for a condition; what the kind of primitive does not have is None.
+#[pyclass(frozen, get_all, module = "pdmp")]
+pub(crate) struct Prediction {
+    /// Style (J,).
+    style: Py<PyArray1<f64>>,
+    /// Goal (D,), discrete.
+    goal: Option<Py<PyArray1<f64>>>,
+    /// Start (D,), discrete.
+    start: Option<Py<PyArray1<f64>>>,
+    /// Anchor (D,), rhythmic.
+    anchor: Option<Py<PyArray1<f64>>>,
+    /// Duration or period in s.
+    duration: f64,
+    /// Covariance (P, P) of style, goal and start or anchor, and duration, in this order, for a new movement; None
+    /// where the demonstrations leave no degree of freedom to estimate it.
+    covariance: Option<Py<PyArray2<f64>>>,
+}
+
+impl Prediction {
+    pub(crate) fn new(py: Python<'_>, prediction: pdmp_core::Prediction) -> Self {
+        let optional = |values: Option<Vec<f64>>| values.map(|values| to_numpy(py, &values).unbind());
+        Self {
+            style: to_numpy(py, &prediction.style).unbind(),
+            goal: optional(prediction.goal),
+            start: optional(prediction.start),
+            anchor: optional(prediction.anchor),
+            duration: prediction.duration,
+            covariance: prediction.covariance.map(|covariance| covariance.into_pyarray(py).unbind()),
+        }
+    }
+}
+
+#[pymethods]
+impl Prediction {
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("<pdmp.Prediction: style {}, duration {:.4} s>", self.style.bind(py).repr()?, self.duration))
+    }
+}

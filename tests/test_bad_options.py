@@ -1,0 +1,130 @@
+"""Bad options of a fit are refused with one ValueError that names them, their value and range."""
+
+import re
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import Demonstration
+from synthetic import loops, reaches
+
+NAN, INF = float("nan"), float("inf")
+POSITION = reaches()[2].position
+RATE = {"dt": 0.02}
+
+
+def numbers(name: str, allowed: str, *values: float) -> list[tuple[dict[str, Any], str]]:
+    """Return one case per value of an option, refused with its name, value and range."""
+    texts = {0: "0", -1: "-1", INF: "inf"}
+    return [({name: v}, f"{name} = {texts.get(v, 'NaN')}: .*{allowed}") for v in values]
+
+
+OPTIONS: list[tuple[dict[str, Any], str]] = [
+    *numbers("dt", "positive and finite", 0, -1, NAN, INF),
+    *numbers("spectrum", r"must lie in \(0, 1\]", 0, -1, NAN, INF),
+    *numbers("tau", "positive and finite", 0, -1, NAN, INF),
+    *numbers("alpha_z", "between 1e-6 and 1e6", 0, -1, NAN, INF),
+    *numbers("beta_z", "between 1e-6 and 1e6", 0, -1, NAN, INF),
+    *numbers("alpha_x", "between 1e-6 and 1e6", 0, -1, NAN, INF),
+    *numbers("smoothing", "positive and finite", 0, -1, NAN, INF),
+    *numbers("nominal", "must not be negative", -1),
+    *numbers("n_styles", "", 0, -1),
+    ({"spectrum": 2}, "spectrum = 2: must lie in"),
+    ({"n_styles": 6}, "n_styles = 6: must lie between 1 and 5, the number of demonstrations"),
+    ({"nominal": 5}, "nominal = 5: must be the index of a demonstration, from 0"),
+    ({"n_samples": 3}, "n_samples = 3: at least 4 samples"),
+    ({"n_samples": -1}, "n_samples = -1: must not be negative"),
+    ({"smoothing": 25.1}, "smoothing = 25.1: must lie below half the sampling rate"),
+    ({"smoothing": "strong"}, "smoothing = 'strong': must be None, \"auto\" or a cut-off in Hz"),
+    ({"kind": "circular"}, 'kind = "circular": must be "discrete" or "rhythmic"'),
+    ({"basis": "rbf"}, 'basis = \'rbf\': must be "gp", "ngnet"'),
+    ({"dof_scale": [1, 0]}, "dof_scale = 0: must be positive and finite"),
+    ({"dof_scale": [-1, 1]}, "dof_scale = -1: must be positive"),
+    ({"dof_scale": [1]}, "dof_scale has length 1, expected 2: one value per DoF"),
+    ({"dof_scale": "unit"}, 'dof_scale = "unit": must be None, "range" or one number per DoF'),
+    ({"contexts": [[1], [2], [3], [4], [NAN]]}, r"contexts\[4, 0\] = NaN"),
+    ({"contexts": [[1], [2]]}, "contexts has length 2, expected 5: one value per demonstration"),
+    ({"contexts": [1, 2, 3, 4, 5]}, r"contexts has shape \[5\], expected two axes \(M, Q\)"),
+    ({"period": 2.0}, "period does not apply to a discrete primitive"),
+]
+
+
+@pytest.mark.parametrize(("option", "message"), OPTIONS, ids=str)
+def test_bad_options_of_a_fit_are_refused(option: dict[str, Any], message: str) -> None:
+    """The option, its value and what is allowed are told."""
+    with pytest.raises(ValueError, match=message):
+        pdmp.fit([demo.position for demo in reaches()], **(RATE | option))
+
+
+RHYTHMIC: list[tuple[dict[str, Any], str]] = [
+    *numbers("mu", "between 1e-6 and 1e6", 0, -1, NAN, INF),
+    *numbers("period", "positive and finite", 0, -1, NAN, INF),
+    ({"period": 1.98}, "period = 1.98: must exceed the last time stamp"),
+    ({"period": [2, 2]}, "period has length 2, expected 3: one value per demonstration"),
+    ({"period": None}, "time-stamped cycle .*: pass period= in seconds"),
+    ({"tau": 1.0}, "tau does not apply to a rhythmic primitive"),
+    ({"alpha_x": 1.0}, "alpha_x does not apply to a rhythmic primitive"),
+]
+
+
+@pytest.mark.parametrize(("option", "message"), RHYTHMIC, ids=str)
+def test_bad_options_of_a_rhythmic_fit_are_refused(option: dict[str, Any], message: str) -> None:
+    """Periods must exceed the stamps, and constants of the other kind are refused."""
+    demos = [Demonstration(demo.position, time=np.arange(100) / 99 * 1.98) for demo in loops()]
+    with pytest.raises(ValueError, match=message):
+        pdmp.fit(demos, **({"kind": "rhythmic", "period": 2.0} | option))
+
+
+def test_missing_rate_is_asked_for() -> None:
+    """Bare arrays need a sampling interval."""
+    with pytest.raises(ValueError, match=r"no sampling interval: pass dt= in seconds"):
+        pdmp.fit([POSITION])
+
+
+@pytest.mark.parametrize(("n_basis", "text"), [(0, "0"), (-5, "-5"), (10**6, "1000000")])
+def test_networks_of_impossible_size_are_refused(n_basis: int, text: str) -> None:
+    """The number that was given is told."""
+    with pytest.raises(ValueError, match=f"n_basis = {text}: must lie between 2 and 1000"):
+        pdmp.NGnet(n_basis)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"kernel": "cubic"}, 'kernel = "cubic": must be "matern32", "matern52" or'),
+        ({"length": 0.0}, "length = 0: must be positive"),
+        ({"length": NAN}, "length = NaN: must be positive"),
+        ({"noise": 0.0}, "noise = 0: must lie between 1e-10 and 1e6"),
+        ({"noise": NAN}, "noise = NaN: must lie between 1e-10 and 1e6"),
+    ],
+)
+def test_impossible_processes_are_refused(arguments: dict[str, Any], message: str) -> None:
+    """Kernel, length and noise are checked at once, before any fit."""
+    with pytest.raises(ValueError, match=message):
+        pdmp.GP(**arguments)
+
+
+@pytest.mark.parametrize("interval", [1e-300, 1e-160])
+def test_rates_whose_squares_overflow_are_refused(interval: float) -> None:
+    """A fit is refused where accelerations would not be numbers."""
+    with pytest.raises(ValueError, match="dt = 1e-"):
+        pdmp.fit([POSITION], dt=interval)
+
+
+@pytest.mark.parametrize("n_samples", [10**14, 2**60])
+def test_more_samples_than_memory_holds_are_refused(n_samples: int) -> None:
+    """A slip in n_samples neither panics nor ends the process."""
+    code = f"""
+import numpy as np, pdmp
+try:
+    pdmp.fit([np.eye(5)], dt=0.1, n_samples={n_samples}, basis="ngnet")
+except (ValueError, MemoryError) as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-300:]
+    assert re.search(f"n_samples = {n_samples}", done.stdout)

@@ -1,0 +1,177 @@
+"""What is learnt, against numpy, scipy and scikit-learn, and on human handwriting."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import Demonstration
+from pdmp.datasets import handwriting
+from synthetic import loops, reaches
+
+integrate = pytest.importorskip("scipy.integrate")
+interpolate = pytest.importorskip("scipy.interpolate")
+
+
+def shapes(*names: str) -> dict[str, list[Demonstration]]:
+    """Return recordings of handwriting, or skip where they are not installed."""
+    try:
+        return handwriting(names or None)
+    except ImportError as error:
+        pytest.skip(str(error))
+
+
+def reproduction_error(model: pdmp.Model, demos: list[Demonstration], m: int) -> float:
+    """Return the RMSE of a demonstration's reproduction over the larger of its DoFs' ranges."""
+    demo = demos[m]
+    time = demo.time - demo.time[0]
+    dt = model.durations[m] / (demo.n_samples - 1)
+    made = model.rollout(**pdmp.as_demonstrated(model, m), dt=dt)
+    shown = interpolate.CubicSpline(time, demo.position)(made.time)
+    return float(np.sqrt(np.mean((made.position - shown) ** 2)) / np.ptp(demo.position, 0).max())
+
+
+@pytest.mark.parametrize("name", ["WShape", "GShape", "Sine", "Multi_Models_3"])
+def test_gp_gives_handwriting_back(name: str) -> None:
+    """With J = M, the reproduction of every demonstration is off by 1e-4 of its range at most."""
+    demos = shapes(name)[name]
+    model = pdmp.fit(demos, n_styles=7)
+    assert max(reproduction_error(model, demos, m) for m in range(7)) <= 1e-4
+
+
+def test_network_gives_all_handwriting_back() -> None:
+    """With J = M and 50 functions, every demonstration of 30 shapes is off by 1e-3 at most."""
+    for name, demos in shapes().items():
+        model = pdmp.fit(demos, n_styles=7, basis="ngnet")
+        worst = max(reproduction_error(model, demos, m) for m in range(7))
+        assert worst <= 1e-3, name
+
+
+def filtered(model: pdmp.Model, spline: Any, centre: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return z (C, D) of Eq. (1) driven by y(u), from z = 0 at the first u, integrated by scipy."""
+
+    def slope(u: float, z: np.ndarray) -> np.ndarray:
+        return model.alpha_z * (model.beta_z * (centre - spline(u)) - z)
+
+    solution = integrate.solve_ivp(
+        slope, (u[0], u[-1]), np.zeros(len(centre)), "DOP853", u, rtol=1e-11, atol=1e-12
+    )
+    return solution.y.T
+
+
+def test_singular_values_are_those_of_the_targets_of_reaches() -> None:
+    """Targets f = y' - z, made here by scipy from the resampled demonstrations, factorise alike."""
+    demos = reaches()
+    model = pdmp.fit(demos, n_styles=3)
+    n = demos[model.nominal].n_samples
+    targets = []
+    for demo in demos:
+        own = interpolate.CubicSpline(np.linspace(0, 1, demo.n_samples), demo.position)
+        u = np.linspace(0, 1, n)
+        spline = interpolate.CubicSpline(u, own(u) - own(0))
+        targets.append((spline(u, 1) - filtered(model, spline, spline(1.0), u)).ravel())
+    left, sigma, _ = np.linalg.svd(targets, full_matrices=False)
+    np.testing.assert_allclose(model.singular_values, sigma, rtol=1e-6, atol=1e-9 * sigma[0])
+    np.testing.assert_allclose(np.abs(model.styles), np.abs(left[:, :3]), atol=1e-6)
+
+
+def test_singular_values_are_those_of_the_targets_of_loops() -> None:
+    """On a circle, z is the periodic steady state, here the second turn of two."""
+    model = pdmp.fit(loops(), kind="rhythmic", n_styles=2)
+    u = np.linspace(0, 2 * np.pi, 100, endpoint=False)
+    targets = []
+    for demo in loops():
+        closed = np.vstack([demo.position, demo.position[:1]])
+        spline = interpolate.CubicSpline(np.append(u, 2 * np.pi), closed, bc_type="periodic")
+        z = filtered(model, spline, demo.position.mean(axis=0), np.append(u, u + 2 * np.pi))[100:]
+        targets.append((spline(u, 1) - z).ravel())
+    sigma = np.linalg.svd(targets, compute_uv=False)
+    np.testing.assert_allclose(model.singular_values, sigma, rtol=1e-6, atol=1e-9 * sigma[0])
+
+
+@pytest.mark.parametrize("n_styles", [1, 3, 5])
+def test_styles_are_orthonormal(n_styles: int) -> None:
+    """The columns of S are the first J columns of U."""
+    styles = pdmp.fit(reaches(), n_styles=n_styles).styles
+    np.testing.assert_allclose(styles.T @ styles, np.eye(n_styles), atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, 0.99, 0.999999, 1.0])
+def test_spectrum_keeps_the_fewest_that_exceed_its_share(share: float) -> None:
+    """J is the smallest for which the sum of the values kept exceeds the share of all."""
+    model = pdmp.fit(reaches(), spectrum=share)
+    shares = np.cumsum(model.singular_values) / model.singular_values.sum()
+    assert model.n_styles == min(5, 1 + np.sum(shares <= share))
+
+
+KERNELS = {
+    "matern32": lambda k, length: k.Matern(length, nu=1.5),
+    "matern52": lambda k, length: k.Matern(length, nu=2.5),
+    "squared_exponential": lambda k, length: k.RBF(length),
+}
+
+
+@pytest.mark.parametrize(("length", "noise"), [(0.2, 1e-4), (0.05, 1e-2), (1.0, 1e-6)])
+@pytest.mark.parametrize("name", KERNELS)
+def test_gp_agrees_with_scikit_learn(name: Any, length: float, noise: float) -> None:
+    """Mean and variance are those of the same process with amplitude fᵀK⁻¹f/C."""
+    process = pytest.importorskip("sklearn.gaussian_process")
+    u, at = np.linspace(0, 1, 60), np.linspace(-0.2, 1.2, 83)
+    f = np.column_stack([np.sin(7 * u), 1e3 * u**2])
+    mean, variance = pdmp.GP(name, length, noise).regress(u, f).predict(at)
+    unit = KERNELS[name](process.kernels, length)
+    for p, target in enumerate(f.T):
+        k = unit(u[:, None]) + noise * np.eye(60)
+        amplitude = target @ np.linalg.solve(k, target) / 60
+        theirs = process.GaussianProcessRegressor(
+            process.kernels.ConstantKernel(amplitude) * unit,
+            alpha=amplitude * noise,
+            optimizer=None,
+        ).fit(u[:, None], target)
+        expected, deviation = theirs.predict(at[:, None], return_std=True)
+        np.testing.assert_allclose(mean[:, p], expected, atol=1e-6 * np.abs(target).max())
+        np.testing.assert_allclose(variance[:, p], deviation**2, atol=1e-6 * amplitude)
+
+
+def noisy() -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return six movements of rank two, clean and with 1 % noise."""
+    s = np.linspace(0, 1, 201)
+    rise, bump = s**3 * (10 - 15 * s + 6 * s**2), np.sin(2 * np.pi * s) ** 3
+    clean = [np.column_stack([rise + k * bump, k * rise]) for k in (-1, -0.6, -0.2, 0.2, 0.6, 1)]
+    random = np.random.default_rng(3)
+    return clean, [x + 0.01 * random.normal(size=x.shape) for x in clean]
+
+
+def test_automatic_smoothing_comes_closer_to_what_was_meant() -> None:
+    """From 1 % noise, the reproduction is closer to the clean movement than the recording was."""
+    clean, recorded = noisy()
+
+    def error(smoothing: Any) -> float:
+        model = pdmp.fit(recorded, dt=0.01, n_styles=2, smoothing=smoothing)
+        made = [model.rollout(**pdmp.as_demonstrated(model, m)).position for m in range(6)]
+        return float(np.sqrt(np.mean(np.square(np.array(made) - clean))))
+
+    assert error("auto") < 0.7 * 0.01
+    assert error("auto") < 0.5 * error(None)
+
+
+def test_automatic_smoothing_finds_the_rank() -> None:
+    """The two dimensions that noise hides come out by the spectrum rule."""
+    _, recorded = noisy()
+    assert pdmp.fit(recorded, dt=0.01).n_styles > 2
+    assert pdmp.fit(recorded, dt=0.01, smoothing="auto").n_styles == 2
+
+
+@pytest.mark.parametrize(("hz", "gain"), [(5.0, 1 / (1 + 4**4)), (20.0, 0.5), (80.0, 1.0)])
+def test_cut_off_damps_as_stated(hz: float, gain: float) -> None:
+    """A tremor of 20 Hz keeps 1/(1 + (f/f_c)⁴) of its amplitude: half at the cut-off."""
+    t = np.arange(401) / 200
+    tremor = np.sin(2 * np.pi * 20 * t)
+    s = t / 2
+    rise = s**3 * (10 - 15 * s + 6 * s**2)
+    model = pdmp.fit([(rise + 0.02 * tremor)[:, None]], dt=1 / 200, smoothing=hz)
+    rest = model.rollout(dt=1 / 200).position[:, 0] - rise
+    inner = slice(100, 301)
+    found = 2 * np.mean(rest[inner] * tremor[inner]) / 0.02
+    assert found == pytest.approx(gain, abs=0.03)

@@ -1,0 +1,235 @@
+"""Movements in Python: the same numbers from every way to make them, and the right ones."""
+
+import copy
+import pickle
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import Demonstration, Status
+from synthetic import loops, reaches
+
+FIELDS = ("time", "position", "velocity", "acceleration")
+MODELS = {
+    "discrete": pdmp.fit(reaches(), n_styles=2),
+    "rhythmic": pdmp.fit(loops(), kind="rhythmic", n_styles=2, mu=3.0),
+}
+KINDS = sorted(MODELS)
+
+
+@pytest.fixture(params=KINDS)
+def model(request: pytest.FixtureRequest) -> pdmp.Model:
+    """Return a model with two styles of either kind."""
+    return MODELS[request.param]
+
+
+def assert_same_motion(model: pdmp.Model, other: pdmp.Model) -> None:
+    """Assert that two models move alike to the last bit."""
+    for name in FIELDS:
+        made, expected = (getattr(m.rollout([0.3, -0.2]), name) for m in (model, other))
+        np.testing.assert_array_equal(made, expected)
+
+
+def test_step_k_is_sample_k(model: pdmp.Model) -> None:
+    """A controller repeats the rollout, start included, beyond the demonstrated end."""
+    conditions = {"style": [0.4, 0.1], "start": [0.2, 0.3], "velocity": [0.1, 0.0], "tau": 0.7}
+    trajectory = model.rollout(dt=0.01, duration=3.0, **conditions)
+    controller = model.controller(0.01, **conditions)
+    for k, time in enumerate(trajectory.time):
+        if k:
+            controller.step()
+        assert controller.time == pytest.approx(time, abs=1e-12)
+        for name in FIELDS[1:]:
+            expected = getattr(trajectory, name)[k]
+            np.testing.assert_allclose(getattr(controller, name), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["position", "velocity", "acceleration"])
+def test_outputs_are_read_only_views(model: pdmp.Model, name: str) -> None:
+    """Each is always the same array in the same memory, which only a step can write."""
+    controller = model.controller(0.01)
+    view = getattr(controller, name)
+    address, before = view.ctypes.data, view.copy()
+    controller.step()
+    assert getattr(controller, name) is view
+    assert view.ctypes.data == address
+    assert not np.array_equal(view, before)
+    with pytest.raises(ValueError, match="read-only"):
+        view[0] = 1.0
+
+
+def test_outputs_cannot_be_made_writable(model: pdmp.Model) -> None:
+    """Read-only is not a flag that the user can take off a view."""
+    with pytest.raises(ValueError, match="WRITEABLE"):
+        model.controller(0.01).position.setflags(write=True)
+
+
+def test_outputs_outlive_the_controller(model: pdmp.Model) -> None:
+    """A view keeps its memory alive after the controller is gone."""
+    controller = model.controller(0.01)
+    controller.step()
+    view, expected = controller.position, controller.position.copy()
+    del controller
+    np.testing.assert_array_equal(view, expected)
+
+
+def test_trajectories_are_the_users_own(model: pdmp.Model) -> None:
+    """Writing into one does not change what comes next."""
+    first = model.rollout()
+    expected = first.position.copy()
+    first.position[:] = np.nan
+    np.testing.assert_array_equal(model.rollout().position, expected)
+
+
+@pytest.mark.parametrize("name", ["styles", "goals", "starts", "anchors", "durations"])
+def test_models_cannot_be_changed_through_their_arrays(model: pdmp.Model, name: str) -> None:
+    """What a model shows is a copy."""
+    expected = getattr(model, name).copy()
+    getattr(model, name)[:] = np.nan
+    np.testing.assert_array_equal(getattr(model, name), expected)
+
+
+def test_status_is_one_of_two_objects() -> None:
+    """A step returns the very members, so that `is`, `==` and a dictionary tell them apart."""
+    controller = MODELS["discrete"].controller(0.01)
+    assert controller.step() is Status.WORKING
+    while controller.time < 5:
+        status = controller.step()
+    assert status is Status.FINISHED
+    assert status == Status.FINISHED != Status.WORKING
+    assert {Status.WORKING: 1, Status.FINISHED: 2}[status] == 2
+
+
+def test_finished_movements_stay_finished() -> None:
+    """After the first FINISHED no WORKING follows, as nothing was commanded."""
+    controller = MODELS["discrete"].controller(0.01)
+    statuses = [controller.step() for _ in range(400)]
+    first = statuses.index(Status.FINISHED)
+    assert set(statuses[first:]) == {Status.FINISHED}
+
+
+@pytest.mark.parametrize(
+    "again", [copy.copy, copy.deepcopy, lambda m: pickle.loads(pickle.dumps(m))]
+)
+def test_copied_models_move_alike(model: pdmp.Model, again: Callable[[Any], Any]) -> None:
+    """Copies and pickles of a model move as it does, to the last bit."""
+    assert_same_motion(again(model), model)
+
+
+OBJECTS = [
+    Demonstration(np.eye(5), dt=0.1, goal=[1, 2, 3, 4, 5], context=[0.5], names=list("abcde")),
+    Demonstration(np.eye(5), time=[0, 1, 3, 4, 9.5]),
+    Demonstration(np.eye(5)),
+    pdmp.GP("matern32", length=0.25, noise=1e-6),
+    pdmp.GP(),
+    pdmp.NGnet(12),
+]
+
+
+@pytest.mark.parametrize("original", OBJECTS, ids=str)
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda o: pickle.loads(pickle.dumps(o))])
+def test_copied_arguments_are_equal(original: Any, again: Callable[[Any], Any]) -> None:
+    """Demonstrations and regressors survive copies and pickles in every attribute."""
+    copied = again(original)
+    names = [n for n in dir(original) if n[0] != "_" and not callable(getattr(original, n))]
+    assert names
+    for name in names:
+        np.testing.assert_array_equal(getattr(copied, name), getattr(original, name))
+
+
+def test_saved_models_move_alike(model: pdmp.Model, tmp_path: Path) -> None:
+    """Save, load: the same bits, and a second save writes the same file."""
+    model.save(tmp_path / "a")
+    loaded = pdmp.load(tmp_path / "a")
+    assert_same_motion(loaded, model)
+    loaded.save(tmp_path / "b")
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"not a model" * 99, b"\xff" * 64, None])
+def test_damaged_files_are_told_from_other_errors(tmp_path: Path, content: bytes | None) -> None:
+    """Garbage and truncated files raise ModelFileError, a PdmpError, with the path."""
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(MODELS["discrete"].to_bytes()[:-7] if content is None else content)
+    with pytest.raises(pdmp.ModelFileError, match="model.safetensors") as error:
+        pdmp.load(path)
+    assert isinstance(error.value, pdmp.PdmpError)
+
+
+def test_missing_files_are_missing_files(tmp_path: Path) -> None:
+    """A path that does not exist raises what Python raises."""
+    with pytest.raises(FileNotFoundError, match="none"):
+        pdmp.load(tmp_path / "none")
+
+
+def test_batch_is_written_in_place(model: pdmp.Model) -> None:
+    """With `out`, positions and velocities appear in the arrays given, strided ones too."""
+    expected = model.rollouts(model.styles, dt=0.05)
+    shape = expected[0].shape
+    out = np.full(shape, np.nan), np.full((*shape[:2], 4), np.nan)[:, :, ::2]
+    returned = model.rollouts(model.styles, dt=0.05, out=out)
+    for mine, theirs, result in zip(out, returned, expected, strict=True):
+        assert theirs is mine
+        np.testing.assert_array_equal(mine, result)
+
+
+def test_batch_is_the_rollouts_one_by_one(model: pdmp.Model) -> None:
+    """Row b of a batch is the rollout of style b."""
+    positions, velocities = model.rollouts(model.styles, dt=0.05, tau=1.5 * model.tau)
+    for style, position, velocity in zip(model.styles, positions, velocities, strict=True):
+        single = model.rollout(style, dt=0.05, tau=1.5 * model.tau)
+        np.testing.assert_allclose(position, single.position, atol=1e-12)
+        np.testing.assert_allclose(velocity, single.velocity, atol=1e-10)
+
+
+@pytest.mark.parametrize("given", [{}, {"start": [0.1, 0.2]}, {"velocity": [0.5, -0.5]}], ids=str)
+def test_jacobian_is_the_difference_of_rollouts(model: pdmp.Model, given: dict[str, Any]) -> None:
+    """Finite differences of rollouts agree with it for every way to start."""
+    jacobian = model.style_jacobian(0.05, **given)
+    style, h = np.array([0.3, -0.4]), 1e-3
+    for j, step in enumerate(h * np.eye(2)):
+        ahead, behind = (model.rollout(style + e, dt=0.05, **given) for e in (step, -step))
+        difference = (ahead.position - behind.position) / (2 * h)
+        np.testing.assert_allclose(jacobian[:, :, j], difference, atol=1e-9)
+
+
+def test_threads_share_a_model(model: pdmp.Model) -> None:
+    """Rollouts from several threads at once are those of one."""
+    styles = np.random.default_rng(0).normal(size=(40, 2))
+    expected = [model.rollout(style).position for style in styles]
+    with ThreadPoolExecutor(8) as pool:
+        made = list(pool.map(lambda style: model.rollout(style).position, styles))
+    np.testing.assert_array_equal(made, expected)
+
+
+def test_threads_cannot_break_a_controller(model: pdmp.Model) -> None:
+    """Two threads that step one controller take turns, or one is told off; no tick is half done."""
+    controller = model.controller(0.001)
+    done: list[int] = []
+    other: list[BaseException] = []
+
+    def run() -> None:
+        for k in range(3000):
+            try:
+                controller.style = [0.1, k / 3000]
+                controller.step()
+                done.append(k)
+            except RuntimeError:
+                pass
+            except BaseException as error:
+                other.append(error)
+
+    threads = [threading.Thread(target=run) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not other
+    assert controller.time == pytest.approx(0.001 * len(done))
+    assert np.isfinite(controller.position).all()

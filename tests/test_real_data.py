@@ -1,0 +1,115 @@
+"""Recordings of people load, are learnt, given back, and predicted from their context."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import Demonstration
+from pdmp.demos import read_folder
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def recordings(name: str, step: int, **options: Any) -> list[Demonstration]:
+    """Return every `step`-th demonstration of a set, or skip where the data are not at hand."""
+    folder = DATA / name
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not there: the recordings' licences forbid copying them here")
+    return list(read_folder(folder, **options).values())[::step]
+
+
+def worst_error(model: pdmp.Model, demos: list[Demonstration]) -> float:
+    """Return the largest RMSE over range of a reproduction, of any demonstration."""
+    errors = []
+    for m, demo in enumerate(demos):
+        steps = demo.n_samples - (model.kind == "discrete")
+        made = model.rollout(**pdmp.as_demonstrated(model, m), dt=model.durations[m] / steps)
+        difference = made.position[: demo.n_samples] - demo.position
+        errors.append(np.sqrt(np.mean(difference**2)) / np.ptp(demo.position, axis=0).max())
+    return max(errors)
+
+
+def assert_finite(trajectory: pdmp.Trajectory) -> None:
+    """Assert that a movement has no number that is none."""
+    for name in ("position", "velocity", "acceleration"):
+        assert np.isfinite(getattr(trajectory, name)).all()
+
+
+ARM = ["r_sh1", "r_sh2", "r_sh3", "r_elb"]
+
+
+def raised_hands() -> list[Demonstration]:
+    """Return movements of a four-joint arm that raises its hand to several heights."""
+    return recordings("raise_hand_bandai", 8, columns=ARM, context=["hold_height_m"])
+
+
+def test_raised_hands_are_given_back() -> None:
+    """With J = M, arm movements at 30 Hz are reproduced to 1e-3 of their range."""
+    demos = raised_hands()
+    model = pdmp.fit(demos, n_styles=len(demos))
+    assert model.names == ARM
+    assert worst_error(model, demos) <= 1e-3
+
+
+def test_raised_hands_are_predicted_from_their_height() -> None:
+    """Heights between and beyond those shown lead to movements of finite numbers and duration."""
+    model = pdmp.fit(raised_hands())
+    for height in (1.0, 1.4, 1.8):
+        assert_finite(model.rollout(context=[height]))
+        assert 0.3 < model.predict([height]).duration < 10
+
+
+def test_noisy_hands_can_be_smoothed() -> None:
+    """With automatic smoothing the reproductions stay within a hundredth of the range."""
+    demos = raised_hands()
+    model = pdmp.fit(demos, n_styles=len(demos), smoothing="auto")
+    assert worst_error(model, demos) <= 1e-2
+
+
+def walking_forces() -> list[Demonstration]:
+    """Return forces of the first walker's stances at many speeds."""
+    return recordings("walking_force_speed", 1, context=["speed_m_s"])[:60]
+
+
+@pytest.mark.parametrize("basis", ["gp", "ngnet"])
+def test_walking_forces_are_given_back(basis: Any) -> None:
+    """With J = M, forces that jump within a sample are reproduced to 5 % of their range."""
+    demos = walking_forces()[::5]
+    model = pdmp.fit(demos, n_styles=len(demos), basis=basis)
+    assert worst_error(model, demos) <= 0.05
+
+
+@pytest.mark.parametrize("basis", ["gp", "ngnet"])
+def test_unseen_speeds_are_predicted_better_than_by_the_mean(basis: Any) -> None:
+    """Stances left out of the fit are closer to the prediction for their speed than to the mean."""
+    demos = walking_forces()
+    seen, unseen = demos[::2], demos[1::2]
+    model = pdmp.fit(seen, n_styles=3, basis=basis)
+    mean = np.mean([demo.position for demo in seen], axis=0)
+    predicted = by_mean = 0.0
+    for demo in unseen:
+        made = model.rollout(context=demo.context, tau=model.tau, dt=demo.time[1] - demo.time[0])
+        predicted += np.mean((made.position[: len(mean)] - demo.position) ** 2)
+        by_mean += np.mean((mean - demo.position) ** 2)
+    assert predicted < 0.5 * by_mean
+
+
+@pytest.mark.parametrize("basis", ["gp", "ngnet"])
+def test_gait_of_boys_is_given_back(basis: Any) -> None:
+    """Cycles of only twenty samples are reproduced to 2 % of their range, from the first on."""
+    demos = recordings("gait_boys", 4)
+    model = pdmp.fit(demos, kind="rhythmic", period=1.0, n_styles=len(demos), basis=basis)
+    assert worst_error(model, demos) <= 0.02
+
+
+def test_running_strides_are_given_back() -> None:
+    """Strides in three planes of three joints are reproduced to 0.5 % of their range."""
+    whole = recordings("running_strides", 60)
+    # The last of 101 points is the first of the next stride.
+    demos = [Demonstration(demo.position[:-1], dt=0.01, names=demo.names) for demo in whole]
+    model = pdmp.fit(demos, kind="rhythmic", n_styles=len(demos))
+    assert worst_error(model, demos) <= 5e-3
+    assert_finite(model.rollout(model.styles.mean(axis=0), duration=5.0))
