@@ -14,12 +14,12 @@ demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and
 	$(BIN)/pdmp demo -o demo
 
 test: .venv/with-test  ## Runs every test, Rust and Python
-	cargo test --workspace
+	cargo test --release --workspace
 	$(BIN)/pytest
 
 check: .venv/with-dev  ## Formatting, lints, types, and the stubs against the module
 	cargo fmt --all --check
-	cargo clippy --workspace --all-targets -- -D warnings
+	cargo clippy --release --workspace --all-targets -- -D warnings
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy

@@ -224,7 +224,7 @@ class Controller:
         dt: float | None = None,
         *,
         measured: ArrayLike | None = None,  # (D,)
-        coupling: ArrayLike | None = None,  # (D,)
+        coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
     ) -> Status: ...
     def reset(
         self,
@@ -267,6 +267,10 @@ class Controller:
     def amplitude(self) -> float: ...
     @amplitude.setter
     def amplitude(self, amplitude: float, /) -> None: ...
+    @property
+    def compliance(self) -> tuple[float, float]: ...  # stopping k_s, tracking k_t
+    @compliance.setter
+    def compliance(self, compliance: tuple[float, float], /) -> None: ...
 
 @final
 class GP:

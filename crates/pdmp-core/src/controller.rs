@@ -2,16 +2,18 @@
 //!
 //! Over a tick the forcing w, the goal and the clock are known at both ends with their slopes; a cubic between them is
 //! propagated exactly ([`crate::Attractor::propagator`]). Style, rate ρ = 1/τ and goal or anchor pass critically damped
-//! filters, so that position and velocity stay continuous: ẏ = ρ(z + w), ÿ = ρ²(z′ + w′) + ρ̇(z + w).
+//! filters, so that position and velocity stay continuous: ẏ = ρ(z + w), ÿ = ρ²(z′ + w′) + ρ̇(z + w). A perturbation
+//! ([`crate::Perturbation`]) slows the phase's clock against the output system's, and adds to ẏ and ÿ.
 //!
 //! Nothing in [`Controller::step`] or in a setter allocates, locks or panics.
 
 use std::sync::Arc;
 
-use crate::attractor::{Jet, Propagator, State};
+use crate::attractor::{Attractor, Jet, Propagator, State};
 use crate::error::{Error, Result, check_positive, check_vector};
 use crate::follower::Follower;
 use crate::model::{Complete, Conditions, Model, blend, check_amplitude, check_style, check_tau, refuse};
+use crate::perturbation::{Held, Perturbation, Push};
 use crate::phase::{Canonical, Kind, amplitude};
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
@@ -47,6 +49,7 @@ pub struct Controller {
     dt: f64,
     conditions: Complete,
     started: bool,
+    status: Status,
     time: f64,
     /// Clock u, or the polar phase φ in [0, 2π).
     clock: f64,
@@ -62,6 +65,7 @@ pub struct Controller {
     /// Forcing and centre at the start of the stretch at work (D,).
     from: Vec<Drive>,
     propagator: Propagator,
+    held: Held,
     position: Vec<f64>,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
@@ -91,6 +95,7 @@ impl Controller {
         let mut controller = Self {
             dt,
             started: false,
+            status: Status::Working,
             time: 0.0,
             clock: 0.0,
             r: 1.0,
@@ -102,6 +107,7 @@ impl Controller {
             z: vec![0.0; n_dofs],
             from: vec![Drive::default(); n_dofs],
             propagator: model.attractor().propagator(dt / conditions.tau),
+            held: Held::new(model.ranges(), model.canonical().extent()),
             position: vec![0.0; n_dofs],
             velocity: vec![0.0; n_dofs],
             acceleration: vec![0.0; n_dofs],
@@ -127,6 +133,8 @@ impl Controller {
         let Self { model, conditions, .. } = self;
         let n_dofs = model.n_dofs();
         self.started = false;
+        self.status = Status::Working;
+        self.held.release();
         (self.time, self.clock) = (0.0, 0.0);
         self.r = conditions.amplitude;
         self.style.jump(&conditions.style);
@@ -166,11 +174,35 @@ impl Controller {
     /// # Errors
     /// `dt` that is not positive, or longer than 1000 τ; the state then stays as it was.
     pub fn step_by(&mut self, dt: f64) -> Result<Status> {
+        self.step_with(dt, &Perturbation::default())
+    }
+
+    /// One tick of `dt` seconds under a perturbation, which is held over it:
+    ///
+    /// ```text
+    /// τẏ = z + w(u) + k_t(ỹ − y) + τc_v
+    /// τż = α_z(β_z(g − y) − z) + τ²c_a
+    /// τu̇ = κ = 1/(1 + k_s‖(ỹ − y)/range‖²)
+    /// ```
+    ///
+    /// `measured` ỹ stops the phase as the robot falls behind and pulls the movement towards it, with the gains of
+    /// [`Controller::set_compliance`]; `coupling` adds c_v to the velocity and c_a to the acceleration. Over the tick the
+    /// pull is the velocity (1 − exp(−k_t h))/dt of the error at its start, h being the tick on the clock: however long
+    /// the tick, it pulls no further than ỹ.
+    ///
+    /// Phase stopping and the pull: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
+    /// Mohajerian and Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9. Terms in ż:
+    /// Pastor, Hoffmann, Asfour and Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385.
+    ///
+    /// # Errors
+    /// As for [`Controller::step_by`], a wrong length, or a number that is not finite; the state then stays as it was.
+    pub fn step_with(&mut self, dt: f64, perturbation: &Perturbation) -> Result<Status> {
         check_positive("dt", dt)?;
         let h = self.rate.integral(dt);
         if h > LONGEST_TICK {
             return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
         }
+        self.held.take(perturbation, &self.position, dt, h)?;
         self.started = true;
         // A tick of just the finest length is not divided for a rounding error.
         let pieces = (h / (FINEST * self.model.canonical().extent()) - 1e-9).ceil().clamp(1.0, MOST_PIECES);
@@ -179,7 +211,11 @@ impl Controller {
         }
         self.time += dt;
         self.read_out();
-        Ok(self.status())
+        // What has settled stays settled, unless it is pushed or commanded.
+        if self.status == Status::Working || self.held.push().is_some() {
+            self.status = self.settled();
+        }
+        Ok(self.status)
     }
 
     /// Moves on by `dt` seconds, stopping at the demonstrated end, where the forcing has a kink.
@@ -187,11 +223,12 @@ impl Controller {
         let Canonical::Discrete { u_end, .. } = self.model.canonical() else {
             return self.advance(dt);
         };
-        let (left, h) = (u_end - self.clock, self.rate.integral(dt));
+        let pace = self.held.pace();
+        let (left, h) = (u_end - self.clock, pace * self.rate.integral(dt));
         if left <= 0.0 || left >= h {
             return self.advance(dt);
         }
-        let before = self.rate.time_to(left, dt);
+        let before = self.rate.time_to(left / pace, dt);
         // What rounding left of a tick that should have ended here is not worth a piece of its own.
         if left > 1e-9 * h {
             self.advance(before);
@@ -202,21 +239,23 @@ impl Controller {
     }
 
     fn advance(&mut self, dt: f64) {
-        let h = self.rate.integral(dt);
+        let (h, pace) = (self.rate.integral(dt), self.held.pace());
         if h <= 0.0 {
             return;
         }
         let moving = !self.centre.settled();
+        let canonical = self.model.canonical();
+        let demonstrated = canonical.kind() == Kind::Discrete && self.clock < canonical.extent();
+        let levers = self.held.push().map(|_| self.levers());
         for d in 0..self.z.len() {
             self.from[d] = self.drive(d);
         }
         self.style.advance(dt);
         self.rate.advance(dt);
         self.centre.advance(dt);
-        match self.model.canonical() {
-            Canonical::Discrete { u_end, .. } => {
-                let demonstrated = self.clock < u_end;
-                self.clock += h;
+        match canonical {
+            Canonical::Discrete { .. } => {
+                self.clock += pace * h;
                 let landscape = self.model.landscape();
                 // At u_end itself the slope of the demonstrated side belongs to this piece.
                 if demonstrated {
@@ -225,8 +264,8 @@ impl Controller {
                     landscape.evaluate(self.clock, &mut self.basis, &mut self.basis_slope);
                 }
             }
-            canonical @ Canonical::Rhythmic { mu } => {
-                self.clock = canonical.phase(self.clock + h);
+            Canonical::Rhythmic { mu } => {
+                self.clock = canonical.phase(self.clock + pace * h);
                 self.r = amplitude(mu, self.r, self.conditions.amplitude, h);
                 self.model.landscape().evaluate(self.clock, &mut self.basis, &mut self.basis_slope);
             }
@@ -248,6 +287,20 @@ impl Controller {
             self.position[d] = origin + next.e;
             self.z[d] = next.z;
         }
+        // From the end on the forcing has the slope of its other side.
+        if demonstrated && self.clock >= canonical.extent() {
+            self.model.landscape().evaluate(self.clock, &mut self.basis, &mut self.basis_slope);
+        }
+        // The system is linear: what a perturbation does comes on top.
+        if let (Some(from), Some(push)) = (levers, self.held.push()) {
+            let to = self.levers();
+            let by_velocity = self.propagator.advance(State::default(), [from[0], to[0]]);
+            let by_acceleration = self.propagator.follow([from[1], to[1]]);
+            for (d, Push { velocity, acceleration }) in push.iter().enumerate() {
+                self.position[d] += by_velocity.e * velocity + by_acceleration.e * acceleration;
+                self.z[d] += by_velocity.z * velocity + by_acceleration.z * acceleration;
+            }
+        }
     }
 
     /// What drives one DoF now, with slopes with respect to the clock.
@@ -256,12 +309,24 @@ impl Controller {
         Drive { forcing: self.force(d), centre: Jet { value: self.centre.value()[d], slope } }
     }
 
+    /// What a unit of c_v adds to the forcing, τ, and a unit of c_a to the centre: τ²/(α_zβ_z), for that is how far the
+    /// centre must move to add τ² to the row of Eq. (1).
+    fn levers(&self) -> [Jet; 2] {
+        let Attractor { alpha_z, beta_z } = self.model.attractor();
+        let tau = 1.0 / self.rate.value()[0];
+        // dτ/du = τ·dτ/dt.
+        let slope = -self.rate.rate()[0] * tau.powi(3);
+        let centre = tau / (alpha_z * beta_z);
+        [Jet { value: tau, slope }, Jet { value: tau * centre, slope: 2.0 * slope * centre }]
+    }
+
     /// Forcing w of one DoF with its slope along the motion: the landscape's, the style's and the amplitude's part.
     fn force(&self, d: usize) -> Jet {
         let n_dofs = self.z.len();
         let (style, rate) = (self.style.value(), self.rate.value()[0]);
         let shape = blend(style, &self.basis, n_dofs, d);
-        let mut slope = blend(style, &self.basis_slope, n_dofs, d);
+        // The landscape is read at the phase's pace; style and amplitude keep the output system's clock.
+        let mut slope = self.held.pace() * blend(style, &self.basis_slope, n_dofs, d);
         if !self.style.settled() {
             slope += blend(self.style.rate(), &self.basis, n_dofs, d) / rate;
         }
@@ -282,17 +347,24 @@ impl Controller {
             self.velocity[d] = rate * flow;
             self.acceleration[d] = rate * rate * (attractor.z_slope(state) + w.slope) + change * flow;
         }
+        for (d, push) in self.held.push().into_iter().flatten().enumerate() {
+            self.velocity[d] += push.velocity;
+            self.acceleration[d] += push.acceleration;
+        }
     }
 
-    /// Whether the movement goes on.
-    pub fn status(&self) -> Status {
+    /// Whether a movement is over: how far a DoF may still go is at most about |e| + 2τ|ẏ|/α_z + |w|/β_z, what is left
+    /// of its way, of its speed at critical damping, and of its forcing.
+    fn settled(&self) -> Status {
         let Canonical::Discrete { u_end, .. } = self.model.canonical() else {
             return Status::Working;
         };
+        let Attractor { alpha_z, beta_z } = self.model.attractor();
         let tau = 1.0 / self.rate.value()[0];
         let settled = |d: usize| {
-            (self.position[d] - self.centre.target()[d]).abs() <= self.tolerance[d]
-                && tau * self.velocity[d].abs() <= self.tolerance[d]
+            let way = (self.position[d] - self.centre.target()[d]).abs();
+            let speed = 2.0 * tau * self.velocity[d].abs() / alpha_z;
+            way + speed + self.force(d).value.abs() / beta_z <= self.tolerance[d]
         };
         let over = self.clock >= u_end && (0..self.z.len()).all(settled);
         if over { Status::Finished } else { Status::Working }
@@ -356,17 +428,39 @@ impl Controller {
         self.commanded()
     }
 
-    /// Commands given before the first step hold from the start.
+    /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
+    ///
+    /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 over the
+    /// demonstrated stretch of the clock, T/τ or 2π; 0 is without.
+    ///
+    /// # Errors
+    /// A gain that is negative, not finite or above 1e100; both then stay as they were.
+    pub fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
+        self.held.set_compliance(stopping, tracking)
+    }
+
+    /// Commands given before the first step hold from the start; later ones set a settled movement going.
     fn commanded(&mut self) -> Result<()> {
+        self.status = Status::Working;
         if !self.started {
             self.begin();
         }
         Ok(())
     }
 
+    /// Whether the movement goes on.
+    pub fn status(&self) -> Status {
+        self.status
+    }
+
     /// The model that is run.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
+    }
+
+    /// Length of a tick given at the start, in seconds.
+    pub fn dt(&self) -> f64 {
+        self.dt
     }
 
     /// Seconds since the start.
@@ -407,6 +501,11 @@ impl Controller {
     /// Time constant commanded, in seconds.
     pub fn tau(&self) -> f64 {
         self.conditions.tau
+    }
+
+    /// Gains k_s and k_t of a measured position.
+    pub fn compliance(&self) -> (f64, f64) {
+        self.held.compliance()
     }
 
     /// Amplitude r₀ commanded; 1 where discrete.

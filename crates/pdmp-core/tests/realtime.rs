@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::*;
-use pdmp_core::{Conditions, Controller, Kind};
+use pdmp_core::{Conditions, Controller, Coupling, Kind, Perturbation};
 
 struct Counting;
 
@@ -63,7 +63,17 @@ fn a_million_ticks_of_random_commands_allocate_nothing() {
                 4 => controller.set_amplitude(values[0]),
                 _ => Ok(()),
             });
-            black_box(controller.step_by(1e-3 * (0.1 + random.next())).unwrap());
+            let dt = 1e-3 * (0.1 + random.next());
+            let given = &values[..n_dofs];
+            let coupling = Some(Coupling { velocity: given, acceleration: given });
+            let refused = given[0].is_nan();
+            let (done, perturbed) = match (random.next() * 4.0) as u8 {
+                0 => (controller.step_with(dt, &Perturbation { measured: Some(given), coupling: None }), true),
+                1 => (controller.step_with(dt, &Perturbation { measured: None, coupling }), true),
+                2 => (controller.step_with(dt, &Perturbation { measured: Some(given), coupling }), true),
+                _ => (controller.step_by(dt), false),
+            };
+            assert_eq!(black_box(done).is_err(), perturbed && refused);
         }
         assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
         assert!(controller.position().iter().all(|y| y.is_finite()));

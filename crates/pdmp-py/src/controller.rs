@@ -1,12 +1,12 @@
 //! The real-time loop in Python.
 
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
-use pdmp_core::Kind;
+use pdmp_core::{Coupling, Kind, Perturbation};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::conditions::Arguments;
-use crate::convert::{to_numpy, vector};
+use crate::convert::{optional, to_numpy, vector};
 use crate::error::raise;
 
 /// Whether a movement goes on (`WORKING`) or has settled on its goal (`FINISHED`).
@@ -31,7 +31,10 @@ impl Output {
     fn new(py: Python<'_>, length: usize) -> PyResult<Self> {
         let data = PyArray1::<f64>::zeros(py, length, false);
         let view = data.call_method0("view")?;
-        view.call_method("setflags", (false,), None)?;
+        // The array under the view too, or numpy would let a user lift the view's protection.
+        for array in [data.as_any(), &view] {
+            array.call_method("setflags", (false,), None)?;
+        }
         Ok(Self { data: data.unbind(), view: view.unbind() })
     }
 
@@ -48,7 +51,7 @@ impl Output {
 /// A running primitive, made by `Model.controller`.
 ///
 /// `step` moves on by one tick and writes into `position`, `velocity` and `acceleration`, which are read-only views
-/// that stay valid. `goal`, `style`, `tau`, `amplitude` and `anchor` can be set at any tick; values that are refused
+/// that stay valid. `goal`, `style`, `tau`, `amplitude`, `anchor` and `compliance` can be set at any tick; values that are refused
 /// leave the last good ones in force.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
@@ -91,12 +94,24 @@ impl Controller {
 
 #[pymethods]
 impl Controller {
-    /// One tick.
+    /// One tick, perturbed if the robot is measured or terms of one's own are given:
+    ///
+    ///     tau y' = z + w(u) + k_t (m - y) + tau c_v
+    ///     tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
+    ///     tau u' = 1 / (1 + k_s |(m - y) / range|**2)
+    ///
+    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. All is evaluated at the
+    /// start of the tick and held over it; however long it is, y is pulled no further than m. A robot that is held
+    /// fast so holds the movement, all but stops its phase, and, let go, continues from there.
     ///
     /// Parameters
     /// ----------
     /// dt : float, optional
     ///     Length of this tick in s, if it differs from the controller's.
+    /// measured : array_like (D,), optional
+    ///     Position m at which the robot is, in the unit of each DoF.
+    /// coupling : tuple of two array_like (D,), optional
+    ///     Terms (c_v, c_a), per s and per s²: the velocity gains c_v, and jumps where it does; the acceleration c_a.
     ///
     /// Returns
     /// -------
@@ -106,13 +121,36 @@ impl Controller {
     /// Raises
     /// ------
     /// ValueError
-    ///     A tick that is not positive or longer than 1000 tau; the state then stays as it was.
-    #[pyo3(signature = (dt=None))]
-    fn step(&mut self, py: Python<'_>, dt: Option<f64>) -> PyResult<Py<PyAny>> {
-        let status = match dt {
-            None => self.inner.step(),
-            Some(dt) => self.inner.step_by(dt),
+    ///     A tick that is not positive or longer than 1000 tau, a wrong length, or a number that is not finite; the
+    ///     state then stays as it was.
+    ///
+    /// References
+    /// ----------
+    /// Ijspeert, Nakanishi, Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739 (phase stopping, term in y').
+    /// Schaal, Mohajerian, Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9.
+    /// Pastor, Hoffmann, Asfour, Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385 (terms in z').
+    #[pyo3(signature = (dt=None, *, measured=None, coupling=None))]
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        dt: Option<f64>,
+        measured: Option<&Bound<'_, PyAny>>,
+        coupling: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+    ) -> PyResult<Py<PyAny>> {
+        let measured = optional("measured", measured)?;
+        let coupling = coupling
+            .map(|(velocity, acceleration)| {
+                Ok::<_, PyErr>((
+                    vector("coupling velocity", &velocity)?,
+                    vector("coupling acceleration", &acceleration)?,
+                ))
+            })
+            .transpose()?;
+        let perturbation = Perturbation {
+            measured: measured.as_deref(),
+            coupling: coupling.as_ref().map(|(velocity, acceleration)| Coupling { velocity, acceleration }),
         };
+        let status = self.inner.step_with(dt.unwrap_or(self.inner.dt()), &perturbation);
         let status = status.map_err(raise)?;
         self.publish(py);
         Ok(match status {
@@ -228,6 +266,18 @@ impl Controller {
     fn set_amplitude(&mut self, py: Python<'_>, amplitude: f64) -> PyResult<()> {
         let result = self.inner.set_amplitude(amplitude);
         self.command(py, result)
+    }
+
+    /// Gains (k_s, k_t) of a measured position: how much it stops the phase, and pulls per unit of u. 0 is without.
+    #[getter]
+    fn compliance(&self) -> (f64, f64) {
+        self.inner.compliance()
+    }
+
+    #[setter]
+    fn set_compliance(&mut self, compliance: (f64, f64)) -> PyResult<()> {
+        let (stopping, tracking) = compliance;
+        self.inner.set_compliance(stopping, tracking).map_err(raise)
     }
 
     fn __repr__(&self) -> String {

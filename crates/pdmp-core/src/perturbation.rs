@@ -1,0 +1,150 @@
+//! What happens to a movement on its way: the robot's measured position ỹ, and terms c_v and c_a of the user's own.
+//!
+//! ```text
+//! τẏ = z + w(u) + k_t(ỹ − y) + τc_v                 Eq. (2)
+//! τż = α_z(β_z(g − y) − z) + τ²c_a                   Eq. (1)
+//! τu̇ = κ = 1/(1 + k_s‖(ỹ − y)/range‖²)              phase stopping: τẋ = −κα_x x, or τφ̇ = κ
+//! ```
+//!
+//! so that ẏ gains c_v and ÿ gains c_a. A robot that is held fast holds the position with it and all but stops the
+//! phase; let go, the movement goes on from there. Phase stopping and the term in the row of Eq. (2) are those of
+//! Ijspeert, Nakanishi and Schaal, ICRA 2002, [doi:10.1109/ROBOT.2002.1014739], and of Schaal, Mohajerian and Ijspeert,
+//! Progress in Brain Research 165, 2007, [doi:10.1016/S0079-6123(06)65027-9]; terms in the row of Eq. (1) those of
+//! Pastor, Hoffmann, Asfour and Schaal, ICRA 2009, [doi:10.1109/ROBOT.2009.5152385].
+//!
+//! All three are evaluated at the start of a tick and held over it, so that its propagation stays exact.
+//!
+//! [doi:10.1109/ROBOT.2002.1014739]: https://doi.org/10.1109/ROBOT.2002.1014739
+//! [doi:10.1016/S0079-6123(06)65027-9]: https://doi.org/10.1016/S0079-6123(06)65027-9
+//! [doi:10.1109/ROBOT.2009.5152385]: https://doi.org/10.1109/ROBOT.2009.5152385
+
+use crate::error::{Error, Result, check_vector};
+
+/// Default k_s: an error of a tenth of the range slows the phase elevenfold.
+const STOPPING: f64 = 1000.0;
+/// Default k_t, over the demonstrated stretch of the clock: held for long, a stronger pull would let the phase creep on
+/// and the movement leap once let go, a weaker one would leave the robot farther behind.
+const TRACKING: f64 = 10.0;
+/// Largest gain; it only keeps products finite.
+const LARGEST_GAIN: f64 = 1e100;
+/// A DoF whose range is no more than this share of the widest stands still.
+const STILL: f64 = 1e-6;
+
+/// What happens to the movement during one tick; by default nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Perturbation<'a> {
+    /// Position ỹ (D,) at which the robot is now, in the unit of each DoF.
+    pub measured: Option<&'a [f64]>,
+    /// The user's own terms.
+    pub coupling: Option<Coupling<'a>>,
+}
+
+/// Terms of the user's own, constant over the tick. The velocity jumps where c_v does.
+#[derive(Clone, Copy, Debug)]
+pub struct Coupling<'a> {
+    /// c_v (D,), added to the velocity, per second.
+    pub velocity: &'a [f64],
+    /// c_a (D,), added to the acceleration, per second squared.
+    pub acceleration: &'a [f64],
+}
+
+/// What is added to one DoF over a tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Push {
+    pub(crate) velocity: f64,
+    pub(crate) acceleration: f64,
+}
+
+/// The perturbation of the tick at work, and how much the movement gives way to it.
+#[derive(Clone, Debug)]
+pub(crate) struct Held {
+    push: Vec<Push>,
+    pushed: bool,
+    pace: f64,
+    /// k_s and k_t.
+    compliance: (f64, f64),
+    /// Range of each DoF (D,); infinite where it stands still, so that an error there does not stop the phase.
+    span: Vec<f64>,
+}
+
+impl Held {
+    /// No perturbation, for DoFs of these ranges and a movement of this extent on the clock.
+    pub(crate) fn new(ranges: &[f64], extent: f64) -> Self {
+        let widest = ranges.iter().fold(0.0f64, |widest, range| widest.max(*range));
+        let span = |&range: &f64| if range > STILL * widest { range } else { f64::INFINITY };
+        Self {
+            push: vec![Push::default(); ranges.len()],
+            pushed: false,
+            pace: 1.0,
+            compliance: (STOPPING, TRACKING / extent),
+            span: ranges.iter().map(span).collect(),
+        }
+    }
+
+    /// Forgets the perturbation.
+    pub(crate) fn release(&mut self) {
+        (self.pushed, self.pace) = (false, 1.0);
+    }
+
+    /// Takes the perturbation of a tick of `dt` seconds, `h` on the clock, that starts at `position`.
+    pub(crate) fn take(&mut self, perturbation: &Perturbation, position: &[f64], dt: f64, h: f64) -> Result<()> {
+        let n_dofs = position.len();
+        if let Some(measured) = perturbation.measured {
+            check_vector("measured", measured, n_dofs, "DoF")?;
+        }
+        if let Some(Coupling { velocity, acceleration }) = perturbation.coupling {
+            check_vector("coupling velocity", velocity, n_dofs, "DoF")?;
+            check_vector("coupling acceleration", acceleration, n_dofs, "DoF")?;
+        }
+        self.release();
+        self.pushed = perturbation.measured.is_some() || perturbation.coupling.is_some();
+        if self.pushed {
+            self.push.fill(Push::default());
+        }
+        if let Some(Coupling { velocity, acceleration }) = perturbation.coupling {
+            for (d, push) in self.push.iter_mut().enumerate() {
+                *push = Push { velocity: velocity[d], acceleration: acceleration[d] };
+            }
+        }
+        if let Some(measured) = perturbation.measured {
+            let (stopping, tracking) = self.compliance;
+            // What k_t alone would take off the error over the tick, so that it pulls no further than ỹ: stable for every
+            // tick and gain up to β_z = 4α_z at least, far from the critical damping of α_z/4.
+            let pull = -(-tracking * h).exp_m1() / dt;
+            let mut strain = 0.0;
+            for (d, push) in self.push.iter_mut().enumerate() {
+                let error = measured[d] - position[d];
+                push.velocity += pull * error;
+                strain += (stopping.sqrt() * error / self.span[d]).powi(2);
+            }
+            self.pace = 1.0 / (1.0 + strain);
+        }
+        Ok(())
+    }
+
+    /// What is added to each DoF (D,), if anything.
+    pub(crate) fn push(&self) -> Option<&[Push]> {
+        self.pushed.then_some(&self.push)
+    }
+
+    /// κ: how fast the phase goes, per unit of the output system's clock.
+    pub(crate) fn pace(&self) -> f64 {
+        self.pace
+    }
+
+    /// k_s and k_t.
+    pub(crate) fn compliance(&self) -> (f64, f64) {
+        self.compliance
+    }
+
+    /// Sets k_s and k_t.
+    pub(crate) fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
+        for (name, value) in [("stopping", stopping), ("tracking", tracking)] {
+            if !(0.0..=LARGEST_GAIN).contains(&value) {
+                return Err(Error::Range { name, value, allowed: "must lie between 0, which is without, and 1e100" });
+            }
+        }
+        self.compliance = (stopping, tracking);
+        Ok(())
+    }
+}

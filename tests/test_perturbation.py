@@ -1,0 +1,77 @@
+"""A disturbed robot and terms of the user's own, across the border."""
+
+import numpy as np
+import pytest
+
+import pdmp
+from synthetic import loops, reaches
+
+MODELS = [pdmp.fit(reaches()), pdmp.fit(loops(), kind="rhythmic", n_styles=2)]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_zero_perturbation_changes_nothing(model: pdmp.Model) -> None:
+    """A robot where it should be and terms of zero leave the movement what it was."""
+    plain, perturbed = model.controller(), model.controller()
+    for _ in range(100):
+        status = plain.step()
+        assert perturbed.step(measured=perturbed.position, coupling=([0, 0], [0, 0])) == status
+    np.testing.assert_array_equal(plain.position, perturbed.position)
+    np.testing.assert_array_equal(plain.acceleration, perturbed.acceleration)
+
+
+def test_coupling_adds_to_velocity_and_acceleration() -> None:
+    """Over a short tick the terms are what is added."""
+    plain, coupled = (MODELS[0].controller(dt=1e-7) for _ in range(2))
+    plain.step()
+    coupled.step(coupling=((0.5, 0), np.float32([0, 3])))
+    np.testing.assert_allclose(coupled.velocity - plain.velocity, [0.5, 0], atol=1e-5)
+    np.testing.assert_allclose((coupled.acceleration - plain.acceleration)[1], 3, atol=1e-4)
+
+
+def test_held_robot_waits_and_then_arrives() -> None:
+    """Held for longer than the movement lasts, it neither finishes nor misses its goal afterwards."""
+    model = MODELS[0]
+    controller = model.controller()
+    for _ in range(500):
+        controller.step()
+    place = controller.position.copy()
+    for _ in range(2000):
+        assert controller.step(measured=place) == pdmp.Status.WORKING
+    assert abs(controller.position[0] - place[0]) < 0.2
+    while controller.step() == pdmp.Status.WORKING:
+        assert controller.time < 6
+    np.testing.assert_allclose(controller.position, controller.goal, atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    "bad", [[0.0], [0.0] * 3, [0.0, np.nan], [np.inf, 0.0], [[0.0, 0.0]], ["a", "b"]]
+)
+def test_bad_perturbations_are_refused_and_change_nothing(bad: list[object]) -> None:
+    """Wrong shapes and numbers that are not finite are named; the state stays as it was."""
+    controller = MODELS[0].controller()
+    controller.step()
+    before = controller.position.copy()
+    for name, arguments in (
+        ("measured", {"measured": bad}),
+        ("coupling velocity", {"coupling": (bad, [0, 0])}),
+        ("coupling acceleration", {"coupling": ([0, 0], bad)}),
+    ):
+        with pytest.raises(ValueError, match=name):
+            controller.step(**arguments)
+    with pytest.raises(ValueError, match="tuple of length 2"):
+        controller.step(coupling=([0, 0],))
+    np.testing.assert_array_equal(controller.position, before)
+    assert controller.time == 0.001
+
+
+def test_compliance_is_checked_and_survives_a_reset() -> None:
+    """Gains have defaults, are refused when negative, and belong to the controller."""
+    controller = MODELS[0].controller()
+    assert controller.compliance == (1000, 10)
+    controller.compliance = (200, 0)
+    for bad in ((-1, 0), (0, np.nan), (np.inf, 0)):
+        with pytest.raises(ValueError, match=r"stopping|tracking"):
+            controller.compliance = bad
+    controller.reset()
+    assert controller.compliance == (200, 0)
