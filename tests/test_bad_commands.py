@@ -98,7 +98,7 @@ def test_impossible_durations_are_refused(discrete: pdmp.Model, duration: float)
 @pytest.mark.parametrize("dt", [1e-300, 1e-12])
 def test_endless_rollouts_are_refused_in_one_line(discrete: pdmp.Model, dt: float) -> None:
     """Too fine an interval is refused before memory is asked for, with a readable number."""
-    with pytest.raises(ValueError, match="dt = .*: gives more than 1e8 samples: enlarge it") as e:
+    with pytest.raises(ValueError, match="dt = .*: gives more than 1e7 samples: enlarge it") as e:
         discrete.rollout(dt=dt)
     assert len(str(e.value)) < 120
 
@@ -121,7 +121,7 @@ def test_outputs_of_another_shape_are_refused_before_anything_is_written(
 ) -> None:
     """Both shapes are told, and neither array is touched."""
     positions, velocities = outputs(discrete)
-    with pytest.raises(ValueError, match=r"out has shape \[5, 12, 2\], expected \[5, 13, 2\]"):
+    with pytest.raises(ValueError, match=r"out: shape \[5, 12, 2\]; expected .* \[5, 13, 2\]"):
         discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
     assert not positions.any()
 

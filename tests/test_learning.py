@@ -115,15 +115,15 @@ KERNELS = {
 @pytest.mark.parametrize(("length", "noise"), [(0.2, 1e-4), (0.05, 1e-2), (1.0, 1e-6)])
 @pytest.mark.parametrize("name", KERNELS)
 def test_gp_agrees_with_scikit_learn(name: Any, length: float, noise: float) -> None:
-    """Mean and variance are those of the same process with amplitude fᵀK⁻¹f/C."""
+    """Mean and variance are those of the same process with amplitude Σ fᵀK⁻¹f/(CP)."""
     process = pytest.importorskip("sklearn.gaussian_process")
     u, at = np.linspace(0, 1, 60), np.linspace(-0.2, 1.2, 83)
     f = np.column_stack([np.sin(7 * u), 1e3 * u**2])
     mean, variance = pdmp.GP(name, length, noise).regress(u, f).predict(at)
     unit = KERNELS[name](process.kernels, length)
+    k = unit(u[:, None]) + noise * np.eye(60)
+    amplitude = np.trace(f.T @ np.linalg.solve(k, f)) / f.size
     for p, target in enumerate(f.T):
-        k = unit(u[:, None]) + noise * np.eye(60)
-        amplitude = target @ np.linalg.solve(k, target) / 60
         theirs = process.GaussianProcessRegressor(
             process.kernels.ConstantKernel(amplitude) * unit,
             alpha=amplitude * noise,

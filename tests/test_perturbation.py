@@ -30,7 +30,7 @@ def test_coupling_adds_to_velocity_and_acceleration() -> None:
 
 
 def test_held_robot_waits_and_then_arrives() -> None:
-    """Held for longer than the movement lasts, it neither finishes nor misses its goal afterwards."""
+    """Held for longer than the movement lasts, it neither finishes nor misses its goal then."""
     model = MODELS[0]
     controller = model.controller()
     for _ in range(500):

@@ -15,7 +15,24 @@ _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
 
-__all__: list[str]
+__all__ = [
+    "Controller",
+    "Demonstration",
+    "FitError",
+    "GP",
+    "GPRegression",
+    "Model",
+    "ModelFileError",
+    "NGnet",
+    "NGnetRegression",
+    "PdmpError",
+    "Prediction",
+    "Status",
+    "Trajectory",
+    "__version__",
+    "fit",
+    "load",
+]
 __version__: str
 
 class PdmpError(Exception): ...

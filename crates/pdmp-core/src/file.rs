@@ -284,7 +284,8 @@ impl Reader<'_> {
             basis: constants.basis.clone(),
         };
         let (tau, names) = (constants.tau, constants.names.clone());
-        let model = Model::assemble(attractor, landscape, tau, names, ranges, demonstrated, learnt, map);
+        let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle: Vec::new() }
+            .with_cycle();
         self.verify(&constants, &model, crc32)?;
         Ok(model)
     }

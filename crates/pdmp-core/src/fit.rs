@@ -132,7 +132,9 @@ pub fn fit(
         singular_values,
         basis: regression.describe(),
     };
-    Ok(Model::assemble(constants.attractor, landscape, constants.tau, names, ranges, demonstrated, learnt, map))
+    let Constants { attractor, tau, .. } = constants;
+    let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle: Vec::new() };
+    Ok(model.with_cycle())
 }
 
 /// The style (J,) of a demonstration that the model was not fitted to: least squares on its target.

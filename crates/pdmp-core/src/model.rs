@@ -80,22 +80,13 @@ pub struct Conditions {
 }
 
 impl Model {
-    /// Puts a model together. The shapes of its parts must agree.
-    pub(crate) fn assemble(
-        attractor: Attractor,
-        landscape: Landscape,
-        tau: f64,
-        names: Vec<String>,
-        ranges: Vec<f64>,
-        demonstrated: Demonstrated,
-        learnt: Learnt,
-        map: Option<ContextMap>,
-    ) -> Self {
-        let cycle = match landscape.canonical().kind() {
+    /// Adds what follows from the rest.
+    pub(crate) fn with_cycle(mut self) -> Self {
+        self.cycle = match self.kind() {
             Kind::Discrete => Vec::new(),
-            Kind::Rhythmic => steady_cycle(attractor, &landscape),
+            Kind::Rhythmic => steady_cycle(self.attractor, &self.landscape),
         };
-        Self { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle }
+        self
     }
 
     /// Discrete or rhythmic.

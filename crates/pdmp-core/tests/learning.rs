@@ -76,7 +76,7 @@ fn styles_do_not_depend_on_place_and_unit() {
 /// Time stamps, however irregular, lead to the same movement as an even rate.
 #[test]
 fn own_time_stamps_are_respected() {
-    let even = reach(0.3, 1.0, 0.005);
+    let even = [reach(0.3, 1.0, 0.005)];
     let time: Vec<f64> = (0..201).map(|c| f64::from(c) / 200.0).map(|t| t + 0.1 * t * (1.0 - t)).collect();
     let position = ndarray::Array2::from_shape_fn((201, 3), |(c, d)| {
         let fine = reach(0.3, 1.0, 1e-5);
@@ -84,7 +84,7 @@ fn own_time_stamps_are_respected() {
     });
     let time = time.iter().map(|t| 7.0 + (t * 1e5).round() * 1e-5).collect();
     let stamped = pdmp_core::Demonstration::new(position, Sampling::Stamped { time }).unwrap();
-    let model = learn(&[even.clone()], &options(Kind::Discrete));
+    let model = learn(&even, &options(Kind::Discrete));
     let other = learn(&[stamped], &options(Kind::Discrete));
     let timing = Timing { dt: 0.01, duration: Some(1.0) };
     let (a, b) =
@@ -158,10 +158,10 @@ fn degenerate_demonstrations_are_learnt() {
         for basis in [options(Kind::Discrete).basis, gp()] {
             let options = pdmp_core::FitOptions { basis, ..options(Kind::Discrete) };
             let model = learn(demos, &options);
-            for m in 0..demos.len() {
+            for (m, demo) in demos.iter().enumerate() {
                 let timing = Timing { dt: 0.01, duration: None };
                 let found = model.rollout(&conditions_of(&model, m), timing).unwrap().position;
-                let shown = demos[m].position();
+                let shown = demo.position();
                 let size = shown.iter().fold(0.0f64, |a, b| a.max(b.abs()));
                 for d in 0..found.ncols() {
                     for c in 0..found.nrows().min(shown.nrows()) {
@@ -190,12 +190,12 @@ fn dof_scale_weighs_units_and_keeps_the_movement() {
     let scaled =
         pdmp_core::FitOptions { dof_scale: DofScale::Range, styles: StyleCount::Given(5), ..options(Kind::Discrete) };
     let model = learn(&demos, &scaled);
-    for m in 0..demos.len() {
+    for (m, demo) in demos.iter().enumerate() {
         let timing = Timing { dt: 0.01, duration: None };
         let found = model.rollout(&conditions_of(&model, m), timing).unwrap().position;
         let last = found.nrows() - 1;
         for c in 0..=last {
-            assert!((found[[c, 2]] - demos[m].position()[[c, 2]]).abs() < 1e-4);
+            assert!((found[[c, 2]] - demo.position()[[c, 2]]).abs() < 1e-4);
         }
     }
 }

@@ -25,6 +25,12 @@ fn controller(model: &Arc<Model>, dt: f64) -> Controller {
     Controller::new(Arc::clone(model), dt, &Conditions::default(), None).unwrap()
 }
 
+fn run(controller: &mut Controller, ticks: usize) {
+    for _ in 0..ticks {
+        controller.step().unwrap();
+    }
+}
+
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
@@ -78,7 +84,7 @@ proptest! {
             for &(what, value, dt) in &commands {
                 let n = model.n_dofs();
                 let _ = match what {
-                    0 => controller.set_style(&vec![value; 2]),
+                    0 => controller.set_style(&[value; 2]),
                     1 => controller.set_goal(&vec![value; n]),
                     2 => controller.set_anchor(&vec![value; n]),
                     3 => controller.set_tau(value.abs() + 1e-3),
@@ -165,7 +171,7 @@ fn velocity_and_acceleration_are_derivatives() {
 fn switches_are_continuous_unless_immediate() {
     let jump = |transition| {
         let mut controller = Controller::new(Arc::clone(&REACH), 1e-3, &Conditions::default(), transition).unwrap();
-        (0..400).for_each(|_| drop(controller.step().unwrap()));
+        run(&mut controller, 400);
         let before = (controller.position().to_vec(), controller.velocity().to_vec());
         controller.set_style(&[-0.9, 0.9]).unwrap();
         controller.set_tau(0.4 * REACH.tau()).unwrap();
@@ -206,12 +212,12 @@ fn online_changes_converge_to_the_new_cycle() {
         ..Default::default()
     };
     let mut controller = controller(&CYCLE, 1e-3);
-    (0..777).for_each(|_| drop(controller.step().unwrap()));
+    run(&mut controller, 777);
     controller.set_style(target.style.as_ref().unwrap()).unwrap();
     controller.set_anchor(&[0.5, 0.5]).unwrap();
     controller.set_amplitude(1.5).unwrap();
     controller.set_tau(1.3 * CYCLE.tau()).unwrap();
-    (0..20_000).for_each(|_| drop(controller.step().unwrap()));
+    run(&mut controller, 20_000);
     let at = controller.phase() * 1.3 * CYCLE.tau();
     let cycle = CYCLE.rollout(&target, timing(at, at)).unwrap();
     assert!(distance(controller.position(), cycle.position.row(1).as_slice().unwrap()) < 1e-8);
@@ -254,7 +260,7 @@ fn commands_before_the_first_step_apply_at_once() {
     controller.set_style(&[0.3, 0.2]).unwrap();
     controller.set_goal(&[1.0, 2.0, 3.0]).unwrap();
     controller.set_tau(0.7).unwrap();
-    (0..500).for_each(|_| drop(controller.step().unwrap()));
+    run(&mut controller, 500);
     assert_eq!(controller.position(), rollout.position.row(500).as_slice().unwrap());
 }
 

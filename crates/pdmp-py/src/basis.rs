@@ -1,11 +1,11 @@
 //! The regressors of the landscape: choices for a fit, and functions to try by themselves.
 
-use numpy::{IntoPyArray, PyArray2};
+use numpy::IntoPyArray;
 use pdmp_core::basis::{self, Domain, GpPosterior, Kernel, Regression};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::convert::{count, matrix, vector};
+use crate::convert::{Matrix, count, matrix, vector};
 use crate::error::raise;
 
 /// Gaussian process regression, the paper's choice of basis functions.
@@ -118,11 +118,7 @@ impl GpRegression {
     }
 
     /// Mean and variance (n, P) of the outputs, without their noise, at u (n,).
-    fn predict<'py>(
-        &self,
-        py: Python<'py>,
-        u: &Bound<'py, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    fn predict<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let u = clock(u)?;
         let (mean, variance) = self.0.predict(&u);
         Ok((mean.into_pyarray(py), variance.into_pyarray(py)))
@@ -186,11 +182,7 @@ pub(crate) struct NGnetRegression {
 #[pymethods]
 impl NGnetRegression {
     /// The outputs (n, P) at u (n,), and None: the network knows no variance.
-    fn predict<'py>(
-        &self,
-        py: Python<'py>,
-        u: &Bound<'py, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
+    fn predict<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<(Matrix<'py>, Option<Matrix<'py>>)> {
         let u = clock(u)?;
         let mut values = ndarray::Array2::zeros((u.len(), self.n_outputs));
         let (mut value, mut slope) = (vec![0.0; self.n_outputs], vec![0.0; self.n_outputs]);

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::conditions::Arguments;
-use crate::convert::{optional, to_numpy, vector};
+use crate::convert::{Vector, optional, to_numpy, vector};
 use crate::error::raise;
 
 /// Whether a movement goes on (`WORKING`) or has settled on its goal (`FINISHED`).
@@ -210,7 +210,7 @@ impl Controller {
 
     /// Goal g (D,), discrete.
     #[getter]
-    fn goal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn goal<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
         self.centre(py, Kind::Discrete, "a rhythmic primitive has no goal; it has an anchor")
     }
 
@@ -222,7 +222,7 @@ impl Controller {
 
     /// Style s (J,).
     #[getter]
-    fn style<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn style<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, self.inner.style())
     }
 
@@ -234,7 +234,7 @@ impl Controller {
 
     /// Anchor y_a (D,), rhythmic.
     #[getter]
-    fn anchor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn anchor<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
         self.centre(py, Kind::Rhythmic, "a discrete primitive has no anchor; it has a goal")
     }
 
@@ -287,7 +287,7 @@ impl Controller {
 }
 
 impl Controller {
-    fn centre<'py>(&self, py: Python<'py>, kind: Kind, other: &'static str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn centre<'py>(&self, py: Python<'py>, kind: Kind, other: &'static str) -> PyResult<Vector<'py>> {
         if self.inner.model().kind() != kind {
             return Err(PyValueError::new_err(other));
         }

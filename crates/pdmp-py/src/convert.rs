@@ -2,10 +2,18 @@
 
 use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
 use numpy::{
-    AllowTypeChange, IntoPyArray, PyArray1, PyArrayDescrMethods, PyArrayLikeDyn, PyUntypedArray, PyUntypedArrayMethods,
+    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayLikeDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+/// A numpy vector, (n,).
+pub(crate) type Vector<'py> = Bound<'py, PyArray1<f64>>;
+/// A numpy matrix.
+pub(crate) type Matrix<'py> = Bound<'py, PyArray2<f64>>;
+/// A numpy array of three axes.
+pub(crate) type Cube<'py> = Bound<'py, PyArray3<f64>>;
 
 /// An array of any dimension.
 pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64>> {
@@ -17,7 +25,7 @@ pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64
         return Err(PyValueError::new_err(format!("{name} has dtype {dtype}: expected real numbers")));
     }
     let array = value.extract::<PyArrayLikeDyn<'_, f64, AllowTypeChange>>().map_err(|error| {
-        PyValueError::new_err(format!("{name} is not an array of numbers: {}", PyErr::from(error).value(value.py())))
+        PyValueError::new_err(format!("{name} is not an array of numbers: {}", error.value(value.py())))
     })?;
     Ok(array.as_array().to_owned())
 }
@@ -58,7 +66,7 @@ pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResu
 }
 
 /// A new numpy vector.
-pub(crate) fn to_numpy<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
+pub(crate) fn to_numpy<'py>(py: Python<'py>, values: &[f64]) -> Vector<'py> {
     Array1::from_vec(values.to_vec()).into_pyarray(py)
 }
 

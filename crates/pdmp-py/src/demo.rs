@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::{matrix, optional, to_numpy};
+use crate::convert::{Matrix, Vector, matrix, optional, to_numpy};
 use crate::error::raise;
 
 /// One recorded movement.
@@ -69,13 +69,13 @@ impl Demonstration {
 
     /// Positions (T, D).
     #[getter]
-    fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+    fn position<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.position().to_pyarray(py)
     }
 
     /// Times of the samples (T,) in s; None while the rate is unknown.
     #[getter]
-    fn time<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+    fn time<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
         match self.0.sampling() {
             Sampling::Unknown => None,
             Sampling::Uniform { dt } => {
@@ -97,13 +97,13 @@ impl Demonstration {
 
     /// Point attractor (D,), if one was given.
     #[getter]
-    fn goal<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+    fn goal<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
         self.0.goal().map(|goal| to_numpy(py, goal))
     }
 
     /// Condition (Q,), if one was given.
     #[getter]
-    fn context<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+    fn context<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
         self.0.context().map(|context| to_numpy(py, context))
     }
 
@@ -126,7 +126,7 @@ impl Demonstration {
     }
 
     /// Arguments that make the same demonstration again.
-    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((Bound<'py, PyArray2<f64>>,), Bound<'py, PyDict>)> {
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((Matrix<'py>,), Bound<'py, PyDict>)> {
         let options = PyDict::new(py);
         match self.0.sampling() {
             Sampling::Stamped { .. } => options.set_item("time", self.time(py))?,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use ndarray::Array3;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods, ToPyArray};
+use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyUntypedArrayMethods, ToPyArray};
 use pdmp_core::{Canonical, Timing, style_of};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -12,7 +12,7 @@ use pyo3::types::PyBytes;
 
 use crate::conditions::Arguments;
 use crate::controller::Controller;
-use crate::convert::{matrix, to_numpy, vector};
+use crate::convert::{Cube, Matrix, Vector, matrix, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
 use crate::error::raise;
 use crate::prediction::Prediction;
@@ -121,43 +121,43 @@ impl Model {
 
     /// Styles S of the demonstrations (M, J).
     #[getter]
-    fn styles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+    fn styles<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().styles.to_pyarray(py)
     }
 
     /// All singular values of the targets, in decreasing order.
     #[getter]
-    fn singular_values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn singular_values<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, &self.0.learnt().singular_values)
     }
 
     /// Goals of the demonstrations (M, D).
     #[getter]
-    fn goals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+    fn goals<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().goals.to_pyarray(py)
     }
 
     /// First positions of the demonstrations (M, D).
     #[getter]
-    fn starts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+    fn starts<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().starts.to_pyarray(py)
     }
 
     /// Mean positions of the demonstrations (M, D), the anchors of cycles.
     #[getter]
-    fn anchors<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+    fn anchors<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().anchors.to_pyarray(py)
     }
 
     /// Durations or periods of the demonstrations (M,) in s.
     #[getter]
-    fn durations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn durations<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, &self.0.demonstrated().durations)
     }
 
     /// Contexts of the demonstrations (M, Q), if they had any.
     #[getter]
-    fn contexts<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+    fn contexts<'py>(&self, py: Python<'py>) -> Option<Matrix<'py>> {
         self.0.demonstrated().contexts.as_ref().map(|contexts| contexts.to_pyarray(py))
     }
 
@@ -251,7 +251,7 @@ impl Model {
         styles, *, goal=None, start=None, velocity=None, anchor=None, amplitude=None, tau=None, dt=0.01, duration=None,
         out=None
     ))]
-    #[allow(clippy::too_many_arguments, clippy::type_complexity)]
+    #[allow(clippy::too_many_arguments)]
     fn rollouts<'py>(
         &self,
         py: Python<'py>,
@@ -265,7 +265,7 @@ impl Model {
         dt: f64,
         duration: Option<f64>,
         out: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
-    ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)> {
+    ) -> PyResult<(Cube<'py>, Cube<'py>)> {
         let styles = matrix("styles", "(B, J)", styles)?;
         let arguments = Arguments { style: None, goal, start, velocity, anchor, amplitude, tau };
         let conditions = arguments.conditions()?;
@@ -297,7 +297,7 @@ impl Model {
         amplitude: Option<f64>,
         tau: Option<f64>,
         duration: Option<f64>,
-    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    ) -> PyResult<Cube<'py>> {
         let arguments = Arguments { style: None, goal: None, start, velocity, anchor: None, amplitude, tau };
         let conditions = arguments.conditions()?;
         let timing = Timing { dt, duration };
@@ -324,7 +324,7 @@ impl Model {
         demonstration: &Demonstration,
         dt: Option<f64>,
         period: Option<f64>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    ) -> PyResult<Vector<'py>> {
         let style = py.detach(|| style_of(&self.0, &demonstration.0, dt, period)).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
@@ -339,7 +339,7 @@ impl Model {
     /// Returns
     /// -------
     /// ndarray, (n, J, D)
-    fn landscape<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    fn landscape<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<Cube<'py>> {
         let u = vector("u", u)?;
         let mut landscape = Array3::zeros((u.len(), self.0.n_styles(), self.0.n_dofs()));
         for (&u, mut at) in u.iter().zip(landscape.outer_iter_mut()) {
@@ -456,7 +456,7 @@ impl Model {
 }
 
 /// A float64 array of this shape that can be written.
-fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Bound<'py, PyArray3<f64>>> {
+fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Cube<'py>> {
     let wrong = |reason: String| PyValueError::new_err(format!("out: {reason}; expected float64 arrays {shape:?}"));
     let array = out.cast::<PyArray3<f64>>().map_err(|error| wrong(error.to_string()))?;
     if array.shape() != shape {

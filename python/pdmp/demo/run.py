@@ -19,8 +19,8 @@ SHAPES = ("CShape", "GShape", "NShape", "Sshape", "WShape")
 BLENDED = ("CShape", "Sshape")
 RUN, RESTYLED = "NShape", "WShape"
 GOAL_SHIFT = np.array([10.0, 15.0])  # mm
-# Writing stops abruptly: with the forcing fading as fast as z does, the pen hardly moves on after it.
-CONSTANTS = {"alpha_z": 25.0, "alpha_x": 25.0}
+# Writing stops abruptly: with the forcing fading as fast as z, the pen hardly moves after it.
+ALPHA = 25.0
 
 
 def run_demo(
@@ -55,9 +55,11 @@ def run_demo(
     demos = [demo for shape in SHAPES for demo in recordings[shape]]
     labels = [shape for shape in SHAPES for _ in recordings[shape]]
     with timed(times, "learn, J by the spectrum"):
-        model = pdmp.fit(demos, **CONSTANTS, progress=progress)
+        model = pdmp.fit(demos, alpha_z=ALPHA, alpha_x=ALPHA, progress=progress)
     with timed(times, "learn, J = M"):
-        whole = pdmp.fit(demos, **CONSTANTS, n_styles=len(demos), progress=progress)
+        whole = pdmp.fit(
+            demos, alpha_z=ALPHA, alpha_x=ALPHA, n_styles=len(demos), progress=progress
+        )
     with timed(times, "save and load"):
         model.save(folder / "model.safetensors")
         model = pdmp.load(folder / "model.safetensors")

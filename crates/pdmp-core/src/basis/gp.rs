@@ -13,8 +13,15 @@ use crate::error::{Error, Result, check_positive};
 
 /// Smallest ratio of noise to signal variance: below, rounding makes the covariance matrix indefinite.
 const LEAST_NOISE: f64 = 1e-10;
-/// Largest ratio that the search considers, and that a failing factorisation is helped with.
-const MOST_NOISE: f64 = 1.0;
+/// Largest ratio that the search considers: a thousandth of the signal's deviation.
+///
+/// What the landscape takes for noise, no style brings back, and noise on the demonstrations is what smoothing is for.
+/// With ratios up to 1 the likelihood took the impact in recorded walking forces for noise, and with it half of the
+/// signal: reproductions were off by 23 % of the range, against 6 % with three styles and 3 % with all below 1e-4.
+/// Handwriting is met to 1e-4 at worst below 1e-6.
+const MOST_NOISE: f64 = 1e-6;
+/// Largest ratio that a failing factorisation is helped with.
+const MOST_HELP: f64 = 1.0;
 /// Samples that the search for hyperparameters looks at; the fit itself uses all.
 const SEARCH_SAMPLES: usize = 400;
 /// Most samples: their covariance matrix is dense.
@@ -27,7 +34,7 @@ const CHUNK: usize = 256;
 /// The P outputs are independent Gaussian processes of mean zero over the clock with one covariance σ²K,
 /// K = k(u, u′; ℓ) + νI. The signal variance has the maximum-likelihood value σ̂² = Σ fᵀK⁻¹f/(CP). Length ℓ and noise
 /// ratio ν, where not given, maximise the log marginal likelihood with that value put in, −CP/2·ln σ̂² − P/2·ln|K|,
-/// over ν from 1e-10 to 1 and ℓ from the distance of the samples to twice the extent of the clock.
+/// over ν from 1e-10 to 1e-6 and ℓ from the distance of the samples to twice the extent of the clock.
 ///
 /// The variance is shared because basis targets share their noise: S has orthonormal columns, so equal noise on the
 /// demonstrations is equal noise on every row of ΣVᵀ, strong or weak. With a variance each, the weak factors of real
@@ -88,7 +95,7 @@ impl Gp {
         let fit = loop {
             match samples.fit(&covariance, noise) {
                 Some(fit) => break fit,
-                None if noise < MOST_NOISE => noise = (10.0 * noise).min(MOST_NOISE),
+                None if noise < MOST_HELP => noise = (10.0 * noise).min(MOST_HELP),
                 None => {
                     let kernel = self.kernel;
                     return Err(Error::Fit(format!(
@@ -463,7 +470,7 @@ mod tests {
     }
 
     #[test]
-    fn length_and_noise_of_data_from_the_prior_are_recovered() {
+    fn the_length_of_data_from_the_prior_is_recovered() {
         for kernel in Kernel::ALL {
             for domain in [INTERVAL, Domain::Circle] {
                 for noise in [1e-3, 0.1] {
@@ -473,9 +480,8 @@ mod tests {
                     let white = normal(150, 6);
                     let drawn = root * DMatrix::from_fn(150, 6, |i, o| white[[i, o]]);
                     let targets = Array2::from_shape_fn((150, 6), |(i, o)| drawn[(i, o)]);
-                    let posterior = fit(&Gp { kernel, ..Gp::default() }, domain, &u, &targets);
+                    let posterior = fit(&Gp { kernel, length: None, noise: Some(noise) }, domain, &u, &targets);
                     assert_relative_eq!(posterior.length(), length, max_relative = 0.25);
-                    assert!((posterior.noise() / noise).ln().abs() < 0.7, "{noise} found as {}", posterior.noise());
                 }
             }
         }
@@ -490,7 +496,8 @@ mod tests {
                 let found = fit(&Gp { kernel, ..Gp::default() }, INTERVAL, &u, &targets);
                 for i in 0..30 {
                     for j in 0..21 {
-                        let (length, ratio) = (0.017 * 1.17_f64.powi(i), 10f64.powf(-0.5 * j as f64).max(LEAST_NOISE));
+                        let ratio = (MOST_NOISE * 10f64.powf(-0.2 * j as f64)).max(LEAST_NOISE);
+                        let length = 0.017 * 1.17_f64.powi(i);
                         let other = Gp { kernel, length: Some(length), noise: Some(ratio) };
                         let other = fit(&other, INTERVAL, &u, &targets);
                         let gain = other.log_likelihood() - found.log_likelihood();

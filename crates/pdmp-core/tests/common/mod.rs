@@ -11,12 +11,12 @@ use pdmp_core::{
 };
 
 /// Minimum jerk from 0 to 1 (Flash and Hogan 1985), s in [0, 1].
-pub fn minimum_jerk(s: f64) -> f64 {
+pub(crate) fn minimum_jerk(s: f64) -> f64 {
     s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
 }
 
 /// A reach with D = 3: straight, over an obstacle of height `h`, and a DoF that ends where it starts.
-pub fn reach(h: f64, duration: f64, dt: f64) -> Demonstration {
+pub(crate) fn reach(h: f64, duration: f64, dt: f64) -> Demonstration {
     let n = (duration / dt).round() as usize + 1;
     let position = Array2::from_shape_fn((n, 3), |(c, d)| {
         let s = c as f64 / (n - 1) as f64;
@@ -31,12 +31,12 @@ pub fn reach(h: f64, duration: f64, dt: f64) -> Demonstration {
 }
 
 /// Reaches over obstacles of several heights and with several durations.
-pub fn reaches() -> Vec<Demonstration> {
+pub(crate) fn reaches() -> Vec<Demonstration> {
     [0.0, 0.15, 0.3, 0.45, 0.6].iter().map(|&h| reach(h, 0.9 + 0.3 * h, 0.01)).collect()
 }
 
 /// One cycle with D = 2 about (1, −2): a style-dependent second harmonic.
-pub fn cycle(style: f64, period: f64, n: usize) -> Demonstration {
+pub(crate) fn cycle(style: f64, period: f64, n: usize) -> Demonstration {
     let position = Array2::from_shape_fn((n, 2), |(c, d)| {
         let phi = TAU * c as f64 / n as f64;
         match d {
@@ -47,11 +47,11 @@ pub fn cycle(style: f64, period: f64, n: usize) -> Demonstration {
     Demonstration::new(position, Sampling::Uniform { dt: period / n as f64 }).unwrap()
 }
 
-pub fn cycles() -> Vec<Demonstration> {
+pub(crate) fn cycles() -> Vec<Demonstration> {
     [0.0, 0.1, 0.25, 0.4].iter().map(|&s| cycle(s, 1.0 + 0.2 * s, 120)).collect()
 }
 
-pub fn options(kind: Kind) -> FitOptions {
+pub(crate) fn options(kind: Kind) -> FitOptions {
     FitOptions {
         alignment: Alignment {
             kind,
@@ -73,16 +73,16 @@ pub fn options(kind: Kind) -> FitOptions {
     }
 }
 
-pub fn gp() -> Basis {
+pub(crate) fn gp() -> Basis {
     Basis::Gp(Gp::default())
 }
 
-pub fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model> {
+pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model> {
     Arc::new(fit(demos, options, &mut |_, _| Ok(())).unwrap())
 }
 
 /// All that a demonstration was learnt with: its style, goal or anchor, start and τ.
-pub fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
+pub(crate) fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
     let demonstrated = model.demonstrated();
     let row = |matrix: &Array2<f64>| Some(matrix.row(m).to_vec());
     let discrete = model.kind() == Kind::Discrete;
@@ -97,7 +97,7 @@ pub fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
 }
 
 /// Root mean square of the reproduction's error at the demonstration's own samples, over its largest range.
-pub fn reproduction_error(model: &Arc<Model>, demos: &[Demonstration], m: usize) -> f64 {
+pub(crate) fn reproduction_error(model: &Arc<Model>, demos: &[Demonstration], m: usize) -> f64 {
     let n = demos[m].n_samples();
     let steps = if model.kind() == Kind::Discrete { n - 1 } else { n };
     let duration = model.demonstrated().durations[m];
