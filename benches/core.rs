@@ -11,8 +11,7 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use pdmp_core::basis::{Basis, Gp, NGnet};
 use pdmp_core::{
-    Alignment, Conditions, Controller, Demonstration, DofScale, FitOptions, Kind, Model, Sampling, Smoothing,
-    StyleCount, Timing, fit,
+    Conditions, Controller, Demonstration, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount, Timing, fit,
 };
 
 /// M movements of D = 7 that span a few dimensions, 1001 samples in one second.
@@ -33,25 +32,9 @@ fn demonstrations(n_demos: usize) -> Vec<Demonstration> {
 }
 
 fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
-    FitOptions {
-        alignment: Alignment {
-            kind: Kind::Discrete,
-            dt: None,
-            period: vec![],
-            smoothing,
-            nominal: None,
-            n_samples: None,
-        },
-        contexts: None,
-        styles: StyleCount::Given(3),
-        basis,
-        dof_scale: DofScale::Unit,
-        tau: None,
-        alpha_z: 25.0,
-        beta_z: None,
-        alpha_x: None,
-        mu: 1.0,
-    }
+    let mut options = FitOptions { styles: StyleCount::Given(3), basis, ..FitOptions::new(Kind::Discrete) };
+    options.alignment.smoothing = smoothing;
+    options
 }
 
 fn learn(options: &FitOptions) -> Model {
@@ -102,7 +85,7 @@ fn rollouts(criterion: &mut Criterion) {
     group.bench_function("one", |bench| bench.iter(|| model.rollout(&Conditions::default(), timing)));
     let styles = Array2::from_shape_fn((100, 3), |(b, j)| (b * 3 + j) as f64 / 300.0);
     group.bench_function("a batch of 100 styles", |bench| {
-        bench.iter(|| model.rollouts(styles.view(), &Conditions::default(), timing));
+        bench.iter(|| model.rollouts(styles.view(), &Conditions::default(), timing, &mut |_| Ok(())));
     });
     group.finish();
 }

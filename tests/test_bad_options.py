@@ -128,3 +128,28 @@ except (ValueError, MemoryError) as error:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-300:]
     assert re.search(r"n_samples = [\d.e]+: must lie between 4 and 1e6", done.stdout)
+
+
+def test_phases_that_vanish_are_refused() -> None:
+    """The landscape divides by the phase at the end, which must be a number."""
+    with pytest.raises(ValueError, match=r"alpha_x = 1000: must not exceed 300"):
+        pdmp.fit(reaches(), alpha_x=1000.0)
+
+
+def test_contexts_that_hardly_vary_are_refused() -> None:
+    """Their squares would leave the range of numbers."""
+    with pytest.raises(ValueError, match=r"contexts = 2\S*e-152: each must vary by"):
+        pdmp.fit(reaches(), contexts=[[k * 1e-152] for k in range(5)])
+
+
+def test_goals_of_cycles_are_refused() -> None:
+    """A cycle has an anchor, and a goal given for it is not passed over in silence."""
+    loop = Demonstration(loops()[1].position, dt=0.02, goal=[0.0, 0.0])
+    with pytest.raises(ValueError, match="demo 1: goal does not apply to a rhythmic"):
+        pdmp.fit([loops()[0], loop], kind="rhythmic")
+
+
+def test_one_name_for_two_dofs_is_refused() -> None:
+    """Columns of a rollout could not be told apart."""
+    with pytest.raises(ValueError, match="names must differ"):
+        Demonstration(POSITION, dt=0.02, names=["a", "a"])

@@ -212,3 +212,21 @@ def test_reader_that_leaves_early_sees_no_traceback(model_file: Path) -> None:
     with process.stderr as errors:
         assert errors.read() == b""
     assert process.wait() == 1
+
+
+def test_negative_exponents_are_numbers(model_file: Path, tmp_path: Path) -> None:
+    """-1e-3 is a number, as models print it, and no option."""
+    out = tmp_path / "out.csv"
+    assert run("rollout", model_file, "--goal", "-1e-3", "2", "-o", out) == 0
+    end = demos.read_csv(out, columns=["x", "y"]).position[-1]
+    np.testing.assert_allclose(end, [-1e-3, 2], atol=0.2)
+
+
+def test_missing_folder_is_told_before_learning(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody waits for a model that cannot be written."""
+    assert run("fit", folder, "-o", tmp_path / "nowhere" / "model.safetensors") == 1
+    told = capsys.readouterr().err
+    assert "no such folder" in told
+    assert "learning" not in told

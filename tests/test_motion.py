@@ -233,3 +233,26 @@ def test_threads_cannot_break_a_controller(model: pdmp.Model) -> None:
     assert not other
     assert controller.time == pytest.approx(0.001 * len(done))
     assert np.isfinite(controller.position).all()
+
+
+def test_goal_moved_from_rest_is_reached() -> None:
+    """A model of demonstrations that never move still goes where it is sent, and finishes."""
+    controller = pdmp.fit([np.ones((50, 2))] * 3, dt=0.01).controller(0.01)
+    for _ in range(10):
+        controller.step()
+    controller.goal = [2.0, 3.3]
+    ticks = 0
+    while controller.step() == pdmp.Status.WORKING:
+        ticks += 1
+        assert ticks < 1000
+    np.testing.assert_allclose(controller.position, [2.0, 3.3], atol=2e-3)
+
+
+def test_reset_starts_as_the_nominal_demonstration() -> None:
+    """What is not given to reset is the nominal demonstration's, not what was commanded before."""
+    model = pdmp.fit(reaches(), n_styles=2)
+    controller = model.controller(style=[0.5, 0.1], tau=2.0)
+    controller.step()
+    controller.reset()
+    assert (controller.tau, controller.time) == (model.tau, 0.0)
+    np.testing.assert_array_equal(controller.style, model.styles[model.nominal])

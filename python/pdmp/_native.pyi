@@ -142,7 +142,7 @@ class Model:
         start: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         anchor: ArrayLike | None = None,
-        amplitude: float | None = None,
+        amplitude: float = 1.0,
         tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
@@ -156,7 +156,7 @@ class Model:
         start: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         anchor: ArrayLike | None = None,
-        amplitude: float | None = None,
+        amplitude: float = 1.0,
         tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
@@ -168,7 +168,7 @@ class Model:
         *,
         start: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
-        amplitude: float | None = None,
+        amplitude: float = 1.0,
         tau: float | None = None,
         duration: float | None = None,
     ) -> _Array: ...  # (T, D, J)
@@ -193,7 +193,7 @@ class Model:
         transition: float | None = None,
         *,
         anchor: ArrayLike | None = None,
-        amplitude: float | None = None,
+        amplitude: float = 1.0,
         context: ArrayLike | None = None,
     ) -> Controller: ...
     def to_bytes(self) -> bytes: ...
@@ -251,8 +251,9 @@ class Controller:
         start: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         anchor: ArrayLike | None = None,
-        amplitude: float | None = None,
+        amplitude: float = 1.0,
         tau: float | None = None,
+        context: ArrayLike | None = None,
     ) -> None: ...
     @property
     def position(self) -> _Array: ...  # (D,), a read-only view that each step updates

@@ -63,6 +63,10 @@ impl Alignment {
             if demo.n_dofs() != n_dofs {
                 return Err(Error::Dofs { expected: n_dofs, found: demo.n_dofs() }.in_demo(m));
             }
+            if self.kind == Kind::Rhythmic && demo.goal().is_some() {
+                let (kind, instead) = (self.kind, ": it moves about the mean of its cycle");
+                return Err(Error::Kind { name: "goal", kind, instead }.in_demo(m));
+            }
             let period = self.period.get(if self.period.len() == 1 { 0 } else { m }).copied();
             timed.push(self.time(demo, period).map_err(|error| error.in_demo(m))?);
         }

@@ -71,6 +71,10 @@ impl ContextMap {
 
         // Columns to unit size, so that metres and labels weigh alike in what counts as rank.
         let sizes = inputs.map_axis(Axis(0), |column| column.iter().fold(0.0f64, |m, x| m.max(x.abs())));
+        if let Some(&value) = sizes.iter().find(|&&size| size > 0.0 && !(1e-100..=1e100).contains(&size)) {
+            let allowed = "each must vary by 1e-100 to 1e100; give them in another unit";
+            return Err(Error::Range { name: "contexts", value, allowed });
+        }
         let sizes = sizes.mapv(|size| if size > 0.0 { size } else { 1.0 });
         let scaled = Mat::from_fn(n_demos, n_inputs, |m, q| inputs[[m, q]] / sizes[q]);
         let svd = Svd::new_thin(scaled.as_ref())
@@ -107,9 +111,6 @@ impl ContextMap {
         let output = (&self.intercept + self.slopes.dot(&offset)).to_vec();
         let n = output.len();
         let duration = output[n - 1].exp();
-        if !(output.iter().all(|x| x.is_finite()) && duration.is_finite() && duration > 0.0) {
-            return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
-        }
         let covariance = self.residual.as_ref().map(|residual| {
             let leverage = 1.0 / self.n_demos as f64 + offset.dot(&self.inverse_scatter.dot(&offset));
             let mut covariance = residual * (1.0 + leverage);
@@ -118,6 +119,10 @@ impl ContextMap {
             covariance.column_mut(n - 1).mapv_inplace(|x| x * duration);
             covariance
         });
+        let mut numbers = output.iter().chain(covariance.iter().flatten());
+        if !(numbers.all(|x| x.is_finite()) && duration.is_finite() && duration > 0.0) {
+            return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
+        }
         let part = |k: usize| Some(output[n_styles + k * n_dofs..n_styles + (k + 1) * n_dofs].to_vec());
         let (goal, start, anchor) = match kind {
             Kind::Discrete => (part(0), part(1), None),

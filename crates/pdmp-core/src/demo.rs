@@ -7,6 +7,9 @@ use crate::error::{Error, LARGEST, Result, check_finite, check_positive};
 /// Fewest samples that carry a cubic spline with not-a-knot ends.
 pub const LEAST_SAMPLES: usize = 4;
 
+/// Longest name of a DoF, in bytes.
+const LONGEST_NAME: usize = 1000;
+
 /// When the samples of a demonstration were taken.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sampling {
@@ -83,11 +86,14 @@ impl Demonstration {
     /// Names the degrees of freedom (D,).
     ///
     /// # Errors
-    /// A number of names other than D.
+    /// A number of names other than D, a name given twice, or one longer than 1000 bytes.
     pub fn with_names(mut self, names: Vec<String>) -> Result<Self> {
         if names.len() != self.n_dofs() {
             let (expected, found) = (self.n_dofs(), names.len());
             return Err(Error::Length { name: "names", expected, found, per: "DoF" });
+        }
+        if names.iter().enumerate().any(|(d, name)| names[..d].contains(name) || name.len() > LONGEST_NAME) {
+            return Err(Error::Arguments("names must differ from each other and have at most 1000 bytes each"));
         }
         self.names = Some(names);
         Ok(self)

@@ -31,6 +31,19 @@ pub enum StyleCount {
     Spectrum(f64),
 }
 
+impl StyleCount {
+    /// Checks the count against the number of things that limit it.
+    pub(crate) fn check(self, most: usize, of: &'static str) -> Result<()> {
+        match self {
+            StyleCount::Given(n_styles) if n_styles < 1 || n_styles > most => Err(Error::Styles { n_styles, most, of }),
+            StyleCount::Spectrum(value) if !(value > 0.0 && value <= 1.0) => {
+                Err(Error::Range { name: "spectrum", value, allowed: "must lie in (0, 1]" })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 impl Factors {
     /// Decomposes the targets F (M, C·D), K = min(M, C·D).
     ///
@@ -80,21 +93,11 @@ impl Factors {
     /// # Errors
     /// A number below 1 or above K, or a share outside (0, 1].
     pub fn truncate(mut self, count: StyleCount) -> Result<Self> {
+        count.check(self.styles.nrows(), "demonstrations")?;
+        count.check(self.basis.ncols(), "target values")?;
         let n_styles = match count {
-            StyleCount::Given(n_styles) => {
-                let (rows, columns) = (self.styles.nrows(), self.basis.ncols());
-                let (most, of) = if rows <= columns { (rows, "demonstrations") } else { (columns, "target values") };
-                if n_styles < 1 || n_styles > most {
-                    return Err(Error::Styles { n_styles, most, of });
-                }
-                n_styles
-            }
-            StyleCount::Spectrum(share) => {
-                if !(share > 0.0 && share <= 1.0) {
-                    return Err(Error::Range { name: "spectrum", value: share, allowed: "must lie in (0, 1]" });
-                }
-                leading(&self.singular_values, share)
-            }
+            StyleCount::Given(n_styles) => n_styles,
+            StyleCount::Spectrum(share) => leading(&self.singular_values, share),
         };
         self.styles = self.styles.slice_move(s![.., ..n_styles]).as_standard_layout().into_owned();
         self.basis = self.basis.slice_move(s![..n_styles, ..]);

@@ -27,7 +27,7 @@ const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.
 const LARGEST_FILE: u64 = 1 << 32;
 /// Largest header that is read, in bytes.
-const LARGEST_HEADER: u64 = 1 << 20;
+const LARGEST_HEADER: u64 = 1 << 26;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -99,7 +99,10 @@ impl Model {
             .map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F64, shape.clone(), bytes)?)))
             .collect::<std::result::Result<Vec<_>, safetensors::SafeTensorError>>()
             .map_err(|error| Error::File(error.to_string()))?;
-        serialize(views, Some(HashMap::from([(KEY.to_string(), json)]))).map_err(|error| Error::File(error.to_string()))
+        let metadata = HashMap::from([(KEY.to_string(), json)]);
+        let bytes = serialize(views, Some(metadata)).map_err(|error| Error::File(error.to_string()))?;
+        header_length(&bytes)?;
+        Ok(bytes)
     }
 
     fn arrays(&self) -> Vec<Array> {
@@ -153,13 +156,17 @@ impl Model {
     /// A path that cannot be read, or a file that is not whole, not a model, or of another version.
     pub fn load(path: &Path) -> Result<Self> {
         let io = |source| Error::Io { path: path.to_path_buf(), source };
-        let file = fs::File::open(path).map_err(io)?;
-        let mut bytes = Vec::new();
-        file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
-        Self::from_bytes(&bytes).map_err(|error| match error {
+        let named = |error| match error {
             Error::File(reason) => Error::File(format!("{}: {reason}", path.display())),
             other => other,
-        })
+        };
+        let mut file = fs::File::open(path).map_err(io)?;
+        let mut bytes = Vec::new();
+        // The header's length first: what is no model need not be read.
+        Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(io)?;
+        header_length(&bytes).map_err(named)?;
+        file.take(LARGEST_FILE).read_to_end(&mut bytes).map_err(io)?;
+        Self::from_bytes(&bytes).map_err(named)
     }
 
     /// Reads a model from the bytes of a file.
@@ -168,10 +175,7 @@ impl Model {
     /// Bytes that are not whole, not a model, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let bad = |reason: &str| Error::File(reason.to_string());
-        let header = bytes.first_chunk().map(|head| u64::from_le_bytes(*head)).ok_or(bad("shorter than a header"))?;
-        if bytes.len() as u64 > LARGEST_FILE || header > LARGEST_HEADER {
-            return Err(bad("larger than any model"));
-        }
+        header_length(bytes)?;
         let broken = |error: safetensors::SafeTensorError| Error::File(error.to_string());
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(broken)?;
         let tensors = SafeTensors::deserialize(bytes).map_err(broken)?;
@@ -188,6 +192,19 @@ impl Model {
         }
         let Sealed { crc32, model, .. } = serde_json::from_str(json).map_err(|error| Error::File(error.to_string()))?;
         Reader { tensors }.model(model, crc32)
+    }
+}
+
+/// Length of the header as the first eight bytes announce it.
+fn header_length(bytes: &[u8]) -> Result<u64> {
+    let bad = |reason: &str| Error::File(reason.to_string());
+    match bytes.first_chunk().map(|head| u64::from_le_bytes(*head)) {
+        None => Err(bad("shorter than a header")),
+        Some(0) => Err(bad("not a safetensors file")),
+        Some(length) if length > LARGEST_HEADER => {
+            Err(bad("not a safetensors file, or damaged: it announces a header larger than any model has"))
+        }
+        Some(length) => Ok(length),
     }
 }
 
@@ -332,8 +349,8 @@ impl Constants {
         for (name, value) in
             [("tau", self.tau), ("alpha_z", self.alpha_z), ("beta_z", self.beta_z), ("alpha_x or mu", a), ("u_end", b)]
         {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::File(format!("{name} = {value} is not a positive number")));
+            if !(1e-12..=1e12).contains(&value) {
+                return Err(Error::File(format!("{name} = {value} is out of range")));
             }
         }
         Ok(())

@@ -8,14 +8,15 @@ use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, Axis};
 
 use crate::align::{Aligned, Alignment};
 use crate::attractor::Attractor;
-use crate::basis::{Basis, Domain};
+use crate::basis::{Basis, Domain, Gp};
 use crate::context::{self, ContextMap};
-use crate::demo::{Demonstration, check_matrix};
+use crate::demo::{Demonstration, check_matrix, zeros};
 use crate::error::{Error, Result, check_positive, check_vector};
 use crate::factor::{Factors, StyleCount};
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
 use crate::phase::{Canonical, Kind};
+use crate::smooth::Smoothing;
 use crate::spline::Spline;
 
 /// The unit of each degree of freedom in the factorisation.
@@ -52,6 +53,26 @@ pub struct FitOptions {
     pub alpha_x: Option<f64>,
     /// μ of the canonical system, rhythmic.
     pub mu: f64,
+}
+
+impl FitOptions {
+    /// The defaults: as many styles as make up nine tenths of the singular values, a Gaussian process, no smoothing,
+    /// α_z = 25, μ = 1, and all else from the demonstrations.
+    pub fn new(kind: Kind) -> Self {
+        let smoothing = Smoothing::Interpolate;
+        Self {
+            alignment: Alignment { kind, dt: None, period: Vec::new(), smoothing, nominal: None, n_samples: None },
+            contexts: None,
+            styles: StyleCount::Spectrum(0.9),
+            basis: Basis::Gp(Gp::default()),
+            dof_scale: DofScale::Unit,
+            tau: None,
+            alpha_z: 25.0,
+            beta_z: None,
+            alpha_x: None,
+            mu: 1.0,
+        }
+    }
 }
 
 /// Where a fit is.
@@ -91,6 +112,7 @@ pub fn fit(
     options: &FitOptions,
     proceed: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
+    options.styles.check(demos.len(), "demonstrations")?;
     let aligned = options.alignment.align(demos, &mut |share| proceed(Stage::Targets, share))?;
     let (contexts, names) = (contexts_of(demos, options.contexts.as_ref())?, names_of(demos)?);
     let (goals, anchors) = (aligned.goals(demos), aligned.anchors());
@@ -98,7 +120,7 @@ pub fn fit(
     let ranges = aligned.ranges();
     let dof_scale = scale_of(&options.dof_scale, &ranges)?;
     let centres = if constants.canonical.kind() == Kind::Discrete { &goals } else { &anchors };
-    let targets = constants.targets(&aligned.position, centres.view(), &dof_scale);
+    let targets = constants.targets(&aligned.position, centres.view(), &dof_scale)?;
 
     proceed(Stage::Factorise, 0.0)?;
     let factors = Factors::of(targets.view())?;
@@ -162,7 +184,7 @@ pub fn style_of(model: &Model, demo: &Demonstration, dt: Option<f64>, period: Op
     let constants = Constants { attractor: model.attractor, canonical: model.canonical(), tau: model.tau };
     let centres = if model.kind() == Kind::Discrete { aligned.goals(demos) } else { aligned.anchors() };
     let scale = &model.learnt.dof_scale;
-    let target = constants.targets(&aligned.position, centres.view(), scale);
+    let target = constants.targets(&aligned.position, centres.view(), scale)?;
 
     let clock = constants.clock(model.learnt.n_samples);
     let n_outputs = model.landscape.n_outputs();
@@ -223,6 +245,10 @@ impl Constants {
                 }
                 let alpha_x = options.alpha_x.unwrap_or(100f64.ln() / u_end);
                 check_rate("alpha_x", alpha_x)?;
+                if alpha_x * u_end > 300.0 {
+                    let allowed = "must not exceed 300 tau / T, or the phase vanishes before the end";
+                    return Err(Error::Range { name: "alpha_x", value: alpha_x, allowed });
+                }
                 (Canonical::Discrete { alpha_x, u_end }, tau)
             }
             Kind::Rhythmic => {
@@ -251,11 +277,11 @@ impl Constants {
     ///
     /// The output system does not care where a movement takes place, but for rounding: discrete demonstrations are
     /// translated to start at 0, and a DoF that does not move has a target of exactly zero.
-    fn targets(&self, position: &Array3<f64>, centres: ArrayView2<f64>, dof_scale: &[f64]) -> Array2<f64> {
+    fn targets(&self, position: &Array3<f64>, centres: ArrayView2<f64>, dof_scale: &[f64]) -> Result<Array2<f64>> {
         let (n_demos, n_samples, n_dofs) = position.dim();
         let clock = self.clock(n_samples);
         let h = clock[1];
-        let mut targets = Array2::zeros((n_demos, n_samples * n_dofs));
+        let mut targets = zeros("targets", (n_demos, n_samples * n_dofs))?;
         for (m, mut row) in targets.rows_mut().into_iter().enumerate() {
             let origin = position.index_axis(Axis(0), m).row(0).to_owned();
             let moved = &position.index_axis(Axis(0), m) - &origin;
@@ -265,7 +291,7 @@ impl Constants {
                 *scaled.1 = value / dof_scale[scaled.0 % n_dofs];
             }
         }
-        targets
+        Ok(targets)
     }
 
     fn target(&self, h: f64, clock: &[f64], position: ArrayView2<f64>, centre: ArrayView1<f64>) -> Array2<f64> {

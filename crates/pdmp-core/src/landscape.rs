@@ -8,10 +8,11 @@ use std::f64::consts::TAU;
 use ndarray::{Array2, aview1};
 
 use crate::basis::Regression;
+use crate::demo::zeros;
 use crate::error::Result;
 use crate::phase::Canonical;
 
-/// Tolerated error of the table, relative to the largest forcing.
+/// Error of the table, relative to the largest forcing, at which cells are halved no more.
 const TOLERANCE: f64 = 1e-9;
 /// Cells of the first table.
 const FEWEST_CELLS: usize = 128;
@@ -47,7 +48,7 @@ impl Landscape {
         let extent = canonical.extent();
         let mut done = 0;
         let mut tabulate = |n: usize, at: &dyn Fn(usize) -> f64| {
-            let (mut values, mut slopes) = (Array2::zeros((n, n_outputs)), Array2::zeros((n, n_outputs)));
+            let (mut values, mut slopes) = (zeros("landscape", (n, n_outputs))?, zeros("landscape", (n, n_outputs))?);
             let (mut value, mut slope) = (vec![0.0; n_outputs], vec![0.0; n_outputs]);
             for k in 0..n {
                 if k % PORTION == 0 {
@@ -98,7 +99,8 @@ impl Landscape {
         self.canonical
     }
 
-    /// Largest error of the table, relative to the largest forcing; an upper bound, measured between the knots.
+    /// Largest error measured in the middle of the cells, relative to the largest forcing, before the cells were halved
+    /// once more: 1e-9 at most where 8192 cells suffice.
     pub fn error(&self) -> f64 {
         self.error
     }

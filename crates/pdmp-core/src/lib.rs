@@ -26,6 +26,35 @@
 //!
 //! Time is axis 0 of every array that has a time axis.
 //!
+//! # Learn, and run at 1 kHz
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use ndarray::Array2;
+//! use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Sampling, Status, fit};
+//!
+//! # fn main() -> pdmp_core::Result<()> {
+//! let bend = |h: f64| {
+//!     let position = Array2::from_shape_fn((101, 2), |(c, d)| {
+//!         let s = c as f64 / 100.0;
+//!         if d == 0 { s * s * (3.0 - 2.0 * s) } else { h * (s * (1.0 - s)).powi(2) }
+//!     });
+//!     Demonstration::new(position, Sampling::Uniform { dt: 0.01 })
+//! };
+//! let demos = [bend(0.5)?, bend(1.0)?, bend(2.0)?];
+//! let model = Arc::new(fit(&demos, &FitOptions::new(Kind::Discrete), &mut |_, _| Ok(()))?);
+//!
+//! let mut controller = Controller::new(model, 1e-3, &Conditions::default(), None)?;
+//! controller.set_goal(&[1.2, 0.1])?;
+//! while controller.step()? == Status::Working {
+//!     let _command = (controller.position(), controller.velocity());
+//! }
+//! assert!((controller.position()[0] - 1.2).abs() < 2e-3);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! [doi:10.1016/j.neunet.2011.02.004]: https://doi.org/10.1016/j.neunet.2011.02.004
 
 mod align;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 
 use crate::attractor::{Attractor, Jet, State};
 use crate::context::{ContextMap, Prediction};
@@ -73,7 +73,7 @@ pub struct Conditions {
     pub start: Option<Vec<f64>>,
     /// Start velocity (D,), per second; otherwise that of the demonstrations.
     pub velocity: Option<Vec<f64>>,
-    /// Amplitude r₀, rhythmic; otherwise 1.
+    /// Amplitude r₀, rhythmic; otherwise 1, which is what a discrete movement has.
     pub amplitude: Option<f64>,
     /// Time constant τ, in seconds.
     pub tau: Option<f64>,
@@ -214,7 +214,7 @@ impl Conditions {
         let centre = match kind {
             Kind::Discrete => {
                 refuse(kind, "anchor", self.anchor.is_some())?;
-                refuse(kind, "amplitude", self.amplitude.is_some())?;
+                refuse(kind, "amplitude", self.amplitude.is_some_and(|amplitude| amplitude != 1.0))?;
                 pick("goal", &self.goal, &demonstrated.goals)?
             }
             Kind::Rhythmic => {
@@ -267,10 +267,9 @@ pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> 
 
 /// Checks a style (J,). Demonstrated ones are at most 1 in magnitude: the bound only keeps products finite.
 pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
-    check_vector("style", style, n_styles, "style dimension")?;
-    match style.iter().position(|s| s.abs() > 1e100) {
+    match style.iter().position(|s| s.is_finite() && s.abs() > 1e100) {
         Some(index) => Err(Error::TooLarge { name: "style", index, value: style[index], limit: 1e100 }),
-        None => Ok(()),
+        None => check_vector("style", style, n_styles, "style dimension"),
     }
 }
 
@@ -316,17 +315,4 @@ fn steady_cycle(attractor: Attractor, landscape: &Landscape) -> Vec<State> {
 /// Weighted sum of the styles' outputs (J·D) for one DoF.
 pub(crate) fn blend(style: &[f64], outputs: &[f64], n_dofs: usize, d: usize) -> f64 {
     style.iter().enumerate().map(|(j, s)| s * outputs[j * n_dofs + d]).sum()
-}
-
-/// A view for the bindings: rows of one matrix per demonstration.
-impl Demonstrated {
-    /// Styles, goals, starts and anchors with their names, as they stand in a model file.
-    pub fn matrices(&self) -> [(&'static str, ArrayView2<'_, f64>); 4] {
-        [
-            ("styles", self.styles.view()),
-            ("goals", self.goals.view()),
-            ("starts", self.starts.view()),
-            ("anchors", self.anchors.view()),
-        ]
-    }
 }

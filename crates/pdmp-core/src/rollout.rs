@@ -14,6 +14,8 @@ use crate::error::{Error, Result, check_positive};
 use crate::model::{Conditions, Model, check_style, check_tau};
 use crate::phase::Kind;
 
+/// Samples between two questions whether to go on.
+const PORTION: usize = 4096;
 /// Most samples of a rollout.
 const MOST_STEPS: f64 = 1e7;
 
@@ -57,6 +59,19 @@ impl Model {
     /// # Errors
     /// Conditions or times that do not fit the model.
     pub fn rollout(self: &Arc<Self>, conditions: &Conditions, timing: Timing) -> Result<Trajectory> {
+        self.rollout_with(conditions, timing, &mut |_| Ok(()))
+    }
+
+    /// [`Model::rollout`] that can be stopped: `proceed` is told the share that is done.
+    ///
+    /// # Errors
+    /// Conditions or times that do not fit the model, or whatever `proceed` returns.
+    pub fn rollout_with(
+        self: &Arc<Self>,
+        conditions: &Conditions,
+        timing: Timing,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Trajectory> {
         let steps = timing.steps(self, conditions)?;
         let mut controller = Controller::new(Arc::clone(self), timing.dt, conditions, Some(0.0))?;
         let shape = (steps + 1, self.n_dofs());
@@ -67,6 +82,9 @@ impl Model {
             acceleration: zeros("rollout", shape)?,
         };
         for k in 0..=steps {
+            if k % PORTION == 0 {
+                proceed(k as f64 / (steps + 1) as f64)?;
+            }
             if k > 0 {
                 controller.step()?;
             }
@@ -81,13 +99,16 @@ impl Model {
 
     /// Movements of many styles (B, J) under otherwise equal conditions: positions and velocities, each (B, T, D).
     ///
+    /// `proceed` is told now and then the share that is done of the part at work.
+    ///
     /// # Errors
-    /// Styles, conditions or times that do not fit the model.
+    /// Styles, conditions or times that do not fit the model, or whatever `proceed` returns.
     pub fn rollouts(
         self: &Arc<Self>,
         styles: ArrayView2<f64>,
         conditions: &Conditions,
         timing: Timing,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<(Array3<f64>, Array3<f64>)> {
         check_matrix("styles", styles)?;
         if styles.ncols() != self.n_styles() {
@@ -98,11 +119,12 @@ impl Model {
             check_style(&style.to_vec(), self.n_styles())?;
         }
         let still = Conditions { style: Some(vec![0.0; self.n_styles()]), ..conditions.clone() };
-        let base = self.rollout(&still, timing)?;
-        let responses = self.style_responses(conditions, timing)?;
-        let batch = |base: &Array2<f64>, response: fn(&Trajectory) -> &Array2<f64>| {
+        let base = self.rollout_with(&still, timing, proceed)?;
+        let responses = self.style_responses(conditions, timing, proceed)?;
+        let mut batch = |base: &Array2<f64>, response: fn(&Trajectory) -> &Array2<f64>| {
             let mut curves = zeros("rollouts", (styles.nrows(), base.nrows(), base.ncols()))?;
-            for (mut curve, style) in curves.outer_iter_mut().zip(styles.rows()) {
+            for (b, (mut curve, style)) in curves.outer_iter_mut().zip(styles.rows()).enumerate() {
+                proceed(b as f64 / styles.nrows() as f64)?;
                 curve.assign(base);
                 for (s, trajectory) in style.iter().zip(&responses) {
                     curve.scaled_add(*s, response(trajectory));
@@ -115,12 +137,19 @@ impl Model {
 
     /// Jacobian ∂y/∂s (T, D, J) of a rollout's positions; exact, and the same for every style.
     ///
+    /// `proceed` is told now and then the share that is done of the part at work.
+    ///
     /// # Errors
-    /// Conditions or times that do not fit the model.
-    pub fn style_jacobian(self: &Arc<Self>, conditions: &Conditions, timing: Timing) -> Result<Array3<f64>> {
-        let responses = self.style_responses(conditions, timing)?;
+    /// Conditions or times that do not fit the model, or whatever `proceed` returns.
+    pub fn style_jacobian(
+        self: &Arc<Self>,
+        conditions: &Conditions,
+        timing: Timing,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Array3<f64>> {
+        let responses = self.style_responses(conditions, timing, proceed)?;
         let (steps, n_dofs) = responses.first().map_or((0, 0), |response| response.position.dim());
-        let mut jacobian = Array3::zeros((steps, n_dofs, responses.len()));
+        let mut jacobian = zeros("style_jacobian", (steps, n_dofs, responses.len()))?;
         for (j, response) in responses.iter().enumerate() {
             jacobian.index_axis_mut(Axis(2), j).assign(&response.position);
         }
@@ -129,7 +158,12 @@ impl Model {
 
     /// Rollouts of the unit styles with all else zero. A start or start velocity that is given stays given, at zero:
     /// whether it is decides how the start depends on the style.
-    fn style_responses(self: &Arc<Self>, conditions: &Conditions, timing: Timing) -> Result<Vec<Trajectory>> {
+    fn style_responses(
+        self: &Arc<Self>,
+        conditions: &Conditions,
+        timing: Timing,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Vec<Trajectory>> {
         conditions.complete(self)?;
         let zeros = || vec![0.0; self.n_dofs()];
         let discrete = self.kind() == Kind::Discrete;
@@ -143,6 +177,6 @@ impl Model {
             amplitude: conditions.amplitude,
             tau: conditions.tau,
         };
-        (0..self.n_styles()).map(|j| self.rollout(&unit(j), timing)).collect()
+        (0..self.n_styles()).map(|j| self.rollout_with(&unit(j), timing, proceed)).collect()
     }
 }

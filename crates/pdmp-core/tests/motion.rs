@@ -308,8 +308,8 @@ fn batch_and_jacobian_agree_with_rollouts() {
         for (start, velocity) in [(None, None), (given(), None), (None, given()), (given(), given())] {
             let conditions = Conditions { start, velocity, tau: Some(1.4 * model.tau()), ..Default::default() };
             let timing = timing(0.01, 1.5);
-            let (positions, velocities) = model.rollouts(styles.view(), &conditions, timing).unwrap();
-            let jacobian = model.style_jacobian(&conditions, timing).unwrap();
+            let (positions, velocities) = model.rollouts(styles.view(), &conditions, timing, &mut |_| Ok(())).unwrap();
+            let jacobian = model.style_jacobian(&conditions, timing, &mut |_| Ok(())).unwrap();
             for (b, style) in styles.rows().into_iter().enumerate() {
                 let style_of = |style: Vec<f64>| Conditions { style: Some(style), ..conditions.clone() };
                 let one = model.rollout(&style_of(style.to_vec()), timing).unwrap();
@@ -346,4 +346,17 @@ fn context_predicts_what_was_shown() {
     assert!((conditions.tau.unwrap() - prediction.duration).abs() < 1e-12);
     assert!(matches!(CYCLE.predict(&[0.3]), Err(Error::Arguments(_))));
     assert!(REACH.predict(&[0.3, 0.1]).is_err() && REACH.predict(&[f64::NAN]).is_err());
+}
+
+/// Long rollouts ask whether to go on, and stop when told so.
+#[test]
+fn rollouts_can_be_interrupted() {
+    let mut asked = 0;
+    let mut stop_later = |share: f64| {
+        asked += 1;
+        if share < 0.5 { Ok(()) } else { Err(Error::Interrupted) }
+    };
+    let stopped = REACH.rollout_with(&Conditions::default(), timing(1e-5, 1.0), &mut stop_later);
+    assert!(matches!(stopped, Err(Error::Interrupted)));
+    assert!(asked > 10);
 }

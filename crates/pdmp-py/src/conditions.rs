@@ -14,7 +14,7 @@ pub(crate) struct Arguments<'a, 'py> {
     pub(crate) start: Option<&'a Bound<'py, PyAny>>,
     pub(crate) velocity: Option<&'a Bound<'py, PyAny>>,
     pub(crate) anchor: Option<&'a Bound<'py, PyAny>>,
-    pub(crate) amplitude: Option<f64>,
+    pub(crate) amplitude: f64,
     pub(crate) tau: Option<f64>,
 }
 
@@ -26,7 +26,7 @@ impl Arguments<'_, '_> {
             anchor: optional("anchor", self.anchor)?,
             start: optional("start", self.start)?,
             velocity: optional("velocity", self.velocity)?,
-            amplitude: self.amplitude,
+            amplitude: Some(self.amplitude),
             tau: self.tau,
         })
     }

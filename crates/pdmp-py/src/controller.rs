@@ -159,8 +159,20 @@ impl Controller {
         })
     }
 
-    /// Start again; the arguments are those of `Model.rollout`.
-    #[pyo3(signature = (*, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=None, tau=None))]
+    /// Start again.
+    ///
+    /// Parameters
+    /// ----------
+    /// style, goal, start, velocity, anchor, amplitude, tau, context
+    ///     As in `Model.rollout`: what is not given is that of the nominal demonstration, not what was commanded before.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     What `Model.rollout` refuses; the movement then goes on as it was.
+    #[pyo3(signature = (
+        *, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, context=None
+    ))]
     #[allow(clippy::too_many_arguments)]
     fn reset(
         &mut self,
@@ -170,10 +182,12 @@ impl Controller {
         start: Option<&Bound<'_, PyAny>>,
         velocity: Option<&Bound<'_, PyAny>>,
         anchor: Option<&Bound<'_, PyAny>>,
-        amplitude: Option<f64>,
+        amplitude: f64,
         tau: Option<f64>,
+        context: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let conditions = Arguments { style, goal, start, velocity, anchor, amplitude, tau }.conditions()?;
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };
+        let conditions = arguments.in_context(self.inner.model(), context)?;
         let result = self.inner.reset(&conditions);
         self.command(py, result)
     }

@@ -15,21 +15,52 @@ create_exception!(pdmp, ModelFileError, PdmpError, "A model file that is damaged
 
 /// The Python exception of a core error: `ValueError` for arguments, `OSError` for the system, ours for the rest.
 pub(crate) fn raise(error: Error) -> PyErr {
-    match error {
+    let mut kind = &error;
+    while let Error::Demo { source, .. } = kind {
+        kind = source;
+    }
+    match kind {
         Error::Fit(_) => FitError::new_err(error.to_string()),
         Error::File(_) => ModelFileError::new_err(error.to_string()),
         Error::Interrupted => PyKeyboardInterrupt::new_err(()),
-        Error::Io { ref path, ref source } => {
+        Error::Io { path, source } => {
             let (reason, path) = (source.to_string(), path.display().to_string());
             match (source.raw_os_error(), source.kind()) {
                 // With an errno Python chooses the subclass.
                 (Some(errno), _) => PyOSError::new_err((errno, reason, path)),
-                (None, ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, reason, path)),
-                (None, ErrorKind::PermissionDenied) => PyPermissionError::new_err((13, reason, path)),
+                (None, ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, "No such file or directory", path)),
+                (None, ErrorKind::PermissionDenied) => PyPermissionError::new_err((13, "Permission denied", path)),
                 (None, _) => PyOSError::new_err(error.to_string()),
             }
         }
         Error::Memory { .. } => PyMemoryError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
+}
+
+/// Runs a long call without holding the interpreter. The call is handed a question whether to go on, which tells
+/// `progress` the share that is done, and whose answer is no after Ctrl-C or an exception of `progress`.
+pub(crate) fn detached<S, T: Send>(
+    py: Python<'_>,
+    progress: impl Fn(Python<'_>, S, f64) -> PyResult<()> + Sync,
+    call: impl FnOnce(&mut dyn FnMut(S, f64) -> Result<(), Error>) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    let mut raised = None;
+    let result = py.detach(|| {
+        call(&mut |stage, share| {
+            Python::attach(|py| py.check_signals().and_then(|()| progress(py, stage, share))).map_err(|error| {
+                raised = Some(error);
+                Error::Interrupted
+            })
+        })
+    });
+    result.map_err(|error| raised.unwrap_or_else(|| raise(error)))
+}
+
+/// [`detached`] for a call whose progress nobody follows.
+pub(crate) fn interruptible<T: Send>(
+    py: Python<'_>,
+    call: impl FnOnce(&mut dyn FnMut(f64) -> Result<(), Error>) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    detached(py, |_, (), _| Ok(()), |proceed| call(&mut |share| proceed((), share)))
 }

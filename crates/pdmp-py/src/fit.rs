@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use ndarray::{ArrayD, Axis, Ix2};
 use pdmp_core::basis::Basis;
-use pdmp_core::{Alignment, DofScale, Error, FitOptions, Kind, Sampling, Smoothing, StyleCount};
+use pdmp_core::{Alignment, DofScale, FitOptions, Kind, Sampling, Smoothing, Stage, StyleCount};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::basis::{Gp, NGnet};
 use crate::convert::{array, count, matrix, numbers};
 use crate::demo::Demonstration;
-use crate::error::raise;
+use crate::error::{detached, raise};
 use crate::model::Model;
 
 /// Learn one movement primitive from several demonstrations.
@@ -125,21 +125,12 @@ pub(crate) fn fit(
         alpha_x,
         mu,
     };
-    // What ended the fit from Python's side: Ctrl-C, or an exception in `progress`.
-    let mut raised = None;
-    let model = py.detach(|| {
-        pdmp_core::fit(&demos, &options, &mut |stage, share| {
-            Python::attach(|py| {
-                py.check_signals()?;
-                progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (stage.name(), share)).map(drop))
-            })
-            .map_err(|error| {
-                raised = Some(error);
-                Error::Interrupted
-            })
-        })
-    });
-    model.map(|model| Model(Arc::new(model))).map_err(|error| raised.unwrap_or_else(|| raise(error)))
+    let show = |py: Python<'_>, stage: Stage, share| match &progress {
+        Some(progress) => progress.call1(py, (stage.name(), share)).map(drop),
+        None => Ok(()),
+    };
+    let model = detached(py, show, |proceed| pdmp_core::fit(&demos, &options, proceed))?;
+    Ok(Model(Arc::new(model)))
 }
 
 fn demonstrations(demos: &Bound<'_, PyAny>) -> PyResult<Vec<pdmp_core::Demonstration>> {

@@ -14,7 +14,7 @@ use crate::conditions::Arguments;
 use crate::controller::Controller;
 use crate::convert::{Cube, Matrix, Vector, matrix, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
-use crate::error::raise;
+use crate::error::{interruptible, raise};
 use crate::prediction::Prediction;
 
 /// A parametric dynamic movement primitive: immutable, picklable, saved by `save`.
@@ -190,7 +190,7 @@ impl Model {
     ///     Start velocity per s; otherwise as in the demonstrations.
     /// anchor : array_like, (D,), optional
     ///     Anchor y_a, rhythmic.
-    /// amplitude : float, optional
+    /// amplitude : float
     ///     Amplitude r₀, rhythmic; 1 as demonstrated.
     /// tau : float, optional
     ///     Time constant in s.
@@ -211,7 +211,7 @@ impl Model {
     /// ValueError
     ///     A wrong length, a number that is not finite, or an argument of the other kind of primitive.
     #[pyo3(signature = (
-        style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=None, tau=None, dt=0.01,
+        style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, dt=0.01,
         duration=None, context=None
     ))]
     #[allow(clippy::too_many_arguments)]
@@ -223,7 +223,7 @@ impl Model {
         start: Option<&Bound<'_, PyAny>>,
         velocity: Option<&Bound<'_, PyAny>>,
         anchor: Option<&Bound<'_, PyAny>>,
-        amplitude: Option<f64>,
+        amplitude: f64,
         tau: Option<f64>,
         dt: f64,
         duration: Option<f64>,
@@ -231,7 +231,8 @@ impl Model {
     ) -> PyResult<Trajectory> {
         let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };
         let conditions = arguments.in_context(&self.0, context)?;
-        let trajectory = py.detach(|| self.0.rollout(&conditions, Timing { dt, duration })).map_err(raise)?;
+        let trajectory =
+            interruptible(py, |proceed| self.0.rollout_with(&conditions, Timing { dt, duration }, proceed))?;
         Ok(Trajectory::new(py, trajectory))
     }
 
@@ -248,7 +249,7 @@ impl Model {
     /// -------
     /// positions, velocities : ndarray, (B, T, D)
     #[pyo3(signature = (
-        styles, *, goal=None, start=None, velocity=None, anchor=None, amplitude=None, tau=None, dt=0.01, duration=None,
+        styles, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, dt=0.01, duration=None,
         out=None
     ))]
     #[allow(clippy::too_many_arguments)]
@@ -260,7 +261,7 @@ impl Model {
         start: Option<&Bound<'py, PyAny>>,
         velocity: Option<&Bound<'py, PyAny>>,
         anchor: Option<&Bound<'py, PyAny>>,
-        amplitude: Option<f64>,
+        amplitude: f64,
         tau: Option<f64>,
         dt: f64,
         duration: Option<f64>,
@@ -271,7 +272,7 @@ impl Model {
         let conditions = arguments.conditions()?;
         let timing = Timing { dt, duration };
         let (positions, velocities) =
-            py.detach(|| self.0.rollouts(styles.view(), &conditions, timing)).map_err(raise)?;
+            interruptible(py, |proceed| self.0.rollouts(styles.view(), &conditions, timing, proceed))?;
         let Some((to_positions, to_velocities)) = out else {
             return Ok((positions.into_pyarray(py), velocities.into_pyarray(py)));
         };
@@ -286,7 +287,7 @@ impl Model {
     /// Jacobian ∂y/∂s of a rollout's positions (T, D, J): exact, and the same for every style and goal.
     ///
     /// Which of `start` and `velocity` are given matters, their values do not.
-    #[pyo3(signature = (dt=0.01, *, start=None, velocity=None, amplitude=None, tau=None, duration=None))]
+    #[pyo3(signature = (dt=0.01, *, start=None, velocity=None, amplitude=1.0, tau=None, duration=None))]
     #[allow(clippy::too_many_arguments)]
     fn style_jacobian<'py>(
         &self,
@@ -294,14 +295,14 @@ impl Model {
         dt: f64,
         start: Option<&Bound<'py, PyAny>>,
         velocity: Option<&Bound<'py, PyAny>>,
-        amplitude: Option<f64>,
+        amplitude: f64,
         tau: Option<f64>,
         duration: Option<f64>,
     ) -> PyResult<Cube<'py>> {
         let arguments = Arguments { style: None, goal: None, start, velocity, anchor: None, amplitude, tau };
         let conditions = arguments.conditions()?;
         let timing = Timing { dt, duration };
-        let jacobian = py.detach(|| self.0.style_jacobian(&conditions, timing)).map_err(raise)?;
+        let jacobian = interruptible(py, |proceed| self.0.style_jacobian(&conditions, timing, proceed))?;
         Ok(jacobian.into_pyarray(py))
     }
 
@@ -403,7 +404,7 @@ impl Model {
     /// Controller
     #[pyo3(signature = (
         dt=0.001, style=None, goal=None, start=None, velocity=None, tau=None, transition=None, *, anchor=None,
-        amplitude=None, context=None
+        amplitude=1.0, context=None
     ))]
     #[allow(clippy::too_many_arguments)]
     fn controller(
@@ -417,7 +418,7 @@ impl Model {
         tau: Option<f64>,
         transition: Option<f64>,
         anchor: Option<&Bound<'_, PyAny>>,
-        amplitude: Option<f64>,
+        amplitude: f64,
         context: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Controller> {
         let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };

@@ -19,7 +19,7 @@ def progress() -> Iterator[Callable[[str, float], None]]:
             print(f"\r\x1b[K{stage} {share:.0%}", end="", file=sys.stderr, flush=True)
         elif stage not in stages:
             stages.append(stage)
-            print(stage, file=sys.stderr)
+            print(f"learning: {stage}", file=sys.stderr)
 
     try:
         yield show

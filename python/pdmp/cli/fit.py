@@ -4,6 +4,7 @@ example: pdmp fit recordings/ --columns q1 q2 q3 --context height_m -o reach.saf
 """
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 
 import pdmp
 from pdmp import demos
@@ -52,6 +53,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Read, learn, write."""
+    folder = Path(options.output).absolute().parent
+    if not folder.is_dir():
+        raise FileNotFoundError(f"{folder}: no such folder; make it first")
     recordings = demos.read(
         options.paths, columns=options.columns, dt=options.dt, context=options.context
     )

@@ -1,6 +1,7 @@
 """Parametric dynamic movement primitives: learn one from demonstrations, run it, look at it."""
 
 import os
+import re
 import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
@@ -8,6 +9,7 @@ from collections.abc import Sequence
 from pdmp._native import PdmpError, __version__
 from pdmp.cli import demo, fit, info, plot, rollout
 
+_NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 COMMANDS = {"fit": fit, "rollout": rollout, "info": info, "plot": plot, "demo": demo}
 
 
@@ -41,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Whoever read the output has gone; what is left of it must not raise at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (PdmpError, ValueError, OSError, ImportError) as error:
+    except (PdmpError, ValueError, OSError, ImportError, MemoryError) as error:
         print(f"pdmp: error: {_in_one_line(error)}", file=sys.stderr)
         return 1
     return 0
@@ -59,6 +61,8 @@ def _parser() -> ArgumentParser:
             description=description,
             formatter_class=RawDescriptionHelpFormatter,
         )
+        # Before Python 3.14 argparse takes -1e-3 for an option.
+        command_parser._negative_number_matcher = _NEGATIVE_NUMBER
         command.arguments(command_parser)
         command_parser.set_defaults(run=command.run)
     return parser

@@ -6,9 +6,7 @@ use std::sync::Arc;
 
 use ndarray::{Array1, Array2};
 use pdmp_core::basis::{Basis, Gp, NGnet};
-use pdmp_core::{
-    Alignment, Demonstration, DofScale, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount, Timing, fit,
-};
+use pdmp_core::{Demonstration, FitOptions, Kind, Model, Sampling, StyleCount, Timing, fit};
 
 /// Minimum jerk from 0 to 1 (Flash and Hogan 1985), s in [0, 1].
 pub(crate) fn minimum_jerk(s: f64) -> f64 {
@@ -51,26 +49,9 @@ pub(crate) fn cycles() -> Vec<Demonstration> {
     [0.0, 0.1, 0.25, 0.4].iter().map(|&s| cycle(s, 1.0 + 0.2 * s, 120)).collect()
 }
 
+/// A network, which fits in a moment, and nearly all of the spectrum.
 pub(crate) fn options(kind: Kind) -> FitOptions {
-    FitOptions {
-        alignment: Alignment {
-            kind,
-            dt: None,
-            period: vec![],
-            smoothing: Smoothing::Interpolate,
-            nominal: None,
-            n_samples: None,
-        },
-        contexts: None,
-        styles: StyleCount::Spectrum(0.9999),
-        basis: Basis::NGnet(NGnet::default()),
-        dof_scale: DofScale::Unit,
-        tau: None,
-        alpha_z: 25.0,
-        beta_z: None,
-        alpha_x: None,
-        mu: 1.0,
-    }
+    FitOptions { styles: StyleCount::Spectrum(0.9999), basis: Basis::NGnet(NGnet::default()), ..FitOptions::new(kind) }
 }
 
 pub(crate) fn gp() -> Basis {

@@ -7,12 +7,14 @@
 //!
 //! Nothing in [`Controller::step`] or in a setter allocates, locks or panics.
 
+mod commands;
+
 use std::sync::Arc;
 
 use crate::attractor::{Attractor, Jet, Propagator, State};
-use crate::error::{Error, Result, check_positive, check_vector};
+use crate::error::{Error, Result, check_positive};
 use crate::follower::Follower;
-use crate::model::{Complete, Conditions, Model, blend, check_amplitude, check_style, check_tau, refuse};
+use crate::model::{Complete, Conditions, Model, blend};
 use crate::perturbation::{Held, Perturbation, Push};
 use crate::phase::{Canonical, Kind, amplitude};
 
@@ -32,6 +34,11 @@ pub enum Status {
     Working,
     /// The demonstrated time is over, and position and velocity have settled on the goal.
     Finished,
+}
+
+/// Distance at which a way from `position` to `centre` counts as gone, not below what rounding leaves.
+fn reach_tolerance(centre: f64, position: f64) -> f64 {
+    (SETTLED * (centre - position).abs()).max(8.0 * f64::EPSILON * centre.abs().max(position.abs()))
 }
 
 /// What drives one degree of freedom.
@@ -86,8 +93,8 @@ impl Controller {
         check_positive("dt", dt)?;
         let share = if model.kind() == Kind::Discrete { 0.1 } else { 0.25 };
         let transition = transition.unwrap_or(share * model.duration());
-        if !(transition.is_finite() && transition >= 0.0) {
-            let allowed = "must be a time in seconds, or 0 for an immediate switch";
+        if !(0.0..=1e6 * model.duration()).contains(&transition) {
+            let allowed = "must lie between 0, an immediate switch, and a million durations";
             return Err(Error::Range { name: "transition", value: transition, allowed });
         }
         let conditions = conditions.complete(&model)?;
@@ -156,7 +163,8 @@ impl Controller {
             }
             self.position[d] = conditions.start.as_ref().map_or(centre + e, |start| start[d]);
             self.z[d] = z;
-            self.tolerance[d] = SETTLED * model.ranges()[d].max((centre - self.position[d]).abs()).max(1e-6 * widest);
+            let range = model.ranges()[d].max(1e-6 * widest);
+            self.tolerance[d] = (SETTLED * range).max(reach_tolerance(centre, self.position[d]));
         }
         self.read_out();
     }
@@ -199,7 +207,7 @@ impl Controller {
     pub fn step_with(&mut self, dt: f64, perturbation: &Perturbation) -> Result<Status> {
         check_positive("dt", dt)?;
         let h = self.rate.integral(dt);
-        if h > LONGEST_TICK {
+        if h.is_nan() || h > LONGEST_TICK {
             return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
         }
         self.held.take(perturbation, &self.position, dt, h)?;
@@ -368,84 +376,6 @@ impl Controller {
         };
         let over = self.clock >= u_end && (0..self.z.len()).all(settled);
         if over { Status::Finished } else { Status::Working }
-    }
-
-    /// Sets the style s (J,) to go to.
-    ///
-    /// # Errors
-    /// A wrong length or a number that is not finite; the style then stays as it was.
-    pub fn set_style(&mut self, style: &[f64]) -> Result<()> {
-        check_style(style, self.model.n_styles())?;
-        self.conditions.style.copy_from_slice(style);
-        self.style.follow(style);
-        self.commanded()
-    }
-
-    /// Sets the goal g (D,) of a discrete movement.
-    ///
-    /// # Errors
-    /// A rhythmic primitive, a wrong length, or a number that is not finite; the goal then stays as it was.
-    pub fn set_goal(&mut self, goal: &[f64]) -> Result<()> {
-        refuse(self.model.kind(), "goal", self.model.kind() == Kind::Rhythmic)?;
-        self.set_centre("goal", goal)
-    }
-
-    /// Sets the anchor y_a (D,) of a rhythmic movement.
-    ///
-    /// # Errors
-    /// A discrete primitive, a wrong length, or a number that is not finite; the anchor then stays as it was.
-    pub fn set_anchor(&mut self, anchor: &[f64]) -> Result<()> {
-        refuse(self.model.kind(), "anchor", self.model.kind() == Kind::Discrete)?;
-        self.set_centre("anchor", anchor)
-    }
-
-    fn set_centre(&mut self, name: &'static str, centre: &[f64]) -> Result<()> {
-        check_vector(name, centre, self.model.n_dofs(), "DoF")?;
-        self.conditions.centre.copy_from_slice(centre);
-        self.centre.follow(centre);
-        self.commanded()
-    }
-
-    /// Sets the time constant τ, in seconds; the rate 1/τ is what passes the filter.
-    ///
-    /// # Errors
-    /// A number that is not positive, or more than a millionfold from the model's τ; τ then stays as it was.
-    pub fn set_tau(&mut self, tau: f64) -> Result<()> {
-        check_tau(tau, self.model.tau())?;
-        self.conditions.tau = tau;
-        self.rate.follow(&[1.0 / tau]);
-        self.commanded()
-    }
-
-    /// Sets the amplitude r₀ of a rhythmic movement; r follows by Eq. (4).
-    ///
-    /// # Errors
-    /// A discrete primitive, a negative number or one that is not finite; r₀ then stays as it was.
-    pub fn set_amplitude(&mut self, amplitude: f64) -> Result<()> {
-        refuse(self.model.kind(), "amplitude", self.model.kind() == Kind::Discrete)?;
-        check_amplitude(amplitude)?;
-        self.conditions.amplitude = amplitude;
-        self.commanded()
-    }
-
-    /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
-    ///
-    /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 over the
-    /// demonstrated stretch of the clock, T/τ or 2π; 0 is without.
-    ///
-    /// # Errors
-    /// A gain that is negative, not finite or above 1e100; both then stay as they were.
-    pub fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
-        self.held.set_compliance(stopping, tracking)
-    }
-
-    /// Commands given before the first step hold from the start; later ones set a settled movement going.
-    fn commanded(&mut self) -> Result<()> {
-        self.status = Status::Working;
-        if !self.started {
-            self.begin();
-        }
-        Ok(())
     }
 
     /// Whether the movement goes on.
