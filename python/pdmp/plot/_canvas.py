@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ceil
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -60,13 +61,16 @@ def movement_panels(
 ) -> tuple[Figure, list[list[Axes]]]:
     """Return a figure and, per title, a column of panels for `draw_movement`.
 
-    The path comes first where there are two degrees of freedom; then each of them over time.
+    The path comes first where there are two degrees of freedom; then each of them over time, in a
+    grid where they are many.
     """
+    labels = dof_labels(model, unit)
+    if len(titles) == 1 and model.n_dofs > 4:
+        return _grid_panels(labels, titles[0], figure)
     has_path = model.n_dofs == 2
     heights = [3.6] * has_path + [1.7] * model.n_dofs
     figure = canvas(figure, max(3.2 * len(titles), 5.5), sum(heights) + 0.5)
     grid = figure.subplots(len(heights), len(titles), squeeze=False, height_ratios=heights)
-    labels = dof_labels(model, unit)
     for column, title in zip(grid.T, titles, strict=True):
         if has_path:
             dress(column[0], *labels)
@@ -75,6 +79,26 @@ def movement_panels(
             dress(axes, "time [s]", label)
         column[0].set_title(title)
     return figure, [list(column) for column in grid.T]
+
+
+def _grid_panels(
+    labels: Sequence[str], title: str, figure: Figure | None
+) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure and one column of panels laid out as a grid, for many degrees of freedom."""
+    n_columns = 3 if len(labels) < 13 else 5
+    n_rows = ceil(len(labels) / n_columns)
+    figure = canvas(figure, 3.2 * n_columns, 1.9 * n_rows + 0.5)
+    panels = figure.subplots(n_rows, n_columns, sharex=True, squeeze=False).ravel()
+    for axes, label in zip(panels, labels, strict=False):
+        dress(axes, "", label)
+    for axes in panels[len(labels) - n_columns : len(labels)]:
+        axes.set_xlabel("time [s]")
+        axes.xaxis.set_tick_params(labelbottom=True)
+    for axes in panels[len(labels) :]:
+        axes.set_axis_off()
+    if title:
+        figure.suptitle(title)
+    return figure, [list(panels[: len(labels)])]
 
 
 def draw_movement(

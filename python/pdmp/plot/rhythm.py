@@ -66,9 +66,9 @@ def phase_portrait(model: Model, *, unit: str = "", figure: Figure | None = None
             linewidth=1.4,
             marker="o",
             markevery=[0],
-            label="from rest",
+            label="from rest at the anchor",
         )
-        dress(axes, label, f"velocity [{unit or 1}/s]")
+        dress(axes, label, f"velocity [{unit}/s]" if unit else "velocity [per s]")
     for axes in panels[model.n_dofs :]:
         axes.set_axis_off()
     legend(figure, panels[0])

@@ -41,6 +41,7 @@ def spectrum(model: Model, *, figure: Figure | None = None) -> Figure:
     axes.bar(number[kept:], share[kept:], color=GREY, label="left out")
     axes.plot(number, share.cumsum(), "o-", color=ORANGE, markersize=4, label="sum so far")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(0.4, len(share) + 0.6)
     axes.set_ylim(0, 105)
     title = f"J = {kept} of {len(share)}: {share[:kept].sum():.1f} % of the singular values"
     dress(axes, "singular value", "share of their sum [%]", title)
