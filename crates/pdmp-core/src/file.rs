@@ -101,7 +101,7 @@ impl Model {
             .map_err(|error| Error::File(error.to_string()))?;
         let metadata = HashMap::from([(KEY.to_string(), json)]);
         let bytes = serialize(views, Some(metadata)).map_err(|error| Error::File(error.to_string()))?;
-        header_length(&bytes)?;
+        check_size(&bytes)?;
         Ok(bytes)
     }
 
@@ -164,7 +164,7 @@ impl Model {
         let mut bytes = Vec::new();
         // The header's length first: what is no model need not be read.
         Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(io)?;
-        header_length(&bytes).map_err(named)?;
+        check_size(&bytes).map_err(named)?;
         file.take(LARGEST_FILE).read_to_end(&mut bytes).map_err(io)?;
         Self::from_bytes(&bytes).map_err(named)
     }
@@ -175,7 +175,7 @@ impl Model {
     /// Bytes that are not whole, not a model, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let bad = |reason: &str| Error::File(reason.to_string());
-        header_length(bytes)?;
+        check_size(bytes)?;
         let broken = |error: safetensors::SafeTensorError| Error::File(error.to_string());
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(broken)?;
         let tensors = SafeTensors::deserialize(bytes).map_err(broken)?;
@@ -195,16 +195,17 @@ impl Model {
     }
 }
 
-/// Length of the header as the first eight bytes announce it.
-fn header_length(bytes: &[u8]) -> Result<u64> {
+/// Checks the size of the file, and that of its header as the first eight bytes announce it.
+fn check_size(bytes: &[u8]) -> Result<()> {
     let bad = |reason: &str| Error::File(reason.to_string());
     match bytes.first_chunk().map(|head| u64::from_le_bytes(*head)) {
+        _ if bytes.len() as u64 > LARGEST_FILE => Err(bad("larger than any model")),
         None => Err(bad("shorter than a header")),
         Some(0) => Err(bad("not a safetensors file")),
         Some(length) if length > LARGEST_HEADER => {
             Err(bad("not a safetensors file, or damaged: it announces a header larger than any model has"))
         }
-        Some(length) => Ok(length),
+        Some(_) => Ok(()),
     }
 }
 

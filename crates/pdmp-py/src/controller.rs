@@ -51,8 +51,8 @@ impl Output {
 /// A running primitive, made by `Model.controller`.
 ///
 /// `step` moves on by one tick and writes into `position`, `velocity` and `acceleration`, which are read-only views
-/// that stay valid. `goal`, `style`, `tau`, `amplitude`, `anchor` and `compliance` can be set at any tick; values that are refused
-/// leave the last good ones in force.
+/// that stay valid. `goal`, `style`, `tau`, `amplitude`, `anchor` and `compliance` can be set at any tick; values that
+/// are refused leave the last good ones in force.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,

@@ -98,16 +98,12 @@ fn check(domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<()> {
     }
 }
 
-/// Largest magnitude of each output, or 1 for an output that is zero throughout.
+/// Largest magnitude of the values, or 1 where all are zero.
 ///
-/// Divided by it, outputs of any magnitude can be squared and summed.
-fn scales(targets: ArrayView2<f64>) -> Vec<f64> {
-    let largest = |column: ndarray::ArrayView1<f64>| column.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    targets
-        .columns()
-        .into_iter()
-        .map(|column| Some(largest(column)).filter(|&most| most > 0.0).unwrap_or(1.0))
-        .collect()
+/// Divided by it, values of any magnitude can be squared and summed.
+fn magnitude<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
+    let largest = values.into_iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    if largest > 0.0 { largest } else { 1.0 }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use ndarray::{Array2, ArrayView2};
 
-use super::{Domain, Regression, scales};
+use super::{Domain, Regression, magnitude};
 use crate::error::{Error, Result};
 
 /// How far the centres reach beyond either end of an interval, in centre spacings.
@@ -81,7 +81,7 @@ impl NGnet {
         let penalty = RIDGE * (n_samples as f64 / self.n_basis as f64).sqrt();
         (0..self.n_basis).for_each(|k| design[(n_samples + k, k)] = penalty);
 
-        let scale = scales(targets);
+        let scale: Vec<f64> = targets.columns().into_iter().map(magnitude).collect();
         let rows = Mat::from_fn(n_samples + self.n_basis, n_outputs, |row, output| {
             if row < n_samples { targets[[row, output]] / scale[output] } else { 0.0 }
         });

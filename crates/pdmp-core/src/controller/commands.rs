@@ -14,7 +14,8 @@ impl Controller {
         check_style(style, self.model.n_styles())?;
         self.conditions.style.copy_from_slice(style);
         self.style.follow(style);
-        self.commanded()
+        self.commanded();
+        Ok(())
     }
 
     /// Sets the goal g (D,) of a discrete movement.
@@ -42,7 +43,8 @@ impl Controller {
         for (d, tolerance) in self.tolerance.iter_mut().enumerate() {
             *tolerance = tolerance.max(reach_tolerance(centre[d], self.position[d]));
         }
-        self.commanded()
+        self.commanded();
+        Ok(())
     }
 
     /// Sets the time constant τ, in seconds; the rate 1/τ is what passes the filter.
@@ -53,7 +55,8 @@ impl Controller {
         check_tau(tau, self.model.tau())?;
         self.conditions.tau = tau;
         self.rate.follow(&[1.0 / tau]);
-        self.commanded()
+        self.commanded();
+        Ok(())
     }
 
     /// Sets the amplitude r₀ of a rhythmic movement; r follows by Eq. (4).
@@ -64,7 +67,8 @@ impl Controller {
         refuse(self.model.kind(), "amplitude", self.model.kind() == Kind::Discrete)?;
         check_amplitude(amplitude)?;
         self.conditions.amplitude = amplitude;
-        self.commanded()
+        self.commanded();
+        Ok(())
     }
 
     /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
@@ -79,11 +83,10 @@ impl Controller {
     }
 
     /// Commands given before the first step hold from the start; later ones set a settled movement going.
-    fn commanded(&mut self) -> Result<()> {
+    fn commanded(&mut self) {
         self.status = Status::Working;
         if !self.started {
             self.begin();
         }
-        Ok(())
     }
 }
