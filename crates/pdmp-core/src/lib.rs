@@ -60,6 +60,7 @@
 mod align;
 mod attractor;
 pub mod basis;
+mod command;
 mod context;
 mod controller;
 mod demo;
@@ -78,6 +79,7 @@ mod spline;
 
 pub use align::Alignment;
 pub use attractor::{Attractor, Jet, Propagator, State};
+pub use command::{Command, Coupling, Motion};
 pub use context::{ContextMap, Prediction};
 pub use controller::{Controller, Status};
 pub use demo::{Demonstration, LEAST_SAMPLES, Sampling, Trajectory};
@@ -86,7 +88,6 @@ pub use factor::{Factors, StyleCount};
 pub use fit::{DofScale, FitOptions, Stage, fit, style_of};
 pub use landscape::Landscape;
 pub use model::{Conditions, Demonstrated, Learnt, Model};
-pub use perturbation::{Coupling, Perturbation};
 pub use phase::{Canonical, Kind};
 pub use rollout::Timing;
 pub use smooth::Smoothing;

@@ -18,7 +18,8 @@
 //! [doi:10.1016/S0079-6123(06)65027-9]: https://doi.org/10.1016/S0079-6123(06)65027-9
 //! [doi:10.1109/ROBOT.2009.5152385]: https://doi.org/10.1109/ROBOT.2009.5152385
 
-use crate::error::{Error, Result, check_vector};
+use crate::command::{Command, Coupling};
+use crate::error::{Error, Result};
 
 /// Default k_s: an error of a tenth of the range slows the phase elevenfold.
 const STOPPING: f64 = 1000.0;
@@ -29,24 +30,6 @@ const TRACKING: f64 = 10.0;
 const LARGEST_GAIN: f64 = 1e100;
 /// A DoF whose range is no more than this share of the widest stands still.
 const STILL: f64 = 1e-6;
-
-/// What happens to the movement during one tick; by default nothing.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Perturbation<'a> {
-    /// Position ỹ (D,) at which the robot is now, in the unit of each DoF.
-    pub measured: Option<&'a [f64]>,
-    /// The user's own terms.
-    pub coupling: Option<Coupling<'a>>,
-}
-
-/// Terms of the user's own, constant over the tick. The velocity jumps where c_v does.
-#[derive(Clone, Copy, Debug)]
-pub struct Coupling<'a> {
-    /// c_v (D,), added to the velocity, per second.
-    pub velocity: &'a [f64],
-    /// c_a (D,), added to the acceleration, per second squared.
-    pub acceleration: &'a [f64],
-}
 
 /// What is added to one DoF over a tick.
 #[derive(Clone, Copy, Debug, Default)]
@@ -81,32 +64,25 @@ impl Held {
         }
     }
 
-    /// Forgets the perturbation.
+    /// Forgets the command.
     pub(crate) fn release(&mut self) {
         (self.pushed, self.pace) = (false, 1.0);
     }
 
-    /// Takes the perturbation of a tick of `dt` seconds, `h` on the clock, that starts at `position`.
-    pub(crate) fn take(&mut self, perturbation: &Perturbation, position: &[f64], dt: f64, h: f64) -> Result<()> {
-        let n_dofs = position.len();
-        if let Some(measured) = perturbation.measured {
-            check_vector("measured", measured, n_dofs, "DoF")?;
-        }
-        if let Some(Coupling { velocity, acceleration }) = perturbation.coupling {
-            check_vector("coupling velocity", velocity, n_dofs, "DoF")?;
-            check_vector("coupling acceleration", acceleration, n_dofs, "DoF")?;
-        }
+    /// Takes the perturbation of a tick of `dt` seconds, `h` on the clock, that starts at `position`; its vectors have
+    /// been checked.
+    pub(crate) fn take(&mut self, command: &Command, position: &[f64], dt: f64, h: f64) {
         self.release();
-        self.pushed = perturbation.measured.is_some() || perturbation.coupling.is_some();
+        self.pushed = command.measured.is_some() || command.coupling.is_some();
         if self.pushed {
             self.push.fill(Push::default());
         }
-        if let Some(Coupling { velocity, acceleration }) = perturbation.coupling {
+        if let Some(Coupling { velocity, acceleration }) = command.coupling {
             for (d, push) in self.push.iter_mut().enumerate() {
                 *push = Push { velocity: velocity[d], acceleration: acceleration[d] };
             }
         }
-        if let Some(measured) = perturbation.measured {
+        if let Some(measured) = command.measured {
             let (stopping, tracking) = self.compliance;
             // What k_t alone would take off the error over the tick, so that it pulls no further than ỹ: stable for every
             // tick and gain up to β_z = 4α_z at least, far from the critical damping of α_z/4.
@@ -119,7 +95,6 @@ impl Held {
             }
             self.pace = 1.0 / (1.0 + strain);
         }
-        Ok(())
     }
 
     /// What is added to each DoF (D,), if anything.

@@ -7,7 +7,7 @@ use std::sync::{Arc, LazyLock};
 
 use common::*;
 use ndarray::{Array2, array};
-use pdmp_core::{Conditions, Controller, Error, Kind, Model, Status, StyleCount, Timing};
+use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status, StyleCount, Timing};
 use proptest::prelude::*;
 
 static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
@@ -91,7 +91,7 @@ proptest! {
                     4 => controller.set_amplitude(value),
                     _ => controller.set_goal(&vec![f64::NAN; n]),
                 };
-                let _ = controller.step_by(dt);
+                let _ = tick(&mut controller, &Command { dt: Some(dt), ..Command::default() });
                 for values in [controller.position(), controller.velocity(), controller.acceleration()] {
                     prop_assert!(values.iter().all(|x| x.is_finite()));
                 }
@@ -176,7 +176,7 @@ fn switches_are_continuous_unless_immediate() {
         controller.set_style(&[-0.9, 0.9]).unwrap();
         controller.set_tau(0.4 * REACH.tau()).unwrap();
         controller.set_goal(&[2.0, -1.0, 0.5]).unwrap();
-        controller.step_by(1e-9).unwrap();
+        tick(&mut controller, &Command { dt: Some(1e-9), ..Command::default() }).unwrap();
         (distance(controller.position(), &before.0), distance(controller.velocity(), &before.1))
     };
     let (position, velocity) = jump(None);
@@ -292,7 +292,7 @@ fn refused_commands_leave_the_last_good_value() {
     }
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
         assert!(controller.set_tau(bad).is_err());
-        assert!(controller.step_by(bad).is_err());
+        assert!(tick(&mut controller, &Command { dt: Some(bad), ..Command::default() }).is_err());
     }
     assert!(matches!(controller.set_anchor(&[0.0; 3]), Err(Error::Kind { .. })));
     assert!(matches!(controller.set_amplitude(1.0), Err(Error::Kind { .. })));

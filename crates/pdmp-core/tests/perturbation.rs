@@ -6,7 +6,7 @@ mod common;
 use std::sync::{Arc, LazyLock};
 
 use common::*;
-use pdmp_core::{Conditions, Controller, Coupling, Error, Kind, Model, Perturbation, Status, StyleCount};
+use pdmp_core::{Command, Conditions, Controller, Coupling, Error, Kind, Model, Status, StyleCount};
 use proptest::prelude::*;
 
 static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
@@ -20,12 +20,12 @@ fn controller(model: &Arc<Model>) -> Controller {
     Controller::new(Arc::clone(model), 1e-3, &Conditions::default(), None).unwrap()
 }
 
-fn measured(position: &[f64]) -> Perturbation<'_> {
-    Perturbation { measured: Some(position), coupling: None }
+fn measured(position: &[f64]) -> Command<'_> {
+    Command { measured: Some(position), ..Command::default() }
 }
 
-fn coupling<'a>(velocity: &'a [f64], acceleration: &'a [f64]) -> Perturbation<'a> {
-    Perturbation { measured: None, coupling: Some(Coupling { velocity, acceleration }) }
+fn coupling<'a>(velocity: &'a [f64], acceleration: &'a [f64]) -> Command<'a> {
+    Command { coupling: Some(Coupling { velocity, acceleration }), ..Command::default() }
 }
 
 fn largest(values: &[f64]) -> f64 {
@@ -97,8 +97,8 @@ fn perturbed_movement_solves_the_stated_equations() {
         for _ in 0..1500 {
             let robot: Vec<f64> = controller.position().iter().zip(behind).map(|(y, e)| y + e).collect();
             let terms = coupling(&velocity[..n], &acceleration[..n]);
-            let terms = if phase { Perturbation { measured: Some(&robot), ..terms } } else { terms };
-            controller.step_with(dt, &terms).unwrap();
+            let terms = if phase { Command { measured: Some(&robot), ..terms } } else { terms };
+            tick(&mut controller, &Command { dt: Some(dt), ..terms }).unwrap();
             for _ in 0..4 {
                 plain = rk4(model, &plain, dt / 4.0, &pushed, &acceleration[..n], pace);
             }
@@ -124,8 +124,8 @@ fn velocity_and_acceleration_stay_derivatives() {
         let mut samples = Vec::new();
         for _ in 0..5000 {
             let robot: Vec<f64> = controller.position().iter().map(|y| y + 0.01).collect();
-            let terms = Perturbation { measured: Some(&robot), ..coupling(&velocity, &acceleration) };
-            controller.step_with(dt, &terms).unwrap();
+            let terms = Command { measured: Some(&robot), ..coupling(&velocity, &acceleration) };
+            tick(&mut controller, &Command { dt: Some(dt), ..terms }).unwrap();
             let row = [controller.position(), controller.velocity(), controller.acceleration()];
             samples.push(row.map(<[f64]>::to_vec));
         }
@@ -155,9 +155,9 @@ fn no_error_and_zero_terms_change_nothing() {
                 }
             }
             plain.step().unwrap();
-            coupled.step_with(1e-3, &coupling(&zero, &zero)).unwrap();
+            tick(&mut coupled, &coupling(&zero, &zero)).unwrap();
             let robot = followed.position().to_vec();
-            followed.step_with(1e-3, &measured(&robot)).unwrap();
+            tick(&mut followed, &measured(&robot)).unwrap();
             for other in [&coupled, &followed] {
                 assert_eq!(plain.position(), other.position());
                 assert_eq!(plain.velocity(), other.velocity());
@@ -181,7 +181,7 @@ fn held_and_let_go_it_continues() {
         (0..400).for_each(|_| _ = held.step().unwrap());
         let (place, phase) = (held.position().to_vec(), held.phase());
         for _ in 0..1000 {
-            assert_eq!(held.step_with(1e-3, &measured(&place)).unwrap(), Status::Working);
+            assert_eq!(tick(&mut held, &measured(&place)).unwrap(), Status::Working);
             assert!(apart(model, held.position(), &place) < 0.16);
             assert!(largest(held.velocity()) < peak);
         }
@@ -211,7 +211,7 @@ fn held_and_let_go_it_continues() {
                 // Back on the cycle: where the free one is at the same phase.
                 while (free.phase() - held.phase()).rem_euclid(std::f64::consts::TAU) > 1e-9 {
                     let left = (held.phase() - free.phase()).rem_euclid(std::f64::consts::TAU) * model.tau();
-                    free.step_by(left.min(1e-3)).unwrap();
+                    tick(&mut free, &Command { dt: Some(left.min(1e-3)), ..Command::default() }).unwrap();
                 }
                 assert!(apart(model, held.position(), free.position()) < 1e-6);
             }
@@ -226,7 +226,7 @@ fn stopped_phase_does_not_finish() {
     controller.set_compliance(1e12, 0.0).unwrap();
     for _ in 0..5000 {
         let far: Vec<f64> = controller.position().iter().map(|y| y + 0.1).collect();
-        assert_eq!(controller.step_with(1e-3, &measured(&far)).unwrap(), Status::Working);
+        assert_eq!(tick(&mut controller, &measured(&far)).unwrap(), Status::Working);
     }
     assert!(controller.phase() > 0.99);
 }
@@ -245,7 +245,7 @@ fn still_dof_does_not_stop_the_phase() {
         let mut robot = pulled.position().to_vec();
         robot[2] += 0.1;
         free.step().unwrap();
-        pulled.step_with(1e-3, &measured(&robot)).unwrap();
+        tick(&mut pulled, &measured(&robot)).unwrap();
     }
     assert_eq!(free.phase(), pulled.phase());
     assert_eq!(free.position()[..2], pulled.position()[..2]);
@@ -260,22 +260,22 @@ fn refused_perturbations_leave_the_state() {
     let fine = [0.1; 3];
     for _ in 0..10 {
         for bad in [&[0.1; 2][..], &[0.1; 4], &[0.1, f64::NAN, 0.0], &[f64::INFINITY, 0.0, 0.0], &[0.0, 0.0, 1e200]] {
-            let last = Perturbation { measured: Some(bad), ..coupling(&fine, &fine) };
+            let last = Command { measured: Some(bad), ..coupling(&fine, &fine) };
             for terms in [measured(bad), coupling(bad, &fine), coupling(&fine, bad), last] {
-                assert!(bad_one.step_with(1e-3, &terms).is_err());
+                assert!(tick(&mut bad_one, &terms).is_err());
             }
         }
-        assert!(bad_one.step_with(-1.0, &measured(&fine)).is_err());
+        assert!(tick(&mut bad_one, &Command { dt: Some(-1.0), ..measured(&fine) }).is_err());
         for gains in [(-1.0, 1.0), (1.0, -1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)] {
             assert!(matches!(bad_one.set_compliance(gains.0, gains.1), Err(Error::Range { .. })));
         }
         assert_eq!(bad_one.compliance(), good.compliance());
         assert_eq!((bad_one.position(), bad_one.time()), (good.position(), good.time()));
-        bad_one.step_with(1e-3, &coupling(&fine, &fine)).unwrap();
-        good.step_with(1e-3, &coupling(&fine, &fine)).unwrap();
+        tick(&mut bad_one, &coupling(&fine, &fine)).unwrap();
+        tick(&mut good, &coupling(&fine, &fine)).unwrap();
         assert_eq!((bad_one.position(), bad_one.velocity()), (good.position(), good.velocity()));
     }
-    let error = bad_one.step_with(1e-3, &measured(&[0.1, f64::NAN, 0.0])).unwrap_err();
+    let error = tick(&mut bad_one, &measured(&[0.1, f64::NAN, 0.0])).unwrap_err();
     assert_eq!(error.to_string(), "measured[1] = NaN: every number must be finite");
     // A new start forgets what was held.
     bad_one.reset(&Conditions::default()).unwrap();
@@ -291,7 +291,7 @@ proptest! {
             controller.set_compliance(1000.0, tracking).unwrap();
             let robot = vec![100.0; model.n_dofs()];
             for _ in 0..ticks {
-                controller.step_with(dt, &measured(&robot)).unwrap();
+                tick(&mut controller, &Command { dt: Some(dt), ..measured(&robot) }).unwrap();
                 prop_assert!(largest(controller.position()) < 250.0, "{:?}", controller.position());
             }
         }
@@ -307,11 +307,11 @@ proptest! {
             for &(what, exponent, dt, gain) in &ticks {
                 let values = vec![10f64.powf(exponent); model.n_dofs()];
                 let terms = coupling(&values, &values);
-                let both = Perturbation { measured: Some(&values), ..terms };
+                let both = Command { measured: Some(&values), ..terms };
                 let _ = match what {
-                    0 => controller.step_with(dt, &measured(&values)),
-                    1 => controller.step_with(dt, &terms),
-                    2 => controller.step_with(dt, &both),
+                    0 => tick(&mut controller, &Command { dt: Some(dt), ..measured(&values) }),
+                    1 => tick(&mut controller, &Command { dt: Some(dt), ..terms }),
+                    2 => tick(&mut controller, &Command { dt: Some(dt), ..both }),
                     _ => controller.set_compliance(gain, gain).and_then(|()| controller.step()),
                 };
                 for values in [controller.position(), controller.velocity(), controller.acceleration()] {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::*;
-use pdmp_core::{Conditions, Controller, Coupling, Kind, Perturbation};
+use pdmp_core::{Command, Conditions, Controller, Coupling, Kind, Motion};
 
 struct Counting;
 
@@ -48,34 +48,42 @@ fn a_million_ticks_of_random_commands_allocate_nothing() {
         let mut controller = Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).unwrap();
         let mut random = Random(1);
         let mut values = vec![0.0; n_dofs.max(n_styles)];
+        let (mut position, mut velocity, mut acceleration) = (vec![0.0; n_dofs], vec![0.0; n_dofs], vec![0.0; n_dofs]);
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         for _ in 0..500_000 {
             values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
             // Refused commands are part of a loop too.
-            if random.next() < 0.01 {
+            let refused = random.next() < 0.01;
+            if refused {
                 values[0] = f64::NAN;
             }
+            let (given, tau, amplitude) = (&values[..n_dofs], own * (0.5 + random.next()), values[0].abs());
             let _ = black_box(match (random.next() * 8.0) as u8 {
                 0 => controller.set_style(&values[..n_styles]),
-                1 => controller.set_goal(&values[..n_dofs]),
-                2 => controller.set_anchor(&values[..n_dofs]),
-                3 => controller.set_tau(own * (0.5 + random.next())),
-                4 => controller.set_amplitude(values[0]),
+                1 => controller.set_goal(given),
+                2 => controller.set_anchor(given),
+                3 => controller.set_tau(tau),
+                4 => controller.set_amplitude(amplitude),
                 _ => Ok(()),
             });
-            let dt = 1e-3 * (0.1 + random.next());
-            let given = &values[..n_dofs];
-            let coupling = Some(Coupling { velocity: given, acceleration: given });
-            let refused = given[0].is_nan();
-            let (done, perturbed) = match (random.next() * 4.0) as u8 {
-                0 => (controller.step_with(dt, &Perturbation { measured: Some(given), coupling: None }), true),
-                1 => (controller.step_with(dt, &Perturbation { measured: None, coupling }), true),
-                2 => (controller.step_with(dt, &Perturbation { measured: Some(given), coupling }), true),
-                _ => (controller.step_by(dt), false),
+            let mut rarely = || random.next() < 0.2;
+            let command = Command {
+                dt: rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
+                style: rarely().then_some(&values[..n_styles]),
+                goal: (rarely() && kind == Kind::Discrete).then_some(given),
+                anchor: (rarely() && kind == Kind::Rhythmic).then_some(given),
+                tau: rarely().then_some(tau),
+                amplitude: (rarely() && kind == Kind::Rhythmic).then_some(amplitude),
+                measured: rarely().then_some(given),
+                coupling: rarely().then_some(Coupling { velocity: given, acceleration: given }),
             };
-            assert_eq!(black_box(done).is_err(), perturbed && refused);
+            let mut motion =
+                Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
+            let vectors = [command.style, command.goal, command.anchor, command.measured];
+            let told = vectors.iter().any(Option::is_some) || command.amplitude.is_some() || command.coupling.is_some();
+            assert_eq!(black_box(controller.update(&command, &mut motion)).is_err(), told && refused);
         }
         assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
-        assert!(controller.position().iter().all(|y| y.is_finite()));
+        assert!(position.iter().chain(&velocity).chain(&acceleration).all(|x| x.is_finite()));
     }
 }

@@ -1,12 +1,12 @@
 //! The real-time loop in Python.
 
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
-use pdmp_core::{Coupling, Kind, Perturbation};
+use pdmp_core::{Command, Coupling, Kind, Motion};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::conditions::Arguments;
-use crate::convert::{Vector, optional, to_numpy, vector};
+use crate::convert::{Vector, refill, to_numpy, vector};
 use crate::error::raise;
 
 /// Whether a movement goes on (`WORKING`) or has settled on its goal (`FINISHED`).
@@ -38,14 +38,22 @@ impl Output {
         Ok(Self { data: data.unbind(), view: view.unbind() })
     }
 
-    #[allow(unsafe_code)]
-    fn write(&self, py: Python<'_>, values: &[f64]) {
+    /// The memory, to be written by a tick.
+    #[allow(unsafe_code, clippy::mut_from_ref)]
+    fn memory(&self, py: Python<'_>) -> &mut [f64] {
         let data = self.data.bind(py);
-        debug_assert_eq!(data.len(), values.len());
-        // SAFETY: the array was made by `new`, one-dimensional, contiguous and as long as the movement has DoFs; it is
-        // written under the controller's exclusive borrow, and readers of its view hold no Rust reference.
-        unsafe { std::ptr::copy_nonoverlapping(values.as_ptr(), data.data(), values.len()) }
+        // SAFETY: `new` made the array contiguous and no other code sees it but through its view, whose readers hold no
+        // Rust reference. Each tick borrows it once, under the controller's exclusive borrow, and calls no Python.
+        unsafe { std::slice::from_raw_parts_mut(data.data(), data.len()) }
     }
+}
+
+/// Vectors given for one tick, copied: they may be lists, strided, or the controller's own outputs.
+#[derive(Default)]
+struct Given {
+    measured: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
 }
 
 /// A running primitive, made by `Model.controller`.
@@ -56,6 +64,7 @@ impl Output {
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,
+    given: Given,
     position: Output,
     velocity: Output,
     acceleration: Output,
@@ -73,6 +82,7 @@ impl Controller {
             acceleration: Output::new(py, length)?,
             working: status.getattr("WORKING")?.unbind(),
             finished: status.getattr("FINISHED")?.unbind(),
+            given: Given::default(),
             inner,
         };
         controller.publish(py);
@@ -80,9 +90,9 @@ impl Controller {
     }
 
     fn publish(&self, py: Python<'_>) {
-        self.position.write(py, self.inner.position());
-        self.velocity.write(py, self.inner.velocity());
-        self.acceleration.write(py, self.inner.acceleration());
+        self.position.memory(py).copy_from_slice(self.inner.position());
+        self.velocity.memory(py).copy_from_slice(self.inner.velocity());
+        self.acceleration.memory(py).copy_from_slice(self.inner.acceleration());
     }
 
     /// A command may hold from the start, and then changes what is shown.
@@ -137,22 +147,27 @@ impl Controller {
         measured: Option<&Bound<'_, PyAny>>,
         coupling: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     ) -> PyResult<Py<PyAny>> {
-        let measured = optional("measured", measured)?;
-        let coupling = coupling
-            .map(|(velocity, acceleration)| {
-                Ok::<_, PyErr>((
-                    vector("coupling velocity", &velocity)?,
-                    vector("coupling acceleration", &acceleration)?,
-                ))
-            })
-            .transpose()?;
-        let perturbation = Perturbation {
-            measured: measured.as_deref(),
-            coupling: coupling.as_ref().map(|(velocity, acceleration)| Coupling { velocity, acceleration }),
+        let Self { inner, given, position, velocity, acceleration, .. } = self;
+        if let Some(measured) = measured {
+            refill("measured", measured, &mut given.measured)?;
+        }
+        if let Some((velocity, acceleration)) = &coupling {
+            refill("coupling velocity", velocity, &mut given.velocity)?;
+            refill("coupling acceleration", acceleration, &mut given.acceleration)?;
+        }
+        let terms = Coupling { velocity: &given.velocity, acceleration: &given.acceleration };
+        let command = Command {
+            dt,
+            measured: measured.map(|_| given.measured.as_slice()),
+            coupling: coupling.map(|_| terms),
+            ..Command::default()
         };
-        let status = self.inner.step_with(dt.unwrap_or(self.inner.dt()), &perturbation);
-        let status = status.map_err(raise)?;
-        self.publish(py);
+        let mut motion = Motion {
+            position: position.memory(py),
+            velocity: velocity.memory(py),
+            acceleration: acceleration.memory(py),
+        };
+        let status = inner.update(&command, &mut motion).map_err(raise)?;
         Ok(match status {
             pdmp_core::Status::Working => self.working.clone_ref(py),
             pdmp_core::Status::Finished => self.finished.clone_ref(py),

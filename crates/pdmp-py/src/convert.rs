@@ -2,8 +2,8 @@
 
 use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
 use numpy::{
-    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayLikeDyn, PyUntypedArray,
-    PyUntypedArrayMethods,
+    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayLikeDyn, PyArrayMethods,
+    PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -38,6 +38,21 @@ pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>>
         .into_dimensionality::<Ix1>()
         .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected one axis")))?;
     Ok(vector.to_vec())
+}
+
+/// A vector into a buffer that is kept, without allocation if it comes as an array of doubles.
+#[allow(unsafe_code)]
+pub(crate) fn refill(name: &str, value: &Bound<'_, PyAny>, buffer: &mut Vec<f64>) -> PyResult<()> {
+    let doubles = value.cast::<PyArray1<f64>>().ok();
+    // SAFETY: the elements are copied at once, and no Python code runs meanwhile.
+    match doubles.map(|array| unsafe { array.as_slice() }) {
+        Some(Ok(values)) => {
+            buffer.clear();
+            buffer.extend_from_slice(values);
+        }
+        _ => *buffer = vector(name, value)?,
+    }
+    Ok(())
 }
 
 /// A vector that may be missing.

@@ -1,9 +1,8 @@
-//! What can be commanded at any tick. A command that is refused leaves the last good one in force.
+//! What can be commanded between ticks. A command that is refused leaves the last good one in force.
 
 use super::{Controller, Status, reach_tolerance};
-use crate::error::{Result, check_vector};
-use crate::model::{check_amplitude, check_style, check_tau, refuse};
-use crate::phase::Kind;
+use crate::command::Command;
+use crate::error::Result;
 
 impl Controller {
     /// Sets the style s (J,) to go to.
@@ -11,11 +10,7 @@ impl Controller {
     /// # Errors
     /// A wrong length or a number that is not finite; the style then stays as it was.
     pub fn set_style(&mut self, style: &[f64]) -> Result<()> {
-        check_style(style, self.model.n_styles())?;
-        self.conditions.style.copy_from_slice(style);
-        self.style.follow(style);
-        self.commanded();
-        Ok(())
+        self.set(&Command { style: Some(style), ..Command::default() })
     }
 
     /// Sets the goal g (D,) of a discrete movement.
@@ -23,8 +18,7 @@ impl Controller {
     /// # Errors
     /// A rhythmic primitive, a wrong length, or a number that is not finite; the goal then stays as it was.
     pub fn set_goal(&mut self, goal: &[f64]) -> Result<()> {
-        refuse(self.model.kind(), "goal", self.model.kind() == Kind::Rhythmic)?;
-        self.set_centre("goal", goal)
+        self.set(&Command { goal: Some(goal), ..Command::default() })
     }
 
     /// Sets the anchor y_a (D,) of a rhythmic movement.
@@ -32,19 +26,7 @@ impl Controller {
     /// # Errors
     /// A discrete primitive, a wrong length, or a number that is not finite; the anchor then stays as it was.
     pub fn set_anchor(&mut self, anchor: &[f64]) -> Result<()> {
-        refuse(self.model.kind(), "anchor", self.model.kind() == Kind::Discrete)?;
-        self.set_centre("anchor", anchor)
-    }
-
-    fn set_centre(&mut self, name: &'static str, centre: &[f64]) -> Result<()> {
-        check_vector(name, centre, self.model.n_dofs(), "DoF")?;
-        self.conditions.centre.copy_from_slice(centre);
-        self.centre.follow(centre);
-        for (d, tolerance) in self.tolerance.iter_mut().enumerate() {
-            *tolerance = tolerance.max(reach_tolerance(centre[d], self.position[d]));
-        }
-        self.commanded();
-        Ok(())
+        self.set(&Command { anchor: Some(anchor), ..Command::default() })
     }
 
     /// Sets the time constant τ, in seconds; the rate 1/τ is what passes the filter.
@@ -52,11 +34,7 @@ impl Controller {
     /// # Errors
     /// A number that is not positive, or more than a millionfold from the model's τ; τ then stays as it was.
     pub fn set_tau(&mut self, tau: f64) -> Result<()> {
-        check_tau(tau, self.model.tau())?;
-        self.conditions.tau = tau;
-        self.rate.follow(&[1.0 / tau]);
-        self.commanded();
-        Ok(())
+        self.set(&Command { tau: Some(tau), ..Command::default() })
     }
 
     /// Sets the amplitude r₀ of a rhythmic movement; r follows by Eq. (4).
@@ -64,11 +42,7 @@ impl Controller {
     /// # Errors
     /// A discrete primitive, a negative number or one that is not finite; r₀ then stays as it was.
     pub fn set_amplitude(&mut self, amplitude: f64) -> Result<()> {
-        refuse(self.model.kind(), "amplitude", self.model.kind() == Kind::Discrete)?;
-        check_amplitude(amplitude)?;
-        self.conditions.amplitude = amplitude;
-        self.commanded();
-        Ok(())
+        self.set(&Command { amplitude: Some(amplitude), ..Command::default() })
     }
 
     /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
@@ -82,11 +56,45 @@ impl Controller {
         self.held.set_compliance(stopping, tracking)
     }
 
-    /// Commands given before the first step hold from the start; later ones set a settled movement going.
-    fn commanded(&mut self) {
-        self.status = Status::Working;
-        if !self.started {
-            self.begin();
+    fn set(&mut self, command: &Command) -> Result<()> {
+        command.check(&self.model)?;
+        self.obey(command);
+        Ok(())
+    }
+
+    /// Takes a command that has been checked. What is commanded already changes nothing.
+    ///
+    /// Commands given before the first tick hold from the start; later ones set a settled movement going.
+    pub(super) fn obey(&mut self, command: &Command) {
+        let conditions = &mut self.conditions;
+        let mut news = false;
+        if let Some(style) = command.style.filter(|style| *style != conditions.style) {
+            conditions.style.copy_from_slice(style);
+            self.style.follow(style);
+            news = true;
+        }
+        if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != conditions.centre) {
+            conditions.centre.copy_from_slice(centre);
+            self.centre.follow(centre);
+            for (d, tolerance) in self.tolerance.iter_mut().enumerate() {
+                *tolerance = tolerance.max(reach_tolerance(centre[d], self.position[d]));
+            }
+            news = true;
+        }
+        if let Some(tau) = command.tau.filter(|tau| *tau != conditions.tau) {
+            conditions.tau = tau;
+            self.rate.follow(&[1.0 / tau]);
+            news = true;
+        }
+        if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != conditions.amplitude) {
+            conditions.amplitude = amplitude;
+            news = true;
+        }
+        if news {
+            self.status = Status::Working;
+            if !self.started {
+                self.begin();
+            }
         }
     }
 }

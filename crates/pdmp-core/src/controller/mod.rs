@@ -3,19 +3,20 @@
 //! Over a tick the forcing w, the goal and the clock are known at both ends with their slopes; a cubic between them is
 //! propagated exactly ([`crate::Attractor::propagator`]). Style, rate ρ = 1/τ and goal or anchor pass critically damped
 //! filters, so that position and velocity stay continuous: ẏ = ρ(z + w), ÿ = ρ²(z′ + w′) + ρ̇(z + w). A perturbation
-//! ([`crate::Perturbation`]) slows the phase's clock against the output system's, and adds to ẏ and ÿ.
+//! ([`Command::measured`], [`Command::coupling`]) slows the phase's clock against the output system's, and adds to ẏ and ÿ.
 //!
-//! Nothing in [`Controller::step`] or in a setter allocates, locks or panics.
+//! Nothing in [`Controller::update`] or in a setter allocates, locks or panics.
 
 mod commands;
 
 use std::sync::Arc;
 
 use crate::attractor::{Attractor, Jet, Propagator, State};
+use crate::command::{Command, Motion};
 use crate::error::{Error, Result, check_positive};
 use crate::follower::Follower;
 use crate::model::{Complete, Conditions, Model, blend};
-use crate::perturbation::{Held, Perturbation, Push};
+use crate::perturbation::{Held, Push};
 use crate::phase::{Canonical, Kind, amplitude};
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
@@ -169,23 +170,18 @@ impl Controller {
         self.read_out();
     }
 
-    /// One tick of the length given at the start.
+    /// One tick of the length given at the start, with nothing new commanded.
     ///
     /// # Errors
-    /// As for [`Controller::step_by`].
+    /// A tick longer than 1000 τ; the state then stays as it was.
     pub fn step(&mut self) -> Result<Status> {
-        self.step_by(self.dt)
+        self.tick(&Command::default())
     }
 
-    /// One tick of `dt` seconds; it may differ from tick to tick.
+    /// One tick under a command, with the motion written where the caller wants it.
     ///
-    /// # Errors
-    /// `dt` that is not positive, or longer than 1000 τ; the state then stays as it was.
-    pub fn step_by(&mut self, dt: f64) -> Result<Status> {
-        self.step_with(dt, &Perturbation::default())
-    }
-
-    /// One tick of `dt` seconds under a perturbation, which is held over it:
+    /// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is
+    /// held over the tick:
     ///
     /// ```text
     /// τẏ = z + w(u) + k_t(ỹ − y) + τc_v
@@ -203,14 +199,27 @@ impl Controller {
     /// Pastor, Hoffmann, Asfour and Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385.
     ///
     /// # Errors
-    /// As for [`Controller::step_by`], a wrong length, or a number that is not finite; the state then stays as it was.
-    pub fn step_with(&mut self, dt: f64, perturbation: &Perturbation) -> Result<Status> {
-        check_positive("dt", dt)?;
-        let h = self.rate.integral(dt);
-        if h.is_nan() || h > LONGEST_TICK {
+    /// A vector of a wrong length, a number that is not finite, τ, amplitude or goal that a setter refuses, or a tick
+    /// that is not positive or longer than 1000 τ.
+    pub fn update(&mut self, command: &Command, motion: &mut Motion) -> Result<Status> {
+        motion.check(self.z.len())?;
+        let status = self.tick(command)?;
+        motion.position.copy_from_slice(&self.position);
+        motion.velocity.copy_from_slice(&self.velocity);
+        motion.acceleration.copy_from_slice(&self.acceleration);
+        Ok(status)
+    }
+
+    fn tick(&mut self, command: &Command) -> Result<Status> {
+        command.check(&self.model)?;
+        let dt = command.dt.unwrap_or(self.dt);
+        let rate = self.rate.value()[0].max(1.0 / command.tau.unwrap_or(self.conditions.tau));
+        if dt * rate > LONGEST_TICK {
             return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
         }
-        self.held.take(perturbation, &self.position, dt, h)?;
+        self.obey(command);
+        let h = self.rate.integral(dt);
+        self.held.take(command, &self.position, dt, h);
         self.started = true;
         // A tick of just the finest length is not divided for a rounding error.
         let pieces = (h / (FINEST * self.model.canonical().extent()) - 1e-9).ceil().clamp(1.0, MOST_PIECES);

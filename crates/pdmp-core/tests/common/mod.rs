@@ -6,7 +6,10 @@ use std::sync::Arc;
 
 use ndarray::{Array1, Array2};
 use pdmp_core::basis::{Basis, Gp, NGnet};
-use pdmp_core::{Demonstration, FitOptions, Kind, Model, Sampling, StyleCount, Timing, fit};
+use pdmp_core::{
+    Command, Controller, Demonstration, FitOptions, Kind, Model, Motion, Result, Sampling, Status, StyleCount, Timing,
+    fit,
+};
 
 /// Minimum jerk from 0 to 1 (Flash and Hogan 1985), s in [0, 1].
 pub(crate) fn minimum_jerk(s: f64) -> f64 {
@@ -60,6 +63,18 @@ pub(crate) fn gp() -> Basis {
 
 pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model> {
     Arc::new(fit(demos, options, &mut |_, _| Ok(())).unwrap())
+}
+
+/// One tick under a command; the motion is then read from the controller.
+pub(crate) fn tick(controller: &mut Controller, command: &Command) -> Result<Status> {
+    let n = controller.model().n_dofs();
+    let (mut position, mut velocity, mut acceleration) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut motion = Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
+    let status = controller.update(command, &mut motion)?;
+    assert_eq!(motion.position, controller.position());
+    assert_eq!(motion.velocity, controller.velocity());
+    assert_eq!(motion.acceleration, controller.acceleration());
+    Ok(status)
 }
 
 /// All that a demonstration was learnt with: its style, goal or anchor, start and τ.

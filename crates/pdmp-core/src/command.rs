@@ -1,0 +1,89 @@
+//! What the caller owns of a tick: what is commanded, and where the motion is written.
+
+use crate::error::{Error, Result, check_positive, check_vector};
+use crate::model::{Model, check_amplitude, check_style, check_tau, refuse};
+use crate::phase::Kind;
+
+/// All that one tick is told; what is `None` stays as it was.
+///
+/// Style, goal, anchor, τ and amplitude stay in force until they are commanded again, so that the same command can be
+/// given at every tick; `dt`, `measured` and `coupling` hold for this tick alone.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Command<'a> {
+    /// Length of this tick, in seconds, if it differs from the controller's.
+    pub dt: Option<f64>,
+    /// Style s (J,) to go to.
+    pub style: Option<&'a [f64]>,
+    /// Goal g (D,) to go to, discrete.
+    pub goal: Option<&'a [f64]>,
+    /// Anchor y_a (D,) to go to, rhythmic.
+    pub anchor: Option<&'a [f64]>,
+    /// Time constant τ to go to, in seconds.
+    pub tau: Option<f64>,
+    /// Amplitude r₀ to go to, rhythmic.
+    pub amplitude: Option<f64>,
+    /// Position ỹ (D,) at which the robot is now, in the unit of each DoF.
+    pub measured: Option<&'a [f64]>,
+    /// The user's own terms.
+    pub coupling: Option<Coupling<'a>>,
+}
+
+/// Terms of the user's own, constant over the tick. The velocity jumps where c_v does.
+#[derive(Clone, Copy, Debug)]
+pub struct Coupling<'a> {
+    /// c_v (D,), added to the velocity, per second.
+    pub velocity: &'a [f64],
+    /// c_a (D,), added to the acceleration, per second squared.
+    pub acceleration: &'a [f64],
+}
+
+/// Where a tick writes its motion: three vectors of the caller's, (D,) each.
+#[derive(Debug)]
+pub struct Motion<'a> {
+    /// Position y, in the unit of each DoF.
+    pub position: &'a mut [f64],
+    /// Velocity ẏ, per second.
+    pub velocity: &'a mut [f64],
+    /// Acceleration ÿ, per second squared.
+    pub acceleration: &'a mut [f64],
+}
+
+impl Command<'_> {
+    /// Checks every number against the model.
+    pub(crate) fn check(&self, model: &Model) -> Result<()> {
+        let (kind, n_dofs) = (model.kind(), model.n_dofs());
+        refuse(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
+        refuse(kind, "anchor", kind == Kind::Discrete && self.anchor.is_some())?;
+        refuse(kind, "amplitude", kind == Kind::Discrete && self.amplitude.is_some())?;
+        self.dt.map_or(Ok(()), |dt| check_positive("dt", dt))?;
+        self.style.map_or(Ok(()), |style| check_style(style, model.n_styles()))?;
+        self.tau.map_or(Ok(()), |tau| check_tau(tau, model.tau()))?;
+        self.amplitude.map_or(Ok(()), check_amplitude)?;
+        let (velocity, acceleration) = self.coupling.map(|terms| (terms.velocity, terms.acceleration)).unzip();
+        for (name, vector) in [
+            ("goal", self.goal),
+            ("anchor", self.anchor),
+            ("measured", self.measured),
+            ("coupling velocity", velocity),
+            ("coupling acceleration", acceleration),
+        ] {
+            vector.map_or(Ok(()), |vector| check_vector(name, vector, n_dofs, "DoF"))?;
+        }
+        Ok(())
+    }
+}
+
+impl Motion<'_> {
+    /// Checks that each vector has one place per DoF.
+    pub(crate) fn check(&self, n_dofs: usize) -> Result<()> {
+        let lengths = [
+            ("position", self.position.len()),
+            ("velocity", self.velocity.len()),
+            ("acceleration", self.acceleration.len()),
+        ];
+        match lengths.into_iter().find(|(_, found)| *found != n_dofs) {
+            Some((name, found)) => Err(Error::Length { name, expected: n_dofs, found, per: "DoF" }),
+            None => Ok(()),
+        }
+    }
+}
