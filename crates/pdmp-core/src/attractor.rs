@@ -12,6 +12,8 @@
 
 use ndarray::{Array2, ArrayView1, ArrayView2};
 
+use crate::lanes::Real;
+
 /// Constants of the output system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attractor {
@@ -23,20 +25,20 @@ pub struct Attractor {
 
 /// A value and its derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Jet {
+pub struct Jet<T = f64> {
     /// The value.
-    pub value: f64,
+    pub value: T,
     /// Its derivative.
-    pub slope: f64,
+    pub slope: T,
 }
 
-/// State of one degree of freedom relative to its attractor.
+/// State of a degree of freedom relative to its attractor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct State {
+pub struct State<T = f64> {
     /// Displacement y − g, in the unit of the DoF.
-    pub e: f64,
+    pub e: T,
     /// Auxiliary state z of Eq. (1), in the unit of the DoF.
-    pub z: f64,
+    pub z: T,
 }
 
 /// Weights of a cubic forcing, given by its jets at both ends of a step.
@@ -47,8 +49,8 @@ struct CubicWeights {
 }
 
 impl CubicWeights {
-    fn apply(&self, from: Jet, to: Jet) -> f64 {
-        self.value[0] * from.value + self.value[1] * to.value + self.slope[0] * from.slope + self.slope[1] * to.slope
+    fn apply<T: Real>(&self, [from, to]: [Jet<T>; 2]) -> T {
+        from.value * self.value[0] + to.value * self.value[1] + (from.slope * self.slope[0] + to.slope * self.slope[1])
     }
 }
 
@@ -71,23 +73,22 @@ impl Attractor {
         let stiffness = self.alpha_z * self.beta_z;
         let phi = phi_functions(-self.alpha_z * h, stiffness * h * h);
         // (a + bAh) applied to the unit vectors: the columns of a 2 × 2 polynomial in A.
-        let first = |[a, b]: [f64; 2]| [a, -b * h * stiffness];
-        let second = |[a, b]: [f64; 2]| [b * h, a - b * h * self.alpha_z];
-        let (from_e, from_z) = (first(phi[0]), second(phi[0]));
-        let rows = |columns: [[f64; 2]; 5], scale: f64| {
-            [0, 1].map(|row| cubic_weights(h, columns.map(|column| scale * column[row])))
-        };
+        let e_to_e = |[a, _]: [f64; 2]| a;
+        let e_to_z = |[_, b]: [f64; 2]| -b * (h * stiffness);
+        let z_to_e = |[_, b]: [f64; 2]| b * h;
+        let z_to_z = |[a, b]: [f64; 2]| a - b * (h * self.alpha_z);
+        let shift = |[a, b]: [f64; 2]| [a * stiffness, b * stiffness];
         Propagator {
             h,
-            transition: [[from_e[0], from_z[0]], [from_e[1], from_z[1]]],
-            forcing: rows(phi.map(first), 1.0),
-            goal: rows(phi.map(second), stiffness),
+            transition: [[e_to_e(phi[0]), z_to_e(phi[0])], [e_to_z(phi[0]), z_to_z(phi[0])]],
+            forcing: [cubic_weights(h, phi.map(e_to_e)), cubic_weights(h, phi.map(e_to_z))],
+            goal: [cubic_weights(h, phi.map(shift).map(z_to_e)), cubic_weights(h, phi.map(shift).map(z_to_z))],
         }
     }
 
     /// z′ = α_z(β_z(g − y) − z) at a state relative to the goal.
-    pub fn z_slope(&self, State { e, z }: State) -> f64 {
-        -self.alpha_z * (self.beta_z * e + z)
+    pub fn z_slope<T: Real>(&self, State { e, z }: State<T>) -> T {
+        (e * self.beta_z + z) * -self.alpha_z
     }
 
     /// The forcing that makes the output system follow a movement (step 2 of Section 3.2): f = y′ − z.
@@ -112,7 +113,7 @@ impl Attractor {
         let mut target = slope.to_owned();
         for (d, mut column) in target.columns_mut().into_iter().enumerate() {
             let jet = |c: usize| Jet { value: attractor[d] - position[[c % n, d]], slope: -slope[[c % n, d]] };
-            let step = |z: f64, c: usize| phi[0] * z + stiffness * weights.apply(jet(c), jet(c + 1));
+            let step = |z: f64, c: usize| phi[0] * z + stiffness * weights.apply([jet(c), jet(c + 1)]);
             let mut z = 0.0;
             if periodic {
                 let turn = (0..n).fold(0.0, step);
@@ -141,20 +142,31 @@ impl Propagator {
     }
 
     /// The state after the step under the forcing w.
-    pub fn advance(&self, state: State, forcing: [Jet; 2]) -> State {
+    pub fn advance<T: Real>(&self, state: State<T>, forcing: [Jet<T>; 2]) -> State<T> {
         let [e, z] = [0, 1].map(|row| {
             let [from_e, from_z] = self.transition[row];
-            from_e * state.e + from_z * state.z + self.forcing[row].apply(forcing[0], forcing[1])
+            (state.e * from_e + state.z * from_z) + self.forcing[row].apply(forcing)
         });
         State { e, z }
     }
 
     /// What a goal moving by γ adds to the state, still relative to where the goal was at the start of the step.
-    pub fn follow(&self, goal: [Jet; 2]) -> State {
-        let [e, z] = [0, 1].map(|row| self.goal[row].apply(goal[0], goal[1]));
+    pub fn follow<T: Real>(&self, goal: [Jet<T>; 2]) -> State<T> {
+        let [e, z] = [0, 1].map(|row| self.goal[row].apply(goal));
         State { e, z }
     }
 }
+
+/// 1/k!.
+const INVERSE_FACTORIAL: [f64; 19] = {
+    let mut inverse = [1.0; 19];
+    let mut k = 1;
+    while k < 19 {
+        inverse[k] = inverse[k - 1] / k as f64;
+        k += 1;
+    }
+    inverse
+};
 
 /// φ₀ … φ₄ of a 2 × 2 matrix M, each as [a, b] meaning a·I + b·M; `trace` and `determinant` are those of M.
 ///
@@ -162,31 +174,29 @@ impl Propagator {
 /// complex, repeated (critical damping) or real.
 fn phi_functions(trace: f64, determinant: f64) -> [[f64; 2]; 5] {
     let size = trace.abs().max(determinant.abs().sqrt());
-    let doublings = if size > 0.5 { (size / 0.5).log2().ceil() } else { 0.0 };
-    let shrink = (-doublings).exp2();
-    let (mut trace, mut determinant) = (trace * shrink, determinant * shrink * shrink);
+    let (mut trace, mut determinant, mut doublings) = (trace, determinant, 0);
+    if size > 0.5 {
+        doublings = (size / 0.5).log2().ceil() as i32;
+        let shrink = 0.5f64.powi(doublings);
+        (trace, determinant) = (trace * shrink, determinant * shrink * shrink);
+    }
 
-    // φ₄ by its Taylor series Σ Mʲ/(j+4)!, the others by φₖ = Mφₖ₊₁ + I/k!.
-    const INVERSE_FACTORIAL: [f64; 5] = [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0];
+    // φ₄ by its Taylor series Σ Mʲ/(j+4)!, the others by φₖ = Mφₖ₊₁ + I/k!. The eigenvalues are at most 1.62 times the
+    // size, so that what is left off lies below 1e-18.
+    let terms = if size < 0.0625 { 9 } else { 15 };
+    let times_m = |[a, b]: [f64; 2]| [-determinant * b, a + trace * b];
     let mut phi = [[0.0; 2]; 5];
-    let mut term = [INVERSE_FACTORIAL[4], 0.0];
-    for j in 1..20 {
-        phi[4][0] += term[0];
-        phi[4][1] += term[1];
-        let [p, q] = term;
-        let divisor = f64::from(j + 4);
-        term = [-determinant * q / divisor, (p + trace * q) / divisor];
-        if term[0].abs() < 1e-20 && term[1].abs() < 1e-20 {
-            break;
-        }
+    for inverse_factorial in INVERSE_FACTORIAL[4..4 + terms].iter().rev() {
+        phi[4] = times_m(phi[4]);
+        phi[4][0] += inverse_factorial;
     }
     for k in (0..4).rev() {
-        let [a, b] = phi[k + 1];
-        phi[k] = [INVERSE_FACTORIAL[k] - determinant * b, a + trace * b];
+        phi[k] = times_m(phi[k + 1]);
+        phi[k][0] += INVERSE_FACTORIAL[k];
     }
 
     // φₖ(2M) = 2⁻ᵏ (φ₀φₖ + Σⱼ₌₁ᵏ φⱼ/(k−j)!), and a + bM = a + (b/2)(2M).
-    for _ in 0..doublings as u32 {
+    for _ in 0..doublings {
         let [a, b] = phi[0];
         let small = phi;
         for k in 0..5 {

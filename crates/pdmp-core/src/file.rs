@@ -118,8 +118,8 @@ impl Model {
             vector("singular_values", &self.learnt.singular_values),
             vector("dof_scale", &self.learnt.dof_scale),
             vector("ranges", &self.ranges),
-            ("landscape.values", knots.clone(), values.to_vec()),
-            ("landscape.slopes", knots, slopes.to_vec()),
+            ("landscape.values", knots.clone(), values),
+            ("landscape.slopes", knots, slopes),
         ];
         if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
             arrays.push(matrix("contexts", contexts));
@@ -274,8 +274,9 @@ impl Reader<'_> {
         };
         let landscape = Landscape::from_knots(
             constants.canonical,
-            knots("landscape.values")?,
-            knots("landscape.slopes")?,
+            n_dofs,
+            &knots("landscape.values")?,
+            &knots("landscape.slopes")?,
             constants.table_error,
         );
         let demonstrated = Demonstrated {

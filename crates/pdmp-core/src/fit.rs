@@ -132,8 +132,8 @@ pub fn fit(
     let regression = options.basis.regress(constants.domain(), &clock, basis_targets.view(), &mut regressing)?;
 
     let mut compiling = |share| proceed(Stage::Compile, share);
-    let landscape =
-        Landscape::compile(constants.canonical, basis_targets.ncols(), regression.as_ref(), &mut compiling)?;
+    let shape = (factors.basis.nrows(), demos[0].n_dofs());
+    let landscape = Landscape::compile(constants.canonical, shape, regression.as_ref(), &mut compiling)?;
 
     let starts = aligned.starts();
     let durations = aligned.durations.clone();
@@ -191,7 +191,7 @@ pub fn style_of(model: &Model, demo: &Demonstration, dt: Option<f64>, period: Op
     let mut design = Mat::zeros(target.len(), model.n_styles());
     let (mut value, mut slope) = (vec![0.0; n_outputs], vec![0.0; n_outputs]);
     for (c, &u) in clock.iter().enumerate() {
-        model.landscape.read(u, &mut value, &mut slope);
+        model.landscape.evaluate(u, &mut value, &mut slope);
         for (o, w) in value.iter().enumerate() {
             let (j, d) = (o / n_dofs, o % n_dofs);
             design[(c * n_dofs + d, j)] = w / scale[d];

@@ -3,47 +3,96 @@
 //! ẍ = −2ωẋ − ω²(x − target), solved in closed form over a tick. Its impulse response is positive, so that a filtered
 //! positive command stays positive, whatever the order and time of its changes.
 
+use crate::lanes::{Lanes, pack};
+
 /// Time to 99 % of a step, times ω: the root of (1 + s)exp(−s) = 0.01.
 const SETTLING: f64 = 6.638_352_067_993_813;
 /// After so long, times ω, what is left of a step lies far below rounding.
 const FORGOTTEN: f64 = 60.0;
 
-/// Several commands that are followed with one time constant.
-#[derive(Clone, Debug)]
-pub(crate) struct Follower {
-    value: Vec<f64>,
-    rate: Vec<f64>,
-    target: Vec<f64>,
+/// The filter: its constant, common to all commands of a movement.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Filter {
     /// ω, per second; infinite for an immediate switch.
     omega: f64,
+}
+
+/// The filter's solution over a tick: what displacement d = x − target and rate v at its start become and add.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Glide {
+    dt: f64,
+    /// x − target at the end, of d and v.
+    value: [f64; 2],
+    /// ẋ at the end, of d and v.
+    rate: [f64; 2],
+    /// ∫(x − target) over the tick, of d and v.
+    integral: [f64; 2],
+}
+
+impl Filter {
+    /// `transition` is the time to 99 % in seconds, 0 for an immediate switch.
+    pub(crate) fn new(transition: f64) -> Self {
+        Self { omega: SETTLING / transition }
+    }
+
+    /// Whether commands are switched to at once.
+    pub(crate) fn immediate(&self) -> bool {
+        self.omega.is_infinite()
+    }
+
+    /// The solution over `dt` seconds.
+    pub(crate) fn glide(&self, dt: f64) -> Glide {
+        let omega = self.omega;
+        let s = omega * dt;
+        let decay = (-s).exp();
+        // ∫exp(−ωt) and ∫ωt·exp(−ωt), times ω.
+        let first = -(-s).exp_m1();
+        let second = first - s * decay;
+        Glide {
+            dt,
+            value: [(1.0 + s) * decay, dt * decay],
+            rate: [-omega * s * decay, (1.0 - s) * decay],
+            integral: [(first + second) / omega, second / (omega * omega)],
+        }
+    }
+}
+
+impl Glide {
+    /// Length of the tick in seconds.
+    pub(crate) fn dt(&self) -> f64 {
+        self.dt
+    }
+}
+
+/// Commands that set out together, in groups of four, padded with zeros.
+#[derive(Clone, Debug)]
+pub(crate) struct Follower {
+    value: Vec<Lanes>,
+    rate: Vec<Lanes>,
+    target: Vec<Lanes>,
     /// Seconds until the values are their targets.
     remaining: f64,
 }
 
 impl Follower {
-    /// At rest on `target`; `transition` is the time to 99 % in seconds, 0 for an immediate switch.
-    pub(crate) fn new(target: &[f64], transition: f64) -> Self {
-        Self {
-            value: target.to_vec(),
-            rate: vec![0.0; target.len()],
-            target: target.to_vec(),
-            omega: SETTLING / transition,
-            remaining: 0.0,
-        }
+    /// At rest on its targets.
+    pub(crate) fn new(target: &[f64]) -> Self {
+        let target: Vec<Lanes> = pack(target).collect();
+        Self { value: target.clone(), rate: vec![Lanes::ZERO; target.len()], target, remaining: 0.0 }
     }
 
     /// Values now.
-    pub(crate) fn value(&self) -> &[f64] {
+    pub(crate) fn value(&self) -> &[Lanes] {
         &self.value
     }
 
     /// Their derivatives with respect to time, per second.
-    pub(crate) fn rate(&self) -> &[f64] {
+    pub(crate) fn rate(&self) -> &[Lanes] {
         &self.rate
     }
 
     /// Where they go.
-    pub(crate) fn target(&self) -> &[f64] {
+    pub(crate) fn target(&self) -> &[Lanes] {
         &self.target
     }
 
@@ -52,69 +101,71 @@ impl Follower {
         self.remaining <= 0.0
     }
 
-    /// Sets out for a target of the same length.
-    pub(crate) fn follow(&mut self, target: &[f64]) {
-        self.target.copy_from_slice(target);
-        if self.omega.is_finite() {
-            self.remaining = FORGOTTEN / self.omega;
-        } else {
-            self.settle();
+    /// Sets out for as many targets.
+    pub(crate) fn follow(&mut self, target: &[f64], filter: &Filter) {
+        if filter.immediate() {
+            return self.jump(target);
         }
+        self.target.iter_mut().zip(pack(target)).for_each(|(old, new)| *old = new);
+        self.remaining = FORGOTTEN / filter.omega;
     }
 
-    /// Jumps to a target of the same length.
+    /// Jumps to as many targets.
     pub(crate) fn jump(&mut self, target: &[f64]) {
-        self.target.copy_from_slice(target);
+        self.target.iter_mut().zip(pack(target)).for_each(|(old, new)| *old = new);
         self.settle();
     }
 
     fn settle(&mut self) {
         self.value.copy_from_slice(&self.target);
-        self.rate.fill(0.0);
+        self.rate.fill(Lanes::ZERO);
         self.remaining = 0.0;
     }
 
-    /// Moves on by `dt` seconds.
-    pub(crate) fn advance(&mut self, dt: f64) {
-        if self.settled() {
-            return;
-        }
-        self.remaining -= dt;
-        if self.settled() {
-            return self.settle();
-        }
-        let (omega, decay) = (self.omega, (-self.omega * dt).exp());
-        for ((x, v), target) in self.value.iter_mut().zip(&mut self.rate).zip(&self.target) {
-            let d = *x - target;
-            let b = *v + omega * d;
-            *x = target + (d + b * dt) * decay;
-            *v = (*v - omega * b * dt) * decay;
+    /// Moves on by a tick.
+    pub(crate) fn advance(&mut self, glide: &Glide) {
+        if self.elapse(glide) {
+            (0..self.value.len()).for_each(|group| self.advance_group(group, glide));
         }
     }
 
-    /// ∫ of the first value over the next `dt` seconds.
-    pub(crate) fn integral(&self, dt: f64) -> f64 {
-        let (x, target) = (self.value[0], self.target[0]);
-        if self.settled() {
-            return x * dt;
+    /// Takes a tick off the time to come, and tells whether each group is now to be moved on.
+    pub(crate) fn elapse(&mut self, glide: &Glide) -> bool {
+        let moving = !self.settled();
+        if moving {
+            self.remaining -= glide.dt;
         }
-        let (omega, s) = (self.omega, self.omega * dt);
-        let (d, b) = (x - target, self.rate[0] + omega * (x - target));
-        let first = -(-s).exp_m1();
-        let second = first - s * (-s).exp();
-        target * dt + d / omega * first + b / (omega * omega) * second
+        moving
+    }
+
+    /// Moves one group on by a tick.
+    #[inline]
+    pub(crate) fn advance_group(&mut self, group: usize, glide: &Glide) {
+        let (x, v, target) = (&mut self.value[group], &mut self.rate[group], self.target[group]);
+        let d = *x - target;
+        (*x, *v) = if self.remaining > 0.0 {
+            (target + (d * glide.value[0] + *v * glide.value[1]), d * glide.rate[0] + *v * glide.rate[1])
+        } else {
+            (target, Lanes::ZERO)
+        };
+    }
+
+    /// ∫ of the first value over a tick.
+    pub(crate) fn integral(&self, glide: &Glide) -> f64 {
+        let [x, v, target] = [&self.value, &self.rate, &self.target].map(|lanes| lanes[0].as_array()[0]);
+        target * glide.dt + ((x - target) * glide.integral[0] + v * glide.integral[1])
     }
 
     /// The time in [0, dt] at which the integral of the first, positive value reaches `area`.
-    pub(crate) fn time_to(&self, area: f64, dt: f64) -> f64 {
+    pub(crate) fn time_to(&self, area: f64, dt: f64, filter: &Filter) -> f64 {
         if self.settled() {
-            return (area / self.value[0]).min(dt);
+            return (area / self.value[0].as_array()[0]).min(dt);
         }
         let (mut low, mut high) = (0.0, dt);
         // The integral is increasing; fifty halvings exhaust the digits of a double.
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
-            if self.integral(middle) < area { low = middle } else { high = middle }
+            if self.integral(&filter.glide(middle)) < area { low = middle } else { high = middle }
         }
         high
     }
@@ -126,46 +177,76 @@ mod tests {
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
+    fn first(lanes: &[Lanes]) -> f64 {
+        lanes[0].as_array()[0]
+    }
+
+    /// One command that sets out from 2 for 5, to be there after 0.3 s.
+    fn command() -> (Follower, Filter) {
+        let (mut follower, filter) = (Follower::new(&[2.0]), Filter::new(0.3));
+        follower.follow(&[5.0], &filter);
+        (follower, filter)
+    }
+
     /// After the transition time 99 % of a step are done, however many ticks it took.
     #[test]
     fn transition_is_the_time_to_99_percent() {
         for ticks in [1, 7, 1000] {
-            let mut follower = Follower::new(&[2.0], 0.3);
-            follower.follow(&[5.0]);
-            (0..ticks).for_each(|_| follower.advance(0.3 / f64::from(ticks)));
-            assert_relative_eq!(follower.value()[0], 2.0 + 0.99 * 3.0, epsilon = 1e-12);
+            let (mut follower, filter) = command();
+            (0..ticks).for_each(|_| follower.advance(&filter.glide(0.3 / f64::from(ticks))));
+            assert_relative_eq!(first(follower.value()), 2.0 + 0.99 * 3.0, epsilon = 1e-12);
         }
+    }
+
+    /// The values solve ẍ = −2ωẋ − ω²(x − target), by RK4.
+    #[test]
+    fn values_solve_the_filter() {
+        let (mut follower, filter) = command();
+        let (mut x, mut v, n) = (2.0, 0.0, 1000);
+        let h = 0.2 / f64::from(n);
+        let f = |x: f64, v: f64| (v, -2.0 * filter.omega * v - filter.omega.powi(2) * (x - 5.0));
+        for _ in 0..n {
+            let a = f(x, v);
+            let b = f(x + h / 2.0 * a.0, v + h / 2.0 * a.1);
+            let c = f(x + h / 2.0 * b.0, v + h / 2.0 * b.1);
+            let d = f(x + h * c.0, v + h * c.1);
+            x += h / 6.0 * (a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0);
+            v += h / 6.0 * (a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1);
+        }
+        follower.advance(&filter.glide(0.2));
+        assert_relative_eq!(first(follower.value()), x, max_relative = 1e-9);
+        assert_relative_eq!(first(follower.rate()), v, max_relative = 1e-8);
     }
 
     /// The integral is that of the values, by Simpson's rule, and its inverse finds the time back.
     #[test]
     fn integral_is_that_of_the_values() {
-        let mut follower = Follower::new(&[2.0], 0.3);
-        follower.follow(&[5.0]);
-        follower.advance(0.02);
+        let (mut follower, filter) = command();
+        follower.advance(&filter.glide(0.02));
         let at = |t: f64| {
             let mut follower = follower.clone();
-            follower.advance(t);
-            follower.value()[0]
+            follower.advance(&filter.glide(t));
+            first(follower.value())
         };
         let n = 1000;
         let h = 0.1 / f64::from(n);
         let simpson: f64 =
             (0..n).map(|k| f64::from(k) * h).map(|t| h / 6.0 * (at(t) + 4.0 * at(t + h / 2.0) + at(t + h))).sum();
-        assert_relative_eq!(follower.integral(0.1), simpson, max_relative = 1e-11);
-        assert_relative_eq!(follower.time_to(simpson, 1.0), 0.1, max_relative = 1e-9);
+        assert_relative_eq!(follower.integral(&filter.glide(0.1)), simpson, max_relative = 1e-11);
+        assert_relative_eq!(follower.time_to(simpson, 1.0, &filter), 0.1, max_relative = 1e-9);
     }
 
     proptest! {
         /// A positive command stays positive under any sequence of changes.
         #[test]
         fn positive_commands_stay_positive(steps in prop::collection::vec((1e-3..1e3f64, 1e-4..1.0f64), 1..30)) {
-            let mut follower = Follower::new(&[1.0], 0.2);
+            let (mut follower, filter) = command();
             for (target, dt) in steps {
-                follower.follow(&[target]);
-                let area = follower.integral(dt);
-                follower.advance(dt);
-                prop_assert!(follower.value()[0] > 0.0 && area > 0.0);
+                follower.follow(&[target], &filter);
+                let glide = filter.glide(dt);
+                let area = follower.integral(&glide);
+                follower.advance(&glide);
+                prop_assert!(first(follower.value()) > 0.0 && area > 0.0);
             }
         }
     }

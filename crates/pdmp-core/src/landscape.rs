@@ -3,14 +3,14 @@
 //! Whatever regression learnt it, the forcing of each style dimension and DoF is stored as a piecewise cubic (Hermite)
 //! on a uniform grid of the clock. Between knots a cubic is off by h⁴/384·|w⁗| at most, and most in the middle of a cell.
 
-use std::f64::consts::TAU;
-
 use ndarray::{Array2, aview1};
 
+use crate::attractor::Jet;
 use crate::basis::Regression;
 use crate::demo::zeros;
 use crate::error::Result;
-use crate::phase::Canonical;
+use crate::lanes::{Lanes, WIDTH, groups};
+use crate::phase::{Canonical, turn};
 
 /// Error of the table, relative to the largest forcing, at which cells are halved no more.
 const TOLERANCE: f64 = 1e-9;
@@ -18,6 +18,8 @@ const TOLERANCE: f64 = 1e-9;
 const FEWEST_CELLS: usize = 128;
 /// Cells beyond which a table is not refined.
 pub(crate) const MOST_CELLS: usize = 8192;
+/// Fading below this is nothing.
+const NOTHING: f64 = 1e-200;
 /// Knots between two questions whether to go on.
 const PORTION: usize = 64;
 
@@ -25,13 +27,54 @@ const PORTION: usize = 64;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landscape {
     canonical: Canonical,
-    n_outputs: usize,
-    /// Values at the knots (cells + 1, J·D) by rows, in the unit of each DoF.
-    values: Vec<f64>,
-    /// Slopes with respect to the clock at the knots (cells + 1, J·D) by rows.
-    slopes: Vec<f64>,
+    n_styles: usize,
+    n_dofs: usize,
+    cells: usize,
+    /// Width of a cell, and how many there are per unit of the clock.
+    width: f64,
+    per_clock: f64,
+    /// By knots, groups of DoFs and styles, so that a step reads one stretch of memory from end to end. The last knot
+    /// stands for what follows.
+    cubics: Vec<Cubic>,
     /// Largest error found in the middle of a cell, relative to the largest forcing.
     error: f64,
+}
+
+/// Coefficients of a cubic from a knot on, over the clock; the first two are value and slope at the knot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Cubic([Lanes; 4]);
+
+/// A place on the clock: a knot, and how far beyond it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    knot: usize,
+    t: f64,
+}
+
+impl Cubic {
+    /// The cubic with given values and slopes at both ends of a cell.
+    fn hermite(from: Jet<Lanes>, to: Jet<Lanes>, width: f64) -> Self {
+        let scale = 1.0 / width;
+        let rise = (to.value - from.value) * scale;
+        let square = (rise * 3.0 - from.slope * 2.0 - to.slope) * scale;
+        let cube = (from.slope + to.slope - rise * 2.0) * (scale * scale);
+        Self([from.value, from.slope, square, cube])
+    }
+
+    /// This, and `times` another.
+    fn plus(self, other: &Self, times: f64) -> Self {
+        let Self([a, b, c, d]) = self;
+        let Self([p, q, r, s]) = *other;
+        Self([a + p * times, b + q * times, c + r * times, d + s * times])
+    }
+
+    fn at(self, t: f64) -> Jet<Lanes> {
+        let Self([value, slope, square, cube]) = self;
+        Jet {
+            value: value + slope * t + (square + cube * t) * (t * t),
+            slope: slope + (square * (2.0 * t) + cube * (3.0 * t * t)),
+        }
+    }
 }
 
 impl Landscape {
@@ -41,11 +84,11 @@ impl Landscape {
     /// Whatever `proceed` returns, which is told the share of the finest possible table that is done.
     pub(crate) fn compile(
         canonical: Canonical,
-        n_outputs: usize,
+        (n_styles, n_dofs): (usize, usize),
         regression: &dyn Regression,
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
-        let extent = canonical.extent();
+        let (extent, n_outputs) = (canonical.extent(), n_styles * n_dofs);
         let mut done = 0;
         let mut tabulate = |n: usize, at: &dyn Fn(usize) -> f64| {
             let (mut values, mut slopes) = (zeros("landscape", (n, n_outputs))?, zeros("landscape", (n, n_outputs))?);
@@ -82,16 +125,39 @@ impl Landscape {
                     close(&mut values);
                     close(&mut slopes);
                 }
-                return Ok(Self::from_knots(canonical, values, slopes, error));
+                return Ok(Self::from_knots(canonical, n_dofs, &values, &slopes, error));
             }
         }
     }
 
-    /// A table from values and slopes at its knots, two arrays of one shape with two rows at least.
-    pub(crate) fn from_knots(canonical: Canonical, values: Array2<f64>, slopes: Array2<f64>, error: f64) -> Self {
-        let n_outputs = values.ncols();
-        let by_rows = |knots: Array2<f64>| knots.as_standard_layout().iter().copied().collect();
-        Self { canonical, n_outputs, values: by_rows(values), slopes: by_rows(slopes), error }
+    /// A table from values and slopes at its knots, each (cells + 1, J·D) with two rows at least.
+    pub(crate) fn from_knots(
+        canonical: Canonical,
+        n_dofs: usize,
+        values: &Array2<f64>,
+        slopes: &Array2<f64>,
+        error: f64,
+    ) -> Self {
+        let (n_knots, n_styles) = (values.nrows(), values.ncols() / n_dofs);
+        let (cells, extent) = (n_knots - 1, canonical.extent());
+        let width = extent / cells as f64;
+        let lanes = |matrix: &Array2<f64>, k: usize, group: usize, j: usize| {
+            let dofs = group * WIDTH..n_dofs.min((group + 1) * WIDTH);
+            let mut lanes = [0.0; WIDTH];
+            lanes.iter_mut().zip(dofs).for_each(|(lane, d)| *lane = matrix[[k, j * n_dofs + d]]);
+            Lanes::new(lanes)
+        };
+        let jet = |k, group, j| Jet { value: lanes(values, k, group, j), slope: lanes(slopes, k, group, j) };
+        let mut cubics = Vec::with_capacity(n_knots * groups(n_dofs) * n_styles);
+        for k in 0..n_knots {
+            for group in 0..groups(n_dofs) {
+                cubics.extend((0..n_styles).map(|j| match jet(k, group, j) {
+                    from if k < cells => Cubic::hermite(from, jet(k + 1, group, j), width),
+                    last => Cubic([last.value, last.slope, Lanes::ZERO, Lanes::ZERO]),
+                }));
+            }
+        }
+        Self { canonical, n_styles, n_dofs, cells, width, per_clock: cells as f64 / extent, cubics, error }
     }
 
     /// The canonical system whose clock the table is read at.
@@ -106,58 +172,96 @@ impl Landscape {
     }
 
     /// Values and slopes at the knots, each (cells + 1, J·D) by rows.
-    pub(crate) fn knots(&self) -> (&[f64], &[f64]) {
-        (&self.values, &self.slopes)
+    pub(crate) fn knots(&self) -> (Vec<f64>, Vec<f64>) {
+        let size = (self.cells + 1) * self.n_outputs();
+        let (mut values, mut slopes) = (vec![0.0; size], vec![0.0; size]);
+        let rows = values.chunks_mut(self.n_outputs()).zip(slopes.chunks_mut(self.n_outputs()));
+        for (k, (values, slopes)) in rows.enumerate() {
+            self.scatter(|group, j| self.knot(k, group, j), values, slopes);
+        }
+        (values, slopes)
+    }
+
+    /// The forcing of a style at a knot, for one group of DoFs.
+    pub(crate) fn knot(&self, k: usize, group: usize, j: usize) -> Jet<Lanes> {
+        self.cubics(k, group)[j].at(0.0)
+    }
+
+    /// The cubics of all styles from a knot on, for one group of DoFs.
+    fn cubics(&self, knot: usize, group: usize) -> &[Cubic] {
+        let start = (knot * groups(self.n_dofs) + group) * self.n_styles;
+        &self.cubics[start..start + self.n_styles]
     }
 
     /// Number of outputs J·D.
     pub fn n_outputs(&self) -> usize {
-        self.n_outputs
+        self.n_styles * self.n_dofs
     }
 
     /// Number of cells of the table.
     pub fn cells(&self) -> usize {
-        self.values.len() / self.n_outputs - 1
+        self.cells
     }
 
     /// The forcing of all J·D outputs and its slope with respect to the clock.
     ///
     /// Past the end of a discrete movement it fades with the phase, w(u) = w(u_end)·x(u)/x(u_end).
     pub fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
+        let place = self.place(u);
+        let jet = |group: usize, j: usize| self.cubics(place.knot, group)[j].at(place.t);
+        match self.fading(u) {
+            Some(Jet { value: fade, slope: fading }) => {
+                let faded = |Jet { value, .. }: Jet<Lanes>| Jet { value: value * fade, slope: value * fading };
+                self.scatter(|group, j| faded(jet(group, j)), value, slope);
+            }
+            None => self.scatter(jet, value, slope),
+        }
+    }
+
+    /// How the forcing fades past the end of a discrete movement, x(u)/x(u_end), with its slope.
+    pub(crate) fn fading(&self, u: f64) -> Option<Jet> {
         match self.canonical {
             Canonical::Discrete { alpha_x, u_end } if u >= u_end => {
                 let fade = (-alpha_x * (u - u_end)).exp();
-                let last = self.row(&self.values, self.cells());
-                for ((value, slope), &end) in value.iter_mut().zip(slope).zip(last) {
-                    *value = fade * end;
-                    *slope = -alpha_x * *value;
-                }
+                // What has faded for long is nothing: products with it would leave the range of fast numbers.
+                let value = if fade < NOTHING { 0.0 } else { fade };
+                Some(Jet { value, slope: -alpha_x * value })
             }
-            Canonical::Discrete { .. } => self.read(u, value, slope),
-            Canonical::Rhythmic { .. } => self.read(u.rem_euclid(TAU), value, slope),
+            _ => None,
         }
     }
 
-    /// Reads the table, which at u_end gives the slope of the demonstrated side.
-    pub(crate) fn read(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
-        let cells = self.cells();
-        let position = u / self.canonical.extent() * cells as f64;
-        // A saturating cast: what lies below the table reads its first cell, what lies above its last.
-        let cell = (position as usize).min(cells - 1);
-        let (x, width) = (position - cell as f64, self.canonical.extent() / cells as f64);
-        let (v0, v1) = (self.row(&self.values, cell), self.row(&self.values, cell + 1));
-        let (s0, s1) = (self.row(&self.slopes, cell), self.row(&self.slopes, cell + 1));
-        for o in 0..v0.len() {
-            // p(x) = v0 + x(m0 + x(c + xd)) with p(1) = v1 and p'(1) = m1.
-            let (m0, m1, rise) = (width * s0[o], width * s1[o], v1[o] - v0[o]);
-            let (c, d) = (3.0 * rise - 2.0 * m0 - m1, m0 + m1 - 2.0 * rise);
-            value[o] = v0[o] + x * (m0 + x * (c + x * d));
-            slope[o] = (m0 + x * (2.0 * c + 3.0 * x * d)) / width;
+    /// Writes what is known by groups and styles as (J, D) by rows.
+    fn scatter(&self, jet: impl Fn(usize, usize) -> Jet<Lanes>, value: &mut [f64], slope: &mut [f64]) {
+        let rows = value.chunks_mut(self.n_dofs).zip(slope.chunks_mut(self.n_dofs));
+        for (j, (value, slope)) in rows.enumerate() {
+            for (group, (value, slope)) in value.chunks_mut(WIDTH).zip(slope.chunks_mut(WIDTH)).enumerate() {
+                let jet = jet(group, j);
+                value.copy_from_slice(&jet.value.to_array()[..value.len()]);
+                slope.copy_from_slice(&jet.slope.to_array()[..slope.len()]);
+            }
         }
     }
 
-    fn row<'a>(&self, knots: &'a [f64], k: usize) -> &'a [f64] {
-        &knots[k * self.n_outputs..(k + 1) * self.n_outputs]
+    /// A place on the clock. What lies beyond a discrete movement is read at its end, and faded by the reader.
+    pub(crate) fn place(&self, u: f64) -> Place {
+        let u = if let Canonical::Rhythmic { .. } = self.canonical { turn(u) } else { u };
+        let position = u * self.per_clock;
+        // A saturating cast: what lies below the table is read in its first cell.
+        let cell = position as u32;
+        if cell < self.cells as u32 {
+            Place { knot: cell as usize, t: (position - f64::from(cell)) * self.width }
+        } else {
+            Place { knot: self.cells, t: 0.0 }
+        }
+    }
+
+    /// Forcing sᵀb at a place, for one group of DoFs, with its slope.
+    #[inline]
+    pub(crate) fn blend(&self, place: Place, group: usize, style: &[f64]) -> Jet<Lanes> {
+        let cubics = self.cubics(place.knot, group);
+        let sum = style.iter().zip(cubics).fold(Cubic::default(), |sum, (s, cubic)| sum.plus(cubic, *s));
+        sum.at(place.t)
     }
 }
 
@@ -202,7 +306,7 @@ mod tests {
             [(Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 }, 9.0), (Canonical::Rhythmic { mu: 1.0 }, 5.0)]
         {
             let regression = Waves(omega);
-            let table = Landscape::compile(canonical, 3, &regression, &mut |_| Ok(())).unwrap();
+            let table = Landscape::compile(canonical, (1, 3), &regression, &mut |_| Ok(())).unwrap();
             assert!(table.error() <= TOLERANCE);
             let (mut value, mut slope, mut exact, mut rise) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
             for k in 0..10_007 {
@@ -221,7 +325,7 @@ mod tests {
     #[test]
     fn forcing_fades_with_the_phase_after_the_end() {
         let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
-        let table = Landscape::compile(canonical, 1, &Waves(9.0), &mut |_| Ok(())).unwrap();
+        let table = Landscape::compile(canonical, (1, 1), &Waves(9.0), &mut |_| Ok(())).unwrap();
         let at = |u: f64| {
             let (mut value, mut slope) = ([0.0], [0.0]);
             table.evaluate(u, &mut value, &mut slope);

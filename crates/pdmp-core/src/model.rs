@@ -4,10 +4,11 @@ use std::f64::consts::TAU;
 
 use ndarray::Array2;
 
-use crate::attractor::{Attractor, Jet, State};
+use crate::attractor::{Attractor, State};
 use crate::context::{ContextMap, Prediction};
 use crate::error::{Error, Result, check_positive, check_vector};
 use crate::landscape::Landscape;
+use crate::lanes::{Lanes, groups};
 use crate::phase::{Canonical, Kind};
 use crate::smooth::Smoothing;
 
@@ -56,8 +57,9 @@ pub struct Model {
     pub(crate) demonstrated: Demonstrated,
     pub(crate) learnt: Learnt,
     pub(crate) map: Option<ContextMap>,
-    /// Periodic steady state at φ = 0 of each output (J·D), per unit of style and amplitude; empty where discrete.
-    pub(crate) cycle: Vec<State>,
+    /// Periodic steady state at φ = 0 per unit of style and amplitude, by groups of DoFs and styles; zero where discrete,
+    /// which starts at rest in z.
+    pub(crate) cycle: Vec<State<Lanes>>,
 }
 
 /// What a movement starts with; what is `None` is that of the nominal demonstration.
@@ -82,9 +84,10 @@ pub struct Conditions {
 impl Model {
     /// Adds what follows from the rest.
     pub(crate) fn with_cycle(mut self) -> Self {
+        let shape = (self.n_dofs(), self.n_styles());
         self.cycle = match self.kind() {
-            Kind::Discrete => Vec::new(),
-            Kind::Rhythmic => steady_cycle(self.attractor, &self.landscape),
+            Kind::Discrete => vec![State::default(); groups(shape.0) * shape.1],
+            Kind::Rhythmic => steady_cycle(self.attractor, &self.landscape, shape),
         };
         self
     }
@@ -294,25 +297,19 @@ pub(crate) fn check_amplitude(value: f64) -> Result<()> {
 }
 
 /// The state from which one turn leads back to itself, (I − exp(2πA))⁻¹ times the response of a turn from rest.
-fn steady_cycle(attractor: Attractor, landscape: &Landscape) -> Vec<State> {
-    let (values, slopes) = landscape.knots();
-    let (n, cells) = (landscape.n_outputs(), landscape.cells());
+fn steady_cycle(attractor: Attractor, landscape: &Landscape, (n_dofs, n_styles): (usize, usize)) -> Vec<State<Lanes>> {
+    let cells = landscape.cells();
     let cell = attractor.propagator(TAU / cells as f64);
     let [[a, b], [c, d]] = attractor.propagator(TAU).transition();
     // A stable system never returns to where it was unforced: the determinant is positive.
-    let determinant = (1.0 - a) * (1.0 - d) - b * c;
-    let jet = |k: usize, o: usize| Jet { value: values[k * n + o], slope: slopes[k * n + o] };
-    let turn = |o: usize| (0..cells).fold(State::default(), |s, k| cell.advance(s, [jet(k, o), jet(k + 1, o)]));
-    (0..n)
-        .map(turn)
-        .map(|State { e, z }| State {
-            e: ((1.0 - d) * e + b * z) / determinant,
-            z: (c * e + (1.0 - a) * z) / determinant,
-        })
-        .collect()
-}
-
-/// Weighted sum of the styles' outputs (J·D) for one DoF.
-pub(crate) fn blend(style: &[f64], outputs: &[f64], n_dofs: usize, d: usize) -> f64 {
-    style.iter().enumerate().map(|(j, s)| s * outputs[j * n_dofs + d]).sum()
+    let scale = 1.0 / ((1.0 - a) * (1.0 - d) - b * c);
+    let mut cycle = Vec::with_capacity(groups(n_dofs) * n_styles);
+    for group in 0..groups(n_dofs) {
+        for j in 0..n_styles {
+            let jet = |k: usize| landscape.knot(k, group, j);
+            let State { e, z } = (0..cells).fold(State::default(), |s, k| cell.advance(s, [jet(k), jet(k + 1)]));
+            cycle.push(State { e: (e * (1.0 - d) + z * b) * scale, z: (e * c + z * (1.0 - a)) * scale });
+        }
+    }
+    cycle
 }

@@ -20,6 +20,7 @@
 
 use crate::command::{Command, Coupling};
 use crate::error::{Error, Result};
+use crate::lanes::{Lanes, groups, pack};
 
 /// Default k_s: an error of a tenth of the range slows the phase elevenfold.
 const STOPPING: f64 = 1000.0;
@@ -31,36 +32,38 @@ const LARGEST_GAIN: f64 = 1e100;
 /// A DoF whose range is no more than this share of the widest stands still.
 const STILL: f64 = 1e-6;
 
-/// What is added to one DoF over a tick.
+/// What is added over a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Push {
-    pub(crate) velocity: f64,
-    pub(crate) acceleration: f64,
+    pub(crate) velocity: Lanes,
+    pub(crate) acceleration: Lanes,
 }
 
 /// The perturbation of the tick at work, and how much the movement gives way to it.
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
+    /// By groups of DoFs.
     push: Vec<Push>,
     pushed: bool,
     pace: f64,
     /// k_s and k_t.
     compliance: (f64, f64),
-    /// Range of each DoF (D,); infinite where it stands still, so that an error there does not stop the phase.
-    span: Vec<f64>,
+    /// 1/range by groups of DoFs; zero where a DoF stands still, so that an error there does not stop the phase.
+    per_range: Vec<Lanes>,
 }
 
 impl Held {
     /// No perturbation, for DoFs of these ranges and a movement of this extent on the clock.
     pub(crate) fn new(ranges: &[f64], extent: f64) -> Self {
         let widest = ranges.iter().fold(0.0f64, |widest, range| widest.max(*range));
-        let span = |&range: &f64| if range > STILL * widest { range } else { f64::INFINITY };
+        let inverse = |&range: &f64| if range > STILL * widest { 1.0 / range } else { 0.0 };
+        let per_range: Vec<f64> = ranges.iter().map(inverse).collect();
         Self {
-            push: vec![Push::default(); ranges.len()],
+            push: vec![Push::default(); groups(ranges.len())],
             pushed: false,
             pace: 1.0,
             compliance: (STOPPING, TRACKING / extent),
-            span: ranges.iter().map(span).collect(),
+            per_range: pack(&per_range).collect(),
         }
     }
 
@@ -71,33 +74,37 @@ impl Held {
 
     /// Takes the perturbation of a tick of `dt` seconds, `h` on the clock, that starts at `position`; its vectors have
     /// been checked.
-    pub(crate) fn take(&mut self, command: &Command, position: &[f64], dt: f64, h: f64) {
+    pub(crate) fn take(&mut self, command: &Command, position: &[Lanes], dt: f64, h: f64) {
         self.release();
         self.pushed = command.measured.is_some() || command.coupling.is_some();
-        if self.pushed {
-            self.push.fill(Push::default());
+        if !self.pushed {
+            return;
         }
+        self.push.fill(Push::default());
         if let Some(Coupling { velocity, acceleration }) = command.coupling {
-            for (d, push) in self.push.iter_mut().enumerate() {
-                *push = Push { velocity: velocity[d], acceleration: acceleration[d] };
-            }
+            let terms = pack(velocity).zip(pack(acceleration));
+            self.push.iter_mut().zip(terms).for_each(|(push, (velocity, acceleration))| {
+                *push = Push { velocity, acceleration };
+            });
         }
         if let Some(measured) = command.measured {
             let (stopping, tracking) = self.compliance;
             // What k_t alone would take off the error over the tick, so that it pulls no further than ỹ: stable for every
             // tick and gain up to β_z = 4α_z at least, far from the critical damping of α_z/4.
             let pull = -(-tracking * h).exp_m1() / dt;
-            let mut strain = 0.0;
-            for (d, push) in self.push.iter_mut().enumerate() {
-                let error = measured[d] - position[d];
-                push.velocity += pull * error;
-                strain += (stopping.sqrt() * error / self.span[d]).powi(2);
+            let mut strain = Lanes::ZERO;
+            let places = pack(measured).zip(position).zip(&self.per_range);
+            for (push, ((measured, position), per_range)) in self.push.iter_mut().zip(places) {
+                let error = measured - *position;
+                push.velocity += error * pull;
+                let share = error * *per_range * stopping.sqrt();
+                strain += share * share;
             }
-            self.pace = 1.0 / (1.0 + strain);
+            self.pace = 1.0 / (1.0 + strain.reduce_add());
         }
     }
 
-    /// What is added to each DoF (D,), if anything.
+    /// What is added, by groups of DoFs, if anything.
     pub(crate) fn push(&self) -> Option<&[Push]> {
         self.pushed.then_some(&self.push)
     }

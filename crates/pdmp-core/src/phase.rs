@@ -77,8 +77,46 @@ impl Canonical {
     pub fn phase(&self, u: f64) -> f64 {
         match *self {
             Canonical::Discrete { alpha_x, .. } => (-alpha_x * u).exp(),
-            Canonical::Rhythmic { .. } => u.rem_euclid(TAU),
+            Canonical::Rhythmic { .. } => turn(u),
         }
+    }
+}
+
+/// An angle in [0, 2π).
+pub(crate) fn turn(phi: f64) -> f64 {
+    // A remainder takes long, and most angles of a control loop are there already. What lies just below 0 rounds to 2π.
+    if (0.0..TAU).contains(&phi) { phi } else { phi.rem_euclid(TAU) % TAU }
+}
+
+/// A sum of many small steps that does not drift: what each addition rounds off is carried to the next (Kahan 1965).
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Sum {
+    value: f64,
+    carried: f64,
+}
+
+impl Sum {
+    /// A sum that starts at `value`.
+    pub(crate) fn at(value: f64) -> Self {
+        Self { value, carried: 0.0 }
+    }
+
+    /// The sum.
+    pub(crate) fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// Adds a step.
+    pub(crate) fn add(&mut self, step: f64) {
+        let step = step + self.carried;
+        let sum = self.value + step;
+        self.carried = step - (sum - self.value);
+        self.value = sum;
+    }
+
+    /// Brings an angle back into [0, 2π).
+    pub(crate) fn wrap(&mut self) {
+        self.value = turn(self.value);
     }
 }
 

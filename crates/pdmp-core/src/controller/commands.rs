@@ -1,6 +1,6 @@
 //! What can be commanded between ticks. A command that is refused leaves the last good one in force.
 
-use super::{Controller, Status, reach_tolerance};
+use super::{Controller, Status};
 use crate::command::Command;
 use crate::error::Result;
 
@@ -66,35 +66,38 @@ impl Controller {
     ///
     /// Commands given before the first tick hold from the start; later ones set a settled movement going.
     pub(super) fn obey(&mut self, command: &Command) {
-        let conditions = &mut self.conditions;
+        let (conditions, filter) = (&mut self.conditions, self.filter);
         let mut news = false;
         if let Some(style) = command.style.filter(|style| *style != conditions.style) {
             conditions.style.copy_from_slice(style);
-            self.style.follow(style);
+            self.style.follow(style, &filter);
             news = true;
         }
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != conditions.centre) {
             conditions.centre.copy_from_slice(centre);
-            self.centre.follow(centre);
-            for (d, tolerance) in self.tolerance.iter_mut().enumerate() {
-                *tolerance = tolerance.max(reach_tolerance(centre[d], self.position[d]));
-            }
+            self.centre.follow(centre, &filter);
             news = true;
         }
         if let Some(tau) = command.tau.filter(|tau| *tau != conditions.tau) {
             conditions.tau = tau;
-            self.rate.follow(&[1.0 / tau]);
+            self.rate.follow(&[1.0 / tau], &filter);
             news = true;
         }
         if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != conditions.amplitude) {
             conditions.amplitude = amplitude;
             news = true;
         }
-        if news {
-            self.status = Status::Working;
-            if !self.started {
-                self.begin();
-            }
+        if !news {
+            return;
+        }
+        self.status = Status::Working;
+        if !self.started {
+            return self.begin();
+        }
+        self.tolerate_way();
+        // A style that was switched to at once.
+        if filter.immediate() {
+            self.read_forcing();
         }
     }
 }

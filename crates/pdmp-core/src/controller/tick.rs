@@ -1,0 +1,274 @@
+//! One tick.
+
+use super::{Controller, Status};
+use crate::attractor::{Attractor, Jet, State};
+use crate::error::{Error, Result};
+use crate::lanes::{Lanes, settle, unpack};
+use crate::perturbation::Push;
+use crate::phase::{Canonical, Sum, amplitude};
+
+/// Most pieces of a tick; a longer one is still stable, only less exact.
+const MOST_PIECES: f64 = 1000.0;
+/// Longest tick, in units of τ.
+const LONGEST_TICK: f64 = 1000.0;
+
+/// What the landscape gives a group of DoFs at the clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Forcing {
+    /// sᵀb.
+    pub(super) shape: Lanes,
+    /// Its derivative with respect to the phase's clock.
+    slope: Lanes,
+    /// ṡᵀb, per second.
+    swing: Lanes,
+}
+
+/// What turns a [`Forcing`] into w = r·sᵀb and its slope along the motion, w′ = rκ·sᵀb′ + r/ρ·ṡᵀb + r′·sᵀb. Past the
+/// end of a discrete movement r stands for the fading phase, and b for what is faded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gate {
+    pub(super) r: f64,
+    /// The landscape is read at the phase's pace κ; style and amplitude keep the output system's clock.
+    along: f64,
+    swing: f64,
+    growth: f64,
+    /// ρ and ρ̇.
+    rate: [f64; 2],
+}
+
+impl Gate {
+    #[inline]
+    fn jet(&self, forcing: &Forcing) -> Jet<Lanes> {
+        let Forcing { shape, slope, swing } = *forcing;
+        Jet { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
+    }
+
+    /// ẏ = ρ(z + w) and ÿ = ρ²(z′ + w′) + ρ̇(z + w).
+    #[inline]
+    fn motion(&self, attractor: Attractor, state: State<Lanes>, w: Jet<Lanes>) -> [Lanes; 2] {
+        let ([rate, change], flow) = (self.rate, state.z + w.value);
+        [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
+    }
+}
+
+impl Controller {
+    /// Checks that a tick is not too long for the rates at which it starts and to which it goes.
+    pub(super) fn check_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
+        let commanded = tau.map_or(first(self.rate.target()), |tau| 1.0 / tau);
+        if dt * first(self.rate.value()).max(commanded) > LONGEST_TICK {
+            return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
+        }
+        Ok(())
+    }
+
+    /// One tick of `dt` seconds, `h` on the clock.
+    pub(super) fn tick(&mut self, dt: f64, h: f64) -> Status {
+        self.started = true;
+        if h <= self.finest {
+            self.piece(dt, h);
+        } else {
+            let pieces = (h / self.finest).ceil().min(MOST_PIECES);
+            for _ in 0..pieces as u32 {
+                let h = self.stretch(dt / pieces);
+                self.piece(dt / pieces, h);
+            }
+        }
+        self.time.add(dt);
+        // What has settled stays settled, unless it is pushed or commanded.
+        if self.status == Status::Working || self.held.push().is_some() {
+            self.status = self.settled();
+        }
+        self.status
+    }
+
+    /// The stretch of the clock that `dt` seconds from now on cover.
+    pub(super) fn stretch(&mut self, dt: f64) -> f64 {
+        if self.rate.settled() {
+            return first(self.rate.value()) * dt;
+        }
+        self.measure(dt);
+        self.rate.integral(&self.glide)
+    }
+
+    /// Gets the filters ready for `dt` seconds.
+    fn measure(&mut self, dt: f64) {
+        if dt != self.glide.dt() {
+            self.glide = self.filter.glide(dt);
+        }
+    }
+
+    /// Moves on by `dt` seconds, `h` on the clock, stopping at the demonstrated end, where the forcing has a kink.
+    fn piece(&mut self, dt: f64, h: f64) {
+        let Canonical::Discrete { u_end, .. } = self.model.canonical() else {
+            return self.advance(dt, h);
+        };
+        let (left, way) = (u_end - self.clock.value(), self.held.pace() * h);
+        if left <= 0.0 || left >= way {
+            return self.advance(dt, h);
+        }
+        let before = self.rate.time_to(left / self.held.pace(), dt, &self.filter);
+        // What rounding left of a tick that should have ended here is not worth a piece of its own.
+        if left > 1e-9 * way {
+            let h = self.stretch(before);
+            self.advance(before, h);
+        }
+        self.clock = Sum::at(u_end);
+        self.read_forcing();
+        let h = self.stretch(dt - before);
+        self.advance(dt - before, h);
+    }
+
+    /// Moves on by `dt` seconds, `h` on the clock.
+    fn advance(&mut self, dt: f64, h: f64) {
+        if h <= 0.0 {
+            return self.read_out();
+        }
+        self.measure(dt);
+        if h != self.propagator.step() {
+            self.propagator = self.model.attractor().propagator(h);
+        }
+        let demonstrated = self.model.landscape().fading(self.clock.value()).is_none();
+        let levers = self.held.push().map(|_| self.levers());
+        let before = self.gate();
+        self.style.advance(&self.glide);
+        self.rate.advance(&self.glide);
+        let moving = self.centre.elapse(&self.glide);
+        self.clock.add(self.held.pace() * h);
+        if let Canonical::Rhythmic { mu } = self.model.canonical() {
+            self.clock.wrap();
+            self.r = amplitude(mu, self.r, self.conditions.amplitude, h);
+        }
+        // A piece that reaches u_end has the slopes of the demonstrated side at both its ends.
+        let after = if demonstrated { self.gate_within() } else { self.gate() };
+
+        let (model, propagator) = (&*self.model, &self.propagator);
+        let (landscape, attractor, place) =
+            (model.landscape(), model.attractor(), model.landscape().place(self.clock.value()));
+        let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, model.n_styles()));
+        let swinging = !self.style.settled();
+        let n = self.forcing.len();
+        let (forcing, centre) = (&mut self.forcing[..n], &mut self.centre);
+        let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
+        let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
+        for group in 0..n {
+            let from = before.jet(&forcing[group]);
+            let along = landscape.blend(place, group, style);
+            let swing = if swinging { landscape.blend(place, group, swing).value } else { Lanes::ZERO };
+            forcing[group] = Forcing { shape: along.value, slope: along.slope, swing };
+            let to = after.jet(&forcing[group]);
+
+            let mut origin = centre.value()[group];
+            let mut next = propagator.advance(State { e: position[group] - origin, z: z[group] }, [from, to]);
+            position[group] = settle(origin + next.e);
+            if moving {
+                let start = Jet { value: Lanes::ZERO, slope: centre.rate()[group] * (1.0 / before.rate[0]) };
+                centre.advance_group(group, &self.glide);
+                let shift = centre.value()[group] - origin;
+                let end = Jet { value: shift, slope: centre.rate()[group] * (1.0 / after.rate[0]) };
+                let moved = propagator.follow([start, end]);
+                position[group] += moved.e;
+                origin = centre.value()[group];
+                next = State { e: position[group] - origin, z: next.z + moved.z };
+            }
+            next.z = settle(next.z);
+            z[group] = next.z;
+            [velocity[group], acceleration[group]] = after.motion(attractor, next, to);
+        }
+        if let Some(before) = levers {
+            self.give_way(before);
+            self.read_out();
+        }
+    }
+
+    /// Adds what a perturbation does; the system is linear.
+    fn give_way(&mut self, before: [Jet; 2]) {
+        let after = self.levers();
+        let by_velocity = self.propagator.advance(State::default(), [before[0], after[0]]);
+        let by_acceleration = self.propagator.follow([before[1], after[1]]);
+        let states = self.position.iter_mut().zip(&mut self.z);
+        for ((position, z), Push { velocity, acceleration }) in states.zip(self.held.push().into_iter().flatten()) {
+            *position += *velocity * by_velocity.e + *acceleration * by_acceleration.e;
+            *z += *velocity * by_velocity.z + *acceleration * by_acceleration.z;
+        }
+    }
+
+    /// What a unit of c_v adds to the forcing, τ, and a unit of c_a to the centre: τ²/(α_zβ_z), for that is how far the
+    /// centre must move to add τ² to the row of Eq. (1).
+    fn levers(&self) -> [Jet; 2] {
+        let Attractor { alpha_z, beta_z } = self.model.attractor();
+        let (tau, rate) = (1.0 / first(self.rate.value()), first(self.rate.rate()));
+        // dτ/du = τ·dτ/dt.
+        let slope = -rate * tau.powi(3);
+        let centre = tau / (alpha_z * beta_z);
+        [Jet { value: tau, slope }, Jet { value: tau * centre, slope: 2.0 * slope * centre }]
+    }
+
+    /// The gate at the clock, at u_end with the slope of what follows.
+    pub(super) fn gate(&self) -> Gate {
+        let within = self.gate_within();
+        match self.model.landscape().fading(self.clock.value()) {
+            Some(Jet { value, slope }) => {
+                Gate { r: value, along: 0.0, swing: value * within.swing, growth: self.held.pace() * slope, ..within }
+            }
+            None => within,
+        }
+    }
+
+    /// The gate of the demonstrated stretch.
+    fn gate_within(&self) -> Gate {
+        let (r, rate) = (self.r, [self.rate.value(), self.rate.rate()].map(first));
+        let growth = match self.model.canonical() {
+            Canonical::Discrete { .. } => 0.0,
+            Canonical::Rhythmic { mu } => mu * (self.conditions.amplitude - r),
+        };
+        Gate { r, along: r * self.held.pace(), swing: r / rate[0], growth, rate }
+    }
+
+    /// Reads the forcing at the clock.
+    pub(super) fn read_forcing(&mut self) {
+        let (model, place) = (&self.model, self.model.landscape().place(self.clock.value()));
+        let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, model.n_styles()));
+        for (group, forcing) in self.forcing.iter_mut().enumerate() {
+            let along = model.landscape().blend(place, group, style);
+            let swing = model.landscape().blend(place, group, swing).value;
+            *forcing = Forcing { shape: along.value, slope: along.slope, swing };
+        }
+    }
+
+    /// Velocity and acceleration of the present state.
+    pub(super) fn read_out(&mut self) {
+        let (gate, attractor) = (self.gate(), self.model.attractor());
+        for group in 0..self.z.len() {
+            let e = self.position[group] - self.centre.value()[group];
+            let w = gate.jet(&self.forcing[group]);
+            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, State { e, z: self.z[group] }, w);
+        }
+        let motion = self.velocity.iter_mut().zip(&mut self.acceleration);
+        for ((velocity, acceleration), push) in motion.zip(self.held.push().into_iter().flatten()) {
+            *velocity += push.velocity;
+            *acceleration += push.acceleration;
+        }
+    }
+
+    /// Whether a movement is over: how far a DoF may still go is at most about |e| + 2τ|ẏ|/α_z + |w|/β_z, what is left
+    /// of its way, of its speed at critical damping, and of its forcing.
+    fn settled(&self) -> Status {
+        let Some(Jet { value: fade, .. }) = self.model.landscape().fading(self.clock.value()) else {
+            return Status::Working;
+        };
+        let Attractor { alpha_z, beta_z } = self.model.attractor();
+        let speed = 2.0 / (alpha_z * first(self.rate.value()));
+        let over = (0..self.z.len()).all(|group| {
+            let way = (self.position[group] - self.centre.target()[group]).abs();
+            let forcing = (self.forcing[group].shape * fade).abs();
+            let left = way + self.velocity[group].abs() * speed + forcing * (1.0 / beta_z);
+            left.simd_le(self.tolerance[group]).all()
+        });
+        if over { Status::Finished } else { Status::Working }
+    }
+}
+
+/// The first of several commands, or the only one.
+fn first(lanes: &[Lanes]) -> f64 {
+    lanes[0].as_array()[0]
+}

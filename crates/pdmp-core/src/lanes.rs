@@ -1,0 +1,47 @@
+//! Four degrees of freedom side by side, as the processor takes them.
+//!
+//! The control loop keeps its vectors in groups of four, padded with zeros, so that every formula of it is written once
+//! and runs in full registers whatever D is. An operation rounds each lane as it would round a number alone: results do
+//! not depend on the machine's width.
+
+use std::ops::{Add, Mul, Sub};
+
+/// Four DoFs.
+pub(crate) type Lanes = wide::f64x4;
+
+/// Number of DoFs in a group.
+pub(crate) const WIDTH: usize = 4;
+
+/// What a formula is evaluated on: a number, or several side by side.
+pub trait Real: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self> {}
+
+impl Real for f64 {}
+impl Real for Lanes {}
+
+/// Below this a number in a loop is rest: products with it would leave the range of fast numbers.
+const REST: f64 = 1e-180;
+
+/// A value, or rest: adding REST and taking it away leaves what lies above 1e-164 as it was, and nothing of the least.
+#[inline]
+pub(crate) fn settle(value: Lanes) -> Lanes {
+    (value + Lanes::splat(REST)) - Lanes::splat(REST)
+}
+
+/// Groups that hold `n` DoFs.
+pub(crate) fn groups(n: usize) -> usize {
+    n.div_ceil(WIDTH)
+}
+
+/// A vector (D,) in groups.
+pub(crate) fn pack(values: &[f64]) -> impl Iterator<Item = Lanes> {
+    values.chunks(WIDTH).map(|chunk| {
+        let mut lanes = [0.0; WIDTH];
+        lanes[..chunk.len()].copy_from_slice(chunk);
+        Lanes::new(lanes)
+    })
+}
+
+/// The first `n` numbers of groups.
+pub(crate) fn unpack(lanes: &[Lanes], n: usize) -> &[f64] {
+    &bytemuck::cast_slice(lanes)[..n]
+}
