@@ -41,30 +41,25 @@ pub struct State<T = f64> {
     pub z: T,
 }
 
-/// Weights of a cubic forcing, given by its jets at both ends of a step.
-#[derive(Clone, Copy, Debug, Default)]
-struct CubicWeights {
-    value: [f64; 2],
-    slope: [f64; 2],
-}
+/// Weights of a cubic given by its jets at both ends of a step: of its two values, then of its two slopes.
+type CubicWeights = [f64; 4];
 
-impl CubicWeights {
-    fn apply<T: Real>(&self, [from, to]: [Jet<T>; 2]) -> T {
-        from.value * self.value[0] + to.value * self.value[1] + (from.slope * self.slope[0] + to.slope * self.slope[1])
-    }
+#[inline(always)]
+fn weigh<T: Real>(weights: &CubicWeights, [from, to]: [Jet<T>; 2]) -> T {
+    from.value * weights[0] + to.value * weights[1] + (from.slope * weights[2] + to.slope * weights[3])
 }
 
 /// The solution of the output system over a step of fixed length.
 #[derive(Clone, Copy, Debug)]
 pub struct Propagator {
     /// Length of the step on the clock.
-    h: f64,
+    pub(crate) h: f64,
     /// exp(Ah), by rows.
-    transition: [[f64; 2]; 2],
+    pub(crate) transition: [[f64; 2]; 2],
     /// Response of e and z to the forcing w.
-    forcing: [CubicWeights; 2],
+    pub(crate) forcing: [CubicWeights; 2],
     /// Response of e and z to the goal's displacement γ.
-    goal: [CubicWeights; 2],
+    pub(crate) goal: [CubicWeights; 2],
 }
 
 impl Attractor {
@@ -87,6 +82,7 @@ impl Attractor {
     }
 
     /// z′ = α_z(β_z(g − y) − z) at a state relative to the goal.
+    #[inline(always)]
     pub fn z_slope<T: Real>(&self, State { e, z }: State<T>) -> T {
         (e * self.beta_z + z) * -self.alpha_z
     }
@@ -113,7 +109,7 @@ impl Attractor {
         let mut target = slope.to_owned();
         for (d, mut column) in target.columns_mut().into_iter().enumerate() {
             let jet = |c: usize| Jet { value: attractor[d] - position[[c % n, d]], slope: -slope[[c % n, d]] };
-            let step = |z: f64, c: usize| phi[0] * z + stiffness * weights.apply([jet(c), jet(c + 1)]);
+            let step = |z: f64, c: usize| phi[0] * z + stiffness * weigh(&weights, [jet(c), jet(c + 1)]);
             let mut z = 0.0;
             if periodic {
                 let turn = (0..n).fold(0.0, step);
@@ -142,17 +138,19 @@ impl Propagator {
     }
 
     /// The state after the step under the forcing w.
+    #[inline(always)]
     pub fn advance<T: Real>(&self, state: State<T>, forcing: [Jet<T>; 2]) -> State<T> {
         let [e, z] = [0, 1].map(|row| {
             let [from_e, from_z] = self.transition[row];
-            (state.e * from_e + state.z * from_z) + self.forcing[row].apply(forcing)
+            (state.e * from_e + state.z * from_z) + weigh(&self.forcing[row], forcing)
         });
         State { e, z }
     }
 
     /// What a goal moving by γ adds to the state, still relative to where the goal was at the start of the step.
+    #[inline(always)]
     pub fn follow<T: Real>(&self, goal: [Jet<T>; 2]) -> State<T> {
-        let [e, z] = [0, 1].map(|row| self.goal[row].apply(goal));
+        let [e, z] = [0, 1].map(|row| weigh(&self.goal[row], goal));
         State { e, z }
     }
 }
@@ -219,10 +217,8 @@ fn phi_functions(trace: f64, determinant: f64) -> [[f64; 2]; 5] {
 fn cubic_weights(h: f64, phi: [f64; 5]) -> CubicWeights {
     let [_, one, two, three, four] = phi;
     let late = 6.0 * three - 12.0 * four;
-    CubicWeights {
-        value: [h * (one - late), h * late],
-        slope: [h * h * (two - 4.0 * three + 6.0 * four), h * h * (6.0 * four - 2.0 * three)],
-    }
+    let square = h * h;
+    [h * (one - late), h * late, square * (two - 4.0 * three + 6.0 * four), square * (6.0 * four - 2.0 * three)]
 }
 
 #[cfg(test)]

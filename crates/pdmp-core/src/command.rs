@@ -52,22 +52,31 @@ impl Command<'_> {
     /// Checks every number against the model.
     pub(crate) fn check(&self, model: &Model) -> Result<()> {
         let (kind, n_dofs) = (model.kind(), model.n_dofs());
+        let vector = |name, vector: Option<&[f64]>| match vector {
+            Some(vector) => check_vector(name, vector, n_dofs, "DoF"),
+            None => Ok(()),
+        };
+        if let Some(dt) = self.dt {
+            check_positive("dt", dt)?;
+        }
+        if let Some(style) = self.style {
+            check_style(style, model.n_styles())?;
+        }
+        if let Some(tau) = self.tau {
+            check_tau(tau, model.tau())?;
+        }
+        if let Some(amplitude) = self.amplitude {
+            refuse(kind, "amplitude", kind == Kind::Discrete)?;
+            check_amplitude(amplitude)?;
+        }
         refuse(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
+        vector("goal", self.goal)?;
         refuse(kind, "anchor", kind == Kind::Discrete && self.anchor.is_some())?;
-        refuse(kind, "amplitude", kind == Kind::Discrete && self.amplitude.is_some())?;
-        self.dt.map_or(Ok(()), |dt| check_positive("dt", dt))?;
-        self.style.map_or(Ok(()), |style| check_style(style, model.n_styles()))?;
-        self.tau.map_or(Ok(()), |tau| check_tau(tau, model.tau()))?;
-        self.amplitude.map_or(Ok(()), check_amplitude)?;
-        let (velocity, acceleration) = self.coupling.map(|terms| (terms.velocity, terms.acceleration)).unzip();
-        for (name, vector) in [
-            ("goal", self.goal),
-            ("anchor", self.anchor),
-            ("measured", self.measured),
-            ("coupling velocity", velocity),
-            ("coupling acceleration", acceleration),
-        ] {
-            vector.map_or(Ok(()), |vector| check_vector(name, vector, n_dofs, "DoF"))?;
+        vector("anchor", self.anchor)?;
+        vector("measured", self.measured)?;
+        if let Some(Coupling { velocity, acceleration }) = self.coupling {
+            vector("coupling velocity", Some(velocity))?;
+            vector("coupling acceleration", Some(acceleration))?;
         }
         Ok(())
     }

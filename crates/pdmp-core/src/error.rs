@@ -208,15 +208,13 @@ pub(crate) fn check_vector(name: &'static str, value: &[f64], expected: usize, p
 
 /// Checks that every element is finite and no larger than [`LARGEST`].
 pub(crate) fn check_finite(name: &'static str, value: &[f64]) -> Result<()> {
-    for (index, &value) in value.iter().enumerate() {
-        if !value.is_finite() {
-            return Err(Error::NotFinite { name, index, value });
+    match value.iter().position(|x| !(0.0..=LARGEST).contains(&x.abs())) {
+        None => Ok(()),
+        Some(index) if value[index].is_finite() => {
+            Err(Error::TooLarge { name, index, value: value[index], limit: LARGEST })
         }
-        if value.abs() > LARGEST {
-            return Err(Error::TooLarge { name, index, value, limit: LARGEST });
-        }
+        Some(index) => Err(Error::NotFinite { name, index, value: value[index] }),
     }
-    Ok(())
 }
 
 /// Checks that `value` is positive and finite.

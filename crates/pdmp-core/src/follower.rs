@@ -3,7 +3,7 @@
 //! ẍ = −2ωẋ − ω²(x − target), solved in closed form over a tick. Its impulse response is positive, so that a filtered
 //! positive command stays positive, whatever the order and time of its changes.
 
-use crate::lanes::{Lanes, pack};
+use crate::lanes::{Lanes, Register, pack};
 
 /// Time to 99 % of a step, times ω: the root of (1 + s)exp(−s) = 0.01.
 const SETTLING: f64 = 6.638_352_067_993_813;
@@ -15,6 +15,8 @@ const FORGOTTEN: f64 = 60.0;
 pub(crate) struct Filter {
     /// ω, per second; infinite for an immediate switch.
     omega: f64,
+    /// Seconds until what is left of a step lies far below rounding.
+    forgets: f64,
 }
 
 /// The filter's solution over a tick: what displacement d = x − target and rate v at its start become and add.
@@ -32,7 +34,7 @@ pub(crate) struct Glide {
 impl Filter {
     /// `transition` is the time to 99 % in seconds, 0 for an immediate switch.
     pub(crate) fn new(transition: f64) -> Self {
-        Self { omega: SETTLING / transition }
+        Self { omega: SETTLING / transition, forgets: FORGOTTEN / SETTLING * transition }
     }
 
     /// Whether commands are switched to at once.
@@ -107,7 +109,7 @@ impl Follower {
             return self.jump(target);
         }
         self.target.iter_mut().zip(pack(target)).for_each(|(old, new)| *old = new);
-        self.remaining = FORGOTTEN / filter.omega;
+        self.remaining = filter.forgets;
     }
 
     /// Jumps to as many targets.
@@ -123,9 +125,12 @@ impl Follower {
     }
 
     /// Moves on by a tick.
-    pub(crate) fn advance(&mut self, glide: &Glide) {
+    #[inline(always)]
+    pub(crate) fn advance<T: Register>(&mut self, glide: &Glide) {
         if self.elapse(glide) {
-            (0..self.value.len()).for_each(|group| self.advance_group(group, glide));
+            for group in 0..self.value.len() {
+                self.advance_group::<T>(group, glide);
+            }
         }
     }
 
@@ -139,15 +144,16 @@ impl Follower {
     }
 
     /// Moves one group on by a tick.
-    #[inline]
-    pub(crate) fn advance_group(&mut self, group: usize, glide: &Glide) {
-        let (x, v, target) = (&mut self.value[group], &mut self.rate[group], self.target[group]);
-        let d = *x - target;
-        (*x, *v) = if self.remaining > 0.0 {
-            (target + (d * glide.value[0] + *v * glide.value[1]), d * glide.rate[0] + *v * glide.rate[1])
-        } else {
-            (target, Lanes::ZERO)
-        };
+    #[inline(always)]
+    pub(crate) fn advance_group<T: Register>(&mut self, group: usize, glide: &Glide) {
+        if self.settled() {
+            (self.value[group], self.rate[group]) = (self.target[group], Lanes::ZERO);
+            return;
+        }
+        let [x, v, target] = [&self.value, &self.rate, &self.target].map(|lanes| T::load(&lanes[group]));
+        let d = x - target;
+        self.value[group] = (target + (d * glide.value[0] + v * glide.value[1])).store();
+        self.rate[group] = (d * glide.rate[0] + v * glide.rate[1]).store();
     }
 
     /// ∫ of the first value over a tick.
@@ -193,7 +199,7 @@ mod tests {
     fn transition_is_the_time_to_99_percent() {
         for ticks in [1, 7, 1000] {
             let (mut follower, filter) = command();
-            (0..ticks).for_each(|_| follower.advance(&filter.glide(0.3 / f64::from(ticks))));
+            (0..ticks).for_each(|_| follower.advance::<Lanes>(&filter.glide(0.3 / f64::from(ticks))));
             assert_relative_eq!(first(follower.value()), 2.0 + 0.99 * 3.0, epsilon = 1e-12);
         }
     }
@@ -213,7 +219,7 @@ mod tests {
             x += h / 6.0 * (a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0);
             v += h / 6.0 * (a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1);
         }
-        follower.advance(&filter.glide(0.2));
+        follower.advance::<Lanes>(&filter.glide(0.2));
         assert_relative_eq!(first(follower.value()), x, max_relative = 1e-9);
         assert_relative_eq!(first(follower.rate()), v, max_relative = 1e-8);
     }
@@ -222,10 +228,10 @@ mod tests {
     #[test]
     fn integral_is_that_of_the_values() {
         let (mut follower, filter) = command();
-        follower.advance(&filter.glide(0.02));
+        follower.advance::<Lanes>(&filter.glide(0.02));
         let at = |t: f64| {
             let mut follower = follower.clone();
-            follower.advance(&filter.glide(t));
+            follower.advance::<Lanes>(&filter.glide(t));
             first(follower.value())
         };
         let n = 1000;
@@ -245,7 +251,7 @@ mod tests {
                 follower.follow(&[target], &filter);
                 let glide = filter.glide(dt);
                 let area = follower.integral(&glide);
-                follower.advance(&glide);
+                follower.advance::<Lanes>(&glide);
                 prop_assert!(first(follower.value()) > 0.0 && area > 0.0);
             }
         }

@@ -9,7 +9,7 @@ use crate::attractor::Jet;
 use crate::basis::Regression;
 use crate::demo::zeros;
 use crate::error::Result;
-use crate::lanes::{Lanes, WIDTH, groups};
+use crate::lanes::{Lanes, Real, Register, WIDTH, groups};
 use crate::phase::{Canonical, turn};
 
 /// Error of the table, relative to the largest forcing, at which cells are halved no more.
@@ -61,19 +61,23 @@ impl Cubic {
         Self([from.value, from.slope, square, cube])
     }
 
-    /// This, and `times` another.
-    fn plus(self, other: &Self, times: f64) -> Self {
-        let Self([a, b, c, d]) = self;
-        let Self([p, q, r, s]) = *other;
-        Self([a + p * times, b + q * times, c + r * times, d + s * times])
+    #[inline(always)]
+    fn load<T: Register>(&self) -> [T; 4] {
+        let [value, slope, square, cube] = &self.0;
+        [T::load(value), T::load(slope), T::load(square), T::load(cube)]
     }
 
-    fn at(self, t: f64) -> Jet<Lanes> {
-        let Self([value, slope, square, cube]) = self;
-        Jet {
-            value: value + slope * t + (square + cube * t) * (t * t),
-            slope: slope + (square * (2.0 * t) + cube * (3.0 * t * t)),
-        }
+    fn at(&self, t: f64) -> Jet<Lanes> {
+        evaluate(self.load(), t)
+    }
+}
+
+/// A cubic of given coefficients.
+#[inline(always)]
+fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> Jet<T> {
+    Jet {
+        value: value + slope * t + (square + cube * t) * (t * t),
+        slope: slope + (square * (2.0 * t) + cube * (3.0 * t * t)),
     }
 }
 
@@ -188,6 +192,7 @@ impl Landscape {
     }
 
     /// The cubics of all styles from a knot on, for one group of DoFs.
+    #[inline(always)]
     fn cubics(&self, knot: usize, group: usize) -> &[Cubic] {
         let start = (knot * groups(self.n_dofs) + group) * self.n_styles;
         &self.cubics[start..start + self.n_styles]
@@ -257,11 +262,14 @@ impl Landscape {
     }
 
     /// Forcing sᵀb at a place, for one group of DoFs, with its slope.
-    #[inline]
-    pub(crate) fn blend(&self, place: Place, group: usize, style: &[f64]) -> Jet<Lanes> {
-        let cubics = self.cubics(place.knot, group);
-        let sum = style.iter().zip(cubics).fold(Cubic::default(), |sum, (s, cubic)| sum.plus(cubic, *s));
-        sum.at(place.t)
+    #[inline(always)]
+    pub(crate) fn blend<T: Register>(&self, place: Place, group: usize, style: &[f64]) -> Jet<T> {
+        let mut sum = [T::default(); 4];
+        for (s, cubic) in style.iter().zip(self.cubics(place.knot, group)) {
+            let [value, slope, square, cube] = cubic.load::<T>();
+            sum = [sum[0] + value * *s, sum[1] + slope * *s, sum[2] + square * *s, sum[3] + cube * *s];
+        }
+        evaluate(sum, place.t)
     }
 }
 

@@ -6,7 +6,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-/// Four DoFs.
+/// Four DoFs, as they lie in memory, and as every processor can take them.
 pub(crate) type Lanes = wide::f64x4;
 
 /// Number of DoFs in a group.
@@ -18,13 +18,37 @@ pub trait Real: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f
 impl Real for f64 {}
 impl Real for Lanes {}
 
+/// Four DoFs in a register.
+pub(crate) trait Register: Real {
+    /// Takes them from memory.
+    fn load(lanes: &Lanes) -> Self;
+    /// Gives them back.
+    fn store(self) -> Lanes;
+
+    fn splat(value: f64) -> Self {
+        Self::load(&Lanes::splat(value))
+    }
+}
+
+impl Register for Lanes {
+    #[inline(always)]
+    fn load(lanes: &Lanes) -> Self {
+        *lanes
+    }
+
+    #[inline(always)]
+    fn store(self) -> Lanes {
+        self
+    }
+}
+
 /// Below this a number in a loop is rest: products with it would leave the range of fast numbers.
 const REST: f64 = 1e-180;
 
 /// A value, or rest: adding REST and taking it away leaves what lies above 1e-164 as it was, and nothing of the least.
-#[inline]
-pub(crate) fn settle(value: Lanes) -> Lanes {
-    (value + Lanes::splat(REST)) - Lanes::splat(REST)
+#[inline(always)]
+pub(crate) fn settle<T: Register>(value: T) -> T {
+    (value + T::splat(REST)) - T::splat(REST)
 }
 
 /// Groups that hold `n` DoFs.
@@ -34,11 +58,10 @@ pub(crate) fn groups(n: usize) -> usize {
 
 /// A vector (D,) in groups.
 pub(crate) fn pack(values: &[f64]) -> impl Iterator<Item = Lanes> {
-    values.chunks(WIDTH).map(|chunk| {
-        let mut lanes = [0.0; WIDTH];
-        lanes[..chunk.len()].copy_from_slice(chunk);
-        Lanes::new(lanes)
-    })
+    let (whole, rest) = values.as_chunks::<WIDTH>();
+    let last =
+        (!rest.is_empty()).then(|| Lanes::new(std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0))));
+    whole.iter().map(|chunk| Lanes::new(*chunk)).chain(last)
 }
 
 /// The first `n` numbers of groups.

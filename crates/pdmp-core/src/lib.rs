@@ -59,6 +59,8 @@
 
 mod align;
 mod attractor;
+#[cfg(target_arch = "x86_64")]
+mod avx;
 pub mod basis;
 mod command;
 mod context;
@@ -75,6 +77,7 @@ mod model;
 mod perturbation;
 mod phase;
 mod rollout;
+mod series;
 mod smooth;
 mod spline;
 

@@ -270,9 +270,10 @@ pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> 
 
 /// Checks a style (J,). Demonstrated ones are at most 1 in magnitude: the bound only keeps products finite.
 pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
-    match style.iter().position(|s| s.is_finite() && s.abs() > 1e100) {
+    check_vector("style", style, n_styles, "style dimension")?;
+    match style.iter().position(|s| s.abs() > 1e100) {
         Some(index) => Err(Error::TooLarge { name: "style", index, value: style[index], limit: 1e100 }),
-        None => check_vector("style", style, n_styles, "style dimension"),
+        None => Ok(()),
     }
 }
 

@@ -22,6 +22,7 @@ use crate::lanes::{Lanes, groups, pack, unpack};
 use crate::model::{Complete, Conditions, Model};
 use crate::perturbation::Held;
 use crate::phase::{Kind, Sum};
+use crate::series::Series;
 use tick::Forcing;
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
@@ -71,6 +72,7 @@ pub struct Controller {
     /// Of the last tick, and good for the next if it is as long.
     glide: Glide,
     propagator: Propagator,
+    series: Series,
 }
 
 impl Controller {
@@ -114,6 +116,7 @@ impl Controller {
             finest: FINEST * model.canonical().extent() * (1.0 + 1e-9),
             glide: filter.glide(dt),
             propagator: model.attractor().propagator(dt / conditions.tau),
+            series: Series::new(model.attractor(), FINEST * model.canonical().extent() * (1.0 + 1e-9)),
             conditions,
             model,
         };

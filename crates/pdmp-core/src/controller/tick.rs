@@ -3,7 +3,7 @@
 use super::{Controller, Status};
 use crate::attractor::{Attractor, Jet, State};
 use crate::error::{Error, Result};
-use crate::lanes::{Lanes, settle, unpack};
+use crate::lanes::{Lanes, Real, Register, settle, unpack};
 use crate::perturbation::Push;
 use crate::phase::{Canonical, Sum, amplitude};
 
@@ -37,15 +37,15 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    #[inline]
-    fn jet(&self, forcing: &Forcing) -> Jet<Lanes> {
-        let Forcing { shape, slope, swing } = *forcing;
+    #[inline(always)]
+    fn jet<T: Register>(&self, forcing: &Forcing) -> Jet<T> {
+        let [shape, slope, swing] = [&forcing.shape, &forcing.slope, &forcing.swing].map(T::load);
         Jet { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
     }
 
     /// ẏ = ρ(z + w) and ÿ = ρ²(z′ + w′) + ρ̇(z + w).
-    #[inline]
-    fn motion(&self, attractor: Attractor, state: State<Lanes>, w: Jet<Lanes>) -> [Lanes; 2] {
+    #[inline(always)]
+    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: Jet<T>) -> [T; 2] {
         let ([rate, change], flow) = (self.rate, state.z + w.value);
         [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
     }
@@ -119,19 +119,36 @@ impl Controller {
     }
 
     /// Moves on by `dt` seconds, `h` on the clock.
+    #[allow(unsafe_code)]
     fn advance(&mut self, dt: f64, h: f64) {
         if h <= 0.0 {
             return self.read_out();
         }
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: AVX2 is there.
+            return unsafe { self.advance_avx(dt, h) };
+        }
+        self.advance_in::<Lanes>(dt, h);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn advance_avx(&mut self, dt: f64, h: f64) {
+        self.advance_in::<crate::avx::Avx>(dt, h);
+    }
+
+    #[inline(always)]
+    fn advance_in<T: Register>(&mut self, dt: f64, h: f64) {
         self.measure(dt);
         if h != self.propagator.step() {
-            self.propagator = self.model.attractor().propagator(h);
+            self.propagator = self.series.propagator::<T>(h);
         }
         let demonstrated = self.model.landscape().fading(self.clock.value()).is_none();
         let levers = self.held.push().map(|_| self.levers());
         let before = self.gate();
-        self.style.advance(&self.glide);
-        self.rate.advance(&self.glide);
+        self.style.advance::<T>(&self.glide);
+        self.rate.advance::<T>(&self.glide);
         let moving = self.centre.elapse(&self.glide);
         self.clock.add(self.held.pace() * h);
         if let Canonical::Rhythmic { mu } = self.model.canonical() {
@@ -151,28 +168,30 @@ impl Controller {
         let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
         let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
         for group in 0..n {
-            let from = before.jet(&forcing[group]);
-            let along = landscape.blend(place, group, style);
-            let swing = if swinging { landscape.blend(place, group, swing).value } else { Lanes::ZERO };
-            forcing[group] = Forcing { shape: along.value, slope: along.slope, swing };
+            let from = before.jet::<T>(&forcing[group]);
+            let along = landscape.blend::<T>(place, group, style);
+            let swing = if swinging { landscape.blend(place, group, swing).value } else { T::default() };
+            forcing[group] = Forcing { shape: along.value.store(), slope: along.slope.store(), swing: swing.store() };
             let to = after.jet(&forcing[group]);
 
-            let mut origin = centre.value()[group];
-            let mut next = propagator.advance(State { e: position[group] - origin, z: z[group] }, [from, to]);
-            position[group] = settle(origin + next.e);
+            let mut origin = T::load(&centre.value()[group]);
+            let state = State { e: T::load(&position[group]) - origin, z: T::load(&z[group]) };
+            let mut next = propagator.advance(state, [from, to]);
+            let mut y = origin + next.e;
             if moving {
-                let start = Jet { value: Lanes::ZERO, slope: centre.rate()[group] * (1.0 / before.rate[0]) };
-                centre.advance_group(group, &self.glide);
-                let shift = centre.value()[group] - origin;
-                let end = Jet { value: shift, slope: centre.rate()[group] * (1.0 / after.rate[0]) };
-                let moved = propagator.follow([start, end]);
-                position[group] += moved.e;
-                origin = centre.value()[group];
-                next = State { e: position[group] - origin, z: next.z + moved.z };
+                let start = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * (1.0 / before.rate[0]) };
+                centre.advance_group::<T>(group, &self.glide);
+                let arrived = T::load(&centre.value()[group]);
+                let slope = T::load(&centre.rate()[group]) * (1.0 / after.rate[0]);
+                let moved = propagator.follow([start, Jet { value: arrived - origin, slope }]);
+                y = y + moved.e;
+                origin = arrived;
+                next.z = next.z + moved.z;
             }
-            next.z = settle(next.z);
-            z[group] = next.z;
-            [velocity[group], acceleration[group]] = after.motion(attractor, next, to);
+            let (y, z_next) = (settle(y), settle(next.z));
+            (position[group], z[group]) = (y.store(), z_next.store());
+            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, to);
+            (velocity[group], acceleration[group]) = (speed.store(), change.store());
         }
         if let Some(before) = levers {
             self.give_way(before);
