@@ -8,7 +8,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 # The bindings are compiled against the interpreter that will import them.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test check bench clean needs
+.PHONY: demo test check bench bench-peers clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to demo/
 	$(BIN)/pdmp demo -o demo
@@ -25,8 +25,11 @@ check: .venv/with-dev  ## Formatting, lints, types, and the stubs against the mo
 	$(BIN)/mypy
 	$(BIN)/stubtest pdmp._native
 
-bench: | needs  ## Measures the core
+bench: | needs  ## Times, latencies and instructions of the core
 	cargo bench --package pdmp-core
+
+bench-peers: .venv/with-peers  ## The same work done by pdmp and by its peers, one thread each
+	OMP_NUM_THREADS=1 $(BIN)/python benches/peers.py
 
 clean:  ## Removes what the targets above made
 	cargo clean

@@ -1,18 +1,13 @@
-//! Times of the core's main parts: the stages of a fit, one tick of the controller, rollouts.
-//!
-//! `make bench` runs all; `cargo bench -p pdmp-core -- step` those whose name contains "step".
+//! Times of learning and of whole trajectories; `step.rs` has those of one tick.
 #![allow(missing_docs)]
 
 use std::f64::consts::PI;
-use std::hint::black_box;
 use std::sync::Arc;
 
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use pdmp_core::basis::{Basis, Gp, NGnet};
-use pdmp_core::{
-    Conditions, Controller, Demonstration, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount, Timing, fit,
-};
+use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount, Timing, fit};
 
 /// M movements of D = 7 that span a few dimensions, 1001 samples in one second.
 fn demonstrations(n_demos: usize) -> Vec<Demonstration> {
@@ -37,8 +32,8 @@ fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
     options
 }
 
-fn learn(options: &FitOptions) -> Model {
-    fit(&demonstrations(20), options, &mut |_, _| Ok(())).expect("a fit")
+fn learn(options: &FitOptions) -> Arc<Model> {
+    Arc::new(fit(&demonstrations(20), options, &mut |_, _| Ok(())).expect("a fit"))
 }
 
 fn fits(criterion: &mut Criterion) {
@@ -56,30 +51,8 @@ fn fits(criterion: &mut Criterion) {
     group.finish();
 }
 
-fn steps(criterion: &mut Criterion) {
-    let model = Arc::new(learn(&options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate)));
-    let start = Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).expect("a controller");
-    let mut live = start.clone();
-    for goal in [[0.5; 7], [0.6; 7]] {
-        live.step().and_then(|_| live.set_goal(&goal)).expect("a goal");
-    }
-    live.set_style(&[0.3, 0.2, 0.1]).expect("a style");
-    live.set_tau(1.3).expect("a time constant");
-    let mut group = criterion.benchmark_group("100 steps D=7 J=3");
-    for (name, from) in [("commands settled", &start), ("style, goal and tau in transition", &live)] {
-        let hundred = |mut controller: Controller| {
-            for _ in 0..100 {
-                black_box(controller.step().expect("a tick"));
-            }
-            controller
-        };
-        group.bench_function(name, |bench| bench.iter_batched(|| from.clone(), hundred, BatchSize::SmallInput));
-    }
-    group.finish();
-}
-
 fn rollouts(criterion: &mut Criterion) {
-    let model = Arc::new(learn(&options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate)));
+    let model = learn(&options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate));
     let timing = Timing { dt: 1e-3, duration: None };
     let mut group = criterion.benchmark_group("rollout 1 s at 1 kHz D=7 J=3");
     group.bench_function("one", |bench| bench.iter(|| model.rollout(&Conditions::default(), timing)));
@@ -90,5 +63,5 @@ fn rollouts(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, fits, steps, rollouts);
+criterion_group!(benches, fits, rollouts);
 criterion_main!(benches);
