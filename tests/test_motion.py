@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -68,15 +67,6 @@ def test_outputs_cannot_be_made_writable(model: pdmp.Model) -> None:
     """Read-only is not a flag that the user can take off a view."""
     with pytest.raises(ValueError, match="WRITEABLE"):
         model.controller(0.01).position.setflags(write=True)
-
-
-def test_outputs_outlive_the_controller(model: pdmp.Model) -> None:
-    """A view keeps its memory alive after the controller is gone."""
-    controller = model.controller(0.01)
-    controller.step()
-    view, expected = controller.position, controller.position.copy()
-    del controller
-    np.testing.assert_array_equal(view, expected)
 
 
 def test_trajectories_are_the_users_own(model: pdmp.Model) -> None:
@@ -206,33 +196,6 @@ def test_threads_share_a_model(model: pdmp.Model) -> None:
     with ThreadPoolExecutor(8) as pool:
         made = list(pool.map(lambda style: model.rollout(style).position, styles))
     np.testing.assert_array_equal(made, expected)
-
-
-def test_threads_cannot_break_a_controller(model: pdmp.Model) -> None:
-    """Two threads that step one controller take turns, or one is told off; no tick is half done."""
-    controller = model.controller(0.001)
-    done: list[int] = []
-    other: list[BaseException] = []
-
-    def run() -> None:
-        for k in range(3000):
-            try:
-                controller.style = [0.1, k / 3000]
-                controller.step()
-                done.append(k)
-            except RuntimeError:
-                pass
-            except BaseException as error:
-                other.append(error)
-
-    threads = [threading.Thread(target=run) for _ in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not other
-    assert controller.time == pytest.approx(0.001 * len(done))
-    assert np.isfinite(controller.position).all()
 
 
 def test_goal_moved_from_rest_is_reached() -> None:

@@ -29,6 +29,7 @@ from pdmp._native import (
     load,
 )
 from pdmp.arguments import as_demonstrated, blend
+from pdmp.pacing import Run, Tick
 
 __all__ = [
     "GP",
@@ -42,7 +43,9 @@ __all__ = [
     "NGnetRegression",
     "PdmpError",
     "Prediction",
+    "Run",
     "Status",
+    "Tick",
     "Trajectory",
     "__version__",
     "as_demonstrated",

@@ -11,6 +11,8 @@ from typing import Any, ClassVar, Literal, TypeAlias, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pdmp.pacing import Run
+
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
@@ -243,6 +245,14 @@ class Controller:
         measured: ArrayLike | None = None,  # (D,)
         coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
     ) -> Status: ...
+    def run(
+        self,
+        rate_hz: float | None = None,
+        *,
+        duration: float | None = None,
+        measured: Callable[[], ArrayLike | None] | None = None,  # (D,)
+        coupling: Callable[[], tuple[ArrayLike, ArrayLike] | None] | None = None,  # both (D,)
+    ) -> Run: ...
     def reset(
         self,
         *,

@@ -4,9 +4,10 @@ use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pdmp_core::{Command, Coupling, Kind, Motion};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyFloat;
 
 use crate::conditions::Arguments;
-use crate::convert::{Vector, refill, to_numpy, vector};
+use crate::convert::{Vector, refill, to_numpy};
 use crate::error::raise;
 
 /// Whether a movement goes on (`WORKING`) or has settled on its goal (`FINISHED`).
@@ -48,9 +49,12 @@ impl Output {
     }
 }
 
-/// Vectors given for one tick, copied: they may be lists, strided, or the controller's own outputs.
+/// Vectors given, copied: they may be lists, strided, or the controller's own outputs.
 #[derive(Default)]
 struct Given {
+    /// By a setter.
+    command: Vec<f64>,
+    /// For one tick.
     measured: Vec<f64>,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
@@ -174,6 +178,58 @@ impl Controller {
         })
     }
 
+    /// Run on the clock: a loop that makes one tick each period, and tells what was late.
+    ///
+    ///     for tick in controller.run(rate_hz=1000):
+    ///         robot.move(controller.position, controller.velocity)
+    ///
+    /// The first tick comes one period after the loop begins; what the body commands acts on the next. Nothing runs
+    /// beside the body: a `break` or an exception, Ctrl-C too, ends the loop between two ticks.
+    ///
+    /// A movement keeps to the clock on the wall. The deadlines start + k / rate_hz stay where they are however late a
+    /// tick comes; one that comes n whole periods late has missed n deadlines, and makes good for them in one step of
+    /// n + 1 periods. After a long stall the position so jumps ahead: leave the loop where the robot cannot follow, or
+    /// let it tell its position, which stops the phase.
+    ///
+    /// In between, the loop sleeps and other threads run. `async for` waits for the other tasks instead; event loops
+    /// wake only to the millisecond, so that deadlines closer than some 5 ms are for threads.
+    ///
+    /// Parameters
+    /// ----------
+    /// rate_hz : float, optional
+    ///     Ticks per second; 1 / dt of the controller otherwise.
+    /// duration : float, optional
+    ///     Length in s, rounded to whole periods. Without it a discrete movement ends with the tick that is `FINISHED`,
+    ///     and a rhythmic one when the loop is left; with it, both last as long.
+    /// measured, coupling : callable, optional
+    ///     Asked without arguments before each tick for what `step` takes under this name, or None.
+    ///
+    /// Returns
+    /// -------
+    /// Run
+    ///     Iterable, once or again, over a `Tick` (time, late, missed) each; `ticks`, `missed` and `worst` sum up.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A rate or duration that is no number between 1e-9 and 1e9; a duration below one period; `measured` or
+    ///     `coupling` that cannot be called.
+    #[pyo3(signature = (rate_hz=None, *, duration=None, measured=None, coupling=None))]
+    fn run<'py>(
+        slf: &Bound<'py, Self>,
+        rate_hz: Option<Bound<'py, PyAny>>,
+        duration: Option<Bound<'py, PyAny>>,
+        measured: Option<Bound<'py, PyAny>>,
+        coupling: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        let rate_hz = match rate_hz {
+            Some(rate_hz) => rate_hz,
+            None => PyFloat::new(py, 1.0 / slf.try_borrow()?.inner.dt()).into_any(),
+        };
+        py.import("pdmp.pacing")?.call_method1("Run", (slf, rate_hz, duration, measured, coupling))
+    }
+
     /// Start again.
     ///
     /// Parameters
@@ -245,7 +301,8 @@ impl Controller {
 
     #[setter]
     fn set_goal(&mut self, py: Python<'_>, goal: &Bound<'_, PyAny>) -> PyResult<()> {
-        let result = self.inner.set_goal(&vector("goal", goal)?);
+        refill("goal", goal, &mut self.given.command)?;
+        let result = self.inner.set_goal(&self.given.command);
         self.command(py, result)
     }
 
@@ -257,7 +314,8 @@ impl Controller {
 
     #[setter]
     fn set_style(&mut self, py: Python<'_>, style: &Bound<'_, PyAny>) -> PyResult<()> {
-        let result = self.inner.set_style(&vector("style", style)?);
+        refill("style", style, &mut self.given.command)?;
+        let result = self.inner.set_style(&self.given.command);
         self.command(py, result)
     }
 
@@ -269,7 +327,8 @@ impl Controller {
 
     #[setter]
     fn set_anchor(&mut self, py: Python<'_>, anchor: &Bound<'_, PyAny>) -> PyResult<()> {
-        let result = self.inner.set_anchor(&vector("anchor", anchor)?);
+        refill("anchor", anchor, &mut self.given.command)?;
+        let result = self.inner.set_anchor(&self.given.command);
         self.command(py, result)
     }
 

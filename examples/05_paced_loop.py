@@ -1,0 +1,23 @@
+"""Runs a primitive on the clock, with a robot that lags behind and is held for a while."""
+
+import numpy as np
+
+import pdmp
+
+s = np.linspace(0, 1, 101)
+forward = s**3 * (10 - 15 * s + 6 * s**2)
+model = pdmp.fit(
+    [np.column_stack([forward, h * np.sin(np.pi * s) ** 2]) for h in (0.1, 0.2, 0.4)], dt=0.006
+)
+controller = model.controller(style=model.styles[1])
+robot = controller.position.copy()
+
+loop = controller.run(rate_hz=1000, measured=lambda: robot)
+for tick in loop:
+    if not 0.2 < tick.time < 0.4:  # held in between: the phase waits
+        robot += 0.2 * (controller.position - robot)
+    if tick.missed:
+        print(f"at {tick.time:.3f} s: {1000 * tick.late:.1f} ms late, {tick.missed} missed")
+
+print(f"{loop.ticks} ticks in {controller.time:.3f} s, robot at {np.round(robot, 3)}")
+print(f"{loop.missed} deadlines missed, at worst {1000 * loop.worst:.1f} ms late")

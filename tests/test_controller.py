@@ -1,0 +1,412 @@
+"""The control loop in Python: its memory, its threads and its clock."""
+
+import asyncio
+import gc
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import Status, pacing
+from synthetic import loops, reaches
+
+NAN, INF = float("nan"), float("inf")
+MODELS = {
+    "discrete": pdmp.fit(reaches(), n_styles=2, basis="ngnet"),
+    "rhythmic": pdmp.fit(loops(), kind="rhythmic", n_styles=2, basis="ngnet"),
+}
+REACH = MODELS["discrete"]
+
+
+@pytest.fixture(params=sorted(MODELS))
+def model(request: pytest.FixtureRequest) -> pdmp.Model:
+    """Return a model of either kind."""
+    return MODELS[request.param]
+
+
+def blocks(work: Callable[[], object]) -> int:
+    """Return by how many memory blocks of Python a second run of some work grows."""
+    work()
+    gc.collect()
+    before = sys.getallocatedblocks()
+    work()
+    return sys.getallocatedblocks() - before
+
+
+def test_a_hundred_thousand_ticks_leave_nothing_behind(model: pdmp.Model) -> None:
+    """Steps, commands as arrays and reads of the views keep no memory."""
+    controller = model.controller(0.01)
+    style, place = np.array([0.1, 0.2]), np.array([0.3, -0.1])
+    centre = "goal" if model.kind == "discrete" else "anchor"
+
+    def work() -> None:
+        for _ in range(50_000):
+            controller.style = style
+            setattr(controller, centre, place)
+            controller.step(measured=controller.position, coupling=(place, place))
+
+    assert blocks(work) < 20
+
+
+def test_a_tick_makes_no_object(model: pdmp.Model) -> None:
+    """What a tick returns and shows, all of it at once, are the objects of the tick before."""
+    controller = model.controller(0.01)
+    names = ("position", "velocity", "acceleration")
+    shown = [[controller.step(), *(getattr(controller, name) for name in names)] for _ in range(9)]
+    assert all(a is b for tick in shown for a, b in zip(tick, shown[0], strict=True))
+
+
+def test_views_outlive_the_controller_unchanged(model: pdmp.Model) -> None:
+    """Memory of a controller that is gone is not given to the next."""
+    controller = model.controller(0.01)
+    controller.step()
+    views = controller.position, controller.velocity, controller.acceleration
+    expected = [view.copy() for view in views]
+    del controller
+    gc.collect()
+    others = [model.controller(0.01, start=[9, 9]) for _ in range(100)]
+    for view, values in zip(views, expected, strict=True):
+        np.testing.assert_array_equal(view, values)
+        assert not any(np.shares_memory(view, other.position) for other in others)
+
+
+def test_two_threads_take_turns(model: pdmp.Model) -> None:
+    """Whatever two threads do to one controller, each tick is whole, and errors are clean."""
+    controller = model.controller(0.001)
+    centre = "goal" if model.kind == "discrete" else "anchor"
+    end = time.perf_counter() + 0.5
+    other: list[BaseException] = []
+
+    def hammer(sign: float) -> int:
+        ticks = 0
+        place = np.array([sign, 0.5 * sign])
+        while time.perf_counter() < end:
+            try:
+                controller.style = [0.1 * sign, 0.2]
+                setattr(controller, centre, place)
+                controller.step(measured=list(controller.position), coupling=(place, place))
+                ticks += 1
+                assert np.isfinite(controller.velocity).all()
+            except RuntimeError as refused:
+                assert "borrowed" in str(refused)
+            except BaseException as error:
+                other.append(error)
+        return ticks
+
+    with ThreadPoolExecutor(2) as pool:
+        ticks = sum(pool.map(hammer, (1.0, -1.0)))
+    assert not other
+    assert ticks > 100
+    assert controller.time == pytest.approx(0.001 * ticks)
+    assert np.isfinite([controller.position, controller.acceleration]).all()
+
+
+def test_a_thread_may_reset_what_another_steps(model: pdmp.Model) -> None:
+    """The controller is then somewhere on its way, finite and as usable as before."""
+    controller = model.controller(0.001)
+    stop = threading.Event()
+
+    def step() -> None:
+        while not stop.is_set():
+            controller.step()
+
+    with ThreadPoolExecutor(1) as pool:
+        stepping = pool.submit(step)
+        for k in range(2000):
+            controller.reset(tau=0.5 + k / 2000)
+        stop.set()
+        stepping.result()
+    controller.reset()
+    alone = model.controller(0.001)
+    assert controller.step() == alone.step()
+    np.testing.assert_array_equal(controller.position, alone.position)
+
+
+def test_a_tick_within_a_tick_is_refused() -> None:
+    """An argument that steps the controller it is given to makes one tick, not a torn one."""
+    controller = REACH.controller(0.001)
+
+    class Measured:
+        def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
+            controller.step()
+            return np.zeros(2)
+
+    with pytest.raises((RuntimeError, ValueError), match="borrowed"):
+        controller.step(measured=Measured())
+    assert controller.time == 0
+    controller.step()
+    assert controller.time == 0.001
+
+
+def test_controllers_in_threads_move_as_one_by_one(model: pdmp.Model) -> None:
+    """Several controllers of one model do not disturb each other, to the last bit."""
+
+    def move(k: int) -> np.ndarray:
+        controller = model.controller(0.01, style=[0.1 * k, -0.1])
+        path = []
+        for tick in range(200):
+            if tick == 50:
+                controller.style = [-0.1, 0.05 * k]
+            controller.step()
+            path.append(controller.position.copy())
+        return np.array(path)
+
+    expected = [move(k) for k in range(8)]
+    with ThreadPoolExecutor(8) as pool:
+        np.testing.assert_array_equal(list(pool.map(move, range(8))), expected)
+
+
+class Clock:
+    """A clock that only sleeping and working move on."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+        self.slept: list[float] = []
+
+    def work(self, seconds: float) -> None:
+        """Spend time."""
+        self.now += seconds
+
+    def sleep(self, seconds: float) -> None:
+        """Spend time asleep, and wake a little late."""
+        self.slept.append(seconds)
+        self.now += seconds + 60e-6
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    """Put paced loops on a clock of their own."""
+    clock = Clock()
+    monkeypatch.setattr(pacing, "perf_counter", lambda: clock.now)
+    monkeypatch.setattr(pacing, "sleep", clock.sleep)
+    return clock
+
+
+def test_paced_loop_is_the_repeated_step(model: pdmp.Model, clock: Clock) -> None:
+    """On time, tick k comes at start + k / rate without drift, and moves as step does."""
+    controller, alone = model.controller(), model.controller()
+    start = clock.now
+    for k, tick in enumerate(controller.run(rate_hz=1000, duration=0.7), 1):
+        alone.step()
+        np.testing.assert_array_equal(controller.position, alone.position)
+        assert (tick.time, tick.missed) == (k / 1000, 0)
+        assert clock.now - start == pytest.approx(tick.time + tick.late)
+        assert tick.late == pytest.approx(60e-6)
+        clock.work(0.4e-3)
+    assert k == 700
+
+
+def test_discrete_movements_end_as_they_finish(clock: Clock) -> None:
+    """The last tick is the one that is FINISHED; the rate is by default the controller's own."""
+    controller, alone = REACH.controller(0.01), REACH.controller(0.01)
+    ticks = sum(1 for _ in controller.run())
+    expected = 1
+    while alone.step() == Status.WORKING:
+        expected += 1
+    assert ticks == expected
+    assert controller.time == pytest.approx(clock.now - 1000, abs=1e-4)
+
+
+def test_a_given_duration_outlasts_the_movement(clock: Clock) -> None:
+    """A loop with a duration holds the goal, and goes to a new one."""
+    controller = REACH.controller(0.01)
+    for tick in controller.run(duration=10):
+        if tick.time > 5:
+            controller.goal = [2, 1]
+    assert controller.time == pytest.approx(10)
+    np.testing.assert_allclose(controller.position, [2, 1], atol=5e-3)
+
+
+def test_late_ticks_keep_the_time_of_the_clock(clock: Clock) -> None:
+    """Missed deadlines are told, made good in one step, and do not move the later ones."""
+    controller = REACH.controller()
+    run = controller.run(rate_hz=1000, duration=0.5)
+    missed, late = [], []
+    for k, tick in enumerate(run):
+        assert controller.time == pytest.approx(tick.time)
+        assert clock.now - 1000 == pytest.approx(tick.time, abs=1e-3)
+        missed.append(tick.missed)
+        late.append(tick.late)
+        clock.work({10: 0.9e-3, 100: 3.5e-3, 200: 42.25e-3}.get(k, 0.1e-3))
+    assert {k: n for k, n in enumerate(missed) if n} == {101: 2, 201: 41}
+    assert late[101] == pytest.approx(2.62e-3)
+    assert late[102] == pytest.approx(60e-6)
+    assert (run.ticks, run.missed, run.worst) == (len(missed), 43, max(late))
+    assert run.ticks + run.missed == 500
+
+
+def test_a_body_that_is_always_late_misses_and_does_not_burst(clock: Clock) -> None:
+    """At 2.5 periods a tick the loop makes as many ticks as there is time for."""
+    run = REACH.controller().run(rate_hz=1000, duration=1)
+    for _ in run:
+        clock.work(2.5e-3)
+    assert run.ticks == pytest.approx(400, abs=20)
+    assert run.ticks + run.missed == pytest.approx(1000, abs=3)
+    assert min(clock.slept) >= 0
+
+
+def test_commands_of_the_body_act_on_the_next_tick(clock: Clock) -> None:
+    """A goal set in the body of tick k is that of step k + 1."""
+    controller, alone = REACH.controller(), REACH.controller()
+    for k, _ in enumerate(controller.run(duration=0.3)):
+        alone.step()
+        np.testing.assert_array_equal(controller.position, alone.position)
+        if k == 100:
+            controller.goal = alone.goal = [0.7, 0.3]
+
+
+def test_perturbations_are_asked_before_each_tick(clock: Clock) -> None:
+    """What measured and coupling return is what step is given, None included."""
+    controller, alone = REACH.controller(), REACH.controller()
+    places = [None if k % 3 else np.array([0.01 * k, 0.1]) for k in range(50)]
+    terms = [None if k % 2 else ([0, 0.1], [0.01 * k, 0]) for k in range(50)]
+    places_left, terms_left = iter(places), iter(terms)
+    asked = {"measured": lambda: next(places_left), "coupling": lambda: next(terms_left)}
+    for k, _ in enumerate(controller.run(duration=0.05, **asked)):
+        alone.step(measured=places[k], coupling=terms[k])
+        np.testing.assert_array_equal(controller.acceleration, alone.acceleration)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, LookupError])
+@pytest.mark.parametrize("place", ["body", "measured", "sleep"])
+def test_interrupted_loops_leave_the_controller_between_two_ticks(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch, error: type[BaseException], place: str
+) -> None:
+    """Wherever an exception comes from, it comes out, and the movement can go on."""
+    controller = REACH.controller()
+    trouble = False
+
+    def guard(here: str) -> None:
+        if trouble and here == place:
+            raise error
+
+    def asleep(seconds: float) -> None:
+        guard("sleep")
+        clock.sleep(seconds)
+
+    monkeypatch.setattr(pacing, "sleep", asleep)
+    run = controller.run(measured=lambda: guard("measured"))
+    with pytest.raises(error):
+        for tick in run:
+            trouble = tick.time > 0.0095
+            guard("body")
+    assert (run.ticks, controller.time) == (10, pytest.approx(0.01))
+    trouble = False
+    clock.work(7)  # while nothing runs is not missed by the next loop
+    for _ in run:
+        if run.ticks == 20:
+            break
+    assert (run.missed, controller.time) == (0, pytest.approx(0.03))
+
+
+def test_paced_loops_keep_real_time() -> None:
+    """On the system's clock no tick comes early, and all of the time is moved through."""
+    controller = REACH.controller()
+    begin = time.perf_counter()
+    run = controller.run(rate_hz=1000, duration=0.2)
+    for tick in run:
+        assert time.perf_counter() - begin >= tick.time
+    assert run.ticks + run.missed >= 200
+    assert controller.time == pytest.approx(tick.time)
+    assert 0 <= tick.late <= run.worst
+
+
+def test_other_threads_run_while_a_loop_sleeps() -> None:
+    """A paced loop gives the interpreter away between its ticks."""
+    waited = threading.Event()
+    done = threading.Event()
+
+    def other() -> None:
+        waited.wait()
+        done.set()
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    run = REACH.controller().run(rate_hz=100, duration=60)
+    for _ in run:
+        waited.set()
+        if done.is_set():
+            break
+    thread.join()
+    assert run.ticks < 6000
+
+
+def test_tasks_run_beside_an_asynchronous_loop() -> None:
+    """`async for` makes the same ticks, and another task is served between them."""
+    controller, alone = REACH.controller(), REACH.controller()
+    served = 0
+
+    async def serve() -> None:
+        nonlocal served
+        while True:
+            served += 1
+            await asyncio.sleep(0)
+
+    async def main() -> pdmp.Run:
+        task = asyncio.create_task(serve())
+        run = controller.run(rate_hz=200, duration=0.2)
+        ticks = 0
+        async for tick in run:
+            ticks += 1
+            alone.step((1 + tick.missed) / 200)
+            assert served >= ticks
+            np.testing.assert_array_equal(controller.position, alone.position)
+        task.cancel()
+        assert ticks == run.ticks
+        return run
+
+    run = asyncio.run(main())
+    assert run.ticks + run.missed >= 40
+
+
+def test_a_cancelled_loop_leaves_the_controller_usable() -> None:
+    """A task that is cancelled ends between two ticks."""
+    controller = REACH.controller()
+
+    async def follow() -> None:
+        async for _ in controller.run(rate_hz=500, duration=60):
+            pass
+
+    async def main() -> None:
+        task = asyncio.create_task(follow())
+        await asyncio.sleep(0.05)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    asyncio.run(main())
+    before = controller.time
+    controller.step()
+    assert controller.time == pytest.approx(before + 0.001)
+
+
+BAD: list[tuple[dict[str, Any], str]] = [
+    *(
+        ({name: bad}, f"{name} = {bad!r}: must be a number between 1e-9 and 1e9")
+        for name in ("rate_hz", "duration")
+        for bad in (0, -1, NAN, INF, 1e-320, 1e300, "fast", [1000])
+    ),
+    ({"rate_hz": 100, "duration": 0.001}, "duration = 0.001: must be at least one period, 0.01 s"),
+    ({"measured": [0, 0]}, "measured must be a function to ask before each tick"),
+    ({"coupling": ([0, 0], [0, 0])}, "coupling must be a function to ask before each tick"),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), BAD, ids=str)
+def test_bad_arguments_are_refused_at_the_call(given: dict[str, Any], message: str) -> None:
+    """A loop that could not run is not made."""
+    with pytest.raises(ValueError) as error:
+        REACH.controller().run(**given)
+    assert message in str(error.value)
+
+
+def test_numbers_of_numpy_are_rates() -> None:
+    """A rate may come out of an array."""
+    for number in (np.int64(100), np.float32(100)):
+        assert next(iter(REACH.controller().run(number))).time > 0
