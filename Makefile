@@ -8,7 +8,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 # The bindings are compiled against the interpreter that will import them.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test check bench bench-peers clean needs
+.PHONY: demo test check bench bench-peers rtsan clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to demo/
 	$(BIN)/pdmp demo -o demo
@@ -30,6 +30,15 @@ bench: | needs  ## Times, latencies and instructions of the core
 
 bench-peers: .venv/with-peers  ## The same work done by pdmp and by its peers, one thread each
 	OMP_NUM_THREADS=1 $(BIN)/python benches/peers.py
+
+# The sanitizer may not touch build scripts, which a named target spares. A compiler without it says why.
+rtsan: | needs  ## Runs the control loop under the real-time sanitizer of a nightly compiler, where there is one
+	@mkdir -p target/rtsan
+	@if ! reason=$$(echo 'fn main() {}' | rustup run nightly rustc -Zsanitizer=realtime -o target/rtsan/probe - 2>&1); \
+	then echo "skipped, for want of a nightly compiler with the real-time sanitizer: $$reason"; \
+	else RUSTFLAGS='-Zsanitizer=realtime --cfg rtsan' rustup run nightly cargo test --release --package pdmp-core \
+		--test realtime --target "$$(rustc -vV | sed -n 's/^host: //p')" --target-dir target/rtsan; \
+	fi
 
 clean:  ## Removes what the targets above made
 	cargo clean

@@ -1,24 +1,31 @@
-//! The control loop does not allocate: a counting allocator watches a million ticks of random commands.
+//! The control loop keeps its time: a million ticks of random commands allocate nothing, and do nothing else that a
+//! real-time thread must not do.
+//!
+//! A counting allocator watches everywhere. `make rtsan` compiles the same ticks with the real-time sanitizer of a
+//! nightly compiler, which ends the process at an allocation, a lock or any other system call that may wait.
 #![allow(missing_docs, unsafe_code)]
+#![cfg_attr(rtsan, feature(sanitize))]
 
 mod common;
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::hint::black_box;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::*;
 use pdmp_core::{Command, Conditions, Controller, Coupling, Kind, Motion};
 
 struct Counting;
 
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+thread_local! {
+    /// Of this thread, for tests run side by side.
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
 
 // SAFETY: every call is handed to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
         unsafe { System.alloc(layout) }
     }
 
@@ -38,52 +45,147 @@ impl Random {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
+
+    fn rarely(&mut self) -> bool {
+        self.next() < 0.2
+    }
+}
+
+/// A controller and all that its caller owns.
+struct Loop {
+    controller: Controller,
+    random: Random,
+    values: Vec<f64>,
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+impl Loop {
+    fn new(kind: Kind) -> Self {
+        let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
+        let model = learn(&demos, &options(kind));
+        let n_dofs = model.n_dofs();
+        Self {
+            random: Random(1),
+            values: vec![0.0; n_dofs.max(model.n_styles())],
+            position: vec![0.0; n_dofs],
+            velocity: vec![0.0; n_dofs],
+            acceleration: vec![0.0; n_dofs],
+            controller: Controller::new(model, 1e-3, &Conditions::default(), None).unwrap(),
+        }
+    }
+
+    /// One command by a setter, good or refused, and one tick under another.
+    #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
+    fn tick(&mut self) {
+        let Self { controller, random, values, position, velocity, acceleration } = self;
+        let (n_dofs, n_styles) = (controller.model().n_dofs(), controller.model().n_styles());
+        let (kind, own) = (controller.model().kind(), controller.model().tau());
+        values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
+        // Refused commands are part of a loop too.
+        let refused = random.next() < 0.01;
+        if refused {
+            values[0] = f64::NAN;
+        }
+        let (given, style, size) = (&values[..n_dofs], &values[..n_styles], values[0].abs());
+        let tau = own * (0.5 + random.next());
+        let _ = black_box(match (random.next() * 10.0) as u8 {
+            0 => controller.set_style(style),
+            1 => controller.set_goal(given),
+            2 => controller.set_anchor(given),
+            3 => controller.set_tau(tau),
+            4 => controller.set_amplitude(size),
+            5 => controller.set_compliance(1e3 * size, 10.0 * size),
+            6 => controller.step().map(drop),
+            _ => Ok(()),
+        });
+        let command = Command {
+            dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
+            style: random.rarely().then_some(style),
+            goal: (random.rarely() && kind == Kind::Discrete).then_some(given),
+            anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(given),
+            tau: random.rarely().then_some(tau),
+            amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(size),
+            measured: random.rarely().then_some(given),
+            coupling: random.rarely().then_some(Coupling { velocity: given, acceleration: given }),
+        };
+        let vectors = [command.style, command.goal, command.anchor, command.measured];
+        let told = vectors.iter().any(Option::is_some) || command.amplitude.is_some() || command.coupling.is_some();
+        let mut motion = Motion { position, velocity, acceleration };
+        assert_eq!(black_box(controller.update(&command, &mut motion)).is_err(), told && refused);
+    }
 }
 
 #[test]
 fn a_million_ticks_of_random_commands_allocate_nothing() {
-    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
-        let model = learn(&demos, &options(kind));
-        let (n_dofs, n_styles, own) = (model.n_dofs(), model.n_styles(), model.tau());
-        let mut controller = Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).unwrap();
-        let mut random = Random(1);
-        let mut values = vec![0.0; n_dofs.max(n_styles)];
-        let (mut position, mut velocity, mut acceleration) = (vec![0.0; n_dofs], vec![0.0; n_dofs], vec![0.0; n_dofs]);
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let mut control = Loop::new(kind);
+        let before = ALLOCATIONS.get();
         for _ in 0..500_000 {
-            values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
-            // Refused commands are part of a loop too.
-            let refused = random.next() < 0.01;
-            if refused {
-                values[0] = f64::NAN;
-            }
-            let (given, tau, amplitude) = (&values[..n_dofs], own * (0.5 + random.next()), values[0].abs());
-            let _ = black_box(match (random.next() * 8.0) as u8 {
-                0 => controller.set_style(&values[..n_styles]),
-                1 => controller.set_goal(given),
-                2 => controller.set_anchor(given),
-                3 => controller.set_tau(tau),
-                4 => controller.set_amplitude(amplitude),
-                _ => Ok(()),
-            });
-            let mut rarely = || random.next() < 0.2;
-            let command = Command {
-                dt: rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
-                style: rarely().then_some(&values[..n_styles]),
-                goal: (rarely() && kind == Kind::Discrete).then_some(given),
-                anchor: (rarely() && kind == Kind::Rhythmic).then_some(given),
-                tau: rarely().then_some(tau),
-                amplitude: (rarely() && kind == Kind::Rhythmic).then_some(amplitude),
-                measured: rarely().then_some(given),
-                coupling: rarely().then_some(Coupling { velocity: given, acceleration: given }),
-            };
-            let mut motion =
-                Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
-            let vectors = [command.style, command.goal, command.anchor, command.measured];
-            let told = vectors.iter().any(Option::is_some) || command.amplitude.is_some() || command.coupling.is_some();
-            assert_eq!(black_box(controller.update(&command, &mut motion)).is_err(), told && refused);
+            control.tick();
         }
-        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
-        assert!(position.iter().chain(&velocity).chain(&acceleration).all(|x| x.is_finite()));
+        assert_eq!(ALLOCATIONS.get() - before, 0);
+        assert!([control.position, control.velocity, control.acceleration].iter().flatten().all(|x| x.is_finite()));
+    }
+}
+
+/// Whatever double arrives in whatever place, it is refused and nothing changes, or the motion stays finite.
+#[test]
+fn numbers_at_the_edge_are_refused_or_bounded() {
+    const EDGES: [f64; 12] =
+        [f64::NAN, f64::INFINITY, -f64::INFINITY, f64::MAX, -1e200, 1e150, 1e-150, 1e-300, 5e-324, -5e-324, 0.0, -0.0];
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let Loop { controller: fresh, .. } = Loop::new(kind);
+        for (what, &edge) in (0..8).flat_map(|what| EDGES.iter().map(move |edge| (what, edge))) {
+            let mut controller = fresh.clone();
+            let values = [edge; 8];
+            let (given, style) = (&values[..fresh.model().n_dofs()], &values[..fresh.model().n_styles()]);
+            let none = Command::default();
+            let command = match what {
+                0 => Command { dt: Some(edge), ..none },
+                1 => Command { tau: Some(edge), ..none },
+                2 => Command { amplitude: Some(edge), ..none },
+                3 => Command { style: Some(style), ..none },
+                4 => Command { goal: Some(given), ..none },
+                5 => Command { anchor: Some(given), ..none },
+                6 => Command { measured: Some(given), ..none },
+                _ => Command { coupling: Some(Coupling { velocity: given, acceleration: given }), ..none },
+            };
+            controller.step().unwrap();
+            let before = controller.clone();
+            for _ in 0..100 {
+                match tick(&mut controller, &command) {
+                    Ok(_) => _ = controller.step().unwrap(),
+                    Err(_) => assert_eq!(controller.position(), before.position()),
+                }
+            }
+            let motion = [controller.position(), controller.velocity(), controller.acceleration()];
+            assert!(motion.into_iter().flatten().all(|x| x.is_finite()), "{kind} {what} {edge:e}: {motion:?}");
+            assert!(edge.is_finite() || controller.time() == before.time());
+        }
+    }
+}
+
+/// Controls of the sanitizer itself: it would pass over anything if it were not at work.
+#[cfg(rtsan)]
+mod sanitizer {
+    use std::hint::black_box;
+    use std::process::Command;
+
+    #[test]
+    #[ignore = "ends the process; the test below runs it"]
+    #[sanitize(realtime = "nonblocking")]
+    fn allocates() {
+        black_box(vec![0.0; black_box(3)]);
+    }
+
+    #[test]
+    fn ends_a_loop_that_allocates() {
+        let itself = std::env::current_exe().unwrap();
+        let ended = Command::new(itself).args(["--exact", "--ignored", "sanitizer::allocates"]).output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(!ended.status.success());
+        assert!(said.contains("RealtimeSanitizer: unsafe-library-call"), "{said}");
     }
 }
