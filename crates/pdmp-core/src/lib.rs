@@ -55,6 +55,9 @@
 //! # }
 //! ```
 //!
+//! `examples/control_loop.rs` runs a model from a file on the clock, with [`Controller::update`] and no memory but the
+//! caller's.
+//!
 //! [doi:10.1016/j.neunet.2011.02.004]: https://doi.org/10.1016/j.neunet.2011.02.004
 
 mod align;
