@@ -3,12 +3,13 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+SHARED := $(if $(filter Darwin,$(shell uname)),dylib,so)
 SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
 
 # The bindings are compiled against the interpreter that will import them.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test check bench bench-peers rtsan clean needs
+.PHONY: demo test check bench bench-peers rtsan capi header clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to demo/
 	$(BIN)/pdmp demo -o demo
@@ -40,9 +41,18 @@ rtsan: | needs  ## Runs the control loop under the real-time sanitizer of a nigh
 		--test realtime --target "$$(rustc -vV | sed -n 's/^host: //p')" --target-dir target/rtsan; \
 	fi
 
+capi: | needs  ## Builds the libraries for C and C++ and puts them and their headers into dist/capi/
+	cargo build --release --package pdmp-capi
+	mkdir -p dist/capi/lib dist/capi/include
+	cp target/release/libpdmp.a target/release/libpdmp.$(SHARED) dist/capi/lib
+	cp crates/pdmp-capi/include/pdmp.h crates/pdmp-capi/include/pdmp.hpp dist/capi/include
+
+header: | needs  ## Makes pdmp.h anew from the sources of the C ABI
+	PDMP_WRITE_HEADER=1 cargo test --release --package pdmp-capi --test header
+
 clean:  ## Removes what the targets above made
 	cargo clean
-	rm -rf .venv demo python/pdmp/_native*.so
+	rm -rf .venv demo dist python/pdmp/_native*.so
 
 .venv/with-%: $(SOURCES) | $(BIN)/python
 	@echo 'building the extension and installing what "$*" needs: some minutes the first time'

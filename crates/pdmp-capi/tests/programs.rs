@@ -1,0 +1,202 @@
+//! Programs in C and C++, built with the system's compilers against both libraries, move as Rust does, to the bit.
+#![cfg(unix)]
+#![allow(missing_docs)]
+
+#[path = "../../pdmp-core/tests/common/mod.rs"]
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command as Process, Output};
+use std::sync::Arc;
+
+use common::*;
+use ndarray::Array2;
+use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status};
+use tempfile::TempDir;
+
+const C: [&str; 2] = ["cc", "-std=c11"];
+const CPP: [&str; 2] = ["c++", "-std=c++17"];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+fn run(process: &mut Process) -> Output {
+    process.output().unwrap_or_else(|error| panic!("{:?} is needed for this test: {error}", process.get_program()))
+}
+
+/// Builds a program with either library, runs both in `folder`, and returns what they print.
+fn prints(compiler: [&str; 2], source: &Path, folder: &Path, arguments: &[&str]) -> [String; 2] {
+    // Cargo puts the libraries beside the tests that it builds.
+    let libraries = std::env::current_exe().unwrap().parent().unwrap().to_path_buf();
+    let search = format!("-L{}", libraries.display());
+    let found_at_run_time = format!("-Wl,-rpath,{}", libraries.display());
+    let archive = libraries.join("libpdmp.a").display().to_string();
+    let links: [&[&str]; 2] = [&[&archive, "-lpthread", "-ldl", "-lm"], &[&search, "-lpdmp", &found_at_run_time]];
+    links.map(|link| {
+        let program = folder.join("program");
+        let [compiler, standard] = compiler;
+        let built = run(Process::new(compiler)
+            .args([standard, "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"])
+            .arg(root().join("crates/pdmp-capi/include"))
+            .arg(source)
+            .arg("-o")
+            .arg(&program)
+            .args(link));
+        assert!(built.status.success(), "{compiler} {link:?}: {}", String::from_utf8_lossy(&built.stderr));
+        let ran = run(Process::new(&program).args(arguments).current_dir(folder));
+        assert!(ran.status.success(), "{link:?}: {}", String::from_utf8_lossy(&ran.stderr));
+        String::from_utf8(ran.stdout).unwrap()
+    })
+}
+
+/// A number that C printed with `%a`: ±0xh.hhhp±d.
+fn hexadecimal(text: &str) -> f64 {
+    let (sign, digits) = text.strip_prefix('-').map_or((1.0, text), |digits| (-1.0, digits));
+    let (mantissa, exponent) = digits.strip_prefix("0x").unwrap().split_once('p').unwrap();
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let digits = u64::from_str_radix(&format!("{whole}{fraction}"), 16).unwrap();
+    // Both factors are powers of two or fit a mantissa, and halving twice keeps a subnormal's scale in range.
+    let exponent: i32 = exponent.parse::<i32>().unwrap() - 4 * fraction.len() as i32;
+    sign * digits as f64 * 2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)
+}
+
+/// The bits of what a program printed, a line per tick.
+fn bits(printed: &str, skip: usize) -> Vec<Vec<u64>> {
+    let line = |line: &str| line.split(' ').skip(skip).map(|text| hexadecimal(text).to_bits()).collect();
+    printed.lines().map(line).collect()
+}
+
+/// The bits of the motion that a controller is in.
+fn motion(controller: &Controller) -> Vec<u64> {
+    let vectors = [controller.position(), controller.velocity(), controller.acceleration()];
+    vectors.concat().iter().map(|number| number.to_bits()).collect()
+}
+
+fn saved(model: &Model, name: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    model.save(&folder.path().join(name)).unwrap();
+    folder
+}
+
+#[test]
+fn hexadecimal_numbers_are_read_exactly() {
+    for (text, number) in [("0x1.999999999999ap-4", 0.1), ("-0x1p+1", -2.0), ("0x0p+0", 0.0), ("0x1.8p-1", 0.75)] {
+        assert_eq!(hexadecimal(text).to_bits(), f64::to_bits(number));
+    }
+}
+
+#[test]
+fn the_c_example_moves_as_rust() {
+    let model = learn(&reaches(), &options(Kind::Discrete));
+    let conditions = conditions_of(&model, model.n_demos() - 1);
+    let goal: Vec<f64> = conditions.goal.as_ref().unwrap().iter().map(|g| g + 0.125).collect();
+    let mut controller = Controller::new(Arc::clone(&model), 1e-3, &conditions, None).unwrap();
+    let (mut expected, mut robot) = (Vec::new(), Vec::new());
+    for tick in 0.. {
+        let held = (500..700).contains(&tick);
+        let command =
+            Command { goal: (tick >= 300).then_some(&goal), measured: held.then_some(&robot), ..Command::default() };
+        let status = common::tick(&mut controller, &command).unwrap();
+        expected.push(motion(&controller));
+        if status == Status::Finished {
+            break;
+        }
+        if !held {
+            robot = controller.position().to_vec();
+        }
+    }
+    assert!(expected.len() > 1000);
+
+    let folder = saved(&model, "reach.safetensors");
+    let source = root().join("examples/c/control_loop.c");
+    for printed in prints(C, &source, folder.path(), &["reach.safetensors"]) {
+        assert_eq!(bits(&printed, 1), expected);
+        let statuses: String = printed.lines().map(|line| &line[..1]).collect();
+        assert_eq!(statuses, "1".repeat(expected.len() - 1) + "2");
+    }
+}
+
+#[test]
+fn the_cpp_example_moves_as_rust() {
+    let model = learn(&cycles(), &options(Kind::Rhythmic));
+    let conditions = conditions_of(&model, 0);
+    let anchor: Vec<f64> = conditions.anchor.as_ref().unwrap().iter().map(|y_a| y_a + 0.25).collect();
+    let mut controller = Controller::new(Arc::clone(&model), 1e-3, &conditions, None).unwrap();
+    let expected: Vec<_> = (0..3000)
+        .map(|tick| {
+            let late = tick >= 2000;
+            let command = Command {
+                anchor: (tick >= 1000).then_some(&anchor),
+                tau: late.then_some(1.5 * model.tau()),
+                amplitude: late.then_some(0.5),
+                ..Command::default()
+            };
+            common::tick(&mut controller, &command).unwrap();
+            motion(&controller)
+        })
+        .collect();
+
+    let folder = saved(&model, "cycle.safetensors");
+    let source = root().join("examples/c/control_loop.cpp");
+    for printed in prints(CPP, &source, folder.path(), &["cycle.safetensors"]) {
+        assert_eq!(bits(&printed, 1), expected);
+    }
+}
+
+#[test]
+fn the_snippet_of_the_readme_moves_as_rust() {
+    let demos: Vec<_> = [0.0, 0.15, 0.3, 0.45, 0.6].map(bend).into();
+    let model = learn(&demos, &options(Kind::Discrete));
+    let mut controller = Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).unwrap();
+    let command = Command { goal: Some(&[1.2, 0.1]), ..Command::default() };
+    let mut expected: Vec<Vec<u64>> = Vec::new();
+    while common::tick(&mut controller, &command).unwrap() == Status::Working {
+        expected.push([controller.position(), controller.velocity()].concat().iter().map(|x| x.to_bits()).collect());
+    }
+
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let snippet = readme.split("```c\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let (includes, body): (Vec<&str>, Vec<&str>) = snippet.lines().partition(|line| line.starts_with('#'));
+    let send = r#"
+        static void send(const double *y, const double *v) { printf("%a %a %a %a\n", y[0], y[1], v[0], v[1]); }
+    "#;
+    let program =
+        format!("#include <stdio.h>\n{}{send}int main(void) {{\n{}\n}}", includes.join("\n"), body.join("\n"));
+    let folder = saved(&model, "reach.safetensors");
+    let source = folder.path().join("snippet.c");
+    fs::write(&source, program).unwrap();
+    for printed in prints(C, &source, folder.path(), &[]) {
+        assert_eq!(bits(&printed, 0), expected);
+    }
+}
+
+/// The reach of the README.
+fn bend(h: f64) -> Demonstration {
+    let position = Array2::from_shape_fn((101, 2), |(c, d)| {
+        let s = c as f64 / 100.0;
+        if d == 0 { minimum_jerk(s) } else { h * 64.0 * (s - s * s).powi(3) }
+    });
+    Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
+}
+
+#[test]
+fn an_example_tells_why_it_stops() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("damaged"), b"not a model at all").unwrap();
+    let source = folder.path().join("load.cpp");
+    let program = r#"
+        #include <cstdio>
+        #include "pdmp.hpp"
+        int main() {
+            for (const char *path : {"damaged", "absent"}) try { pdmp::Model::load(path); }
+            catch (const pdmp::Error &error) { std::printf("%d %s\n", error.status(), error.what()); }
+        }"#;
+    fs::write(&source, program).unwrap();
+    for printed in prints(CPP, &source, folder.path(), &[]) {
+        let lines: Vec<_> = printed.lines().collect();
+        assert!(lines[0].starts_with("-6 not a usable model file: damaged: "), "{printed}");
+        assert!(lines[1].starts_with("-5 absent: No such file"), "{printed}");
+    }
+}

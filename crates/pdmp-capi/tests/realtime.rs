@@ -1,0 +1,136 @@
+//! The loop through the C ABI is that of Rust, to the bit, and allocates nothing: a counting allocator watches.
+#![allow(missing_docs, unsafe_code)]
+
+#[path = "../../pdmp-core/tests/common/mod.rs"]
+mod common;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::mem::MaybeUninit;
+use std::ptr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use common::*;
+use pdmp::*;
+use pdmp_core::{Command, Conditions, Controller, Coupling, Kind, Motion};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call is handed to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// A small generator of numbers in [0, 1), so that the loop itself allocates nothing.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn rarely(&mut self) -> bool {
+        self.next() < 0.2
+    }
+}
+
+fn vector(told: Option<&[f64]>) -> pdmp_vector {
+    told.map_or(pdmp_vector { data: ptr::null(), length: 0 }, |v| pdmp_vector { data: v.as_ptr(), length: v.len() })
+}
+
+fn number(told: &Option<f64>) -> *const f64 {
+    told.as_ref().map_or(ptr::null(), ptr::from_ref)
+}
+
+/// A command as C writes it.
+fn in_c(command: &Command) -> pdmp_command {
+    pdmp_command {
+        style: vector(command.style),
+        goal: vector(command.goal),
+        anchor: vector(command.anchor),
+        tau: number(&command.tau),
+        amplitude: number(&command.amplitude),
+        dt: number(&command.dt),
+        measured: vector(command.measured),
+        coupling: pdmp_coupling {
+            velocity: vector(command.coupling.map(|terms| terms.velocity)),
+            acceleration: vector(command.coupling.map(|terms| terms.acceleration)),
+        },
+    }
+}
+
+fn bits(numbers: &[f64]) -> impl Iterator<Item = u64> {
+    numbers.iter().map(|number| number.to_bits())
+}
+
+#[test]
+fn random_commands_move_c_as_rust_and_allocate_nothing() {
+    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
+        let model = learn(&demos, &options(kind));
+        let (n_dofs, n_styles, own) = (model.n_dofs(), model.n_styles(), model.tau());
+        let mut rust = Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).unwrap();
+        let none = pdmp_text { data: ptr::null_mut(), size: 0 };
+        let bytes = model.to_bytes().unwrap();
+        let (mut loaded, mut made) = (MaybeUninit::uninit(), MaybeUninit::uninit());
+        let memory = pdmp_memory { data: ptr::null_mut(), size: 0 };
+        let settings = pdmp_settings { dt: 1e-3, transition: ptr::null(), memory };
+        // SAFETY: every pointer is NULL or valid.
+        let c = unsafe {
+            pdmp_model_from_bytes(bytes.as_ptr().cast(), bytes.len(), Some(&mut loaded), none);
+            let model = Box::from_raw(loaded.assume_init());
+            pdmp_controller_new(Some(&model), Some(&settings), None, Some(&mut made), none);
+            made.assume_init()
+        };
+
+        let mut random = Random(1);
+        let mut values = vec![0.0; n_dofs.max(n_styles)];
+        let zeros = || vec![0.0; n_dofs];
+        let (mut position, mut velocity, mut acceleration) = (zeros(), zeros(), zeros());
+        let mut ours = [zeros(), zeros(), zeros()];
+        let places = ours.each_mut().map(|place| pdmp_buffer { data: place.as_mut_ptr(), length: n_dofs });
+        let out = pdmp_motion { position: places[0], velocity: places[1], acceleration: places[2] };
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        for _ in 0..200_000 {
+            values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
+            // Refused commands are part of a loop too.
+            if random.next() < 0.01 {
+                values[0] = f64::NAN;
+            }
+            let given = &values[..n_dofs];
+            let command = Command {
+                dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
+                style: random.rarely().then_some(&values[..n_styles]),
+                goal: (random.rarely() && kind == Kind::Discrete).then_some(given),
+                anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(given),
+                tau: random.rarely().then_some(own * (0.5 + random.next())),
+                amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(values[0].abs()),
+                measured: random.rarely().then_some(given),
+                coupling: random.rarely().then_some(Coupling { velocity: given, acceleration: given }),
+            };
+            let mut motion =
+                Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
+            let expected = rust.update(&command, &mut motion);
+            // SAFETY: the controller is alive, and the command and the motion are valid.
+            let status = unsafe { pdmp_controller_update(c.as_mut(), Some(&in_c(&command)), Some(&out)) };
+            assert_eq!(status, expected.map_or(pdmp_status::PDMP_RANGE, pdmp_status::from));
+            let pairs = [(&position, &ours[0]), (&velocity, &ours[1]), (&acceleration, &ours[2])];
+            assert!(pairs.into_iter().all(|(rust, c)| bits(rust).eq(bits(c))));
+        }
+        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+        // SAFETY: it is not used again.
+        unsafe { pdmp_controller_free(c) };
+    }
+}
