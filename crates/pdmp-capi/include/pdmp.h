@@ -197,13 +197,13 @@ pdmp_status pdmp_model_load(const char *path, pdmp_model **model, pdmp_text erro
 /// `bytes` is NULL or points to `size` bytes, and `error` has the room that it tells.
 pdmp_status pdmp_model_from_bytes(const void *bytes, size_t size, pdmp_model **model, pdmp_text error);
 
-/// Gives a model back. Its controllers go on: what they need of it stays. NULL is nothing to do.
+/// Frees a model. Its controllers go on: what they need of it stays. With NULL it does nothing.
 void pdmp_model_free(pdmp_model *model);
 
 /// Tells kind, sizes and times of a model.
 pdmp_status pdmp_model_describe(const pdmp_model *model, pdmp_info *info);
 
-/// Name of a degree of freedom, counted from 0, which lives as long as the model; NULL if there is none such.
+/// Name of a degree of freedom, counted from 0, in UTF-8. It lives as long as the model, and is NULL past the last.
 const char *pdmp_model_name(const pdmp_model *model, size_t dof);
 
 /// Conditions that repeat a demonstration, counted from 0: its style, goal and start or anchor, and tau.
@@ -237,7 +237,8 @@ size_t pdmp_controller_size(void);
 /// Alignment of a controller in memory of the caller's, in bytes.
 size_t pdmp_controller_alignment(void);
 
-/// Starts a movement. The controller is NULL if it is refused. The model may be freed before it.
+/// Makes a controller and starts its movement; NULL conditions are those of the nominal demonstration. The controller
+/// is NULL if it is refused. The model may be freed before it.
 ///
 /// # Safety
 /// What `settings` and `conditions` point to is valid, their memory is used by nothing else, and `error` has the room
@@ -248,7 +249,7 @@ pdmp_status pdmp_controller_new(const pdmp_model *model,
                                 pdmp_controller **controller,
                                 pdmp_text error);
 
-/// Ends a controller. Memory of the caller's is the caller's again. NULL is nothing to do.
+/// Frees a controller. Memory of the caller's is the caller's again. With NULL it does nothing.
 ///
 /// # Safety
 /// `controller` is NULL or was made by pdmp_controller_new, and is not used again.
@@ -284,8 +285,10 @@ pdmp_status pdmp_controller_set_tau(pdmp_controller *controller, double tau);
 /// Sets the amplitude r_0 of a rhythmic movement; r follows by Eq. (4).
 pdmp_status pdmp_controller_set_amplitude(pdmp_controller *controller, double amplitude);
 
-/// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock; 0 is
-/// without.
+/// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
+///
+/// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 over the
+/// demonstrated stretch of the clock, T/tau or 2 pi; 0 is without.
 pdmp_status pdmp_controller_set_compliance(pdmp_controller *controller, double stopping, double tracking);
 
 /// One tick with nothing new commanded. Answers whether the movement goes on.
@@ -294,8 +297,8 @@ pdmp_status pdmp_controller_step(pdmp_controller *controller);
 /// One tick under a command, with the motion written where the caller wants it; NULL is nothing told, or not wanted.
 /// Answers whether the movement goes on.
 ///
-/// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is held
-/// over the tick:
+/// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is
+/// held over the tick:
 ///
 ///     tau y' = z + w(u) + k_t (m - y) + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
@@ -305,9 +308,7 @@ pdmp_status pdmp_controller_step(pdmp_controller *controller);
 ///
 /// # Safety
 /// What `command` and `motion` point to is valid.
-pdmp_status pdmp_controller_update(pdmp_controller *controller,
-                                   const pdmp_command *command,
-                                   const pdmp_motion *motion);
+pdmp_status pdmp_controller_update(pdmp_controller *controller, const pdmp_command *command, const pdmp_motion *motion);
 
 /// Reads the motion as it is now. Answers whether it goes on.
 ///
@@ -315,11 +316,9 @@ pdmp_status pdmp_controller_update(pdmp_controller *controller,
 /// What `motion` points to is valid.
 pdmp_status pdmp_controller_read(pdmp_controller *controller, const pdmp_motion *motion);
 
-/// Tells the seconds since the start, and the phase: x in (0, 1] where discrete, phi in [0, 2 pi) where rhythmic. Either
-/// may be NULL. Answers whether the movement goes on.
-pdmp_status pdmp_controller_progress(const pdmp_controller *controller,
-                                     double *time,
-                                     double *phase);
+/// Tells the seconds since the start, and the phase: x in (0, 1] where discrete, phi in [0, 2 pi) where rhythmic; NULL
+/// is not wanted. Answers whether the movement goes on.
+pdmp_status pdmp_controller_progress(const pdmp_controller *controller, double *time, double *phase);
 
 /// Tells why the last call that this controller refused was refused, and returns the length of that text without its
 /// closing zero. There is none, of length 0, before the first.

@@ -1,7 +1,7 @@
 // The C++17 face of pdmp.h: ownership, vectors and exceptions, and nothing of its own.
 //
-// Making and resetting throw pdmp::Error. What runs in the loop is noexcept and answers a pdmp_status: below zero it was
-// refused, nothing has changed, and Controller::error tells why. Lengths, units and equations are those of pdmp.h.
+// Making and resetting throw pdmp::Error. What runs in the loop is noexcept and answers a pdmp_status: below zero it
+// was refused, nothing has changed, and Controller::error tells why. Lengths, units and equations are those of pdmp.h.
 
 #ifndef PDMP_HPP
 #define PDMP_HPP
@@ -68,7 +68,7 @@ inline pdmp_vector told(const std::vector<double> &numbers) noexcept {
 inline const double *told(const std::optional<double> &number) noexcept { return number ? &*number : nullptr; }
 
 inline pdmp_conditions told(const Conditions &c) noexcept {
-    return {told(c.style), told(c.goal),      told(c.anchor), told(c.start),
+    return {told(c.style),    told(c.goal),      told(c.anchor), told(c.start),
             told(c.velocity), told(c.amplitude), told(c.tau)};
 }
 
@@ -139,8 +139,8 @@ private:
         pdmp_conditions told{};
         detail::check([&](pdmp_text error) { return call(&told, {numbers.data(), numbers.size()}, error); });
         using detail::copy;
-        return {copy(told.style), copy(told.goal),  copy(told.anchor), copy(told.start),
-                copy(told.velocity), std::nullopt, *told.tau};
+        return {copy(told.style),    copy(told.goal), copy(told.anchor), copy(told.start),
+                copy(told.velocity), std::nullopt,    *told.tau};
     }
 
     struct Free {

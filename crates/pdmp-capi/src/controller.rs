@@ -52,7 +52,8 @@ pub extern "C" fn pdmp_controller_alignment() -> usize {
     align_of::<pdmp_controller>()
 }
 
-/// Starts a movement. The controller is NULL if it is refused. The model may be freed before it.
+/// Makes a controller and starts its movement; NULL conditions are those of the nominal demonstration. The controller
+/// is NULL if it is refused. The model may be freed before it.
 ///
 /// # Safety
 /// What `settings` and `conditions` point to is valid, their memory is used by nothing else, and `error` has the room
@@ -109,7 +110,7 @@ fn place_in(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> 
     }
 }
 
-/// Ends a controller. Memory of the caller's is the caller's again. NULL is nothing to do.
+/// Frees a controller. Memory of the caller's is the caller's again. With NULL it does nothing.
 ///
 /// # Safety
 /// `controller` is NULL or was made by pdmp_controller_new, and is not used again.
@@ -223,8 +224,10 @@ pub extern "C" fn pdmp_controller_set_amplitude(
     on(controller, |controller| Ok(controller.inner.set_amplitude(amplitude).map(|()| PDMP_OK)?))
 }
 
-/// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock; 0 is
-/// without.
+/// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
+///
+/// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 over the
+/// demonstrated stretch of the clock, T/tau or 2 pi; 0 is without.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_set_compliance(
     controller: Option<&mut pdmp_controller>,
@@ -243,8 +246,8 @@ pub extern "C" fn pdmp_controller_step(controller: Option<&mut pdmp_controller>)
 /// One tick under a command, with the motion written where the caller wants it; NULL is nothing told, or not wanted.
 /// Answers whether the movement goes on.
 ///
-/// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is held
-/// over the tick:
+/// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is
+/// held over the tick:
 ///
 ///     tau y' = z + w(u) + k_t (m - y) + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
@@ -292,8 +295,8 @@ pub unsafe extern "C" fn pdmp_controller_read(
     })
 }
 
-/// Tells the seconds since the start, and the phase: x in (0, 1] where discrete, phi in [0, 2 pi) where rhythmic. Either
-/// may be NULL. Answers whether the movement goes on.
+/// Tells the seconds since the start, and the phase: x in (0, 1] where discrete, phi in [0, 2 pi) where rhythmic; NULL
+/// is not wanted. Answers whether the movement goes on.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_progress(
     controller: Option<&pdmp_controller>,

@@ -125,7 +125,7 @@ pub unsafe extern "C" fn pdmp_model_from_bytes(
     unsafe { deliver(model, error, read) }
 }
 
-/// Gives a model back. Its controllers go on: what they need of it stays. NULL is nothing to do.
+/// Frees a model. Its controllers go on: what they need of it stays. With NULL it does nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_model_free(model: Option<Box<pdmp_model>>) {
     drop(model);
@@ -157,7 +157,7 @@ pub extern "C" fn pdmp_model_describe(
     answer(call, drop)
 }
 
-/// Name of a degree of freedom, counted from 0, which lives as long as the model; NULL if there is none such.
+/// Name of a degree of freedom, counted from 0, in UTF-8. It lives as long as the model, and is NULL past the last.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_model_name(model: Option<&pdmp_model>, dof: usize) -> *const c_char {
     model.and_then(|model| model.names.get(dof)).map_or(ptr::null(), |name| name.as_ptr())

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use common::*;
 use ndarray::Array2;
-use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status};
+use pdmp_core::{Command, Conditions, Controller, Coupling, Demonstration, Kind, Model, Sampling, Status};
 use tempfile::TempDir;
 
 const C: [&str; 2] = ["cc", "-std=c11"];
@@ -64,7 +64,7 @@ fn hexadecimal(text: &str) -> f64 {
 
 /// The bits of what a program printed, a line per tick.
 fn bits(printed: &str, skip: usize) -> Vec<Vec<u64>> {
-    let line = |line: &str| line.split(' ').skip(skip).map(|text| hexadecimal(text).to_bits()).collect();
+    let line = |line: &str| line.split_whitespace().skip(skip).map(|text| hexadecimal(text).to_bits()).collect();
     printed.lines().map(line).collect()
 }
 
@@ -182,21 +182,36 @@ fn bend(h: f64) -> Demonstration {
 }
 
 #[test]
-fn an_example_tells_why_it_stops() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("damaged"), b"not a model at all").unwrap();
-    let source = folder.path().join("load.cpp");
-    let program = r#"
-        #include <cstdio>
-        #include "pdmp.hpp"
-        int main() {
-            for (const char *path : {"damaged", "absent"}) try { pdmp::Model::load(path); }
-            catch (const pdmp::Error &error) { std::printf("%d %s\n", error.status(), error.what()); }
-        }"#;
-    fs::write(&source, program).unwrap();
-    for printed in prints(CPP, &source, folder.path(), &[]) {
-        let lines: Vec<_> = printed.lines().collect();
-        assert!(lines[0].starts_with("-6 not a usable model file: damaged: "), "{printed}");
-        assert!(lines[1].starts_with("-5 absent: No such file"), "{printed}");
+fn every_member_of_the_cpp_wrapper_does_as_rust() {
+    let model = learn(&reaches(), &options(Kind::Discrete));
+    let mut conditions = model.conditions(&model.predict(&[0.2]).unwrap());
+    conditions.velocity = Some(vec![0.0; 3]);
+    let mut controller = Controller::new(Arc::clone(&model), 2e-3, &conditions, Some(0.0)).unwrap();
+    let (goal, measured) = ([0.75, 0.5, 0.25], [0.5, 0.25, 0.0]);
+    let expected: Vec<_> = (0..500)
+        .map(|tick| {
+            match tick {
+                100 => controller.set_style(&conditions_of(&model, 0).style.unwrap()).unwrap(),
+                150 => controller.set_goal(&goal).unwrap(),
+                200 => controller.set_tau(1.5).unwrap(),
+                250 => controller.set_compliance(100.0, 5.0).unwrap(),
+                _ => {}
+            }
+            // Only every other tick of the program has a command.
+            let told = |from, to| tick % 2 == 0 && (from..to).contains(&tick);
+            let command = Command {
+                measured: told(300, 350).then_some(&measured),
+                coupling: told(400, 500).then_some(Coupling { velocity: &measured, acceleration: &goal }),
+                ..Command::default()
+            };
+            common::tick(&mut controller, &command).unwrap();
+            motion(&controller)
+        })
+        .collect();
+
+    let folder = saved(&model, "reach.safetensors");
+    let source = root().join("crates/pdmp-capi/tests/wrapper.cpp");
+    for printed in prints(CPP, &source, folder.path(), &["reach.safetensors"]) {
+        assert_eq!(bits(&printed, 0), expected);
     }
 }

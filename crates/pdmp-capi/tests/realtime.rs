@@ -102,6 +102,7 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
         let mut ours = [zeros(), zeros(), zeros()];
         let places = ours.each_mut().map(|place| pdmp_buffer { data: place.as_mut_ptr(), length: n_dofs });
         let out = pdmp_motion { position: places[0], velocity: places[1], acceleration: places[2] };
+        let mut reason = [0; 256];
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         for _ in 0..200_000 {
             values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
@@ -126,6 +127,25 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
             // SAFETY: the controller is alive, and the command and the motion are valid.
             let status = unsafe { pdmp_controller_update(c.as_mut(), Some(&in_c(&command)), Some(&out)) };
             assert_eq!(status, expected.map_or(pdmp_status::PDMP_RANGE, pdmp_status::from));
+            let (style, tau) = (&values[..n_styles], own * (0.5 + random.next()));
+            // SAFETY: the controller is alive, and vectors and text are valid.
+            let (expected, status) = unsafe {
+                match (random.next() * 20.0) as u8 {
+                    0 => (rust.set_style(style), pdmp_controller_set_style(c.as_mut(), vector(Some(style)))),
+                    1 => (rust.set_goal(given), pdmp_controller_set_goal(c.as_mut(), vector(Some(given)))),
+                    2 => (rust.set_anchor(given), pdmp_controller_set_anchor(c.as_mut(), vector(Some(given)))),
+                    3 => (rust.set_tau(tau), pdmp_controller_set_tau(c.as_mut(), tau)),
+                    4 => (rust.set_amplitude(tau), pdmp_controller_set_amplitude(c.as_mut(), tau)),
+                    5 => (rust.set_compliance(tau, tau), pdmp_controller_set_compliance(c.as_mut(), tau, tau)),
+                    _ => (Ok(()), pdmp_status::PDMP_OK),
+                }
+            };
+            assert_eq!(expected.is_ok(), status == pdmp_status::PDMP_OK);
+            if expected.is_err() {
+                let text = pdmp_text { data: reason.as_mut_ptr(), size: reason.len() };
+                // SAFETY: the text has the room that it tells.
+                assert!(unsafe { pdmp_controller_error(c.as_ref(), text) } > 0);
+            }
             let pairs = [(&position, &ours[0]), (&velocity, &ours[1]), (&acceleration, &ours[2])];
             assert!(pairs.into_iter().all(|(rust, c)| bits(rust).eq(bits(c))));
         }

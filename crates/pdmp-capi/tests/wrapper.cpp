@@ -1,0 +1,83 @@
+// Uses every member of pdmp.hpp on a discrete model of three DoFs, and prints the motion after each tick.
+
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "pdmp.hpp"
+
+static void require(bool claim, int line) {
+    if (!claim) throw std::logic_error("line " + std::to_string(line));
+}
+
+#define REQUIRE(claim) require(claim, __LINE__)
+
+template <class Call>
+static pdmp_status thrown(Call call) {
+    try {
+        call();
+    } catch (const pdmp::Error &error) {
+        REQUIRE(error.what()[0] != '\0');
+        return error.status();
+    }
+    return PDMP_OK;
+}
+
+int main(int, char **argv) try {
+    REQUIRE(thrown([] { pdmp::Model::load("absent"); }) == PDMP_IO);
+    REQUIRE(thrown([] { pdmp::Model::from_bytes("damaged", 7); }) == PDMP_FILE);
+
+    std::ifstream file(argv[1], std::ios::binary);
+    const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
+    auto model = pdmp::Model::from_bytes(bytes.data(), bytes.size());
+    REQUIRE(model.info().n_dofs == 3 && model.info().kind == PDMP_DISCRETE);
+    REQUIRE(model.name(0) == pdmp::Model::load(argv[1]).name(0) && model.name(3).empty());
+    REQUIRE(thrown([&] { model.demonstration(5); }) == PDMP_RANGE);
+    REQUIRE(thrown([&] { model.predict({}); }) == PDMP_NULL);
+
+    auto conditions = model.predict({0.2});
+    conditions.velocity = {0.0, 0.0, 0.0};
+    pdmp::Controller first(model, 0.002, {}, 0.0);
+    auto controller = std::move(first);
+    model = pdmp::Model::load(argv[1]);
+    REQUIRE(controller.error().empty());
+    controller.reset(conditions);
+    conditions.amplitude = 2.0;
+    REQUIRE(thrown([&] { controller.reset(conditions); }) == PDMP_ABSENT);
+    REQUIRE(thrown([&] { pdmp::Controller refused(model, 0.0); }) == PDMP_RANGE);
+    REQUIRE(first.step() == PDMP_NULL);
+
+    pdmp::Motion motion(3);
+    const std::array<double, 3> goal{0.75, 0.5, 0.25};
+    const double measured[] = {0.5, 0.25, 0.0};
+    const auto style = model.demonstration(0).style;
+    for (int tick = 0; tick < 500; ++tick) {
+        pdmp_command command{};
+        if (tick == 100) REQUIRE(controller.set_style(pdmp::view(style)) == PDMP_OK);
+        if (tick == 150) REQUIRE(controller.set_goal(pdmp::view(goal)) == PDMP_OK);
+        if (tick == 200) REQUIRE(controller.set_tau(1.5) == PDMP_OK);
+        if (tick == 250) REQUIRE(controller.set_compliance(100.0, 5.0) == PDMP_OK);
+        if (tick >= 300 && tick < 350) command.measured = pdmp::view(measured);
+        if (tick >= 400) command.coupling = {pdmp::view(measured), pdmp::view(goal)};
+        if (tick % 2 == 0) {
+            REQUIRE(controller.update(command, motion) == PDMP_WORKING);
+        } else {
+            REQUIRE(controller.step() == PDMP_WORKING && controller.read(motion) == PDMP_WORKING);
+        }
+        for (const auto *numbers : {&motion.position, &motion.velocity, &motion.acceleration})
+            for (const double number : *numbers) std::printf("%a ", number);
+        std::printf("\n");
+    }
+    REQUIRE(controller.set_anchor(pdmp::view(goal)) == PDMP_ABSENT);
+    REQUIRE(controller.set_amplitude(0.5) == PDMP_ABSENT);
+    REQUIRE(controller.error() == "amplitude does not apply to a discrete primitive");
+    double time = 0.0, phase = 0.0;
+    REQUIRE(controller.progress(&time, &phase) == PDMP_WORKING);
+    REQUIRE(time > 0.999 && time < 1.001 && phase > 0.0 && phase < 1.0);
+    return 0;
+} catch (const std::exception &error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+}
