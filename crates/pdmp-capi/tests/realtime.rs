@@ -3,49 +3,17 @@
 
 #[path = "../../pdmp-core/tests/common/mod.rs"]
 mod common;
+#[path = "../../pdmp-core/tests/common/counting.rs"]
+mod counting;
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::mem::MaybeUninit;
 use std::ptr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::*;
+use counting::{Random, allocations};
 use pdmp::*;
 use pdmp_core::{Command, Conditions, Controller, Coupling, Kind, Motion};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call is handed to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// A small generator of numbers in [0, 1), so that the loop itself allocates nothing.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn rarely(&mut self) -> bool {
-        self.next() < 0.2
-    }
-}
 
 fn vector(told: Option<&[f64]>) -> pdmp_vector {
     told.map_or(pdmp_vector { data: ptr::null(), length: 0 }, |v| pdmp_vector { data: v.as_ptr(), length: v.len() })
@@ -103,7 +71,7 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
         let places = ours.each_mut().map(|place| pdmp_buffer { data: place.as_mut_ptr(), length: n_dofs });
         let out = pdmp_motion { position: places[0], velocity: places[1], acceleration: places[2] };
         let mut reason = [0; 256];
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         for _ in 0..200_000 {
             values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
             // Refused commands are part of a loop too.
@@ -149,7 +117,7 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
             let pairs = [(&position, &ours[0]), (&velocity, &ours[1]), (&acceleration, &ours[2])];
             assert!(pairs.into_iter().all(|(rust, c)| bits(rust).eq(bits(c))));
         }
-        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+        assert_eq!(allocations() - before, 0);
         // SAFETY: it is not used again.
         unsafe { pdmp_controller_free(c) };
     }

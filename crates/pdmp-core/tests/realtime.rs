@@ -3,53 +3,18 @@
 //!
 //! A counting allocator watches everywhere. `make rtsan` compiles the same ticks with the real-time sanitizer of a
 //! nightly compiler, which ends the process at an allocation, a lock or any other system call that may wait.
-#![allow(missing_docs, unsafe_code)]
+#![allow(missing_docs)]
 #![cfg_attr(rtsan, feature(sanitize))]
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::hint::black_box;
 
 use common::*;
+use counting::{Random, allocations};
 use pdmp_core::{Command, Conditions, Controller, Coupling, Kind, Motion};
-
-struct Counting;
-
-thread_local! {
-    /// Of this thread, for tests run side by side.
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is handed to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// A small generator of numbers in [0, 1), so that the loop itself allocates nothing.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn rarely(&mut self) -> bool {
-        self.next() < 0.2
-    }
-}
 
 /// A controller and all that its caller owns.
 struct Loop {
@@ -121,11 +86,11 @@ impl Loop {
 fn a_million_ticks_of_random_commands_allocate_nothing() {
     for kind in [Kind::Discrete, Kind::Rhythmic] {
         let mut control = Loop::new(kind);
-        let before = ALLOCATIONS.get();
+        let before = allocations();
         for _ in 0..500_000 {
             control.tick();
         }
-        assert_eq!(ALLOCATIONS.get() - before, 0);
+        assert_eq!(allocations() - before, 0);
         assert!([control.position, control.velocity, control.acceleration].iter().flatten().all(|x| x.is_finite()));
     }
 }
