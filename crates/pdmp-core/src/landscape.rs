@@ -10,7 +10,7 @@ use crate::basis::Regression;
 use crate::demo::zeros;
 use crate::error::Result;
 use crate::lanes::{Lanes, Real, Register, WIDTH, groups};
-use crate::phase::{Canonical, turn};
+use crate::phase::{Canonical, rest, turn};
 
 /// Error of the table, relative to the largest forcing, at which cells are halved no more.
 const TOLERANCE: f64 = 1e-9;
@@ -18,8 +18,6 @@ const TOLERANCE: f64 = 1e-9;
 const FEWEST_CELLS: usize = 128;
 /// Cells beyond which a table is not refined.
 pub(crate) const MOST_CELLS: usize = 8192;
-/// Fading below this is nothing.
-const NOTHING: f64 = 1e-200;
 /// Knots between two questions whether to go on.
 const PORTION: usize = 64;
 
@@ -227,9 +225,7 @@ impl Landscape {
     pub(crate) fn fading(&self, u: f64) -> Option<Jet> {
         match self.canonical {
             Canonical::Discrete { alpha_x, u_end } if u >= u_end => {
-                let fade = (-alpha_x * (u - u_end)).exp();
-                // What has faded for long is nothing: products with it would leave the range of fast numbers.
-                let value = if fade < NOTHING { 0.0 } else { fade };
+                let value = rest((-alpha_x * (u - u_end)).exp());
                 Some(Jet { value, slope: -alpha_x * value })
             }
             _ => None,

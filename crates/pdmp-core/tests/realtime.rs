@@ -132,6 +132,27 @@ fn numbers_at_the_edge_are_refused_or_bounded() {
     }
 }
 
+/// Denormals take tens of times as long: what fades away ends at zero.
+#[test]
+fn rest_has_no_denormals() {
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let Loop { mut controller, .. } = Loop::new(kind);
+        if kind == Kind::Rhythmic {
+            controller.set_amplitude(0.0).unwrap();
+        }
+        let whole = |x: &f64| *x == 0.0 || x.is_normal();
+        for dt in [1e-3, 0.1, 10.0] {
+            for _ in 0..20_000 {
+                let command = Command { dt: Some(dt), ..Command::default() };
+                tick(&mut controller, &command).unwrap();
+                let motion = [controller.position(), controller.velocity(), controller.acceleration()];
+                assert!(motion.into_iter().flatten().all(whole), "{kind} at {}: {motion:?}", controller.time());
+                assert!(whole(&controller.phase()), "{kind} at {}: {:e}", controller.time(), controller.phase());
+            }
+        }
+    }
+}
+
 /// Controls of the sanitizer itself: it would pass over anything if it were not at work.
 #[cfg(rtsan)]
 mod sanitizer {

@@ -291,3 +291,43 @@ impl Controller {
 fn first(lanes: &[Lanes]) -> f64 {
     lanes[0].as_array()[0]
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use ndarray::Array2;
+
+    use super::*;
+    use crate::{Conditions, Demonstration, FitOptions, Kind, Sampling, fit};
+
+    /// Registers of any width round alike: the motion is the same to the last bit.
+    #[test]
+    fn every_width_moves_alike() {
+        let reach = |h: f64| {
+            let position = Array2::from_shape_fn((101, 6), |(c, d)| {
+                let s = c as f64 / 100.0;
+                s * s * (3.0 - 2.0 * s) + h * (d as f64 * s).sin() * s * (1.0 - s)
+            });
+            Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
+        };
+        let demos = [0.0, 0.4, 1.0].map(reach);
+        let options =
+            FitOptions { basis: crate::basis::Basis::NGnet(Default::default()), ..FitOptions::new(Kind::Discrete) };
+        let model = Arc::new(fit(&demos, &options, &mut |_, _| Ok(())).unwrap());
+        let mut any = Controller::new(model, 1e-3, &Conditions::default(), None).unwrap();
+        any.step().unwrap();
+        any.set_goal(&[0.3; 6]).unwrap();
+        any.set_tau(0.8).unwrap();
+        any.set_style(&vec![0.5; any.model.n_styles()]).unwrap();
+        let mut four = any.clone();
+        for _ in 0..1500 {
+            let h = any.stretch(1e-3);
+            any.advance(1e-3, h);
+            four.stretch(1e-3);
+            four.advance_in::<Lanes>(1e-3, h);
+            assert_eq!(any.position(), four.position());
+            assert_eq!(any.acceleration(), four.acceleration());
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! The control loop against a tight solution of its own equations, and against closed forms after very many ticks.
+#![allow(missing_docs)]
+
+mod common;
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use common::*;
+use pdmp_core::{Canonical, Command, Conditions, Controller, FitOptions, Kind, Model, StyleCount};
+
+/// ω of a filter that has gone 99 % of its way after `transition` seconds: (1 + s)exp(−s) = 0.01.
+fn omega(transition: f64) -> f64 {
+    6.638_352_067_993_813 / transition
+}
+
+/// Everything that moves: y, z, u and r, then style, rate 1/τ and centre, each with its derivative.
+struct Reference<'a> {
+    model: &'a Model,
+    state: Vec<f64>,
+    /// Style, rate and centre, to which their filters go, and r₀.
+    target: Vec<f64>,
+    amplitude: f64,
+    omega: f64,
+}
+
+impl Reference<'_> {
+    fn slope(&self, state: &[f64]) -> Vec<f64> {
+        let (n, n_styles) = (self.model.n_dofs(), self.model.n_styles());
+        let pdmp_core::Attractor { alpha_z, beta_z } = self.model.attractor();
+        let (y, rest) = state.split_at(n);
+        let (z, rest) = rest.split_at(n);
+        let (u, r, filters) = (rest[0], rest[1], &rest[2..]);
+        let (style, rate, centre) = (&filters[..n_styles], filters[n_styles], &filters[n_styles + 1..]);
+        let (mut outputs, mut rises) = ([0.0; 16], [0.0; 16]);
+        self.model.landscape().evaluate(u, &mut outputs[..n * n_styles], &mut rises[..n * n_styles]);
+        let w = |d: usize| r * style.iter().enumerate().map(|(j, s)| s * outputs[j * n + d]).sum::<f64>();
+        let growth = match self.model.canonical() {
+            Canonical::Discrete { .. } => 0.0,
+            Canonical::Rhythmic { mu } => mu * (self.amplitude - r),
+        };
+        let mut slope: Vec<f64> = (0..n).map(|d| rate * (z[d] + w(d))).collect();
+        slope.extend((0..n).map(|d| rate * alpha_z * (beta_z * (centre[d] - y[d]) - z[d])));
+        slope.extend([rate, rate * growth]);
+        let (value, speed) = filters.split_at(self.target.len());
+        slope.extend(speed);
+        slope.extend(
+            value
+                .iter()
+                .zip(speed)
+                .zip(&self.target)
+                .map(|((x, v), target)| -2.0 * self.omega * v - self.omega.powi(2) * (x - target)),
+        );
+        slope
+    }
+
+    fn rk4(&mut self, dt: f64) {
+        let add = |k: &[f64], t: f64| self.state.iter().zip(k).map(|(x, k)| x + t * k).collect::<Vec<_>>();
+        let a = self.slope(&self.state);
+        let b = self.slope(&add(&a, dt / 2.0));
+        let c = self.slope(&add(&b, dt / 2.0));
+        let d = self.slope(&add(&c, dt));
+        for (i, x) in self.state.iter_mut().enumerate() {
+            *x += dt / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
+        }
+    }
+}
+
+/// Largest distance of a loop at `dt` from the reference, over the range of each DoF, for 1.5 durations; `live` changes
+/// everything on the way.
+fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
+    const TRANSITION: f64 = 0.3;
+    let row = |matrix: &ndarray::Array2<f64>| matrix.row(model.demonstrated().nominal).to_vec();
+    let discrete = model.kind() == Kind::Discrete;
+    let demonstrated = model.demonstrated();
+    let centre = row(if discrete { &demonstrated.goals } else { &demonstrated.anchors });
+    let (style, start, n) = (row(&demonstrated.styles), row(&demonstrated.starts), model.n_dofs());
+    let conditions = Conditions {
+        start: Some(start.clone()),
+        velocity: (!discrete).then(|| vec![0.0; n]),
+        tau: Some(tau),
+        ..Conditions::default()
+    };
+    let transition = TRANSITION * tau / model.tau();
+    let mut controller = Controller::new(Arc::clone(model), dt, &conditions, Some(transition)).unwrap();
+    let target: Vec<f64> = style.iter().copied().chain([1.0 / tau]).chain(centre).collect();
+    // ẏ = ρ(z + w): at rest, or with z = 0.
+    let z = controller.velocity().iter().map(|v| v * tau);
+    let mut reference =
+        Reference { model, state: start, target: target.clone(), amplitude: 1.0, omega: omega(transition) };
+    reference.state.extend(vec![0.0; n]);
+    reference.state.extend([0.0, 1.0]);
+    reference.state.extend(&target);
+    reference.state.extend(vec![0.0; target.len()]);
+    let flow = reference.slope(&reference.state);
+    let z: Vec<f64> = z.zip(&flow).map(|(v, w)| v - w * tau).collect();
+    reference.state[n..2 * n].copy_from_slice(&z);
+
+    let ticks = (1.5 * model.duration() * tau / model.tau() / dt).round() as usize;
+    let mut worst = 0.0f64;
+    for k in 0..ticks {
+        if live && k == ticks / 4 {
+            let (style, centre) = ([0.4, -0.3], [0.3, -0.1, 0.2]);
+            controller.set_style(&style).unwrap();
+            controller.set_tau(1.3 * tau).unwrap();
+            if discrete {
+                controller.set_goal(&centre[..n]).unwrap();
+            } else {
+                controller.set_anchor(&centre[..n]).unwrap();
+                controller.set_amplitude(1.4).unwrap();
+                reference.amplitude = 1.4;
+            }
+            reference.target = style.iter().copied().chain([1.0 / (1.3 * tau)]).chain(centre[..n].to_vec()).collect();
+        }
+        controller.step().unwrap();
+        // As many parts as make the reference's own error, that of the kink at u_end included, negligible.
+        let parts = (dt / 2e-5 * model.tau() / tau).ceil() as usize;
+        (0..parts).for_each(|_| reference.rk4(dt / parts as f64));
+        for (d, y) in controller.position().iter().enumerate() {
+            worst = worst.max((y - reference.state[d]).abs() / model.ranges()[d]);
+        }
+    }
+    worst
+}
+
+/// 1e-8 of the range at 1 kHz and 1e-6 at 100 Hz, across the demonstrated end, for movements of 0.3 s too, and while
+/// style, goal or anchor, τ and amplitude are all on their way.
+#[test]
+fn ticks_solve_the_equations() {
+    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
+        let model = learn(&demos, &FitOptions { styles: StyleCount::Given(2), ..options(kind) });
+        for tau in [model.tau(), 0.3 / model.duration() * model.tau()] {
+            for live in [false, true] {
+                for (dt, bound) in [(1e-3, 1e-8), (1e-2, 1e-6)] {
+                    let error = error(&model, tau, dt, live);
+                    println!("{kind} tau {tau:.3} dt {dt} live {live}: {error:.1e}");
+                    assert!(error <= bound, "{kind} tau {tau:.3} dt {dt} live {live}: {error:e} > {bound:e}");
+                }
+            }
+        }
+    }
+}
+
+/// After a hundred million ticks of a rhythmic movement its phase and its time are those of the closed forms.
+#[test]
+fn a_hundred_million_ticks_do_not_drift() {
+    let model = learn(&cycles(), &options(Kind::Rhythmic));
+    let (ticks, dt, tau) = (100_000_000u32, 1.1e-3, 0.37 * model.tau());
+    let conditions = Conditions { tau: Some(tau), ..Conditions::default() };
+    let mut controller = Controller::new(model, dt, &conditions, None).unwrap();
+    for _ in 0..ticks {
+        controller.step().unwrap();
+    }
+    let time = f64::from(ticks) * dt;
+    assert!((controller.time() - time).abs() <= 1e-9 * time, "{} {time}", controller.time());
+    let apart = (controller.phase() - time / tau).rem_euclid(TAU);
+    assert!(apart.min(TAU - apart) <= 1e-6, "{apart:e}");
+}
+
+/// Ticks of any lengths lead to the same place as equal ones.
+#[test]
+fn tick_length_may_change_at_every_tick() {
+    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
+        let model = learn(&demos, &options(kind));
+        let make = || Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).unwrap();
+        let (mut even, mut uneven) = (make(), make());
+        for _ in 0..100 {
+            (0..20).for_each(|_| _ = even.step().unwrap());
+            for dt in [7e-4, 1e-6, 4.299e-3, 1e-2, 5e-3] {
+                tick(&mut uneven, &Command { dt: Some(dt), ..Command::default() }).unwrap();
+            }
+            for (a, b) in even.position().iter().zip(uneven.position()) {
+                assert!((a - b).abs() < 1e-7, "{kind} at {}: {:e}", even.time(), a - b);
+            }
+        }
+    }
+}
