@@ -7,6 +7,10 @@ use crate::lanes::{Lanes, Register, pack};
 
 /// Time to 99 % of a step, times ω: the root of (1 + s)exp(−s) = 0.01.
 const SETTLING: f64 = 6.638_352_067_993_813;
+/// A part of a transition, times ω, within which a cubic is off by some 1e-9 of the step.
+const FINEST: f64 = 0.07;
+/// Most parts of a tick for a transition's sake.
+const MOST_PARTS: f64 = 32.0;
 /// After so long, times ω, what is left of a step lies far below rounding.
 const FORGOTTEN: f64 = 60.0;
 
@@ -40,6 +44,12 @@ impl Filter {
     /// Whether commands are switched to at once.
     pub(crate) fn immediate(&self) -> bool {
         self.omega.is_infinite()
+    }
+
+    /// Parts in which `dt` seconds of a transition are well described by cubics; what is over within one of many need
+    /// not be.
+    pub(crate) fn parts(&self, dt: f64) -> f64 {
+        (self.omega * dt / FINEST).min(MOST_PARTS)
     }
 
     /// The solution over `dt` seconds.

@@ -64,10 +64,12 @@ impl Controller {
     /// One tick of `dt` seconds, `h` on the clock.
     pub(super) fn tick(&mut self, dt: f64, h: f64) -> Status {
         self.started = true;
-        if h <= self.finest {
+        let moving = !(self.style.settled() && self.rate.settled() && self.centre.settled());
+        let parts = (h / self.finest).max(if moving { self.filter.parts(dt) } else { 0.0 });
+        if parts <= 1.0 {
             self.piece(dt, h);
         } else {
-            let pieces = (h / self.finest).ceil().min(MOST_PIECES);
+            let pieces = parts.ceil().min(MOST_PIECES);
             for _ in 0..pieces as u32 {
                 let h = self.stretch(dt / pieces);
                 self.piece(dt / pieces, h);
