@@ -3,7 +3,7 @@
 //! ẍ = −2ωẋ − ω²(x − target), solved in closed form over a tick. Its impulse response is positive, so that a filtered
 //! positive command stays positive, whatever the order and time of its changes.
 
-use crate::lanes::{Lanes, Register, pack};
+use crate::lanes::{Lanes, Register, pack, repack};
 
 /// Time to 99 % of a step, times ω: the root of (1 + s)exp(−s) = 0.01.
 const SETTLING: f64 = 6.638_352_067_993_813;
@@ -89,7 +89,7 @@ pub(crate) struct Follower {
 impl Follower {
     /// At rest on its targets.
     pub(crate) fn new(target: &[f64]) -> Self {
-        let target: Vec<Lanes> = pack(target).collect();
+        let target = pack(target);
         Self { value: target.clone(), rate: vec![Lanes::ZERO; target.len()], target, remaining: 0.0 }
     }
 
@@ -118,13 +118,13 @@ impl Follower {
         if filter.immediate() {
             return self.jump(target);
         }
-        self.target.iter_mut().zip(pack(target)).for_each(|(old, new)| *old = new);
+        repack(&mut self.target, target);
         self.remaining = filter.forgets;
     }
 
     /// Jumps to as many targets.
     pub(crate) fn jump(&mut self, target: &[f64]) {
-        self.target.iter_mut().zip(pack(target)).for_each(|(old, new)| *old = new);
+        repack(&mut self.target, target);
         self.settle();
     }
 

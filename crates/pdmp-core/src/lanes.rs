@@ -57,11 +57,15 @@ pub(crate) fn groups(n: usize) -> usize {
 }
 
 /// A vector (D,) in groups.
-pub(crate) fn pack(values: &[f64]) -> impl Iterator<Item = Lanes> {
-    let (whole, rest) = values.as_chunks::<WIDTH>();
-    let last =
-        (!rest.is_empty()).then(|| Lanes::new(std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0))));
-    whole.iter().map(|chunk| Lanes::new(*chunk)).chain(last)
+pub(crate) fn pack(values: &[f64]) -> Vec<Lanes> {
+    let mut lanes = vec![Lanes::ZERO; groups(values.len())];
+    repack(&mut lanes, values);
+    lanes
+}
+
+/// Writes a vector over another of its length.
+pub(crate) fn repack(lanes: &mut [Lanes], values: &[f64]) {
+    bytemuck::cast_slice_mut(lanes)[..values.len()].copy_from_slice(values);
 }
 
 /// The first `n` numbers of groups.

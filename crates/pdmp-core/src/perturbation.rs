@@ -20,7 +20,7 @@
 
 use crate::command::{Command, Coupling};
 use crate::error::{Error, Result};
-use crate::lanes::{Lanes, groups, pack};
+use crate::lanes::{Lanes, groups, pack, repack};
 
 /// Default k_s: an error of a tenth of the range slows the phase elevenfold.
 const STOPPING: f64 = 1000.0;
@@ -32,22 +32,23 @@ const LARGEST_GAIN: f64 = 1e100;
 /// A DoF whose range is no more than this share of the widest stands still.
 const STILL: f64 = 1e-6;
 
-/// What is added over a tick.
-#[derive(Clone, Copy, Debug, Default)]
+/// What is added over a tick, by groups of DoFs.
+#[derive(Clone, Debug)]
 pub(crate) struct Push {
-    pub(crate) velocity: Lanes,
-    pub(crate) acceleration: Lanes,
+    pub(crate) velocity: Vec<Lanes>,
+    pub(crate) acceleration: Vec<Lanes>,
 }
 
 /// The perturbation of the tick at work, and how much the movement gives way to it.
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
-    /// By groups of DoFs.
-    push: Vec<Push>,
+    push: Push,
     pushed: bool,
     pace: f64,
     /// k_s and k_t.
     compliance: (f64, f64),
+    /// ỹ by groups of DoFs.
+    measured: Vec<Lanes>,
     /// 1/range by groups of DoFs; zero where a DoF stands still, so that an error there does not stop the phase.
     per_range: Vec<Lanes>,
 }
@@ -57,13 +58,15 @@ impl Held {
     pub(crate) fn new(ranges: &[f64], extent: f64) -> Self {
         let widest = ranges.iter().fold(0.0f64, |widest, range| widest.max(*range));
         let inverse = |&range: &f64| if range > STILL * widest { 1.0 / range } else { 0.0 };
+        let zeros = vec![Lanes::ZERO; groups(ranges.len())];
         let per_range: Vec<f64> = ranges.iter().map(inverse).collect();
         Self {
-            push: vec![Push::default(); groups(ranges.len())],
+            push: Push { velocity: zeros.clone(), acceleration: zeros.clone() },
             pushed: false,
             pace: 1.0,
             compliance: (STOPPING, TRACKING / extent),
-            per_range: pack(&per_range).collect(),
+            measured: zeros,
+            per_range: pack(&per_range),
         }
     }
 
@@ -80,12 +83,12 @@ impl Held {
         if !self.pushed {
             return;
         }
-        self.push.fill(Push::default());
         if let Some(Coupling { velocity, acceleration }) = command.coupling {
-            let terms = pack(velocity).zip(pack(acceleration));
-            self.push.iter_mut().zip(terms).for_each(|(push, (velocity, acceleration))| {
-                *push = Push { velocity, acceleration };
-            });
+            repack(&mut self.push.velocity, velocity);
+            repack(&mut self.push.acceleration, acceleration);
+        } else {
+            self.push.velocity.fill(Lanes::ZERO);
+            self.push.acceleration.fill(Lanes::ZERO);
         }
         if let Some(measured) = command.measured {
             let (stopping, tracking) = self.compliance;
@@ -93,19 +96,19 @@ impl Held {
             // tick and gain up to β_z = 4α_z at least, far from the critical damping of α_z/4.
             let pull = -(-tracking * h).exp_m1() / dt;
             let mut strain = Lanes::ZERO;
-            let places = pack(measured).zip(position).zip(&self.per_range);
-            for (push, ((measured, position), per_range)) in self.push.iter_mut().zip(places) {
-                let error = measured - *position;
-                push.velocity += error * pull;
-                let share = error * *per_range * stopping.sqrt();
+            repack(&mut self.measured, measured);
+            for (group, velocity) in self.push.velocity.iter_mut().enumerate() {
+                let error = self.measured[group] - position[group];
+                *velocity += error * pull;
+                let share = error * self.per_range[group] * stopping.sqrt();
                 strain += share * share;
             }
             self.pace = 1.0 / (1.0 + strain.reduce_add());
         }
     }
 
-    /// What is added, by groups of DoFs, if anything.
-    pub(crate) fn push(&self) -> Option<&[Push]> {
+    /// What is added, if anything.
+    pub(crate) fn push(&self) -> Option<&Push> {
         self.pushed.then_some(&self.push)
     }
 

@@ -84,15 +84,14 @@ impl Series {
             return self.attractor.propagator(h);
         }
         let square = h * h;
-        let [forcing_e, forcing_z, goal_e, goal_z, [ee, ez, ze, zz]] = std::array::from_fn(|group| {
-            let (mut even, mut odd) = (T::default(), T::default());
-            for pair in self.coefficients.iter().rev() {
-                let [next_even, next_odd] = &pair[group];
-                even = even * square + T::load(next_even);
-                odd = odd * square + T::load(next_odd);
+        let mut sums = [[T::default(); 2]; GROUPS];
+        for pairs in self.coefficients.iter().rev() {
+            for (sum, [even, odd]) in sums.iter_mut().zip(pairs) {
+                *sum = [sum[0] * square + T::load(even), sum[1] * square + T::load(odd)];
             }
-            (even + odd * h).store().to_array()
-        });
+        }
+        let [forcing_e, forcing_z, goal_e, goal_z, [ee, ez, ze, zz]] =
+            sums.map(|[even, odd]| (even + odd * h).store().to_array());
         Propagator { h, transition: [[ee, ez], [ze, zz]], forcing: [forcing_e, forcing_z], goal: [goal_e, goal_z] }
     }
 }

@@ -14,11 +14,11 @@ mod tick;
 
 use std::sync::Arc;
 
-use crate::attractor::{Propagator, State};
+use crate::attractor::{Jet, Propagator, State};
 use crate::command::{Command, Motion};
 use crate::error::{Error, Result, check_positive};
 use crate::follower::{Filter, Follower, Glide};
-use crate::lanes::{Lanes, groups, pack, unpack};
+use crate::lanes::{Lanes, groups, repack, unpack};
 use crate::model::{Complete, Conditions, Model};
 use crate::perturbation::Held;
 use crate::phase::{Kind, Sum};
@@ -60,6 +60,8 @@ pub struct Controller {
     centre: Follower,
     /// By groups of DoFs, as all that follows.
     forcing: Vec<Forcing>,
+    /// Forcing at the start of the stretch at work.
+    from: Vec<Jet<Lanes>>,
     z: Vec<Lanes>,
     position: Vec<Lanes>,
     velocity: Vec<Lanes>,
@@ -106,6 +108,7 @@ impl Controller {
             rate: Follower::new(&[1.0 / conditions.tau]),
             centre: Follower::new(&conditions.centre),
             forcing: vec![Forcing::default(); zeros.len()],
+            from: vec![Jet::default(); zeros.len()],
             z: zeros.clone(),
             position: zeros.clone(),
             velocity: zeros.clone(),
@@ -162,23 +165,25 @@ impl Controller {
             *z = on_cycle.z;
         }
         if let Some(start) = &conditions.start {
-            self.position.iter_mut().zip(pack(start)).for_each(|(position, start)| *position = start);
+            repack(&mut self.position, start);
         }
         if let Some(velocity) = &conditions.velocity {
-            for (z, (velocity, forcing)) in self.z.iter_mut().zip(pack(velocity).zip(&self.forcing)) {
-                *z = velocity * conditions.tau - forcing.shape * *r;
+            repack(&mut self.z, velocity);
+            for (z, forcing) in self.z.iter_mut().zip(&self.forcing) {
+                *z = *z * conditions.tau - forcing.shape * *r;
             }
         }
     }
 
     /// Sets the distances at which the way from the start to the goal counts as gone.
     fn tolerate(&mut self) {
-        self.tolerance.fill(Lanes::ZERO);
-        self.tolerate_way();
-        let widest = self.model.ranges().iter().fold(0.0f64, |widest, range| widest.max(*range));
-        for (tolerance, range) in self.tolerance.iter_mut().zip(pack(self.model.ranges())) {
-            *tolerance = tolerance.max(range.max(Lanes::splat(1e-6 * widest)) * SETTLED);
+        let ranges = self.model.ranges();
+        let widest = ranges.iter().fold(0.0f64, |widest, range| widest.max(*range));
+        repack(&mut self.tolerance, ranges);
+        for tolerance in &mut self.tolerance {
+            *tolerance = tolerance.max(Lanes::splat(1e-6 * widest)) * SETTLED;
         }
+        self.tolerate_way();
     }
 
     /// Widens the tolerances to the way that the goal commanded leaves, not below what rounding does.

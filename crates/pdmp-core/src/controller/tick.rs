@@ -3,6 +3,7 @@
 use super::{Controller, Status};
 use crate::attractor::{Attractor, Jet, State};
 use crate::error::{Error, Result};
+use crate::landscape::{Landscape, Place};
 use crate::lanes::{Lanes, Real, Register, settle, unpack};
 use crate::perturbation::Push;
 use crate::phase::{Canonical, Sum, amplitude};
@@ -23,6 +24,18 @@ pub(super) struct Forcing {
     swing: Lanes,
 }
 
+impl Forcing {
+    /// Reads a group at a place, for a style s and, while it is on its way, ṡ.
+    #[inline(always)]
+    fn read<T: Register>(landscape: &Landscape, place: Place, group: usize, s: &[f64], rate: Option<&[f64]>) -> Self {
+        let [along, swing] = match rate {
+            Some(rate) => landscape.blend_both::<T>(place, group, [s, rate]),
+            None => [landscape.blend(place, group, s), Jet::default()],
+        };
+        Self { shape: along.value.store(), slope: along.slope.store(), swing: swing.value.store() }
+    }
+}
+
 /// What turns a [`Forcing`] into w = r·sᵀb and its slope along the motion, w′ = rκ·sᵀb′ + r/ρ·ṡᵀb + r′·sᵀb. Past the
 /// end of a discrete movement r stands for the fading phase, and b for what is faded.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +47,8 @@ pub(super) struct Gate {
     growth: f64,
     /// ρ and ρ̇.
     rate: [f64; 2],
+    /// 1/ρ.
+    tau: f64,
 }
 
 impl Gate {
@@ -149,6 +164,10 @@ impl Controller {
         let demonstrated = self.model.landscape().fading(self.clock.value()).is_none();
         let levers = self.held.push().map(|_| self.levers());
         let before = self.gate();
+        for (from, forcing) in self.from.iter_mut().zip(&self.forcing) {
+            let Jet { value, slope } = before.jet::<T>(forcing);
+            *from = Jet { value: value.store(), slope: slope.store() };
+        }
         self.style.advance::<T>(&self.glide);
         self.rate.advance::<T>(&self.glide);
         let moving = self.centre.elapse(&self.glide);
@@ -163,17 +182,15 @@ impl Controller {
         let (model, propagator) = (&*self.model, &self.propagator);
         let (landscape, attractor, place) =
             (model.landscape(), model.attractor(), model.landscape().place(self.clock.value()));
-        let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, model.n_styles()));
-        let swinging = !self.style.settled();
+        let style = unpack(self.style.value(), model.n_styles());
+        let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
         let n = self.forcing.len();
         let (forcing, centre) = (&mut self.forcing[..n], &mut self.centre);
         let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
         let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
         for group in 0..n {
-            let from = before.jet::<T>(&forcing[group]);
-            let along = landscape.blend::<T>(place, group, style);
-            let swing = if swinging { landscape.blend(place, group, swing).value } else { T::default() };
-            forcing[group] = Forcing { shape: along.value.store(), slope: along.slope.store(), swing: swing.store() };
+            let from = Jet { value: T::load(&self.from[group].value), slope: T::load(&self.from[group].slope) };
+            forcing[group] = Forcing::read::<T>(landscape, place, group, style, swing);
             let to = after.jet(&forcing[group]);
 
             let mut origin = T::load(&centre.value()[group]);
@@ -181,10 +198,10 @@ impl Controller {
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
-                let start = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * (1.0 / before.rate[0]) };
+                let start = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * before.tau };
                 centre.advance_group::<T>(group, &self.glide);
                 let arrived = T::load(&centre.value()[group]);
-                let slope = T::load(&centre.rate()[group]) * (1.0 / after.rate[0]);
+                let slope = T::load(&centre.rate()[group]) * after.tau;
                 let moved = propagator.follow([start, Jet { value: arrived - origin, slope }]);
                 y = y + moved.e;
                 origin = arrived;
@@ -206,10 +223,11 @@ impl Controller {
         let after = self.levers();
         let by_velocity = self.propagator.advance(State::default(), [before[0], after[0]]);
         let by_acceleration = self.propagator.follow([before[1], after[1]]);
-        let states = self.position.iter_mut().zip(&mut self.z);
-        for ((position, z), Push { velocity, acceleration }) in states.zip(self.held.push().into_iter().flatten()) {
-            *position += *velocity * by_velocity.e + *acceleration * by_acceleration.e;
-            *z += *velocity * by_velocity.z + *acceleration * by_acceleration.z;
+        let Some(Push { velocity, acceleration }) = self.held.push() else { return };
+        for group in 0..self.z.len() {
+            let (v, a) = (velocity[group], acceleration[group]);
+            self.position[group] += v * by_velocity.e + a * by_acceleration.e;
+            self.z[group] += v * by_velocity.z + a * by_acceleration.z;
         }
     }
 
@@ -242,7 +260,8 @@ impl Controller {
             Canonical::Discrete { .. } => 0.0,
             Canonical::Rhythmic { mu } => mu * (self.conditions.amplitude - r),
         };
-        Gate { r, along: r * self.held.pace(), swing: r / rate[0], growth, rate }
+        let tau = 1.0 / rate[0];
+        Gate { r, along: r * self.held.pace(), swing: r * tau, growth, rate, tau }
     }
 
     /// Reads the forcing at the clock.
@@ -250,9 +269,7 @@ impl Controller {
         let (model, place) = (&self.model, self.model.landscape().place(self.clock.value()));
         let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, model.n_styles()));
         for (group, forcing) in self.forcing.iter_mut().enumerate() {
-            let along = model.landscape().blend(place, group, style);
-            let swing = model.landscape().blend(place, group, swing).value;
-            *forcing = Forcing { shape: along.value, slope: along.slope, swing };
+            *forcing = Forcing::read::<Lanes>(model.landscape(), place, group, style, Some(swing));
         }
     }
 
@@ -264,10 +281,11 @@ impl Controller {
             let w = gate.jet(&self.forcing[group]);
             [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, State { e, z: self.z[group] }, w);
         }
-        let motion = self.velocity.iter_mut().zip(&mut self.acceleration);
-        for ((velocity, acceleration), push) in motion.zip(self.held.push().into_iter().flatten()) {
-            *velocity += push.velocity;
-            *acceleration += push.acceleration;
+        if let Some(Push { velocity, acceleration }) = self.held.push() {
+            for group in 0..self.z.len() {
+                self.velocity[group] += velocity[group];
+                self.acceleration[group] += acceleration[group];
+            }
         }
     }
 
