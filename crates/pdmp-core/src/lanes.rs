@@ -42,13 +42,11 @@ impl Register for Lanes {
     }
 }
 
-/// Below this a number in a loop is rest: products with it would leave the range of fast numbers.
-const REST: f64 = 1e-180;
-
-/// A value, or rest: adding REST and taking it away leaves what lies above 1e-164 as it was, and nothing of the least.
+/// A value, or zero at rest: adding `rest` and taking it away leaves what lies 16 digits above it as it was, and nothing
+/// of what lies below, whose products would leave the range of fast numbers.
 #[inline(always)]
-pub(crate) fn settle<T: Register>(value: T) -> T {
-    (value + T::splat(REST)) - T::splat(REST)
+pub(crate) fn settle<T: Register>(value: T, rest: T) -> T {
+    (value + rest) - rest
 }
 
 /// Groups that hold `n` DoFs.

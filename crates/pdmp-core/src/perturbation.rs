@@ -30,7 +30,7 @@ const TRACKING: f64 = 10.0;
 /// Largest gain; it only keeps products finite.
 const LARGEST_GAIN: f64 = 1e100;
 /// A DoF whose range is no more than this share of the widest stands still.
-const STILL: f64 = 1e-6;
+pub(crate) const STILL: f64 = 1e-6;
 
 /// What is added over a tick, by groups of DoFs.
 #[derive(Clone, Debug)]
@@ -53,10 +53,15 @@ pub(crate) struct Held {
     per_range: Vec<Lanes>,
 }
 
+/// The widest of the DoFs' ranges.
+pub(crate) fn widest(ranges: &[f64]) -> f64 {
+    ranges.iter().fold(0.0, |widest, range| widest.max(*range))
+}
+
 impl Held {
     /// No perturbation, for DoFs of these ranges and a movement of this extent on the clock.
     pub(crate) fn new(ranges: &[f64], extent: f64) -> Self {
-        let widest = ranges.iter().fold(0.0f64, |widest, range| widest.max(*range));
+        let widest = widest(ranges);
         let inverse = |&range: &f64| if range > STILL * widest { 1.0 / range } else { 0.0 };
         let zeros = vec![Lanes::ZERO; groups(ranges.len())];
         let per_range: Vec<f64> = ranges.iter().map(inverse).collect();

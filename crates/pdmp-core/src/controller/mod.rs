@@ -20,7 +20,7 @@ use crate::error::{Error, Result, check_positive};
 use crate::follower::{Filter, Follower, Glide};
 use crate::lanes::{Lanes, groups, repack, unpack};
 use crate::model::{Complete, Conditions, Model};
-use crate::perturbation::Held;
+use crate::perturbation::{Held, STILL, widest};
 use crate::phase::{Kind, Sum};
 use crate::series::Series;
 use tick::Forcing;
@@ -29,6 +29,9 @@ use tick::Forcing;
 const FINEST: f64 = 1.0 / 500.0;
 /// A movement has settled within this share of its range.
 const SETTLED: f64 = 1e-3;
+
+/// A share of the range at which a movement is at rest.
+const REST: f64 = 1e-150;
 
 /// Whether a movement goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +71,8 @@ pub struct Controller {
     acceleration: Vec<Lanes>,
     /// Distance from the goal at which each DoF has settled.
     tolerance: Vec<Lanes>,
+    /// Far below the last digit of every movement.
+    rest: f64,
     held: Held,
     /// A stretch of the clock that is not divided.
     finest: f64,
@@ -96,6 +101,9 @@ impl Controller {
         }
         let conditions = conditions.complete(&model)?;
         let (filter, zeros) = (Filter::new(transition), vec![Lanes::ZERO; groups(model.n_dofs())]);
+        // A tick of just this length is not divided for a rounding error.
+        let finest = FINEST * model.canonical().extent() * (1.0 + 1e-9);
+        let series = Series::new(model.attractor(), finest);
         let mut controller = Self {
             dt,
             started: false,
@@ -114,12 +122,12 @@ impl Controller {
             velocity: zeros.clone(),
             acceleration: zeros.clone(),
             tolerance: zeros,
+            rest: REST * widest(model.ranges()),
             held: Held::new(model.ranges(), model.canonical().extent()),
-            // A tick of just this length is not divided for a rounding error.
-            finest: FINEST * model.canonical().extent() * (1.0 + 1e-9),
+            finest,
             glide: filter.glide(dt),
-            propagator: model.attractor().propagator(dt / conditions.tau),
-            series: Series::new(model.attractor(), FINEST * model.canonical().extent() * (1.0 + 1e-9)),
+            propagator: series.propagator::<Lanes>(dt / conditions.tau),
+            series,
             conditions,
             model,
         };
@@ -178,10 +186,10 @@ impl Controller {
     /// Sets the distances at which the way from the start to the goal counts as gone.
     fn tolerate(&mut self) {
         let ranges = self.model.ranges();
-        let widest = ranges.iter().fold(0.0f64, |widest, range| widest.max(*range));
+        let least = Lanes::splat(STILL * widest(ranges));
         repack(&mut self.tolerance, ranges);
         for tolerance in &mut self.tolerance {
-            *tolerance = tolerance.max(Lanes::splat(1e-6 * widest)) * SETTLED;
+            *tolerance = tolerance.max(least) * SETTLED;
         }
         self.tolerate_way();
     }

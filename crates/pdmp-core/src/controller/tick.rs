@@ -184,7 +184,7 @@ impl Controller {
             (model.landscape(), model.attractor(), model.landscape().place(self.clock.value()));
         let style = unpack(self.style.value(), model.n_styles());
         let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
-        let n = self.forcing.len();
+        let (n, rest) = (self.forcing.len(), T::splat(self.rest));
         let (forcing, centre) = (&mut self.forcing[..n], &mut self.centre);
         let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
         let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
@@ -207,7 +207,7 @@ impl Controller {
                 origin = arrived;
                 next.z = next.z + moved.z;
             }
-            let (y, z_next) = (settle(y), settle(next.z));
+            let (y, z_next) = (settle(y, rest), settle(next.z, rest));
             (position[group], z[group]) = (y.store(), z_next.store());
             let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, to);
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
