@@ -25,20 +25,20 @@ pub struct Attractor {
 
 /// A value and its derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Jet<T = f64> {
+pub(crate) struct Jet<T = f64> {
     /// The value.
-    pub value: T,
+    pub(crate) value: T,
     /// Its derivative.
-    pub slope: T,
+    pub(crate) slope: T,
 }
 
 /// State of a degree of freedom relative to its attractor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct State<T = f64> {
+pub(crate) struct State<T = f64> {
     /// Displacement y − g, in the unit of the DoF.
-    pub e: T,
+    pub(crate) e: T,
     /// Auxiliary state z of Eq. (1), in the unit of the DoF.
-    pub z: T,
+    pub(crate) z: T,
 }
 
 /// Weights of a cubic given by its jets at both ends of a step: of its two values, then of its two slopes.
@@ -51,7 +51,7 @@ fn weigh<T: Real>(weights: &CubicWeights, [from, to]: [Jet<T>; 2]) -> T {
 
 /// The solution of the output system over a step of fixed length.
 #[derive(Clone, Copy, Debug)]
-pub struct Propagator {
+pub(crate) struct Propagator {
     /// Length of the step on the clock.
     pub(crate) h: f64,
     /// exp(Ah), by rows.
@@ -64,7 +64,7 @@ pub struct Propagator {
 
 impl Attractor {
     /// The exact solution over a stretch `h` of the clock.
-    pub fn propagator(&self, h: f64) -> Propagator {
+    pub(crate) fn propagator(&self, h: f64) -> Propagator {
         let stiffness = self.alpha_z * self.beta_z;
         let phi = phi_functions(-self.alpha_z * h, stiffness * h * h);
         // (a + bAh) applied to the unit vectors: the columns of a 2 × 2 polynomial in A.
@@ -83,7 +83,7 @@ impl Attractor {
 
     /// z′ = α_z(β_z(g − y) − z) at a state relative to the goal.
     #[inline(always)]
-    pub fn z_slope<T: Real>(&self, State { e, z }: State<T>) -> T {
+    pub(crate) fn z_slope<T: Real>(&self, State { e, z }: State<T>) -> T {
         (e * self.beta_z + z) * -self.alpha_z
     }
 
@@ -128,18 +128,18 @@ impl Attractor {
 
 impl Propagator {
     /// Length of the step on the clock.
-    pub fn step(&self) -> f64 {
+    pub(crate) fn step(&self) -> f64 {
         self.h
     }
 
     /// exp(Ah), by rows.
-    pub fn transition(&self) -> [[f64; 2]; 2] {
+    pub(crate) fn transition(&self) -> [[f64; 2]; 2] {
         self.transition
     }
 
     /// The state after the step under the forcing w.
     #[inline(always)]
-    pub fn advance<T: Real>(&self, state: State<T>, forcing: [Jet<T>; 2]) -> State<T> {
+    pub(crate) fn advance<T: Real>(&self, state: State<T>, forcing: [Jet<T>; 2]) -> State<T> {
         let [e, z] = [0, 1].map(|row| {
             let [from_e, from_z] = self.transition[row];
             (state.e * from_e + state.z * from_z) + weigh(&self.forcing[row], forcing)
@@ -149,7 +149,7 @@ impl Propagator {
 
     /// What a goal moving by γ adds to the state, still relative to where the goal was at the start of the step.
     #[inline(always)]
-    pub fn follow<T: Real>(&self, goal: [Jet<T>; 2]) -> State<T> {
+    pub(crate) fn follow<T: Real>(&self, goal: [Jet<T>; 2]) -> State<T> {
         let [e, z] = [0, 1].map(|row| weigh(&self.goal[row], goal));
         State { e, z }
     }

@@ -270,6 +270,9 @@ impl Reader<'_> {
             if constants.has_context { self.map(&constants, n_demos, n_styles, n_dofs)? } else { (None, None) };
         let knots = |name| {
             let data = self.array(name, &[n_knots, n_styles, n_dofs])?;
+            if let Some(value) = data.iter().find(|x| x.abs() > LARGEST) {
+                return Err(Error::File(format!("{name} holds {value:e}")));
+            }
             Array2::from_shape_vec((n_knots, n_styles * n_dofs), data).map_err(|error| Error::File(error.to_string()))
         };
         let landscape = Landscape::from_knots(

@@ -12,7 +12,7 @@ const FINEST: f64 = 0.07;
 /// Most parts of a tick for a transition's sake.
 const MOST_PARTS: f64 = 32.0;
 /// After so long, times ω, what is left of a step lies far below rounding.
-const FORGOTTEN: f64 = 60.0;
+const FORGOTTEN: f64 = 45.0;
 
 /// The filter: its constant, common to all commands of a movement.
 #[derive(Clone, Copy, Debug)]
@@ -52,10 +52,17 @@ impl Filter {
         (self.omega * dt / FINEST).min(MOST_PARTS)
     }
 
+    /// How far a group may still go, at most.
+    pub(crate) fn left(&self, follower: &Follower, group: usize) -> Lanes {
+        let Follower { value, rate, target, .. } = follower;
+        (value[group] - target[group]).abs() + rate[group].abs() * (1.0 / self.omega)
+    }
+
     /// The solution over `dt` seconds.
     pub(crate) fn glide(&self, dt: f64) -> Glide {
         let omega = self.omega;
-        let s = omega * dt;
+        // A step that is over is over, however long since.
+        let s = (omega * dt).min(1e4);
         let decay = (-s).exp();
         // ∫exp(−ωt) and ∫ωt·exp(−ωt), times ω.
         let first = -(-s).exp_m1();
@@ -63,7 +70,7 @@ impl Filter {
         Glide {
             dt,
             value: [(1.0 + s) * decay, dt * decay],
-            rate: [-omega * s * decay, (1.0 - s) * decay],
+            rate: [-omega * (s * decay), (1.0 - s) * decay],
             integral: [(first + second) / omega, second / (omega * omega)],
         }
     }

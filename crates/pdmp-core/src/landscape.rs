@@ -10,7 +10,7 @@ use crate::basis::Regression;
 use crate::demo::zeros;
 use crate::error::Result;
 use crate::lanes::{Lanes, Real, Register, WIDTH, groups};
-use crate::phase::{Canonical, rest, turn};
+use crate::phase::{Canonical, faded, turn};
 
 /// Error of the table, relative to the largest forcing, at which cells are halved no more.
 const TOLERANCE: f64 = 1e-9;
@@ -40,6 +40,7 @@ pub struct Landscape {
 
 /// Coefficients of a cubic from a knot on, over the clock; the first two are value and slope at the knot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(64))]
 struct Cubic([Lanes; 4]);
 
 /// A place on the clock: a knot, and how far beyond it.
@@ -226,7 +227,7 @@ impl Landscape {
     pub(crate) fn fading(&self, u: f64) -> Option<Jet> {
         match self.canonical {
             Canonical::Discrete { alpha_x, u_end } if u >= u_end => {
-                let value = rest((-alpha_x * (u - u_end)).exp());
+                let value = faded((-alpha_x * (u - u_end)).exp());
                 Some(Jet { value, slope: -alpha_x * value })
             }
             _ => None,

@@ -13,7 +13,10 @@ pub(crate) type Lanes = wide::f64x4;
 pub(crate) const WIDTH: usize = 4;
 
 /// What a formula is evaluated on: a number, or several side by side.
-pub trait Real: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self> {}
+pub(crate) trait Real:
+    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
+{
+}
 
 impl Real for f64 {}
 impl Real for Lanes {}
@@ -42,10 +45,10 @@ impl Register for Lanes {
     }
 }
 
-/// A value, or zero at rest: adding `rest` and taking it away leaves what lies 16 digits above it as it was, and nothing
-/// of what lies below, whose products would leave the range of fast numbers.
+/// Flushes what has all but come to rest to zero: adding `rest` and taking it away leaves what lies 16 digits above it
+/// as it was, and nothing of what lies below, whose products would leave the range of fast numbers.
 #[inline(always)]
-pub(crate) fn settle<T: Register>(value: T, rest: T) -> T {
+pub(crate) fn flush<T: Register>(value: T, rest: T) -> T {
     (value + rest) - rest
 }
 

@@ -62,8 +62,6 @@
 
 mod align;
 mod attractor;
-#[cfg(target_arch = "x86_64")]
-mod avx;
 pub mod basis;
 mod command;
 mod context;
@@ -85,7 +83,7 @@ mod smooth;
 mod spline;
 
 pub use align::Alignment;
-pub use attractor::{Attractor, Jet, Propagator, State};
+pub use attractor::Attractor;
 pub use command::{Command, Coupling, Motion};
 pub use context::{ContextMap, Prediction};
 pub use controller::{Controller, Status};
@@ -94,7 +92,6 @@ pub use error::{Error, LARGEST, Result};
 pub use factor::{Factors, StyleCount};
 pub use fit::{DofScale, FitOptions, Stage, fit, style_of};
 pub use landscape::Landscape;
-pub use lanes::Real;
 pub use model::{Conditions, Demonstrated, Learnt, Model};
 pub use phase::{Canonical, Kind};
 pub use rollout::Timing;

@@ -32,6 +32,9 @@ const LARGEST_GAIN: f64 = 1e100;
 /// A DoF whose range is no more than this share of the widest stands still.
 pub(crate) const STILL: f64 = 1e-6;
 
+/// A range below which its inverse would leave what can be squared.
+const LEAST: f64 = 1e-140;
+
 /// What is added over a tick, by groups of DoFs.
 #[derive(Clone, Debug)]
 pub(crate) struct Push {
@@ -62,7 +65,7 @@ impl Held {
     /// No perturbation, for DoFs of these ranges and a movement of this extent on the clock.
     pub(crate) fn new(ranges: &[f64], extent: f64) -> Self {
         let widest = widest(ranges);
-        let inverse = |&range: &f64| if range > STILL * widest { 1.0 / range } else { 0.0 };
+        let inverse = |&range: &f64| if range > (STILL * widest).max(LEAST) { 1.0 / range } else { 0.0 };
         let zeros = vec![Lanes::ZERO; groups(ranges.len())];
         let per_range: Vec<f64> = ranges.iter().map(inverse).collect();
         Self {
@@ -108,7 +111,7 @@ impl Held {
                 let share = error * self.per_range[group] * stopping.sqrt();
                 strain += share * share;
             }
-            self.pace = 1.0 / (1.0 + strain.reduce_add());
+            self.pace = 1.0 / (1.0 + strain.to_array().iter().sum::<f64>());
         }
     }
 

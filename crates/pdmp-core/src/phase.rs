@@ -76,7 +76,7 @@ impl Canonical {
     /// The phase at clock `u`: x in (0, 1], or φ in [0, 2π).
     pub fn phase(&self, u: f64) -> f64 {
         match *self {
-            Canonical::Discrete { alpha_x, .. } => rest((-alpha_x * u).exp()),
+            Canonical::Discrete { alpha_x, .. } => faded((-alpha_x * u).exp()),
             Canonical::Rhythmic { .. } => turn(u),
         }
     }
@@ -122,12 +122,12 @@ impl Sum {
 
 /// The amplitude r after a stretch `h` of the clock: r₀ + (r − r₀)exp(−μh).
 pub(crate) fn amplitude(mu: f64, r: f64, target: f64, h: f64) -> f64 {
-    rest(target + (r - target) * (-mu * h).exp())
+    faded(target + (r - target) * (-mu * h).exp())
 }
 
 /// A number that is not negative, or zero where it has all but faded: what lies below would leave the range of fast
 /// numbers.
-pub(crate) fn rest(x: f64) -> f64 {
+pub(crate) fn faded(x: f64) -> f64 {
     if x < 1e-200 { 0.0 } else { x }
 }
 

@@ -7,7 +7,10 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use common::*;
-use pdmp_core::{Canonical, Command, Conditions, Controller, FitOptions, Kind, Model, StyleCount};
+use ndarray::Array2;
+use pdmp_core::{
+    Canonical, Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Sampling, StyleCount,
+};
 
 /// ω of a filter that has gone 99 % of its way after `transition` seconds: (1 + s)exp(−s) = 0.01.
 fn omega(transition: f64) -> f64 {
@@ -69,7 +72,7 @@ impl Reference<'_> {
 /// Largest distance of a loop at `dt` from the reference, over the range of each DoF, for 1.5 durations; `live` changes
 /// everything on the way.
 fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
-    let row = |matrix: &ndarray::Array2<f64>| matrix.row(model.demonstrated().nominal).to_vec();
+    let row = |matrix: &Array2<f64>| matrix.row(model.demonstrated().nominal).to_vec();
     let discrete = model.kind() == Kind::Discrete;
     let demonstrated = model.demonstrated();
     let centre = row(if discrete { &demonstrated.goals } else { &demonstrated.anchors });
@@ -102,7 +105,8 @@ fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
         if live && k == ticks / 4 {
             let style = [0.4, -0.3];
             // About as far as the movement is wide.
-            let centre: Vec<f64> = centre.iter().zip([0.4, -0.5, 0.3]).map(|(centre, way)| centre + way).collect();
+            let centre: Vec<f64> =
+                centre.iter().zip([0.4, -0.5, 0.3].iter().cycle()).map(|(centre, way)| centre + way).collect();
             controller.set_style(&style).unwrap();
             controller.set_tau(1.3 * tau).unwrap();
             if discrete {
@@ -129,7 +133,15 @@ fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
 /// 1 kHz while style, goal or anchor, τ and amplitude are all on their way.
 #[test]
 fn ticks_solve_the_equations() {
-    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
+    // Three DoFs fill a part of a register, seven one and a part.
+    let wide = |demo: &Demonstration| {
+        let position = demo.position();
+        let mixed = |c: usize, d: usize| position[[c, d % 3]] + 0.3 * d as f64 * position[[c, (d + 1) % 3]];
+        let position = Array2::from_shape_fn((demo.n_samples(), 7), |(c, d)| mixed(c, d));
+        Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
+    };
+    let seven = reaches().iter().map(wide).collect();
+    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Discrete, seven), (Kind::Rhythmic, cycles())] {
         let model = learn(&demos, &FitOptions { styles: StyleCount::Given(2), ..options(kind) });
         for tau in [model.tau(), 0.3 / model.duration() * model.tau()] {
             for live in [false, true] {

@@ -282,6 +282,61 @@ fn finishes_when_settled_and_starts_again() {
     assert_eq!(controller.step().unwrap(), Status::Working);
 }
 
+/// FINISHED is said at the goal that is in force, whatever was commanded before, and not while the goal is on its way.
+#[test]
+fn finishes_at_the_goal_in_force() {
+    let nominal = REACH.demonstrated().goals.row(REACH.demonstrated().nominal).to_vec();
+    let mut far = controller(&REACH, 1e-3);
+    run(&mut far, 10);
+    far.set_goal(&[1e4; 3]).unwrap();
+    run(&mut far, 10);
+    far.set_goal(&nominal).unwrap();
+    while far.step().unwrap() == Status::Working {}
+    // What is left of a way of a hundred, which is as far as it strayed.
+    assert!(distance(far.position(), &nominal) < 0.1, "{:?}", far.position());
+
+    let mut back = controller(&REACH, 1e-3);
+    while back.step().unwrap() == Status::Working {}
+    back.set_goal(&[10.0; 3]).unwrap();
+    back.step().unwrap();
+    back.set_goal(&nominal).unwrap();
+    while back.step().unwrap() == Status::Working {}
+    run(&mut back, 20);
+    assert!(distance(back.position(), &nominal) < 0.01, "{:?}", back.position());
+}
+
+/// Everything at the edge of what is accepted, together, leaves the motion finite.
+#[test]
+fn extremes_together_leave_the_motion_finite() {
+    for model in [&*REACH, &*CYCLE] {
+        for transition in [0.0, 1e-307, 1e-3, 1e6 * model.duration()] {
+            for (size, tau, dt) in [(1e100, 1e-6, 1e-4), (1e100, 1e6, 1e4), (-1e50, 1e6, 1e8), (0.0, 1e-6, 1e-9)] {
+                let conditions = Conditions::default();
+                let mut controller = Controller::new(Arc::clone(model), 1e-3, &conditions, Some(transition)).unwrap();
+                controller.step().unwrap();
+                let (style, centre) = ([size; 2], vec![size; model.n_dofs()]);
+                let discrete = model.kind() == Kind::Discrete;
+                let command = Command {
+                    dt: Some(dt),
+                    style: Some(&style),
+                    goal: discrete.then_some(&centre),
+                    anchor: (!discrete).then_some(&centre),
+                    tau: Some(tau * model.tau()),
+                    amplitude: (!discrete).then_some(1e45),
+                    measured: Some(&centre),
+                    ..Command::default()
+                };
+                for _ in 0..20 {
+                    let _ = tick(&mut controller, &command);
+                    let motion = [controller.position(), controller.velocity(), controller.acceleration()];
+                    assert!(motion.into_iter().flatten().all(|x| x.is_finite()), "{transition} {size} {tau} {dt}");
+                    assert!(controller.phase().is_finite());
+                }
+            }
+        }
+    }
+}
+
 /// What is refused in the loop changes nothing.
 #[test]
 fn refused_commands_leave_the_last_good_value() {

@@ -66,25 +66,26 @@ impl Controller {
     ///
     /// Commands given before the first tick hold from the start; later ones set a settled movement going.
     pub(super) fn obey(&mut self, command: &Command) {
-        let (conditions, filter) = (&mut self.conditions, self.filter);
+        let filter = self.filter;
         let mut news = false;
-        if let Some(style) = command.style.filter(|style| *style != conditions.style) {
-            conditions.style.copy_from_slice(style);
+        if let Some(style) = command.style.filter(|style| *style != self.conditions.style) {
+            self.conditions.style.copy_from_slice(style);
             self.style.follow(style, &filter);
             news = true;
         }
-        if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != conditions.centre) {
-            conditions.centre.copy_from_slice(centre);
+        if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
+            self.conditions.centre.copy_from_slice(centre);
             self.centre.follow(centre, &filter);
+            self.set_tolerance();
             news = true;
         }
-        if let Some(tau) = command.tau.filter(|tau| *tau != conditions.tau) {
-            conditions.tau = tau;
+        if let Some(tau) = command.tau.filter(|tau| *tau != self.conditions.tau) {
+            self.conditions.tau = tau;
             self.rate.follow(&[1.0 / tau], &filter);
             news = true;
         }
-        if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != conditions.amplitude) {
-            conditions.amplitude = amplitude;
+        if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != self.conditions.amplitude) {
+            self.conditions.amplitude = amplitude;
             news = true;
         }
         if !news {
@@ -94,7 +95,6 @@ impl Controller {
         if !self.started {
             return self.begin();
         }
-        self.tolerate_way();
         // A style that was switched to at once.
         if filter.immediate() {
             self.read_forcing();

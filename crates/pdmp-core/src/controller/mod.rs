@@ -6,9 +6,12 @@
 //! ([`Command::measured`], [`Command::coupling`]) slows the phase's clock against the output system's, and adds to ẏ and
 //! ÿ.
 //!
-//! Nothing in [`Controller::update`] or in a setter allocates, locks or panics, and a tick takes O(J·D) whatever the
-//! model was learnt from.
+//! Nothing in [`Controller::update`] or in a setter allocates, locks or panics. A tick takes O(J·D), whatever the model was
+//! learnt from: once if it is shorter than a 500th of the movement and than a 95th of a transition under way, and as many
+//! times as it is longer otherwise, a thousand at most.
 
+#[cfg(target_arch = "x86_64")]
+mod avx;
 mod commands;
 mod tick;
 
@@ -63,7 +66,8 @@ pub struct Controller {
     centre: Follower,
     /// By groups of DoFs, as all that follows.
     forcing: Vec<Forcing>,
-    /// Forcing at the start of the stretch at work.
+    /// Forcing at the start of the stretch at work, taken before anything moves: kept as numbers for the loop over the
+    /// groups, it would not stay in registers.
     from: Vec<Jet<Lanes>>,
     z: Vec<Lanes>,
     position: Vec<Lanes>,
@@ -126,7 +130,7 @@ impl Controller {
             held: Held::new(model.ranges(), model.canonical().extent()),
             finest,
             glide: filter.glide(dt),
-            propagator: series.propagator::<Lanes>(dt / conditions.tau),
+            propagator: series.propagator::<Lanes>(1.0 / conditions.tau * dt),
             series,
             conditions,
             model,
@@ -157,7 +161,7 @@ impl Controller {
         self.centre.jump(&conditions.centre);
         self.read_forcing();
         self.place();
-        self.tolerate();
+        self.set_tolerance();
         self.read_out();
     }
 
@@ -183,19 +187,14 @@ impl Controller {
         }
     }
 
-    /// Sets the distances at which the way from the start to the goal counts as gone.
-    fn tolerate(&mut self) {
+    /// Sets the distances at which the way from here to the goal counts as gone, not below what rounding leaves of it.
+    pub(super) fn set_tolerance(&mut self) {
         let ranges = self.model.ranges();
         let least = Lanes::splat(STILL * widest(ranges));
         repack(&mut self.tolerance, ranges);
         for tolerance in &mut self.tolerance {
             *tolerance = tolerance.max(least) * SETTLED;
         }
-        self.tolerate_way();
-    }
-
-    /// Widens the tolerances to the way that the goal commanded leaves, not below what rounding does.
-    fn tolerate_way(&mut self) {
         let ends = self.centre.target().iter().zip(&self.position);
         for (tolerance, (&centre, &position)) in self.tolerance.iter_mut().zip(ends) {
             let rounding = centre.abs().max(position.abs()) * (8.0 * f64::EPSILON);
@@ -239,17 +238,25 @@ impl Controller {
     /// that is not positive or longer than 1000 τ.
     pub fn update(&mut self, command: &Command, motion: &mut Motion) -> Result<Status> {
         motion.check(self.model.n_dofs())?;
+        let status = self.step_with(command)?;
+        motion.position.copy_from_slice(self.position());
+        motion.velocity.copy_from_slice(self.velocity());
+        motion.acceleration.copy_from_slice(self.acceleration());
+        Ok(status)
+    }
+
+    /// [`Controller::update`] whose motion is read from the controller afterwards.
+    ///
+    /// # Errors
+    /// As for [`Controller::update`].
+    pub fn step_with(&mut self, command: &Command) -> Result<Status> {
         command.check(&self.model)?;
         let dt = command.dt.unwrap_or(self.dt);
         self.check_length(dt, command.tau)?;
         self.obey(command);
         let h = self.stretch(dt);
         self.held.take(command, &self.position, dt, h);
-        let status = self.tick(dt, h);
-        motion.position.copy_from_slice(self.position());
-        motion.velocity.copy_from_slice(self.velocity());
-        motion.acceleration.copy_from_slice(self.acceleration());
-        Ok(status)
+        Ok(self.tick(dt, h))
     }
 
     /// Whether the movement goes on.

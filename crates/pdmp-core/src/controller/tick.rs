@@ -4,7 +4,7 @@ use super::{Controller, Status};
 use crate::attractor::{Attractor, Jet, State};
 use crate::error::{Error, Result};
 use crate::landscape::{Landscape, Place};
-use crate::lanes::{Lanes, Real, Register, settle, unpack};
+use crate::lanes::{Lanes, Real, Register, flush, unpack};
 use crate::perturbation::Push;
 use crate::phase::{Canonical, Sum, amplitude};
 
@@ -70,7 +70,9 @@ impl Controller {
     /// Checks that a tick is not too long for the rates at which it starts and to which it goes.
     pub(super) fn check_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
         let commanded = tau.map_or(first(self.rate.target()), |tau| 1.0 / tau);
-        if dt * first(self.rate.value()).max(commanded) > LONGEST_TICK {
+        let at_once = !self.started || self.filter.immediate();
+        let fastest = if at_once { commanded } else { commanded.max(first(self.rate.value())) };
+        if dt * fastest > LONGEST_TICK {
             return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
         }
         Ok(())
@@ -136,27 +138,20 @@ impl Controller {
     }
 
     /// Moves on by `dt` seconds, `h` on the clock.
-    #[allow(unsafe_code)]
     fn advance(&mut self, dt: f64, h: f64) {
         if h <= 0.0 {
             return self.read_out();
         }
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: AVX2 is there.
-            return unsafe { self.advance_avx(dt, h) };
+        if super::avx::advance(self, dt, h) {
+            return;
         }
         self.advance_in::<Lanes>(dt, h);
     }
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn advance_avx(&mut self, dt: f64, h: f64) {
-        self.advance_in::<crate::avx::Avx>(dt, h);
-    }
-
+    /// The same in registers of one kind.
     #[inline(always)]
-    fn advance_in<T: Register>(&mut self, dt: f64, h: f64) {
+    pub(super) fn advance_in<T: Register>(&mut self, dt: f64, h: f64) {
         self.measure(dt);
         if h != self.propagator.step() {
             self.propagator = self.series.propagator::<T>(h);
@@ -207,7 +202,7 @@ impl Controller {
                 origin = arrived;
                 next.z = next.z + moved.z;
             }
-            let (y, z_next) = (settle(y, rest), settle(next.z, rest));
+            let (y, z_next) = (flush(y, rest), flush(next.z, rest));
             (position[group], z[group]) = (y.store(), z_next.store());
             let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, to);
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
@@ -290,18 +285,18 @@ impl Controller {
         }
     }
 
-    /// Whether a movement is over: how far a DoF may still go is at most about |e| + 2τ|ẏ|/α_z + |w|/β_z, what is left
-    /// of its way, of its speed at critical damping, and of its forcing.
+    /// Whether a movement is over: how far a DoF may still go is at most about |y − g| + 2|z + w|/α_z + |w|/β_z, what is
+    /// left of its way, of its speed at critical damping, and of its forcing, and as far as the goal itself still goes.
     fn settled(&self) -> Status {
         let Some(Jet { value: fade, .. }) = self.model.landscape().fading(self.clock.value()) else {
             return Status::Working;
         };
         let Attractor { alpha_z, beta_z } = self.model.attractor();
-        let speed = 2.0 / (alpha_z * first(self.rate.value()));
         let over = (0..self.z.len()).all(|group| {
             let way = (self.position[group] - self.centre.target()[group]).abs();
-            let forcing = (self.forcing[group].shape * fade).abs();
-            let left = way + self.velocity[group].abs() * speed + forcing * (1.0 / beta_z);
+            let forcing = self.forcing[group].shape * fade;
+            let flow = (self.z[group] + forcing).abs() * (2.0 / alpha_z);
+            let left = way + flow + forcing.abs() * (1.0 / beta_z) + self.filter.left(&self.centre, group);
             left.simd_le(self.tolerance[group]).all()
         });
         if over { Status::Finished } else { Status::Working }

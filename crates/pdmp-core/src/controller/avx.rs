@@ -1,4 +1,4 @@
-//! Four degrees of freedom in one register of AVX2.
+//! The tick with four degrees of freedom in one register of AVX2.
 //!
 //! The intrinsics must be inlined into a function that may use them, hence `inline(always)` down to the last of them.
 #![allow(unsafe_code)]
@@ -9,16 +9,33 @@ use std::arch::x86_64::{
 };
 use std::ops::{Add, Mul, Sub};
 
+use super::Controller;
 use crate::lanes::{Lanes, Real, Register};
 
-/// Four DoFs; to be used only where the processor has AVX2.
+/// Moves on as [`Controller::advance_in`] does, if the processor has AVX2.
+#[inline(always)]
+pub(super) fn advance(controller: &mut Controller, dt: f64, h: f64) -> bool {
+    let found = std::arch::is_x86_feature_detected!("avx2");
+    if found {
+        // SAFETY: it was found.
+        unsafe { advance_found(controller, dt, h) };
+    }
+    found
+}
+
+#[target_feature(enable = "avx2")]
+fn advance_found(controller: &mut Controller, dt: f64, h: f64) {
+    controller.advance_in::<Avx>(dt, h);
+}
+
+/// Four DoFs. Only `advance_found` names this type, so that AVX2 was found wherever there is one.
 #[derive(Clone, Copy)]
-pub(crate) struct Avx(__m256d);
+struct Avx(__m256d);
 
 impl Default for Avx {
     #[inline(always)]
     fn default() -> Self {
-        // SAFETY: whoever names this type has found AVX2, as for all that follows.
+        // SAFETY: AVX2 was found, as for all that follows.
         Self(unsafe { _mm256_setzero_pd() })
     }
 }
