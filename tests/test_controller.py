@@ -213,6 +213,17 @@ def test_discrete_movements_end_as_they_finish(clock: Clock) -> None:
     assert controller.time == pytest.approx(clock.now - 1000, abs=1e-4)
 
 
+def test_a_goal_set_as_it_finishes_is_gone_to(clock: Clock) -> None:
+    """What the body of the last tick commands keeps the loop going."""
+    controller = REACH.controller(0.01)
+    goals = [[2, 1], [0.5, 0]]
+    for _ in controller.run():
+        if controller.status == Status.FINISHED and goals:
+            controller.goal = goals.pop()
+    assert not goals
+    np.testing.assert_allclose(controller.position, [2, 1], atol=5e-3)
+
+
 def test_a_given_duration_outlasts_the_movement(clock: Clock) -> None:
     """A loop with a duration holds the goal, and goes to a new one."""
     controller = REACH.controller(0.01)

@@ -65,8 +65,12 @@ def test_outputs_are_read_only_views(model: pdmp.Model, name: str) -> None:
 
 def test_outputs_cannot_be_made_writable(model: pdmp.Model) -> None:
     """Read-only is not a flag that the user can take off a view."""
+    position = model.controller(0.01).position
     with pytest.raises(ValueError, match="WRITEABLE"):
-        model.controller(0.01).position.setflags(write=True)
+        position.setflags(write=True)
+    assert not isinstance(position.base, np.ndarray)
+    with pytest.raises(ValueError, match="resize"):
+        position.resize(10**6, refcheck=False)
 
 
 def test_trajectories_are_the_users_own(model: pdmp.Model) -> None:

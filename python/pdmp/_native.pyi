@@ -135,7 +135,7 @@ class Model:
     @property
     def basis(self) -> str: ...  # what was chosen, in one line
     @property
-    def table_error(self) -> float: ...  # bound on the error of the compiled landscape
+    def table_error(self) -> float: ...  # estimated error of the compiled landscape
     def rollout(
         self,
         style: ArrayLike | None = None,  # (J,)
@@ -271,6 +271,8 @@ class Controller:
     def velocity(self) -> _Array: ...
     @property
     def acceleration(self) -> _Array: ...
+    @property
+    def status(self) -> Status: ...
     @property
     def phase(self) -> float: ...  # x in (0, 1], or phi in [0, 2 pi)
     @property

@@ -70,7 +70,7 @@ class Run:
     def __iter__(self) -> Iterator[Tick]:
         """Begin a loop that sleeps between its ticks."""
         self._begin()
-        while not self._over:
+        while not self._over():
             sleep(self._wait())
             yield self._tick()
 
@@ -79,16 +79,24 @@ class Run:
         from asyncio import sleep
 
         self._begin()
-        while not self._over:
+        while not self._over():
             await sleep(self._wait())
+            while (early := self._wait()) > 0:  # as event loops may wake
+                await sleep(early)
             yield self._tick()
 
     def _begin(self) -> None:
         self.ticks = self.missed = 0
         self.worst = 0.0
         self._periods = 0  # that the movement has made
-        self._over = False
         self._start = perf_counter()
+
+    def _over(self) -> bool:
+        """Tell whether to end, with what the body commanded taken into account."""
+        if self._last is None:
+            return self.ticks > 0 and self._controller.status == Status.FINISHED
+        # A movement that has settled is held, and may be commanded anew.
+        return self._periods >= self._last
 
     def _due(self) -> float:
         return self._start + (self._periods + 1) / self._rate
@@ -99,14 +107,12 @@ class Run:
     def _tick(self) -> Tick:
         late = max(0.0, perf_counter() - self._due())
         missed = int(late * self._rate)
-        status = self._controller.step(
+        if self._last is not None:
+            missed = min(missed, self._last - self._periods - 1)
+        self._controller.step(
             (1 + missed) / self._rate, measured=self._measured(), coupling=self._coupling()
         )
         self._periods += 1 + missed
-        if self._last is None:
-            self._over = status == Status.FINISHED
-        else:  # A movement that has settled is held, and may be commanded anew.
-            self._over = self._periods >= self._last
         self.ticks += 1
         self.missed += missed
         self.worst = max(self.worst, late)

@@ -1,7 +1,7 @@
 //! The real-time loop in Python.
 
-use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
-use pdmp_core::{Command, Coupling, Kind, Motion};
+use numpy::{PyArray1, PyArrayMethods};
+use pdmp_core::{Command, Coupling, Kind};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyFloat;
@@ -20,32 +20,26 @@ pub(crate) enum Status {
     Finished,
 }
 
-/// A vector that the loop writes and the user reads without a copy.
-struct Output {
-    /// Written by the controller alone; the user never sees it.
-    data: Py<PyArray1<f64>>,
-    /// A read-only view of the same memory.
-    view: Py<PyAny>,
-}
+/// A vector that the loop writes and the user reads without a copy: a read-only array over memory that numpy does not
+/// own, so that it can neither be made writable nor resized.
+struct Output(Py<PyArray1<f64>>);
 
 impl Output {
     fn new(py: Python<'_>, length: usize) -> PyResult<Self> {
-        let data = PyArray1::<f64>::zeros(py, length, false);
-        let view = data.call_method0("view")?;
-        // The array under the view too, or numpy would let a user lift the view's protection.
-        for array in [data.as_any(), &view] {
-            array.call_method("setflags", (false,), None)?;
-        }
-        Ok(Self { data: data.unbind(), view: view.unbind() })
+        let array = PyArray1::from_vec(py, vec![0.0; length]);
+        array.call_method("setflags", (false,), None)?;
+        Ok(Self(array.unbind()))
     }
 
-    /// The memory, to be written by a tick.
-    #[allow(unsafe_code, clippy::mut_from_ref)]
-    fn memory(&self, py: Python<'_>) -> &mut [f64] {
-        let data = self.data.bind(py);
-        // SAFETY: `new` made the array contiguous and no other code sees it but through its view, whose readers hold no
-        // Rust reference. Each tick borrows it once, under the controller's exclusive borrow, and calls no Python.
-        unsafe { std::slice::from_raw_parts_mut(data.data(), data.len()) }
+    #[allow(unsafe_code)]
+    fn write(&self, py: Python<'_>, values: &[f64]) {
+        let data = self.0.bind(py).data();
+        // SAFETY: `new` made the array contiguous and as long as the movement has DoFs; no Rust reference to it exists.
+        unsafe { data.copy_from_nonoverlapping(values.as_ptr(), values.len()) }
+    }
+
+    fn view(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+        self.0.clone_ref(py)
     }
 }
 
@@ -94,9 +88,9 @@ impl Controller {
     }
 
     fn publish(&self, py: Python<'_>) {
-        self.position.memory(py).copy_from_slice(self.inner.position());
-        self.velocity.memory(py).copy_from_slice(self.inner.velocity());
-        self.acceleration.memory(py).copy_from_slice(self.inner.acceleration());
+        self.position.write(py, self.inner.position());
+        self.velocity.write(py, self.inner.velocity());
+        self.acceleration.write(py, self.inner.acceleration());
     }
 
     /// A command may hold from the start, and then changes what is shown.
@@ -151,7 +145,7 @@ impl Controller {
         measured: Option<&Bound<'_, PyAny>>,
         coupling: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     ) -> PyResult<Py<PyAny>> {
-        let Self { inner, given, position, velocity, acceleration, .. } = self;
+        let Self { inner, given, .. } = self;
         if let Some(measured) = measured {
             refill("measured", measured, &mut given.measured)?;
         }
@@ -166,16 +160,9 @@ impl Controller {
             coupling: coupling.map(|_| terms),
             ..Command::default()
         };
-        let mut motion = Motion {
-            position: position.memory(py),
-            velocity: velocity.memory(py),
-            acceleration: acceleration.memory(py),
-        };
-        let status = inner.update(&command, &mut motion).map_err(raise)?;
-        Ok(match status {
-            pdmp_core::Status::Working => self.working.clone_ref(py),
-            pdmp_core::Status::Finished => self.finished.clone_ref(py),
-        })
+        inner.step_with(&command).map_err(raise)?;
+        self.publish(py);
+        Ok(self.status(py))
     }
 
     /// Run on the clock: a loop that makes one tick each period, and tells what was late.
@@ -199,8 +186,8 @@ impl Controller {
     /// rate_hz : float, optional
     ///     Ticks per second; 1 / dt of the controller otherwise.
     /// duration : float, optional
-    ///     Length in s, rounded to whole periods. Without it a discrete movement ends with the tick that is `FINISHED`,
-    ///     and a rhythmic one when the loop is left; with it, both last as long.
+    ///     Length in s, rounded to whole periods. Without it a discrete movement ends once its `status` is `FINISHED` and
+    ///     the body has commanded nothing more, and a rhythmic one when the loop is left; with it, both last as long.
     /// measured, coupling : callable, optional
     ///     Asked without arguments before each tick for what `step` takes under this name, or None.
     ///
@@ -265,26 +252,35 @@ impl Controller {
 
     /// Position y (D,): a read-only view.
     #[getter]
-    fn position(&self, py: Python<'_>) -> Py<PyAny> {
-        self.position.view.clone_ref(py)
+    fn position(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+        self.position.view(py)
     }
 
     /// Velocity (D,) per s: a read-only view.
     #[getter]
-    fn velocity(&self, py: Python<'_>) -> Py<PyAny> {
-        self.velocity.view.clone_ref(py)
+    fn velocity(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+        self.velocity.view(py)
     }
 
     /// Acceleration (D,) per s²: a read-only view.
     #[getter]
-    fn acceleration(&self, py: Python<'_>) -> Py<PyAny> {
-        self.acceleration.view.clone_ref(py)
+    fn acceleration(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+        self.acceleration.view(py)
     }
 
     /// Phase: x in (0, 1] where discrete, φ in [0, 2π) where rhythmic.
     #[getter]
     fn phase(&self) -> f64 {
         self.inner.phase()
+    }
+
+    /// Whether the movement goes on: what the last `step` returned, or `WORKING` if something was commanded since.
+    #[getter]
+    fn status(&self, py: Python<'_>) -> Py<PyAny> {
+        match self.inner.status() {
+            pdmp_core::Status::Working => self.working.clone_ref(py),
+            pdmp_core::Status::Finished => self.finished.clone_ref(py),
+        }
     }
 
     /// Time since the start in s.

@@ -167,7 +167,7 @@ impl Model {
         &self.0.learnt().basis
     }
 
-    /// Bound on the error of the compiled landscape, relative to its largest value.
+    /// Estimated error of the compiled landscape, relative to its largest value.
     #[getter]
     fn table_error(&self) -> f64 {
         self.0.landscape().error()
