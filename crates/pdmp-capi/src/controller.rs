@@ -4,7 +4,7 @@ use std::mem::{MaybeUninit, align_of, size_of};
 use std::ptr;
 use std::sync::Arc;
 
-use pdmp_core::{Command, Controller, Motion};
+use pdmp_core::{Command, Controller};
 
 use crate::model::pdmp_model;
 use crate::pair::{pdmp_memory, pdmp_text, pdmp_vector};
@@ -16,10 +16,6 @@ use pdmp_status::PDMP_OK;
 /// A running primitive: a model, its commands and its state. One thread at a time uses it.
 pub struct pdmp_controller {
     inner: Controller,
-    /// Where a tick writes before the caller does, whose vectors may overlap with the command's.
-    position: Vec<f64>,
-    velocity: Vec<f64>,
-    acceleration: Vec<f64>,
     /// Why the last call that was refused was.
     fault: Option<Fault>,
     /// Whether its memory is the library's.
@@ -75,12 +71,8 @@ pub unsafe extern "C" fn pdmp_controller_new(
         let transition = unsafe { transition.as_ref() }.copied();
         // SAFETY: the caller's promise is the same.
         let conditions = conditions.map(|conditions| unsafe { conditions.get(model) }).transpose()?.unwrap_or_default();
-        let zeros = || vec![0.0; model.n_dofs()];
         let made = pdmp_controller {
             inner: Controller::new(Arc::clone(model), dt, &conditions, transition)?,
-            position: zeros(),
-            velocity: zeros(),
-            acceleration: zeros(),
             fault: None,
             owned: given.is_none(),
         };
@@ -264,13 +256,14 @@ pub unsafe extern "C" fn pdmp_controller_update(
     motion: Option<&pdmp_motion>,
 ) -> pdmp_status {
     on(controller, |controller| {
-        let pdmp_controller { inner, position, velocity, acceleration, .. } = controller;
-        motion.map_or(Ok(()), |motion| motion.check(position.len()))?;
+        let inner = &mut controller.inner;
+        motion.map_or(Ok(()), |motion| motion.check(inner.model().n_dofs()))?;
         // SAFETY: the caller's promise is the same.
         let command = command.map_or(Ok(Command::default()), |command| unsafe { command.get(inner.model()) })?;
-        let status = inner.update(&command, &mut Motion { position, velocity, acceleration })?;
+        let status = inner.step_with(&command)?;
         if let Some(motion) = motion {
-            // SAFETY: the caller's promise is the same, and the room was checked.
+            // SAFETY: the caller's promise is the same, and the room was checked. The command, whose vectors may overlap
+            // with these, has been read.
             unsafe { motion.put(inner) };
         }
         Ok(status.into())
@@ -288,7 +281,7 @@ pub unsafe extern "C" fn pdmp_controller_read(
 ) -> pdmp_status {
     on(controller, |controller| {
         let motion = motion.ok_or(Fault::Null("motion"))?;
-        motion.check(controller.position.len())?;
+        motion.check(controller.inner.model().n_dofs())?;
         // SAFETY: the caller's promise is the same, and the room was checked.
         unsafe { motion.put(&controller.inner) };
         Ok(controller.inner.status().into())
