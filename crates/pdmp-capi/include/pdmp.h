@@ -2,9 +2,11 @@
 //
 // - A pointer and the length it reaches are one argument, and a struct that is all zero tells nothing: what is not told
 //   stays as it was, or is that of the nominal demonstration. Numbers are counted, texts and memory are in bytes.
-// - A status below zero is a refusal. Its call changed nothing, and a text says what is wrong and what would be right.
+// - A status below zero is a refusal. Its call changed nothing, but for PDMP_INTERNAL, and a text says what is wrong and
+//   what would be right.
 // - What runs in the loop neither allocates nor locks: pdmp_controller_step, _update, _set_..., _read, _progress and
 //   _error. All else may take its time.
+// - Structs may grow from version to version: compile anew with each.
 // - Threads: a model can be shared; a controller is used by one thread at a time.
 //
 // Link with -lpdmp; the static library wants -lpthread -ldl -lm too. In C++, pdmp.hpp wraps all this.

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use pdmp_core::{Command, Controller};
 
+use crate::buffers::{pdmp_memory, pdmp_text, pdmp_vector};
+use crate::command::{pdmp_command, pdmp_conditions, pdmp_motion};
 use crate::model::pdmp_model;
-use crate::pair::{pdmp_memory, pdmp_text, pdmp_vector};
 use crate::status::{Fault, answer, answer_in, pdmp_status};
-use crate::told::{pdmp_command, pdmp_conditions, pdmp_motion};
 
 use pdmp_status::PDMP_OK;
 

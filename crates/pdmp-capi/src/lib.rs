@@ -9,14 +9,14 @@
 #![allow(unsafe_code, reason = "C hands over pointers and lengths apart")]
 #![allow(non_camel_case_types, reason = "types and constants have their C names")]
 
+mod buffers;
+mod command;
 mod controller;
 mod model;
-mod pair;
 mod status;
-mod told;
 
+pub use buffers::*;
+pub use command::*;
 pub use controller::*;
 pub use model::*;
-pub use pair::*;
 pub use status::{pdmp_status, pdmp_version};
-pub use told::*;

@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 use pdmp_core::{Conditions, Error, Kind, Model, Prediction};
 
-use crate::pair::{pdmp_buffer, pdmp_text, pdmp_vector};
+use crate::buffers::{pdmp_buffer, pdmp_text, pdmp_vector};
+use crate::command::pdmp_conditions;
 use crate::status::{Fault, answer, answer_in, pdmp_status};
-use crate::told::pdmp_conditions;
 
 use pdmp_kind::*;
 use pdmp_status::PDMP_OK;

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use pdmp_core::{Error, Status};
 
-use crate::pair::pdmp_text;
+use crate::buffers::pdmp_text;
 
 /// What a call came to; below zero it was refused.
 #[repr(C)]

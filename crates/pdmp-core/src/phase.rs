@@ -90,12 +90,12 @@ pub(crate) fn turn(phi: f64) -> f64 {
 
 /// A sum of many small steps that does not drift: what each addition rounds off is carried to the next (Kahan 1965).
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Sum {
+pub(crate) struct CompensatedSum {
     value: f64,
     carried: f64,
 }
 
-impl Sum {
+impl CompensatedSum {
     /// A sum that starts at `value`.
     pub(crate) fn at(value: f64) -> Self {
         Self { value, carried: 0.0 }

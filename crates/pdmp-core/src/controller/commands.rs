@@ -58,14 +58,14 @@ impl Controller {
 
     fn set(&mut self, command: &Command) -> Result<()> {
         command.check(&self.model)?;
-        self.obey(command);
+        self.apply(command);
         Ok(())
     }
 
     /// Takes a command that has been checked. What is commanded already changes nothing.
     ///
     /// Commands given before the first tick hold from the start; later ones set a settled movement going.
-    pub(super) fn obey(&mut self, command: &Command) {
+    pub(super) fn apply(&mut self, command: &Command) {
         let filter = self.filter;
         let mut news = false;
         if let Some(style) = command.style.filter(|style| *style != self.conditions.style) {

@@ -24,7 +24,7 @@ use crate::follower::{Filter, Follower, Glide};
 use crate::lanes::{Lanes, groups, repack, unpack};
 use crate::model::{Complete, Conditions, Model};
 use crate::perturbation::{Held, STILL, widest};
-use crate::phase::{Kind, Sum};
+use crate::phase::{CompensatedSum, Kind};
 use crate::series::Series;
 use tick::Forcing;
 
@@ -53,9 +53,9 @@ pub struct Controller {
     conditions: Complete,
     started: bool,
     status: Status,
-    time: Sum,
+    time: CompensatedSum,
     /// Clock u, or the polar phase φ in [0, 2π).
-    clock: Sum,
+    clock: CompensatedSum,
     /// Amplitude r; 1 where discrete.
     r: f64,
     filter: Filter,
@@ -112,8 +112,8 @@ impl Controller {
             dt,
             started: false,
             status: Status::Working,
-            time: Sum::default(),
-            clock: Sum::default(),
+            time: CompensatedSum::default(),
+            clock: CompensatedSum::default(),
             r: 1.0,
             filter,
             style: Follower::new(&conditions.style),
@@ -153,7 +153,7 @@ impl Controller {
         self.started = false;
         self.status = Status::Working;
         self.held.release();
-        (self.time, self.clock) = (Sum::default(), Sum::default());
+        (self.time, self.clock) = (CompensatedSum::default(), CompensatedSum::default());
         let conditions = &self.conditions;
         self.r = conditions.amplitude;
         self.style.jump(&conditions.style);
@@ -253,7 +253,7 @@ impl Controller {
         command.check(&self.model)?;
         let dt = command.dt.unwrap_or(self.dt);
         self.check_length(dt, command.tau)?;
-        self.obey(command);
+        self.apply(command);
         let h = self.stretch(dt);
         self.held.take(command, &self.position, dt, h);
         Ok(self.tick(dt, h))

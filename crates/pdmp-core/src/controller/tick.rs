@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::landscape::{Landscape, Place};
 use crate::lanes::{Lanes, Real, Register, flush, unpack};
 use crate::perturbation::Push;
-use crate::phase::{Canonical, Sum, amplitude};
+use crate::phase::{Canonical, CompensatedSum, amplitude};
 
 /// Most pieces of a tick; a longer one is still stable, only less exact.
 const MOST_PIECES: f64 = 1000.0;
@@ -131,7 +131,7 @@ impl Controller {
             let h = self.stretch(before);
             self.advance(before, h);
         }
-        self.clock = Sum::at(u_end);
+        self.clock = CompensatedSum::at(u_end);
         self.read_forcing();
         let h = self.stretch(dt - before);
         self.advance(dt - before, h);
@@ -209,13 +209,13 @@ impl Controller {
         }
         landscape.prefetch(self.clock.value() + self.held.pace() * h);
         if let Some(before) = levers {
-            self.give_way(before);
+            self.add_perturbation(before);
             self.read_out();
         }
     }
 
     /// Adds what a perturbation does; the system is linear.
-    fn give_way(&mut self, before: [Jet; 2]) {
+    fn add_perturbation(&mut self, before: [Jet; 2]) {
         let after = self.levers();
         let by_velocity = self.propagator.advance(State::default(), [before[0], after[0]]);
         let by_acceleration = self.propagator.follow([before[1], after[1]]);

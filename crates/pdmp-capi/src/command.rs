@@ -4,7 +4,7 @@ use std::ptr;
 
 use pdmp_core::{Command, Conditions, Controller, Coupling, Model};
 
-use crate::pair::{pdmp_buffer, pdmp_vector};
+use crate::buffers::{pdmp_buffer, pdmp_vector};
 use crate::status::Fault;
 
 /// What a movement starts with; what is not told is that of the nominal demonstration.
