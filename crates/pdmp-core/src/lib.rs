@@ -81,6 +81,7 @@ mod rollout;
 mod series;
 mod smooth;
 mod spline;
+mod threads;
 
 pub use align::Alignment;
 pub use attractor::Attractor;
@@ -96,3 +97,4 @@ pub use model::{Conditions, Demonstrated, Learnt, Model};
 pub use phase::{Canonical, Kind};
 pub use rollout::Timing;
 pub use smooth::Smoothing;
+pub use threads::Threads;
