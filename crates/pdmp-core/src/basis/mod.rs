@@ -1,7 +1,6 @@
 //! Regression of the basis targets over the clock (step 4 of Section 3.2): one regressor a file.
 
 mod gp;
-mod kernel;
 mod ngnet;
 mod search;
 
@@ -10,8 +9,7 @@ use std::fmt;
 
 use ndarray::ArrayView2;
 
-pub use self::gp::{Gp, GpPosterior};
-pub use self::kernel::Kernel;
+pub use self::gp::{Gp, GpPosterior, Kernel};
 pub use self::ngnet::{NGnet, NGnetRegression};
 use crate::error::{Error, Result, check_positive};
 
@@ -88,8 +86,8 @@ fn check(domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<()> {
     if let Some((index, &value)) = u.iter().enumerate().find(|(_, u)| !u.is_finite()) {
         return Err(Error::NotFinite { name: "u", index, value });
     }
-    if u.windows(2).any(|pair| pair[1] <= pair[0]) {
-        return Err(Error::Arguments("u must increase"));
+    if u.windows(2).any(|pair| pair[1] < pair[0]) {
+        return Err(Error::Arguments("u must not decrease"));
     }
     // Targets may exceed the bound on positions, of which they hold the derivative.
     match targets.indexed_iter().find(|(_, value)| !value.is_finite()) {
@@ -125,7 +123,7 @@ mod tests {
             assert!(matches!(error(interval, &[], &Array2::ones((0, 1))), Error::Arguments(_)));
             assert!(matches!(error(interval, &[0.0], &two), Error::Length { expected: 2, found: 1, .. }));
             assert!(matches!(error(interval, &[0.0, nan], &two), Error::NotFinite { index: 1, .. }));
-            assert!(matches!(error(interval, &[1.0, 1.0], &two), Error::Arguments(_)));
+            assert!(matches!(error(interval, &[1.0, 0.9], &two), Error::Arguments(_)));
             let gap = array![[1.0, 1.0], [nan, 1.0]];
             assert!(matches!(error(interval, &[0.0, 1.0], &gap), Error::NotFiniteAt { row: 1, column: 0, .. }));
         }

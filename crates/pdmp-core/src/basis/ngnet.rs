@@ -58,7 +58,7 @@ impl NGnet {
         Ok(ngnet)
     }
 
-    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must increase.
+    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease.
     ///
     /// # Errors
     /// Settings out of range, arrays that do not match, numbers that are not finite.

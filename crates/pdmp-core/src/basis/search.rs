@@ -1,116 +1,180 @@
-//! Maximum of an expensive function of few variables: a scan of a grid, then the simplex method from its best point.
+//! Maximum of a smooth, expensive function of two variables in a box: a coarse scan, then ascent from its best places.
 
 use crate::error::Result;
 
-/// Simplex searches from the best point so far, while each still gains more than `GAIN`.
-const ROUNDS: usize = 3;
-const GAIN: f64 = 0.01;
-/// Steps granted to each search, and the size at which its simplex has converged.
-const STEPS: usize = 60;
-const TOLERANCE: f64 = 0.01;
+/// Most places from which the ascent starts.
+const STARTS: usize = 3;
+/// The ascent ends where the next step promises to gain less.
+const GAIN: f64 = 1e-5;
+/// Most steps of an ascent, and most times that one of them is halved.
+const STEPS: usize = 50;
+const HALVINGS: usize = 20;
 
 /// The range of one variable.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Axis {
     pub(super) low: f64,
     pub(super) high: f64,
-    /// Points of the scan, ends included; at least 2.
+    /// Points of the scan, ends included; one, the lower end, if the variable is given.
     pub(super) points: usize,
 }
 
 impl Axis {
+    /// Of a variable that has one value.
+    pub(super) fn given(value: f64) -> Self {
+        Self { low: value, high: value, points: 1 }
+    }
+
     fn step(&self) -> f64 {
-        (self.high - self.low) / (self.points - 1) as f64
+        (self.high - self.low) / (self.points - 1).max(1) as f64
     }
 }
 
-/// A point and the function there.
-#[derive(Clone)]
-struct Vertex {
-    at: Vec<f64>,
-    value: f64,
+/// A value of the function, −∞ where it does not exist, and its gradient.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Score {
+    pub(super) value: f64,
+    pub(super) gradient: [f64; 2],
 }
 
-/// Where in the box f is largest; it may be −∞ where it does not exist.
+impl Score {
+    pub(super) const IMPOSSIBLE: Self = Self { value: f64::NEG_INFINITY, gradient: [0.0; 2] };
+}
+
+/// What is to be maximised.
+pub(super) trait Objective {
+    /// A guess at the value, good enough to find the neighbourhood of a maximum.
+    fn glance(&mut self, at: [f64; 2]) -> Result<f64>;
+
+    /// The function and its gradient.
+    fn score(&mut self, at: [f64; 2]) -> Result<Score>;
+}
+
+/// Where in the box the function is largest.
 ///
-/// The scan avoids local maxima and plateaus. The simplex may collapse onto a face of the box, to which it is clamped:
-/// hence the further rounds.
-///
-/// Nelder and Mead, The Computer Journal 7 (1965) 308–313.
-pub(super) fn maximise(axes: &[Axis], mut f: impl FnMut(&[f64]) -> Result<f64>) -> Result<Vec<f64>> {
-    let mut evaluate = |mut at: Vec<f64>| -> Result<Vertex> {
-        at.iter_mut().zip(axes).for_each(|(x, axis)| *x = x.clamp(axis.low, axis.high));
-        Ok(Vertex { value: f(&at)?, at })
+/// The scan avoids local maxima and plateaus, and the ascent never ends below a start: of a flat function the first
+/// point is returned.
+pub(super) fn maximise(axes: &[Axis; 2], objective: &mut impl Objective) -> Result<[f64; 2]> {
+    let [rows, columns] = axes.map(|axis| axis.points);
+    let point = |cell: usize| {
+        let index = [cell / columns, cell % columns];
+        std::array::from_fn(|k| axes[k].low + index[k] as f64 * axes[k].step())
     };
-    let mut best = evaluate(axes.iter().map(|axis| axis.low).collect())?;
-    for cell in 1..axes.iter().map(|axis| axis.points).product() {
-        let mut rest = cell;
-        let digit = |axis: &Axis| {
-            let k = rest % axis.points;
-            rest /= axis.points;
-            axis.low + k as f64 * axis.step()
-        };
-        let vertex = evaluate(axes.iter().map(digit).collect())?;
-        if vertex.value > best.value {
-            best = vertex;
+    let glances: Vec<f64> = (0..rows * columns).map(|cell| objective.glance(point(cell))).collect::<Result<_>>()?;
+    let mut starts: Vec<usize> = (0..glances.len()).filter(|&cell| is_summit(&glances, columns, cell)).collect();
+    starts.sort_by(|&a, &b| glances[b].total_cmp(&glances[a]));
+    let mut best: Option<([f64; 2], f64)> = None;
+    for &start in starts.iter().take(STARTS) {
+        let (at, value) = climb(axes, point(start), objective)?;
+        if best.is_none_or(|(_, most)| value > most) {
+            best = Some((at, value));
         }
     }
-    for _ in 0..ROUNDS {
-        let start = best.value;
-        best = climb(best, axes, &mut evaluate)?;
-        if best.value - start < GAIN {
-            break;
-        }
-    }
-    Ok(best.at)
+    Ok(best.map_or(point(0), |(at, _)| at))
 }
 
-/// The simplex method from `start`, never to a point below it.
-fn climb(start: Vertex, axes: &[Axis], evaluate: &mut impl FnMut(Vec<f64>) -> Result<Vertex>) -> Result<Vertex> {
-    let n = axes.len();
-    let mut simplex = vec![start];
-    for (k, axis) in axes.iter().enumerate() {
-        let mut at = simplex[0].at.clone();
-        // Half a cell of the scan, to the farther side.
-        at[k] += 0.5 * axis.step() * if at[k] > 0.5 * (axis.low + axis.high) { -1.0 } else { 1.0 };
-        simplex.push(evaluate(at)?);
-    }
+/// Whether no neighbour of a cell is higher, nor as high and before it.
+fn is_summit(values: &[f64], columns: usize, cell: usize) -> bool {
+    let (row, column) = ((cell / columns) as isize, (cell % columns) as isize);
+    let rows = (values.len() / columns) as isize;
+    (-1..=1).flat_map(|i| (-1..=1).map(move |j| (row + i, column + j))).all(|(i, j)| {
+        let inside = (0..rows).contains(&i) && (0..columns as isize).contains(&j);
+        let other = (i * columns as isize + j) as usize;
+        !inside || other == cell || values[cell] > values[other] || (values[cell] == values[other] && cell < other)
+    })
+}
+
+/// Ascent from `start`, never to a point below it: the quasi-Newton method of Broyden, Fletcher, Goldfarb and Shanno
+/// on the variables that are free to move, one cell of the scan at a time.
+///
+/// Nocedal and Wright, Numerical Optimization (2006), Sections 6.1 and 16.7.
+fn climb(axes: &[Axis; 2], start: [f64; 2], objective: &mut impl Objective) -> Result<([f64; 2], f64)> {
+    let mut at = start;
+    let mut here = objective.score(at)?;
+    let mut curvature: Option<Curvature> = None;
     for _ in 0..STEPS {
-        simplex.sort_by(|a, b| b.value.total_cmp(&a.value));
-        if size(&simplex) < TOLERANCE {
+        let g = here.gradient;
+        let free = [0, 1].map(|k| if g[k] > 0.0 { at[k] < axes[k].high } else { g[k] < 0.0 && at[k] > axes[k].low });
+        let mut step = match &curvature {
+            Some(curvature) => curvature.step(g, free),
+            // Half a cell, along the gradient.
+            None => {
+                let steepest = (0..2).filter(|&k| free[k]).map(|k| g[k].abs() / axes[k].step()).fold(0.0, f64::max);
+                [0, 1].map(|k| if free[k] { 0.5 * g[k] / steepest } else { 0.0 })
+            }
+        };
+        let cells = (0..2).filter(|&k| free[k]).map(|k| step[k].abs() / axes[k].step()).fold(1.0, f64::max);
+        step = step.map(|s| s / cells);
+        if !(step[0] * g[0] + step[1] * g[1] > GAIN) {
             break;
         }
-        // A point on the line from the worst vertex through the centre of the others.
-        let along = |factor: f64| -> Vec<f64> {
-            let centre = |k: usize| simplex[..n].iter().map(|vertex| vertex.at[k]).sum::<f64>() / n as f64;
-            (0..n).map(|k| centre(k) + factor * (centre(k) - simplex[n].at[k])).collect()
-        };
-        let (first, last, worst) = (simplex[0].value, simplex[n - 1].value, simplex[n].value);
-        let reflected = evaluate(along(1.0))?;
-        let further = match reflected.value {
-            value if value > first => Some(2.0),
-            value if value > last => None,
-            value if value > worst => Some(0.5),
-            _ => Some(-0.5),
-        };
-        let second = further.map(|factor| evaluate(along(factor))).transpose()?;
-        let candidate = second.filter(|second| second.value > reflected.value).unwrap_or(reflected);
-        if candidate.value > worst {
-            simplex[n] = candidate;
-        } else {
-            for k in 1..=n {
-                let halfway = simplex[0].at.iter().zip(&simplex[k].at).map(|(a, b)| 0.5 * (a + b)).collect();
-                simplex[k] = evaluate(halfway)?;
-            }
-        }
+        let Some((next, there)) = advance(axes, at, here, step, objective)? else { break };
+        let moved = [0, 1].map(|k| next[k] - at[k]);
+        let bent = [0, 1].map(|k| g[k] - there.gradient[k]);
+        curvature = Curvature::updated(curvature, moved, bent);
+        (at, here) = (next, there);
     }
-    simplex.sort_by(|a, b| b.value.total_cmp(&a.value));
-    Ok(simplex.swap_remove(0))
+    Ok((at, here.value))
 }
 
-/// Largest distance of a vertex from the first, along any axis.
-fn size(simplex: &[Vertex]) -> f64 {
-    let pairs = simplex.iter().flat_map(|vertex| vertex.at.iter().zip(&simplex[0].at));
-    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+/// The first point along a step, clamped to the box and halved until it pays, if there is one.
+fn advance(
+    axes: &[Axis; 2],
+    at: [f64; 2],
+    here: Score,
+    mut step: [f64; 2],
+    objective: &mut impl Objective,
+) -> Result<Option<([f64; 2], Score)>> {
+    for _ in 0..HALVINGS {
+        let next = [0, 1].map(|k| (at[k] + step[k]).clamp(axes[k].low, axes[k].high));
+        let promised: f64 = (0..2).map(|k| here.gradient[k] * (next[k] - at[k])).sum();
+        let there = objective.score(next)?;
+        if there.value > here.value && there.value >= here.value + 1e-4 * promised {
+            return Ok(Some((next, there)));
+        }
+        step = step.map(|s| 0.5 * s);
+    }
+    Ok(None)
+}
+
+/// Estimate of minus the second derivatives, positive definite.
+#[derive(Clone, Copy)]
+struct Curvature {
+    first: f64,
+    mixed: f64,
+    second: f64,
+}
+
+impl Curvature {
+    /// To the top of the parabola, as far as the variables are free.
+    fn step(&self, g: [f64; 2], free: [bool; 2]) -> [f64; 2] {
+        let Self { first, mixed, second } = *self;
+        match free {
+            [true, true] => {
+                let determinant = first * second - mixed * mixed;
+                [(second * g[0] - mixed * g[1]) / determinant, (first * g[1] - mixed * g[0]) / determinant]
+            }
+            [true, false] => [g[0] / first, 0.0],
+            [false, true] => [0.0, g[1] / second],
+            [false, false] => [0.0, 0.0],
+        }
+    }
+
+    /// Learns that the gradient fell by `bent` over a step. Where it rose, the function is not yet a hill, and nothing
+    /// is learnt.
+    fn updated(old: Option<Self>, moved: [f64; 2], bent: [f64; 2]) -> Option<Self> {
+        let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+        let fall = dot(moved, bent);
+        if !(fall > 1e-8 * (dot(moved, moved) * dot(bent, bent)).sqrt()) {
+            return None;
+        }
+        let scale = dot(bent, bent) / fall;
+        let b = old.unwrap_or(Self { first: scale, mixed: 0.0, second: scale });
+        let lost = [b.first * moved[0] + b.mixed * moved[1], b.mixed * moved[0] + b.second * moved[1]];
+        let share = dot(moved, lost);
+        let entry = |b: f64, i: usize, j: usize| b - lost[i] * lost[j] / share + bent[i] * bent[j] / fall;
+        Some(Self { first: entry(b.first, 0, 0), mixed: entry(b.mixed, 0, 1), second: entry(b.second, 1, 1) })
+    }
 }
 
 #[cfg(test)]
@@ -119,47 +183,96 @@ mod tests {
     use crate::Error;
     use approx::assert_abs_diff_eq;
 
-    fn square() -> Vec<Axis> {
-        vec![Axis { low: -4.0, high: 4.0, points: 6 }, Axis { low: -10.0, high: 0.0, points: 6 }]
+    struct Hill<F>(F);
+
+    impl<F: FnMut([f64; 2]) -> Result<Score>> Objective for Hill<F> {
+        fn glance(&mut self, at: [f64; 2]) -> Result<f64> {
+            Ok((self.0)(at)?.value)
+        }
+
+        fn score(&mut self, at: [f64; 2]) -> Result<Score> {
+            (self.0)(at)
+        }
+    }
+
+    const SQUARE: [Axis; 2] = [Axis { low: -4.0, high: 4.0, points: 6 }, Axis { low: -10.0, high: 0.0, points: 6 }];
+
+    fn top(f: impl Fn([f64; 2]) -> (f64, [f64; 2])) -> [f64; 2] {
+        let score = |at| {
+            let (value, gradient) = f(at);
+            Ok(Score { value, gradient })
+        };
+        maximise(&SQUARE, &mut Hill(score)).unwrap()
     }
 
     #[test]
     fn finds_the_top_of_a_slanting_ridge() {
-        let f = |x: &[f64]| Ok(-(x[0] - 0.7).powi(2) - 30.0 * (x[1] + 5.0 * x[0] - 0.3).powi(2));
-        let top = maximise(&square(), f).unwrap();
-        assert_abs_diff_eq!(top[0], 0.7, epsilon = 0.1);
-        assert_abs_diff_eq!(top[1], -3.2, epsilon = 0.5);
+        let top = top(|[x, y]| {
+            let across = y + 5.0 * x - 0.3;
+            (-(x - 0.7).powi(2) - 30.0 * across * across, [-2.0 * (x - 0.7) - 300.0 * across, -60.0 * across])
+        });
+        assert_abs_diff_eq!(top[0], 0.7, epsilon = 0.05);
+        assert_abs_diff_eq!(top[1], -3.2, epsilon = 0.25);
     }
 
     #[test]
     fn finds_the_top_on_an_edge_and_in_a_corner() {
-        let edge = maximise(&square(), |x| Ok(-(x[0] - 1.1).powi(2) + x[1])).unwrap();
+        let edge = top(|[x, y]| (y - (x - 1.1).powi(2), [-2.0 * (x - 1.1), 1.0]));
         assert_abs_diff_eq!(edge[0], 1.1, epsilon = 0.05);
         assert_eq!(edge[1], 0.0);
-        assert_eq!(maximise(&square(), |x| Ok(x[0] - x[1])).unwrap(), [4.0, -10.0]);
+        assert_eq!(top(|[x, y]| (x - y, [1.0, -1.0])), [4.0, -10.0]);
     }
 
     #[test]
     fn crosses_a_plateau_and_avoids_where_the_function_does_not_exist() {
-        let f = |x: &[f64]| Ok(if x[0] < 0.0 { f64::NEG_INFINITY } else { (-(x[0] - 3.0).powi(2) * 9.0).exp() });
-        assert_abs_diff_eq!(maximise(&square(), f).unwrap()[0], 3.0, epsilon = 0.05);
+        let found = top(|[x, _]| {
+            let bell = 100.0 * (-9.0 * (x - 3.0).powi(2)).exp();
+            if x < 0.0 { (f64::NEG_INFINITY, [0.0; 2]) } else { (bell, [-18.0 * (x - 3.0) * bell, 0.0]) }
+        });
+        assert_abs_diff_eq!(found[0], 3.0, epsilon = 0.01);
+    }
+
+    #[test]
+    fn the_higher_of_two_tops_is_found_though_the_scan_prefers_the_other() {
+        let found = top(|[x, y]| {
+            // Cells of the scan lie at ±0.8, ±2.4, ±4: the top at −1.6 is between them.
+            let bell = |centre: f64, height: f64, width: f64| {
+                let e = height * (-((x - centre) / width).powi(2)).exp();
+                (e, -2.0 * (x - centre) / (width * width) * e)
+            };
+            let ((a, da), (b, db)) = (bell(2.4, 10.0, 0.5), bell(-1.6, 20.0, 0.8));
+            (a + b - 0.01 * y * y, [da + db, -0.02 * y])
+        });
+        assert_abs_diff_eq!(found[0], -1.6, epsilon = 0.01);
+    }
+
+    #[test]
+    fn given_variables_stay() {
+        let axes = [SQUARE[0], Axis::given(7.0)];
+        let score = |[x, y]: [f64; 2]| Ok(Score { value: -x * x + y, gradient: [-2.0 * x, 1.0] });
+        let top = maximise(&axes, &mut Hill(score)).unwrap();
+        assert_abs_diff_eq!(top[0], 0.0, epsilon = 0.05);
+        assert_eq!(top[1], 7.0);
     }
 
     #[test]
     fn stays_in_the_box_and_ends_on_any_function() {
-        for constant in [0.0, f64::NEG_INFINITY] {
+        // Flat, without a value, and with a gradient that lies.
+        for (constant, slope) in [(0.0, 0.0), (f64::NEG_INFINITY, 0.0), (1.0, 1e9), (1.0, f64::NAN)] {
             let mut n = 0;
-            let at = maximise(&square(), |x| {
+            let score = |at: [f64; 2]| {
                 n += 1;
-                assert!((-4.0..=4.0).contains(&x[0]) && (-10.0..=0.0).contains(&x[1]));
-                Ok(constant)
-            });
-            assert!(at.is_ok() && n < 300);
+                assert!((-4.0..=4.0).contains(&at[0]) && (-10.0..=0.0).contains(&at[1]));
+                Ok(Score { value: constant, gradient: [slope; 2] })
+            };
+            assert_eq!(maximise(&SQUARE, &mut Hill(score)).unwrap(), [-4.0, -10.0]);
+            assert!(n < 100);
         }
     }
 
     #[test]
     fn hands_an_interruption_on() {
-        assert!(matches!(maximise(&square(), |_| Err(Error::Interrupted)), Err(Error::Interrupted)));
+        let mut stopped = Hill(|_| Err(Error::Interrupted));
+        assert!(matches!(maximise(&SQUARE, &mut stopped), Err(Error::Interrupted)));
     }
 }
