@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
-use pdmp_core::basis::{Basis, Gp, NGnet};
+use pdmp_core::basis::{Basis, Domain, Gp, Kernel, NGnet};
 use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount, Timing, fit};
 
 /// M movements of D = 7 that span a few dimensions, 1001 samples in one second.
@@ -51,6 +51,40 @@ fn fits(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// P smooth outputs over [0, 1] at C samples.
+fn targets(n_samples: usize, n_outputs: usize) -> (Vec<f64>, Array2<f64>) {
+    let u: Vec<f64> = (0..n_samples).map(|i| i as f64 / (n_samples - 1) as f64).collect();
+    let targets = Array2::from_shape_fn((n_samples, n_outputs), |(i, o)| {
+        let (phase, o) = (2.0 * PI * u[i], o as f64);
+        ((1.0 + 0.3 * o) * phase + 0.4 * o).sin().exp() / (1.0 + o)
+    });
+    (u, targets)
+}
+
+fn processes(criterion: &mut Criterion) {
+    let domain = Domain::Interval { end: 1.0 };
+    let mut group = criterion.benchmark_group("gaussian process");
+    group.sample_size(10);
+    for kernel in [Kernel::Matern32, Kernel::Matern52] {
+        for (n_samples, n_outputs) in [(1001, 21), (1000, 3), (4000, 3), (16_000, 3), (100_000, 3)] {
+            let (u, targets) = targets(n_samples, n_outputs);
+            for (what, length, noise) in [("given", Some(0.2), Some(1e-8)), ("found", None, None)] {
+                let gp = Gp { kernel, length, noise };
+                let name = format!("{kernel} C={n_samples} P={n_outputs}, hyperparameters {what}");
+                group.bench_function(name, |bench| {
+                    bench.iter(|| gp.regress(domain, &u, targets.view(), &mut |_| Ok(())));
+                });
+            }
+        }
+    }
+    let (u, targets) = targets(1000, 3);
+    let gp = Gp { kernel: Kernel::SquaredExponential, length: Some(0.2), noise: Some(1e-8) };
+    group.bench_function("squared exponential C=1000 P=3, hyperparameters given", |bench| {
+        bench.iter(|| gp.regress(domain, &u, targets.view(), &mut |_| Ok(())));
+    });
+    group.finish();
+}
+
 fn rollouts(criterion: &mut Criterion) {
     let model = learn(&options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate));
     let timing = Timing { dt: 1e-3, duration: None };
@@ -63,5 +97,5 @@ fn rollouts(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, fits, rollouts);
+criterion_group!(benches, fits, processes, rollouts);
 criterion_main!(benches);

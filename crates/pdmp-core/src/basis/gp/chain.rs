@@ -49,6 +49,14 @@ impl<const D: usize> Chain<D> {
     fn groups(&self) -> usize {
         self.targets.len() / self.u.len()
     }
+
+    /// Treats equal distances as if they were not.
+    #[cfg(test)]
+    pub(super) fn forget_evenness(&mut self) {
+        if let Gaps::Even { gap, n_samples } = self.gaps {
+            self.gaps = Gaps::Uneven(vec![gap; n_samples]);
+        }
+    }
 }
 
 impl<const D: usize> Process for Chain<D>

@@ -150,3 +150,49 @@ fn inverse_root<const D: usize>(matrix: &Square<D>) -> Option<(Square<D>, f64)> 
     let log_determinant = 2.0 * (0..D).map(|i| (lower[(i, i)] * scale[i]).ln()).sum::<f64>();
     log_determinant.is_finite().then_some((root, log_determinant))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    fn norm(d: usize, length: f64) -> f64 {
+        let k = |a: f64| if d == 2 { (1.0 + a) * (-a).exp() } else { (1.0 + a + a * a / 3.0) * (-a).exp() };
+        let turn = TAU * ((2 * d - 1) as f64).sqrt() / length;
+        1.0 + 2.0 * (1..=(60.0 / turn) as i32 + 1).map(|n| k(n as f64 * turn)).sum::<f64>()
+    }
+
+    fn check<const D: usize>(length: f64) {
+        let turn = Turn::new::<D>(length);
+        assert_relative_eq!(turn.norm, norm(D, length), max_relative = 1e-12);
+        let [less, more] = [-1e-5_f64, 1e-5].map(|h| Turn::new::<D>(length * h.exp()));
+        assert!((turn.rise - (more.norm.ln() - less.norm.ln()) / 2e-5).abs() < 1e-9);
+        let rise = (more.log_determinant::<D>().0 - less.log_determinant::<D>().0) / 2e-5;
+        assert!((turn.log_determinant::<D>().1 - rise).abs() < 1e-8);
+        let matrix = crate::basis::gp::state::Transition::<D>::new(TAU * turn.rate).matrix;
+        let determinant = (0..D).map(|i| 1.0 - matrix[(i, i)]).product::<f64>();
+        assert_relative_eq!(turn.log_determinant::<D>().0.exp(), determinant, max_relative = 1e-10);
+    }
+
+    proptest! {
+        #[test]
+        fn a_turn_sums_all_images(e in -3.0..2.0) {
+            check::<2>(10f64.powf(e));
+            check::<3>(10f64.powf(e));
+        }
+
+        #[test]
+        fn a_root_of_the_inverse_is_one(entries in prop::array::uniform9(-1.0..1.0), e in 0.0..40.0) {
+            // Graded, as covariances of states are.
+            let e: f64 = e;
+            let grade = Square::<3>::from_diagonal(&SVector::from([-e, -0.5 * e, 0.0].map(|e| 10f64.powf(e))));
+            let a = Square::<3>::from_iterator(entries);
+            let matrix = grade * (a * a.transpose() + Square::identity()) * grade;
+            let (root, log_determinant) = inverse_root(&matrix).unwrap();
+            let unit = root.transpose() * matrix * root;
+            prop_assert!((unit - Square::identity()).amax() < 1e-12);
+            prop_assert!((log_determinant + 2.0 * root.determinant().abs().ln()).abs() < 1e-10);
+        }
+    }
+}

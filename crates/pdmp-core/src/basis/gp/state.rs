@@ -103,3 +103,52 @@ fn moments<const D: usize>(a: f64, decay: f64) -> [f64; 5] {
     }
     m
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    /// Of the same unit whatever the step: component i of a state grows as a^{D−1−i} in the short run.
+    fn close<const D: usize>(a: &Square<D>, b: &Square<D>) -> bool {
+        let size = |i: usize| a[(i, i)].max(b[(i, i)]).sqrt();
+        (0..D).all(|i| (0..D).all(|j| (a[(i, j)] - b[(i, j)]).abs() <= 1e-13 * size(i) * size(j)))
+    }
+
+    fn check<const D: usize>(a: f64, b: f64, kernel: impl Fn(f64) -> f64) {
+        let [first, second, both] = [a, b, a + b].map(Transition::<D>::new);
+        // Two steps are one.
+        assert_relative_eq!(second.matrix * first.matrix, both.matrix, max_relative = 1e-12, epsilon = 1e-300);
+        let noise = second.matrix * first.noise * second.matrix.transpose() + second.noise;
+        assert!(close(&noise, &both.noise), "{noise} {}", both.noise);
+        // The process is stationary, and its covariance the kernel.
+        let p = stationary::<D>();
+        assert!(close(&p, &(first.matrix * p * first.matrix.transpose() + first.noise)));
+        assert!(((first.matrix * p)[(0, 0)] - kernel(a)).abs() < 1e-14);
+        // dQ/da = FQ + QFᵀ + q(0)q(0)ᵀ, which is q(a)q(a)ᵀ.
+        let moved = drift(&first.noise);
+        let mut rate = moved + moved.transpose();
+        let white = Transition::<D>::new(0.0).drive;
+        rate += white * white.transpose();
+        let drive = first.drive * first.drive.transpose();
+        assert!((rate - drive).amax() < 1e-13, "{rate} {drive}");
+    }
+
+    proptest! {
+        #[test]
+        fn steps_compose_and_keep_the_process_stationary(e in -9.0..2.0, f in -9.0..2.0) {
+            let (a, b) = (10f64.powf(e), 10f64.powf(f));
+            check::<2>(a, b, |a| (1.0 + a) * (-a).exp());
+            check::<3>(a, b, |a| (1.0 + a + a * a / 3.0) * (-a).exp());
+        }
+    }
+
+    #[test]
+    fn no_step_is_too_short_or_too_long() {
+        let (none, endless) = (Transition::<3>::new(0.0), Transition::<3>::new(f64::INFINITY));
+        assert_eq!((none.matrix, none.noise), (Square::identity(), Square::zeros()));
+        assert_eq!((endless.matrix, endless.noise), (Square::zeros(), stationary()));
+        assert_eq!(endless.noise[(0, 0)], 1.0);
+    }
+}

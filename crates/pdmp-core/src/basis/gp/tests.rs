@@ -61,45 +61,145 @@ fn covariances(kernel: Kernel, domain: Domain, length: f64, a: &[f64], b: &[f64]
     DMatrix::from_fn(a.len(), b.len(), |i, j| covariance(kernel, domain, length, a[i] - b[j]))
 }
 
+/// What a process is asked to learn: samples at uneven distances, some repeated, on the circle more than once around.
+#[derive(Clone, Debug)]
+struct Problem {
+    kernel: Kernel,
+    domain: Domain,
+    u: Vec<f64>,
+    targets: Array2<f64>,
+}
+
+fn problems() -> impl Strategy<Value = Problem> {
+    let gap = prop_oneof![1 => Just(0.0), 3 => 0.0..1.0];
+    let sample = (gap, prop::array::uniform5(-1.0..1.0));
+    let samples = prop::collection::vec(sample, 2..15);
+    (prop::sample::select(&Kernel::ALL[..]), samples, 1..5_usize, prop::bool::ANY, 0.5..1.5).prop_map(
+        |(kernel, samples, n_outputs, circle, stretch)| {
+            let domain = if circle { Domain::Circle } else { INTERVAL };
+            let total = samples.iter().map(|(gap, _)| gap).sum::<f64>().max(0.1);
+            let place = |reached: &mut f64, gap: f64| {
+                *reached += gap;
+                Some(stretch * domain.extent() * *reached / total)
+            };
+            let u = samples.iter().map(|(gap, _)| *gap).scan(0.0, place).collect();
+            let targets = Array2::from_shape_fn((samples.len(), n_outputs), |(i, o)| samples[i].1[o]);
+            Problem { kernel, domain, u, targets }
+        },
+    )
+}
+
+/// The joint normal density, by a dense matrix.
+struct Exact {
+    inverse: DMatrix<f64>,
+    /// K⁻¹f.
+    weights: DMatrix<f64>,
+    signal: f64,
+    log_likelihood: f64,
+}
+
+impl Exact {
+    fn new(kernel: Kernel, domain: Domain, at: (f64, f64), u: &[f64], targets: &Array2<f64>) -> Self {
+        let (n, p) = targets.dim();
+        let k = covariances(kernel, domain, at.0, u, u) + DMatrix::identity(n, n) * at.1;
+        let factor = k.cholesky().unwrap();
+        let f = DMatrix::from_fn(n, p, |i, o| targets[[i, o]]);
+        let weights = factor.solve(&f);
+        let signal = f.dot(&weights) / (n * p) as f64;
+        let log_determinant = 2.0 * factor.l().diagonal().map(f64::ln).sum();
+        let log_likelihood = -0.5 * p as f64 * (n as f64 * ((TAU * signal).ln() + 1.0) + log_determinant);
+        Self { inverse: factor.inverse(), weights, signal, log_likelihood }
+    }
+}
+
+fn quietly<T>(work: impl FnOnce(&mut Progress) -> Result<T>) -> T {
+    work(&mut Progress { proceed: &mut |_| Ok(()), share: 0.0 }).unwrap()
+}
+
+fn score(kernel: Kernel, domain: Domain, u: &[f64], targets: &Array2<f64>, at: Hyperparameters) -> Score {
+    let samples = Samples::new(u, targets.view());
+    quietly(|progress| match kernel {
+        Kernel::Matern32 => Chain::<2>::new(domain, &samples).score(at, progress),
+        Kernel::Matern52 => Chain::<3>::new(domain, &samples).score(at, progress),
+        Kernel::SquaredExponential => Dense::new(domain, &samples).score(at, progress),
+    })
+}
+
 proptest! {
     #[test]
     fn mean_variance_and_likelihood_are_those_of_the_joint_normal_density(
-        kernel in prop::sample::select(&Kernel::ALL[..]), length in 0.05..0.5, noise in -3.0..0.0, circle: bool,
-        gaps in prop::collection::vec(0.05..1.0, 16),
-        values in prop::collection::vec(-1.0..1.0, 30),
+        problem in problems(), length in -1.3..0.7, noise in -6.0..0.0,
     ) {
-        // 15 samples, not at equal distances.
-        let domain = if circle { Domain::Circle } else { INTERVAL };
-        let (length, noise) = (length * domain.extent(), 10f64.powf(noise));
-        let total: f64 = gaps.iter().sum();
-        let mut reached = 0.0;
-        let step = |gap: &f64| { reached += gap; domain.extent() * reached / total };
-        let u: Vec<f64> = gaps[..15].iter().map(step).collect();
-        let targets = Array2::from_shape_vec((15, 2), values).unwrap();
+        let Problem { kernel, domain, u, targets } = problem;
+        let (length, noise) = (10f64.powf(length) * domain.extent(), 10f64.powf(noise));
         let posterior = fit(&Gp { kernel, length: Some(length), noise: Some(noise) }, domain, &u, &targets);
-        let query = [-0.1, 0.0, 0.31, 0.5, 0.9, 1.05].map(|q| q * domain.extent());
-        let (mean, variance) = posterior.predict(&query);
+        let exact = Exact::new(kernel, domain, (length, noise), &u, &targets);
+        prop_assert!((posterior.log_likelihood() - exact.log_likelihood).abs() < 1e-8 * (1.0 + exact.log_likelihood.abs()));
+        prop_assert!((posterior.signal_variance() / exact.signal - 1.0).abs() < 1e-8);
 
-        let k = covariances(kernel, domain, length, &u, &u) + DMatrix::identity(15, 15) * noise;
-        let inverse = k.clone().lu().try_inverse().unwrap();
+        let query: Vec<f64> = [-0.3, 0.0, 0.31, 0.5, 0.9, 1.2].map(|q| q * domain.extent()).into_iter().chain(u.clone()).collect();
+        let (mean, variance) = posterior.predict(&query);
         let cross = covariances(kernel, domain, length, &query, &u);
-        let share = DMatrix::identity(6, 6) - &cross * &inverse * cross.transpose();
-        let all = DMatrix::from_fn(15, 2, |i, o| targets[[i, o]]);
-        let signal = (all.transpose() * &inverse * &all).trace() / 30.0;
-        let mut log_likelihood = 0.0;
-        for o in 0..2 {
-            let f = DMatrix::from_fn(15, 1, |i, _| targets[[i, o]]);
-            let expected = &cross * &inverse * &f;
-            let density = &k * (signal * TAU);
-            let exponent = (f.transpose() * (&k * signal).lu().try_inverse().unwrap() * &f)[(0, 0)];
-            log_likelihood -= 0.5 * (exponent + density.lu().determinant().ln());
-            for q in 0..6 {
-                prop_assert!((mean[[q, o]] - expected[(q, 0)]).abs() < 1e-8);
-                prop_assert!((at(&posterior, query[q]).0[o] - expected[(q, 0)]).abs() < 1e-8);
-                prop_assert!((variance[[q, o]] - signal * share[(q, q)]).abs() < 1e-8 * signal.max(1.0));
+        let (expected, known) = (&cross * &exact.weights, &cross * &exact.inverse * cross.transpose());
+        for q in 0..query.len() {
+            let share = 1.0 - known[(q, q)];
+            prop_assert!((variance[[q, 0]] / exact.signal - share).abs() < 1e-8);
+            for o in 0..targets.ncols() {
+                prop_assert!((mean[[q, o]] - expected[(q, o)]).abs() < 1e-8);
+                prop_assert_eq!(mean[[q, o]], at(&posterior, query[q]).0[o]);
+                prop_assert_eq!(variance[[q, o]], variance[[q, 0]]);
             }
         }
-        prop_assert!((posterior.log_likelihood() - log_likelihood).abs() < 1e-6 * log_likelihood.abs().max(1.0));
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_the_joint_normal_density(
+        problem in problems(), length in -1.3..0.7, noise in -6.0..0.0,
+    ) {
+        let Problem { kernel, domain, u, targets } = problem;
+        let (length, noise) = (10f64.powf(length) * domain.extent(), 10f64.powf(noise));
+        let found = score(kernel, domain, &u, &targets, Hyperparameters { length, noise });
+        let exact = Exact::new(kernel, domain, (length, noise), &u, &targets);
+        // dK/d ln ℓ by differences of fourth order.
+        let k = |h: f64| covariances(kernel, domain, length * h.exp(), &u, &u);
+        let by_length = (8.0 * (k(1e-3) - k(-1e-3)) - (k(2e-3) - k(-2e-3))) / 12e-3;
+        let by_noise = DMatrix::identity(u.len(), u.len()) * noise;
+        for (derivative, found) in [by_length, by_noise].into_iter().zip(found.gradient) {
+            let pull = (exact.weights.transpose() * &derivative * &exact.weights).trace() / exact.signal;
+            let spread = targets.ncols() as f64 * (&exact.inverse * &derivative).trace();
+            let expected = 0.5 * (pull - spread);
+            prop_assert!((found - expected).abs() < 1e-6 * (1.0 + pull.abs() + spread.abs()), "{found} is not {expected}");
+        }
+        // And of the likelihood itself.
+        let profile = |d: f64, e: f64| {
+            let at = Hyperparameters { length: length * d.exp(), noise: noise * e.exp() };
+            score(kernel, domain, &u, &targets, at).value
+        };
+        let h = 1e-4;
+        let difference = [profile(h, 0.0) - profile(-h, 0.0), profile(0.0, h) - profile(0.0, -h)].map(|d| d / (2.0 * h));
+        for (difference, found) in difference.into_iter().zip(found.gradient) {
+            prop_assert!((found - difference).abs() < 1e-4 * (1.0 + found.abs()), "{found} is not {difference}");
+        }
+    }
+
+    #[test]
+    fn what_has_settled_is_what_would_have_been_computed(
+        length in -2.0..1.0, noise in -10.0..0.0, n_samples in 2..400_usize, circle: bool,
+    ) {
+        let domain = if circle { Domain::Circle } else { INTERVAL };
+        let u = grid(domain, n_samples);
+        let samples = Samples::new(&u, waves(domain, &u).view());
+        let hyperparameters = Hyperparameters { length: 10f64.powf(length) * domain.extent(), noise: 10f64.powf(noise) };
+        let even = Chain::<3>::new(domain, &samples);
+        let mut uneven = Chain::<3>::new(domain, &samples);
+        uneven.forget_evenness();
+        let score = |chain: &Chain<3>| quietly(|progress| chain.score(hyperparameters, progress));
+        let (even, uneven) = (score(&even), score(&uneven));
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-7 * (n_samples as f64 + a.abs());
+        prop_assert!(close(even.value, uneven.value), "{} is not {}", even.value, uneven.value);
+        for k in 0..2 {
+            prop_assert!(close(even.gradient[k], uneven.gradient[k]), "{even:?} {uneven:?}");
+        }
     }
 
     #[test]
@@ -271,6 +371,139 @@ fn an_indefinite_matrix_is_helped_with_noise() {
         let gp = Gp { kernel, length: Some(1e6), noise: Some(LEAST_NOISE) };
         let posterior = fit(&gp, INTERVAL, &u, &waves(INTERVAL, &u));
         assert!(posterior.noise() < 1e-6 && at(&posterior, 0.5).0[0].is_finite());
+    }
+}
+
+/// Whatever the length, from far below the distance of the samples to far beyond the extent.
+#[test]
+fn no_length_or_noise_is_too_extreme() {
+    for domain in [INTERVAL, Domain::Circle] {
+        let u = grid(domain, 200);
+        let targets = waves(domain, &u);
+        for kernel in Kernel::ALL {
+            for exponent in -6..=6 {
+                for noise in [1e-10, 1e-6, 1.0, 1e6] {
+                    let length = 10f64.powi(exponent)
+                        * domain.extent()
+                        * if exponent.abs() == 6 { 0.999999_f64.powi(exponent.signum()) } else { 1.0 };
+                    let gp = Gp { kernel, length: Some(length), noise: Some(noise) };
+                    let posterior = fit(&gp, domain, &u, &targets);
+                    assert!(posterior.log_likelihood().is_finite());
+                    let (mean, variance) = posterior.predict(&[-1.0, 0.0, 0.3, 0.5, 1.0, 7.0]);
+                    let largest = mean.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+                    assert!(largest < 100.0 || exponent > 0, "{kernel} {domain:?} {length} {noise:e}: {largest}");
+                    assert!(variance.iter().all(|v| *v >= 0.0 && *v <= 1.001 * posterior.signal_variance()));
+                    let (_, slope) = at(&posterior, 0.3);
+                    assert!(slope.iter().all(|slope| slope.is_finite()));
+                }
+            }
+        }
+    }
+}
+
+/// A kernel that is 1 everywhere leaves the mean of the samples, drawn to zero by the noise.
+#[test]
+fn an_endless_length_on_the_circle_leaves_the_mean() {
+    let u = grid(Domain::Circle, 100);
+    let targets = waves(Domain::Circle, &u);
+    let mean = targets.column(0).mean().unwrap();
+    for kernel in Kernel::ALL {
+        for turns in [1e3, 1e4, 1e5] {
+            let gp = Gp { kernel, length: Some(turns * TAU), noise: Some(1e-3) };
+            let posterior = fit(&gp, Domain::Circle, &u, &targets);
+            for u in [0.0, 1.0, 6.0] {
+                assert_relative_eq!(at(&posterior, u).0[0], mean / (1.0 + 1e-5), max_relative = 1e-6);
+            }
+        }
+    }
+}
+
+#[test]
+fn many_samples_of_the_least_noise_are_met() {
+    for domain in [INTERVAL, Domain::Circle] {
+        let u = grid(domain, 5000);
+        let targets = waves(domain, &u);
+        for kernel in [Kernel::Matern32, Kernel::Matern52] {
+            for length in [0.01, 0.2, 2.0] {
+                let gp = Gp { kernel, length: Some(length * domain.extent()), noise: Some(1e-10) };
+                let (mean, variance) = fit(&gp, domain, &u, &targets).predict(&u);
+                assert!((mean - &targets).iter().all(|error| error.abs() < 1e-6));
+                assert!(variance.iter().all(|variance| variance.is_finite()));
+            }
+        }
+    }
+}
+
+/// A matrix of them would take 80 GB.
+#[test]
+fn a_hundred_thousand_samples_are_learnt() {
+    for domain in [INTERVAL, Domain::Circle] {
+        let u = grid(domain, 100_000);
+        let targets = waves(domain, &u);
+        let posterior = fit(&Gp::default(), domain, &u, &targets);
+        for i in (0..u.len()).step_by(997) {
+            assert_abs_diff_eq!(at(&posterior, u[i]).0[0], targets[[i, 0]], epsilon = 1e-3);
+        }
+    }
+}
+
+/// Rounding and scatter of the clock make a path uneven, and repeated samples are averaged.
+#[test]
+fn repeated_samples_count_as_their_mean_with_less_noise() {
+    let u = grid(INTERVAL, 30);
+    let (targets, error) = (waves(INTERVAL, &u), normal(30, 2));
+    let twice: Vec<f64> = u.iter().flat_map(|&u| [u, u]).collect();
+    let both = Array2::from_shape_fn((60, 2), |(i, o)| {
+        targets[[i / 2, o]] + if i % 2 == 0 { error[[i / 2, o]] } else { -error[[i / 2, o]] }
+    });
+    for kernel in Kernel::ALL {
+        let gp = |noise| Gp { kernel, length: Some(0.3), noise: Some(noise) };
+        let (once, twice) = (fit(&gp(0.01), INTERVAL, &u, &targets), fit(&gp(0.02), INTERVAL, &twice, &both));
+        for u in [-0.1, 0.0, 0.4, 1.0] {
+            for o in 0..2 {
+                assert_abs_diff_eq!(at(&once, u).0[o], at(&twice, u).0[o], epsilon = 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flat_likelihood_is_left_as_it_is() {
+    // One sample has the same likelihood at every length.
+    for kernel in Kernel::ALL {
+        for domain in [INTERVAL, Domain::Circle] {
+            let posterior = fit(&Gp { kernel, ..Gp::default() }, domain, &[0.0], &Array2::ones((1, 1)));
+            assert!(posterior.length() > 0.0 && posterior.noise() >= LEAST_NOISE);
+            assert_abs_diff_eq!(at(&posterior, 0.0).0[0], 1.0, epsilon = 1e-5);
+        }
+    }
+}
+
+#[test]
+fn a_dense_matrix_of_too_many_samples_is_refused() {
+    let gp = Gp { kernel: Kernel::SquaredExponential, ..Gp::default() };
+    let u = grid(INTERVAL, 10_001);
+    let error = gp.regress(INTERVAL, &u, Array2::zeros((10_001, 1)).view(), &mut |_| Ok(())).unwrap_err();
+    assert!(matches!(error, Error::Range { name: "samples", .. }));
+}
+
+/// Also while one likelihood of many samples is computed.
+#[test]
+fn the_caller_is_asked_every_few_thousand_samples() {
+    for (kernel, n_samples) in
+        [(Kernel::Matern32, 100_000), (Kernel::Matern52, 100_000), (Kernel::SquaredExponential, 1100)]
+    {
+        for domain in [INTERVAL, Domain::Circle] {
+            let u = grid(domain, n_samples);
+            let mut asked = 0;
+            let mut stop = |_| {
+                asked += 1;
+                if asked > 3 { Err(Error::Interrupted) } else { Ok(()) }
+            };
+            let gp = Gp { kernel, length: Some(0.1), noise: Some(1e-6) };
+            let stopped = gp.regress(domain, &u, waves(domain, &u).view(), &mut stop);
+            assert!(matches!(stopped, Err(Error::Interrupted)));
+        }
     }
 }
 
