@@ -42,6 +42,14 @@ def locked(x: np.ndarray) -> np.ndarray:
     return x
 
 
+def packed(x: np.ndarray) -> np.ndarray:
+    """Return a field of records whose length is no multiple of a number's."""
+    records = np.zeros(x.shape, [("value", "f8"), ("other", "f4")])
+    records["value"] = x
+    field: np.ndarray = records["value"]
+    return field
+
+
 FORMS: dict[str, Callable[[np.ndarray], Any]] = {
     "float32": np.float32,
     "big-endian": lambda x: x.astype(">f8"),
@@ -50,6 +58,7 @@ FORMS: dict[str, Callable[[np.ndarray], Any]] = {
     "reversed strides": lambda x: np.ascontiguousarray(x[::-1, ::-1])[::-1, ::-1],
     "transposed": lambda x: np.ascontiguousarray(x.T).T,
     "unaligned": lambda x: np.frombuffer(b"." + x.tobytes(), "u1")[1:].view("f8").reshape(x.shape),
+    "field of records": packed,
     "read-only": locked,
     "lists": np.ndarray.tolist,
     "tuples": lambda x: tuple(map(tuple, x)),

@@ -24,6 +24,12 @@ pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64
         let dtype = untyped.dtype();
         return Err(PyValueError::new_err(format!("{name} has dtype {dtype}: expected real numbers")));
     }
+    // Fields of packed records: a view in Rust steps by whole numbers.
+    if let Ok(untyped) = value.cast::<PyUntypedArray>()
+        && !untyped.is_aligned()
+    {
+        return self::array(name, &value.call_method0("copy")?);
+    }
     let array = value.extract::<PyArrayLikeDyn<'_, f64, AllowTypeChange>>().map_err(|error| {
         PyValueError::new_err(format!("{name} is not an array of numbers: {}", error.value(value.py())))
     })?;
