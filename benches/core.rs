@@ -4,10 +4,13 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use criterion::{Criterion, criterion_group, criterion_main};
-use ndarray::Array2;
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use ndarray::{Array2, Array3};
 use pdmp_core::basis::{Basis, Domain, Gp, Kernel, NGnet};
-use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount, Timing, fit};
+use pdmp_core::{
+    BatchConditions, Conditions, Demonstration, Derivative, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount,
+    Threads, Timing, Variable, fit,
+};
 
 /// M movements of D = 7 that span a few dimensions, 1001 samples in one second.
 fn demonstrations(n_demos: usize) -> Vec<Demonstration> {
@@ -32,8 +35,10 @@ fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
     options
 }
 
-fn learn(options: &FitOptions) -> Arc<Model> {
-    Arc::new(fit(&demonstrations(20), options, &mut |_, _| Ok(())).expect("a fit"))
+fn learn(n_styles: usize) -> Arc<Model> {
+    let options = options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate);
+    let options = FitOptions { styles: StyleCount::Given(n_styles), ..options };
+    Arc::new(fit(&demonstrations(40), &options, &mut |_, _| Ok(())).expect("a fit"))
 }
 
 fn fits(criterion: &mut Criterion) {
@@ -86,13 +91,37 @@ fn processes(criterion: &mut Criterion) {
 }
 
 fn rollouts(criterion: &mut Criterion) {
-    let model = learn(&options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate));
     let timing = Timing { dt: 1e-3, duration: None };
-    let mut group = criterion.benchmark_group("rollout 1 s at 1 kHz D=7 J=3");
-    group.bench_function("one", |bench| bench.iter(|| model.rollout(&Conditions::default(), timing)));
-    let styles = Array2::from_shape_fn((100, 3), |(b, j)| (b * 3 + j) as f64 / 300.0);
-    group.bench_function("a batch of 100 styles", |bench| {
-        bench.iter(|| model.rollouts(styles.view(), &Conditions::default(), timing, &mut |_| Ok(())));
+    let model = learn(3);
+    let mut group = criterion.benchmark_group("1 s at 1 kHz, D=7");
+    group.sample_size(20);
+    group.bench_function("rollout", |bench| bench.iter(|| model.rollout(&Conditions::default(), timing)));
+    for n_styles in [3, 35] {
+        let model = learn(n_styles);
+        let styles = Array2::from_shape_fn((1000, n_styles), |(b, j)| (b + j) as f64 / 1000.0);
+        let conditions = BatchConditions { styles, ..BatchConditions::default() };
+        let batch = model.batch(conditions, timing, &mut |_| Ok(())).expect("a batch");
+        let mut outputs = [(); 2].map(|()| Array3::zeros(batch.shape()));
+        for n_threads in [1, 2] {
+            let threads = Threads::new(n_threads).expect("some");
+            group.bench_function(
+                format!("1000 rollouts with velocities, J={n_styles}, threads={n_threads}"),
+                |bench| {
+                    bench.iter(|| {
+                        let outputs = outputs.each_mut().map(|output| output.view_mut());
+                        batch.write(0..1000, outputs.into(), threads, &mut |_| Ok(()))
+                    });
+                },
+            );
+        }
+    }
+    let jacobian = |model: &Arc<Model>| {
+        let (variable, derivative) = (Variable::Style, Derivative::Position);
+        model.jacobian(variable, derivative, &Conditions::default(), timing, &mut |_| Ok(()))
+    };
+    group.bench_function("style Jacobian", |bench| bench.iter(|| jacobian(&model)));
+    group.bench_function("style Jacobian of a model that never moved", |bench| {
+        bench.iter_batched(|| Arc::new(Model::clone(&model)), |model| jacobian(&model), BatchSize::SmallInput);
     });
     group.finish();
 }

@@ -29,6 +29,7 @@ __all__ = [
     "NGnetRegression",
     "PdmpError",
     "Prediction",
+    "RolloutChunks",
     "Status",
     "Trajectory",
     "__version__",
@@ -154,26 +155,70 @@ class Model:
         self,
         styles: ArrayLike,  # (B, J)
         *,
-        goal: ArrayLike | None = None,  # (D,), as are start, velocity and anchor
-        start: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        anchor: ArrayLike | None = None,
+        goals: ArrayLike | None = None,  # (D,) or (B, D), as are starts, velocities and anchors
+        starts: ArrayLike | None = None,
+        velocities: ArrayLike | None = None,
+        anchors: ArrayLike | None = None,
         amplitude: float = 1.0,
         tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
-        out: tuple[_Array, _Array] | None = None,
-    ) -> tuple[_Array, _Array]: ...  # positions and velocities (B, T, D)
+        derivatives: int = 1,  # at most 2
+        out: Sequence[_Array] | None = None,
+        threads: int | None = None,
+    ) -> tuple[_Array, ...]: ...  # positions and as many derivatives (B, T, D)
+    def rollout_chunks(
+        self,
+        styles: ArrayLike,  # (B, J)
+        *,
+        size: int = 1000,
+        goals: ArrayLike | None = None,  # (D,) or (B, D), as are starts, velocities and anchors
+        starts: ArrayLike | None = None,
+        velocities: ArrayLike | None = None,
+        anchors: ArrayLike | None = None,
+        amplitude: float = 1.0,
+        tau: float | None = None,
+        dt: float = 0.01,
+        duration: float | None = None,
+        derivatives: int = 1,
+        threads: int | None = None,
+    ) -> RolloutChunks: ...
     def style_jacobian(
         self,
         dt: float = 0.01,
         *,
+        derivative: int = 0,  # at most 2
         start: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         amplitude: float = 1.0,
         tau: float | None = None,
         duration: float | None = None,
     ) -> _Array: ...  # (T, D, J)
+    def goal_jacobian(
+        self,
+        dt: float = 0.01,
+        *,
+        derivative: int = 0,
+        tau: float | None = None,
+        duration: float | None = None,
+    ) -> _Array: ...  # (T, D, D)
+    def anchor_jacobian(
+        self,
+        dt: float = 0.01,
+        *,
+        derivative: int = 0,
+        start: ArrayLike | None = None,
+        tau: float | None = None,
+        duration: float | None = None,
+    ) -> _Array: ...  # (T, D, D)
+    def start_jacobian(
+        self,
+        dt: float = 0.01,
+        *,
+        derivative: int = 0,
+        tau: float | None = None,
+        duration: float | None = None,
+    ) -> _Array: ...  # (T, D, D)
     def style_of(
         self,
         demonstration: Demonstration,
@@ -202,6 +247,11 @@ class Model:
     @staticmethod
     def from_bytes(data: bytes) -> Model: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class RolloutChunks:
+    def __iter__(self) -> RolloutChunks: ...
+    def __next__(self) -> tuple[_Array, ...]: ...
 
 @final
 class Prediction:

@@ -54,6 +54,16 @@ pub enum Error {
         /// What each element belongs to.
         per: &'static str,
     },
+    /// Another number of vectors than there are movements.
+    #[error("{name} has {found} rows, but there are {expected} styles: pass one row for each, or one vector for all")]
+    Rows {
+        /// The argument.
+        name: &'static str,
+        /// The number of styles.
+        expected: usize,
+        /// The number of rows.
+        found: usize,
+    },
     /// A number outside its range.
     #[error("{name} = {}: {allowed}", Number(*value))]
     Range {

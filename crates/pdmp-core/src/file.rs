@@ -306,7 +306,8 @@ impl Reader<'_> {
             basis: constants.basis.clone(),
         };
         let (tau, names) = (constants.tau, constants.names.clone());
-        let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle: Vec::new() }
+        let (cycle, responses) = Default::default();
+        let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle, responses }
             .with_cycle();
         self.verify(&constants, &model, crc32)?;
         Ok(model)

@@ -155,7 +155,8 @@ pub fn fit(
         basis: regression.describe(),
     };
     let Constants { attractor, tau, .. } = constants;
-    let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle: Vec::new() };
+    let (cycle, responses) = Default::default();
+    let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle, responses };
     Ok(model.with_cycle())
 }
 

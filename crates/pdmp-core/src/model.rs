@@ -10,6 +10,7 @@ use crate::error::{Error, Result, check_positive, check_vector};
 use crate::landscape::Landscape;
 use crate::lanes::{Lanes, groups};
 use crate::phase::{Canonical, Kind};
+use crate::responses::Cache;
 use crate::smooth::Smoothing;
 
 /// What was learnt from each demonstration, in absolute coordinates.
@@ -60,6 +61,8 @@ pub struct Model {
     /// Periodic steady state at φ = 0 per unit of style and amplitude, by groups of DoFs and styles; zero where discrete,
     /// which starts at rest in z.
     pub(crate) cycle: Vec<State<Lanes>>,
+    /// What whole movements are made of, kept for the next ones; the control loop never looks at it.
+    pub(crate) responses: Cache,
 }
 
 /// What a movement starts with; what is `None` is that of the nominal demonstration.
@@ -268,11 +271,14 @@ pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> 
     if given { Err(Error::Kind { name, kind, instead }) } else { Ok(()) }
 }
 
-/// Checks a style (J,). Demonstrated ones are at most 1 in magnitude: the bound only keeps products finite.
+/// Largest magnitude of a style. Demonstrated ones are at most 1: the bound only keeps products finite.
+pub(crate) const LARGEST_STYLE: f64 = 1e100;
+
+/// Checks a style (J,).
 pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
     check_vector("style", style, n_styles, "style dimension")?;
-    match style.iter().position(|s| s.abs() > 1e100) {
-        Some(index) => Err(Error::TooLarge { name: "style", index, value: style[index], limit: 1e100 }),
+    match style.iter().position(|s| s.abs() > LARGEST_STYLE) {
+        Some(index) => Err(Error::TooLarge { name: "style", index, value: style[index], limit: LARGEST_STYLE }),
         None => Ok(()),
     }
 }

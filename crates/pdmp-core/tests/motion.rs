@@ -6,7 +6,6 @@ mod common;
 use std::sync::{Arc, LazyLock};
 
 use common::*;
-use ndarray::{Array2, array};
 use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status, StyleCount, Timing};
 use proptest::prelude::*;
 
@@ -352,31 +351,6 @@ fn refused_commands_leave_the_last_good_value() {
     assert!(matches!(controller.set_anchor(&[0.0; 3]), Err(Error::Kind { .. })));
     assert!(matches!(controller.set_amplitude(1.0), Err(Error::Kind { .. })));
     assert_eq!((controller.centre(), controller.tau()), ([1.0, 2.0, 3.0].as_slice(), REACH.tau()));
-}
-
-/// A batch is the rollouts one by one, and the Jacobian their derivative, for every way to start.
-#[test]
-fn batch_and_jacobian_agree_with_rollouts() {
-    let styles = array![[0.2, -0.3], [1.0, 0.0], [-2.0, 5.0]];
-    for model in [&*REACH, &*CYCLE] {
-        let given = || Some(vec![0.4; model.n_dofs()]);
-        for (start, velocity) in [(None, None), (given(), None), (None, given()), (given(), given())] {
-            let conditions = Conditions { start, velocity, tau: Some(1.4 * model.tau()), ..Default::default() };
-            let timing = timing(0.01, 1.5);
-            let (positions, velocities) = model.rollouts(styles.view(), &conditions, timing, &mut |_| Ok(())).unwrap();
-            let jacobian = model.style_jacobian(&conditions, timing, &mut |_| Ok(())).unwrap();
-            for (b, style) in styles.rows().into_iter().enumerate() {
-                let style_of = |style: Vec<f64>| Conditions { style: Some(style), ..conditions.clone() };
-                let one = model.rollout(&style_of(style.to_vec()), timing).unwrap();
-                let close = |a: &Array2<f64>, b: ndarray::ArrayView2<f64>| (a - &b).iter().all(|d| d.abs() < 1e-10);
-                assert!(close(&one.position, positions.index_axis(ndarray::Axis(0), b)));
-                assert!(close(&one.velocity, velocities.index_axis(ndarray::Axis(0), b)));
-                let moved = model.rollout(&style_of(vec![style[0], style[1] + 0.5]), timing).unwrap();
-                let slope = (&moved.position - &one.position) / 0.5;
-                assert!(close(&slope, jacobian.index_axis(ndarray::Axis(2), 1)));
-            }
-        }
-    }
 }
 
 /// The number of samples is that of the contract: a multiple of dt keeps its last sample, rounding or not.

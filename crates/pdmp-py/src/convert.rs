@@ -5,8 +5,11 @@ use numpy::{
     AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayLikeDyn, PyArrayMethods,
     PyUntypedArray, PyUntypedArrayMethods,
 };
+use pdmp_core::Threads;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use crate::error::raise;
 
 /// A numpy vector, (n,).
 pub(crate) type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -86,6 +89,20 @@ pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResu
         .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
 }
 
+/// A float64 array of this shape that can be written.
+pub(crate) fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Cube<'py>> {
+    let wrong = |reason: String| PyValueError::new_err(format!("out: {reason}; expected float64 arrays {shape:?}"));
+    let array = out.cast::<PyArray3<f64>>().map_err(|error| wrong(error.to_string()))?;
+    if array.shape() != shape {
+        return Err(wrong(format!("shape {:?}", array.shape())));
+    }
+    if !array.is_aligned() {
+        return Err(wrong("not aligned in memory".into()));
+    }
+    array.try_readwrite().map_err(|error| wrong(error.to_string()))?;
+    Ok(array.clone())
+}
+
 /// A new numpy vector.
 pub(crate) fn to_numpy<'py>(py: Python<'py>, values: &[f64]) -> Vector<'py> {
     Array1::from_vec(values.to_vec()).into_pyarray(py)
@@ -94,4 +111,10 @@ pub(crate) fn to_numpy<'py>(py: Python<'py>, values: &[f64]) -> Vector<'py> {
 /// A count, which cannot be negative.
 pub(crate) fn count(name: &str, value: isize) -> PyResult<usize> {
     usize::try_from(value).map_err(|_| PyValueError::new_err(format!("{name} = {value}: must not be negative")))
+}
+
+/// A number of threads; without one, as many as the system has.
+pub(crate) fn threads(value: Option<isize>) -> PyResult<Threads> {
+    let Some(value) = value else { return Ok(Threads::available()) };
+    Threads::new(count("threads", value)?).map_err(raise)
 }

@@ -1,12 +1,14 @@
 //! Python bindings: every function converts, detaches where it is long, calls the core, and converts back.
 
 mod basis;
+mod batch;
 mod conditions;
 mod controller;
 mod convert;
 mod demo;
 mod error;
 mod fit;
+mod jacobian;
 mod model;
 mod prediction;
 
@@ -27,6 +29,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<basis::NGnet>()?;
     module.add_class::<basis::NGnetRegression>()?;
     module.add_class::<model::Model>()?;
+    module.add_class::<batch::RolloutChunks>()?;
     module.add_class::<prediction::Prediction>()?;
     module.add_class::<controller::Status>()?;
     module.add_class::<controller::Controller>()?;

@@ -4,15 +4,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use ndarray::Array3;
-use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyUntypedArrayMethods, ToPyArray};
+use numpy::{IntoPyArray, ToPyArray};
 use pdmp_core::{Canonical, Timing, style_of};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::conditions::Arguments;
 use crate::controller::Controller;
-use crate::convert::{Cube, Matrix, Vector, matrix, to_numpy, vector};
+use crate::convert::{Cube, Matrix, Vector, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
 use crate::error::{interruptible, raise};
 use crate::prediction::Prediction;
@@ -236,76 +235,6 @@ impl Model {
         Ok(Trajectory::new(py, trajectory))
     }
 
-    /// Movements of many styles under otherwise equal conditions.
-    ///
-    /// Parameters
-    /// ----------
-    /// styles : array_like, (B, J)
-    ///     Style parameters; the other arguments are those of `rollout`.
-    /// out : tuple of two (B, T, D) float64 arrays, optional
-    ///     Where to write positions and velocities.
-    ///
-    /// Returns
-    /// -------
-    /// positions, velocities : ndarray, (B, T, D)
-    #[pyo3(signature = (
-        styles, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, dt=0.01, duration=None,
-        out=None
-    ))]
-    #[allow(clippy::too_many_arguments)]
-    fn rollouts<'py>(
-        &self,
-        py: Python<'py>,
-        styles: &Bound<'py, PyAny>,
-        goal: Option<&Bound<'py, PyAny>>,
-        start: Option<&Bound<'py, PyAny>>,
-        velocity: Option<&Bound<'py, PyAny>>,
-        anchor: Option<&Bound<'py, PyAny>>,
-        amplitude: f64,
-        tau: Option<f64>,
-        dt: f64,
-        duration: Option<f64>,
-        out: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
-    ) -> PyResult<(Cube<'py>, Cube<'py>)> {
-        let styles = matrix("styles", "(B, J)", styles)?;
-        let arguments = Arguments { style: None, goal, start, velocity, anchor, amplitude, tau };
-        let conditions = arguments.conditions()?;
-        let timing = Timing { dt, duration };
-        let (positions, velocities) =
-            interruptible(py, |proceed| self.0.rollouts(styles.view(), &conditions, timing, proceed))?;
-        let Some((to_positions, to_velocities)) = out else {
-            return Ok((positions.into_pyarray(py), velocities.into_pyarray(py)));
-        };
-        let shape = positions.shape();
-        let (to_positions, to_velocities) = (writable(&to_positions, shape)?, writable(&to_velocities, shape)?);
-        // Both are known to fit before either is written.
-        to_positions.try_readwrite()?.as_array_mut().assign(&positions);
-        to_velocities.try_readwrite()?.as_array_mut().assign(&velocities);
-        Ok((to_positions, to_velocities))
-    }
-
-    /// Jacobian ∂y/∂s of a rollout's positions (T, D, J): exact, and the same for every style and goal.
-    ///
-    /// Which of `start` and `velocity` are given matters, their values do not.
-    #[pyo3(signature = (dt=0.01, *, start=None, velocity=None, amplitude=1.0, tau=None, duration=None))]
-    #[allow(clippy::too_many_arguments)]
-    fn style_jacobian<'py>(
-        &self,
-        py: Python<'py>,
-        dt: f64,
-        start: Option<&Bound<'py, PyAny>>,
-        velocity: Option<&Bound<'py, PyAny>>,
-        amplitude: f64,
-        tau: Option<f64>,
-        duration: Option<f64>,
-    ) -> PyResult<Cube<'py>> {
-        let arguments = Arguments { style: None, goal: None, start, velocity, anchor: None, amplitude, tau };
-        let conditions = arguments.conditions()?;
-        let timing = Timing { dt, duration };
-        let jacobian = interruptible(py, |proceed| self.0.style_jacobian(&conditions, timing, proceed))?;
-        Ok(jacobian.into_pyarray(py))
-    }
-
     /// The style (J,) of a new demonstration: least squares on its target.
     ///
     /// Parameters
@@ -454,15 +383,4 @@ impl Model {
             model.learnt().basis
         )
     }
-}
-
-/// A float64 array of this shape that can be written.
-fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Cube<'py>> {
-    let wrong = |reason: String| PyValueError::new_err(format!("out: {reason}; expected float64 arrays {shape:?}"));
-    let array = out.cast::<PyArray3<f64>>().map_err(|error| wrong(error.to_string()))?;
-    if array.shape() != shape {
-        return Err(wrong(format!("shape {:?}", array.shape())));
-    }
-    array.try_readwrite().map_err(|error| wrong(error.to_string()))?;
-    Ok(array.clone())
 }

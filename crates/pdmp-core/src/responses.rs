@@ -1,0 +1,249 @@
+//! What whole movements are made of: responses to a unit of each condition.
+//!
+//! For constant style, goal and τ a movement is linear in its conditions,
+//!
+//! ```text
+//! y(t) = y⁰(t) + (y(0) − y⁰(0))·E(t) + (ẏ(0) − ẏ⁰(0))·V(t),   y⁰(t) = g + r₀ Σⱼ sⱼRⱼ(t),
+//! ```
+//!
+//! where Rⱼ is the movement of the j-th unit style about zero, from zero (discrete) or on its cycle (rhythmic), E the way
+//! back from a start of one, and V what a start velocity of one adds. Where no start velocity is given the last term
+//! is missing, and the one before it where a rhythmic movement is given no start. Velocities and accelerations are
+//! made of the curves' derivatives in the same way. All curves are rollouts, so that they repeat the control loop.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ndarray::Array2;
+
+use crate::demo::Trajectory;
+use crate::error::{Error, Result};
+use crate::model::{Conditions, Model};
+use crate::phase::Kind;
+use crate::rollout::Timing;
+
+/// Most responses that a model keeps, and the most memory that they take, in bytes.
+const MOST_KEPT: usize = 8;
+const MOST_BYTES: usize = 64 << 20;
+
+/// How often a movement is differentiated with respect to time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Derivative {
+    /// Positions, in the unit of each DoF.
+    Position,
+    /// Velocities, per second.
+    Velocity,
+    /// Accelerations, per second squared.
+    Acceleration,
+}
+
+impl Derivative {
+    /// All, in order.
+    pub const ALL: [Self; 3] = [Self::Position, Self::Velocity, Self::Acceleration];
+
+    /// The derivative of order `n`, where `name` is the argument that says so.
+    ///
+    /// # Errors
+    /// An order above 2.
+    pub fn of_order(name: &'static str, n: usize) -> Result<Self> {
+        let allowed = "must be 0 (position), 1 (velocity) or 2 (acceleration)";
+        Self::ALL.get(n).copied().ok_or(Error::Range { name, value: n as f64, allowed })
+    }
+}
+
+/// Responses over time (T, D), of one derivative.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Curves {
+    /// Rⱼ.
+    pub(crate) styles: Vec<Array2<f64>>,
+    /// E, the same for every DoF, as is V.
+    pub(crate) start: Array2<f64>,
+    pub(crate) velocity: Array2<f64>,
+}
+
+/// Curves of positions, velocities and accelerations.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Responses([Curves; 3]);
+
+impl Responses {
+    pub(crate) fn of(&self, derivative: Derivative) -> &Curves {
+        &self.0[derivative as usize]
+    }
+
+    fn bytes(&self) -> usize {
+        self.0.iter().map(|curves| (curves.styles.len() + 2) * curves.start.len() * size_of::<f64>()).sum()
+    }
+}
+
+/// What responses depend on, apart from the model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Key {
+    dt: f64,
+    tau: f64,
+    steps: usize,
+}
+
+/// The responses used last. A copied model starts without any.
+#[derive(Default)]
+pub(crate) struct Cache(Mutex<VecDeque<(Key, Arc<Responses>)>>);
+
+impl Cache {
+    /// Does `work` on what is kept, the latest last. Whatever panicked meanwhile left it whole.
+    fn with<T>(&self, work: impl FnOnce(&mut VecDeque<(Key, Arc<Responses>)>) -> T) -> T {
+        work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn find(&self, key: Key) -> Option<Arc<Responses>> {
+        self.with(|kept| {
+            let entry = kept.iter().position(|(k, _)| *k == key).and_then(|index| kept.remove(index))?;
+            let found = Arc::clone(&entry.1);
+            kept.push_back(entry);
+            Some(found)
+        })
+    }
+
+    /// Keeps responses as long as no later ones need their place; those that are too large not at all.
+    fn keep(&self, key: Key, responses: &Arc<Responses>) {
+        self.with(|kept| {
+            kept.retain(|(k, _)| *k != key);
+            kept.push_back((key, Arc::clone(responses)));
+            while kept.len() > MOST_KEPT || kept.iter().map(|(_, kept)| kept.bytes()).sum::<usize>() > MOST_BYTES {
+                kept.pop_front();
+            }
+        });
+    }
+}
+
+impl Clone for Cache {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl fmt::Debug for Cache {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("Cache")
+    }
+}
+
+impl Model {
+    /// The responses at these times, from the cache where they are found.
+    pub(crate) fn responses(
+        self: &Arc<Self>,
+        tau: f64,
+        timing: Timing,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Arc<Responses>> {
+        let key = Key { dt: timing.dt, tau, steps: timing.steps(self, tau)? };
+        if let Some(found) = self.responses.find(key) {
+            return Ok(found);
+        }
+        // The cache is free meanwhile: whoever computes the same finds the same.
+        let responses = Arc::new(self.compute_responses(tau, timing, proceed)?);
+        self.responses.keep(key, &responses);
+        Ok(responses)
+    }
+
+    fn compute_responses(
+        self: &Arc<Self>,
+        tau: f64,
+        timing: Timing,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Responses> {
+        let (n_dofs, n_styles) = (self.n_dofs(), self.n_styles());
+        let n_runs = (n_styles + 2) as f64;
+        let mut run = |done: usize, conditions: Conditions| {
+            let Trajectory { position, velocity, acceleration, .. } =
+                self.rollout_with(&conditions, timing, &mut |share| proceed((done as f64 + share) / n_runs))?;
+            Ok([position, velocity, acceleration])
+        };
+        let zeros = || Some(vec![0.0; n_dofs]);
+        let ones = || Some(vec![1.0; n_dofs]);
+        let still =
+            Conditions { style: Some(vec![0.0; n_styles]), start: zeros(), tau: Some(tau), ..self.about_zero() };
+        let start = run(0, Conditions { start: ones(), ..still.clone() })?;
+        let velocity = run(1, Conditions { velocity: ones(), ..still.clone() })?;
+        let mut curves = std::iter::zip(start, velocity).map(|(start, velocity)| Curves {
+            styles: Vec::with_capacity(n_styles),
+            start,
+            velocity,
+        });
+        let mut responses = Responses(std::array::from_fn(|_| curves.next().expect("three of each")));
+        for j in 0..n_styles {
+            let style = (0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect();
+            let unit = Conditions { style: Some(style), tau: Some(tau), ..self.about_zero() };
+            for (curves, curve) in responses.0.iter_mut().zip(run(j + 2, unit)?) {
+                curves.styles.push(curve);
+            }
+        }
+        Ok(responses)
+    }
+
+    /// A goal and start, or an anchor, of zero.
+    fn about_zero(&self) -> Conditions {
+        let zeros = Some(vec![0.0; self.n_dofs()]);
+        match self.kind() {
+            Kind::Discrete => Conditions { goal: zeros.clone(), start: zeros, ..Conditions::default() },
+            Kind::Rhythmic => Conditions { anchor: zeros, ..Conditions::default() },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn responses(n: usize) -> Arc<Responses> {
+        let curve = || Array2::zeros((n, 1));
+        Arc::new(Responses([(); 3].map(|()| Curves { styles: vec![curve()], start: curve(), velocity: curve() })))
+    }
+
+    fn key(steps: usize) -> Key {
+        Key { dt: 0.01, tau: 1.0, steps }
+    }
+
+    /// Those asked for last are kept, up to a number of entries and of bytes.
+    #[test]
+    fn memory_of_the_cache_is_bounded() {
+        let cache = Cache::default();
+        for n in 0..100 {
+            cache.keep(key(n), &responses(3));
+            assert!(cache.find(key(0)).is_some(), "what is asked for again and again stays");
+        }
+        let kept = (0..100).filter(|&n| cache.find(key(n)).is_some()).collect::<Vec<_>>();
+        assert_eq!(kept, [0, 93, 94, 95, 96, 97, 98, 99]);
+        // Three eighths of the bytes each.
+        let large = responses(MOST_BYTES / (9 * 8) * 3 / 8);
+        for n in 0..20 {
+            cache.keep(key(n), &large);
+            assert!(cache.with(|kept| kept.iter().map(|(_, kept)| kept.bytes()).sum::<usize>()) <= MOST_BYTES);
+        }
+        assert_eq!((0..20).filter(|&n| cache.find(key(n)).is_some()).collect::<Vec<_>>(), [18, 19]);
+        cache.keep(key(50), &responses(MOST_BYTES));
+        assert!(cache.find(key(50)).is_none(), "too large to be kept");
+    }
+
+    /// A key is the whole of what responses depend on; a copy of a cache is empty.
+    #[test]
+    fn other_times_are_not_found() {
+        let cache = Cache::default();
+        cache.keep(key(5), &responses(6));
+        cache.keep(key(5), &responses(6));
+        assert_eq!(cache.with(|kept| kept.len()), 1);
+        for other in [Key { dt: 0.02, ..key(5) }, Key { tau: 1.1, ..key(5) }, key(6)] {
+            assert!(cache.find(other).is_none());
+        }
+        assert!(cache.clone().find(key(5)).is_none());
+    }
+
+    /// A panic elsewhere while the cache was held does not close it.
+    #[test]
+    fn poisoned_cache_works_on() {
+        let cache = Cache::default();
+        let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| cache.with(|_| panic!("on purpose"))));
+        assert!(panic.is_err());
+        cache.keep(key(5), &responses(6));
+        assert!(cache.find(key(5)).is_some());
+    }
+}

@@ -1,0 +1,327 @@
+//! What many movements at once, and the derivatives of a movement, must be.
+#![allow(missing_docs)]
+
+mod common;
+
+use std::sync::{Arc, LazyLock};
+
+use common::*;
+use ndarray::{Array2, Array3, Axis, array, s};
+use pdmp_core::{
+    BatchConditions, Conditions, Controller, Derivative, Error, Kind, Model, Rows, StyleCount, Threads, Timing,
+    Trajectory, Variable,
+};
+use proptest::prelude::*;
+
+static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
+    learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Discrete) })
+});
+static CYCLE: LazyLock<Arc<Model>> = LazyLock::new(|| {
+    learn(&cycles(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Rhythmic) })
+});
+
+fn timing(dt: f64, duration: f64) -> Timing {
+    Timing { dt, duration: Some(duration) }
+}
+
+fn all(conditions: &BatchConditions, model: &Arc<Model>, timing: Timing) -> Vec<Array3<f64>> {
+    let (highest, threads) = (Derivative::Acceleration, Threads::ONE);
+    model.rollouts(conditions.clone(), timing, highest, threads, &mut |_| Ok(())).unwrap()
+}
+
+fn jacobian(variable: Variable, order: Derivative, model: &Arc<Model>, conditions: &Conditions) -> Array3<f64> {
+    model.jacobian(variable, order, conditions, timing(0.01, 1.5), &mut |_| Ok(())).unwrap()
+}
+
+fn of(trajectory: &Trajectory, order: Derivative) -> &Array2<f64> {
+    match order {
+        Derivative::Position => &trajectory.position,
+        Derivative::Velocity => &trajectory.velocity,
+        Derivative::Acceleration => &trajectory.acceleration,
+    }
+}
+
+/// Largest difference, and largest magnitude.
+fn difference(a: &Array2<f64>, b: &Array2<f64>) -> (f64, f64) {
+    let largest = |a: &Array2<f64>| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    (largest(&(a - b)), largest(b))
+}
+
+/// A vector for each of three movements.
+fn each(n: usize) -> impl Strategy<Value = Array2<f64>> {
+    prop::collection::vec(-3.0..3.0f64, 3 * n).prop_map(move |v| Array2::from_shape_vec((3, n), v).unwrap())
+}
+
+/// None, one for all, or one for each.
+fn rows(n: usize) -> impl Strategy<Value = Option<Rows>> {
+    prop_oneof![
+        Just(None),
+        each(n).prop_map(|rows| Some(Rows::All(rows.row(0).to_vec()))),
+        each(n).prop_map(|rows| Some(Rows::Each(rows))),
+    ]
+}
+
+fn row(rows: &Option<Rows>, b: usize) -> Option<Vec<f64>> {
+    rows.as_ref().map(|rows| match rows {
+        Rows::All(row) => row.clone(),
+        Rows::Each(rows) => rows.row(b).to_vec(),
+    })
+}
+
+proptest! {
+    /// Every movement of a batch is what the control loop makes of its conditions, within and past the end.
+    #[test]
+    fn batch_is_the_loop(
+        styles in each(2),
+        rows in (rows(3), rows(3), rows(3)),
+        amplitude in prop_oneof![Just(0.0), 0.1..3.0f64],
+        dt in prop_oneof![Just(1e-3), Just(1e-2), 2e-3..3e-2f64],
+        factor in 0.3..3.0f64,
+        length in 0.1..2.0f64,
+    ) {
+        for model in [&*REACH, &*CYCLE] {
+            let (kind, n) = (model.kind(), model.n_dofs());
+            let cut = |rows: &Option<Rows>| rows.clone().map(|rows| match rows {
+                Rows::All(row) => Rows::All(row[..n].to_vec()),
+                Rows::Each(rows) => Rows::Each(rows.slice(s![.., ..n]).to_owned()),
+            });
+            let (centres, starts, velocities) = (cut(&rows.0), cut(&rows.1), cut(&rows.2));
+            let discrete = kind == Kind::Discrete;
+            let tau = Some(factor * model.tau());
+            let conditions = BatchConditions {
+                styles: styles.clone(),
+                goals: centres.clone().filter(|_| discrete),
+                anchors: centres.clone().filter(|_| !discrete),
+                starts: starts.clone(),
+                velocities: velocities.clone(),
+                amplitude: Some(amplitude).filter(|_| !discrete),
+                tau,
+            };
+            let duration = length * factor * model.duration();
+            let made = all(&conditions, model, timing(dt, duration));
+            for b in 0..3 {
+                let one = Conditions {
+                    style: Some(styles.row(b).to_vec()),
+                    goal: row(&centres, b).filter(|_| discrete),
+                    anchor: row(&centres, b).filter(|_| !discrete),
+                    start: row(&starts, b),
+                    velocity: row(&velocities, b),
+                    amplitude: conditions.amplitude,
+                    tau,
+                };
+                let mut controller = Controller::new(Arc::clone(model), dt, &one, Some(0.0)).unwrap();
+                let mut stepped = [(); 3].map(|()| Array2::zeros((made[0].len_of(Axis(1)), n)));
+                for k in 0..stepped[0].nrows() {
+                    if k > 0 {
+                        controller.step().unwrap();
+                    }
+                    let motion = [controller.position(), controller.velocity(), controller.acceleration()];
+                    for (stepped, motion) in stepped.iter_mut().zip(motion) {
+                        stepped.row_mut(k).assign(&ndarray::aview1(motion));
+                    }
+                }
+                for (order, (made, stepped)) in made.iter().zip(&stepped).enumerate() {
+                    let (off, size) = difference(&made.index_axis(Axis(0), b).to_owned(), stepped);
+                    prop_assert!(off < 1e-11 * size.max(1.0), "{kind} {order}: {off:e} of {size:e}");
+                }
+            }
+        }
+    }
+
+    /// Whatever the pieces and the threads, every number is the same to the last bit.
+    #[test]
+    fn division_of_the_work_leaves_the_bits(size in 1usize..50, n_threads in 1usize..5, samples in 1usize..900) {
+        let styles = Array2::from_shape_fn((41, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
+        let velocities = Some(Rows::Each(Array2::from_shape_fn((41, 3), |(b, d)| (b * d) as f64 * 0.01)));
+        let conditions = BatchConditions { styles, velocities, ..BatchConditions::default() };
+        let timing = timing(1e-3, (samples - 1) as f64 * 1e-3);
+        let expected = all(&conditions, &REACH, timing);
+        let batch = REACH.batch(conditions, timing, &mut |_| Ok(())).unwrap();
+        let mut ends = vec![0];
+        for chunk in batch.chunks(size).unwrap() {
+            prop_assert_eq!(chunk.start, *ends.last().unwrap());
+            ends.push(chunk.end);
+            let threads = Threads::new(n_threads).unwrap();
+            let made = batch.rollouts(chunk.clone(), Derivative::Velocity, threads, &mut |_| Ok(())).unwrap();
+            prop_assert_eq!(made.len(), 2);
+            for (made, expected) in made.iter().zip(&expected) {
+                prop_assert_eq!(made.view(), expected.slice(s![chunk.clone(), .., ..]));
+            }
+        }
+        prop_assert_eq!(*ends.last().unwrap(), 41);
+        prop_assert_eq!(ends.len() - 1, 41usize.div_ceil(size));
+    }
+}
+
+/// Blocks of a large batch go to several threads, and to outputs of any layout, with the same bits.
+#[test]
+fn large_batches_are_the_same_on_several_threads() {
+    let styles = Array2::from_shape_fn((2000, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
+    let batch =
+        REACH.batch(BatchConditions { styles, ..Default::default() }, timing(1e-3, 0.4), &mut |_| Ok(())).unwrap();
+    let expected = batch.rollouts(0..2000, Derivative::Position, Threads::ONE, &mut |_| Ok(())).unwrap();
+    let mut shares = Vec::new();
+    let threads = Threads::new(3).unwrap();
+    let mut strided = Array3::zeros((401, 2000, 6));
+    let output = strided.slice_mut(s![.., .., ..;2]).permuted_axes([1, 0, 2]);
+    let mut proceed = |share| {
+        shares.push(share);
+        Ok(())
+    };
+    batch.write(0..2000, vec![output], threads, &mut proceed).unwrap();
+    assert_eq!(strided.slice(s![.., .., ..;2]).permuted_axes([1, 0, 2]), expected[0]);
+    assert!(strided.slice(s![.., .., 1..;2]).iter().all(|x| *x == 0.0));
+    assert!(shares[0] == 0.0 && shares.is_sorted() && shares.iter().all(|share| (0.0..1.0).contains(share)));
+}
+
+/// Between blocks a batch asks whether to go on, and stops when told so.
+#[test]
+fn batches_can_be_interrupted() {
+    let styles = Array2::zeros((3000, 2));
+    let batch =
+        REACH.batch(BatchConditions { styles, ..Default::default() }, timing(1e-3, 1.0), &mut |_| Ok(())).unwrap();
+    let mut stop_later = |share: f64| if share < 0.3 { Ok(()) } else { Err(Error::Interrupted) };
+    let stopped = batch.rollouts(0..3000, Derivative::Position, Threads::ONE, &mut stop_later);
+    assert!(matches!(stopped, Err(Error::Interrupted)));
+    let new = Arc::new(Model::clone(&REACH));
+    let stopped =
+        new.batch(BatchConditions { styles: array![[0.0, 0.0]], ..Default::default() }, timing(1e-3, 1.0), &mut |_| {
+            Err(Error::Interrupted)
+        });
+    assert!(matches!(stopped, Err(Error::Interrupted)));
+}
+
+/// What is remembered has the bits of what is computed anew, whatever else has been asked for meanwhile.
+#[test]
+fn remembered_responses_have_the_same_bits() {
+    let styles = array![[0.4, -1.0], [0.0, 2.0]];
+    for (model, other) in [(&*REACH, 0.7), (&*CYCLE, 1.3)] {
+        let conditions = BatchConditions { styles: styles.clone(), ..Default::default() };
+        let slower = BatchConditions { tau: Some(other), ..conditions.clone() };
+        let fresh = || Arc::new(Model::clone(model));
+        let (expected, expected_slower) = [&conditions, &slower].map(|c| all(c, &fresh(), timing(0.01, 1.0))).into();
+        let used = fresh();
+        for k in 0..40 {
+            assert_eq!(all(&conditions, &used, timing(0.01, 1.0)), expected);
+            assert_eq!(all(&slower, &used, timing(0.01, 1.0)), expected_slower);
+            all(&conditions, &used, timing(0.01, 0.1 + 0.01 * k as f64));
+        }
+    }
+}
+
+/// The Jacobians are the differences of rollouts, for every way to start: a movement is linear in its conditions.
+#[test]
+fn jacobians_are_differences_of_rollouts() {
+    for model in [&*REACH, &*CYCLE] {
+        let (n, discrete) = (model.n_dofs(), model.kind() == Kind::Discrete);
+        let given = |x: f64| Some((0..n).map(|d| x + d as f64).collect::<Vec<_>>());
+        for (start, velocity) in [(None, None), (given(0.4), None), (None, given(-0.3)), (given(0.4), given(-0.3))] {
+            let base = Conditions {
+                style: Some(vec![0.2, -0.3]),
+                goal: given(0.1).filter(|_| discrete),
+                anchor: given(0.1).filter(|_| !discrete),
+                start,
+                velocity,
+                amplitude: Some(if discrete { 1.0 } else { 0.7 }),
+                tau: Some(1.4 * model.tau()),
+            };
+            let rollout = |conditions: &Conditions| model.rollout(conditions, timing(0.01, 1.5)).unwrap();
+            let centre = if discrete { Variable::Goal } else { Variable::Anchor };
+            for variable in [Variable::Style, centre, Variable::Start] {
+                if variable == Variable::Start && base.start.is_none() && !discrete {
+                    continue;
+                }
+                let entries = if variable == Variable::Style { 2 } else { n };
+                for entry in 0..entries {
+                    let mut moved = base.clone();
+                    let vector = match variable {
+                        Variable::Style => &mut moved.style,
+                        Variable::Goal => &mut moved.goal,
+                        Variable::Anchor => &mut moved.anchor,
+                        Variable::Start => &mut moved.start,
+                    };
+                    let nominal = || model.demonstrated().starts.row(model.demonstrated().nominal).to_vec();
+                    vector.get_or_insert_with(nominal)[entry] += 0.5;
+                    let (ahead, behind) = (rollout(&moved), rollout(&base));
+                    for order in Derivative::ALL {
+                        let slope = (of(&ahead, order) - of(&behind, order)) / 0.5;
+                        let found = jacobian(variable, order, model, &base).index_axis(Axis(2), entry).to_owned();
+                        let (off, size) = difference(&found, &slope);
+                        assert!(off < 1e-10 * size.max(1.0), "{variable:?} {order:?} {entry}: {off:e} of {size:e}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A goal belongs to a discrete primitive, an anchor to a rhythmic one.
+#[test]
+fn variables_of_the_other_kind_are_refused() {
+    let ask = |model: &Arc<Model>, variable| {
+        model.jacobian(variable, Derivative::Position, &Conditions::default(), timing(0.1, 1.0), &mut |_| Ok(()))
+    };
+    assert!(matches!(ask(&REACH, Variable::Anchor), Err(Error::Kind { name: "anchor", .. })));
+    assert!(matches!(ask(&CYCLE, Variable::Goal), Err(Error::Kind { name: "goal", .. })));
+    assert!(matches!(Derivative::of_order("derivative", 3), Err(Error::Range { name: "derivative", .. })));
+}
+
+/// What does not fit is refused with the argument's name and its numbers.
+#[test]
+fn bad_batches_are_refused() {
+    let good = || BatchConditions { styles: Array2::zeros((4, 2)), ..Default::default() };
+    let refused = |model: &Arc<Model>, conditions| {
+        model.batch(conditions, timing(0.1, 1.0), &mut |_| Ok(())).unwrap_err().to_string()
+    };
+    let mut nan = Array2::zeros((4, 3));
+    nan[[2, 1]] = f64::NAN;
+    for (conditions, message) in [
+        (BatchConditions { styles: Array2::zeros((4, 3)), ..good() }, "styles has length 3, expected 2"),
+        (BatchConditions { styles: array![[0.0, 1e101]], ..good() }, "styles[0, 1] = 1e101"),
+        (
+            BatchConditions { goals: Some(Rows::Each(Array2::zeros((3, 3)))), ..good() },
+            "goals has 3 rows, but there are 4",
+        ),
+        (
+            BatchConditions { starts: Some(Rows::Each(Array2::zeros((4, 2)))), ..good() },
+            "starts has length 2, expected 3",
+        ),
+        (BatchConditions { velocities: Some(Rows::Each(nan)), ..good() }, "velocities[2, 1] = NaN"),
+        (
+            BatchConditions { velocities: Some(Rows::All(vec![0.0; 4])), ..good() },
+            "velocities has length 4, expected 3",
+        ),
+        (BatchConditions { anchors: Some(Rows::All(vec![0.0; 3])), ..good() }, "anchors does not apply to a discrete"),
+        (BatchConditions { amplitude: Some(2.0), ..good() }, "amplitude does not apply"),
+        (BatchConditions { tau: Some(-1.0), ..good() }, "tau = -1"),
+    ] {
+        let found = refused(&REACH, conditions);
+        assert!(found.starts_with(message), "{found}");
+    }
+    let goals = Some(Rows::All(vec![0.0; 2]));
+    assert!(refused(&CYCLE, BatchConditions { goals, ..good() }).ends_with("they move about anchors; set anchors"));
+    let batch = REACH.batch(good(), timing(0.1, 1.0), &mut |_| Ok(())).unwrap();
+    assert!(matches!(batch.chunks(0), Err(Error::Range { name: "size", .. })));
+    let (mut narrow, mut good) = (Array3::zeros((4, 11, 2)), Array3::zeros((4, 11, 3)));
+    for (movements, output) in [(0..4, narrow.view_mut()), (1..5, good.view_mut())] {
+        assert!(batch.write(movements, vec![output], Threads::ONE, &mut |_| Ok(())).is_err());
+    }
+}
+
+/// Numbers at the edge of their range stay numbers.
+#[test]
+fn extreme_batches_are_finite() {
+    for model in [&*REACH, &*CYCLE] {
+        let huge = Some(Rows::All(vec![1e150; model.n_dofs()]));
+        let conditions = BatchConditions {
+            styles: array![[1e100, -1e100], [0.0, 0.0]],
+            starts: huge.clone(),
+            velocities: huge,
+            amplitude: Some(if model.kind() == Kind::Discrete { 1.0 } else { 1e150 }),
+            ..Default::default()
+        };
+        assert!(all(&conditions, model, timing(0.01, 2.0)).iter().flatten().all(|x| x.is_finite()));
+    }
+    let none = BatchConditions { styles: Array2::zeros((0, 2)), ..Default::default() };
+    assert_eq!(all(&none, &REACH, timing(0.1, 1.0))[0].dim(), (0, 11, 3));
+}
