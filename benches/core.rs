@@ -1,33 +1,19 @@
 //! Times of learning and of whole trajectories; `step.rs` has those of one tick.
 #![allow(missing_docs)]
 
+mod movements;
+
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use movements::movements;
 use ndarray::{Array2, Array3};
 use pdmp_core::basis::{Basis, Domain, Gp, Kernel, NGnet};
 use pdmp_core::{
-    BatchConditions, Conditions, Demonstration, Derivative, FitOptions, Kind, Model, Sampling, Smoothing, StyleCount,
-    Threads, Timing, Variable, fit,
+    BatchConditions, Conditions, Derivative, FitOptions, Kind, Model, Smoothing, StyleCount, Threads, Timing, Variable,
+    fit,
 };
-
-/// M movements of D = 7 that span a few dimensions, 1001 samples in one second.
-fn demonstrations(n_demos: usize) -> Vec<Demonstration> {
-    let shape = |m: usize, d: usize, s: f64| {
-        let reach = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
-        let phase = m as f64 / n_demos as f64;
-        reach * (1.0 + d as f64)
-            + phase * (PI * s).sin().powi(2)
-            + phase * phase * (2.0 * PI * s).sin() * (PI * s).sin()
-    };
-    (0..n_demos)
-        .map(|m| {
-            let position = Array2::from_shape_fn((1001, 7), |(c, d)| shape(m, d, c as f64 / 1000.0));
-            Demonstration::new(position, Sampling::Uniform { dt: 1e-3 }).expect("finite")
-        })
-        .collect()
-}
 
 fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
     let mut options = FitOptions { styles: StyleCount::Given(3), basis, ..FitOptions::new(Kind::Discrete) };
@@ -38,11 +24,11 @@ fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
 fn learn(n_styles: usize) -> Arc<Model> {
     let options = options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate);
     let options = FitOptions { styles: StyleCount::Given(n_styles), ..options };
-    Arc::new(fit(&demonstrations(40), &options, &mut |_, _| Ok(())).expect("a fit"))
+    Arc::new(fit(&movements(40, 1001), &options, &mut |_, _| Ok(())).expect("a fit"))
 }
 
 fn fits(criterion: &mut Criterion) {
-    let demos = demonstrations(20);
+    let demos = movements(20, 1001);
     let mut group = criterion.benchmark_group("fit M=20 C=1001 D=7 J=3");
     group.sample_size(10);
     for (name, basis, smoothing) in [

@@ -91,6 +91,7 @@ def fit(
     beta_z: float | None = None,
     alpha_x: float | None = None,
     mu: float = 1.0,
+    threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model: ...
 def load(path: str | PathLike[str]) -> Model: ...

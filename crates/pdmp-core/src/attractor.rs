@@ -10,8 +10,6 @@
 //! step h is a combination of φ-functions of Ah (Hochbruck and Ostermann, Acta Numerica 19, 2010), so that a step is
 //! stable and exact for every h. The inverse drives z alone by a given y, which is the same problem in one dimension.
 
-use ndarray::{Array2, ArrayView1, ArrayView2};
-
 use crate::lanes::Real;
 
 /// Constants of the output system.
@@ -87,42 +85,77 @@ impl Attractor {
         (e * self.beta_z + z) * -self.alpha_z
     }
 
-    /// The forcing that makes the output system follow a movement (step 2 of Section 3.2): f = y′ − z.
-    ///
-    /// `position` and `slope` = dy/du (C, D) are samples of one cubic spline at intervals `h` of the clock, and
-    /// `attractor` (D,) is the goal or anchor. z solves Eq. (1) driven by that spline, exactly: from z(0) = 0, or, for a
-    /// `periodic` movement whose C samples make one turn, on its periodic steady state.
-    pub fn target(
-        &self,
-        h: f64,
-        position: ArrayView2<f64>,
-        slope: ArrayView2<f64>,
-        attractor: ArrayView1<f64>,
-        periodic: bool,
-    ) -> Array2<f64> {
-        let n = position.nrows();
+    /// The inverse of the output system for movements that are sampled at intervals `h` of the clock.
+    pub(crate) fn inverse(&self, h: f64) -> Inverse {
         let m = -self.alpha_z * h;
         // A scalar argument is a 2 × 2 one whose other eigenvalue is zero.
         let phi = phi_functions(m, 0.0).map(|[a, b]| a + b * m);
-        let weights = cubic_weights(h, phi);
         let stiffness = self.alpha_z * self.beta_z;
-        let mut target = slope.to_owned();
-        for (d, mut column) in target.columns_mut().into_iter().enumerate() {
-            let jet = |c: usize| Jet { value: attractor[d] - position[[c % n, d]], slope: -slope[[c % n, d]] };
-            let step = |z: f64, c: usize| phi[0] * z + stiffness * weigh(&weights, [jet(c), jet(c + 1)]);
-            let mut z = 0.0;
-            if periodic {
-                let turn = (0..n).fold(0.0, step);
-                z = turn / -(m * n as f64).exp_m1();
-            }
+        Inverse { m, decay: phi[0], weights: cubic_weights(h, phi).map(|weight| stiffness * weight) }
+    }
+}
+
+/// The output system driven by a movement instead of driving it, over steps of fixed length.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Inverse {
+    /// −α_zh.
+    m: f64,
+    /// exp(−α_zh).
+    decay: f64,
+    /// Response of z to g − y.
+    weights: CubicWeights,
+}
+
+impl Inverse {
+    /// The forcing that makes the output system follow a movement (step 2 of Section 3.2), f = y′ − z, in the place of
+    /// the movement's positions.
+    ///
+    /// `position` and `slope` = dy/du (C·D, by rows) are samples of one cubic spline, and `attractor` (D,) is the goal or
+    /// anchor. z solves Eq. (1) driven by that spline, exactly: from z(0) = 0, or, for a `periodic` movement whose C
+    /// samples make one turn, on its periodic steady state.
+    pub(crate) fn target(&self, position: &mut [f64], slope: &[f64], attractor: &[f64], periodic: bool) {
+        let n_dofs = attractor.len();
+        let n = position.len() / n_dofs;
+        let row = |c: usize| c * n_dofs..(c + 1) * n_dofs;
+        let mut z = vec![0.0; n_dofs];
+        if periodic {
             for c in 0..n {
-                column[c] -= z;
-                if c + 1 < n {
-                    z = step(z, c);
-                }
+                let next = (c + 1) % n;
+                self.step(
+                    &mut z,
+                    attractor,
+                    [&position[row(c)], &position[row(next)]],
+                    [&slope[row(c)], &slope[row(next)]],
+                );
+            }
+            let turns = -(self.m * n as f64).exp_m1();
+            z.iter_mut().for_each(|z| *z /= turns);
+        }
+        let mut now = z.clone();
+        for c in 0..n {
+            now.copy_from_slice(&z);
+            if c + 1 < n {
+                let slopes = [&slope[row(c)], &slope[row(c + 1)]];
+                self.step(&mut z, attractor, [&position[row(c)], &position[row(c + 1)]], slopes);
+            }
+            for ((target, slope), z) in position[row(c)].iter_mut().zip(&slope[row(c)]).zip(&now) {
+                *target = slope - z;
             }
         }
-        target
+    }
+
+    /// z one step on, given position and slope at both ends of it.
+    #[inline(always)]
+    fn step(&self, z: &mut [f64], attractor: &[f64], [y, y_next]: [&[f64]; 2], [dy, dy_next]: [&[f64]; 2]) {
+        let n = z.len();
+        let (attractor, y, y_next, dy, dy_next) = (&attractor[..n], &y[..n], &y_next[..n], &dy[..n], &dy_next[..n]);
+        for d in 0..n {
+            let jets = [
+                Jet { value: attractor[d] - y[d], slope: -dy[d] },
+                Jet { value: attractor[d] - y_next[d], slope: -dy_next[d] },
+            ];
+            z[d] = self.decay * z[d] + weigh(&self.weights, jets);
+        }
     }
 }
 
@@ -313,20 +346,21 @@ mod tests {
         let n = 401;
         let h = 1.0 / (n - 1) as f64;
         let u: Array1<f64> = Array1::linspace(0.0, 1.0, n);
-        let y = u.mapv(|u| (3.0 * u).sin() + 0.2 * u).insert_axis(ndarray::Axis(1));
-        let dy = u.mapv(|u| 3.0 * (3.0 * u).cos() + 0.2).insert_axis(ndarray::Axis(1));
-        let goal = Array1::from_vec(vec![0.9]);
-        let w = system.target(h, y.view(), dy.view(), goal.view(), false);
+        let y = u.mapv(|u| (3.0 * u).sin() + 0.2 * u).to_vec();
+        let dy = u.mapv(|u| 3.0 * (3.0 * u).cos() + 0.2).to_vec();
+        let goal = 0.9;
+        let mut w = y.clone();
+        system.inverse(h).target(&mut w, &dy, &[goal], false);
         let propagator = system.propagator(h);
         let slope = |c: usize| {
             let (from, to) = (c.saturating_sub(1), (c + 1).min(n - 1));
-            (w[[to, 0]] - w[[from, 0]]) / ((to - from) as f64 * h)
+            (w[to] - w[from]) / ((to - from) as f64 * h)
         };
-        let jet = |c: usize| Jet { value: w[[c, 0]], slope: slope(c) };
-        let mut state = State { e: y[[0, 0]] - goal[0], z: 0.0 };
+        let jet = |c: usize| Jet { value: w[c], slope: slope(c) };
+        let mut state = State { e: y[0] - goal, z: 0.0 };
         for c in 0..n - 1 {
             state = propagator.advance(state, [jet(c), jet(c + 1)]);
-            assert_relative_eq!(state.e + goal[0], y[[c + 1, 0]], epsilon = 2e-5);
+            assert_relative_eq!(state.e + goal, y[c + 1], epsilon = 2e-5);
         }
     }
 
@@ -337,14 +371,13 @@ mod tests {
         let n = 400;
         let h = std::f64::consts::TAU / n as f64;
         let u = Array1::from_iter((0..n).map(|c| c as f64 * h));
-        let column = |f: &dyn Fn(f64) -> f64| u.mapv(f).insert_axis(ndarray::Axis(1));
-        let (y, dy) = (column(&|u| (2.0 * u).sin()), column(&|u| 2.0 * (2.0 * u).cos()));
-        let f = system.target(h, y.view(), dy.view(), Array1::zeros(1).view(), true);
+        let (mut f, dy) = (u.mapv(|u| (2.0 * u).sin()).to_vec(), u.mapv(|u| 2.0 * (2.0 * u).cos()).to_vec());
+        system.inverse(h).target(&mut f, &dy, &[0.0], true);
         let (alpha, beta) = (8.0, 2.0);
         for c in 0..n {
             let (sin, cos) = (2.0 * u[c]).sin_cos();
             let z = -alpha * beta * (alpha * sin - 2.0 * cos) / (alpha * alpha + 4.0);
-            assert_relative_eq!(f[[c, 0]], 2.0 * cos - z, epsilon = 1e-6);
+            assert_relative_eq!(f[c], 2.0 * cos - z, epsilon = 1e-6);
         }
     }
 }

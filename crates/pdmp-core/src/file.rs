@@ -15,10 +15,11 @@ use serde::{Deserialize, Serialize};
 use crate::attractor::Attractor;
 use crate::context::ContextMap;
 use crate::error::{Error, LARGEST, Result};
-use crate::landscape::{Landscape, MOST_CELLS};
+use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
 use crate::phase::Canonical;
 use crate::smooth::Smoothing;
+use crate::tabulate::{Jets, MOST_CELLS};
 
 /// Version of the file's layout.
 const SCHEMA: u32 = 1;
@@ -107,7 +108,7 @@ impl Model {
 
     fn arrays(&self) -> Vec<Array> {
         let demonstrated = &self.demonstrated;
-        let (values, slopes) = self.landscape.knots();
+        let Jets { values, slopes, .. } = self.landscape.knots();
         let knots = vec![self.landscape.cells() + 1, self.n_styles(), self.n_dofs()];
         let mut arrays = vec![
             matrix("styles", &demonstrated.styles),
@@ -273,15 +274,11 @@ impl Reader<'_> {
             if let Some(value) = data.iter().find(|x| x.abs() > LARGEST) {
                 return Err(Error::File(format!("{name} holds {value:e}")));
             }
-            Array2::from_shape_vec((n_knots, n_styles * n_dofs), data).map_err(|error| Error::File(error.to_string()))
+            Ok(data)
         };
-        let landscape = Landscape::from_knots(
-            constants.canonical,
-            n_dofs,
-            &knots("landscape.values")?,
-            &knots("landscape.slopes")?,
-            constants.table_error,
-        );
+        let (values, slopes) = (knots("landscape.values")?, knots("landscape.slopes")?);
+        let knots = Jets { n_outputs: n_styles * n_dofs, values, slopes };
+        let landscape = Landscape::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
         let demonstrated = Demonstrated {
             styles: self.matrix("styles", (n_demos, n_styles))?,
             goals: self.matrix("goals", (n_demos, n_dofs))?,

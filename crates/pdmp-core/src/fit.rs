@@ -4,20 +4,21 @@ use std::f64::consts::TAU;
 
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
-use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, Axis};
+use ndarray::{Array1, Array2, s};
 
 use crate::align::{Aligned, Alignment};
 use crate::attractor::Attractor;
 use crate::basis::{Basis, Domain, Gp};
 use crate::context::{self, ContextMap};
-use crate::demo::{Demonstration, check_matrix, zeros};
+use crate::demo::{Demonstration, check_matrix};
 use crate::error::{Error, Result, check_positive, check_vector};
 use crate::factor::{Factors, StyleCount};
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
 use crate::phase::{Canonical, Kind};
 use crate::smooth::Smoothing;
-use crate::spline::Spline;
+use crate::targets::Targets;
+use crate::threads::Threads;
 
 /// The unit of each degree of freedom in the factorisation.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,11 +54,13 @@ pub struct FitOptions {
     pub alpha_x: Option<f64>,
     /// μ of the canonical system, rhythmic.
     pub mu: f64,
+    /// How many threads may work on it. The model does not depend on it, to the last bit.
+    pub threads: Threads,
 }
 
 impl FitOptions {
     /// The defaults: as many styles as make up nine tenths of the singular values, a Gaussian process, no smoothing,
-    /// α_z = 25, μ = 1, and all else from the demonstrations.
+    /// α_z = 25, μ = 1, as many threads as the system allows, and all else from the demonstrations.
     pub fn new(kind: Kind) -> Self {
         let smoothing = Smoothing::Interpolate;
         Self {
@@ -71,6 +74,7 @@ impl FitOptions {
             beta_z: None,
             alpha_x: None,
             mu: 1.0,
+            threads: Threads::available(),
         }
     }
 }
@@ -113,30 +117,34 @@ pub fn fit(
     proceed: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
     options.styles.check(demos.len(), "demonstrations")?;
-    let aligned = options.alignment.align(demos, &mut |share| proceed(Stage::Targets, share))?;
+    let aligned = options.alignment.align(demos)?;
     let (contexts, names) = (contexts_of(demos, options.contexts.as_ref())?, names_of(demos)?);
-    let (goals, anchors) = (aligned.goals(demos), aligned.anchors());
     let constants = Constants::of(options, &aligned)?;
-    let ranges = aligned.ranges();
+    let threads = options.threads;
+    let mut targeting = |share| proceed(Stage::Targets, share);
+    let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
+    let ranges = targets.ranges();
     let dof_scale = scale_of(&options.dof_scale, &ranges)?;
-    let centres = if constants.canonical.kind() == Kind::Discrete { &goals } else { &anchors };
-    let targets = constants.targets(&aligned.position, centres.view(), &dof_scale)?;
+    targets.scale(&dof_scale);
+    let Targets { forcing, goals, starts, anchors, .. } = targets;
 
     proceed(Stage::Factorise, 0.0)?;
-    let factors = Factors::of(targets.view())?;
+    let factors = Factors::of(forcing.view())?;
+    drop(forcing);
     let singular_values = factors.singular_values.clone();
     let factors = factors.truncate(options.styles)?;
 
-    let (clock, basis_targets) = constants.by_clock(&factors.basis, &dof_scale);
+    proceed(Stage::Regress, 0.0)?;
+    let clock = constants.canonical.clock(aligned.n_samples);
+    let basis_targets = by_clock(&factors.basis, &dof_scale);
     let mut regressing = |share| proceed(Stage::Regress, share);
     let regression = options.basis.regress(constants.domain(), &clock, basis_targets.view(), &mut regressing)?;
 
     let mut compiling = |share| proceed(Stage::Compile, share);
     let shape = (factors.basis.nrows(), demos[0].n_dofs());
-    let landscape = Landscape::compile(constants.canonical, shape, regression.as_ref(), &mut compiling)?;
+    let landscape = Landscape::compile(constants.canonical, shape, regression.as_ref(), threads, &mut compiling)?;
 
-    let starts = aligned.starts();
-    let durations = aligned.durations.clone();
+    let Aligned { durations, nominal, .. } = aligned;
     let map = match &contexts {
         None => None,
         Some(contexts) => {
@@ -145,8 +153,7 @@ pub fn fit(
             Some(ContextMap::fit(contexts.view(), outputs.view())?)
         }
     };
-    let demonstrated =
-        Demonstrated { styles: factors.styles, goals, starts, anchors, durations, contexts, nominal: aligned.nominal };
+    let demonstrated = Demonstrated { styles: factors.styles, goals, starts, anchors, durations, contexts, nominal };
     let learnt = Learnt {
         n_samples: clock.len(),
         smoothing: options.alignment.smoothing,
@@ -180,14 +187,13 @@ pub fn style_of(model: &Model, demo: &Demonstration, dt: Option<f64>, period: Op
         nominal: None,
         n_samples: Some(model.learnt.n_samples),
     };
-    let demos = std::slice::from_ref(demo);
-    let aligned = alignment.align(demos, &mut |_| Ok(()))?;
-    let constants = Constants { attractor: model.attractor, canonical: model.canonical(), tau: model.tau };
-    let centres = if model.kind() == Kind::Discrete { aligned.goals(demos) } else { aligned.anchors() };
+    let aligned = alignment.align(std::slice::from_ref(demo))?;
+    let mut target = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;
     let scale = &model.learnt.dof_scale;
-    let target = constants.targets(&aligned.position, centres.view(), scale)?;
+    target.scale(scale);
+    let target = target.forcing;
 
-    let clock = constants.clock(model.learnt.n_samples);
+    let clock = model.canonical().clock(model.learnt.n_samples);
     let n_outputs = model.landscape.n_outputs();
     let mut design = Mat::zeros(target.len(), model.n_styles());
     let (mut value, mut slope) = (vec![0.0; n_outputs], vec![0.0; n_outputs]);
@@ -267,51 +273,19 @@ impl Constants {
             Canonical::Rhythmic { .. } => Domain::Circle,
         }
     }
+}
 
-    /// The clock at the C samples of an aligned demonstration.
-    fn clock(&self, n_samples: usize) -> Vec<f64> {
-        let steps = if self.canonical.kind() == Kind::Discrete { n_samples - 1 } else { n_samples };
-        (0..n_samples).map(|c| self.canonical.extent() * (c as f64 / steps as f64)).collect()
-    }
-
-    /// Targets F (M, C·D) of all demonstrations, in units of `dof_scale` (step 2).
-    ///
-    /// The output system does not care where a movement takes place, but for rounding: discrete demonstrations are
-    /// translated to start at 0, and a DoF that does not move has a target of exactly zero.
-    fn targets(&self, position: &Array3<f64>, centres: ArrayView2<f64>, dof_scale: &[f64]) -> Result<Array2<f64>> {
-        let (n_demos, n_samples, n_dofs) = position.dim();
-        let clock = self.clock(n_samples);
-        let h = clock[1];
-        let mut targets = zeros("targets", (n_demos, n_samples * n_dofs))?;
-        for (m, mut row) in targets.rows_mut().into_iter().enumerate() {
-            let origin = position.index_axis(Axis(0), m).row(0).to_owned();
-            let moved = &position.index_axis(Axis(0), m) - &origin;
-            let centre = &centres.row(m) - &origin;
-            let target = self.target(h, &clock, moved.view(), centre.view());
-            for (value, scaled) in target.rows().into_iter().flatten().zip(row.indexed_iter_mut()) {
-                *scaled.1 = value / dof_scale[scaled.0 % n_dofs];
-            }
+/// F_basis (J, C·D) as outputs over the clock (C, J·D), in the unit of each DoF.
+fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
+    let n_dofs = dof_scale.len();
+    let mut outputs = Array2::zeros((basis.ncols() / n_dofs, basis.nrows() * n_dofs));
+    for (c, mut output) in outputs.rows_mut().into_iter().enumerate() {
+        let forcing = basis.slice(s![.., c * n_dofs..(c + 1) * n_dofs]);
+        for ((output, forcing), scale) in output.iter_mut().zip(forcing).zip(dof_scale.iter().cycle()) {
+            *output = forcing * scale;
         }
-        Ok(targets)
     }
-
-    fn target(&self, h: f64, clock: &[f64], position: ArrayView2<f64>, centre: ArrayView1<f64>) -> Array2<f64> {
-        let periodic = self.canonical.kind() == Kind::Rhythmic;
-        let spline =
-            if periodic { Spline::periodic(clock, TAU, position) } else { Spline::not_a_knot(clock, position) };
-        self.attractor.target(h, position, spline.slopes(), centre, periodic)
-    }
-
-    /// F_basis (J, C·D) as outputs over the clock (C, J·D), in the unit of each DoF.
-    fn by_clock(&self, basis: &Array2<f64>, dof_scale: &[f64]) -> (Vec<f64>, Array2<f64>) {
-        let n_dofs = dof_scale.len();
-        let n_samples = basis.ncols() / n_dofs;
-        let outputs = Array2::from_shape_fn((n_samples, basis.nrows() * n_dofs), |(c, o)| {
-            let (j, d) = (o / n_dofs, o % n_dofs);
-            basis[[j, c * n_dofs + d]] * dof_scale[d]
-        });
-        (self.clock(n_samples), outputs)
-    }
+    outputs
 }
 
 /// Rates of the systems: far enough from the ends of the number range for their products.

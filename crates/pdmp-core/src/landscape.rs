@@ -1,25 +1,15 @@
 //! The attractor landscape, compiled to a table that is read in constant time.
 //!
 //! Whatever regression learnt it, the forcing of each style dimension and DoF is stored as a piecewise cubic (Hermite)
-//! on a uniform grid of the clock. Between knots a cubic is off by h⁴/384·|w⁗| at most, and most in the middle of a cell.
-
-use ndarray::{Array2, aview1};
+//! on a uniform grid of the clock.
 
 use crate::attractor::Jet;
 use crate::basis::Regression;
-use crate::demo::zeros;
 use crate::error::Result;
 use crate::lanes::{Lanes, Real, Register, WIDTH, groups};
 use crate::phase::{Canonical, faded, turn};
-
-/// Error of the table, relative to the largest forcing, at which cells are halved no more.
-const TOLERANCE: f64 = 1e-9;
-/// Cells of the first table.
-const FEWEST_CELLS: usize = 128;
-/// Cells beyond which a table is not refined.
-pub(crate) const MOST_CELLS: usize = 8192;
-/// Knots between two questions whether to go on.
-const PORTION: usize = 64;
+use crate::tabulate::{Jets, tabulate};
+use crate::threads::Threads;
 
 /// Forcing w of unit styles over the clock: discrete x·b(x; W), rhythmic b(φ; W).
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +71,7 @@ fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> Jet<T> {
 }
 
 impl Landscape {
-    /// Tabulates a regression, halving the cells until their midpoints agree.
+    /// Compiles a regression of J·D outputs.
     ///
     /// # Errors
     /// Whatever `proceed` returns, which is told the share of the finest possible table that is done.
@@ -89,76 +79,30 @@ impl Landscape {
         canonical: Canonical,
         (n_styles, n_dofs): (usize, usize),
         regression: &dyn Regression,
+        threads: Threads,
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
-        let (extent, n_outputs) = (canonical.extent(), n_styles * n_dofs);
-        let mut done = 0;
-        let mut tabulate = |n: usize, at: &dyn Fn(usize) -> f64| {
-            let (mut values, mut slopes) = (zeros("landscape", (n, n_outputs))?, zeros("landscape", (n, n_outputs))?);
-            let (mut value, mut slope) = (vec![0.0; n_outputs], vec![0.0; n_outputs]);
-            for k in 0..n {
-                if k % PORTION == 0 {
-                    proceed(done as f64 / (MOST_CELLS + 1) as f64)?;
-                }
-                regression.evaluate(at(k), &mut value, &mut slope);
-                values.row_mut(k).assign(&aview1(&value));
-                slopes.row_mut(k).assign(&aview1(&slope));
-                done += 1;
-            }
-            Ok((values, slopes))
-        };
-        let mut knots = tabulate(FEWEST_CELLS + 1, &|k| extent * k as f64 / FEWEST_CELLS as f64)?;
-        loop {
-            let (values, slopes) = &knots;
-            let cells = values.nrows() - 1;
-            let width = extent / cells as f64;
-            let middles = tabulate(cells, &|k| width * (k as f64 + 0.5))?;
-            let largest = values.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
-            let mut error = 0.0f64;
-            for ((k, o), exact) in middles.0.indexed_iter() {
-                let cubic =
-                    0.5 * (values[[k, o]] + values[[k + 1, o]]) + width / 8.0 * (slopes[[k, o]] - slopes[[k + 1, o]]);
-                error = error.max((cubic - exact).abs() / largest);
-            }
-            // The midpoints are paid for and become knots. That makes the error 16 times smaller where w is smooth, and 8
-            // times at a kink of w″, as a Matérn-3/2 process has; a quarter is promised.
-            knots = (interleave(values, &middles.0), interleave(slopes, &middles.1));
-            error = if error <= 4.0 * TOLERANCE { error / 4.0 } else { error };
-            if error <= TOLERANCE || 2 * cells >= MOST_CELLS {
-                let (mut values, mut slopes) = knots;
-                if let Canonical::Rhythmic { .. } = canonical {
-                    close(&mut values);
-                    close(&mut slopes);
-                }
-                return Ok(Self::from_knots(canonical, n_dofs, &values, &slopes, error));
-            }
+        let (mut knots, error) = tabulate(canonical.extent(), n_styles * n_dofs, regression, threads, proceed)?;
+        if let Canonical::Rhythmic { .. } = canonical {
+            knots.close();
         }
+        Ok(Self::from_knots(canonical, n_dofs, &knots, error))
     }
 
-    /// A table from values and slopes at its knots, each (cells + 1, J·D) with two rows at least.
-    pub(crate) fn from_knots(
-        canonical: Canonical,
-        n_dofs: usize,
-        values: &Array2<f64>,
-        slopes: &Array2<f64>,
-        error: f64,
-    ) -> Self {
-        let (n_knots, n_styles) = (values.nrows(), values.ncols() / n_dofs);
-        let (cells, extent) = (n_knots - 1, canonical.extent());
+    /// A table from values and slopes of J·D outputs at its knots, two at least.
+    pub(crate) fn from_knots(canonical: Canonical, n_dofs: usize, knots: &Jets, error: f64) -> Self {
+        let (cells, n_styles, extent) = (knots.len() - 1, knots.n_outputs / n_dofs, canonical.extent());
         let width = extent / cells as f64;
-        let lanes = |matrix: &Array2<f64>, k: usize, group: usize, j: usize| {
-            let dofs = group * WIDTH..n_dofs.min((group + 1) * WIDTH);
-            let mut lanes = [0.0; WIDTH];
-            lanes.iter_mut().zip(dofs).for_each(|(lane, d)| *lane = matrix[[k, j * n_dofs + d]]);
-            Lanes::new(lanes)
-        };
-        let jet = |k, group, j| Jet { value: lanes(values, k, group, j), slope: lanes(slopes, k, group, j) };
-        let mut cubics = Vec::with_capacity(n_knots * groups(n_dofs) * n_styles);
-        for k in 0..n_knots {
-            for group in 0..groups(n_dofs) {
-                cubics.extend((0..n_styles).map(|j| match jet(k, group, j) {
-                    from if k < cells => Cubic::hermite(from, jet(k + 1, group, j), width),
-                    last => Cubic([last.value, last.slope, Lanes::ZERO, Lanes::ZERO]),
+        let mut cubics = Vec::with_capacity((cells + 1) * groups(n_dofs) * n_styles);
+        for k in 0..=cells {
+            for first in (0..n_dofs).step_by(WIDTH) {
+                let n = WIDTH.min(n_dofs - first);
+                cubics.extend((0..n_styles).map(|j| {
+                    let from = knots.jet(k, j * n_dofs + first, n);
+                    if k == cells {
+                        return Cubic([from.value, from.slope, Lanes::ZERO, Lanes::ZERO]);
+                    }
+                    Cubic::hermite(from, knots.jet(k + 1, j * n_dofs + first, n), width)
                 }));
             }
         }
@@ -176,15 +120,13 @@ impl Landscape {
         self.error
     }
 
-    /// Values and slopes at the knots, each (cells + 1, J·D) by rows.
-    pub(crate) fn knots(&self) -> (Vec<f64>, Vec<f64>) {
-        let size = (self.cells + 1) * self.n_outputs();
-        let (mut values, mut slopes) = (vec![0.0; size], vec![0.0; size]);
-        let rows = values.chunks_mut(self.n_outputs()).zip(slopes.chunks_mut(self.n_outputs()));
-        for (k, (values, slopes)) in rows.enumerate() {
+    /// Values and slopes at the knots.
+    pub(crate) fn knots(&self) -> Jets {
+        let mut knots = Jets::zeros(self.cells + 1, self.n_outputs());
+        for (k, (values, slopes)) in knots.rows_mut(1).enumerate() {
             self.scatter(|group, j| self.knot(k, group, j), values, slopes);
         }
-        (values, slopes)
+        knots
     }
 
     /// The forcing of a style at a knot, for one group of DoFs.
@@ -310,23 +252,10 @@ fn accumulate<T: Real>(sum: &mut [T; 4], cubic: [T; 4], times: f64) {
     }
 }
 
-/// Rows of `knots` with those of `middles` between them.
-fn interleave(knots: &Array2<f64>, middles: &Array2<f64>) -> Array2<f64> {
-    Array2::from_shape_fn((knots.nrows() + middles.nrows(), knots.ncols()), |(k, o)| {
-        if k % 2 == 0 { knots[[k / 2, o]] } else { middles[[k / 2, o]] }
-    })
-}
-
-/// Makes the last knot of a turn the first, which they are but for rounding.
-fn close(knots: &mut Array2<f64>) {
-    let first = knots.row(0).to_owned();
-    let last = knots.nrows() - 1;
-    knots.row_mut(last).assign(&first);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tabulate::TOLERANCE;
 
     #[derive(Debug)]
     struct Waves(f64);
@@ -351,7 +280,7 @@ mod tests {
             [(Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 }, 9.0), (Canonical::Rhythmic { mu: 1.0 }, 5.0)]
         {
             let regression = Waves(omega);
-            let table = Landscape::compile(canonical, (1, 3), &regression, &mut |_| Ok(())).unwrap();
+            let table = Landscape::compile(canonical, (1, 3), &regression, Threads::ONE, &mut |_| Ok(())).unwrap();
             assert!(table.error() <= TOLERANCE);
             let (mut value, mut slope, mut exact, mut rise) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
             for k in 0..10_007 {
@@ -386,7 +315,7 @@ mod tests {
         for k in 0..100 {
             let kink = Kink((0.5f64.sqrt() + f64::from(k) * 0.618_033_988_75).fract());
             let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
-            let table = Landscape::compile(canonical, (1, 1), &kink, &mut |_| Ok(())).unwrap();
+            let table = Landscape::compile(canonical, (1, 1), &kink, Threads::ONE, &mut |_| Ok(())).unwrap();
             for u in (0..=400).map(|i| kink.0 + 1e-5 * f64::from(i - 200)).filter(|u| (0.0..1.0).contains(u)) {
                 let (mut value, mut slope, mut exact, mut rise) = ([0.0], [0.0], [0.0], [0.0]);
                 table.evaluate(u, &mut value, &mut slope);
@@ -400,7 +329,7 @@ mod tests {
     #[test]
     fn forcing_fades_with_the_phase_after_the_end() {
         let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
-        let table = Landscape::compile(canonical, (1, 1), &Waves(9.0), &mut |_| Ok(())).unwrap();
+        let table = Landscape::compile(canonical, (1, 1), &Waves(9.0), Threads::ONE, &mut |_| Ok(())).unwrap();
         let at = |u: f64| {
             let (mut value, mut slope) = ([0.0], [0.0]);
             table.evaluate(u, &mut value, &mut slope);

@@ -85,6 +85,8 @@ mod rollout;
 mod series;
 mod smooth;
 mod spline;
+mod tabulate;
+mod targets;
 mod threads;
 
 pub use align::Alignment;

@@ -30,6 +30,14 @@ impl Kind {
             Kind::Rhythmic => "rhythmic",
         }
     }
+
+    /// Intervals from the first of `n_samples` to the end of the movement, or to the next cycle.
+    pub(crate) fn steps(self, n_samples: usize) -> usize {
+        match self {
+            Kind::Discrete => n_samples - 1,
+            Kind::Rhythmic => n_samples,
+        }
+    }
 }
 
 impl fmt::Display for Kind {
@@ -71,6 +79,12 @@ impl Canonical {
             Canonical::Discrete { u_end, .. } => u_end,
             Canonical::Rhythmic { .. } => TAU,
         }
+    }
+
+    /// The clock at each of `n_samples` at equal intervals.
+    pub(crate) fn clock(&self, n_samples: usize) -> Vec<f64> {
+        let steps = self.kind().steps(n_samples) as f64;
+        (0..n_samples).map(|c| self.extent() * (c as f64 / steps)).collect()
     }
 
     /// The phase at clock `u`: x in (0, 1], or φ in [0, 2π).

@@ -1,4 +1,4 @@
-//! Interpolating cubic splines through the samples of a recording, kept as values and slopes at the knots.
+//! Interpolating cubic splines through the samples of a recording, by their values and slopes at the knots.
 //!
 //! On the interval from knot k to its neighbour o, with H = t_o − t_k, r = (t − t_k)/H and the chord δ = (y_o − y_k)/H,
 //!
@@ -6,236 +6,275 @@
 //! y(t) = y_k + (t − t_k)[ṡ_k + r(3δ − 2ṡ_k − ṡ_o) + r²(ṡ_k + ṡ_o − 2δ)]
 //! ```
 //!
-//! and the slopes ṡ follow from the continuity of the second derivative: one tridiagonal system for all columns,
-//! solved in O(n). Every coefficient is a ratio of intervals, and no value is squared: neither the unit of time nor
-//! that of the values matters.
+//! and the slopes ṡ follow from the continuity of the second derivative: one tridiagonal system for all columns, and for
+//! all splines over the same knots, solved in O(n). Every coefficient is a ratio of intervals, and no value is squared:
+//! neither the unit of time nor that of the values matters.
 //!
 //! C. de Boor, A Practical Guide to Splines, Springer 1978, chapter IV.
 
-use ndarray::{Array2, ArrayView1, ArrayView2, s};
-
-/// A twice continuously differentiable piecewise cubic in D dimensions.
+/// Knots of cubic splines, with the system that the slopes solve, factorised.
+///
+/// Values and slopes at the knots lie by rows: those of all D columns at the first knot, then at the next.
 #[derive(Clone, Debug)]
-pub(crate) struct Spline {
-    /// Knots; a periodic spline repeats the first one a period later.
-    knots: Vec<f64>,
-    /// Values at the knots.
-    values: Array2<f64>,
-    /// Slopes at the knots.
-    slopes: Array2<f64>,
-    /// Period, in the unit of the knots.
-    period: Option<f64>,
+pub(crate) struct Knots {
+    /// Times of the n knots; those of periodic splines repeat the first a period later.
+    time: Vec<f64>,
+    /// An equation for the slope at each knot.
+    equations: Vec<Equation>,
+    /// What joins the ends of periodic splines.
+    seam: Option<Seam>,
 }
 
-/// Where a time lies: `x` after knot `near`, which is the fraction `r` of the signed interval `width` to knot `far`.
-struct Place {
-    near: usize,
-    far: usize,
-    width: f64,
-    x: f64,
-    r: f64,
+/// A row of the tridiagonal system before it is factorised: what the slopes before, at and after the knot weigh, and the
+/// rises over two neighbouring intervals.
+struct Condition {
+    slopes: [f64; 3],
+    rises: [f64; 2],
 }
 
-impl Spline {
-    /// The spline through `values` (n, D) at `time` (n,) whose third derivative is continuous at the second knot and
-    /// the last but one. It reproduces cubics.
+/// A row of the factorised system.
+#[derive(Clone, Copy, Debug)]
+struct Equation {
+    /// Weights of the rises over two neighbouring intervals.
+    rises: [f64; 2],
+    /// How much of the slope before is taken off in the forward substitution.
+    lower: f64,
+    /// How much of the slope after is taken off in the backward substitution.
+    upper: f64,
+    /// Inverse of the pivot.
+    scale: f64,
+}
+
+/// Sherman–Morrison: the cyclic matrix is a tridiagonal one plus u·vᵀ, u = (−2, 0, …, bottom), v = (1, 0, …, last).
+#[derive(Clone, Debug)]
+struct Seam {
+    last: f64,
+    /// The tridiagonal system's solution x for u, as x/(1 + vᵀx).
+    correction: Vec<f64>,
+}
+
+impl Knots {
+    /// Knots of splines whose third derivative is continuous at the second knot and the last but one. They reproduce
+    /// cubics.
     ///
     /// The caller has checked that n is at least 4 and that the times increase.
-    pub(crate) fn not_a_knot(time: &[f64], values: ArrayView2<f64>) -> Self {
-        let (n, h, chords) = (time.len(), intervals(time), chords(time, values));
-        let mut rows = vec![[0.0; 3]; n];
-        let mut slopes = Array2::zeros(values.dim());
-        let mut set = |i: usize, row: [f64; 3], inner: usize, [left, right]: [f64; 2]| {
-            rows[i] = row;
-            slopes.row_mut(i).scaled_add(left, &chords.row(inner - 1));
-            slopes.row_mut(i).scaled_add(right, &chords.row(inner));
-        };
-        let ([end, next], [outer, inner]) = end_condition(h[0], h[1]);
-        set(0, [0.0, end, next], 1, [outer, inner]);
-        for i in 1..n - 1 {
-            let (row, weights) = inner_condition(h[i - 1], h[i]);
-            set(i, row, i, weights);
-        }
+    pub(crate) fn not_a_knot(time: Vec<f64>) -> Self {
+        let (n, h) = (time.len(), intervals(&time));
+        let mut conditions = Vec::with_capacity(n);
+        let ([end, next], rises) = end_condition(h[0], h[1]);
+        conditions.push(Condition { slopes: [0.0, end, next], rises });
+        conditions.extend(h.windows(2).map(|h| inner_condition(h[0], h[1])));
         let ([end, next], [outer, inner]) = end_condition(h[n - 2], h[n - 3]);
-        set(n - 1, [next, end, 0.0], n - 2, [inner, outer]);
-        solve_tridiagonal(&rows, &mut slopes);
-        Self { knots: time.to_vec(), values: values.to_owned(), slopes, period: None }
+        conditions.push(Condition { slopes: [next, end, 0.0], rises: [inner, outer] });
+        Self { time, equations: factorise(&conditions), seam: None }
     }
 
-    /// The spline of the given period through `values` (n, D) at `time` (n,), t_0 < … < t_{n−1} < t_0 + period.
+    /// Knots of splines of the given period, t_0 < … < t_{n−1} < t_0 + period.
     ///
     /// The caller has checked that n is at least 3 and that the times increase.
-    pub(crate) fn periodic(time: &[f64], period: f64, values: ArrayView2<f64>) -> Self {
-        let (n, n_dofs) = values.dim();
-        let knots: Vec<f64> = time.iter().copied().chain([time[0] + period]).collect();
-        let values = close(values);
-        let (h, chords) = (intervals(&knots), chords(&knots, values.view()));
-        let mut rows = vec![[0.0; 3]; n];
-        let mut rhs = Array2::zeros((n, n_dofs + 1));
-        for i in 0..n {
-            let before = (i + n - 1) % n;
-            let (row, [a, b]) = inner_condition(h[before], h[i]);
-            rows[i] = row;
-            let mut rhs = rhs.slice_mut(s![i, ..n_dofs]);
-            rhs.scaled_add(a, &chords.row(before));
-            rhs.scaled_add(b, &chords.row(i));
+    pub(crate) fn periodic(mut time: Vec<f64>, period: f64) -> Self {
+        let n = time.len();
+        time.push(time[0] + period);
+        let h = intervals(&time);
+        let mut conditions: Vec<_> = (0..n).map(|i| inner_condition(h[(i + n - 1) % n], h[i])).collect();
+        let (top, bottom) = (conditions[0].slopes[0], conditions[n - 1].slopes[2]);
+        conditions[0].slopes[1] += 2.0;
+        conditions[n - 1].slopes[1] += top * bottom / 2.0;
+        let equations = factorise(&conditions);
+
+        let last = -top / 2.0;
+        let mut correction = vec![0.0; n];
+        (correction[0], correction[n - 1]) = (-2.0, bottom);
+        for i in 1..n {
+            correction[i] -= equations[i].lower * correction[i - 1];
         }
-        // Sherman–Morrison: the cyclic matrix is a tridiagonal one plus u·vᵀ, u = (−2, 0, …, bottom) in the last column
-        // of the right-hand side, v = (1, 0, …, −top/2).
-        let (top, bottom) = (rows[0][0], rows[n - 1][2]);
-        rows[0][1] += 2.0;
-        rows[n - 1][1] += top * bottom / 2.0;
-        rhs[[0, n_dofs]] = -2.0;
-        rhs[[n - 1, n_dofs]] = bottom;
-        solve_tridiagonal(&rows, &mut rhs);
-        let along_v = &rhs.row(0) - &(&rhs.row(n - 1) * (top / 2.0));
-        let mut slopes = rhs.slice(s![.., ..n_dofs]).to_owned();
-        for (mut slope, u) in slopes.rows_mut().into_iter().zip(rhs.column(n_dofs)) {
-            slope.scaled_add(-u / (1.0 + along_v[n_dofs]), &along_v.slice(s![..n_dofs]));
+        substitute_back(&equations, &mut correction);
+        let size = 1.0 + correction[0] + last * correction[n - 1];
+        correction.iter_mut().for_each(|x| *x /= size);
+        Self { time, equations, seam: Some(Seam { last, correction }) }
+    }
+
+    /// Number of knots n.
+    fn len(&self) -> usize {
+        self.equations.len()
+    }
+
+    /// Writes the `slopes` (n·D) at the knots of the spline through `values` (n·D).
+    pub(crate) fn slopes(&self, values: &[f64], slopes: &mut [f64]) {
+        let n = self.len();
+        let n_dofs = values.len() / n;
+        let value = |i: usize| &values[i * n_dofs..][..n_dofs];
+        for (i, equation) in self.equations.iter().enumerate() {
+            let [from, at, to] = match self.seam {
+                None if i == 0 => [0, 1, 2],
+                None if i == n - 1 => [n - 3, n - 2, n - 1],
+                Some(_) if i == 0 => [n - 1, 0, 1],
+                Some(_) if i == n - 1 => [n - 2, n - 1, 0],
+                _ => [i - 1, i, i + 1],
+            };
+            let ([left, right], [from, at, to]) = (equation.rises, [from, at, to].map(value));
+            let (before, slope) = slopes.split_at_mut(i * n_dofs);
+            let slope = &mut slope[..n_dofs];
+            for d in 0..n_dofs {
+                slope[d] = left * (at[d] - from[d]) + right * (to[d] - at[d]);
+            }
+            if i > 0 {
+                take_off(slope, equation.lower, &before[(i - 1) * n_dofs..]);
+            }
         }
-        Self { knots, values, slopes: close(slopes.view()), period: Some(period) }
-    }
-
-    /// Values at the knots (n, D).
-    #[cfg(test)]
-    pub(crate) fn values(&self) -> ArrayView2<'_, f64> {
-        self.values.slice(s![..self.n_knots(), ..])
-    }
-
-    /// Slopes at the knots (n, D).
-    pub(crate) fn slopes(&self) -> ArrayView2<'_, f64> {
-        self.slopes.slice(s![..self.n_knots(), ..])
-    }
-
-    /// Writes the value at `t` to `out` (D,). Beyond the knots the end cubics continue, or the period repeats.
-    pub(crate) fn value(&self, t: f64, out: &mut [f64]) {
-        let at = self.place(t);
-        for (d, out) in out.iter_mut().enumerate() {
-            let [y, slope, bend, twist] = self.coefficients(&at, d);
-            *out = y + at.x * (slope + at.r * (bend + at.r * twist));
-        }
-    }
-
-    /// Writes the slope at `t` to `out` (D,).
-    #[cfg(test)]
-    pub(crate) fn slope(&self, t: f64, out: &mut [f64]) {
-        let at = self.place(t);
-        for (d, out) in out.iter_mut().enumerate() {
-            let [_, slope, bend, twist] = self.coefficients(&at, d);
-            *out = slope + at.r * (2.0 * bend + 3.0 * at.r * twist);
+        substitute_back(&self.equations, slopes);
+        if let Some(Seam { last, correction }) = &self.seam {
+            let mut along = slopes[..n_dofs].to_vec();
+            take_off(&mut along, -last, &slopes[(n - 1) * n_dofs..]);
+            for (slope, x) in slopes.chunks_exact_mut(n_dofs).zip(correction) {
+                take_off(slope, *x, &along);
+            }
         }
     }
 
-    /// Values (k, D) at `times` (k,).
-    pub(crate) fn sample(&self, times: &[f64]) -> Array2<f64> {
-        self.tabulate(times, Self::value)
-    }
-
-    /// Slopes (k, D) at `times` (k,).
-    #[cfg(test)]
-    pub(crate) fn sample_slopes(&self, times: &[f64]) -> Array2<f64> {
-        self.tabulate(times, Self::slope)
-    }
-
-    fn tabulate(&self, times: &[f64], evaluate: impl Fn(&Self, f64, &mut [f64])) -> Array2<f64> {
-        let n_dofs = self.values.ncols();
-        let mut table = Array2::zeros((times.len(), n_dofs));
-        let mut row = vec![0.0; n_dofs];
-        for (mut out, &t) in table.rows_mut().into_iter().zip(times) {
-            evaluate(self, t, &mut row);
-            out.assign(&ArrayView1::from(&row));
+    /// Writes to `out` (k·D) what the spline of such `values` and `slopes` (n·D) is worth at `times` (k), which do not
+    /// decrease. At the knots the values come out bit for bit, and beyond them the end cubics continue.
+    pub(crate) fn sample(&self, values: &[f64], slopes: &[f64], times: impl IntoIterator<Item = f64>, out: &mut [f64]) {
+        let n_dofs = values.len() / self.len();
+        let mut right = 1;
+        for (t, out) in times.into_iter().zip(out.chunks_exact_mut(n_dofs)) {
+            while right + 1 < self.time.len() && self.time[right] <= t {
+                right += 1;
+            }
+            let [near, far] = self.by_distance(t, right);
+            let (x, per_width) = (t - self.time[near], 1.0 / (self.time[far] - self.time[near]));
+            let r = x * per_width;
+            let [near, far] = [near, far].map(|knot| knot % self.len() * n_dofs);
+            let [y, y_far] = [near, far].map(|first| &values[first..][..n_dofs]);
+            let [slope, slope_far] = [near, far].map(|first| &slopes[first..][..n_dofs]);
+            for d in 0..n_dofs {
+                let chord = (y_far[d] - y[d]) * per_width;
+                let (bend, twist) =
+                    (3.0 * chord - 2.0 * slope[d] - slope_far[d], slope[d] + slope_far[d] - 2.0 * chord);
+                out[d] = y[d] + x * (slope[d] + r * (bend + r * twist));
+            }
         }
-        table
     }
 
-    fn n_knots(&self) -> usize {
-        self.knots.len() - usize::from(self.period.is_some())
-    }
-
-    /// Expands about the nearer knot, so that values and slopes at the knots come out bit for bit.
-    fn place(&self, t: f64) -> Place {
-        let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
-        let t = match self.period {
-            Some(period) if !(first..last).contains(&t) => first + (t - first).rem_euclid(period),
-            _ => t,
-        };
-        let right = self.knots.partition_point(|&knot| knot <= t).clamp(1, self.knots.len() - 1);
+    /// The knot `right` and the one before it, the nearer to `t` first: expanded about it, the cubic has its very values
+    /// at the knots.
+    fn by_distance(&self, t: f64, right: usize) -> [usize; 2] {
         let left = right - 1;
-        let (near, far) = if t - self.knots[left] < self.knots[right] - t { (left, right) } else { (right, left) };
-        let (x, width) = (t - self.knots[near], self.knots[far] - self.knots[near]);
-        Place { near, far, width, x, r: x / width }
-    }
-
-    /// y_k, ṡ_k, 3δ − 2ṡ_k − ṡ_o and ṡ_k + ṡ_o − 2δ of column `d`.
-    fn coefficients(&self, at: &Place, d: usize) -> [f64; 4] {
-        let [y, y_far] = [at.near, at.far].map(|k| self.values[[k, d]]);
-        let [slope, slope_far] = [at.near, at.far].map(|k| self.slopes[[k, d]]);
-        let chord = (y_far - y) / at.width;
-        [y, slope, 3.0 * chord - 2.0 * slope - slope_far, slope + slope_far - 2.0 * chord]
+        if t - self.time[left] < self.time[right] - t { [left, right] } else { [right, left] }
     }
 }
 
-fn intervals(knots: &[f64]) -> Vec<f64> {
-    knots.windows(2).map(|pair| pair[1] - pair[0]).collect()
+fn intervals(time: &[f64]) -> Vec<f64> {
+    time.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// Slopes of the chords (n − 1, D).
-fn chords(knots: &[f64], values: ArrayView2<f64>) -> Array2<f64> {
-    let mut chords = &values.slice(s![1.., ..]) - &values.slice(s![..-1, ..]);
-    for (mut chord, h) in chords.rows_mut().into_iter().zip(intervals(knots)) {
-        chord /= h;
-    }
-    chords
-}
-
-/// Appends the first row to the end.
-fn close(rows: ArrayView2<f64>) -> Array2<f64> {
-    Array2::from_shape_fn((rows.nrows() + 1, rows.ncols()), |(i, d)| rows[[i % rows.nrows(), d]])
-}
-
-/// Continuity of the second derivative between two intervals: weights of the three slopes, and of the two chords.
-fn inner_condition(left: f64, right: f64) -> ([f64; 3], [f64; 2]) {
+/// Continuity of the second derivative between two intervals.
+fn inner_condition(left: f64, right: f64) -> Condition {
     let (a, b) = (right / (left + right), left / (left + right));
-    ([a, 2.0, b], [3.0 * a, 3.0 * b])
+    Condition { slopes: [a, 2.0, b], rises: [3.0 * a / left, 3.0 * b / right] }
 }
 
 /// Continuity of the third derivative between the two intervals at an end, less the condition on the second:
-/// weights of the end slope and the next, and of the outer chord and the inner.
+/// weights of the end slope and the next, and of the outer rise and the inner.
 fn end_condition(outer: f64, inner: f64) -> ([f64; 2], [f64; 2]) {
     let (a, b) = (inner / (outer + inner), outer / (outer + inner));
-    ([a, 1.0], [a * (2.0 + b), b * b])
+    ([a, 1.0], [a * (2.0 + b) / outer, b * b / inner])
 }
 
-/// Solves for all columns in place; `rows` hold (lower, diagonal, upper). No pivots are exchanged: all of these systems
-/// are diagonally dominant, those of the end conditions once the end slope is eliminated.
-fn solve_tridiagonal(rows: &[[f64; 3]], rhs: &mut Array2<f64>) {
-    let mut pivots: Vec<f64> = Vec::with_capacity(rows.len());
-    for (i, &[lower, diagonal, _]) in rows.iter().enumerate() {
-        let mut pivot = diagonal;
-        if i > 0 {
-            let factor = lower / pivots[i - 1];
-            pivot -= factor * rows[i - 1][2];
-            let (above, mut row) = rhs.multi_slice_mut((s![i - 1, ..], s![i, ..]));
-            row.scaled_add(-factor, &above);
-        }
-        pivots.push(pivot);
+/// Gauss without exchanging pivots: all of these systems are diagonally dominant, those of the end conditions once the
+/// end slope is eliminated.
+fn factorise(conditions: &[Condition]) -> Vec<Equation> {
+    let mut equations: Vec<Equation> = Vec::with_capacity(conditions.len());
+    for &Condition { slopes: [below, diagonal, upper], rises } in conditions {
+        let (lower, eliminated) = equations.last().map_or((0.0, 0.0), |above| {
+            let lower = below * above.scale;
+            (lower, lower * above.upper)
+        });
+        equations.push(Equation { rises, lower, upper, scale: 1.0 / (diagonal - eliminated) });
     }
-    for (i, pivot) in pivots.iter().enumerate().rev() {
-        if i + 1 < rows.len() {
-            let (mut row, below) = rhs.multi_slice_mut((s![i, ..], s![i + 1, ..]));
-            row.scaled_add(-rows[i][2], &below);
+    equations
+}
+
+/// Solves the upper half of the system for all columns, in place.
+fn substitute_back(equations: &[Equation], slopes: &mut [f64]) {
+    let n_dofs = slopes.len() / equations.len();
+    for (i, equation) in equations.iter().enumerate().rev() {
+        let (slope, after) = slopes[i * n_dofs..].split_at_mut(n_dofs);
+        if i + 1 < equations.len() {
+            take_off(slope, equation.upper, after);
         }
-        rhs.row_mut(i).mapv_inplace(|x| x / pivot);
+        slope.iter_mut().for_each(|slope| *slope *= equation.scale);
     }
+}
+
+/// row −= times · other, as far as the row goes.
+#[inline(always)]
+fn take_off(row: &mut [f64], times: f64, other: &[f64]) {
+    row.iter_mut().zip(other).for_each(|(x, y)| *x -= times * y);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
-    use ndarray::{Axis, array, concatenate};
+    use ndarray::{Array2, ArrayView2, Axis, concatenate};
     use proptest::prelude::*;
     use std::f64::consts::TAU;
+
+    /// A spline with its own knots.
+    struct Spline {
+        knots: Knots,
+        period: Option<f64>,
+        values: Array2<f64>,
+        slopes: Array2<f64>,
+    }
+
+    impl Spline {
+        fn not_a_knot(time: &[f64], values: ArrayView2<f64>) -> Self {
+            Self::over(Knots::not_a_knot(time.to_vec()), None, values)
+        }
+
+        fn periodic(time: &[f64], period: f64, values: ArrayView2<f64>) -> Self {
+            Self::over(Knots::periodic(time.to_vec(), period), Some(period), values)
+        }
+
+        fn over(knots: Knots, period: Option<f64>, values: ArrayView2<f64>) -> Self {
+            let values = values.as_standard_layout().to_owned();
+            let mut slopes = Array2::zeros(values.dim());
+            knots.slopes(values.as_slice().unwrap(), slopes.as_slice_mut().unwrap());
+            Self { knots, period, values, slopes }
+        }
+
+        fn sample(&self, times: &[f64]) -> Array2<f64> {
+            let mut out = Array2::zeros((times.len(), self.values.ncols()));
+            let [values, slopes] = [&self.values, &self.slopes].map(|table| table.as_slice().unwrap());
+            self.knots.sample(values, slopes, times.iter().map(|&t| self.turned(t)), out.as_slice_mut().unwrap());
+            out
+        }
+
+        /// The derivative of what is sampled, by the formula that heads this file.
+        fn sample_slopes(&self, times: &[f64]) -> Array2<f64> {
+            Array2::from_shape_fn((times.len(), self.values.ncols()), |(i, d)| {
+                let (t, time) = (self.turned(times[i]), &self.knots.time);
+                let right = time.partition_point(|&knot| knot <= t).clamp(1, time.len() - 1);
+                let [near, far] = self.knots.by_distance(t, right);
+                let width = time[far] - time[near];
+                let r = (t - time[near]) / width;
+                let [near, far] = [near, far].map(|knot| [knot % self.knots.len(), d]);
+                let (chord, [s, o]) =
+                    ((self.values[far] - self.values[near]) / width, [near, far].map(|k| self.slopes[k]));
+                s + r * (2.0 * (3.0 * chord - 2.0 * s - o) + 3.0 * r * (s + o - 2.0 * chord))
+            })
+        }
+
+        fn turned(&self, t: f64) -> f64 {
+            let first = self.knots.time[0];
+            match self.period {
+                Some(period) if !(first..first + period).contains(&t) => first + (t - first).rem_euclid(period),
+                _ => t,
+            }
+        }
+    }
 
     /// Increasing knots with intervals between 0.1 and 1.
     fn knots(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<f64>> {
@@ -308,8 +347,7 @@ mod tests {
                 Spline::periodic(&time, period, values.view()),
             ] {
                 prop_assert_eq!(spline.sample(&time), &values);
-                prop_assert_eq!(spline.values(), &values);
-                prop_assert_eq!(spline.sample_slopes(&time), spline.slopes());
+                prop_assert_eq!(spline.sample_slopes(&time), spline.slopes);
             }
         }
     }
@@ -345,18 +383,6 @@ mod tests {
     }
 
     #[test]
-    fn a_period_repeats() {
-        let time = [0.2, 0.9, 1.5, 2.8, 3.0];
-        let spline = Spline::periodic(&time, 3.5, column(&time, |t| (t * t).cos()).view());
-        for t in [0.2, 1.1, 3.3, 3.6] {
-            for turns in [-3.0, -1.0, 1.0, 7.0] {
-                assert_relative_eq!(at(&spline, t + turns * 3.5), at(&spline, t), epsilon = 1e-12);
-                assert_relative_eq!(slope_at(&spline, t + turns * 3.5), slope_at(&spline, t), epsilon = 1e-11);
-            }
-        }
-    }
-
-    #[test]
     fn columns_do_not_mix_and_a_constant_has_no_slope() {
         let time = uniform(30, 0.1);
         let sine = column(&time, f64::sin);
@@ -365,9 +391,9 @@ mod tests {
             (Spline::not_a_knot(&time, both.view()), Spline::not_a_knot(&time, sine.view())),
             (Spline::periodic(&time, 3.1, both.view()), Spline::periodic(&time, 3.1, sine.view())),
         ] {
-            assert!(pair.slopes().column(0).iter().all(|&slope| slope == 0.0));
-            assert_eq!(pair.slopes().column(1), alone.slopes().column(0));
-            assert_eq!(pair.sample(&[-0.77, 1.234, 50.0]).column(0), array![0.1, 0.1, 0.1]);
+            assert!(pair.slopes.column(0).iter().all(|&slope| slope == 0.0));
+            assert_eq!(pair.slopes.column(1), alone.slopes.column(0));
+            assert!([-0.77, 1.234, 50.0].map(|t| at(&pair, t)).iter().all(|&y| y == 0.1));
         }
     }
 

@@ -4,6 +4,7 @@
 //! multiprocessing makes them, and whoever waits for it there would wait forever.
 
 use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 
@@ -47,32 +48,62 @@ impl Threads {
     /// # Errors
     /// That of the first item that has one; what comes after it may be left undone.
     pub(crate) fn try_for_each<T: Send>(self, items: Vec<T>, work: impl Fn(T) -> Result<()> + Sync) -> Result<()> {
-        let others = self.get().min(items.len()).saturating_sub(1);
+        self.try_for_each_told(items, work, &mut |_| Ok(()))
+    }
+
+    /// [`Self::try_for_each`] that asks `proceed` whether to go on, with the share of the items that have been taken.
+    /// The calling thread asks, which alone may, before each item of its own.
+    ///
+    /// # Errors
+    /// Whatever `proceed` returns; otherwise that of the first item that has one.
+    pub(crate) fn try_for_each_told<T: Send>(
+        self,
+        items: Vec<T>,
+        work: impl Fn(T) -> Result<()> + Sync,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<()> {
+        let n_items = items.len();
+        let others = self.get().min(n_items).saturating_sub(1);
         let queue = Mutex::new(items.into_iter().enumerate());
         let failed: Mutex<Option<(usize, Error)>> = Mutex::new(None);
+        let stopped = AtomicBool::new(false);
+        // Works on the next item, if there is one and the work goes on.
         let labour = || {
-            while held(&failed).is_none() {
-                // In a statement of its own: the queue is free again while the work is done.
-                let next = held(&queue).next();
-                let Some((index, item)) = next else { return };
-                if let Err(error) = work(item) {
-                    let mut failed = held(&failed);
-                    if failed.as_ref().is_none_or(|(first, _)| index < *first) {
-                        *failed = Some((index, error));
-                    }
+            if stopped.load(Relaxed) {
+                return false;
+            }
+            // In a statement of its own: the queue is free again while the work is done.
+            let next = held(&queue).next();
+            let Some((index, item)) = next else { return false };
+            if let Err(error) = work(item) {
+                stopped.store(true, Relaxed);
+                let mut failed = held(&failed);
+                if failed.as_ref().is_none_or(|(first, _)| index < *first) {
+                    *failed = Some((index, error));
                 }
             }
+            true
         };
-        thread::scope(|scope| {
+        let told = thread::scope(|scope| {
             for _ in 0..others {
                 // A system without threads to spare leaves the work to those that run.
-                let _ = thread::Builder::new().spawn_scoped(scope, labour);
+                let _ = thread::Builder::new().spawn_scoped(scope, || while labour() {});
             }
-            labour();
+            loop {
+                let left = held(&queue).len();
+                if left == 0 {
+                    return Ok(());
+                }
+                let told = proceed((n_items - left) as f64 / n_items as f64);
+                stopped.fetch_or(told.is_err(), Relaxed);
+                if told.is_err() || !labour() {
+                    return told;
+                }
+            }
         });
-        match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            Some((_, error)) => Err(error),
-            None => Ok(()),
+        match (told, failed.into_inner().unwrap_or_else(PoisonError::into_inner)) {
+            (Ok(()), Some((_, error))) => Err(error),
+            (told, _) => told,
         }
     }
 }

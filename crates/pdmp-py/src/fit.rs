@@ -55,6 +55,8 @@ use crate::model::Model;
 ///     it closest.
 /// mu : float
 ///     Constant of the rhythmic canonical system.
+/// threads : int, optional
+///     How many threads may work on it; otherwise as many as the system allows. The model does not depend on it.
 /// progress : callable, optional
 ///     Called with the stage and the share of it that is done; an exception it raises ends the fit.
 ///
@@ -76,10 +78,10 @@ use crate::model::Model;
 #[pyo3(signature = (
     demos, *, kind="discrete", dt=None, period=None, contexts=None, n_styles=None, spectrum=0.9, basis=None,
     smoothing=None, nominal=None, n_samples=None, dof_scale=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None,
-    mu=1.0, progress=None
+    mu=1.0, threads=None, progress=None
 ), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, n_styles=None, spectrum=0.9, \
     basis='gp', smoothing=None, nominal=None, n_samples=None, dof_scale=None, tau=None, alpha_z=25.0, beta_z=None, \
-    alpha_x=None, mu=1.0, progress=None)")]
+    alpha_x=None, mu=1.0, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -100,6 +102,7 @@ pub(crate) fn fit(
     beta_z: Option<f64>,
     alpha_x: Option<f64>,
     mu: f64,
+    threads: Option<isize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
     let demos = demonstrations(demos)?;
@@ -124,6 +127,7 @@ pub(crate) fn fit(
         beta_z,
         alpha_x,
         mu,
+        threads: crate::convert::threads(threads)?,
     };
     let show = |py: Python<'_>, stage: Stage, share| match &progress {
         Some(progress) => progress.call1(py, (stage.name(), share)).map(drop),

@@ -35,8 +35,8 @@ impl Domain {
     }
 }
 
-/// A fitted function of the clock with several outputs.
-pub trait Regression: fmt::Debug {
+/// A fitted function of the clock with several outputs, which several threads may read.
+pub trait Regression: fmt::Debug + Sync {
     /// Writes the outputs and their derivatives with respect to `u`, each (outputs,).
     fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]);
 

@@ -1,0 +1,86 @@
+//! Where the time of a fit goes, stage by stage as the fit itself tells them, and the memory that a large one takes.
+#![allow(missing_docs)]
+
+mod movements;
+
+use std::env;
+use std::fs;
+use std::time::{Duration, Instant};
+
+use movements::movements;
+use pdmp_core::basis::{Basis, NGnet};
+use pdmp_core::{Demonstration, FitOptions, Kind, Smoothing, Stage, StyleCount, fit};
+
+const STAGES: [Stage; 4] = [Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile];
+
+/// Time of each stage of one fit: from when it is first told of to the next; the first from the call, the last to the
+/// model.
+fn stages(demos: &[Demonstration], options: &FitOptions) -> [Duration; 4] {
+    let mut marks = vec![Instant::now()];
+    let mut proceed = |stage, _| {
+        if STAGES.get(marks.len()) == Some(&stage) {
+            marks.push(Instant::now());
+        }
+        Ok(())
+    };
+    let model = fit(demos, options, &mut proceed).expect("a fit");
+    marks.push(Instant::now());
+    drop(model);
+    std::array::from_fn(|stage| marks[stage + 1] - marks[stage])
+}
+
+/// A row of the table: the median of each stage over `n` fits, and that of their sums.
+fn row(name: &str, n: usize, demos: &[Demonstration], options: &FitOptions) {
+    let runs: Vec<[Duration; 4]> = (0..n).map(|_| stages(demos, options)).collect();
+    let median = |of: &dyn Fn(&[Duration; 4]) -> Duration| {
+        let mut times: Vec<Duration> = runs.iter().map(of).collect();
+        times.sort();
+        format!("{:>9.3}", 1e3 * times[n / 2].as_secs_f64())
+    };
+    let each: Vec<String> = (0..STAGES.len()).map(|stage| median(&|times| times[stage])).collect();
+    println!("| {name:<21} | {} | {} |", each.join(" | "), median(&|times| times.iter().sum()));
+}
+
+fn heading(title: &str) {
+    println!("\n{title}\n");
+    println!("|                       |   targets | factorise |   regress |   compile |       all |");
+    println!("|-----------------------|----------:|----------:|----------:|----------:|----------:|");
+}
+
+/// The most memory that this process has held so far, where the system tells it.
+fn most_memory() -> Option<String> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kilobytes: f64 = peak.trim().trim_end_matches(" kB").parse().ok()?;
+    Some(format!("{:.0} MB", kilobytes / 1e3))
+}
+
+fn main() {
+    // The test harness runs benches to see that they start.
+    if !env::args().any(|argument| argument == "--bench") {
+        return;
+    }
+    let network = FitOptions {
+        styles: StyleCount::Given(3),
+        basis: Basis::NGnet(NGnet::default()),
+        ..FitOptions::new(Kind::Discrete)
+    };
+    let mut smoothed = network.clone();
+    smoothed.alignment.smoothing = Smoothing::Auto;
+    let process = FitOptions { styles: StyleCount::Given(3), ..FitOptions::new(Kind::Discrete) };
+
+    let demos = movements(20, 1001);
+    heading("Milliseconds of a fit, M = 20, C = 1001, D = 7, J = 3");
+    row("NGnet", 101, &demos, &network);
+    row("NGnet, auto smoothing", 21, &demos, &smoothed);
+    row("GP", 11, &demos, &process);
+
+    let demos = movements(5000, 200);
+    let before = most_memory();
+    heading("Milliseconds of a fit, M = 5000, C = 200, D = 7");
+    row("NGnet, J = 5", 3, &demos, &FitOptions { styles: StyleCount::Given(5), ..network.clone() });
+    row("NGnet, J by spectrum", 3, &demos, &FitOptions { styles: StyleCount::Spectrum(0.9), ..network });
+    if let (Some(before), Some(after)) = (before, most_memory()) {
+        println!("\nMost memory: {after}, of which {before} before the first of these fits.");
+    }
+}

@@ -1,0 +1,149 @@
+//! Steps 1 and 2 of Section 3.2, demonstration by demonstration: aligned, and turned into its target at once, so that the
+//! aligned demonstrations never lie in memory together.
+
+use std::f64::consts::TAU;
+
+use ndarray::{Array2, Axis};
+
+use crate::align::Aligned;
+use crate::attractor::{Attractor, Inverse};
+use crate::demo::zeros;
+use crate::error::Result;
+use crate::phase::{Canonical, Kind};
+use crate::spline::Knots;
+use crate::threads::Threads;
+
+/// What a fit takes from the demonstrations, one a row.
+#[derive(Debug)]
+pub(crate) struct Targets {
+    /// Targets F (M, C·D), in the unit of each DoF.
+    pub(crate) forcing: Array2<f64>,
+    /// First samples (M, D).
+    pub(crate) starts: Array2<f64>,
+    /// Goals (M, D): those given with the demonstrations, otherwise the last samples.
+    pub(crate) goals: Array2<f64>,
+    /// Means over the phase (M, D), the anchors y_a of cycles.
+    pub(crate) anchors: Array2<f64>,
+    /// Peak-to-peak ranges (M, D).
+    ranges: Array2<f64>,
+}
+
+/// The rows of one demonstration.
+struct Rows<'a> {
+    forcing: &'a mut [f64],
+    start: &'a mut [f64],
+    goal: &'a mut [f64],
+    anchor: &'a mut [f64],
+    range: &'a mut [f64],
+}
+
+impl Targets {
+    /// The targets of all demonstrations; `proceed` is told the share that is done.
+    ///
+    /// # Errors
+    /// No memory, a bad smoothing, or whatever `proceed` returns.
+    pub(crate) fn of(
+        aligned: &Aligned,
+        attractor: Attractor,
+        canonical: Canonical,
+        threads: Threads,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Self> {
+        let (n_demos, n_dofs) = (aligned.durations.len(), aligned.demo(0).n_dofs());
+        let mut targets = Self {
+            forcing: zeros("targets", (n_demos, aligned.n_samples * n_dofs))?,
+            starts: Array2::zeros((n_demos, n_dofs)),
+            goals: Array2::zeros((n_demos, n_dofs)),
+            anchors: Array2::zeros((n_demos, n_dofs)),
+            ranges: Array2::zeros((n_demos, n_dofs)),
+        };
+        let work = Work::new(attractor, canonical, aligned.n_samples);
+        let learn = |(m, rows): (usize, Rows)| {
+            aligned.sample(m, rows.forcing)?;
+            work.learn(rows, aligned.demo(m).goal());
+            Ok(())
+        };
+        threads.try_for_each_told(targets.rows().enumerate().collect(), learn, proceed)?;
+        Ok(targets)
+    }
+
+    /// Largest peak-to-peak range of each DoF within one demonstration (D,).
+    pub(crate) fn ranges(&self) -> Vec<f64> {
+        self.ranges.fold_axis(Axis(0), 0.0f64, |most, range| most.max(*range)).to_vec()
+    }
+
+    /// Counts the targets in the given unit of each DoF.
+    pub(crate) fn scale(&mut self, dof_scale: &[f64]) {
+        if dof_scale.iter().any(|&scale| scale != 1.0) {
+            self.forcing.iter_mut().zip(dof_scale.iter().cycle()).for_each(|(f, scale)| *f /= scale);
+        }
+    }
+
+    fn rows(&mut self) -> impl Iterator<Item = Rows<'_>> {
+        let n_dofs = self.starts.ncols();
+        let n_values = self.forcing.ncols();
+        fn chunks(matrix: &mut Array2<f64>, n: usize) -> std::slice::ChunksExactMut<'_, f64> {
+            matrix.as_slice_mut().unwrap_or_default().chunks_exact_mut(n)
+        }
+        let [starts, goals, anchors, ranges] = [&mut self.starts, &mut self.goals, &mut self.anchors, &mut self.ranges]
+            .map(|matrix| chunks(matrix, n_dofs));
+        let places = starts.zip(goals).zip(anchors).zip(ranges);
+        chunks(&mut self.forcing, n_values).zip(places).map(|(forcing, (((start, goal), anchor), range))| Rows {
+            forcing,
+            start,
+            goal,
+            anchor,
+            range,
+        })
+    }
+}
+
+/// What all demonstrations have in common.
+struct Work {
+    kind: Kind,
+    inverse: Inverse,
+    knots: Knots,
+}
+
+impl Work {
+    fn new(attractor: Attractor, canonical: Canonical, n_samples: usize) -> Self {
+        let clock = canonical.clock(n_samples);
+        let inverse = attractor.inverse(clock[1]);
+        let kind = canonical.kind();
+        let knots = match kind {
+            Kind::Discrete => Knots::not_a_knot(clock),
+            Kind::Rhythmic => Knots::periodic(clock, TAU),
+        };
+        Self { kind, inverse, knots }
+    }
+
+    /// Fills the rows of a demonstration whose positions stand in the place of its target.
+    ///
+    /// The output system does not care where a movement takes place, but for rounding: demonstrations are translated to
+    /// start at 0, and a DoF that does not move has a target of exactly zero, and its own position as its mean, to the
+    /// last digit.
+    fn learn(&self, Rows { forcing: position, start, goal, anchor, range }: Rows, given: Option<&[f64]>) {
+        let n_dofs = start.len();
+        start.copy_from_slice(&position[..n_dofs]);
+        goal.copy_from_slice(given.unwrap_or(&position[position.len() - n_dofs..]));
+        let (mut low, mut high) = (vec![0.0; n_dofs], vec![0.0; n_dofs]);
+        for row in position.chunks_exact_mut(n_dofs) {
+            for (d, y) in row.iter_mut().enumerate() {
+                *y -= start[d];
+                anchor[d] += *y;
+                low[d] = f64::min(low[d], *y);
+                high[d] = f64::max(high[d], *y);
+            }
+        }
+        let n_samples = (position.len() / n_dofs) as f64;
+        for d in 0..n_dofs {
+            anchor[d] = start[d] + anchor[d] / n_samples;
+            range[d] = high[d] - low[d];
+        }
+        let centre = if self.kind == Kind::Discrete { goal } else { anchor };
+        let centre: Vec<f64> = centre.iter().zip(start).map(|(centre, start)| *centre - *start).collect();
+        let mut slopes = vec![0.0; position.len()];
+        self.knots.slopes(position, &mut slopes);
+        self.inverse.target(position, &slopes, &centre, self.kind == Kind::Rhythmic);
+    }
+}
