@@ -114,6 +114,29 @@ def test_rollout_with_odd_arguments_is_orderly(kind: str, arguments: dict[str, A
 @pytest.mark.parametrize("kind", MODELS)
 @QUICK
 @given(
+    ODD | st.just(np.ones((3, 2))),
+    some(
+        duration=SPANS,
+        dt=SPANS,
+        tau=SPANS,
+        amplitude=SCALARS,
+        derivatives=COUNTS,
+        threads=COUNTS,
+        **dict.fromkeys(["goals", "starts", "velocities", "anchors", "out"], ODD),
+    ),
+)
+def test_batch_with_odd_arguments_is_orderly(
+    kind: str, styles: Any, arguments: dict[str, Any]
+) -> None:
+    """Whatever the arguments, finite numbers or an orderly refusal come out."""
+    for values in attempt(MODELS[kind].rollouts, styles, **arguments) or ():
+        assert np.isfinite(values).all()
+
+
+@pytest.mark.filterwarnings("ignore::numpy.exceptions.ComplexWarning")
+@pytest.mark.parametrize("kind", MODELS)
+@QUICK
+@given(
     some(style=ODD, transition=SPANS, **MOVE),
     st.lists(
         st.tuples(st.sampled_from(["goal", "style", "anchor"]), ODD)

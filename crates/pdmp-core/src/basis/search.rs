@@ -1,5 +1,7 @@
 //! Maximum of a smooth, expensive function of two variables in a box: a coarse scan, then ascent from its best places.
 
+use std::cmp::Ordering;
+
 use crate::error::Result;
 
 /// Most places from which the ascent starts.
@@ -105,7 +107,7 @@ fn climb(axes: &[Axis; 2], start: [f64; 2], objective: &mut impl Objective) -> R
         };
         let cells = (0..2).filter(|&k| free[k]).map(|k| step[k].abs() / axes[k].step()).fold(1.0, f64::max);
         step = step.map(|s| s / cells);
-        if !(step[0] * g[0] + step[1] * g[1] > GAIN) {
+        if (step[0] * g[0] + step[1] * g[1]).partial_cmp(&GAIN) != Some(Ordering::Greater) {
             break;
         }
         let Some((next, there)) = advance(axes, at, here, step, objective)? else { break };
@@ -165,7 +167,8 @@ impl Curvature {
     fn updated(old: Option<Self>, moved: [f64; 2], bent: [f64; 2]) -> Option<Self> {
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
         let fall = dot(moved, bent);
-        if !(fall > 1e-8 * (dot(moved, moved) * dot(bent, bent)).sqrt()) {
+        let least = 1e-8 * (dot(moved, moved) * dot(bent, bent)).sqrt();
+        if fall.partial_cmp(&least) != Some(Ordering::Greater) {
             return None;
         }
         let scale = dot(bent, bent) / fall;

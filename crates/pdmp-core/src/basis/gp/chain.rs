@@ -191,7 +191,7 @@ impl<const D: usize> Filtered<'_, D> {
             }
             let transition = self.path.after(i);
             let covariance = &self.steps[i + 1].covariance;
-            if i + 1 <= self.settled || i + 1 == self.chain.u.len() {
+            if i < self.settled || i + 1 == self.chain.u.len() {
                 let moved = drift(&(covariance - transition.noise));
                 half_rise = 0.5 * (moved + moved.transpose() + transition.drive * transition.drive.transpose());
             }

@@ -390,8 +390,9 @@ fn no_length_or_noise_is_too_extreme() {
                     let posterior = fit(&gp, domain, &u, &targets);
                     assert!(posterior.log_likelihood().is_finite());
                     let (mean, variance) = posterior.predict(&[-1.0, 0.0, 0.3, 0.5, 1.0, 7.0]);
-                    let largest = mean.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-                    assert!(largest < 100.0 || exponent > 0, "{kernel} {domain:?} {length} {noise:e}: {largest}");
+                    assert!(mean.iter().all(|value| value.is_finite()));
+                    let inside = mean.slice(ndarray::s![1..5, ..]).fold(0.0_f64, |most, value| most.max(value.abs()));
+                    assert!(inside < 3.0, "{kernel} {domain:?} {length} {noise:e}: {inside}");
                     assert!(variance.iter().all(|v| *v >= 0.0 && *v <= 1.001 * posterior.signal_variance()));
                     let (_, slope) = at(&posterior, 0.3);
                     assert!(slope.iter().all(|slope| slope.is_finite()));
@@ -427,7 +428,9 @@ fn many_samples_of_the_least_noise_are_met() {
             for length in [0.01, 0.2, 2.0] {
                 let gp = Gp { kernel, length: Some(length * domain.extent()), noise: Some(1e-10) };
                 let (mean, variance) = fit(&gp, domain, &u, &targets).predict(&u);
-                assert!((mean - &targets).iter().all(|error| error.abs() < 1e-6));
+                let error = (mean - &targets).iter().fold(0.0_f64, |most, error| most.max(error.abs()));
+                // Next to an end a long length bends the mean by as much as the noise lets it.
+                assert!(error < 1e-4, "{kernel} {domain:?} {length}: {error:e}");
                 assert!(variance.iter().all(|variance| variance.is_finite()));
             }
         }

@@ -1,0 +1,323 @@
+"""Many movements at once, in pieces and on several threads, and the derivatives of a movement."""
+
+import pickle
+import signal
+import subprocess
+import sys
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from synthetic import loops, reaches
+
+NAN = float("nan")
+FIELDS = ("position", "velocity", "acceleration")
+STYLES = np.random.default_rng(0).normal(size=(23, 2))
+MODELS = {
+    "discrete": pdmp.fit(reaches(), n_styles=2, basis="ngnet"),
+    "rhythmic": pdmp.fit(loops(), kind="rhythmic", n_styles=2, basis="ngnet"),
+}
+
+
+@pytest.fixture(params=sorted(MODELS))
+def model(request: pytest.FixtureRequest) -> pdmp.Model:
+    """Return a model with two styles and two degrees of freedom of either kind."""
+    return MODELS[request.param]
+
+
+def centres(model: pdmp.Model) -> str:
+    """Return the name of the argument that moves a batch as a whole."""
+    return "goals" if model.kind == "discrete" else "anchors"
+
+
+SINGULAR = {"goals": "goal", "anchors": "anchor", "starts": "start", "velocities": "velocity"}
+
+
+@pytest.mark.parametrize("names", [(), ("starts",), ("velocities",), ("starts", "velocities")])
+@pytest.mark.parametrize("one_each", [False, True])
+@pytest.mark.parametrize("dt", [0.001, 0.01])
+def test_each_movement_has_its_own_conditions(
+    model: pdmp.Model, names: tuple[str, ...], one_each: bool, dt: float
+) -> None:
+    """Movement b is the rollout of row b of every argument, or of what is given for all."""
+    rng = np.random.default_rng(1)
+    shape = (len(STYLES), 2) if one_each else (2,)
+    given = {name: rng.normal(size=shape) for name in (centres(model), *names)}
+    made = model.rollouts(STYLES, dt=dt, tau=0.8 * model.tau, derivatives=2, **given)
+    for b in (0, 7, 22):
+        own = {SINGULAR[n]: rows[b] if one_each else rows for n, rows in given.items()}
+        single = model.rollout(STYLES[b], dt=dt, tau=0.8 * model.tau, **own)
+        for values, name in zip(made, FIELDS, strict=True):
+            expected = getattr(single, name)
+            np.testing.assert_allclose(values[b], expected, atol=1e-12 * abs(expected).max())
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 0.4, 2.5])
+def test_amplitude_is_that_of_all(amplitude: float) -> None:
+    """A rhythmic batch swings as widely as the rollout does; not at all at zero."""
+    model = MODELS["rhythmic"]
+    positions, _ = model.rollouts(STYLES, amplitude=amplitude)
+    expected = model.rollout(STYLES[3], amplitude=amplitude).position
+    np.testing.assert_allclose(positions[3], expected, atol=1e-12)
+    assert (np.ptp(positions, axis=1) == 0).all() == (amplitude == 0)
+
+
+@pytest.mark.parametrize("derivatives", [0, 1, 2])
+def test_as_many_derivatives_as_asked_for(model: pdmp.Model, derivatives: int) -> None:
+    """The tuple has one array more, and what is left out does not change the rest."""
+    made = model.rollouts(STYLES, derivatives=derivatives)
+    expected = model.rollouts(STYLES, derivatives=2)
+    assert len(made) == 1 + derivatives
+    for values, full in zip(made, expected, strict=False):
+        np.testing.assert_array_equal(values, full, strict=True)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_pieces_and_threads_leave_the_bits(model: pdmp.Model, threads: int) -> None:
+    """All pieces together are the batch to the last bit, whatever the number of threads."""
+    styles, velocities = np.tile(STYLES, (20, 1)), np.tile(STYLES, (20, 1)) / 3
+    expected = model.rollouts(styles, dt=0.005, velocities=velocities, threads=1)
+    whole = model.rollouts(styles, dt=0.005, velocities=velocities, threads=threads)
+    pieces = list(
+        model.rollout_chunks(styles, size=77, dt=0.005, velocities=velocities, threads=threads)
+    )
+    assert [len(positions) for positions, _ in pieces] == [77] * 5 + [75]
+    for values, full, parts in zip(whole, expected, zip(*pieces, strict=True), strict=True):
+        np.testing.assert_array_equal(values, full)
+        np.testing.assert_array_equal(np.concatenate(parts), full)
+
+
+def test_many_movements_take_little_memory() -> None:
+    """A million movements pass in pieces of a thousand; as one batch they would take 1.4 GB."""
+    model, total = MODELS["discrete"], 0
+    styles = np.zeros((10**6, 2))
+    tracemalloc.start()
+    for (positions,) in model.rollout_chunks(styles, dt=0.02, derivatives=0, duration=1.8):
+        total += len(positions)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert total == 10**6
+    assert peak < 5e6
+
+
+def test_pieces_may_be_shared_among_threads(model: pdmp.Model) -> None:
+    """Threads that take from one iterator get every piece once."""
+    styles = np.arange(600.0).reshape(300, 2)
+    chunks = model.rollout_chunks(styles, size=7, dt=0.05, derivatives=0)
+    assert iter(chunks) is chunks
+
+    def take(_: int) -> list[float]:
+        return [position[0, 0] for (positions,) in chunks for position in positions]
+
+    with ThreadPoolExecutor(4) as pool:
+        taken = sorted(x for part in pool.map(take, range(4)) for x in part)
+    (expected,) = model.rollouts(styles, dt=0.05, derivatives=0)
+    np.testing.assert_array_equal(taken, sorted(expected[:, 0, 0]))
+
+
+def test_no_styles_give_no_movements(model: pdmp.Model) -> None:
+    """A batch may be empty, and has then no pieces."""
+    none = np.zeros((0, 2))
+    positions, velocities = model.rollouts(none, dt=0.1, duration=1.0)
+    assert positions.shape == velocities.shape == (0, 11, 2)
+    assert list(model.rollout_chunks(none)) == []
+
+
+def test_what_is_remembered_has_the_same_bits(model: pdmp.Model) -> None:
+    """A model that was asked much before answers like one that was not, from several threads."""
+    times = [{"dt": dt, "tau": tau} for dt in (0.01, 0.02, 0.03, 0.05) for tau in (0.5, 0.8, 1, 2)]
+    fresh: pdmp.Model = pickle.loads(pickle.dumps(model))
+    expected = [pickle.loads(pickle.dumps(model)).rollouts(STYLES, **t)[1] for t in times]
+
+    def ask(n: int) -> None:
+        for k in np.random.default_rng(n).integers(len(times), size=60):
+            np.testing.assert_array_equal(fresh.rollouts(STYLES, **times[k])[1], expected[k])
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(ask, range(4)))
+
+
+WAYS: list[dict[str, Any]] = [
+    {},
+    {"start": [0.1, 0.2]},
+    {"velocity": [0.5, -0.5]},
+    {"start": [0.1, 0.2], "velocity": [0.5, -0.5]},
+]
+
+
+@pytest.mark.parametrize("given", WAYS, ids=str)
+@pytest.mark.parametrize("derivative", [0, 1, 2])
+def test_movement_is_its_jacobians_times_the_changes(
+    model: pdmp.Model, given: dict[str, Any], derivative: int
+) -> None:
+    """However far style, goal or anchor, and start are moved, the rollout moves as they say."""
+    rng, name = np.random.default_rng(2), FIELDS[derivative]
+    style, step, shift, push = rng.normal(size=(4, 2))
+    centre = SINGULAR[centres(model)]
+    shared = {"tau": 0.7, "dt": 0.02, "duration": 1.5}
+    start = {"start": given["start"]} if "start" in given else {}
+
+    def motion(style: np.ndarray, at: np.ndarray, **given: Any) -> np.ndarray:
+        values: np.ndarray = getattr(model.rollout(style, **{centre: at}, **given, **shared), name)
+        return values
+
+    base = motion(style, shift, **given)
+    expected = base + model.style_jacobian(derivative=derivative, **given, **shared) @ step
+    tolerance = 1e-11 * abs(expected).max()
+    np.testing.assert_allclose(motion(style + step, shift, **given), expected, atol=tolerance)
+    if model.kind == "discrete":
+        jacobian = model.goal_jacobian(derivative=derivative, **shared)
+    else:
+        jacobian = model.anchor_jacobian(derivative=derivative, **start, **shared)
+    expected = base + jacobian @ push
+    np.testing.assert_allclose(motion(style, shift + push, **given), expected, atol=tolerance)
+    if start:
+        moved = {**given, "start": given["start"] + push}
+        expected = base + model.start_jacobian(derivative=derivative, **shared) @ push
+        np.testing.assert_allclose(motion(style, shift, **moved), expected, atol=tolerance)
+
+
+def test_jacobian_follows_the_amplitude() -> None:
+    """A style counts as much as the amplitude lets it."""
+    model = MODELS["rhythmic"]
+    half = model.style_jacobian(amplitude=0.5, velocity=[0, 0])
+    np.testing.assert_array_equal(half, model.style_jacobian(velocity=[0, 0]) / 2)
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"goals": np.zeros((3, 2))}, "goals has 3 rows, but there are 23 styles: pass one row for ea"),
+    ({"starts": np.zeros((23, 3))}, "starts has length 3, expected 2: one value per DoF"),
+    ({"velocities": [0.0]}, "velocities has length 1, expected 2: one value per DoF"),
+    ({"starts": np.where(np.arange(46) == 35, NAN, 0).reshape(23, 2)}, r"starts\[17, 1\] = NaN"),
+    ({"starts": 0.3}, r"starts has shape \[\], expected \(D,\) or \(B, D\)"),
+    ({"goals": np.zeros((1, 23, 2))}, r"goals has shape \[1, 23, 2\], expected \(D,\) or \(B, D\)"),
+    ({"anchors": [0, 0]}, "anchors does not apply to a discrete primitive: .*; set goals"),
+    ({"styles": np.zeros((4, 3))}, "styles has length 3, expected 2: one value per style"),
+    ({"styles": [0.0, 0.0]}, r"styles has shape \[2\], expected two axes \(B, J\)"),
+    ({"styles": [[0.0, 0.0], [0.0, NAN]]}, r"styles\[1, 1\] = NaN"),
+    ({"derivatives": 3}, r"derivatives = 3: must be 0 \(position\), 1"),
+    ({"derivatives": -1}, "derivatives = -1: must not be negative"),
+    ({"threads": 0}, "threads = 0: must lie between 1 and 1024"),
+    ({"threads": 1025}, "threads = 1025: must lie between 1 and 1024"),
+    ({"tau": 0.0}, "tau = 0: must be positive"),
+    ({"dt": NAN}, "dt = NaN"),
+    ({"amplitude": 2.0}, "amplitude does not apply"),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), REFUSED, ids=str)
+def test_bad_batches_are_refused(given: dict[str, Any], message: str) -> None:
+    """Batches and pieces alike name the argument and the numbers, before anything is done."""
+    for call in (MODELS["discrete"].rollouts, MODELS["discrete"].rollout_chunks):
+        with pytest.raises(ValueError, match=message):
+            call(**{"styles": STYLES, "dt": 0.1, **given})
+
+
+@pytest.mark.parametrize("size", [0, -1])
+def test_pieces_have_a_size(size: int) -> None:
+    """An iterator that would never end is not begun."""
+    with pytest.raises(ValueError, match=f"size = {size}: must"):
+        MODELS["discrete"].rollout_chunks(STYLES, size=size)
+
+
+def test_jacobians_belong_to_a_kind() -> None:
+    """A discrete primitive has no anchor, a rhythmic one no goal; there is no third derivative."""
+    with pytest.raises(ValueError, match="goal does not apply to a rhythmic primitive"):
+        MODELS["rhythmic"].goal_jacobian()
+    with pytest.raises(ValueError, match="anchor does not apply to a discrete primitive"):
+        MODELS["discrete"].anchor_jacobian()
+    for name in ("style_jacobian", "start_jacobian", "goal_jacobian"):
+        with pytest.raises(ValueError, match="derivative = 3: must be 0"):
+            getattr(MODELS["discrete"], name)(derivative=3)
+
+
+def arrays(n: int = 2) -> list[np.ndarray]:
+    """Return arrays that fit the movements of `STYLES` at 0.1 s for 1 s."""
+    return [np.zeros((23, 11, 2)) for _ in range(n)]
+
+
+def test_outputs_are_one_for_each_derivative() -> None:
+    """Too few and too many arrays are refused with their number."""
+    model, batch = MODELS["discrete"], {"styles": STYLES, "dt": 0.1, "duration": 1.0}
+    for n, derivatives in ((1, 1), (2, 0), (2, 2)):
+        message = f"out: {n} arrays; expected {derivatives + 1} float64 arrays"
+        with pytest.raises(ValueError, match=message):
+            model.rollouts(**batch, derivatives=derivatives, out=arrays(n))
+
+
+def test_outputs_that_overlap_are_refused() -> None:
+    """One memory cannot hold positions and velocities; nothing is written."""
+    model, (one, _) = MODELS["discrete"], arrays()
+    for out in ((one, one), (one, one[::-1])):
+        with pytest.raises(ValueError, match="out: .*share memory"):
+            model.rollouts(STYLES, dt=0.1, duration=1.0, out=out)
+    assert not one.any()
+
+
+def test_outputs_off_the_grid_of_numbers_are_refused() -> None:
+    """A field of packed records is not written."""
+    records = np.zeros((23, 11, 2), [("value", "f8"), ("other", "f4")])
+    with pytest.raises(ValueError, match="out: not aligned in memory"):
+        MODELS["discrete"].rollouts(
+            STYLES, dt=0.1, duration=1.0, derivatives=0, out=(records["value"],)
+        )
+    assert not records["other"].any()
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_outputs_may_lie_in_memory_as_they_like(model: pdmp.Model, order: Any) -> None:
+    """The arrays given are those returned, with the numbers of a batch without them."""
+    expected = model.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=2)
+    out = [np.full((23, 11, 2), NAN, order=order)[::-1] for _ in range(3)]
+    made = model.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=2, out=out)
+    for mine, theirs, result in zip(out, made, expected, strict=True):
+        assert theirs is mine
+        np.testing.assert_array_equal(mine, result)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="this system has no limit on memory")
+def test_more_than_memory_holds_is_refused(tmp_path: Path) -> None:
+    """A batch beyond the memory allowed is a MemoryError that tells its size; pieces of it fit."""
+    MODELS["discrete"].save(tmp_path / "model")
+    code = f"""
+import resource, numpy as np, pdmp
+model, styles = pdmp.load({str(tmp_path / "model")!r}), np.zeros((10**6, 2))
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+try:
+    model.rollouts(styles, dt=1e-3, duration=1.0, threads=1)
+except MemoryError as error:
+    print(error)
+print(next(model.rollout_chunks(styles, dt=1e-3, duration=1.0, threads=1))[0].shape)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    told, shape = done.stdout.splitlines()
+    assert told.startswith("rollouts would take 2002000000.0 numbers: not enough memory")
+    assert shape == "(1000, 1001, 2)"
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no timer signals")
+def test_signal_ends_a_long_batch() -> None:
+    """An exception of a signal handler comes out of the batch while it is written."""
+
+    class Late(Exception):
+        pass
+
+    def ring(*_: object) -> None:
+        raise Late
+
+    model, styles = MODELS["discrete"], np.zeros((20000, 2))
+    out = np.empty((20000, 1001, 2))
+    model.rollouts(styles[:1], dt=1e-3, duration=1.0)
+    before = signal.signal(signal.SIGALRM, ring)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.002)
+        with pytest.raises(Late):
+            model.rollouts(styles, dt=1e-3, duration=1.0, derivatives=0, out=(out,), threads=1)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
