@@ -55,13 +55,13 @@ def test_signal_ends_a_long_fit() -> None:
     def ring(*_: object) -> None:
         raise Late
 
-    s = np.linspace(0, 1, 400)
+    s = np.linspace(0, 1, 40_000)
     demos = [np.sin(np.outer(s, np.arange(1, 8)) + m) for m in range(7)]
     before = signal.signal(signal.SIGALRM, ring)
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.05)
         with pytest.raises(Late):
-            pdmp.fit(demos, dt=0.01, n_styles=7)
+            pdmp.fit(demos, dt=1e-4, n_styles=7)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)

@@ -52,7 +52,7 @@ impl Threads {
     }
 
     /// [`Self::try_for_each`] that asks `proceed` whether to go on, with the share of the items that have been taken.
-    /// The calling thread asks, which alone may, before each item of its own.
+    /// The calling thread asks, which alone may: at first, and before each item of its own.
     ///
     /// # Errors
     /// Whatever `proceed` returns; otherwise that of the first item that has one.
@@ -62,6 +62,8 @@ impl Threads {
         work: impl Fn(T) -> Result<()> + Sync,
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<()> {
+        // Asked once at least, also where others are quick to take all that there is.
+        proceed(0.0)?;
         let n_items = items.len();
         let others = self.get().min(n_items).saturating_sub(1);
         let queue = Mutex::new(items.into_iter().enumerate());
