@@ -123,7 +123,7 @@ def test_own_interval_goes_before_that_of_the_fit() -> None:
 
 
 def test_even_time_stamps_are_an_interval() -> None:
-    """Stamps at c dt are the same demonstration as dt itself, but for the rounding of the stamps."""
+    """Stamps at c dt are the same demonstration as dt itself, rounding aside."""
     stamped = [Demonstration(x, time=DT * np.arange(80)) for x in POSITIONS]
     assert_close(pdmp.fit(stamped), pdmp.fit(POSITIONS, dt=DT))
 
@@ -146,7 +146,7 @@ def test_irregular_stamps_give_the_movement_that_was_sampled() -> None:
 
 
 def test_stamped_cycles_with_a_period_are_the_cycles_themselves() -> None:
-    """With their common period, stamps along a cycle say what the interval says, but for rounding."""
+    """With their common period, stamps along a cycle say what the interval says."""
     demos = loops()
     stamped = [Demonstration(demo.position, time=DT * np.arange(100)) for demo in demos]
     assert_close(
