@@ -189,20 +189,20 @@ impl Aligned<'_> {
     pub(crate) fn sample(&self, m: usize, position: &mut [f64]) -> Result<()> {
         let (demo, Clock { ticks, duration, extent }) = (&self.demos[m], self.clocks[m]);
         let n = demo.n_samples();
-        let mut values: Vec<f64> = demo.position().iter().copied().collect();
-        let time: Vec<f64> = (0..n).map(|c| ticks.at(c)).collect();
-        if self.smoothing != Smoothing::Interpolate {
-            let seconds: Vec<f64> = time.iter().map(|tick| tick * ticks.unit()).collect();
+        let values: Vec<f64> = if self.smoothing == Smoothing::Interpolate {
+            demo.position().iter().copied().collect()
+        } else {
+            let seconds: Vec<f64> = (0..n).map(|c| ticks.at(c) * ticks.unit()).collect();
             let period = (self.kind == Kind::Rhythmic).then_some(duration);
-            let smoothed =
-                smooth(self.smoothing, &seconds, period, demo.position()).map_err(|error| error.in_demo(m))?;
-            values = smoothed.iter().copied().collect();
-        }
+            let smoothed = smooth(self.smoothing, &seconds, period, demo.position());
+            smoothed.map_err(|error| error.in_demo(m))?.iter().copied().collect()
+        };
         let steps = self.kind.steps(self.n_samples) as f64;
         if matches!(ticks, Ticks::Even { .. }) && n == self.n_samples && extent == steps {
             position.copy_from_slice(&values);
             return Ok(());
         }
+        let time = (0..n).map(|c| ticks.at(c)).collect();
         let knots = match self.kind {
             Kind::Discrete => Knots::not_a_knot(time),
             Kind::Rhythmic => Knots::periodic(time, extent),

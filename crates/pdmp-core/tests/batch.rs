@@ -3,26 +3,15 @@
 
 mod common;
 
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
 use common::*;
 use ndarray::{Array2, Array3, Axis, array, s};
 use pdmp_core::{
-    BatchConditions, Conditions, Controller, Derivative, Error, Kind, Model, Rows, StyleCount, Threads, Timing,
-    Trajectory, Variable,
+    BatchConditions, Conditions, Controller, Derivative, Error, Kind, Model, Rows, Threads, Timing, Trajectory,
+    Variable,
 };
 use proptest::prelude::*;
-
-static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
-    learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Discrete) })
-});
-static CYCLE: LazyLock<Arc<Model>> = LazyLock::new(|| {
-    learn(&cycles(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Rhythmic) })
-});
-
-fn timing(dt: f64, duration: f64) -> Timing {
-    Timing { dt, duration: Some(duration) }
-}
 
 fn all(conditions: &BatchConditions, model: &Arc<Model>, timing: Timing) -> Vec<Array3<f64>> {
     let (highest, threads) = (Derivative::Acceleration, Threads::ONE);

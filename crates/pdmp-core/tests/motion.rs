@@ -3,22 +3,11 @@
 
 mod common;
 
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
 use common::*;
-use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status, StyleCount, Timing};
+use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
 use proptest::prelude::*;
-
-static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
-    learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Discrete) })
-});
-static CYCLE: LazyLock<Arc<Model>> = LazyLock::new(|| {
-    learn(&cycles(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Rhythmic) })
-});
-
-fn timing(dt: f64, duration: f64) -> Timing {
-    Timing { dt, duration: Some(duration) }
-}
 
 fn controller(model: &Arc<Model>, dt: f64) -> Controller {
     Controller::new(Arc::clone(model), dt, &Conditions::default(), None).unwrap()

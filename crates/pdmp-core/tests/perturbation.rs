@@ -3,18 +3,11 @@
 
 mod common;
 
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
 use common::*;
-use pdmp_core::{Command, Conditions, Controller, Coupling, Error, Kind, Model, Status, StyleCount};
+use pdmp_core::{Command, Conditions, Controller, Coupling, Error, Kind, Model, Status};
 use proptest::prelude::*;
-
-static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
-    learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Discrete) })
-});
-static CYCLE: LazyLock<Arc<Model>> = LazyLock::new(|| {
-    learn(&cycles(), &pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options(Kind::Rhythmic) })
-});
 
 fn controller(model: &Arc<Model>) -> Controller {
     Controller::new(Arc::clone(model), 1e-3, &Conditions::default(), None).unwrap()

@@ -2,7 +2,7 @@
 #![allow(dead_code, missing_docs)]
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use ndarray::{Array1, Array2};
 use pdmp_core::basis::{Basis, Gp, NGnet};
@@ -63,6 +63,16 @@ pub(crate) fn gp() -> Basis {
 
 pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model> {
     Arc::new(fit(demos, options, &mut |_, _| Ok(())).unwrap())
+}
+
+/// Reaches and cycles learnt with two styles.
+pub(crate) static REACH: LazyLock<Arc<Model>> =
+    LazyLock::new(|| learn(&reaches(), &FitOptions { styles: StyleCount::Given(2), ..options(Kind::Discrete) }));
+pub(crate) static CYCLE: LazyLock<Arc<Model>> =
+    LazyLock::new(|| learn(&cycles(), &FitOptions { styles: StyleCount::Given(2), ..options(Kind::Rhythmic) }));
+
+pub(crate) fn timing(dt: f64, duration: f64) -> Timing {
+    Timing { dt, duration: Some(duration) }
 }
 
 /// One tick under a command; the motion is then read from the controller.
