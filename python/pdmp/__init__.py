@@ -14,6 +14,7 @@ from pdmp._native import (
     GP,
     Controller,
     Demonstration,
+    Factors,
     FitError,
     GPRegression,
     Model,
@@ -26,6 +27,7 @@ from pdmp._native import (
     Status,
     Trajectory,
     __version__,
+    factorise,
     fit,
     load,
 )
@@ -36,6 +38,7 @@ __all__ = [
     "GP",
     "Controller",
     "Demonstration",
+    "Factors",
     "FitError",
     "GPRegression",
     "Model",
@@ -52,6 +55,7 @@ __all__ = [
     "__version__",
     "as_demonstrated",
     "blend",
+    "factorise",
     "fit",
     "load",
 ]

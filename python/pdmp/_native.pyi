@@ -20,6 +20,7 @@ _Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
 __all__ = [
     "Controller",
     "Demonstration",
+    "Factors",
     "FitError",
     "GP",
     "GPRegression",
@@ -33,6 +34,7 @@ __all__ = [
     "Status",
     "Trajectory",
     "__version__",
+    "factorise",
     "fit",
     "load",
 ]
@@ -94,6 +96,12 @@ def fit(
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model: ...
+def factorise(
+    targets: ArrayLike,  # (M, C*D)
+    *,
+    n_styles: int | None = None,
+    spectrum: float = 0.9,
+) -> Factors: ...
 def load(path: str | PathLike[str]) -> Model: ...
 
 @final
@@ -123,7 +131,9 @@ class Model:
     @property
     def styles(self) -> _Array: ...  # (M, J)
     @property
-    def singular_values(self) -> _Array: ...  # (M,)
+    def singular_values(self) -> _Array: ...  # decreasing: all, or of a large library the first J
+    @property
+    def left_out(self) -> float: ...  # share of the targets, by RMS, that J styles leave out
     @property
     def goals(self) -> _Array: ...  # (M, D)
     @property
@@ -253,6 +263,17 @@ class Model:
 class RolloutChunks:
     def __iter__(self) -> RolloutChunks: ...
     def __next__(self) -> tuple[_Array, ...]: ...
+
+@final
+class Factors:
+    @property
+    def styles(self) -> _Array: ...  # (M, J)
+    @property
+    def basis(self) -> _Array: ...  # (J, C*D)
+    @property
+    def singular_values(self) -> _Array: ...  # decreasing: all, or of a large library the first J
+    @property
+    def left_out(self) -> float: ...
 
 @final
 class Prediction:

@@ -22,7 +22,7 @@ use crate::smooth::Smoothing;
 use crate::tabulate::{Jets, MOST_CELLS};
 
 /// Version of the file's layout.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 /// The metadata key.
 const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.
@@ -50,6 +50,7 @@ struct Constants {
     nominal: usize,
     n_samples: usize,
     smoothing: Smoothing,
+    left_out: f64,
     basis: String,
     table_error: f64,
     has_context: bool,
@@ -82,6 +83,7 @@ impl Model {
             nominal: self.demonstrated.nominal,
             n_samples: self.learnt.n_samples,
             smoothing: self.learnt.smoothing,
+            left_out: self.learnt.left_out,
             basis: self.learnt.basis.clone(),
             table_error: self.landscape.error(),
             has_context: self.map.is_some(),
@@ -300,6 +302,7 @@ impl Reader<'_> {
             smoothing: constants.smoothing,
             dof_scale,
             singular_values,
+            left_out: constants.left_out,
             basis: constants.basis.clone(),
         };
         let (tau, names) = (constants.tau, constants.names.clone());

@@ -128,11 +128,9 @@ pub fn fit(
     targets.scale(&dof_scale);
     let Targets { forcing, goals, starts, anchors, .. } = targets;
 
-    proceed(Stage::Factorise, 0.0)?;
-    let factors = Factors::of(forcing.view())?;
+    let mut factorising = |share| proceed(Stage::Factorise, share);
+    let factors = Factors::of(forcing.view(), options.styles, &mut factorising)?;
     drop(forcing);
-    let singular_values = factors.singular_values.clone();
-    let factors = factors.truncate(options.styles)?;
 
     proceed(Stage::Regress, 0.0)?;
     let clock = constants.canonical.clock(aligned.n_samples);
@@ -153,12 +151,15 @@ pub fn fit(
             Some(ContextMap::fit(contexts.view(), outputs.view())?)
         }
     };
-    let demonstrated = Demonstrated { styles: factors.styles, goals, starts, anchors, durations, contexts, nominal };
+    let left_out = factors.left_out();
+    let Factors { styles, singular_values, .. } = factors;
+    let demonstrated = Demonstrated { styles, goals, starts, anchors, durations, contexts, nominal };
     let learnt = Learnt {
         n_samples: clock.len(),
         smoothing: options.alignment.smoothing,
         dof_scale,
         singular_values,
+        left_out,
         basis: regression.describe(),
     };
     let Constants { attractor, tau, .. } = constants;

@@ -41,8 +41,11 @@ pub struct Learnt {
     pub smoothing: Smoothing,
     /// Unit of each DoF in the factorisation (D,).
     pub dof_scale: Vec<f64>,
-    /// All singular values of the targets.
+    /// Singular values of the targets, in decreasing order: all, or the first J alone, where [`crate::Factors`] did not
+    /// compute the others.
     pub singular_values: Vec<f64>,
+    /// Share of the targets, by root mean square, that J styles leave out.
+    pub left_out: f64,
     /// The basis functions, in one line.
     pub basis: String,
 }

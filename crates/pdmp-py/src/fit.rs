@@ -116,10 +116,7 @@ pub(crate) fn fit(
             n_samples: n_samples.map(|n| count("n_samples", n)).transpose()?,
         },
         contexts: contexts.map(|contexts| matrix("contexts", "(M, Q)", contexts)).transpose()?,
-        styles: match n_styles {
-            Some(n_styles) => StyleCount::Given(count("n_styles", n_styles)?),
-            None => StyleCount::Spectrum(spectrum),
-        },
+        styles: style_count(n_styles, spectrum)?,
         basis: basis_of(basis)?,
         dof_scale: dof_scale_of(dof_scale)?,
         tau,
@@ -135,6 +132,14 @@ pub(crate) fn fit(
     };
     let model = detached(py, show, |proceed| pdmp_core::fit(&demos, &options, proceed))?;
     Ok(Model(Arc::new(model)))
+}
+
+/// J as given, or from a share of the spectrum.
+pub(crate) fn style_count(n_styles: Option<isize>, spectrum: f64) -> PyResult<StyleCount> {
+    match n_styles {
+        Some(n_styles) => count("n_styles", n_styles).map(StyleCount::Given),
+        None => Ok(StyleCount::Spectrum(spectrum)),
+    }
 }
 
 fn demonstrations(demos: &Bound<'_, PyAny>) -> PyResult<Vec<pdmp_core::Demonstration>> {

@@ -7,6 +7,7 @@ mod controller;
 mod convert;
 mod demo;
 mod error;
+mod factor;
 mod fit;
 mod jacobian;
 mod model;
@@ -28,12 +29,14 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<basis::GpRegression>()?;
     module.add_class::<basis::NGnet>()?;
     module.add_class::<basis::NGnetRegression>()?;
+    module.add_class::<factor::Factors>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<batch::RolloutChunks>()?;
     module.add_class::<prediction::Prediction>()?;
     module.add_class::<controller::Status>()?;
     module.add_class::<controller::Controller>()?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
+    module.add_function(wrap_pyfunction!(factor::factorise, module)?)?;
     module.add_function(wrap_pyfunction!(model::load, module)?)?;
     Ok(())
 }

@@ -124,10 +124,17 @@ impl Model {
         self.0.demonstrated().styles.to_pyarray(py)
     }
 
-    /// All singular values of the targets, in decreasing order.
+    /// Singular values of the targets, in decreasing order: all min(M, C·D) of them, or the first J alone, where
+    /// n_styles was given and is so small beside the library that the others were not computed.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, &self.0.learnt().singular_values)
+    }
+
+    /// Share of the targets F, by root mean square, that the J styles leave out: ‖F − S·F_basis‖/‖F‖.
+    #[getter]
+    fn left_out(&self) -> f64 {
+        self.0.learnt().left_out
     }
 
     /// Goals of the demonstrations (M, D).

@@ -5,7 +5,11 @@ example: pdmp info reach.safetensors
 
 from argparse import ArgumentParser, Namespace
 
+import numpy as np
+
 import pdmp
+
+MOST = 40  # singular values that are printed
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -16,8 +20,6 @@ def arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Load and print."""
     model = pdmp.load(options.model)
-    total = model.singular_values.sum() or 1.0
-    kept = model.singular_values[: model.n_styles].sum() / total
     constants = f"alpha_z {model.alpha_z:g}, beta_z {model.beta_z:g}"
     if model.alpha_x is not None:
         constants += f", alpha_x {model.alpha_x:g}"
@@ -28,8 +30,8 @@ def run(options: Namespace) -> None:
         "demonstrations": f"{model.n_demos}, nominal {model.nominal}",
         "durations": f"{model.durations.min():g} to {model.durations.max():g} s",
         "DoFs": f"{model.n_dofs}: {', '.join(model.names)}",
-        "styles": f"{model.n_styles}, {kept:.1%} of the singular values",
-        "singular values": " ".join(f"{value:.4g}" for value in model.singular_values),
+        "styles": f"{model.n_styles}, which leave out {model.left_out:.1%} of the targets' RMS",
+        "singular values": _several(model.singular_values),
         "basis": f"{model.basis}; table error {model.table_error:.1e}",
         "tau": f"{model.tau:g} s",
         "constants": constants,
@@ -39,3 +41,10 @@ def run(options: Namespace) -> None:
         lines["contexts"] = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high, strict=True))
     for name, text in lines.items():
         print(f"{name:<16}{text}")
+
+
+def _several(values: np.ndarray) -> str:
+    """Write the first numbers of a list that may be long."""
+    left = len(values) - MOST
+    more = f" and {left} more" if left > 0 else ""
+    return " ".join(f"{value:.4g}" for value in values[:MOST]) + more

@@ -43,8 +43,9 @@ def spectrum(model: Model, *, figure: Figure | None = None) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0.4, len(share) + 0.6)
     axes.set_ylim(0, 105)
-    title = f"J = {kept} of {len(share)}: {share[:kept].sum():.1f} % of the singular values"
-    dress(axes, "singular value", "share of their sum [%]", title)
+    left_out = f"{100 * model.left_out:.2g} % of the targets' RMS left out"
+    title = f"J = {kept} of {model.n_demos}: {left_out}"
+    dress(axes, "singular value, of those computed", "share of their sum [%]", title)
     axes.legend(frameon=False, loc="center right")
     return figure
 

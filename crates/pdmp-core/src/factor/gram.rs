@@ -1,0 +1,65 @@
+//! All singular values, and the leading singular vectors, from the Gram matrix.
+
+use faer::diag::Diag;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, Mat, MatRef, Par};
+
+use super::{ACCURACY, product};
+use crate::error::Result;
+
+/// Singular values below this share of σ₁ are not taken from the Gram matrix: an eigenvector is off by ε·(σ₁/σ)².
+pub(super) const SMALL: f64 = 1e-3;
+
+/// Eigenvectors (K, K) of A·Aᵀ for A (K, L), and the roots of its eigenvalues, in decreasing order; off by √(K·ε)·σ₁
+/// where they vanish. Nothing where the iteration does not converge.
+pub(super) struct Gram {
+    matrix: Mat<f64>,
+    vectors: Mat<f64>,
+    pub(super) values: Vec<f64>,
+}
+
+impl Gram {
+    /// Half the work of a triangularisation, and all of it products. `proceed` is asked every so often.
+    pub(super) fn of(wide: MatRef<f64>, proceed: &mut dyn FnMut(f64) -> Result<()>) -> Result<Option<Self>> {
+        let (k, length) = wide.shape();
+        let most = (1_000_000_000 / (k * k)).max(1024);
+        let mut matrix = Mat::zeros(k, k);
+        for start in (0..length).step_by(most) {
+            proceed(start as f64 / length as f64)?;
+            let part = wide.subcols(start, most.min(length - start));
+            let (lower, dense) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+            matmul(matrix.as_mut(), lower, Accum::Add, part, dense, part.transpose(), dense, 1.0, Par::Seq);
+        }
+        for j in 0..k {
+            for i in 0..j {
+                matrix[(i, j)] = matrix[(j, i)];
+            }
+        }
+        let (mut ascending, mut vectors) = (Diag::zeros(k), Mat::zeros(k, k));
+        let scratch = self_adjoint_evd_scratch::<f64>(k, ComputeEigenvectors::Yes, Par::Seq, Default::default());
+        let mut memory = MemBuffer::new(scratch);
+        let stack = MemStack::new(&mut memory);
+        let into = Some(vectors.as_mut());
+        if self_adjoint_evd(matrix.as_ref(), ascending.as_mut(), into, Par::Seq, stack, Default::default()).is_err() {
+            return Ok(None);
+        }
+        let values: Vec<f64> = ascending.column_vector().iter().rev().map(|l| l.max(0.0).sqrt()).collect();
+        Ok(Some(Self { matrix, vectors, values }))
+    }
+
+    /// The first `kept` vectors, if the leading J among them are singular vectors: not below [`SMALL`]·σ₁, and with
+    /// measured residuals of at most [`ACCURACY`]·σ₁.
+    pub(super) fn leading(&self, n_styles: usize, kept: usize) -> Option<Mat<f64>> {
+        let (first, values) = (self.values[0], &self.values[..n_styles]);
+        let vectors = self.vectors.as_ref().reverse_cols().subcols(0, kept).to_owned();
+        let images = product(self.matrix.as_ref(), vectors.subcols(0, n_styles));
+        let residual = |j: usize| {
+            let pairs = images.col(j).iter().zip(vectors.col(j).iter());
+            pairs.map(|(image, x)| (image - values[j].powi(2) * x).powi(2)).sum::<f64>().sqrt()
+        };
+        let sound = |j: usize| values[j] >= SMALL * first && residual(j) <= ACCURACY * first * values[j];
+        (0..n_styles).all(sound).then_some(vectors)
+    }
+}
