@@ -399,9 +399,15 @@ class GP:
 @final
 class GPRegression:
     @property
+    def kernel(self) -> _Kernel: ...
+    @property
     def length(self) -> float: ...
     @property
     def noise(self) -> float: ...
+    @property
+    def signal_variance(self) -> float: ...  # in the squared unit of the outputs
+    @property
+    def log_likelihood(self) -> float: ...  # summed over the outputs
     def predict(self, u: ArrayLike) -> tuple[_Array, _Array]: ...  # mean, variance (len(u), P)
 
 @final

@@ -99,29 +99,57 @@ impl Gp {
     }
 }
 
-/// A Gaussian process given data.
+/// A Gaussian process given data, f(u) ~ N(0, σ̂²K) for each of P outputs, with K = k(u, u′) + νI.
 #[pyclass(frozen, name = "GPRegression", module = "pdmp")]
 pub(crate) struct GpRegression(GpPosterior);
 
 #[pymethods]
 impl GpRegression {
-    /// Length scale that was used.
+    /// Name of the covariance function.
+    #[getter]
+    fn kernel(&self) -> &'static str {
+        self.0.kernel().name()
+    }
+
+    /// Length scale that was used, in units of the clock.
     #[getter]
     fn length(&self) -> f64 {
         self.0.length()
     }
 
-    /// Noise ratio that was used.
+    /// Ratio ν of noise to signal variance that was used.
     #[getter]
     fn noise(&self) -> f64 {
         self.0.noise()
     }
 
+    /// Signal variance σ̂² = Σ fᵀK⁻¹f/(CP), its likeliest value, in the squared unit of the outputs.
+    ///
+    /// All outputs share it. The variance of the noise is noise * signal_variance.
+    #[getter]
+    fn signal_variance(&self) -> f64 {
+        self.0.signal_variance()
+    }
+
+    /// Log marginal likelihood of the data, −CP/2·(ln 2πσ̂² + 1) − P/2·ln|K|, summed over the outputs.
+    ///
+    /// Of densities in the unit of the outputs; 0 where all of them are zero.
+    #[getter]
+    fn log_likelihood(&self) -> f64 {
+        self.0.log_likelihood()
+    }
+
     /// Mean and variance (n, P) of the outputs, without their noise, at u (n,).
+    ///
+    /// The variance, σ̂²(1 − kᵀK⁻¹k), is the same for all outputs.
     fn predict<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let u = clock(u)?;
         let (mean, variance) = self.0.predict(&u);
         Ok((mean.into_pyarray(py), variance.into_pyarray(py)))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<pdmp.GPRegression: {}>", self.0.describe())
     }
 }
 

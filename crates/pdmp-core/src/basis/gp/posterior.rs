@@ -65,6 +65,11 @@ impl Form {
 }
 
 impl GpPosterior {
+    /// The covariance function.
+    pub fn kernel(&self) -> Kernel {
+        self.kernel
+    }
+
     /// Length scale ℓ in units of u.
     pub fn length(&self) -> f64 {
         self.at.length
