@@ -92,6 +92,13 @@ def test_networks_of_impossible_size_are_refused(n_basis: int) -> None:
         pdmp.NGnet(n_basis)
 
 
+@pytest.mark.parametrize("overlap", [0, -1, 0.29, 3.01, NAN, INF])
+def test_networks_of_impossible_width_are_refused(overlap: float) -> None:
+    """The width that was given and its range are told."""
+    with pytest.raises(ValueError, match="overlap = .*: must lie between 0.3 and 3"):
+        pdmp.NGnet(overlap=overlap)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

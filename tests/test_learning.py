@@ -1,5 +1,6 @@
 """What is learnt, against numpy, scipy and scikit-learn, and on human handwriting."""
 
+import inspect
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,31 @@ def test_spectrum_keeps_the_fewest_that_exceed_its_share(share: float) -> None:
     model = pdmp.fit(reaches(), spectrum=share)
     shares = np.cumsum(model.singular_values) / model.singular_values.sum()
     assert model.n_styles == min(5, 1 + np.sum(shares <= share))
+
+
+@pytest.mark.parametrize("overlap", [0.5, 1.2, 2.0])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_network_is_a_sum_of_the_stated_functions(periodic: bool, overlap: float) -> None:
+    """What is learnt is b(u) = Σ wₖψₖ(u) / Σ ψₖ(u) of width s = overlap·h for some weights."""
+    end, n = 2 * np.pi, 20
+    u = np.linspace(0, end, 200, endpoint=not periodic)
+    h = end / n if periodic else end / (n - 5)
+    s = overlap * h
+    r = u[:, None] - h * (np.arange(n) - (0 if periodic else 2))
+    psi = np.exp((np.cos(r) - 1) / s**2) if periodic else np.exp(-(r**2) / (2 * s**2))
+    psi /= psi.sum(axis=1, keepdims=True)
+    targets = np.exp(np.sin(3 * r[:, :2]))
+    learnt, _ = pdmp.NGnet(n, overlap).regress(u, targets, periodic=periodic).predict(u)
+    weights = np.linalg.lstsq(psi, learnt)[0]
+    np.testing.assert_allclose(psi @ weights, learnt, atol=1e-10)
+
+
+def test_defaults_of_a_network_are_those_of_its_signature() -> None:
+    """What help() shows is what is used."""
+    shown = inspect.signature(pdmp.NGnet).parameters
+    used = pdmp.NGnet()
+    assert (shown["n_basis"].default, shown["overlap"].default) == (used.n_basis, used.overlap)
+    assert repr(used) == f"pdmp.NGnet({used.n_basis}, overlap={used.overlap})"
 
 
 KERNELS = {

@@ -123,6 +123,7 @@ OBJECTS = [
     pdmp.GP("matern32", length=0.25, noise=1e-6),
     pdmp.GP(),
     pdmp.NGnet(12),
+    pdmp.NGnet(12, overlap=0.7),
 ]
 
 

@@ -412,9 +412,11 @@ class GPRegression:
 
 @final
 class NGnet:
-    def __new__(cls, n_basis: int = 50) -> NGnet: ...
+    def __new__(cls, n_basis: int = 50, overlap: float = 1.2) -> NGnet: ...
     @property
     def n_basis(self) -> int: ...
+    @property
+    def overlap(self) -> float: ...  # in centre spacings
     def regress(
         self,
         u: ArrayLike,  # (C,)

@@ -153,17 +153,28 @@ impl GpRegression {
     }
 }
 
-/// Normalised Gaussian network: weighted Gaussians on the clock that sum to one.
+/// Normalised Gaussian network: weighted bell functions on the clock, over their sum.
+///
+/// b(u) = Σ wₖψₖ(u) / Σ ψₖ(u) with ψₖ = exp(−(u − cₖ)²/2s²), or exp((cos(u − cₖ) − 1)/s²) where the movement is
+/// rhythmic. The centres cₖ lie at equal distances h, for discrete movements up to 2h beyond the ends, and
+/// s = overlap·h.
 ///
 /// Parameters
 /// ----------
 /// n_basis : int
-///     Number of functions N, at least 2.
+///     Number of functions N, from 2 to 1000.
+/// overlap : float
+///     Width s of a function in centre spacings h, from 0.3 to 3. Narrow functions ripple between their centres, wide
+///     ones are nearly dependent.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Too few functions.
+///     A number out of range.
+///
+/// References
+/// ----------
+/// Ijspeert, Nakanishi, Hoffmann, Pastor, Schaal, Neural Computation 25 (2013), https://doi.org/10.1162/NECO_a_00393
 #[pyclass(frozen, module = "pdmp", from_py_object)]
 #[derive(Clone)]
 pub(crate) struct NGnet(pub(crate) basis::NGnet);
@@ -171,15 +182,24 @@ pub(crate) struct NGnet(pub(crate) basis::NGnet);
 #[pymethods]
 impl NGnet {
     #[new]
-    #[pyo3(signature = (n_basis=50))]
-    fn new(n_basis: isize) -> PyResult<Self> {
-        basis::NGnet::new(count("n_basis", n_basis)?).map(Self).map_err(raise)
+    #[pyo3(
+        signature = (n_basis=basis::NGnet::default().n_basis as isize, overlap=basis::NGnet::default().overlap),
+        text_signature = "(n_basis=50, overlap=1.2)"
+    )]
+    fn new(n_basis: isize, overlap: f64) -> PyResult<Self> {
+        basis::NGnet::new(count("n_basis", n_basis)?, overlap).map(Self).map_err(raise)
     }
 
     /// Number of functions N.
     #[getter]
     fn n_basis(&self) -> usize {
         self.0.n_basis
+    }
+
+    /// Width of a function in centre spacings.
+    #[getter]
+    fn overlap(&self) -> f64 {
+        self.0.overlap
     }
 
     /// Regress targets (C, P) on the clock u (C,), from 0; within [0, 2π) if periodic.
@@ -191,12 +211,12 @@ impl NGnet {
         Ok(NGnetRegression { regression, n_outputs })
     }
 
-    fn __getnewargs__(&self) -> (usize,) {
-        (self.0.n_basis,)
+    fn __getnewargs__(&self) -> (usize, f64) {
+        (self.0.n_basis, self.0.overlap)
     }
 
     fn __repr__(&self) -> String {
-        format!("pdmp.NGnet({})", self.0.n_basis)
+        format!("pdmp.NGnet({}, overlap={})", self.0.n_basis, self.0.overlap)
     }
 }
 

@@ -55,12 +55,12 @@ impl Default for NGnet {
 }
 
 impl NGnet {
-    /// A network of `n_basis` functions of the default width.
+    /// A network of `n_basis` functions, `overlap` centre spacings wide.
     ///
     /// # Errors
-    /// A number outside 2 to 1000.
-    pub fn new(n_basis: usize) -> Result<Self> {
-        let ngnet = Self { n_basis, ..Self::default() };
+    /// A number outside 2 to 1000, or a width outside 0.3 to 3.
+    pub fn new(n_basis: usize, overlap: f64) -> Result<Self> {
+        let ngnet = Self { n_basis, overlap };
         ngnet.check()?;
         Ok(ngnet)
     }
@@ -312,7 +312,7 @@ mod tests {
     fn the_circle_closes() {
         let u = grid(Domain::Circle, 100);
         let targets = column(&u, |u| (u / 2.0).sin());
-        let fitted = NGnet::new(20).unwrap().regress(Domain::Circle, &u, targets.view()).unwrap();
+        let fitted = NGnet::new(20, 1.2).unwrap().regress(Domain::Circle, &u, targets.view()).unwrap();
         for u in [0.0, 1.0, 5.0] {
             assert_abs_diff_eq!(at(&fitted, u).0, at(&fitted, u + TAU).0, epsilon = 1e-12);
             assert_abs_diff_eq!(at(&fitted, u).1, at(&fitted, u + TAU).1, epsilon = 1e-11);
@@ -335,9 +335,10 @@ mod tests {
     #[test]
     fn settings_out_of_range_are_refused() {
         for n_basis in [0, 1, 1001, usize::MAX] {
-            assert!(matches!(NGnet::new(n_basis), Err(Error::Range { name: "n_basis", .. })));
+            assert!(matches!(NGnet::new(n_basis, 1.2), Err(Error::Range { name: "n_basis", .. })));
         }
-        for overlap in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        for overlap in [0.0, -1.0, 0.29, 3.01, f64::NAN, f64::INFINITY] {
+            assert!(matches!(NGnet::new(50, overlap), Err(Error::Range { name: "overlap", .. })));
             let ngnet = NGnet { overlap, ..NGnet::default() };
             let error = ngnet.regress(INTERVAL, &[0.0], Array2::zeros((1, 1)).view()).unwrap_err();
             assert!(matches!(error, Error::Range { name: "overlap", .. }));
