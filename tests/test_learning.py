@@ -1,4 +1,4 @@
-"""What is learnt, against numpy, scipy and scikit-learn, and on human handwriting."""
+"""What is learnt, against numpy and scipy, and on human handwriting."""
 
 import inspect
 from typing import Any
@@ -129,35 +129,6 @@ def test_defaults_of_a_network_are_those_of_its_signature() -> None:
     used = pdmp.NGnet()
     assert (shown["n_basis"].default, shown["overlap"].default) == (used.n_basis, used.overlap)
     assert repr(used) == f"pdmp.NGnet({used.n_basis}, overlap={used.overlap})"
-
-
-KERNELS = {
-    "matern32": lambda k, length: k.Matern(length, nu=1.5),
-    "matern52": lambda k, length: k.Matern(length, nu=2.5),
-    "squared_exponential": lambda k, length: k.RBF(length),
-}
-
-
-@pytest.mark.parametrize(("length", "noise"), [(0.2, 1e-4), (0.05, 1e-2), (1.0, 1e-6)])
-@pytest.mark.parametrize("name", KERNELS)
-def test_gp_agrees_with_scikit_learn(name: Any, length: float, noise: float) -> None:
-    """Mean and variance are those of the same process with amplitude Σ fᵀK⁻¹f/(CP)."""
-    process = pytest.importorskip("sklearn.gaussian_process")
-    u, at = np.linspace(0, 1, 60), np.linspace(-0.2, 1.2, 83)
-    f = np.column_stack([np.sin(7 * u), 1e3 * u**2])
-    mean, variance = pdmp.GP(name, length, noise).regress(u, f).predict(at)
-    unit = KERNELS[name](process.kernels, length)
-    k = unit(u[:, None]) + noise * np.eye(60)
-    amplitude = np.trace(f.T @ np.linalg.solve(k, f)) / f.size
-    for p, target in enumerate(f.T):
-        theirs = process.GaussianProcessRegressor(
-            process.kernels.ConstantKernel(amplitude) * unit,
-            alpha=amplitude * noise,
-            optimizer=None,
-        ).fit(u[:, None], target)
-        expected, deviation = theirs.predict(at[:, None], return_std=True)
-        np.testing.assert_allclose(mean[:, p], expected, atol=1e-6 * np.abs(target).max())
-        np.testing.assert_allclose(variance[:, p], deviation**2, atol=1e-6 * amplitude)
 
 
 def noisy() -> tuple[list[np.ndarray], list[np.ndarray]]:
