@@ -58,21 +58,20 @@ pub(super) trait Objective {
 /// point is returned.
 pub(super) fn maximise(axes: &[Axis; 2], objective: &mut impl Objective) -> Result<[f64; 2]> {
     let [rows, columns] = axes.map(|axis| axis.points);
-    let point = |cell: usize| {
-        let index = [cell / columns, cell % columns];
-        std::array::from_fn(|k| axes[k].low + index[k] as f64 * axes[k].step())
-    };
-    let glances: Vec<f64> = (0..rows * columns).map(|cell| objective.glance(point(cell))).collect::<Result<_>>()?;
-    let mut starts: Vec<usize> = (0..glances.len()).filter(|&cell| is_summit(&glances, columns, cell)).collect();
+    let mut scan = Scan { axes, objective };
+    let cell = |index: usize| [index / columns, index % columns].map(|k| k as f64);
+    let glances: Vec<f64> =
+        (0..rows * columns).map(|index| scan.objective.glance(scan.place(cell(index)))).collect::<Result<_>>()?;
+    let mut starts: Vec<usize> = (0..glances.len()).filter(|&index| is_summit(&glances, columns, index)).collect();
     starts.sort_by(|&a, &b| glances[b].total_cmp(&glances[a]));
     let mut best: Option<([f64; 2], f64)> = None;
     for &start in starts.iter().take(STARTS) {
-        let (at, value) = climb(axes, point(start), objective)?;
+        let (at, value) = scan.climb(cell(start))?;
         if best.is_none_or(|(_, most)| value > most) {
             best = Some((at, value));
         }
     }
-    Ok(best.map_or(point(0), |(at, _)| at))
+    Ok(scan.place(best.map_or([0.0; 2], |(at, _)| at)))
 }
 
 /// Whether no neighbour of a cell is higher, nor as high and before it.
@@ -86,57 +85,72 @@ fn is_summit(values: &[f64], columns: usize, cell: usize) -> bool {
     })
 }
 
-/// Ascent from `start`, never to a point below it: the quasi-Newton method of Broyden, Fletcher, Goldfarb and Shanno
-/// on the variables that are free to move, one cell of the scan at a time.
-///
-/// Nocedal and Wright, Numerical Optimization (2006), Sections 6.1 and 16.7.
-fn climb(axes: &[Axis; 2], start: [f64; 2], objective: &mut impl Objective) -> Result<([f64; 2], f64)> {
-    let mut at = start;
-    let mut here = objective.score(at)?;
-    let mut curvature: Option<Curvature> = None;
-    for _ in 0..STEPS {
-        let g = here.gradient;
-        let free = [0, 1].map(|k| if g[k] > 0.0 { at[k] < axes[k].high } else { g[k] < 0.0 && at[k] > axes[k].low });
-        let mut step = match &curvature {
-            Some(curvature) => curvature.step(g, free),
-            // Half a cell, along the gradient.
-            None => {
-                let steepest = (0..2).filter(|&k| free[k]).map(|k| g[k].abs() / axes[k].step()).fold(0.0, f64::max);
-                [0, 1].map(|k| if free[k] { 0.5 * g[k] / steepest } else { 0.0 })
-            }
-        };
-        let cells = (0..2).filter(|&k| free[k]).map(|k| step[k].abs() / axes[k].step()).fold(1.0, f64::max);
-        step = step.map(|s| s / cells);
-        if (step[0] * g[0] + step[1] * g[1]).partial_cmp(&GAIN) != Some(Ordering::Greater) {
-            break;
-        }
-        let Some((next, there)) = advance(axes, at, here, step, objective)? else { break };
-        let moved = [0, 1].map(|k| next[k] - at[k]);
-        let bent = [0, 1].map(|k| g[k] - there.gradient[k]);
-        curvature = Curvature::updated(curvature, moved, bent);
-        (at, here) = (next, there);
-    }
-    Ok((at, here.value))
+/// The box in cells of the scan, in which the variables weigh alike.
+struct Scan<'a, O> {
+    axes: &'a [Axis; 2],
+    objective: &'a mut O,
 }
 
-/// The first point along a step, clamped to the box and halved until it pays, if there is one.
-fn advance(
-    axes: &[Axis; 2],
-    at: [f64; 2],
-    here: Score,
-    mut step: [f64; 2],
-    objective: &mut impl Objective,
-) -> Result<Option<([f64; 2], Score)>> {
-    for _ in 0..HALVINGS {
-        let next = [0, 1].map(|k| (at[k] + step[k]).clamp(axes[k].low, axes[k].high));
-        let promised: f64 = (0..2).map(|k| here.gradient[k] * (next[k] - at[k])).sum();
-        let there = objective.score(next)?;
-        if there.value > here.value && there.value >= here.value + 1e-4 * promised {
-            return Ok(Some((next, there)));
-        }
-        step = step.map(|s| 0.5 * s);
+impl<O: Objective> Scan<'_, O> {
+    fn place(&self, at: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| self.axes[k].low + at[k] * self.axes[k].step())
     }
-    Ok(None)
+
+    fn score(&mut self, at: [f64; 2]) -> Result<Score> {
+        let Score { value, gradient } = self.objective.score(self.place(at))?;
+        Ok(Score { value, gradient: [0, 1].map(|k| gradient[k] * self.axes[k].step()) })
+    }
+
+    /// The last cell of each axis.
+    fn ends(&self) -> [f64; 2] {
+        [0, 1].map(|k| (self.axes[k].points - 1) as f64)
+    }
+
+    /// Ascent from `start`, never to a point below it: the quasi-Newton method of Broyden, Fletcher, Goldfarb and Shanno
+    /// on the variables that are free to move, one cell at a time.
+    ///
+    /// Nocedal and Wright, Numerical Optimization (2006), Sections 6.1 and 16.7.
+    fn climb(&mut self, start: [f64; 2]) -> Result<([f64; 2], f64)> {
+        let (mut at, ends) = (start, self.ends());
+        let mut here = self.score(at)?;
+        let mut curvature: Option<Curvature> = None;
+        for _ in 0..STEPS {
+            let g = here.gradient;
+            let free = [0, 1].map(|k| if g[k] > 0.0 { at[k] < ends[k] } else { g[k] < 0.0 && at[k] > 0.0 });
+            let most = |v: [f64; 2]| (0..2).filter(|&k| free[k]).map(|k| v[k].abs()).fold(0.0, f64::max);
+            let mut step = match &curvature {
+                Some(curvature) => curvature.step(g, free),
+                // Half a cell, along the gradient.
+                None => [0, 1].map(|k| if free[k] { 0.5 * g[k] / most(g) } else { 0.0 }),
+            };
+            let cells = most(step).max(1.0);
+            step = step.map(|s| s / cells);
+            if (step[0] * g[0] + step[1] * g[1]).partial_cmp(&GAIN) != Some(Ordering::Greater) {
+                break;
+            }
+            let Some((next, there)) = self.advance(at, here, step)? else { break };
+            let moved = [0, 1].map(|k| next[k] - at[k]);
+            let bent = [0, 1].map(|k| g[k] - there.gradient[k]);
+            curvature = Curvature::updated(curvature, moved, bent);
+            (at, here) = (next, there);
+        }
+        Ok((at, here.value))
+    }
+
+    /// The first point along a step, clamped to the box and halved until it pays, if there is one.
+    fn advance(&mut self, at: [f64; 2], here: Score, mut step: [f64; 2]) -> Result<Option<([f64; 2], Score)>> {
+        let ends = self.ends();
+        for _ in 0..HALVINGS {
+            let next = [0, 1].map(|k| (at[k] + step[k]).clamp(0.0, ends[k]));
+            let promised: f64 = (0..2).map(|k| here.gradient[k] * (next[k] - at[k])).sum();
+            let there = self.score(next)?;
+            if there.value > here.value && there.value >= here.value + 1e-4 * promised {
+                return Ok(Some((next, there)));
+            }
+            step = step.map(|s| 0.5 * s);
+        }
+        Ok(None)
+    }
 }
 
 /// Estimate of minus the second derivatives, positive definite.

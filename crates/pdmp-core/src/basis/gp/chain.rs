@@ -8,9 +8,8 @@ use super::posterior::Form;
 use super::smoother::Smoother;
 use super::state::{Square, drift, rate, stationary};
 use super::trajectory::Trajectory;
-use super::{Fitted, Hyperparameters, PORTION, Process, Progress, Samples};
+use super::{Fitted, Hyperparameters, PORTION, Process, Profile, Progress, Samples, Slope};
 use crate::basis::Domain;
-use crate::basis::search::Score;
 use crate::error::Result;
 use crate::lanes::{Lanes, WIDTH, groups};
 
@@ -84,21 +83,17 @@ where
         Self { domain, gaps: Gaps::new(&u, end.map(|turn| u[0] + turn)), u, targets, n_outputs }
     }
 
-    fn profile(&self, at: Hyperparameters, progress: &mut Progress) -> Result<f64> {
-        Ok(self.filter(at, progress)?.map_or(f64::NEG_INFINITY, |filtered| filtered.profile()))
+    fn profile(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<Profile>> {
+        Ok(self.filter(at, progress)?.map(|filtered| filtered.profile()))
     }
 
-    fn score(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Score> {
-        match self.filter(at, progress)? {
-            Some(filtered) => filtered.score(progress),
-            None => Ok(Score::IMPOSSIBLE),
-        }
+    fn slope(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<(Profile, Slope)>> {
+        self.filter(at, progress)?.map(|filtered| filtered.slope(progress)).transpose()
     }
 
     fn fit(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<Fitted>> {
         let Some(filtered) = self.filter(at, progress)? else { return Ok(None) };
-        let (variance, profile) = (filtered.variance() * filtered.norm, filtered.profile());
-        Ok(Some(Fitted { variance, profile, form: filtered.smooth(progress)?.into() }))
+        Ok(Some(Fitted { profile: filtered.profile(), form: filtered.smooth(progress)?.into() }))
     }
 }
 
@@ -146,13 +141,11 @@ impl<const D: usize> Filtered<'_, D> {
         misfits[..self.chain.n_outputs].iter().sum::<f64>() / n_values.max(1) as f64
     }
 
-    /// −CP/2·ln σ̂² − P/2·ln|K|; nothing is said by outputs that are all zero.
-    fn profile(&self) -> f64 {
-        let variance = self.variance();
-        if variance == 0.0 {
-            return 0.0;
-        }
-        -0.5 * self.chain.n_outputs as f64 * (self.chain.u.len() as f64 * variance.ln() + self.log_determinant)
+    /// K of the chain is that of the process times the norm.
+    fn profile(&self) -> Profile {
+        let (n_samples, n_outputs) = (self.chain.u.len() as f64, self.chain.n_outputs as f64);
+        let log_determinant = n_outputs * (self.log_determinant - n_samples * self.norm.ln());
+        Profile { n_values: n_samples * n_outputs, variance: self.variance() * self.norm, log_determinant }
     }
 
     /// The smoother at the end of the path, where only a circle has more to say: ξ − x ~ N(0, P).
@@ -170,15 +163,15 @@ impl<const D: usize> Filtered<'_, D> {
         Smoother::new(&self.path, &self.steps, self.settled, adjoint, precision)
     }
 
-    /// The profile and its gradient.
+    /// The profile and its derivatives.
     ///
     /// With G = Σ rrᵀ/σ̂² − P·N at the sample after a step, the log likelihood changes by ½tr(dP·G) + Σ rᵀdx/σ̂² with
     /// what the step says of that sample: dx = Fx·da, dP = (FM + MFᵀ + qqᵀ)·da, M = P − Q; and with the noise by
     /// ½Σα²/σ̂² − P/2·tr K⁻¹, α = K⁻¹f.
-    fn score(&self, progress: &mut Progress) -> Result<Score> {
+    fn slope(&self, progress: &mut Progress) -> Result<(Profile, Slope)> {
         let profile = self.profile();
-        if self.variance() == 0.0 {
-            return Ok(Score { value: profile, gradient: [0.0; 2] });
+        if profile.variance == 0.0 {
+            return Ok((profile, Slope { pull: [0.0; 2], spread: [0.0; 2] }));
         }
         let (n_outputs, groups) = (self.chain.n_outputs as f64, self.chain.groups());
         let mut smoother = self.smoother();
@@ -211,14 +204,18 @@ impl<const D: usize> Filtered<'_, D> {
         let total = |sums: &[Lanes], shared: f64| {
             let sums: &[f64] = bytemuck::cast_slice(sums);
             let (outputs, directions) = sums.split_at(self.chain.n_outputs);
-            outputs.iter().sum::<f64>() / self.variance() + n_outputs * (directions.iter().sum::<f64>() - shared)
+            (outputs.iter().sum::<f64>() / self.variance(), n_outputs * (shared - directions.iter().sum::<f64>()))
         };
-        let mut length = -total(&by_length, shared_length);
-        let noise = 0.5 * self.noise * total(&by_noise, shared_noise);
+        let (by_length, by_noise) = (total(&by_length, shared_length), total(&by_noise, shared_noise));
+        let mut pull = [-by_length.0, 0.5 * self.noise * by_noise.0];
+        let mut spread = [-by_length.1, 0.5 * self.noise * by_noise.1];
         if let Some((turn, _)) = &self.closure {
-            length += noise * turn.rise + n_outputs * turn.log_determinant::<D>().1;
+            // K and ν of the chain are those of the process times the norm, which goes with the length.
+            let half = 0.5 * profile.n_values;
+            pull[0] += turn.rise * (pull[1] - half);
+            spread[0] += turn.rise * (spread[1] - half) - n_outputs * turn.log_determinant::<D>().1;
         }
-        Ok(Score { value: profile, gradient: [length, noise] })
+        Ok((profile, Slope { pull, spread }))
     }
 
     /// The posterior everywhere.

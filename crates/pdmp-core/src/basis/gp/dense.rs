@@ -7,9 +7,8 @@ use ndarray::Array2;
 
 use super::bell::Bell;
 use super::posterior::Form;
-use super::{Fitted, Hyperparameters, Process, Progress, Samples};
+use super::{Fitted, Hyperparameters, Process, Profile, Progress, Samples, Slope};
 use crate::basis::Domain;
-use crate::basis::search::Score;
 use crate::error::Result;
 
 /// Columns that are factorised at once.
@@ -77,40 +76,39 @@ impl Process for Dense {
         Self { domain, u: samples.u.clone(), outputs }
     }
 
-    fn profile(&self, at: Hyperparameters, progress: &mut Progress) -> Result<f64> {
-        Ok(self.factorise(at, progress)?.map_or(f64::NEG_INFINITY, |factors| factors.profile()))
+    fn profile(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<Profile>> {
+        Ok(self.factorise(at, progress)?.map(|factors| factors.profile()))
     }
 
-    /// With α = K⁻¹f, the log likelihood changes by ½Σ αᵀdKα/σ̂² − P/2·tr(K⁻¹dK).
-    fn score(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Score> {
-        let Some(factors) = self.factorise(at, progress)? else { return Ok(Score::IMPOSSIBLE) };
-        let (value, variance) = (factors.profile(), factors.variance());
-        if variance == 0.0 {
-            return Ok(Score { value, gradient: [0.0; 2] });
-        }
-        let (n_samples, n_outputs) = factors.whitened.shape();
-        let weights = factors.weights();
-        let mut root = Mat::<f64>::identity(n_samples, n_samples);
-        factors.lower.solve_lower_triangular_in_place(&mut root);
-        // Σ ααᵀ/σ̂² − P·K⁻¹, of which dK takes the trace.
-        let mut pull = &weights * weights.transpose() * faer::Scale(1.0 / variance);
-        matmul(&mut pull, Accum::Add, root.transpose(), &root, -(n_outputs as f64), Par::Seq);
-        let (mut by_length, mut by_noise) = (0.0, 0.0);
-        for j in 0..n_samples {
-            by_noise += 0.5 * at.noise * pull[(j, j)];
-            for i in j + 1..n_samples {
-                by_length += pull[(i, j)] * factors.bell.by_length(self.u[i] - self.u[j]).1;
+    fn slope(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<(Profile, Slope)>> {
+        let Some(factors) = self.factorise(at, progress)? else { return Ok(None) };
+        let profile = factors.profile();
+        let (mut pull, mut spread) = ([0.0; 2], [0.0; 2]);
+        if profile.variance > 0.0 {
+            let (n_samples, n_outputs) = factors.whitened.shape();
+            let weights = factors.weights();
+            let products = &weights * weights.transpose() * faer::Scale(1.0 / profile.variance);
+            let mut root = Mat::<f64>::identity(n_samples, n_samples);
+            factors.lower.solve_lower_triangular_in_place(&mut root);
+            let inverse = root.transpose() * &root * faer::Scale(n_outputs as f64);
+            for (sum, matrix) in [(&mut pull, &products), (&mut spread, &inverse)] {
+                for j in 0..n_samples {
+                    sum[1] += 0.5 * at.noise * matrix[(j, j)];
+                    for i in j + 1..n_samples {
+                        sum[0] += matrix[(i, j)] * factors.bell.by_length(self.u[i] - self.u[j]).1;
+                    }
+                }
             }
         }
-        Ok(Score { value, gradient: [by_length, by_noise] })
+        Ok(Some((profile, Slope { pull, spread })))
     }
 
     fn fit(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<Fitted>> {
         let Some(factors) = self.factorise(at, progress)? else { return Ok(None) };
-        let (variance, profile, weights) = (factors.variance(), factors.profile(), factors.weights());
+        let (profile, weights) = (factors.profile(), factors.weights());
         let weights = Array2::from_shape_fn(weights.shape(), |(i, o)| weights[(i, o)]);
         let expansion = Expansion { bell: factors.bell, u: self.u.clone(), lower: factors.lower, weights };
-        Ok(Some(Fitted { variance, profile, form: Form::SquaredExponential(expansion) }))
+        Ok(Some(Fitted { profile, form: Form::SquaredExponential(expansion) }))
     }
 }
 
@@ -124,21 +122,11 @@ struct Factors {
 }
 
 impl Factors {
-    /// σ̂² = Σ fᵀK⁻¹f/(CP).
-    fn variance(&self) -> f64 {
-        let n_values = (self.whitened.nrows() * self.whitened.ncols()) as f64;
-        self.whitened.squared_norm_l2() / n_values.max(1.0)
-    }
-
-    /// −CP/2·ln σ̂² − P/2·ln|K|; nothing is said by outputs that are all zero.
-    fn profile(&self) -> f64 {
+    fn profile(&self) -> Profile {
         let (n_samples, n_outputs) = self.whitened.shape();
-        let variance = self.variance();
-        if variance == 0.0 {
-            return 0.0;
-        }
-        let half_log_determinant: f64 = (0..n_samples).map(|i| self.lower[(i, i)].ln()).sum();
-        -(n_outputs as f64) * (0.5 * n_samples as f64 * variance.ln() + half_log_determinant)
+        let n_values = (n_samples * n_outputs) as f64;
+        let log_determinant = 2.0 * n_outputs as f64 * (0..n_samples).map(|i| self.lower[(i, i)].ln()).sum::<f64>();
+        Profile { n_values, variance: self.whitened.squared_norm_l2() / n_values.max(1.0), log_determinant }
     }
 
     /// K⁻¹f.

@@ -26,13 +26,18 @@ use crate::error::{Error, Result, check_positive};
 
 /// Smallest ratio of noise to signal variance: below, rounding makes the covariance matrix indefinite.
 const LEAST_NOISE: f64 = 1e-10;
-/// Largest ratio that the search considers: a thousandth of the signal's deviation.
+/// Largest ratio that the search considers, and largest share of the targets' mean square that it leaves to noise: a
+/// thousandth of the signal's deviation, and of the targets.
 ///
 /// What the landscape takes for noise, no style brings back, and noise on the demonstrations is what smoothing is for.
 /// With ratios up to 1 the likelihood took the impact in recorded walking forces for noise, and with it half of the
 /// signal: reproductions were off by 23 % of the range, against 6 % with three styles and 3 % with all below 1e-4.
-/// Handwriting is met to 1e-4 at worst below 1e-6.
+/// Handwriting is met to 1e-4 at worst below 1e-6. The ratio alone is no bound: long lengths have signal variances far
+/// beyond the targets' mean square, and with 1e-6 of it recorded robot paths were reproduced worse than by a network.
 const MOST_NOISE: f64 = 1e-6;
+/// Weight, in halves of the number of values, of the square by which the logarithm of the noise exceeds its bound. The
+/// likelihood pulls by no more than half of that number: it is exceeded by a twentieth at most.
+const BARRIER: f64 = 20.0;
 /// Largest ratio that a failing factorisation is helped with.
 const MOST_HELP: f64 = 1.0;
 /// Samples that the scan for the neighbourhood of the likeliest hyperparameters looks at.
@@ -47,7 +52,8 @@ const PORTION: usize = 4096;
 /// The P outputs are independent Gaussian processes of mean zero over the clock with one covariance σ²K,
 /// K = k(u, u′; ℓ) + νI. The signal variance has the maximum-likelihood value σ̂² = Σ fᵀK⁻¹f/(CP). Length ℓ and noise
 /// ratio ν, where not given, maximise the log marginal likelihood with that value put in, −CP/2·ln σ̂² − P/2·ln|K|,
-/// over ν from 1e-10 to 1e-6 and ℓ from the distance of the samples to twice the extent of the clock.
+/// over ν from 1e-10 to 1e-6 and ℓ from the distance of the samples to twice the extent of the clock, with a noise
+/// νσ̂² of at most a millionth of the targets' mean square.
 ///
 /// The variance is shared because basis targets share their noise: S has orthonormal columns, so equal noise on the
 /// demonstrations is equal noise on every row of ΣVᵀ, strong or weak. With a variance each, the weak factors of real
@@ -140,11 +146,11 @@ impl Gp {
         };
         progress.reach(1.0)?;
 
-        let Fitted { variance, profile, form } = fitted;
-        let deviation = variance.sqrt() * samples.scale;
+        let Fitted { profile, form } = fitted;
+        let deviation = profile.variance.sqrt() * samples.scale;
         // What the search may leave out: that the densities are per unit of the outputs.
         let constant = if deviation > 0.0 { (TAU.sqrt() * samples.scale).ln() + 0.5 } else { 0.0 };
-        let log_likelihood = profile - targets.len() as f64 * constant;
+        let log_likelihood = profile.value() - targets.len() as f64 * constant;
         let (kernel, scale, n_outputs) = (self.kernel, samples.scale, targets.ncols());
         Ok(GpPosterior { kernel, at, form, scale, n_outputs, deviation, log_likelihood })
     }
@@ -180,8 +186,14 @@ impl Gp {
             given.map_or(Axis { low: low.ln(), high: high.ln(), points }, |given| Axis::given(given.ln()))
         };
         let axes = [axis(self.length, lengths, 12), axis(self.noise, (LEAST_NOISE, MOST_NOISE), 3)];
+        let bound = match self.noise {
+            Some(_) => None,
+            None => {
+                Some(MOST_NOISE * samples.targets.iter().map(|f| f * f).sum::<f64>() / samples.targets.len() as f64)
+            }
+        };
         let process = |most: usize| P::new(domain, &samples.thinned(most));
-        let mut likelihood = Likelihood { scanned: process(SCANNED), searched: process(P::SEARCHED), progress };
+        let mut likelihood = Likelihood { scanned: process(SCANNED), searched: process(P::SEARCHED), bound, progress };
         let [length, noise] = maximise(&axes, &mut likelihood)?;
         // What is given comes out as it was.
         Ok(Hyperparameters {
@@ -236,42 +248,93 @@ trait Process {
 
     fn new(domain: Domain, samples: &Samples) -> Self;
 
-    /// −CP/2·ln σ̂² − P/2·ln|K|, the log likelihood but for a constant; −∞ where rounding makes K indefinite.
-    fn profile(&self, at: Hyperparameters, progress: &mut Progress) -> Result<f64>;
+    /// How likely the samples are; nothing where rounding makes K indefinite.
+    fn profile(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<Profile>>;
 
-    /// The same, and its gradient with respect to ln ℓ and ln ν.
-    fn score(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Score>;
+    /// The same, and how it changes with ln ℓ and ln ν.
+    fn slope(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<(Profile, Slope)>>;
 
     /// The process given the samples; nothing where rounding makes K indefinite.
     fn fit(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<Fitted>>;
 }
 
+/// The likelihood of samples whose signal has its likeliest variance.
+#[derive(Clone, Copy, Debug)]
+struct Profile {
+    /// CP.
+    n_values: f64,
+    /// σ̂² = Σ fᵀK⁻¹f/(CP).
+    variance: f64,
+    /// P·ln|K|.
+    log_determinant: f64,
+}
+
+/// Derivatives with respect to (ln ℓ, ln ν).
+#[derive(Clone, Copy, Debug)]
+struct Slope {
+    /// ½Σ αᵀdKα/σ̂², α = K⁻¹f.
+    pull: [f64; 2],
+    /// P/2·tr(K⁻¹dK).
+    spread: [f64; 2],
+}
+
+impl Profile {
+    /// −CP/2·ln σ̂² − P/2·ln|K|, the log likelihood but for a constant; nothing is said by outputs that are all zero.
+    fn value(&self) -> f64 {
+        if self.variance == 0.0 { 0.0 } else { -0.5 * (self.n_values * self.variance.ln() + self.log_determinant) }
+    }
+
+    fn gradient(&self, slope: &Slope) -> [f64; 2] {
+        [0, 1].map(|k| if self.variance == 0.0 { 0.0 } else { slope.pull[k] - slope.spread[k] })
+    }
+}
+
 /// A process given its samples.
 struct Fitted {
-    /// σ̂².
-    variance: f64,
-    profile: f64,
+    profile: Profile,
     form: Form,
 }
 
-/// The likelihood as a function of (ln ℓ, ln ν).
+/// The likelihood as a function of (ln ℓ, ln ν), less what keeps the noise within its bound.
 struct Likelihood<'a, 'b, P> {
     scanned: P,
     searched: P,
+    /// Largest νσ̂², if it has one.
+    bound: Option<f64>,
     progress: &'a mut Progress<'b>,
+}
+
+impl<P> Likelihood<'_, '_, P> {
+    /// ln(νσ̂²) above its bound.
+    fn excess(&self, profile: &Profile, noise: f64) -> f64 {
+        self.bound.map_or(0.0, |bound| (noise * profile.variance / bound).ln().max(0.0))
+    }
 }
 
 impl<P: Process> Objective for Likelihood<'_, '_, P> {
     fn glance(&mut self, at: [f64; 2]) -> Result<f64> {
         self.progress.advance()?;
         let [length, noise] = at.map(f64::exp);
-        self.scanned.profile(Hyperparameters { length, noise }, self.progress)
+        let found = self.scanned.profile(Hyperparameters { length, noise }, self.progress)?;
+        Ok(found.map_or(f64::NEG_INFINITY, |profile| {
+            profile.value() - 0.25 * BARRIER * profile.n_values * self.excess(&profile, noise).powi(2)
+        }))
     }
 
     fn score(&mut self, at: [f64; 2]) -> Result<Score> {
         self.progress.advance()?;
         let [length, noise] = at.map(f64::exp);
-        self.searched.score(Hyperparameters { length, noise }, self.progress)
+        let Some((profile, slope)) = self.searched.slope(Hyperparameters { length, noise }, self.progress)? else {
+            return Ok(Score::IMPOSSIBLE);
+        };
+        // σ̂² falls where K pulls: d ln σ̂² = −2·pull/(CP).
+        let (excess, weight) = (self.excess(&profile, noise), 0.5 * BARRIER * profile.n_values);
+        let rise = [0, 1].map(|k| k as f64 - 2.0 * slope.pull[k] / profile.n_values);
+        let gradient = profile.gradient(&slope);
+        Ok(Score {
+            value: profile.value() - 0.5 * weight * excess * excess,
+            gradient: [0, 1].map(|k| gradient[k] - weight * excess * rise[k]),
+        })
     }
 }
 
