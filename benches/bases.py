@@ -1,0 +1,219 @@
+"""Which basis reproduces recordings best, and which foresees what it was not shown.
+
+``make bench-bases`` prints the tables; ``--write`` puts them into docs/bases.md.
+"""
+
+import argparse
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+import pdmp
+from peers.arena import machine
+from recordings import Group, groups
+
+KERNELS = ("matern32", "matern52", "squared_exponential")
+SIZES = (20, 35, 50, 75, 100, 150, 200)
+WIDTHS = (1.0, 1.2, 1.5)
+FINE = 4000  # samples of a rollout: straight lines between them are exact to 1e-6
+
+Basis = pdmp.GP | pdmp.NGnet
+
+
+def named(*bases: Basis) -> dict[str, Basis]:
+    """Return regressors by name."""
+    return {
+        f"GP, {basis.kernel}"
+        if isinstance(basis, pdmp.GP)
+        else f"NGnet, N = {basis.n_basis}, width {basis.overlap}": basis
+        for basis in bases
+    }
+
+
+DEFAULTS = named(pdmp.GP(), pdmp.NGnet())
+BASES = named(
+    *map(pdmp.GP, KERNELS),
+    *(pdmp.NGnet(*pair) for pair in product(SIZES, WIDTHS)),
+    *DEFAULTS.values(),
+)
+
+FIGURES = ["reproduction, median", "worst", "held out", "log density", "fit [ms]"]
+CAPTION = """\
+Measured on {machine} by `make bench-bases`: {sets} sets of recordings, {groups} groups of
+repetitions, {demos} demonstrations; at most ten a group, of at most 400 samples. Defaults are bold.
+
+- *Reproduction*: a primitive is learnt from a group with J = M, and each demonstration is rolled
+  out with its own style, place and duration. RMSE at its samples over the largest range of a degree
+  of freedom: median over sets of the median over a set's demonstrations, and worst demonstration.
+- *Held out*: the basis targets of the group are regressed on every second sample and compared at
+  the others. RMSE over the largest range of the targets, and log density of a value in units of the
+  targets' RMS: medians over sets of the medians over a set's groups. The Gaussian process has a
+  variance and noise of its own; a network is given the mean square of its residuals at the samples
+  shown, each as if that sample had been left out.
+- *Fit*: time of `pdmp.fit`, all four steps: median over groups.
+"""
+
+
+@dataclass(frozen=True)
+class Score:
+    """What one basis makes of one group."""
+
+    reproduction: list[float]  # RMSE over range, of each demonstration
+    held_out: float  # RMSE over range of the targets
+    density: float  # log density of a value, in units of the targets' RMS
+    seconds: float
+
+
+def score(group: Group, basis: Basis) -> Score:
+    """Learn a group with a basis, and try it."""
+    begin = perf_counter()
+    model = pdmp.fit(group.demos, kind=group.kind, n_styles=len(group.demos), basis=basis)
+    seconds = perf_counter() - begin
+    return Score(reproduction(model, group), *foresight(group, basis), seconds)
+
+
+def reproduction(model: pdmp.Model, group: Group) -> list[float]:
+    """Return the RMSE over range of every demonstration, rolled out as it was shown."""
+    errors = []
+    for m, demo in enumerate(group.demos):
+        made = model.rollout(**pdmp.as_demonstrated(model, m), dt=model.durations[m] / FINE)
+        # Recordings that lost a sample here and there have their own clock.
+        shown = [np.interp(demo.time, made.time, column) for column in made.position.T]
+        difference = np.transpose(shown) - demo.position
+        errors.append(np.sqrt(np.mean(difference**2)) / np.ptp(demo.position, axis=0).max())
+    return errors
+
+
+def foresight(group: Group, basis: Basis) -> tuple[float, float]:
+    """Return RMSE over range and log density of every second sample, given the others."""
+    u, factors, extent = targets(group)
+    periodic = group.kind == "rhythmic"
+    shown = slice(0, None, 2)
+    # What lies past the last sample shown is another question.
+    hidden = slice(1, None if periodic else len(u[shown]) * 2 - 2, 2)
+    learnt = basis.regress(u[shown], factors[shown], periodic=periodic)
+    mean, variance = learnt.predict(u[hidden])
+    error = factors[hidden] - mean
+    if variance is None:
+        variance = np.mean(left_out(basis, u[shown], factors[shown], periodic) ** 2)
+    else:
+        variance = variance + learnt.noise * learnt.signal_variance
+    unit = np.mean(factors**2)
+    density = -0.5 * (np.log(2 * np.pi * variance / unit) + error**2 / variance)
+    return rmse(error, group) / extent, float(np.mean(density))
+
+
+def left_out(net: pdmp.NGnet, u: np.ndarray, targets: np.ndarray, periodic: bool) -> np.ndarray:
+    """Return by how much a network misses each sample that it is not shown (C, P).
+
+    It is linear, f̂ = Hf, and so misses sample i by (fᵢ − f̂ᵢ)/(1 − Hᵢᵢ) without it.
+    """
+    missed = targets - net.regress(u, targets, periodic=periodic).predict(u)[0]
+    hat = net.regress(u, np.eye(len(u)), periodic=periodic).predict(u)[0]
+    return missed / (1 - np.diag(hat))[:, None]
+
+
+def rmse(error: np.ndarray, group: Group) -> float:
+    """Return the RMSE over demonstrations: with orthonormal styles, the factors' squares add up."""
+    n_values = len(error) * len(group.demos) * group.demos[0].n_dofs
+    return float(np.sqrt(np.sum(error**2) / n_values))
+
+
+@cache
+def targets(group: Group) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the clock (C,), the basis targets (C, J·D) and the largest range of the targets.
+
+    A rough process with the least noise goes through every target, and so its landscape gives them
+    back.
+    """
+    exact = pdmp.GP("matern32", noise=1e-10)
+    model = pdmp.fit(group.demos, kind=group.kind, n_styles=len(group.demos), basis=exact)
+    count = group.demos[model.nominal].n_samples
+    if model.kind == "discrete":
+        u = np.linspace(0, model.durations[model.nominal] / model.tau, count)
+        gate = np.exp(-model.alpha_x * u)[:, None, None]
+    else:
+        u, gate = 2 * np.pi * np.arange(count) / count, 1.0
+    factors = gate * model.landscape(u)
+    demonstrated = np.einsum("mj,cjd->mcd", model.styles, factors)
+    return u, factors.reshape(count, -1), float(np.ptp(demonstrated, axis=(0, 1)).max())
+
+
+def over_sets(scores: dict[Group, Score]) -> list[str]:
+    """Return the figures of one basis: medians over sets, worst of all, median time."""
+    sets = defaultdict(list)
+    for group, found in scores.items():
+        sets[group.source].append(found)
+    medians = [
+        (
+            np.median([error for found in members for error in found.reproduction]),
+            np.median([found.held_out for found in members]),
+            np.median([found.density for found in members]),
+        )
+        for members in sets.values()
+    ]
+    reproduced, held_out, density = np.median(medians, axis=0)
+    worst = max(error for found in scores.values() for error in found.reproduction)
+    seconds = np.median([found.seconds for found in scores.values()])
+    shares = [f"{share:.1e}" for share in (reproduced, worst, held_out)]
+    return [*shares, f"{density:.2f}", f"{1e3 * seconds:.3g}"]
+
+
+def table(names: list[str], rows: list[list[str]]) -> list[str]:
+    """Write a table in Markdown: names at the left, figures at the right."""
+    align = ["---"] * len(names) + ["---:"] * len(FIGURES)
+    return [f"| {' | '.join(row)} |" for row in [[*names, *FIGURES], align, *rows]] + [""]
+
+
+def report(scores: dict[str, dict[Group, Score]]) -> str:
+    """Write everything that was found."""
+    seen = list(next(iter(scores.values())))
+    lines = ["# Bases, compared on recordings", ""]
+    lines.append(
+        CAPTION.format(
+            machine=machine(),
+            sets=len({group.source for group in seen}),
+            groups=len(seen),
+            demos=sum(len(group.demos) for group in seen),
+        )
+    )
+    for kind in ("discrete", "rhythmic"):
+        rows = []
+        for name, found in scores.items():
+            of_kind = {group: score for group, score in found.items() if group.kind == kind}
+            if of_kind:
+                mark = "**" if name in DEFAULTS else ""
+                rows.append([f"{mark}{name}{mark}", *over_sets(of_kind)])
+        lines += [f"## {kind.capitalize()} movements", "", *table(["basis"], rows)]
+    lines += ["## The defaults, set by set", ""]
+    rows = []
+    for source in dict.fromkeys(group.source for group in seen):
+        for name in DEFAULTS:
+            of_set = {group: s for group, s in scores[name].items() if group.source == source}
+            rows.append([source, name, *over_sets(of_set)])
+    lines += table(["set", "basis"], rows)
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Score every basis on every group, and print or write the tables."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--write", action="store_true", help="write docs/bases.md")
+    write = arguments.parse_args().write
+    scores: dict[str, dict[Group, Score]] = {name: {} for name in BASES}
+    for group in groups():
+        for name, basis in BASES.items():
+            scores[name][group] = score(group, basis)
+    if write:
+        (Path(__file__).parents[1] / "docs" / "bases.md").write_text(report(scores))
+    else:
+        print(report(scores))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""Factors of the targets: all of a small library, the leading ones of a large one."""
+
+from functools import cache, partial
+
+import numpy as np
+
+import pdmp
+from peers.arena import Begin, Work
+
+SMALL = (20, 28_000)
+LARGE = (1000, 40_000)
+N_LEADING = 5
+
+
+def library(n_demos: int, n_values: int) -> np.ndarray:
+    """Return targets (M, C·D) of forty factors that each have half of the one before, and noise."""
+    random = np.random.default_rng(0)
+    strengths = 0.5 ** np.arange(40)
+    left, right = random.normal(size=(n_demos, 40)), random.normal(size=(40, n_values))
+    return (left * strengths) @ right + 1e-3 * random.normal(size=(n_demos, n_values))
+
+
+# The large one takes a third of a gigabyte, which the contestants share.
+targets = cache(library)
+
+
+def pdmp_factors(shape: tuple[int, int], n_styles: int) -> Begin:
+    """Find the leading factors, as many as are asked for."""
+    return lambda: partial(pdmp.factorise, targets(*shape), n_styles=n_styles)
+
+
+def numpy_factors(shape: tuple[int, int]) -> Begin:
+    """Find all factors, by LAPACK's divide and conquer."""
+    return lambda: partial(np.linalg.svd, targets(*shape), full_matrices=False)
+
+
+def scipy_factors() -> Begin:
+    """Find the leading factors by Lanczos iteration, to machine precision."""
+    from scipy.sparse.linalg import svds
+
+    return lambda: partial(svds, targets(*LARGE), k=N_LEADING, random_state=0)
+
+
+def scikit_learn_factors() -> Begin:
+    """Find the leading factors by random projection, as precisely as its defaults are."""
+    from sklearn.utils.extmath import randomized_svd
+
+    return lambda: partial(randomized_svd, targets(*LARGE), N_LEADING, random_state=0)
+
+
+WORKS = [
+    Work(
+        "singular value decomposition of {} × {}".format(*SMALL),
+        calls=1,
+        bouts=20,
+        contestants={
+            "pdmp": partial(pdmp_factors, SMALL, SMALL[0]),
+            "numpy": partial(numpy_factors, SMALL),
+        },
+    ),
+    Work(
+        "{} leading factors of {} × {}".format(N_LEADING, *LARGE),
+        calls=1,
+        bouts=5,
+        contestants={
+            "pdmp": partial(pdmp_factors, LARGE, N_LEADING),
+            "scikit-learn, randomised": scikit_learn_factors,
+            "scipy, Lanczos": scipy_factors,
+            "numpy, all of them": partial(numpy_factors, LARGE),
+        },
+    ),
+]

@@ -1,0 +1,71 @@
+"""Learning a primitive: from one demonstration, and from many."""
+
+from functools import partial
+
+import numpy as np
+
+import pdmp
+from peers.arena import Begin, Work
+from peers.libraries import movement_primitives_dmp, pydmps_dmp
+from peers.movement import DT, N_DOFS, movement, movements
+
+N_DEMOS = 20
+
+
+def pdmp_imitate(basis: str) -> Begin:
+    """Learn a primitive of one demonstration, with the check that its table is close enough."""
+    demonstration = movement(1)
+    return lambda: partial(pdmp.fit, [demonstration], dt=DT, basis=basis)
+
+
+def movement_primitives_imitate() -> Begin:
+    """Learn one demonstration."""
+    dmp = movement_primitives_dmp()
+    return lambda: partial(dmp.imitate, np.linspace(0, 1, 1001), movement(1))
+
+
+def pydmps_imitate() -> Begin:
+    """Learn one demonstration."""
+    dmp = pydmps_dmp()
+    return lambda: partial(dmp.imitate_path, movement(1).T)
+
+
+def pdmp_fit(basis: str) -> Begin:
+    """Learn one primitive of all demonstrations, with their styles."""
+    demonstrations = movements(N_DEMOS)
+    return lambda: partial(pdmp.fit, demonstrations, dt=DT, basis=basis)
+
+
+def movement_primitives_promp() -> Begin:
+    """Learn the distribution of the weights, by the expectation maximisation that it has."""
+    from movement_primitives.promp import ProMP
+
+    promp = ProMP(N_DOFS)
+    positions = np.array(movements(N_DEMOS))
+    times = np.tile(np.linspace(0, 1, positions.shape[1]), (N_DEMOS, 1))
+    return lambda: partial(promp.imitate, times, positions)
+
+
+WORKS = [
+    Work(
+        "imitation of one demonstration of 1001 samples, D=7",
+        calls=1,
+        bouts=10,
+        contestants={
+            "pdmp, network": partial(pdmp_imitate, "ngnet"),
+            "pdmp, Gaussian process": partial(pdmp_imitate, "gp"),
+            "movement_primitives": movement_primitives_imitate,
+            "pydmps": pydmps_imitate,
+        },
+    ),
+    Work(
+        f"fit of {N_DEMOS} demonstrations of 1001 samples, D={N_DOFS}",
+        calls=1,
+        bouts=10,
+        contestants={
+            "pdmp, network": partial(pdmp_fit, "ngnet"),
+            "pdmp, Gaussian process": partial(pdmp_fit, "gp"),
+            "movement_primitives, ProMP": movement_primitives_promp,
+        },
+    ),
+]

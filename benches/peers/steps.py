@@ -1,0 +1,181 @@
+"""One tick of a control loop."""
+
+from functools import partial
+from itertools import cycle
+from typing import Any
+
+from peers.arena import Begin, Call, Work
+from peers.libraries import EULER, RK4, movement_primitives_dmp, pydmps_dmp
+from peers.movement import DT, N_DOFS, goals, movement, primitive
+
+TICKS = 800  # within the second that the movement lasts: no one finishes early
+
+
+def pdmp_settled() -> Begin:
+    """Step with style, goal and tau at rest."""
+    controller = primitive().controller(dt=DT)
+
+    def begin() -> Call:
+        controller.reset()
+        controller.step()
+        return controller.step
+
+    return begin
+
+
+def pdmp_live() -> Begin:
+    """Step with style, goal and tau on their way to others: 800 ticks do not end the transition."""
+    model = primitive()
+    controller = model.controller(dt=DT)
+
+    def begin() -> Call:
+        controller.reset()
+        controller.step()
+        controller.style = model.styles[1]
+        controller.goal = model.goals[1] + 0.1
+        controller.tau = 1.2 * model.tau
+        return controller.step
+
+    return begin
+
+
+def pdmp_new_goal() -> Begin:
+    """Step with a goal set before each; the filter of the goal starts anew."""
+    controller = primitive().controller(dt=DT)
+    targets = cycle(goals())
+
+    def tick() -> None:
+        controller.goal = next(targets)
+        controller.step()
+
+    def begin() -> Call:
+        controller.reset()
+        controller.step()
+        return tick
+
+    return begin
+
+
+def ruckig_start() -> tuple[Any, Any, Any]:
+    """Make generator, input and output for the same way with limits that let it last a second.
+
+    The work differs in kind: no shape is learnt or followed. A jerk-limited trajectory is computed
+    when the target changes and sampled at every other tick.
+    """
+    from ruckig import InputParameter, OutputParameter, Ruckig
+
+    given = InputParameter(N_DOFS)
+    given.target_position = movement(0)[-1].tolist()
+    given.max_velocity = [10.0] * N_DOFS
+    given.max_acceleration = [40.0] * N_DOFS
+    given.max_jerk = [400.0] * N_DOFS
+    return Ruckig(N_DOFS, DT), given, OutputParameter(N_DOFS)
+
+
+def ruckig_rest(given: Any) -> None:
+    """Put the input at rest at the start of the way."""
+    given.current_position = movement(0)[0].tolist()
+    given.current_velocity = [0.0] * N_DOFS
+    given.current_acceleration = [0.0] * N_DOFS
+
+
+def ruckig_sample() -> Begin:
+    """Sample a trajectory: its computation, in the first update, is not timed."""
+    generator, given, output = ruckig_start()
+
+    def tick() -> None:
+        generator.update(given, output)
+        output.pass_to_input(given)
+
+    def begin() -> Call:
+        ruckig_rest(given)
+        tick()
+        return tick
+
+    return begin
+
+
+def ruckig_new_goal() -> Begin:
+    """Compute a trajectory at every tick, to a target set before each."""
+    generator, given, output = ruckig_start()
+    targets = cycle([goal.tolist() for goal in goals()])
+
+    def tick() -> None:
+        given.target_position = next(targets)
+        generator.update(given, output)
+        output.pass_to_input(given)
+
+    def begin() -> Call:
+        ruckig_rest(given)
+        tick()
+        return tick
+
+    return begin
+
+
+def movement_primitives_step(method: str, new_goal: bool) -> Begin:
+    """Step with the compiled Euler or Runge-Kutta method."""
+    dmp = movement_primitives_dmp()
+    targets = cycle(goals())
+    state = [dmp.start_y, dmp.start_yd]
+
+    def tick() -> None:
+        state[:] = dmp.step(*state, step_function=method)
+
+    def tick_to_new_goal() -> None:
+        dmp.configure(goal_y=next(targets))
+        tick()
+
+    def begin() -> Call:
+        dmp.reset()
+        state[:] = dmp.start_y, dmp.start_yd
+        tick()
+        return tick_to_new_goal if new_goal else tick
+
+    return begin
+
+
+def pydmps_step(new_goal: bool) -> Begin:
+    """Step with its Euler method."""
+    dmp = pydmps_dmp()
+    targets = cycle(goals())
+
+    def tick_to_new_goal() -> None:
+        dmp.goal = next(targets)
+        dmp.step()
+
+    def begin() -> Call:
+        dmp.reset_state()
+        dmp.step()
+        return tick_to_new_goal if new_goal else dmp.step
+
+    return begin
+
+
+WORKS = [
+    Work(
+        "one step, D=7, at 1 kHz",
+        calls=TICKS,
+        bouts=40,
+        contestants={
+            "pdmp, J=3": pdmp_settled,
+            "pdmp, J=3, style, goal and tau in transition": pdmp_live,
+            "ruckig, sampling its trajectory": ruckig_sample,
+            "movement_primitives, Euler": partial(movement_primitives_step, EULER, False),
+            "movement_primitives, RK4": partial(movement_primitives_step, RK4, False),
+            "pydmps, Euler": partial(pydmps_step, False),
+        },
+    ),
+    Work(
+        "one step, D=7, to a goal that is new at every tick",
+        calls=TICKS,
+        bouts=40,
+        contestants={
+            "pdmp, J=3": pdmp_new_goal,
+            "ruckig, computing its trajectory": ruckig_new_goal,
+            "movement_primitives, Euler": partial(movement_primitives_step, EULER, True),
+            "movement_primitives, RK4": partial(movement_primitives_step, RK4, True),
+            "pydmps, Euler": partial(pydmps_step, True),
+        },
+    ),
+]

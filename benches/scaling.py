@@ -1,0 +1,106 @@
+"""How the time to learn grows: Gaussian processes with samples, factors with demonstrations.
+
+``make bench-scaling`` runs this and draws docs/scaling.png.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from matplotlib.axes import Axes
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import Matern
+
+import pdmp
+from pdmp.plot._canvas import MARKERS, PALETTE, canvas, dress
+from peers.factors import library
+from peers.regression import LENGTH, NOISE, samples
+
+LONGEST = 2.0  # s: who takes longer is shown no more
+REPEATS = 5
+SIZES = [round(10 ** (exponent / 4)) for exponent in range(6, 21)]  # C, 32 to 100 000
+LIBRARIES = [round(10 ** (exponent / 4)) for exponent in range(2, 15)]  # M, 3 to 3162
+N_VALUES = 7000  # C·D
+
+Call = Callable[[], object]
+
+
+def process(**hyperparameters: float) -> Callable[[int], Call]:
+    """Regress as many samples with three outputs."""
+    return lambda count: partial(pdmp.GP("matern52", **hyperparameters).regress, *samples(count))
+
+
+def dense(count: int) -> Call:
+    """Do the same with scikit-learn, hyperparameters given."""
+    u, f = samples(count)
+    gp = GaussianProcessRegressor(Matern(LENGTH, nu=2.5), alpha=NOISE, optimizer=None)
+    return partial(gp.fit, u[:, None], f)
+
+
+def leading(n_demos: int) -> Call:
+    """Find the five leading factors."""
+    return partial(pdmp.factorise, library(n_demos, N_VALUES), n_styles=min(5, n_demos))
+
+
+def every(n_demos: int) -> Call:
+    """Find all factors."""
+    return partial(pdmp.factorise, library(n_demos, N_VALUES), n_styles=n_demos)
+
+
+def lapack(n_demos: int) -> Call:
+    """Find all factors with numpy."""
+    return partial(np.linalg.svd, library(n_demos, N_VALUES), full_matrices=False)
+
+
+def times(work: Callable[[int], Call], sizes: list[int]) -> dict[int, float]:
+    """Return the least time [s] by size, until one takes too long."""
+    found: dict[int, float] = {}
+    for size in sizes:
+        call = work(size)
+        found[size] = min(timed(call) for _ in range(REPEATS))
+        if found[size] > LONGEST:
+            break
+    return found
+
+
+def timed(call: Call) -> float:
+    """Return the time of one call [s]."""
+    begin = perf_counter()
+    call()
+    return perf_counter() - begin
+
+
+def panel(axes: Axes, works: dict[str, Callable[[int], Call]], sizes: list[int], over: str) -> None:
+    """Draw the times of several works over the size of the problem, and print them."""
+    dress(axes, over, "time [s]")
+    for look, (name, work) in enumerate(works.items()):
+        found = times(work, sizes)
+        style = {"marker": MARKERS[look], "color": PALETTE[look], "markersize": 4}
+        axes.loglog(list(found), list(found.values()), label=name, **style)
+        print(f"{name}: " + ", ".join(f"{size}: {1e3 * t:.3g} ms" for size, t in found.items()))
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False)
+
+
+def main() -> None:
+    """Time both and draw the figure."""
+    processes = {
+        "pdmp, Matérn-5/2, hyperparameters given": process(length=LENGTH, noise=NOISE),
+        "pdmp, Matérn-5/2, with hyperparameters": process(),
+        "scikit-learn, the same, hyperparameters given": dense,
+    }
+    factors = {
+        "pdmp, five leading factors": leading,
+        "pdmp, all factors": every,
+        "numpy, all factors": lapack,
+    }
+    figure = canvas(None, 9, 4.2)
+    left, right = figure.subplots(1, 2)
+    panel(left, processes, SIZES, "samples C, with three outputs")
+    panel(right, factors, LIBRARIES, f"demonstrations M, with C·D = {N_VALUES}")
+    figure.savefig(Path(__file__).parents[1] / "docs" / "scaling.png")
+
+
+if __name__ == "__main__":
+    main()
