@@ -1,5 +1,7 @@
 //! Alignment of demonstrations (step 1 of Section 3.2): linear time scaling to a nominal one, resampled to C samples.
 
+use std::borrow::Cow;
+
 use crate::demo::{Demonstration, LEAST_SAMPLES, Sampling};
 use crate::error::{Error, Result, check_positive};
 use crate::phase::Kind;
@@ -189,13 +191,14 @@ impl Aligned<'_> {
     pub(crate) fn sample(&self, m: usize, position: &mut [f64]) -> Result<()> {
         let (demo, Clock { ticks, duration, extent }) = (&self.demos[m], self.clocks[m]);
         let n = demo.n_samples();
-        let values: Vec<f64> = if self.smoothing == Smoothing::Interpolate {
-            demo.position().iter().copied().collect()
+        let own = demo.position();
+        let values = if self.smoothing == Smoothing::Interpolate {
+            own.as_slice().map_or_else(|| Cow::Owned(own.iter().copied().collect()), Cow::Borrowed)
         } else {
             let seconds: Vec<f64> = (0..n).map(|c| ticks.at(c) * ticks.unit()).collect();
             let period = (self.kind == Kind::Rhythmic).then_some(duration);
-            let smoothed = smooth(self.smoothing, &seconds, period, demo.position());
-            smoothed.map_err(|error| error.in_demo(m))?.iter().copied().collect()
+            let smoothed = smooth(self.smoothing, &seconds, period, own).map_err(|error| error.in_demo(m))?;
+            Cow::Owned(smoothed.iter().copied().collect())
         };
         let steps = self.kind.steps(self.n_samples) as f64;
         if matches!(ticks, Ticks::Even { .. }) && n == self.n_samples && extent == steps {

@@ -15,7 +15,7 @@ const FEWEST_CELLS: usize = 128;
 /// Cells beyond which a table is not refined.
 pub(crate) const MOST_CELLS: usize = 8192;
 /// Knots between two questions whether to go on.
-const PORTION: usize = 64;
+const PORTION: usize = 256;
 
 /// Values and slopes of several outputs at increasing places on the clock, each by rows (places, outputs).
 #[derive(Clone, Debug)]
@@ -38,32 +38,40 @@ pub(crate) fn tabulate(
     proceed: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<(Jets, f64)> {
     let mut done = 0;
-    let mut read = |n: usize, at: &(dyn Fn(usize) -> f64 + Sync)| {
-        let mut jets = Jets::zeros(n, n_outputs);
-        let evaluate = |(portion, (values, slopes)): (usize, (&mut [f64], &mut [f64]))| {
+    // Reads the rows of `jets` from one to the next in steps, the place of each being a multiple of the width.
+    let mut read = |jets: &mut Jets, (first, step): (usize, usize), width: f64| {
+        let n = (jets.len() - first).div_ceil(step);
+        let evaluate = |(): &mut (), (portion, (values, slopes)): (usize, (&mut [f64], &mut [f64]))| {
             let rows = values.chunks_exact_mut(n_outputs).zip(slopes.chunks_exact_mut(n_outputs));
-            for (k, (value, slope)) in rows.enumerate() {
-                regression.evaluate(at(portion * PORTION + k), value, slope);
+            for (k, (value, slope)) in rows.enumerate().skip(first).step_by(step) {
+                regression.evaluate(width * (portion * step * PORTION + k) as f64, value, slope);
             }
             Ok(())
         };
         let mut telling = |share: f64| proceed((done as f64 + share * n as f64) / (MOST_CELLS + 1) as f64);
-        threads.try_for_each_told(jets.rows_mut(PORTION).enumerate().collect(), evaluate, &mut telling)?;
+        threads.try_for_each_told(
+            jets.rows_mut(step * PORTION).enumerate().collect(),
+            || (),
+            evaluate,
+            &mut telling,
+        )?;
         done += n;
-        Ok(jets)
+        Ok(())
     };
-    let mut knots = read(FEWEST_CELLS + 1, &|k| extent * k as f64 / FEWEST_CELLS as f64)?;
+    let mut cells = FEWEST_CELLS;
+    let mut knots = Jets::zeros(cells + 1, n_outputs);
+    read(&mut knots, (0, 1), extent / cells as f64)?;
     loop {
-        let cells = knots.len() - 1;
-        let width = extent / cells as f64;
-        let middles = read(cells, &|k| width * (k as f64 + 0.5))?;
         let largest = knots.values.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
-        let error = knots.error(&middles, width) / largest;
-        // The midpoints are paid for and become knots. That makes the error 16 times smaller where w is smooth, and 8
-        // times at a kink of w″, as a Matérn-3/2 process has; a quarter is promised.
-        knots = knots.interleaved(&middles);
+        // The midpoints are paid for and become knots.
+        knots = knots.spread();
+        cells *= 2;
+        read(&mut knots, (1, 2), extent / cells as f64)?;
+        let error = knots.error_of_every_second(extent / cells as f64) / largest;
+        // That makes the error 16 times smaller where w is smooth, and 8 times at a kink of w″, as a Matérn-3/2 process
+        // has; a quarter is promised.
         let error = if error <= 4.0 * TOLERANCE { error / 4.0 } else { error };
-        if error <= TOLERANCE || 2 * cells >= MOST_CELLS {
+        if error <= TOLERANCE || cells >= MOST_CELLS {
             return Ok((knots, error));
         }
     }
@@ -97,32 +105,29 @@ impl Jets {
         Jet { value, slope }
     }
 
-    /// Largest distance of the cubics between these knots from the values in the middle of the cells.
-    fn error(&self, middles: &Self, width: f64) -> f64 {
-        let after = |table: &[f64], at: usize| table[at + self.n_outputs];
-        let mut error = 0.0f64;
-        for (at, exact) in middles.values.iter().enumerate() {
-            let value = self.values[at] + after(&self.values, at);
-            let slope = self.slopes[at] - after(&self.slopes, at);
-            error = error.max((0.5 * value + width / 8.0 * slope - exact).abs());
+    /// These knots with room for the middles of their cells between them.
+    fn spread(&self) -> Self {
+        let mut spread = Self::zeros(2 * self.len() - 1, self.n_outputs);
+        for (to, from) in [(&mut spread.values, &self.values), (&mut spread.slopes, &self.slopes)] {
+            let rows = to.chunks_exact_mut(self.n_outputs).step_by(2);
+            rows.zip(from.chunks_exact(self.n_outputs)).for_each(|(to, from)| to.copy_from_slice(from));
         }
-        error
+        spread
     }
 
-    /// These knots with the middles of their cells between them.
-    fn interleaved(&self, middles: &Self) -> Self {
-        let n_outputs = self.n_outputs;
-        let [values, slopes] =
-            [(&self.values, &middles.values), (&self.slopes, &middles.slopes)].map(|(knots, middles)| {
-                let mut both = Vec::with_capacity(knots.len() + middles.len());
-                for (knot, middle) in knots.chunks_exact(n_outputs).zip(middles.chunks_exact(n_outputs)) {
-                    both.extend_from_slice(knot);
-                    both.extend_from_slice(middle);
-                }
-                both.extend_from_slice(&knots[knots.len() - n_outputs..]);
-                both
-            });
-        Self { n_outputs, values, slopes }
+    /// Largest distance of the cubics between every second knot from the value at the knot between them, `width` from
+    /// either.
+    fn error_of_every_second(&self, width: f64) -> f64 {
+        let n = self.n_outputs;
+        let cells = self.values.windows(3 * n).zip(self.slopes.windows(3 * n)).step_by(2 * n);
+        let mut error = 0.0f64;
+        for (values, slopes) in cells {
+            for o in 0..n {
+                let cubic = 0.5 * (values[o] + values[2 * n + o]) + 0.25 * width * (slopes[o] - slopes[2 * n + o]);
+                error = error.max((cubic - values[n + o]).abs());
+            }
+        }
+        error
     }
 
     /// Makes the last knot of a turn the first, which they are but for rounding.

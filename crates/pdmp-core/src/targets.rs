@@ -58,12 +58,13 @@ impl Targets {
             ranges: Array2::zeros((n_demos, n_dofs)),
         };
         let work = Work::new(attractor, canonical, aligned.n_samples);
-        let learn = |(m, rows): (usize, Rows)| {
+        let slopes = || vec![0.0; aligned.n_samples * n_dofs];
+        let learn = |slopes: &mut Vec<f64>, (m, rows): (usize, Rows)| {
             aligned.sample(m, rows.forcing)?;
-            work.learn(rows, aligned.demo(m).goal());
+            work.learn(rows, aligned.demo(m).goal(), slopes);
             Ok(())
         };
-        threads.try_for_each_told(targets.rows().enumerate().collect(), learn, proceed)?;
+        threads.try_for_each_told(targets.rows().enumerate().collect(), slopes, learn, proceed)?;
         Ok(targets)
     }
 
@@ -122,17 +123,19 @@ impl Work {
     /// The output system does not care where a movement takes place, but for rounding: demonstrations are translated to
     /// start at 0, and a DoF that does not move has a target of exactly zero, and its own position as its mean, to the
     /// last digit.
-    fn learn(&self, Rows { forcing: position, start, goal, anchor, range }: Rows, given: Option<&[f64]>) {
+    fn learn(&self, rows: Rows, given: Option<&[f64]>, slopes: &mut [f64]) {
+        let Rows { forcing: position, start, goal, anchor, range } = rows;
         let n_dofs = start.len();
         start.copy_from_slice(&position[..n_dofs]);
         goal.copy_from_slice(given.unwrap_or(&position[position.len() - n_dofs..]));
         let (mut low, mut high) = (vec![0.0; n_dofs], vec![0.0; n_dofs]);
         for row in position.chunks_exact_mut(n_dofs) {
-            for (d, y) in row.iter_mut().enumerate() {
-                *y -= start[d];
-                anchor[d] += *y;
-                low[d] = f64::min(low[d], *y);
-                high[d] = f64::max(high[d], *y);
+            let so_far = anchor.iter_mut().zip(low.iter_mut().zip(&mut high));
+            for ((y, start), (sum, (low, high))) in row.iter_mut().zip(start.iter()).zip(so_far) {
+                *y -= start;
+                *sum += *y;
+                *low = if *y < *low { *y } else { *low };
+                *high = if *y > *high { *y } else { *high };
             }
         }
         let n_samples = (position.len() / n_dofs) as f64;
@@ -142,8 +145,7 @@ impl Work {
         }
         let centre = if self.kind == Kind::Discrete { goal } else { anchor };
         let centre: Vec<f64> = centre.iter().zip(start).map(|(centre, start)| *centre - *start).collect();
-        let mut slopes = vec![0.0; position.len()];
-        self.knots.slopes(position, &mut slopes);
-        self.inverse.target(position, &slopes, &centre, self.kind == Kind::Rhythmic);
+        self.knots.slopes(position, slopes);
+        self.inverse.target(position, slopes, &centre, self.kind == Kind::Rhythmic);
     }
 }

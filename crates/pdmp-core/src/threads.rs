@@ -48,18 +48,20 @@ impl Threads {
     /// # Errors
     /// That of the first item that has one; what comes after it may be left undone.
     pub(crate) fn try_for_each<T: Send>(self, items: Vec<T>, work: impl Fn(T) -> Result<()> + Sync) -> Result<()> {
-        self.try_for_each_told(items, work, &mut |_| Ok(()))
+        self.try_for_each_told(items, || (), |(), item| work(item), &mut |_| Ok(()))
     }
 
     /// [`Self::try_for_each`] that asks `proceed` whether to go on, with the share of the items that have been taken.
-    /// The calling thread asks, which alone may: at first, and before each item of its own.
+    /// The calling thread asks, which alone may: at first, and before each item of its own. It also makes the `scratch`
+    /// of each thread beforehand: the system takes back the memory of threads that end, and is slow to give it again.
     ///
     /// # Errors
     /// Whatever `proceed` returns; otherwise that of the first item that has one.
-    pub(crate) fn try_for_each_told<T: Send>(
+    pub(crate) fn try_for_each_told<T: Send, S: Send>(
         self,
         items: Vec<T>,
-        work: impl Fn(T) -> Result<()> + Sync,
+        scratch: impl Fn() -> S,
+        work: impl Fn(&mut S, T) -> Result<()> + Sync,
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<()> {
         // Asked once at least, also where others are quick to take all that there is.
@@ -70,14 +72,14 @@ impl Threads {
         let failed: Mutex<Option<(usize, Error)>> = Mutex::new(None);
         let stopped = AtomicBool::new(false);
         // Works on the next item, if there is one and the work goes on.
-        let labour = || {
+        let labour = |scratch: &mut S| {
             if stopped.load(Relaxed) {
                 return false;
             }
             // In a statement of its own: the queue is free again while the work is done.
             let next = held(&queue).next();
             let Some((index, item)) = next else { return false };
-            if let Err(error) = work(item) {
+            if let Err(error) = work(scratch, item) {
                 stopped.store(true, Relaxed);
                 let mut failed = held(&failed);
                 if failed.as_ref().is_none_or(|(first, _)| index < *first) {
@@ -87,10 +89,13 @@ impl Threads {
             true
         };
         let told = thread::scope(|scope| {
+            let labour = &labour;
             for _ in 0..others {
+                let mut scratch = scratch();
                 // A system without threads to spare leaves the work to those that run.
-                let _ = thread::Builder::new().spawn_scoped(scope, || while labour() {});
+                let _ = thread::Builder::new().spawn_scoped(scope, move || while labour(&mut scratch) {});
             }
+            let mut scratch = scratch();
             loop {
                 let left = held(&queue).len();
                 if left == 0 {
@@ -98,7 +103,7 @@ impl Threads {
                 }
                 let told = proceed((n_items - left) as f64 / n_items as f64);
                 stopped.fetch_or(told.is_err(), Relaxed);
-                if told.is_err() || !labour() {
+                if told.is_err() || !labour(&mut scratch) {
                     return told;
                 }
             }

@@ -20,8 +20,8 @@ mod tests;
 
 use faer::linalg::matmul::matmul;
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Accum, Mat, MatMut, MatRef, Par};
-use ndarray::{Array2, ArrayView2, CowArray, Ix2, s};
+use faer::{Accum, Mat, MatRef, Par};
+use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip, s};
 
 use crate::demo::{check_matrix, zeros};
 use crate::error::{Error, LARGEST, Result};
@@ -154,7 +154,7 @@ struct Library<'a> {
 struct Projection {
     styles: Mat<f64>,
     basis: Array2<f64>,
-    /// Products of the rows of `basis`.
+    /// Products of the rows of SᵀF.
     products: Mat<f64>,
 }
 
@@ -198,7 +198,7 @@ impl<'a> Library<'a> {
         if let StyleCount::Given(n_styles) = styles
             && let Some(vectors) = krylov::leading(wide, n_styles, &mut |share| proceed(share / 3.0))?
         {
-            let projection = self.project(vectors)?;
+            let projection = self.project(vectors, n_styles)?;
             if projection.is_sound(n_styles) {
                 let values = projection.norms();
                 let left = self.squares - values.iter().map(|s| s * s).sum::<f64>();
@@ -210,7 +210,7 @@ impl<'a> Library<'a> {
             // Of few demonstrations all factors cost little, and give all singular values their digits.
             let kept = if k <= 64 { k } else { n_styles };
             if let Some(vectors) = gram.leading(n_styles, kept) {
-                let projection = self.project(vectors)?;
+                let projection = self.project(vectors, n_styles)?;
                 if projection.is_sound(n_styles) {
                     let mut values = projection.norms();
                     values.extend(&gram.values[kept..]);
@@ -228,13 +228,14 @@ impl<'a> Library<'a> {
         let triangle = reflect::triangle(self.wide(), proceed)?;
         let small::Svd { sigma: values, v, .. } = small::Svd::of(triangle.as_ref());
         let n_styles = styles.among(&values);
-        let projection = self.project(v.subcols(0, n_styles).to_owned())?;
+        let projection = self.project(v.subcols(0, n_styles).to_owned(), n_styles)?;
         let left = values[n_styles..].iter().map(|s| s * s).sum::<f64>();
         Ok(self.finish(projection, n_styles, values, left + ROUNDING * ROUNDING * self.squares))
     }
 
-    /// S and F_basis = SᵀF from the singular vectors of the short side.
-    fn project(&self, vectors: Mat<f64>) -> Result<Projection> {
+    /// S and F_basis = SᵀF from the singular vectors of the short side, and the products of all rows of SᵀF, of which
+    /// the first J are kept.
+    fn project(&self, vectors: Mat<f64>, n_styles: usize) -> Result<Projection> {
         let targets = self.matrix();
         let (rows, columns) = targets.shape();
         // F·v = σ·u: in decreasing order, as they come, dividing by σ is no more than making them orthonormal.
@@ -248,22 +249,24 @@ impl<'a> Library<'a> {
                 style.rb_mut().iter_mut().for_each(|x| *x = -*x);
             }
         }
-        let n_styles = styles.ncols();
-        // A target that is zero throughout stays so: a DoF at rest is not moved by what rounding leaves of it.
-        let mut basis = zeros("basis", (n_styles, columns))?;
-        let rows_of = basis.as_slice_mut().unwrap_or_default();
-        let into = MatMut::from_row_major_slice_mut(rows_of, n_styles, columns);
-        matmul(into, Accum::Replace, styles.transpose(), targets, 1.0, Par::Seq);
-        let whole = MatRef::from_row_major_slice(basis.as_slice().unwrap_or_default(), n_styles, columns);
-        let mut products = Mat::zeros(n_styles, n_styles);
-        matmul(products.as_mut(), Accum::Replace, whole, whole.transpose(), 1.0, Par::Seq);
+        let found = styles.ncols();
+        let (mut basis, mut products) = (zeros("basis", (n_styles, columns))?, Mat::zeros(found, found));
+        let mut part = Mat::zeros(found, PANEL.min(columns));
+        for start in (0..columns).step_by(PANEL) {
+            let mut part = part.as_mut().subcols_mut(0, PANEL.min(columns - start));
+            // A target that is zero throughout stays so: a DoF at rest is not moved by what rounding leaves of it.
+            let share = targets.subcols(start, part.ncols());
+            matmul(part.rb_mut(), Accum::Replace, styles.transpose(), share, 1.0, Par::Seq);
+            matmul(products.as_mut(), Accum::Add, part.rb(), part.rb().transpose(), 1.0, Par::Seq);
+            let into = basis.slice_mut(s![.., start..start + part.ncols()]);
+            Zip::indexed(into).for_each(|(j, column), to| *to = part[(j, column)]);
+        }
         Ok(Projection { styles, basis, products })
     }
 
-    /// Keeps J of the factors, and undoes the scale; `left` is the square of what they do not tell of F.
+    /// Undoes the scale; `left` is the square of what they do not tell of F.
     fn finish(&self, projection: Projection, n_styles: usize, values: Vec<f64>, left: f64) -> Factors {
         let Projection { styles, mut basis, .. } = projection;
-        basis.slice_collapse(s![..n_styles, ..]);
         if self.scale != 1.0 {
             basis *= self.scale;
         }
@@ -293,6 +296,9 @@ fn product(a: MatRef<f64>, x: MatRef<f64>) -> Mat<f64> {
     matmul(transposed.as_mut(), Accum::Replace, x.transpose(), a.transpose(), 1.0, Par::Seq);
     transposed.transpose().to_owned()
 }
+
+/// Columns of F that are projected at once, which stay at hand for both products.
+const PANEL: usize = 1024;
 
 /// Relative rounding of a sum of squares, with a margin.
 const ROUNDING: f64 = 1e-13;
