@@ -52,6 +52,18 @@ fn targets(n_samples: usize, n_outputs: usize) -> (Vec<f64>, Array2<f64>) {
     (u, targets)
 }
 
+fn networks(criterion: &mut Criterion) {
+    let domain = Domain::Interval { end: 1.0 };
+    let mut group = criterion.benchmark_group("network");
+    for (n_samples, n_outputs) in [(1001, 21), (16_000, 3)] {
+        let (u, targets) = targets(n_samples, n_outputs);
+        group.bench_function(format!("C={n_samples} P={n_outputs}"), |bench| {
+            bench.iter(|| NGnet::default().regress(domain, &u, targets.view()));
+        });
+    }
+    group.finish();
+}
+
 fn processes(criterion: &mut Criterion) {
     let domain = Domain::Interval { end: 1.0 };
     let mut group = criterion.benchmark_group("gaussian process");
@@ -112,5 +124,5 @@ fn rollouts(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, fits, processes, rollouts);
+criterion_group!(benches, fits, networks, processes, rollouts);
 criterion_main!(benches);
