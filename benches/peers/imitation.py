@@ -7,7 +7,7 @@ import numpy as np
 import pdmp
 from peers.arena import Begin, Work
 from peers.libraries import movement_primitives_dmp, pydmps_dmp
-from peers.movement import DT, N_DOFS, movement, movements
+from peers.movement import DT, N_DOFS, N_STYLES, movement, movements
 
 N_DEMOS = 20
 
@@ -15,7 +15,7 @@ N_DEMOS = 20
 def pdmp_imitate(basis: str) -> Begin:
     """Learn a primitive of one demonstration, with the check that its table is close enough."""
     demonstration = movement(1)
-    return lambda: partial(pdmp.fit, [demonstration], dt=DT, basis=basis)
+    return lambda: partial(pdmp.fit, [demonstration], dt=DT, basis=basis, threads=1)
 
 
 def movement_primitives_imitate() -> Begin:
@@ -31,19 +31,23 @@ def pydmps_imitate() -> Begin:
 
 
 def pdmp_fit(basis: str) -> Begin:
-    """Learn one primitive of all demonstrations, with their styles."""
-    demonstrations = movements(N_DEMOS)
-    return lambda: partial(pdmp.fit, demonstrations, dt=DT, basis=basis)
+    """Learn one primitive of all demonstrations, with as many styles as reproduce each of them."""
+    settings = {"dt": DT, "n_styles": N_STYLES, "basis": basis, "threads": 1}
+    return lambda: partial(pdmp.fit, movements(N_DEMOS), **settings)
 
 
 def movement_primitives_promp() -> Begin:
-    """Learn the distribution of the weights, by the expectation maximisation that it has."""
+    """Learn the distribution of ten weights for each degree of freedom, as many as by default.
+
+    A few rounds of expectation maximisation suffice. What takes the time, and eight gigabytes, are
+    matrices of all values by all values of a demonstration, one for each.
+    """
     from movement_primitives.promp import ProMP
 
-    promp = ProMP(N_DOFS)
     positions = np.array(movements(N_DEMOS))
     times = np.tile(np.linspace(0, 1, positions.shape[1]), (N_DEMOS, 1))
-    return lambda: partial(promp.imitate, times, positions)
+    # One that has learnt starts from what it knows.
+    return lambda: partial(ProMP(N_DOFS).imitate, times, positions)
 
 
 WORKS = [

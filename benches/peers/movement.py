@@ -9,7 +9,7 @@ import pdmp
 N_DOFS = 7
 N_STYLES = 3
 DT = 0.001  # s
-# As many functions for every learner as pdmp's network has by default.
+# As many functions for whoever imitates one movement as pdmp's network has by default.
 N_BASIS = 50
 
 
