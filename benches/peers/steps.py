@@ -24,9 +24,9 @@ def pdmp_settled() -> Begin:
 
 
 def pdmp_live() -> Begin:
-    """Step with style, goal and tau on their way to others: 800 ticks do not end the transition."""
+    """Step with style, goal and tau on their way to others, slowly enough to take all ticks."""
     model = primitive()
-    controller = model.controller(dt=DT)
+    controller = model.controller(dt=DT, transition=DT * TICKS)
 
     def begin() -> Call:
         controller.reset()
