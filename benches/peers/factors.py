@@ -64,6 +64,7 @@ WORKS = [
         bouts=5,
         contestants={
             "pdmp": partial(pdmp_factors, LARGE, N_LEADING),
+            "pdmp, all of them": partial(pdmp_factors, LARGE, LARGE[0]),
             "scikit-learn, randomised": scikit_learn_factors,
             "scipy, Lanczos": scipy_factors,
             "numpy, all of them": partial(numpy_factors, LARGE),
