@@ -6,7 +6,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 
 from peers import factors, imitation, regression, rollouts, steps
-from peers.arena import Work, machine, run, written
+from peers.arena import Work, machine, ratio, run, written
 
 PACKAGES = [
     "pdmp",
@@ -38,7 +38,7 @@ def summary(results: list[tuple[Work, dict[str, float]]]) -> None:
         first = next(iter(medians.values()))
         titles = iter([work.title])
         for name, median in medians.items():
-            figures = f"{written(median):>7} | {median / first:>6.3g}"
+            figures = f"{written(median):>7} | {ratio(median, first):>6}"
             print(f"| {next(titles, ''):<84} | {name:<46} | {figures} |")
 
 

@@ -72,7 +72,7 @@ def run(work: Work) -> dict[str, float]:
         # A few dozen calls have no thousandth.
         often = written(np.quantile(singly[name], 0.999)) if work.calls > 1 else "–"
         figures = f"{written(median):>7} | {often:>7} | {written(max(singly[name])):>7}"
-        print(f"| {name:<46} | {figures} | {median / first:>6.3g} |", flush=True)
+        print(f"| {name:<46} | {figures} | {ratio(median, first):>6} |", flush=True)
     return medians
 
 
@@ -81,6 +81,11 @@ def written(ns: float) -> str:
     units = [(1e9, "s"), (1e6, "ms"), (1e3, "µs")]
     size, unit = next((pair for pair in units if ns >= pair[0]), (1, "ns"))
     return f"{ns / size:#.3g}".rstrip(".") + f" {unit}"
+
+
+def ratio(median: float, first: float) -> str:
+    """Write a ratio with three digits, or as a whole number."""
+    return f"{median / first:.3g}" if median < 999.5 * first else f"{median / first:.0f}"
 
 
 def machine() -> str:
