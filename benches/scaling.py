@@ -72,23 +72,27 @@ def timed(call: Call) -> float:
     return perf_counter() - begin
 
 
-def panel(axes: Axes, works: dict[str, Callable[[int], Call]], sizes: list[int], over: str) -> None:
+def panel(
+    axes: Axes, title: str, works: dict[str, Callable[[int], Call]], sizes: list[int], over: str
+) -> None:
     """Draw the times of several works over the size of the problem, and print them."""
     dress(axes, over, "time [s]")
+    print(title)
     for look, (name, work) in enumerate(works.items()):
         found = times(work, sizes)
         style = {"marker": MARKERS[look], "color": PALETTE[look], "markersize": 4}
         axes.loglog(list(found), list(found.values()), label=name, **style)
         print(f"{name}: " + ", ".join(f"{size}: {1e3 * t:.3g} ms" for size, t in found.items()))
-    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False)
+    place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "alignment": "left"}
+    axes.legend(title=title, title_fontsize="large", frameon=False, **place)
 
 
 def main() -> None:
     """Time both and draw the figure."""
     processes = {
-        "pdmp, Matérn-5/2, hyperparameters given": process(length=LENGTH, noise=NOISE),
-        "pdmp, Matérn-5/2, with hyperparameters": process(),
-        "scikit-learn, the same, hyperparameters given": dense,
+        "pdmp, hyperparameters given": process(length=LENGTH, noise=NOISE),
+        "pdmp, with hyperparameters": process(),
+        "scikit-learn, hyperparameters given": dense,
     }
     factors = {
         "pdmp, five leading factors": leading,
@@ -97,8 +101,10 @@ def main() -> None:
     }
     figure = canvas(None, 9, 4.2)
     left, right = figure.subplots(1, 2)
-    panel(left, processes, SIZES, "samples C, with three outputs")
-    panel(right, factors, LIBRARIES, f"demonstrations M, with C·D = {N_VALUES}")
+    title = "Gaussian process, Matérn-5/2, three outputs"
+    panel(left, title, processes, SIZES, "samples C")
+    title = f"Factors of targets (M, {N_VALUES})"
+    panel(right, title, factors, LIBRARIES, "demonstrations M")
     figure.savefig(Path(__file__).parents[1] / "docs" / "scaling.png")
 
 
