@@ -14,8 +14,10 @@ pub(crate) const TOLERANCE: f64 = 1e-9;
 const FEWEST_CELLS: usize = 128;
 /// Cells beyond which a table is not refined.
 pub(crate) const MOST_CELLS: usize = 8192;
-/// Knots between two questions whether to go on.
-const PORTION: usize = 256;
+/// Knots between two questions whether to go on, which one thread reads.
+const PORTION: usize = 1024;
+/// Knots that are read at once.
+const BLOCK: usize = 64;
 
 /// Values and slopes of several outputs at increasing places on the clock, each by rows (places, outputs).
 #[derive(Clone, Debug)]
@@ -41,17 +43,27 @@ pub(crate) fn tabulate(
     // Reads the rows of `jets` from one to the next in steps, the place of each being a multiple of the width.
     let mut read = |jets: &mut Jets, (first, step): (usize, usize), width: f64| {
         let n = (jets.len() - first).div_ceil(step);
-        let evaluate = |(): &mut (), (portion, (values, slopes)): (usize, (&mut [f64], &mut [f64]))| {
-            let rows = values.chunks_exact_mut(n_outputs).zip(slopes.chunks_exact_mut(n_outputs));
-            for (k, (value, slope)) in rows.enumerate().skip(first).step_by(step) {
-                regression.evaluate(width * (portion * step * PORTION + k) as f64, value, slope);
+        let scratch = || (Vec::with_capacity(BLOCK), Jets::zeros(BLOCK, n_outputs));
+        let evaluate = |(u, jets): &mut (Vec<f64>, Jets), (portion, rows): (usize, (&mut [f64], &mut [f64]))| {
+            let size = step * BLOCK * n_outputs;
+            let blocks = rows.0.chunks_mut(size).zip(rows.1.chunks_mut(size));
+            for (block, (values, slopes)) in blocks.enumerate() {
+                let places = (0..values.len() / n_outputs).skip(first).step_by(step);
+                u.clear();
+                u.extend(places.map(|k| width * ((portion * PORTION + block * BLOCK) * step + k) as f64));
+                let size = u.len() * n_outputs;
+                regression.evaluate_all(u, &mut jets.values[..size], &mut jets.slopes[..size]);
+                for (rows, numbers) in [(values, &jets.values), (slopes, &jets.slopes)] {
+                    let rows = rows.chunks_exact_mut(n_outputs).skip(first).step_by(step);
+                    rows.zip(numbers.chunks_exact(n_outputs)).for_each(|(row, numbers)| row.copy_from_slice(numbers));
+                }
             }
             Ok(())
         };
         let mut telling = |share: f64| proceed((done as f64 + share * n as f64) / (MOST_CELLS + 1) as f64);
         threads.try_for_each_told(
             jets.rows_mut(step * PORTION).enumerate().collect(),
-            || (),
+            scratch,
             evaluate,
             &mut telling,
         )?;

@@ -1,6 +1,6 @@
 //! Arrays across the border: anything numpy can turn into float64 comes in, float64 goes out.
 
-use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
+use ndarray::{Array1, Array2, ArrayD, ArrayView2, Ix1, Ix2};
 use numpy::{
     AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayLikeDyn, PyArrayMethods,
     PyUntypedArray, PyUntypedArrayMethods,
@@ -18,8 +18,8 @@ pub(crate) type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 /// A numpy array of three axes.
 pub(crate) type Cube<'py> = Bound<'py, PyArray3<f64>>;
 
-/// An array of any dimension.
-pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64>> {
+/// An array of any dimension, without a copy where it comes as doubles.
+fn doubles<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDyn<'py, f64, AllowTypeChange>> {
     // numpy would drop imaginary parts, and read text and dates as numbers.
     if let Ok(untyped) = value.cast::<PyUntypedArray>()
         && !matches!(untyped.dtype().kind(), b'f' | b'i' | b'u' | b'b' | b'O')
@@ -31,12 +31,16 @@ pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64
     if let Ok(untyped) = value.cast::<PyUntypedArray>()
         && !untyped.is_aligned()
     {
-        return self::array(name, &value.call_method0("copy")?);
+        return doubles(name, &value.call_method0("copy")?);
     }
-    let array = value.extract::<PyArrayLikeDyn<'_, f64, AllowTypeChange>>().map_err(|error| {
+    value.extract().map_err(|error: PyErr| {
         PyValueError::new_err(format!("{name} is not an array of numbers: {}", error.value(value.py())))
-    })?;
-    Ok(array.as_array().to_owned())
+    })
+}
+
+/// An array of any dimension.
+pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64>> {
+    Ok(doubles(name, value)?.as_array().to_owned())
 }
 
 /// A vector, (n,).
@@ -84,9 +88,23 @@ pub(crate) fn numbers(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<
 pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
     let array = array(name, value)?;
     let shape = array.shape().to_vec();
-    array
-        .into_dimensionality::<Ix2>()
-        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
+    array.into_dimensionality::<Ix2>().map_err(|_| shapeless(name, axes, &shape))
+}
+
+/// Calls with a matrix of the named axes, which is not copied where it comes as doubles.
+pub(crate) fn with_matrix<T>(
+    name: &str,
+    axes: &str,
+    value: &Bound<'_, PyAny>,
+    call: impl FnOnce(ArrayView2<f64>) -> PyResult<T>,
+) -> PyResult<T> {
+    let array = doubles(name, value)?;
+    let view = array.as_array().into_dimensionality::<Ix2>().map_err(|_| shapeless(name, axes, array.shape()))?;
+    call(view)
+}
+
+fn shapeless(name: &str, axes: &str, shape: &[usize]) -> PyErr {
+    PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}"))
 }
 
 /// A float64 array of this shape that can be written.

@@ -40,6 +40,15 @@ pub trait Regression: fmt::Debug + Sync {
     /// Writes the outputs and their derivatives with respect to `u`, each (outputs,).
     fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]);
 
+    /// The same at every one of `u` (n,), each (n, outputs) by rows.
+    fn evaluate_all(&self, u: &[f64], values: &mut [f64], slopes: &mut [f64]) {
+        let n_outputs = values.len() / u.len().max(1);
+        let rows = values.chunks_exact_mut(n_outputs.max(1)).zip(slopes.chunks_exact_mut(n_outputs.max(1)));
+        for (&u, (value, slope)) in u.iter().zip(rows) {
+            self.evaluate(u, value, slope);
+        }
+    }
+
     /// What was chosen, in one line.
     fn describe(&self) -> String;
 }

@@ -1,8 +1,10 @@
 //! Normalised Gaussian network: regression by bell functions that sum to one.
 
+use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
-use ndarray::ArrayView2;
+use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
+use ndarray::{ArrayView2, Axis};
 
 use super::{Domain, Regression, magnitude};
 use crate::error::{Error, Result};
@@ -27,12 +29,15 @@ const RIDGE: f64 = 1e-4;
 /// Widths from a centre at which a bell function has fallen to the last digit, exp(−8.5²/2) = 2e-16.
 const REACH: f64 = 8.5;
 
+/// Places at which the functions are had at once.
+const PORTION: usize = 64;
+
 /// Normalised Gaussian network.
 ///
 /// b(u) = Σₖ wₖψₖ(u) / Σᵢψᵢ(u), with N bell functions at equal distances h on the clock u:
 /// ψₖ = exp(−(u − cₖ)²/2s²) on an interval, where the outermost centres lie two h beyond the ends, and the von Mises
 /// function ψₖ = exp((cos(u − cₖ) − 1)/s²) on the circle; s = `overlap`·h. Only the functions near u
-/// count, W of them, so that the weights are found in O(C·W² + N³), and b(u) in O(W).
+/// count. The weights are found in O(C·N² + N³).
 ///
 /// Moody and Darken, Neural Computation 1 (1989) 281–294; as the basis of movement primitives: Ijspeert, Nakanishi,
 /// Hoffmann, Pastor and Schaal, Neural Computation 25 (2013) 328–373, <https://doi.org/10.1162/NECO_a_00393>.
@@ -76,34 +81,23 @@ impl NGnet {
         let functions = Functions::new(self, domain);
         let scale: Vec<f64> = targets.columns().into_iter().map(magnitude).collect();
 
-        // The normal equations ΦᵀΦ and Φᵀy, by rows: of ΦᵀΦ the diagonal and what lies within a window after it.
-        let (n_basis, width) = (self.n_basis, functions.window());
-        let (mut gram, mut right) = (vec![0.0; n_basis * width], vec![0.0; n_basis * n_outputs]);
-        let (mut window, mut y) = (Vec::with_capacity(width), vec![0.0; n_outputs]);
-        for (&u, target) in u.iter().zip(targets.rows()) {
-            window.clear();
-            functions.for_each(u, |k, psi, _| window.push((k, psi)));
-            let sum: f64 = window.iter().map(|(_, psi)| psi).sum();
-            window.iter_mut().for_each(|(_, psi)| *psi /= sum);
-            y.iter_mut().zip(target).zip(&scale).for_each(|((y, target), scale)| *y = target / scale);
-            for (i, &(k, phi)) in window.iter().enumerate() {
-                let products = gram[k * width..][..width].iter_mut().zip(&window[i..]);
-                products.for_each(|(sum, (_, other))| *sum += phi * other);
-                let products = right[k * n_outputs..][..n_outputs].iter_mut().zip(&y);
-                products.for_each(|(sum, y)| *sum += phi * y);
-            }
+        // The normal equations ΦᵀΦ and Φᵀy.
+        let n_basis = self.n_basis;
+        let (mut system, mut right) = (Mat::<f64>::zeros(n_basis, n_basis), Mat::<f64>::zeros(n_basis, n_outputs));
+        let mut rows = Rows::new(n_basis);
+        for (u, targets) in u.chunks(PORTION).zip(targets.axis_chunks_iter(Axis(0), PORTION)) {
+            functions.fill(&mut rows, u);
+            let (phi, _) = rows.matrices(n_basis);
+            let (lower, dense) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+            triangular::matmul(&mut system, lower, Accum::Add, phi.transpose(), dense, phi, dense, 1.0, Par::Seq);
+            let y = Mat::from_fn(u.len(), n_outputs, |i, o| targets[[i, o]] / scale[o]);
+            matmul(&mut right, Accum::Add, phi.transpose(), &y, 1.0, Par::Seq);
         }
-
-        let mut system = Mat::<f64>::zeros(n_basis, n_basis);
-        for (k, row) in gram.chunks_exact(width).enumerate() {
-            for (after, product) in row.iter().enumerate() {
-                let other = (k + after) % n_basis;
-                system[(k.max(other), k.min(other))] += product;
-            }
+        for k in 0..n_basis {
             system[(k, k)] += RIDGE * RIDGE * n_samples as f64 / n_basis as f64;
         }
         let factor = system.llt(Side::Lower).map_err(|_| Error::Fit("the network's functions are dependent".into()))?;
-        let solution = factor.solve(Mat::from_fn(n_basis, n_outputs, |k, o| right[k * n_outputs + o]));
+        let solution = factor.solve(right);
         let weights = (0..n_basis * n_outputs).map(|at| (at / n_outputs, at % n_outputs));
         let weights = weights.map(|(k, o)| solution[(k, o)] * scale[o]).collect();
         Ok(NGnetRegression { functions, weights })
@@ -132,6 +126,8 @@ struct Functions {
     spacing: f64,
     /// Functions on either side of the nearest one that are not negligible.
     reach: usize,
+    /// exp(−(2i + 1)h²/2s²): on an interval the quotient of neighbours, i and i + 1 from the nearest one, at its centre.
+    quotients: Vec<f64>,
 }
 
 impl Functions {
@@ -153,7 +149,9 @@ impl Functions {
         };
         // The nearest centre lies up to half a spacing away.
         let reach = (reach + 0.5).ceil() as usize;
-        Self { settings: ngnet.clone(), domain, first, spacing, reach }
+        let quotient = |i: usize| (-0.5 * (2 * i + 1) as f64 / ngnet.overlap.powi(2)).exp();
+        let quotients = (0..reach).map(quotient).collect();
+        Self { settings: ngnet.clone(), domain, first, spacing, reach, quotients }
     }
 
     /// Most functions that are not negligible anywhere.
@@ -161,10 +159,34 @@ impl Functions {
         self.settings.n_basis.min(2 * self.reach + 1)
     }
 
-    /// Calls `visit(k, ψₖ, d ln ψₖ/du)` for the functions near `u`, in the order of their centres, where all ψ share a
-    /// factor that makes the largest one 1.
+    /// Fills the rows φₖ = ψₖ/Σᵢψᵢ and their derivatives for each `u`.
+    fn fill(&self, rows: &mut Rows, u: &[f64]) {
+        let n_basis = self.settings.n_basis;
+        for numbers in [&mut rows.shares, &mut rows.rises] {
+            numbers.clear();
+            numbers.resize(u.len() * n_basis, 0.0);
+        }
+        let both = rows.shares.chunks_exact_mut(n_basis).zip(rows.rises.chunks_exact_mut(n_basis));
+        for (&u, (phi, rise)) in u.iter().zip(both) {
+            // With q = Σψ: φ = ψ/q and φ′ = (ψ′ − φq′)/q.
+            let (mut q, mut dq) = (0.0, 0.0);
+            self.for_each(u, |k, psi, rate| {
+                (phi[k], rise[k]) = (psi, psi * rate);
+                q += psi;
+                dq += psi * rate;
+            });
+            for (phi, rise) in phi.iter_mut().zip(rise) {
+                *phi /= q;
+                *rise = (*rise - *phi * dq) / q;
+            }
+        }
+    }
+
+    /// Calls `visit(k, ψₖ, d ln ψₖ/du)` for the functions near `u`, where all ψ share a factor that makes the largest
+    /// one 1.
     ///
-    /// The factor cancels in the network. Without it every ψ would underflow far from the centres.
+    /// The factor cancels in the network. Without it every ψ would underflow far from the centres. On an interval one
+    /// exponential tells the quotients of all neighbours.
     fn for_each(&self, u: f64, mut visit: impl FnMut(usize, f64, f64)) {
         let NGnet { n_basis, overlap } = self.settings;
         let precision = 1.0 / (overlap * self.spacing).powi(2);
@@ -172,11 +194,17 @@ impl Functions {
         match self.domain {
             Domain::Interval { .. } => {
                 let nearest = (((u - self.first) / self.spacing).round() as usize).min(n_basis - 1);
-                let distance = |k: usize| u - centre(k);
-                let largest = distance(nearest).powi(2);
-                for k in nearest.saturating_sub(self.reach)..n_basis.min(nearest + self.reach + 1) {
-                    let r = distance(k);
-                    visit(k, (0.5 * precision * (largest - r * r)).exp(), -r * precision);
+                let rate = |k: usize| (centre(k) - u) * precision;
+                let growth = ((u - centre(nearest)) * self.spacing * precision).exp();
+                let (mut above, mut below) = (1.0, 1.0);
+                visit(nearest, 1.0, rate(nearest));
+                for (k, quotient) in (nearest + 1..n_basis).zip(&self.quotients) {
+                    above *= growth * quotient;
+                    visit(k, above, rate(k));
+                }
+                for (k, quotient) in (0..nearest).rev().zip(&self.quotients) {
+                    below *= quotient / growth;
+                    visit(k, below, rate(k));
                 }
             }
             Domain::Circle => {
@@ -195,6 +223,24 @@ impl Functions {
     }
 }
 
+/// φ and φ′ at some places, (n·N, by rows).
+struct Rows {
+    shares: Vec<f64>,
+    rises: Vec<f64>,
+}
+
+impl Rows {
+    fn new(n_basis: usize) -> Self {
+        let [shares, rises] = [0, 1].map(|_| Vec::with_capacity(PORTION * n_basis));
+        Self { shares, rises }
+    }
+
+    fn matrices(&self, n_basis: usize) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
+        let matrix = |numbers| MatRef::from_row_major_slice(numbers, self.shares.len() / n_basis, n_basis);
+        (matrix(&self.shares), matrix(&self.rises))
+    }
+}
+
 /// A fitted network.
 #[derive(Clone, Debug)]
 pub struct NGnetRegression {
@@ -205,22 +251,22 @@ pub struct NGnetRegression {
 
 impl Regression for NGnetRegression {
     fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
-        // With p = Σwψ and q = Σψ: b = p/q and b′ = (p′ − bq′)/q.
-        value.fill(0.0);
-        slope.fill(0.0);
-        let (mut q, mut dq) = (0.0, 0.0);
-        self.functions.for_each(u, |k, psi, rate| {
-            q += psi;
-            dq += psi * rate;
-            let (rise, weights) = (psi * rate, &self.weights[k * value.len()..]);
-            for ((p, dp), w) in value.iter_mut().zip(slope.iter_mut()).zip(weights) {
-                *p += psi * w;
-                *dp += rise * w;
+        self.evaluate_all(&[u], value, slope);
+    }
+
+    fn evaluate_all(&self, u: &[f64], values: &mut [f64], slopes: &mut [f64]) {
+        let n_basis = self.functions.settings.n_basis;
+        let n_outputs = self.weights.len() / n_basis;
+        let weights = MatRef::from_row_major_slice(&self.weights, n_basis, n_outputs);
+        let mut rows = Rows::new(n_basis);
+        let size = PORTION * n_outputs.max(1);
+        for (u, (values, slopes)) in u.chunks(PORTION).zip(values.chunks_mut(size).zip(slopes.chunks_mut(size))) {
+            self.functions.fill(&mut rows, u);
+            let (phi, rise) = rows.matrices(n_basis);
+            for (numbers, functions) in [(values, phi), (slopes, rise)] {
+                let into = MatMut::from_row_major_slice_mut(numbers, u.len(), n_outputs);
+                matmul(into, Accum::Replace, functions, weights, 1.0, Par::Seq);
             }
-        });
-        for (value, slope) in value.iter_mut().zip(slope) {
-            *value /= q;
-            *slope = (*slope - *value * dq) / q;
         }
     }
 
