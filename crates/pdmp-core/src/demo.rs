@@ -152,13 +152,13 @@ pub struct Trajectory {
 pub(crate) fn zeros<D: IntoDimension>(name: &'static str, shape: D) -> Result<Array<f64, D::Dim>> {
     let shape = shape.into_dimension();
     let numbers: f64 = shape.slice().iter().map(|&n| n as f64).product();
-    let mut data = Vec::new();
-    // An allocation may hold isize::MAX bytes.
-    if numbers * 8.0 >= isize::MAX as f64 || data.try_reserve_exact(numbers as usize).is_err() {
-        return Err(Error::Memory { name, numbers });
+    let none = || Error::Memory { name, numbers };
+    // An allocation may hold isize::MAX bytes. The system's memory is zero as it comes.
+    if numbers * 8.0 >= isize::MAX as f64 {
+        return Err(none());
     }
-    data.resize(numbers as usize, 0.0);
-    Array::from_shape_vec(shape, data).map_err(|_| Error::Memory { name, numbers })
+    let data = bytemuck::allocation::try_zeroed_vec(numbers as usize).map_err(|()| none())?;
+    Array::from_shape_vec(shape, data).map_err(|_| none())
 }
 
 /// Checks that every element of a matrix is finite and no larger than [`LARGEST`].

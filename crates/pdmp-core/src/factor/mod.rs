@@ -20,8 +20,8 @@ mod tests;
 
 use faer::linalg::matmul::matmul;
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Accum, Mat, MatRef, Par};
-use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip, s};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+use ndarray::{Array2, ArrayView2, CowArray, Ix2};
 
 use crate::demo::{check_matrix, zeros};
 use crate::error::{Error, LARGEST, Result};
@@ -251,15 +251,17 @@ impl<'a> Library<'a> {
         }
         let found = styles.ncols();
         let (mut basis, mut products) = (zeros("basis", (n_styles, columns))?, Mat::zeros(found, found));
-        let mut part = Mat::zeros(found, PANEL.min(columns));
+        let mut part = vec![0.0; found * PANEL.min(columns)];
         for start in (0..columns).step_by(PANEL) {
-            let mut part = part.as_mut().subcols_mut(0, PANEL.min(columns - start));
+            let width = PANEL.min(columns - start);
+            let part = &mut part[..found * width];
             // A target that is zero throughout stays so: a DoF at rest is not moved by what rounding leaves of it.
-            let share = targets.subcols(start, part.ncols());
-            matmul(part.rb_mut(), Accum::Replace, styles.transpose(), share, 1.0, Par::Seq);
-            matmul(products.as_mut(), Accum::Add, part.rb(), part.rb().transpose(), 1.0, Par::Seq);
-            let into = basis.slice_mut(s![.., start..start + part.ncols()]);
-            Zip::indexed(into).for_each(|(j, column), to| *to = part[(j, column)]);
+            let into = MatMut::from_row_major_slice_mut(part, found, width);
+            matmul(into, Accum::Replace, styles.transpose(), targets.subcols(start, width), 1.0, Par::Seq);
+            let rows = MatRef::from_row_major_slice(part, found, width);
+            matmul(products.as_mut(), Accum::Add, rows, rows.transpose(), 1.0, Par::Seq);
+            let whole = basis.as_slice_mut().unwrap_or_default().chunks_exact_mut(columns);
+            whole.zip(part.chunks_exact(width)).for_each(|(row, part)| row[start..start + width].copy_from_slice(part));
         }
         Ok(Projection { styles, basis, products })
     }
