@@ -86,9 +86,7 @@ pub(crate) fn numbers(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<
 
 /// A matrix with the named axes.
 pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
-    let array = array(name, value)?;
-    let shape = array.shape().to_vec();
-    array.into_dimensionality::<Ix2>().map_err(|_| shapeless(name, axes, &shape))
+    with_matrix(name, axes, value, |matrix| Ok(matrix.to_owned()))
 }
 
 /// Calls with a matrix of the named axes, which is not copied where it comes as doubles.
@@ -99,12 +97,11 @@ pub(crate) fn with_matrix<T>(
     call: impl FnOnce(ArrayView2<f64>) -> PyResult<T>,
 ) -> PyResult<T> {
     let array = doubles(name, value)?;
-    let view = array.as_array().into_dimensionality::<Ix2>().map_err(|_| shapeless(name, axes, array.shape()))?;
+    let view = array.as_array().into_dimensionality::<Ix2>().map_err(|_| {
+        let shape = array.shape();
+        PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}"))
+    })?;
     call(view)
-}
-
-fn shapeless(name: &str, axes: &str, shape: &[usize]) -> PyErr {
-    PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}"))
 }
 
 /// A float64 array of this shape that can be written.
