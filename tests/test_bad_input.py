@@ -68,7 +68,7 @@ GIVEN = {
     "goal too short": ({"goal": [1.0]}, "goal has length 1, expected 2: one value per DoF"),
     "goal NaN": ({"goal": [1.0, NAN]}, r"goal\[1\] = NaN"),
     "context NaN": ({"context": [NAN]}, r"context\[0\] = NaN"),
-    "context empty": ({"context": []}, "context is empty: pass at least one number"),
+    "context empty": ({"context": []}, "context is empty: pass at least one value"),
     "names too few": ({"names": ["x"]}, "names has length 1, expected 2: one value per DoF"),
 } | {f"dt {dt}": ({"dt": dt}, f"dt = {text}: must be positive and finite") for dt, text in [
     (0.0, "0"), (-0.1, "-0.1"), (NAN, "NaN"), (INF, "inf")

@@ -46,9 +46,9 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"dof_scale": [-1, 1]}, "dof_scale = -1: must lie between"),
     ({"dof_scale": [1]}, "dof_scale has length 1, expected 2: one value per DoF"),
     ({"dof_scale": "unit"}, 'dof_scale = "unit": must be None, "range" or one number per DoF'),
-    ({"contexts": [[1], [2], [3], [4], [NAN]]}, r"contexts\[4, 0\] = NaN"),
+    ({"contexts": [[1], [2], [3], [4], [NAN]]}, r"demo 4: context\[0\] = NaN"),
     ({"contexts": [[1], [2]]}, "contexts has length 2, expected 5: one value per demonstration"),
-    ({"contexts": [1, 2, 3, 4, 5]}, r"contexts has shape \[5\], expected two axes \(M, Q\)"),
+    ({"contexts": [1, 2, 3, 4, 5]}, r"contexts\[0\] = 1: expected two axes \(M, Q\)"),
     ({"period": 2.0}, "period does not apply to a discrete primitive"),
 ]
 

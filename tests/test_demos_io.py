@@ -175,10 +175,18 @@ def test_npz_and_index_must_agree(folder: Path) -> None:
         demos.read_folder(folder)
 
 
-def test_context_must_be_a_number(folder: Path) -> None:
-    """A word in a context column is refused with its place."""
-    with pytest.raises(ValueError, match=r"index\.csv, line 2, column 'shape': 'C' is not a num"):
-        demos.read_folder(folder, context=["shape"])
+def test_context_may_be_labels(folder: Path) -> None:
+    """A column of words makes labels."""
+    found = demos.read_folder(folder, context=["shape", "height"])
+    assert found["a"].context == ["C", 0.1]
+
+
+def test_context_is_all_numbers_or_all_labels(folder: Path) -> None:
+    """A word among numbers is refused with its place."""
+    index = folder / "index.csv"
+    index.write_text(index.read_text().replace("0.1", "low"))
+    with pytest.raises(ValueError, match=r"index\.csv, line 2, column 'height': 'low' is not a n"):
+        demos.read_folder(folder, context=["height"])
 
 
 def test_id_must_be_unique(folder: Path) -> None:

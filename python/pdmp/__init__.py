@@ -12,6 +12,7 @@ multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.n
 
 from pdmp._native import (
     GP,
+    ContextMap,
     Controller,
     Demonstration,
     Factors,
@@ -36,6 +37,7 @@ from pdmp.pacing import Run, Tick
 
 __all__ = [
     "GP",
+    "ContextMap",
     "Controller",
     "Demonstration",
     "Factors",

@@ -15,9 +15,13 @@ from pdmp.pacing import Run
 
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
+_Map: TypeAlias = Literal["auto", "linear", "polynomial", "gp"]
+_Context: TypeAlias = ArrayLike | Sequence[float | str]
+_Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
 _Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
 
 __all__ = [
+    "ContextMap",
     "Controller",
     "Demonstration",
     "Factors",
@@ -53,7 +57,7 @@ class Demonstration:
         dt: float | None = None,
         time: ArrayLike | None = None,  # (T,)
         goal: ArrayLike | None = None,  # (D,)
-        context: ArrayLike | None = None,  # (Q,)
+        context: _Context | None = None,  # (Q,)
         names: Sequence[str] | None = None,  # D of them
     ) -> Demonstration: ...
     def __getnewargs_ex__(self) -> tuple[tuple[_Array], dict[str, Any]]: ...
@@ -66,7 +70,7 @@ class Demonstration:
     @property
     def goal(self) -> _Array | None: ...
     @property
-    def context(self) -> _Array | None: ...
+    def context(self) -> _Array | list[float | str] | None: ...
     @property
     def names(self) -> list[str] | None: ...
     @property
@@ -80,7 +84,8 @@ def fit(
     kind: _Kind = "discrete",
     dt: float | None = None,
     period: ArrayLike | None = None,  # one, or (M,)
-    contexts: ArrayLike | None = None,  # (M, Q)
+    contexts: _Contexts | None = None,  # (M, Q)
+    map: _Map = "auto",
     n_styles: int | None = None,
     spectrum: float = 0.9,
     basis: Literal["gp", "ngnet"] | GP | NGnet = "gp",
@@ -143,7 +148,9 @@ class Model:
     @property
     def durations(self) -> _Array: ...  # (M,)
     @property
-    def contexts(self) -> _Array | None: ...  # (M, Q)
+    def contexts(self) -> _Array | list[list[float | str]] | None: ...  # (M, Q)
+    @property
+    def map(self) -> ContextMap | None: ...
     @property
     def basis(self) -> str: ...  # what was chosen, in one line
     @property
@@ -160,7 +167,7 @@ class Model:
         tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
-        context: ArrayLike | None = None,  # (Q,)
+        context: _Context | None = None,  # (Q,)
     ) -> Trajectory: ...
     def rollouts(
         self,
@@ -238,7 +245,14 @@ class Model:
         period: float | None = None,
     ) -> _Array: ...  # (J,)
     def landscape(self, u: ArrayLike) -> _Array: ...  # (len(u), J, D)
-    def predict(self, context: ArrayLike) -> Prediction: ...
+    def predict(self, context: _Context) -> Prediction: ...
+    def band(
+        self,
+        context: _Context,  # (Q,)
+        *,
+        level: float = 0.9,
+        dt: float = 0.01,
+    ) -> tuple[_Array, _Array]: ...  # lower, upper (T, D)
     def save(self, path: str | PathLike[str]) -> None: ...
     def controller(
         self,
@@ -252,7 +266,7 @@ class Model:
         *,
         anchor: ArrayLike | None = None,
         amplitude: float = 1.0,
-        context: ArrayLike | None = None,
+        context: _Context | None = None,
     ) -> Controller: ...
     def to_bytes(self) -> bytes: ...
     @staticmethod
@@ -289,6 +303,26 @@ class Prediction:
     def duration(self) -> float: ...
     @property
     def covariance(self) -> _Array | None: ...  # of all of these in this order, (P, P)
+    @property
+    def freedom(self) -> int: ...  # degrees of freedom from which the covariance is known
+    @property
+    def outside(self) -> _Array: ...  # (Q,), in ranges of the demonstrated contexts
+
+@final
+class ContextMap:
+    def __new__(
+        cls,
+        contexts: _Contexts,  # (M, Q)
+        outputs: ArrayLike,  # (M, P)
+        map: _Map = "auto",
+    ) -> ContextMap: ...
+    @property
+    def kind(self) -> Literal["linear", "polynomial", "gp"]: ...
+    @property
+    def errors(self) -> list[tuple[str, float]]: ...
+    @property
+    def freedom(self) -> int: ...
+    def predict(self, contexts: _Contexts) -> tuple[_Array, _Array | None]: ...
 
 @final
 class Trajectory:
@@ -335,7 +369,7 @@ class Controller:
         anchor: ArrayLike | None = None,
         amplitude: float = 1.0,
         tau: float | None = None,
-        context: ArrayLike | None = None,
+        context: _Context | None = None,
     ) -> None: ...
     @property
     def position(self) -> _Array: ...  # (D,), a read-only view that each step updates

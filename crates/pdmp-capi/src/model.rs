@@ -7,7 +7,7 @@ use std::path::Path;
 use std::ptr;
 use std::sync::Arc;
 
-use pdmp_core::{Conditions, Error, Kind, Model, Prediction};
+use pdmp_core::{Conditions, ContextColumn, ContextMap, Error, Kind, Model, Prediction};
 
 use crate::buffers::{pdmp_buffer, pdmp_text, pdmp_vector};
 use crate::command::pdmp_conditions;
@@ -20,6 +20,7 @@ use pdmp_status::PDMP_OK;
 pub struct pdmp_model {
     pub(crate) inner: Arc<Model>,
     names: Vec<CString>,
+    labels: Vec<Vec<CString>>,
 }
 
 /// The kind of movement.
@@ -67,9 +68,18 @@ unsafe fn deliver(
         let place = model.ok_or(Fault::Null("model"))?.write(ptr::null_mut());
         let inner = load()?;
         // In C a name ends at its first zero byte.
-        let names = inner.names().iter().map(|name| CString::new(name.split('\0').next().unwrap_or_default()));
-        let names = names.collect::<Result<_, _>>().map_err(|_| Fault::Internal)?;
-        *place = Box::into_raw(Box::new(pdmp_model { inner: Arc::new(inner), names }));
+        let texts = |texts: &[String]| {
+            let texts = texts.iter().map(|text| CString::new(text.split('\0').next().unwrap_or_default()));
+            texts.collect::<Result<Vec<_>, _>>().map_err(|_| Fault::Internal)
+        };
+        let names = texts(inner.names())?;
+        let columns = inner.map().map(ContextMap::columns).unwrap_or_default();
+        let labels = columns.iter().map(|column| match column {
+            ContextColumn::Label(labels) => texts(labels),
+            ContextColumn::Number => Ok(Vec::new()),
+        });
+        let labels = labels.collect::<Result<_, _>>()?;
+        *place = Box::into_raw(Box::new(pdmp_model { inner: Arc::new(inner), names, labels }));
         Ok(PDMP_OK)
     };
     // SAFETY: the caller's promise is the same.
@@ -191,14 +201,24 @@ pub unsafe extern "C" fn pdmp_model_demonstration(
             anchor: (!discrete).then(|| shown.anchors.row(demonstration).to_vec()),
             duration: shown.durations[demonstration],
             covariance: None,
+            freedom: 0,
+            outside: Vec::new(),
         })
     };
     // SAFETY: the caller's promise is the same.
     unsafe { lay_down(model, conditions, numbers, error, shown) }
 }
 
-/// Conditions of the movement predicted for a context (n_contexts), by the linear map of Section 4.1.2: style, goal and
-/// start or anchor, and tau.
+/// A label that a value of the contexts may be, both counted from 0, in UTF-8. It lives as long as the model, and is NULL
+/// past the last, and where the value is a number. In a context a label is given by its index.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_model_label(model: Option<&pdmp_model>, value: usize, label: usize) -> *const c_char {
+    let found = model.and_then(|model| model.labels.get(value)?.get(label));
+    found.map_or(ptr::null(), |label| label.as_ptr())
+}
+
+/// Conditions of the movement predicted for a context (n_contexts), as in Section 4.1.2: style, goal and start or anchor,
+/// and tau. A label is given by its index, see pdmp_model_label.
 ///
 /// They are written to `numbers`, which has room for pdmp_info.n_conditions of them, and `conditions` points there.
 ///
@@ -219,7 +239,10 @@ pub unsafe extern "C" fn pdmp_model_predict(
             // SAFETY: the caller's promise is the same.
             expected => unsafe { context.need("context", expected, "context value") }?,
         };
-        Ok(model.predict(context)?)
+        Ok(match model.map() {
+            Some(map) => model.predict(&map.context(context)?)?,
+            None => model.predict(context)?,
+        })
     };
     // SAFETY: the caller's promise is the same.
     unsafe { lay_down(model, conditions, numbers, error, predict) }

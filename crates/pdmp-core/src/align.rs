@@ -177,6 +177,11 @@ impl Ticks<'_> {
 }
 
 impl Aligned<'_> {
+    /// The same, read at another number of samples.
+    pub(crate) fn resampled(self, n_samples: usize) -> Self {
+        Self { n_samples, ..self }
+    }
+
     /// Demonstration `m` as it was given.
     pub(crate) fn demo(&self, m: usize) -> &Demonstration {
         &self.demos[m]

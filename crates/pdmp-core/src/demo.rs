@@ -2,7 +2,7 @@
 
 use ndarray::{Array, Array2, ArrayView2, Dimension, IntoDimension};
 
-use crate::error::{Error, LARGEST, Result, check_finite, check_positive};
+use crate::error::{Error, LARGEST, Result, check_number, check_positive};
 
 /// Fewest samples that carry a cubic spline with not-a-knot ends.
 pub const LEAST_SAMPLES: usize = 4;
@@ -27,13 +27,40 @@ pub enum Sampling {
     },
 }
 
+/// One value of a context.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ContextValue {
+    /// A quantity, such as a height.
+    Number(f64),
+    /// A name, such as that of a style; no label is nearer to one than to another.
+    Label(String),
+}
+
+impl From<f64> for ContextValue {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl From<&str> for ContextValue {
+    fn from(label: &str) -> Self {
+        Self::Label(label.to_string())
+    }
+}
+
+impl From<String> for ContextValue {
+    fn from(label: String) -> Self {
+        Self::Label(label)
+    }
+}
+
 /// One recorded movement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Demonstration {
     position: Array2<f64>,
     sampling: Sampling,
     goal: Option<Vec<f64>>,
-    context: Option<Vec<f64>>,
+    context: Option<Vec<ContextValue>>,
     names: Option<Vec<String>>,
 }
 
@@ -73,12 +100,10 @@ impl Demonstration {
     /// Sets the condition under which this movement was made (Q,), such as an obstacle's height.
     ///
     /// # Errors
-    /// No number, or one that is not finite.
-    pub fn with_context(mut self, context: Vec<f64>) -> Result<Self> {
-        if context.is_empty() {
-            return Err(Error::Arguments("context is empty: pass at least one number, or none at all"));
-        }
-        check_finite("context", &context)?;
+    /// No value, or a number that is not finite.
+    pub fn with_context<V: Into<ContextValue>>(mut self, context: Vec<V>) -> Result<Self> {
+        let context: Vec<ContextValue> = context.into_iter().map(Into::into).collect();
+        check_context(&context)?;
         self.context = Some(context);
         Ok(self)
     }
@@ -115,7 +140,7 @@ impl Demonstration {
     }
 
     /// The condition given for this movement (Q,).
-    pub fn context(&self) -> Option<&[f64]> {
+    pub fn context(&self) -> Option<&[ContextValue]> {
         self.context.as_deref()
     }
 
@@ -159,6 +184,17 @@ pub(crate) fn zeros<D: IntoDimension>(name: &'static str, shape: D) -> Result<Ar
     }
     let data = bytemuck::allocation::try_zeroed_vec(numbers as usize).map_err(|()| none())?;
     Array::from_shape_vec(shape, data).map_err(|_| none())
+}
+
+/// Checks that there are values, and that the numbers among them are finite.
+pub(crate) fn check_context(context: &[ContextValue]) -> Result<()> {
+    if context.is_empty() {
+        return Err(Error::Arguments("context is empty: pass at least one value, or none at all"));
+    }
+    context.iter().enumerate().try_for_each(|(index, value)| match value {
+        ContextValue::Number(number) => check_number("context", index, *number),
+        ContextValue::Label(_) => Ok(()),
+    })
 }
 
 /// Checks that every element of a matrix is finite and no larger than [`LARGEST`].

@@ -154,6 +154,34 @@ pub enum Error {
         /// What limits it.
         of: &'static str,
     },
+    /// A context value that stands for no label that was shown.
+    #[error("context[{column}] = {value}: never shown; the labels are {known}")]
+    Label {
+        /// Which value of the context.
+        column: usize,
+        /// What it is.
+        value: String,
+        /// The labels that it may be.
+        known: String,
+    },
+    /// A label where the model knows numbers.
+    #[error("context[{column}] = {label:?}: a number is expected, as in the demonstrations")]
+    NoNumber {
+        /// Which value of the context.
+        column: usize,
+        /// What it is.
+        label: String,
+    },
+    /// A context value that is a label in one demonstration and a number in another.
+    #[error("contexts[:, {column}] holds {labels} labels and {numbers} numbers: give one or the other")]
+    Mixed {
+        /// Which value of the contexts.
+        column: usize,
+        /// How many labels.
+        labels: usize,
+        /// How many numbers.
+        numbers: usize,
+    },
     /// An argument that the other kind of primitive has.
     #[error("{name} does not apply to a {kind} primitive{instead}")]
     Kind {
@@ -218,12 +246,15 @@ pub(crate) fn check_vector(name: &'static str, value: &[f64], expected: usize, p
 
 /// Checks that every element is finite and no larger than [`LARGEST`].
 pub(crate) fn check_finite(name: &'static str, value: &[f64]) -> Result<()> {
-    match value.iter().position(|x| !(0.0..=LARGEST).contains(&x.abs())) {
-        None => Ok(()),
-        Some(index) if value[index].is_finite() => {
-            Err(Error::TooLarge { name, index, value: value[index], limit: LARGEST })
-        }
-        Some(index) => Err(Error::NotFinite { name, index, value: value[index] }),
+    value.iter().enumerate().try_for_each(|(index, &value)| check_number(name, index, value))
+}
+
+/// Checks that the element `value` at `index` is finite and no larger than [`LARGEST`].
+pub(crate) fn check_number(name: &'static str, index: usize, value: f64) -> Result<()> {
+    match value.abs() {
+        size if size <= LARGEST => Ok(()),
+        size if size.is_finite() => Err(Error::TooLarge { name, index, value, limit: LARGEST }),
+        _ => Err(Error::NotFinite { name, index, value }),
     }
 }
 

@@ -13,7 +13,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
 use crate::attractor::Attractor;
-use crate::context::ContextMap;
+use crate::context::{ContextColumn, ContextMap, Kernel, MapKind, Recipe};
 use crate::error::{Error, LARGEST, Result};
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
@@ -22,7 +22,7 @@ use crate::smooth::Smoothing;
 use crate::tabulate::{Jets, MOST_CELLS};
 
 /// Version of the file's layout.
-const SCHEMA: u32 = 2;
+const SCHEMA: u32 = 3;
 /// The metadata key.
 const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.
@@ -53,8 +53,17 @@ struct Constants {
     left_out: f64,
     basis: String,
     table_error: f64,
-    has_context: bool,
-    has_residual: bool,
+    map: Option<Map>,
+}
+
+/// How a map comes about from what was demonstrated.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Map {
+    columns: Vec<ContextColumn>,
+    kind: MapKind,
+    kernel: Option<Kernel>,
+    errors: Vec<(MapKind, Option<f64>)>,
 }
 
 /// An array by name: shape and elements by rows.
@@ -86,8 +95,7 @@ impl Model {
             left_out: self.learnt.left_out,
             basis: self.learnt.basis.clone(),
             table_error: self.landscape.error(),
-            has_context: self.map.is_some(),
-            has_residual: self.map.as_ref().is_some_and(|map| map.residual.is_some()),
+            map: self.map.as_ref().map(Map::of),
         };
         let arrays: Vec<(&str, Vec<usize>, Vec<u8>)> = self
             .arrays()
@@ -126,11 +134,8 @@ impl Model {
         ];
         if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
             arrays.push(matrix("contexts", contexts));
-            arrays.push(("map.centre", vec![map.centre.len()], map.centre.to_vec()));
-            arrays.push(("map.intercept", vec![map.intercept.len()], map.intercept.to_vec()));
-            arrays.push(matrix("map.slopes", &map.slopes));
-            arrays.push(matrix("map.inverse_scatter", &map.inverse_scatter));
-            arrays.extend(map.residual.as_ref().map(|residual| matrix("map.residual", residual)));
+            arrays.push(vector("map.ratios", &map.recipe().ratios));
+            arrays.extend(self.learnt.left_over.as_ref().map(|left_over| matrix("left_over", left_over)));
         }
         arrays
     }
@@ -269,8 +274,10 @@ impl Reader<'_> {
         }
         constants.check()?;
 
-        let (contexts, map) =
-            if constants.has_context { self.map(&constants, n_demos, n_styles, n_dofs)? } else { (None, None) };
+        let contexts = match &constants.map {
+            Some(map) => Some(self.matrix("contexts", (n_demos, map.columns.len()))?),
+            None => None,
+        };
         let knots = |name| {
             let data = self.array(name, &[n_knots, n_styles, n_dofs])?;
             if let Some(value) = data.iter().find(|x| x.abs() > LARGEST) {
@@ -303,35 +310,50 @@ impl Reader<'_> {
             dof_scale,
             singular_values,
             left_out: constants.left_out,
+            left_over: None,
             basis: constants.basis.clone(),
         };
         let (tau, names) = (constants.tau, constants.names.clone());
         let (cycle, responses) = Default::default();
-        let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle, responses }
+        let map = None;
+        let mut model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle, responses }
             .with_cycle();
+        if let Some(map) = &constants.map {
+            model.map = Some(self.map(map, &model)?);
+            let [n_samples, _] = self.shape("left_over")?;
+            let left_over = self.matrix("left_over", (n_samples, n_dofs))?;
+            if n_samples == 0 || left_over.iter().any(|x| *x < 0.0) {
+                return Err(bad("left_over holds no variances"));
+            }
+            model.learnt.left_over = Some(left_over);
+        }
         self.verify(&constants, &model, crc32)?;
         Ok(model)
     }
 
-    fn map(
-        &self,
-        constants: &Constants,
-        n_demos: usize,
-        n_styles: usize,
-        n_dofs: usize,
-    ) -> Result<(Option<Array2<f64>>, Option<ContextMap>)> {
-        let [_, q] = self.shape("contexts")?;
-        let places = if matches!(constants.canonical, Canonical::Discrete { .. }) { 2 } else { 1 };
-        let p = n_styles + places * n_dofs + 1;
-        let map = ContextMap {
-            centre: self.array("map.centre", &[q])?.into(),
-            intercept: self.array("map.intercept", &[p])?.into(),
-            slopes: self.matrix("map.slopes", (p, q))?,
-            inverse_scatter: self.matrix("map.inverse_scatter", (q, q))?,
-            residual: if constants.has_residual { Some(self.matrix("map.residual", (p, p))?) } else { None },
-            n_demos,
+    /// The map, had again from what was demonstrated.
+    fn map(&self, map: &Map, model: &Model) -> Result<ContextMap> {
+        let bad = |reason: &str| Error::File(reason.to_string());
+        let outputs = model.outputs();
+        let ratios = self.array("map.ratios", &[outputs.ncols()])?;
+        let sound = match map.kernel {
+            None => ratios.iter().all(|ratio| *ratio == 0.0),
+            Some(Kernel::Quadratic) => ratios.iter().all(|ratio| *ratio >= 0.0),
+            Some(Kernel::Matern { length }) => length > 0.0 && ratios.iter().all(|ratio| *ratio >= 0.0),
         };
-        Ok((Some(self.matrix("contexts", (n_demos, q))?), Some(map)))
+        let contexts = model.demonstrated.contexts.as_ref().ok_or(bad("no contexts"))?;
+        for (q, column) in map.columns.iter().enumerate() {
+            if contexts.column(q).iter().any(|&number| column.value(q, number).is_err()) {
+                return Err(bad("a context is none of its labels"));
+            }
+        }
+        if !sound {
+            return Err(bad("the map's constants are out of range"));
+        }
+        let errors = map.errors.iter().map(|&(kind, error)| (kind, error.unwrap_or(f64::INFINITY))).collect();
+        let recipe = Recipe { kind: map.kind, kernel: map.kernel, ratios, errors };
+        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), recipe)
+            .map_err(|error| Error::File(error.to_string()))
     }
 
     /// Checks that the file holds the model's arrays and no others, unchanged.
@@ -343,6 +365,15 @@ impl Reader<'_> {
         let tensors: Vec<_> = names.iter().filter_map(|name| self.tensors.tensor(name).ok()).collect();
         let found = checksum(constants, names.iter().copied().zip(tensors.iter().map(|tensor| tensor.data())))?;
         if found == crc32 { Ok(()) } else { Err(Error::File("damaged: the checksum does not match".to_string())) }
+    }
+}
+
+impl Map {
+    fn of(map: &ContextMap) -> Self {
+        let Recipe { kind, kernel, errors, .. } = map.recipe();
+        // Infinite where the others say nothing: JSON has no such number.
+        let errors = errors.into_iter().map(|(kind, error)| (kind, error.is_finite().then_some(error))).collect();
+        Self { columns: map.columns().to_vec(), kind, kernel, errors }
     }
 }
 

@@ -1,16 +1,17 @@
 //! Learning a primitive from demonstrations: the four steps of Section 3.2, composed.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
-use ndarray::{Array1, Array2, s};
+use ndarray::{Array2, s};
 
 use crate::align::{Aligned, Alignment};
 use crate::attractor::Attractor;
 use crate::basis::{Basis, Domain, Gp};
-use crate::context::{self, ContextMap};
-use crate::demo::{Demonstration, check_matrix};
+use crate::context::{ContextColumn, ContextMap, MapChoice, tabulate};
+use crate::demo::{ContextValue, Demonstration, check_context};
 use crate::error::{Error, Result, check_positive, check_vector};
 use crate::factor::{Factors, StyleCount};
 use crate::landscape::Landscape;
@@ -36,8 +37,10 @@ pub enum DofScale {
 pub struct FitOptions {
     /// How demonstrations are read and aligned.
     pub alignment: Alignment,
-    /// Conditions of the demonstrations (M, Q); otherwise those that they carry.
-    pub contexts: Option<Array2<f64>>,
+    /// Conditions of the demonstrations (M rows of Q); otherwise those that they carry.
+    pub contexts: Option<Vec<Vec<ContextValue>>>,
+    /// What leads from contexts to movements.
+    pub map: MapChoice,
     /// Style dimension J.
     pub styles: StyleCount,
     /// Function approximator of the landscape.
@@ -66,6 +69,7 @@ impl FitOptions {
         Self {
             alignment: Alignment { kind, dt: None, period: Vec::new(), smoothing, nominal: None, n_samples: None },
             contexts: None,
+            map: MapChoice::Auto,
             styles: StyleCount::Spectrum(0.9),
             basis: Basis::Gp(Gp::default()),
             dof_scale: DofScale::Unit,
@@ -118,7 +122,7 @@ pub fn fit(
 ) -> Result<Model> {
     options.styles.check(demos.len(), "demonstrations")?;
     let aligned = options.alignment.align(demos)?;
-    let (contexts, names) = (contexts_of(demos, options.contexts.as_ref())?, names_of(demos)?);
+    let (contexts, names) = (contexts_of(demos, options.contexts.as_deref())?, names_of(demos)?);
     let constants = Constants::of(options, &aligned)?;
     let threads = options.threads;
     let mut targeting = |share| proceed(Stage::Targets, share);
@@ -142,15 +146,8 @@ pub fn fit(
     let shape = (factors.basis.nrows(), demos[0].n_dofs());
     let landscape = Landscape::compile(constants.canonical, shape, regression.as_ref(), threads, &mut compiling)?;
 
-    let Aligned { durations, nominal, .. } = aligned;
-    let map = match &contexts {
-        None => None,
-        Some(contexts) => {
-            let places = [goals.view(), starts.view(), anchors.view()];
-            let outputs = context::outputs(constants.canonical.kind(), factors.styles.view(), places, &durations);
-            Some(ContextMap::fit(contexts.view(), outputs.view())?)
-        }
-    };
+    let (durations, nominal) = (aligned.durations.clone(), aligned.nominal);
+    let (columns, contexts) = contexts.unzip();
     let left_out = factors.left_out();
     let Factors { styles, singular_values, .. } = factors;
     let demonstrated = Demonstrated { styles, goals, starts, anchors, durations, contexts, nominal };
@@ -160,12 +157,22 @@ pub fn fit(
         dof_scale,
         singular_values,
         left_out,
+        left_over: None,
         basis: regression.describe(),
     };
     let Constants { attractor, tau, .. } = constants;
     let (cycle, responses) = Default::default();
+    let map = None;
     let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle, responses };
-    Ok(model.with_cycle())
+    let mut model = Arc::new(model.with_cycle());
+    if let (Some(columns), Some(contexts)) = (columns, &model.demonstrated.contexts) {
+        let (outputs, metric) = (model.outputs(), model.metric()?);
+        let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
+        let left_over = model.left_over(aligned)?;
+        let model = Arc::make_mut(&mut model);
+        (model.map, model.learnt.left_over) = (Some(map), Some(left_over));
+    }
+    Ok(Arc::unwrap_or_clone(model))
 }
 
 /// The style (J,) of a demonstration that the model was not fitted to: least squares on its target.
@@ -315,32 +322,26 @@ fn scale_of(scale: &DofScale, ranges: &[f64]) -> Result<Vec<f64>> {
     }
 }
 
-/// Contexts (M, Q): those given, or those of the demonstrations if they carry any.
-fn contexts_of(demos: &[Demonstration], given: Option<&Array2<f64>>) -> Result<Option<Array2<f64>>> {
+/// Contexts (M, Q), with what their columns mean: those given, or those of the demonstrations if they carry any.
+fn contexts_of(
+    demos: &[Demonstration],
+    given: Option<&[Vec<ContextValue>]>,
+) -> Result<Option<(Vec<ContextColumn>, Array2<f64>)>> {
     if let Some(contexts) = given {
-        if contexts.nrows() != demos.len() {
-            let (expected, found) = (demos.len(), contexts.nrows());
+        if contexts.len() != demos.len() {
+            let (expected, found) = (demos.len(), contexts.len());
             return Err(Error::Length { name: "contexts", expected, found, per: "demonstration" });
         }
-        if contexts.ncols() == 0 {
-            return Err(Error::Arguments(
-                "contexts have no values: pass an array of shape (M, Q) with Q of at least 1",
-            ));
+        for (m, context) in contexts.iter().enumerate() {
+            check_context(context).map_err(|error| error.in_demo(m))?;
         }
-        check_matrix("contexts", contexts.view())?;
-        return Ok(Some(contexts.clone()));
     }
-    let Some(width) = demos.iter().find_map(|demo| demo.context()).map(<[f64]>::len) else {
-        return Ok(None);
+    let contexts: Option<Vec<&[ContextValue]>> = match given {
+        Some(contexts) => Some(contexts.iter().map(Vec::as_slice).collect()),
+        None if demos.iter().all(|demo| demo.context().is_none()) => None,
+        None => Some(demos.iter().map(|demo| demo.context().unwrap_or_default()).collect()),
     };
-    let mut contexts = Array2::zeros((demos.len(), width));
-    for (m, demo) in demos.iter().enumerate() {
-        let context = demo.context().unwrap_or_default();
-        check_vector("context", context, width, "context value, as in the other demonstrations")
-            .map_err(|error| error.in_demo(m))?;
-        contexts.row_mut(m).assign(&Array1::from_vec(context.to_vec()));
-    }
-    Ok(Some(contexts))
+    contexts.map(|contexts| tabulate(&contexts)).transpose()
 }
 
 /// Names of the DoFs: those of the demonstrations if they carry any, which must agree.

@@ -62,6 +62,7 @@
 
 mod align;
 mod attractor;
+mod band;
 pub mod basis;
 mod batch;
 mod combine;
@@ -93,9 +94,9 @@ pub use align::Alignment;
 pub use attractor::Attractor;
 pub use batch::{Batch, BatchConditions, Chunks, Rows};
 pub use command::{Command, Coupling, Motion};
-pub use context::{ContextMap, Prediction};
+pub use context::{ContextColumn, ContextMap, Expected, MapChoice, MapKind, Prediction};
 pub use controller::{Controller, Status};
-pub use demo::{Demonstration, LEAST_SAMPLES, Sampling, Trajectory};
+pub use demo::{ContextValue, Demonstration, LEAST_SAMPLES, Sampling, Trajectory};
 pub use error::{Error, LARGEST, Result};
 pub use factor::{Factors, StyleCount};
 pub use fit::{DofScale, FitOptions, Stage, fit, style_of};

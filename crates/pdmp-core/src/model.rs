@@ -6,6 +6,7 @@ use ndarray::Array2;
 
 use crate::attractor::{Attractor, State};
 use crate::context::{ContextMap, Prediction};
+use crate::demo::ContextValue;
 use crate::error::{Error, Result, check_positive, check_vector};
 use crate::landscape::Landscape;
 use crate::lanes::{Lanes, groups};
@@ -26,7 +27,7 @@ pub struct Demonstrated {
     pub anchors: Array2<f64>,
     /// Durations or periods (M,), in seconds.
     pub durations: Vec<f64>,
-    /// Contexts (M, Q).
+    /// Contexts (M, Q), labels as their index among [`ContextMap::columns`].
     pub contexts: Option<Array2<f64>>,
     /// Index of the nominal demonstration.
     pub nominal: usize,
@@ -46,6 +47,8 @@ pub struct Learnt {
     pub singular_values: Vec<f64>,
     /// Share of the targets, by root mean square, that J styles leave out.
     pub left_out: f64,
+    /// Variance over the phase (S, D) of what J styles leave out of the demonstrations, where contexts are known.
+    pub left_over: Option<Array2<f64>>,
     /// The basis functions, in one line.
     pub basis: String,
 }
@@ -163,15 +166,21 @@ impl Model {
         self.demonstrated.durations[self.demonstrated.nominal]
     }
 
-    /// The movement for a context (Q,), by the linear map of Section 4.1.2.
+    /// The map from contexts to style, goal and start or anchor, and logarithm of the duration, where contexts are
+    /// known.
+    pub fn map(&self) -> Option<&ContextMap> {
+        self.map.as_ref()
+    }
+
+    /// The movement for a context (Q,), as in Section 4.1.2.
     ///
     /// # Errors
-    /// A model without contexts, a context of another length, or a number that is not finite.
-    pub fn predict(&self, context: &[f64]) -> Result<Prediction> {
+    /// A model without contexts, a context of another length, a label never shown, or a number that is not finite.
+    pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<Prediction> {
         let map = self.map.as_ref().ok_or(Error::Arguments(
             "the model knows no contexts: fit it with contexts=, or with demonstrations that carry one",
         ))?;
-        map.predict(context, self.kind(), self.n_styles(), self.n_dofs())
+        Prediction::of(map.predict(context)?, map.freedom(), self.kind(), self.n_styles(), self.n_dofs())
     }
 
     /// The conditions of a prediction, with τ scaled to the predicted duration.

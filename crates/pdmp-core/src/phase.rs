@@ -31,6 +31,14 @@ impl Kind {
         }
     }
 
+    /// Samples that make so many intervals from the start to the end of the movement, or to the next cycle.
+    pub(crate) fn samples(self, n_steps: usize) -> usize {
+        match self {
+            Kind::Discrete => n_steps + 1,
+            Kind::Rhythmic => n_steps,
+        }
+    }
+
     /// Intervals from the first of `n_samples` to the end of the movement, or to the next cycle.
     pub(crate) fn steps(self, n_samples: usize) -> usize {
         match self {

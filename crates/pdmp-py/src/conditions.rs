@@ -38,7 +38,8 @@ impl Arguments<'_, '_> {
         context: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Conditions> {
         let given = self.conditions()?;
-        let Some(context) = optional("context", context)? else { return Ok(given) };
+        let Some(context) = context else { return Ok(given) };
+        let context = crate::convert::context("context", context)?;
         if given.style.is_some() {
             return Err(PyValueError::new_err("pass style or context, not both: the context predicts the style"));
         }

@@ -5,9 +5,11 @@ use numpy::{
     AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayLikeDyn, PyArrayMethods,
     PyUntypedArray, PyUntypedArrayMethods,
 };
-use pdmp_core::Threads;
-use pyo3::exceptions::PyValueError;
+use pdmp_core::{ContextValue, Threads};
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyString};
 
 use crate::error::raise;
 
@@ -71,6 +73,65 @@ pub(crate) fn refill(name: &str, value: &Bound<'_, PyAny>, buffer: &mut Vec<f64>
 /// A vector that may be missing.
 pub(crate) fn optional(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
     value.map(|value| vector(name, value)).transpose()
+}
+
+/// A context (Q,) of numbers and labels.
+pub(crate) fn context(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<ContextValue>> {
+    let Ok(items) = value.try_iter() else { return Ok(vec![context_value(name, value)?]) };
+    if value.is_instance_of::<PyString>() {
+        return Err(PyTypeError::new_err(format!("{name} is a single text: put it into a list, one value per column")));
+    }
+    items.enumerate().map(|(q, item)| context_value(&format!("{name}[{q}]"), &item?)).collect()
+}
+
+fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue> {
+    if let Ok(label) = value.extract::<String>() {
+        return Ok(ContextValue::Label(label));
+    }
+    value.extract().map(ContextValue::Number).map_err(|_| {
+        let shown = value.repr().map_or_else(|_| "it".to_string(), |repr| repr.to_string());
+        PyTypeError::new_err(format!("{name} = {shown}: expected a number or a text"))
+    })
+}
+
+/// Contexts (M, Q) of numbers and labels.
+pub(crate) fn contexts(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
+    let shape: Option<Vec<usize>> = value.getattr("shape").and_then(|shape| shape.extract()).ok();
+    if shape.as_ref().is_some_and(|shape| shape.len() != 2) {
+        let shape = shape.unwrap_or_default();
+        return Err(PyValueError::new_err(format!("contexts has shape {shape:?}, expected two axes (M, Q)")));
+    }
+    let rows = value
+        .try_iter()
+        .map_err(|_| PyTypeError::new_err("contexts must be an array of shape (M, Q), or a list of M lists"))?;
+    rows.enumerate()
+        .map(|(m, row)| {
+            let row = row?;
+            if row.is_instance_of::<PyString>() || row.try_iter().is_err() {
+                let shown = row.repr()?;
+                return Err(PyValueError::new_err(format!(
+                    "contexts[{m}] = {shown}: expected two axes (M, Q): put the values of each demonstration into a list"
+                )));
+            }
+            context(&format!("contexts[{m}]"), &row)
+        })
+        .collect()
+}
+
+/// A context as numpy has it where all are numbers, or as a list with its labels.
+pub(crate) fn shown_context<'py>(py: Python<'py>, context: &[ContextValue]) -> PyResult<Bound<'py, PyAny>> {
+    let numbers: Option<Vec<f64>> = context
+        .iter()
+        .map(|value| if let ContextValue::Number(number) = value { Some(*number) } else { None })
+        .collect();
+    if let Some(numbers) = numbers {
+        return Ok(to_numpy(py, &numbers).into_any());
+    }
+    let values = context.iter().map(|value| match value {
+        ContextValue::Number(number) => number.into_bound_py_any(py),
+        ContextValue::Label(label) => label.into_bound_py_any(py),
+    });
+    Ok(PyList::new(py, values.collect::<PyResult<Vec<_>>>()?)?.into_any())
 }
 
 /// One number, or a vector.

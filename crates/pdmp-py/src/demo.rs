@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::{Matrix, Vector, matrix, optional, to_numpy};
+use crate::convert::{Matrix, Vector, matrix, optional, shown_context, to_numpy};
 use crate::error::raise;
 
 /// One recorded movement.
@@ -22,7 +22,7 @@ use crate::error::raise;
 ///     Strictly increasing time stamps in s.
 /// goal : array_like, (D,), optional
 ///     Point attractor; the last sample serves otherwise.
-/// context : array_like, (Q,), optional
+/// context : array_like or list, (Q,), optional
 ///     The condition under which the movement was made, such as an obstacle's height.
 /// names : sequence of str, optional
 ///     One name per degree of freedom.
@@ -58,8 +58,8 @@ impl Demonstration {
         if let Some(goal) = optional("goal", goal)? {
             demo = demo.with_goal(goal).map_err(raise)?;
         }
-        if let Some(context) = optional("context", context)? {
-            demo = demo.with_context(context).map_err(raise)?;
+        if let Some(values) = context {
+            demo = demo.with_context(crate::convert::context("context", values)?).map_err(raise)?;
         }
         if let Some(names) = names {
             demo = demo.with_names(names).map_err(raise)?;
@@ -101,10 +101,10 @@ impl Demonstration {
         self.0.goal().map(|goal| to_numpy(py, goal))
     }
 
-    /// Condition (Q,), if one was given.
+    /// Condition (Q,), if one was given: an array, or a list where there are labels.
     #[getter]
-    fn context<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
-        self.0.context().map(|context| to_numpy(py, context))
+    fn context<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.0.context().map(|context| shown_context(py, context)).transpose()
     }
 
     /// Names of the degrees of freedom, if they were given.
@@ -133,19 +133,23 @@ impl Demonstration {
             _ => options.set_item("dt", self.dt())?,
         }
         options.set_item("goal", self.goal(py))?;
-        options.set_item("context", self.context(py))?;
+        options.set_item("context", self.context(py)?)?;
         options.set_item("names", self.names())?;
         Ok(((self.position(py),), options))
     }
 
-    fn __repr__(&self) -> String {
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let rate = match self.0.sampling() {
             Sampling::Unknown => "rate unknown".to_string(),
             Sampling::Uniform { dt } => format!("dt {dt} s"),
             Sampling::Stamped { time } => format!("{} s", time[time.len() - 1] - time[0]),
         };
-        let context = self.0.context().map_or(String::new(), |context| format!(", context {context:?}"));
-        format!("<pdmp.Demonstration: {} samples × {} DoFs, {rate}{context}>", self.0.n_samples(), self.0.n_dofs())
+        let context = match self.context(py)? {
+            None => String::new(),
+            Some(context) => format!(", context {}", context.call_method0("tolist").unwrap_or(context).repr()?),
+        };
+        let (n_samples, n_dofs) = (self.0.n_samples(), self.0.n_dofs());
+        Ok(format!("<pdmp.Demonstration: {n_samples} samples × {n_dofs} DoFs, {rate}{context}>"))
     }
 }
 

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use ndarray::{ArrayD, Axis, Ix2};
 use pdmp_core::basis::Basis;
-use pdmp_core::{Alignment, DofScale, FitOptions, Kind, Sampling, Smoothing, Stage, StyleCount};
+use pdmp_core::{Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Sampling, Smoothing, Stage, StyleCount};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::basis::{Gp, NGnet};
-use crate::convert::{array, count, matrix, numbers};
+use crate::convert::{array, count, numbers};
 use crate::demo::Demonstration;
 use crate::error::{detached, raise};
 use crate::model::Model;
@@ -29,8 +29,12 @@ use crate::model::Model;
 ///     Sampling interval in s of the demonstrations that carry none.
 /// period : float or (M,) array_like, optional
 ///     Periods in s of time-stamped cycles.
-/// contexts : (M, Q) array_like, optional
+/// contexts : (M, Q) array_like, or M lists of Q numbers and labels, optional
 ///     The condition of each demonstration; otherwise those that they carry.
+/// map : {"auto", "linear", "polynomial", "gp"}
+///     What leads from contexts to movements: least squares as in the paper, ridge regression on polynomials of second
+///     degree, or a Gaussian process. "auto" is the process, unless another is better at contexts left out by more
+///     than one standard error; `model.map` tells.
 /// n_styles : int, optional
 ///     Style dimension J; otherwise from `spectrum`.
 /// spectrum : float
@@ -76,10 +80,10 @@ use crate::model::Model;
 /// Matsubara, Hyon, Morimoto, Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
 #[pyfunction]
 #[pyo3(signature = (
-    demos, *, kind="discrete", dt=None, period=None, contexts=None, n_styles=None, spectrum=0.9, basis=None,
+    demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, spectrum=0.9, basis=None,
     smoothing=None, nominal=None, n_samples=None, dof_scale=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None,
     mu=1.0, threads=None, progress=None
-), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, n_styles=None, spectrum=0.9, \
+), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, spectrum=0.9, \
     basis='gp', smoothing=None, nominal=None, n_samples=None, dof_scale=None, tau=None, alpha_z=25.0, beta_z=None, \
     alpha_x=None, mu=1.0, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
@@ -90,6 +94,7 @@ pub(crate) fn fit(
     dt: Option<f64>,
     period: Option<&Bound<'_, PyAny>>,
     contexts: Option<&Bound<'_, PyAny>>,
+    map: &str,
     n_styles: Option<isize>,
     spectrum: f64,
     basis: Option<&Bound<'_, PyAny>>,
@@ -115,7 +120,8 @@ pub(crate) fn fit(
             nominal: nominal.map(|n| count("nominal", n)).transpose()?,
             n_samples: n_samples.map(|n| count("n_samples", n)).transpose()?,
         },
-        contexts: contexts.map(|contexts| matrix("contexts", "(M, Q)", contexts)).transpose()?,
+        contexts: contexts.map(crate::convert::contexts).transpose()?,
+        map: map_of(map)?,
         styles: style_count(n_styles, spectrum)?,
         basis: basis_of(basis)?,
         dof_scale: dof_scale_of(dof_scale)?,
@@ -177,6 +183,15 @@ fn unrated(m: usize, position: ArrayD<f64>) -> PyResult<pdmp_core::Demonstration
         PyValueError::new_err(format!("demo {m}: position has shape {shape:?}, expected two axes (T, D)"))
     })?;
     pdmp_core::Demonstration::new(position, Sampling::Unknown).map_err(|error| raise(error.in_demo(m)))
+}
+
+pub(crate) fn map_of(map: &str) -> PyResult<MapChoice> {
+    if map == "auto" {
+        return Ok(MapChoice::Auto);
+    }
+    let found = MapKind::ALL.into_iter().find(|kind| kind.name() == map);
+    let wanted = "must be \"auto\", \"linear\", \"polynomial\" or \"gp\"";
+    found.map(MapChoice::Given).ok_or_else(|| PyValueError::new_err(format!("map = {map:?}: {wanted}")))
 }
 
 pub(crate) fn kind_of(kind: &str) -> PyResult<Kind> {

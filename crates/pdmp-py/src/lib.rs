@@ -3,6 +3,7 @@
 mod basis;
 mod batch;
 mod conditions;
+mod context;
 mod controller;
 mod convert;
 mod demo;
@@ -32,6 +33,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<factor::Factors>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<batch::RolloutChunks>()?;
+    module.add_class::<context::ContextMap>()?;
     module.add_class::<prediction::Prediction>()?;
     module.add_class::<controller::Status>()?;
     module.add_class::<controller::Controller>()?;

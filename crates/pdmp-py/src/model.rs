@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use ndarray::Array3;
 use numpy::{IntoPyArray, ToPyArray};
-use pdmp_core::{Canonical, Timing, style_of};
+use pdmp_core::{Canonical, ContextColumn, Timing, style_of};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyList};
 
 use crate::conditions::Arguments;
+use crate::context::ContextMap;
 use crate::controller::Controller;
-use crate::convert::{Cube, Matrix, Vector, to_numpy, vector};
+use crate::convert::{Cube, Matrix, Vector, shown_context, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
 use crate::error::{interruptible, raise};
 use crate::prediction::Prediction;
@@ -161,10 +162,24 @@ impl Model {
         to_numpy(py, &self.0.demonstrated().durations)
     }
 
-    /// Contexts of the demonstrations (M, Q), if they had any.
+    /// Contexts of the demonstrations (M, Q), if they had any: an array, or lists where there are labels.
     #[getter]
-    fn contexts<'py>(&self, py: Python<'py>) -> Option<Matrix<'py>> {
-        self.0.demonstrated().contexts.as_ref().map(|contexts| contexts.to_pyarray(py))
+    fn contexts<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let (Some(contexts), Some(map)) = (&self.0.demonstrated().contexts, self.0.map()) else { return Ok(None) };
+        if map.columns().iter().all(|column| *column == ContextColumn::Number) {
+            return Ok(Some(contexts.to_pyarray(py).into_any()));
+        }
+        let rows = contexts.rows().into_iter().map(|row| {
+            let context = map.context(&row.to_vec()).map_err(raise)?;
+            shown_context(py, &context)
+        });
+        Ok(Some(PyList::new(py, rows.collect::<PyResult<Vec<_>>>()?)?.into_any()))
+    }
+
+    /// What leads from contexts to movements, if there are any.
+    #[getter]
+    fn map(&self) -> Option<ContextMap> {
+        self.0.map().cloned().map(ContextMap)
     }
 
     /// What was chosen for the basis functions, in one line.
@@ -288,11 +303,11 @@ impl Model {
         Ok(landscape.into_pyarray(py))
     }
 
-    /// The movement for a condition, by the linear map of Section 4.1.2.
+    /// The movement for a condition, as in Section 4.1.2.
     ///
     /// Parameters
     /// ----------
-    /// context : array_like, (Q,)
+    /// context : array_like or list, (Q,)
     ///     The condition.
     ///
     /// Returns
@@ -302,10 +317,47 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     A model fitted without contexts, a wrong length, or a number that is not finite.
+    ///     A model fitted without contexts, a wrong length, a label never shown, or a number that is not finite.
     fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
-        let prediction = self.0.predict(&vector("context", context)?).map_err(raise)?;
+        let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
         Ok(Prediction::new(py, prediction))
+    }
+
+    /// Bounds within which a new movement of a condition lies, for each sample of `rollout(context=context, dt=dt)`.
+    ///
+    /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, a = ∂y/∂(style, goal, start), the variance v that
+    /// the styles leave out of the demonstrations, and Student's quantile t for the degrees of freedom. Movements are
+    /// compared at equal phase: how their duration varies is in the prediction.
+    ///
+    /// Parameters
+    /// ----------
+    /// context : array_like or list, (Q,)
+    ///     The condition.
+    /// level : float
+    ///     Probability that a number lies within its bounds.
+    /// dt : float
+    ///     Interval between samples in s.
+    ///
+    /// Returns
+    /// -------
+    /// lower, upper : (T, D) ndarray
+    ///     In the unit of each degree of freedom.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A level that is no probability, what `predict` refuses, or demonstrations too few to tell a band.
+    #[pyo3(signature = (context, *, level=0.9, dt=0.01))]
+    fn band<'py>(
+        &self,
+        py: Python<'py>,
+        context: &Bound<'_, PyAny>,
+        level: f64,
+        dt: f64,
+    ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
+        let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+        let [lower, upper] = self.0.band(&prediction, level, Timing { dt, duration: None }).map_err(raise)?;
+        Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 
     /// Write a model file. It appears whole or not at all, whatever interrupts the writing.

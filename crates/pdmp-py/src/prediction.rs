@@ -1,6 +1,6 @@
 //! The prediction of a context map in Python.
 
-use numpy::{IntoPyArray, PyArray1, PyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::convert::to_numpy;
@@ -21,6 +21,11 @@ pub(crate) struct Prediction {
     /// Covariance (P, P) of style, goal and start or anchor, and duration, in this order, for a new movement; None
     /// where the demonstrations leave no degree of freedom to estimate it.
     covariance: Option<Py<PyArray2<f64>>>,
+    /// Degrees of freedom from which the covariance is known.
+    freedom: usize,
+    /// How far each value of the context lies outside of those demonstrated, in their range (Q,): 0 inside and for
+    /// labels, infinite where a value that was never varied differs.
+    outside: Py<PyArray1<f64>>,
 }
 
 impl Prediction {
@@ -33,6 +38,8 @@ impl Prediction {
             anchor: optional(prediction.anchor),
             duration: prediction.duration,
             covariance: prediction.covariance.map(|covariance| covariance.into_pyarray(py).unbind()),
+            freedom: prediction.freedom,
+            outside: to_numpy(py, &prediction.outside).unbind(),
         }
     }
 }
@@ -40,6 +47,16 @@ impl Prediction {
 #[pymethods]
 impl Prediction {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("<pdmp.Prediction: style {}, duration {:.4} s>", self.style.bind(py).repr()?, self.duration))
+        let most = self.outside.bind(py).readonly().as_array().fold(0.0f64, |most, outside| most.max(*outside));
+        let warning = match most {
+            0.0 => String::new(),
+            most if most.is_finite() => format!("; outside of the demonstrated contexts by {most:.2} of their range"),
+            _ => "; outside of the demonstrated contexts, which do not vary in this".to_string(),
+        };
+        Ok(format!(
+            "<pdmp.Prediction: style {}, duration {:.4} s{warning}>",
+            self.style.bind(py).repr()?,
+            self.duration
+        ))
     }
 }

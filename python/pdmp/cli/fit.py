@@ -26,6 +26,12 @@ def arguments(parser: ArgumentParser) -> None:
         "--context", nargs="+", metavar="NAME", help="columns of index.csv that make the context"
     )
     parser.add_argument(
+        "--map",
+        choices=["auto", "linear", "polynomial", "gp"],
+        default="auto",
+        help="what leads from contexts to movements; default: auto",
+    )
+    parser.add_argument(
         "--kind",
         choices=["discrete", "rhythmic"],
         default="discrete",
@@ -64,6 +70,7 @@ def run(options: Namespace) -> None:
             recordings,
             kind=options.kind,
             period=options.period,
+            map=options.map,
             n_styles=options.styles,
             spectrum=options.spectrum,
             basis=options.basis,

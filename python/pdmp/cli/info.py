@@ -4,6 +4,7 @@ example: pdmp info reach.safetensors
 """
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -37,10 +38,18 @@ def run(options: Namespace) -> None:
         "constants": constants,
     }
     if model.contexts is not None:
-        low, high = model.contexts.min(axis=0), model.contexts.max(axis=0)
-        lines["contexts"] = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high, strict=True))
+        columns = zip(*model.contexts, strict=True)
+        lines["contexts"] = ", ".join(_extent(column) for column in columns)
+        lines["map"] = str(model.map)
     for name, text in lines.items():
         print(f"{name:<16}{text}")
+
+
+def _extent(values: Sequence[float | str]) -> str:
+    """Write the labels, or the range of the numbers, that a value of the contexts has."""
+    labels = sorted({value for value in values if isinstance(value, str)})
+    numbers = [value for value in values if not isinstance(value, str)]
+    return " ".join(labels) or f"{min(numbers):g} to {max(numbers):g}"
 
 
 def _several(values: np.ndarray) -> str:

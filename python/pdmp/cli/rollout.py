@@ -17,7 +17,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help="CSV to write")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--style", nargs="+", type=float, metavar="S", help="style parameters")
-    which.add_argument("--context", nargs="+", type=float, metavar="C", help="context to meet")
+    which.add_argument("--context", nargs="+", type=_value, metavar="C", help="context to meet")
     which.add_argument("--demo", type=int, metavar="M", help="demonstration to repeat, from 0")
     for name, text in (
         ("goal", "where a discrete movement ends"),
@@ -43,3 +43,11 @@ def run(options: Namespace) -> None:
     trajectory = model.rollout(**given)
     demos.write_csv(options.output, trajectory, model.names)
     print(f"{options.output}: {len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
+
+
+def _value(text: str) -> float | str:
+    """Return a number, or a label."""
+    try:
+        return float(text)
+    except ValueError:
+        return text

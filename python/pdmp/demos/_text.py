@@ -53,6 +53,11 @@ def number(path: Path, line: int, name: str, field: str) -> float:
     return value
 
 
+def is_number(field: str) -> bool:
+    """Say whether a field holds a number, finite or not."""
+    return _parsed(field) is not None
+
+
 def _parsed(field: str) -> float | None:
     try:
         return float(field)

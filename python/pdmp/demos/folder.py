@@ -29,7 +29,7 @@ def read(
     dt : float, optional
         Sampling interval [s], in place of time stamps.
     context : sequence of str, optional
-        Columns of the folders' index whose numbers make the context (Q,).
+        Columns of the folders' index whose numbers or labels make the context (Q,).
 
     Raises
     ------
@@ -71,7 +71,7 @@ def read_folder(
     dt : float, optional
         Sampling interval [s], in place of time stamps.
     context : sequence of str, optional
-        Columns of the index whose numbers make the context (Q,) of each demonstration.
+        Columns of the index whose numbers or labels make the context (Q,) of each demonstration.
 
     Raises
     ------
@@ -100,16 +100,22 @@ def read_folder(
     }
 
 
-def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float] | None]:
-    """Read the ids in an index, each with its context."""
-    lines = _text.rows(path)
-    _, header = next(lines)
+def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str] | None]:
+    """Read the ids in an index, each with its context.
+
+    A column without any number holds labels.
+    """
+    (_, header), *lines = _text.rows(path)
     name = _text.column(path, header, "id")
     where = [_text.column(path, header, column) for column in columns]
-    contexts: dict[str, list[float] | None] = {}
+    labels = {k for k in where if not any(_text.is_number(fields[k]) for _, fields in lines)}
+    contexts: dict[str, list[float | str] | None] = {}
     for line, fields in lines:
         if fields[name] in contexts:
             raise ValueError(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
-        values = [_text.number(path, line, header[k], fields[k]) for k in where]
+        values = [
+            fields[k] if k in labels else _text.number(path, line, header[k], fields[k])
+            for k in where
+        ]
         contexts[fields[name]] = values or None
     return contexts

@@ -19,7 +19,7 @@ def read_csv(
     columns: Sequence[str] | None = None,
     time: str = "t",
     dt: float | None = None,
-    context: Sequence[float] | None = None,
+    context: Sequence[float | str] | None = None,
 ) -> Demonstration:
     """Read one demonstration from a CSV file.
 
@@ -33,7 +33,7 @@ def read_csv(
         Column of the time stamps [s].
     dt : float, optional
         Sampling interval [s], in place of time stamps.
-    context : sequence of float, optional
+    context : sequence of float or str, optional
         Context (Q,) of the demonstration.
 
     Raises

@@ -55,7 +55,8 @@ def styles(
 ) -> Figure:
     """Draw the style of each demonstration, in the planes of the first three style parameters.
 
-    Without labels, the colour tells the context where that is a single number.
+    Without labels, the context serves where that is a single one, or the colour tells it where
+    it is a single number.
 
     Parameters
     ----------
@@ -77,14 +78,18 @@ def styles(
         raise ValueError(
             f"labels has length {len(labels)}, expected {model.n_demos}: one per demonstration"
         )
+    context = model.contexts if labels is None else None
+    if isinstance(context, list) and len(context[0]) == 1:
+        labels = [str(value) for (value,) in context]
     # The index of the demonstration takes the place of a second style parameter.
     points = np.column_stack([model.styles, np.arange(model.n_demos)])
     names = [f"style $s_{{{j + 1}}}$" for j in range(model.n_styles)] + ["demonstration"]
     others = [1, 2] if model.n_styles > 2 else [1]
     figure = canvas(figure, 1.0 + 4.5 * len(others), 4.2)
     groups = list(dict.fromkeys(labels or [""]))
-    context = model.contexts if labels is None else None
-    values = context[:, 0] if context is not None and context.shape[1] == 1 else None
+    values = None
+    if isinstance(context, np.ndarray) and context.shape[1] == 1:
+        values = context[:, 0]
     panels = figure.subplots(1, len(others), squeeze=False)[0]
     for axes, other in zip(panels, others, strict=True):
         for k, group in enumerate(groups):

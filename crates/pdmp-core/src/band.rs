@@ -1,0 +1,158 @@
+//! How a predicted movement may turn out: the covariance of its conditions, seen through the responses to each, and what
+//! its styles leave out.
+//!
+//! At one phase y = Σⱼ sⱼRⱼ + g(1 − E) + y(0)E, or Σⱼ sⱼRⱼ + y_a about an anchor, is linear in what a map predicts.
+//! A movement is compared with another at equal phase, so that its duration plays no part.
+
+use std::sync::Arc;
+
+use ndarray::{Array1, Array2, ArrayView1, Axis};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::align::Aligned;
+use crate::context::{Prediction, outputs};
+use crate::error::{Error, Result};
+use crate::model::Model;
+use crate::phase::Kind;
+use crate::responses::{Curves, Derivative};
+use crate::rollout::Timing;
+
+/// Steps of a movement over which errors are averaged.
+const STEPS: usize = 100;
+
+/// Positions per unit of each output but the duration.
+struct Sensitivity<'a> {
+    curves: &'a Curves,
+    kind: Kind,
+}
+
+impl Sensitivity<'_> {
+    /// Indices and values of the outputs that move DoF `d` at sample `k`.
+    fn of(&self, k: usize, d: usize) -> Vec<(usize, f64)> {
+        let (n_styles, n_dofs) = (self.curves.styles.len(), self.curves.start.ncols());
+        let styles = self.curves.styles.iter().enumerate().map(|(j, curve)| (j, curve[[k, d]]));
+        let start = self.curves.start[[k, d]];
+        let places = match self.kind {
+            Kind::Discrete => vec![(n_styles + d, 1.0 - start), (n_styles + n_dofs + d, start)],
+            Kind::Rhythmic => vec![(n_styles + d, 1.0)],
+        };
+        styles.chain(places).collect()
+    }
+
+    /// Positions (T, D) for the outputs of one movement.
+    fn positions(&self, outputs: ArrayView1<f64>) -> Array2<f64> {
+        Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| {
+            self.of(k, d).iter().map(|&(i, x)| outputs[i] * x).sum()
+        })
+    }
+
+    /// Variances (T, D) for a covariance of the outputs.
+    fn variances(&self, covariance: &Array2<f64>) -> Array2<f64> {
+        Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| {
+            let active = self.of(k, d);
+            let row = |i: usize| active.iter().map(|&(j, y)| covariance[[i, j]] * y).sum::<f64>();
+            active.iter().map(|&(i, x)| x * row(i)).sum::<f64>().max(0.0)
+        })
+    }
+}
+
+impl Model {
+    /// What a map is to predict (M, P).
+    pub(crate) fn outputs(&self) -> Array2<f64> {
+        let shown = &self.demonstrated;
+        let places = [shown.goals.view(), shown.starts.view(), shown.anchors.view()];
+        outputs(self.kind(), shown.styles.view(), places, &shown.durations)
+    }
+
+    /// The matrix (P, P) that makes errors of the outputs into the mean square of the movement's, summed over DoFs. A
+    /// duration that is off by all of itself counts as much as the nominal movement's own variation.
+    pub(crate) fn metric(self: &Arc<Self>) -> Result<Array2<f64>> {
+        let (kind, outputs) = (self.kind(), self.outputs());
+        let responses = self.phases(&mut |_| Ok(()))?;
+        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind };
+        let (length, n_dofs) = sensitivity.curves.start.dim();
+        let mut metric = Array2::zeros((outputs.ncols(), outputs.ncols()));
+        for (k, d) in (0..length).flat_map(|k| (0..n_dofs).map(move |d| (k, d))) {
+            let active = sensitivity.of(k, d);
+            for &(i, x) in &active {
+                active.iter().for_each(|&(j, y)| metric[[i, j]] += x * y / length as f64);
+            }
+        }
+        let nominal = sensitivity.positions(outputs.row(self.demonstrated.nominal));
+        metric[[outputs.ncols() - 1, outputs.ncols() - 1]] = nominal.var_axis(Axis(0), 0.0).sum();
+        Ok(metric)
+    }
+
+    /// Variance (S, D) over the phase of what the styles leave out of the demonstrations.
+    pub(crate) fn left_over(self: &Arc<Self>, aligned: Aligned) -> Result<Array2<f64>> {
+        let (kind, outputs) = (self.kind(), self.outputs());
+        let responses = self.phases(&mut |_| Ok(()))?;
+        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind };
+        let n_samples = kind.samples(STEPS);
+        let aligned = aligned.resampled(n_samples);
+        let mut sum = Array2::zeros((n_samples, self.n_dofs()));
+        let mut shown = Array2::zeros(sum.dim());
+        for (m, outputs) in outputs.rows().into_iter().enumerate() {
+            aligned.sample(m, shown.as_slice_mut().unwrap_or_default())?;
+            let made = sensitivity.positions(outputs);
+            sum.zip_mut_with(&(&shown - &made.slice(ndarray::s![..n_samples, ..])), |sum, error| *sum += error * error);
+        }
+        Ok(sum / (outputs.nrows() - 1).max(1) as f64)
+    }
+
+    /// Responses over the demonstrated duration, in as many steps as errors are averaged over.
+    fn phases(
+        self: &Arc<Self>,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Arc<crate::responses::Responses>> {
+        self.responses(self.tau, Timing { dt: self.duration() / STEPS as f64, duration: None }, proceed)
+    }
+
+    /// Bounds (T, D) within which a new movement of the predicted condition lies at each phase, with the probability
+    /// `level` for each number by itself: the samples of [`Model::rollout`] with the prediction's conditions,
+    ///
+    /// ```text
+    /// y ± t·√(aᵀΣa + v),
+    /// ```
+    ///
+    /// with the covariance Σ of the prediction, a = ∂y/∂(style, goal, start), the variance v that the styles leave out
+    /// of the demonstrations, and Student's quantile t for the prediction's degrees of freedom.
+    ///
+    /// # Errors
+    /// A prediction without covariance, or a level that is no probability; else as for a rollout.
+    pub fn band(self: &Arc<Self>, prediction: &Prediction, level: f64, timing: Timing) -> Result<[Array2<f64>; 2]> {
+        if !(level > 0.0 && level < 1.0) {
+            return Err(Error::Range { name: "level", value: level, allowed: "must lie between 0 and 1" });
+        }
+        let covariance = prediction.covariance.as_ref().ok_or(Error::Arguments(
+            "the demonstrations leave nothing from which a band could be told: show more, or more contexts",
+        ))?;
+        let left_over = self.learnt.left_over.as_ref().ok_or(Error::Arguments("the model knows no contexts"))?;
+        let conditions = self.conditions(prediction);
+        let centre = self.rollout(&conditions, timing)?.position;
+        let tau = conditions.tau.unwrap_or(self.tau);
+        let responses = self.responses(tau, timing, &mut |_| Ok(()))?;
+        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind: self.kind() };
+        let mut width = sensitivity.variances(covariance);
+        let step = timing.dt * STEPS as f64 / (self.duration() * tau / self.tau);
+        for (k, mut width) in width.rows_mut().into_iter().enumerate() {
+            width += &at(left_over, k as f64 * step, self.kind());
+        }
+        let student = StudentsT::new(0.0, 1.0, prediction.freedom.max(1) as f64)
+            .map_err(|_| Error::Arguments("no degree of freedom is left"))?;
+        let quantile = student.inverse_cdf(0.5 * (1.0 + level));
+        let width = width.mapv(|variance| quantile * variance.sqrt());
+        Ok([&centre - &width, &centre + &width])
+    }
+}
+
+/// Curves (S, D) at a place between two samples: the last one past the end, or around.
+fn at(curves: &Array2<f64>, place: f64, kind: Kind) -> Array1<f64> {
+    let n = curves.nrows();
+    let (low, share) = (place.floor(), place.fract());
+    let row = |k: f64| match kind {
+        Kind::Discrete => curves.row((k as usize).min(n - 1)),
+        Kind::Rhythmic => curves.row(k as usize % n),
+    };
+    &row(low) * (1.0 - share) + &row(low + 1.0) * share
+}

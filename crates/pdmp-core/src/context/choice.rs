@@ -1,0 +1,252 @@
+//! How a map is chosen: ratios and length by evidence, the kind of map by its error at contexts left out.
+
+use std::fmt;
+
+use ndarray::{Array1, Array2, ArrayView2, Axis};
+use serde::{Deserialize, Serialize};
+
+use super::kernel::Kernel;
+use super::kriging::{Kriging, Values};
+use crate::error::Result;
+
+/// Lengths that are tried, in units of the contexts' spread: from a quarter to eight.
+const LENGTHS: usize = 9;
+/// Grid of ln(ρ·mean λ), and how far the search goes on from its best.
+const GRID: (f64, f64, f64) = (-7.0, 16.0, 0.5);
+const HALVINGS: usize = 12;
+/// Fewest contexts between which a choice is made.
+const FEWEST: usize = 4;
+/// Most contexts of a map whose cost grows with their cube.
+pub(crate) const MOST: usize = 1024;
+
+/// What leads from contexts to movements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MapKind {
+    /// Least squares, as in Section 4.1.2 of the paper.
+    Linear,
+    /// Ridge regression on polynomials of second degree, the penalty of each output by its evidence.
+    Polynomial,
+    /// A Gaussian process (Matérn-5/2), length and the noise of each output by their evidence.
+    Gp,
+}
+
+impl MapKind {
+    /// All, the one first that returns to the mean outside of what was shown.
+    pub const ALL: [Self; 3] = [Self::Gp, Self::Polynomial, Self::Linear];
+
+    /// The name used in files and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Polynomial => "polynomial",
+            Self::Gp => "gp",
+        }
+    }
+}
+
+impl fmt::Display for MapKind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Linear => "linear",
+            Self::Polynomial => "polynomial",
+            Self::Gp => "Gaussian process",
+        })
+    }
+}
+
+/// How the map from contexts is chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MapChoice {
+    /// The Gaussian process, unless another map is better at contexts left out by more than one standard error.
+    #[default]
+    Auto,
+    /// This one.
+    Given(MapKind),
+}
+
+/// A map of one kind, with all its constants.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub(super) kind: MapKind,
+    pub(super) kernel: Option<Kernel>,
+    pub(super) kriging: Kriging,
+    pub(super) values: Values,
+    pub(super) ratios: Vec<f64>,
+}
+
+/// Places (n, F) and what was shown there (n, P).
+pub(super) struct Shown<'a> {
+    pub(super) inputs: ArrayView2<'a, f64>,
+    pub(super) n_inputs: usize,
+    pub(super) outputs: ArrayView2<'a, f64>,
+}
+
+impl Candidate {
+    /// The best map of a kind.
+    pub(super) fn of(kind: MapKind, shown: &Shown) -> Result<Self> {
+        match kind {
+            MapKind::Linear => Self::with(kind, None, shown, |_, _| vec![0.0; shown.outputs.ncols()]),
+            MapKind::Polynomial => {
+                Self::with(kind, Some(Kernel::Quadratic), shown, |kriging, values| ratios(kriging, values))
+            }
+            MapKind::Gp => {
+                let lively = lively(shown.outputs);
+                let mut best: Option<(f64, Kernel)> = None;
+                for k in 0..LENGTHS {
+                    let length = 0.25 * 32f64.powf(k as f64 / (LENGTHS - 1) as f64);
+                    let kernel = Kernel::Matern { length };
+                    let kriging = Kriging::new(shown.inputs, shown.n_inputs, false, Some(kernel))?;
+                    let values = kriging.project(shown.outputs);
+                    // Weak: a factor of e to either side of two spreads costs half a unit.
+                    let prior = -0.5 * (length.ln() - 0.7).powi(2);
+                    let evidence = Evidence::new(&kriging, &values).best();
+                    let total: f64 = lively.iter().map(|&p| evidence[p].1 + prior).sum();
+                    if best.is_none_or(|(most, _)| total > most) {
+                        best = Some((total, kernel));
+                    }
+                }
+                Self::with(kind, best.map(|(_, kernel)| kernel), shown, |kriging, values| ratios(kriging, values))
+            }
+        }
+    }
+
+    /// The map with a known kernel, and ratios as `ratios` finds them.
+    pub(super) fn with(
+        kind: MapKind,
+        kernel: Option<Kernel>,
+        shown: &Shown,
+        ratios: impl FnOnce(&Kriging, &Values) -> Vec<f64>,
+    ) -> Result<Self> {
+        let kriging = Kriging::new(shown.inputs, shown.n_inputs, kernel.is_none(), kernel)?;
+        let values = kriging.project(shown.outputs);
+        let ratios = ratios(&kriging, &values);
+        Ok(Self { kind, kernel, kriging, values, ratios })
+    }
+
+    /// Squared errors at each context left out (n,), by the metric (P, P).
+    fn errors(&self, metric: ArrayView2<f64>) -> Array1<f64> {
+        let errors = self.kriging.left_out(&self.values, &self.ratios);
+        if errors.iter().any(|error| !error.is_finite()) {
+            return Array1::from_elem(errors.nrows(), f64::INFINITY);
+        }
+        (errors.dot(&metric) * &errors).sum_axis(Axis(1))
+    }
+}
+
+/// The map of a choice, and the error of each that was tried at contexts left out.
+pub(super) fn choose(
+    choice: MapChoice,
+    shown: &Shown,
+    metric: ArrayView2<f64>,
+) -> Result<(Candidate, Vec<(MapKind, f64)>)> {
+    let n = shown.inputs.nrows();
+    let kinds = match choice {
+        MapChoice::Given(kind) => vec![kind],
+        MapChoice::Auto if (FEWEST..=MOST).contains(&n) => MapKind::ALL.to_vec(),
+        MapChoice::Auto => vec![MapKind::Linear],
+    };
+    let mut candidates = Vec::with_capacity(kinds.len());
+    for kind in kinds {
+        let candidate = Candidate::of(kind, shown)?;
+        let errors = candidate.errors(metric);
+        candidates.push((candidate, errors));
+    }
+    let tried: Vec<_> = candidates.iter().map(|(candidate, errors)| (candidate.kind, mean(errors))).collect();
+    let reference = candidates[0].1.clone();
+    let better = |errors: &Array1<f64>| {
+        let gain = &reference - errors;
+        let spread = (&gain - mean(&gain)).mapv(|x| x * x).sum() / (n * (n - 1).max(1)) as f64;
+        mean(&gain) > spread.sqrt()
+    };
+    let best = (1..candidates.len())
+        .filter(|&k| better(&candidates[k].1))
+        .min_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1))
+        .unwrap_or(0);
+    Ok((candidates.swap_remove(best).0, tried))
+}
+
+fn mean(values: &Array1<f64>) -> f64 {
+    values.mean().unwrap_or(0.0)
+}
+
+/// Outputs that vary at all.
+fn lively(outputs: ArrayView2<f64>) -> Vec<usize> {
+    let varies = |column: ndarray::ArrayView1<f64>| {
+        let mean = column.mean().unwrap_or(0.0);
+        let size = column.fold(0.0f64, |most, y| most.max(y.abs()));
+        column.iter().any(|y| (y - mean).abs() > 1e-9 * size)
+    };
+    (0..outputs.ncols()).filter(|&p| varies(outputs.column(p))).collect()
+}
+
+/// The ratio ρ of each output, by its evidence.
+fn ratios(kriging: &Kriging, values: &Values) -> Vec<f64> {
+    let evidence = Evidence::new(kriging, values);
+    evidence.best().iter().enumerate().map(|(p, &(at, value))| evidence.refined(p, at, value)).collect()
+}
+
+/// Restricted log likelihood of the ratio ρ, and a weak prior on it (Patterson and Thompson, Biometrika 58, 1971).
+struct Evidence<'a> {
+    eigenvalues: &'a [f64],
+    squares: Array2<f64>,
+    /// Mean of the eigenvalues: of the same size as a ratio's inverse.
+    unit: f64,
+}
+
+impl<'a> Evidence<'a> {
+    fn new(kriging: &'a Kriging, values: &Values) -> Self {
+        let eigenvalues = kriging.eigenvalues().and_then(|values| values.as_slice()).unwrap_or_default();
+        let unit = (eigenvalues.iter().sum::<f64>() / eigenvalues.len().max(1) as f64).max(f64::MIN_POSITIVE);
+        Self { eigenvalues, squares: values.rest.mapv(|b| b * b), unit }
+    }
+
+    fn ratio(&self, at: f64) -> f64 {
+        if at == f64::NEG_INFINITY { 0.0 } else { at.exp() / self.unit }
+    }
+
+    /// The best place of the grid for each output, as ln(ρ·mean λ), and its evidence.
+    fn best(&self) -> Vec<(f64, f64)> {
+        let (low, high, step) = GRID;
+        let places = 1 + ((high - low) / step) as usize;
+        let mut best = vec![(f64::NEG_INFINITY, f64::NEG_INFINITY); self.squares.ncols()];
+        for at in std::iter::once(f64::NEG_INFINITY).chain((0..places).map(|k| low + k as f64 * step)) {
+            let ratio = self.ratio(at);
+            let shrinkage: Array1<f64> = self.eigenvalues.iter().map(|l| 1.0 / (ratio * l + 1.0)).collect();
+            let volume: f64 = self.eigenvalues.iter().map(|l| (ratio * l).ln_1p()).sum();
+            for (best, sum) in best.iter_mut().zip(shrinkage.dot(&self.squares)) {
+                let value = self.value(at, sum, volume);
+                if value > best.1 {
+                    *best = (at, value);
+                }
+            }
+        }
+        best
+    }
+
+    fn value(&self, at: f64, sum: f64, volume: f64) -> f64 {
+        let freedom = self.eigenvalues.len() as f64;
+        let prior = ((at.exp() + 1e-3).ln() / 3.0).powi(2);
+        -0.5 * (freedom * (sum / freedom).max(1e-300).ln() + volume + prior)
+    }
+
+    /// The ratio of one output, from the best place of the grid on.
+    fn refined(&self, p: usize, mut at: f64, mut value: f64) -> f64 {
+        let mut step = 0.5 * GRID.2;
+        for _ in 0..if at.is_finite() { HALVINGS } else { 0 } {
+            for side in [at - step, at + step] {
+                let ratio = self.ratio(side);
+                let terms = self.eigenvalues.iter().zip(self.squares.column(p));
+                let (sum, volume) = terms.fold((0.0, 0.0), |(sum, volume), (l, square)| {
+                    (sum + square / (ratio * l + 1.0), volume + (ratio * l).ln_1p())
+                });
+                let found = self.value(side, sum, volume);
+                if found > value {
+                    (at, value) = (side, found);
+                }
+            }
+            step *= 0.5;
+        }
+        self.ratio(at)
+    }
+}

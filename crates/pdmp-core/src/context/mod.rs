@@ -1,0 +1,268 @@
+//! From a condition to a movement (Section 4.1.2): the map U from contexts to all that a movement needs.
+//!
+//! The paper predicts the style alone, by least squares. Goal, start, anchor and duration vary with the condition too,
+//! so one map predicts them together. The duration enters by its logarithm and so stays positive. Demonstrations of
+//! one context are averaged, and every context counts once: what they share beyond their context must not weigh by
+//! how often it was shown.
+
+mod choice;
+mod kernel;
+mod kriging;
+mod prediction;
+mod space;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashMap;
+
+use ndarray::{Array2, ArrayView2, Axis};
+
+pub use choice::{MapChoice, MapKind};
+pub(crate) use kernel::Kernel;
+pub use prediction::Prediction;
+pub(crate) use prediction::outputs;
+pub use space::ContextColumn;
+pub(crate) use space::tabulate;
+
+use choice::{Candidate, MOST, Shown, choose};
+use kriging::Kriging;
+use space::{Scale, numbers};
+
+use crate::demo::{ContextValue, check_matrix};
+use crate::error::{Error, Result};
+
+/// A map from contexts of Q values to P outputs, with the covariance of what it predicts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContextMap {
+    columns: Vec<ContextColumn>,
+    scale: Scale,
+    kind: MapKind,
+    kernel: Option<Kernel>,
+    ratios: Vec<f64>,
+    errors: Vec<(MapKind, f64)>,
+    kriging: Kriging,
+    /// Coefficients (q, P) and (r, P) of a place's two kinds of coordinates.
+    flat: Array2<f64>,
+    rest: Array2<f64>,
+    /// Covariance (P, P) of the contexts' noise, where more contexts than coefficients leave any.
+    noise: Option<Array2<f64>>,
+    /// Covariance (P, P) that a new movement adds to it: that within a context, as far as it is not averaged away.
+    within: Option<Array2<f64>>,
+    freedom: usize,
+}
+
+/// What a map is determined by, besides the data: enough to have it again.
+#[derive(Clone, Debug)]
+pub(crate) struct Recipe {
+    pub(crate) kind: MapKind,
+    pub(crate) kernel: Option<Kernel>,
+    pub(crate) ratios: Vec<f64>,
+    pub(crate) errors: Vec<(MapKind, f64)>,
+}
+
+/// What a map says of a context.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expected {
+    /// Expected outputs (P,).
+    pub mean: Vec<f64>,
+    /// Covariance (P, P) of new outputs; `None` where no context is left over to estimate it.
+    pub covariance: Option<Array2<f64>>,
+    /// How far each value of the context lies outside of those that were shown, in their range (Q,).
+    pub outside: Vec<f64>,
+}
+
+impl ContextMap {
+    /// Learns a map from contexts (M rows of Q) to outputs (M, P), all of which have one unit where one is chosen.
+    ///
+    /// # Errors
+    /// Contexts and outputs that do not fit together, numbers that are not finite, labels beside numbers in one
+    /// column, or more contexts than the kind of map can have.
+    pub fn fit(contexts: &[Vec<ContextValue>], outputs: ArrayView2<f64>, choice: MapChoice) -> Result<Self> {
+        check_matrix("outputs", outputs)?;
+        if contexts.len() != outputs.nrows() {
+            let (expected, found) = (outputs.nrows(), contexts.len());
+            return Err(Error::Length { name: "contexts", expected, found, per: "row of the outputs" });
+        }
+        let contexts: Vec<&[ContextValue]> = contexts.iter().map(Vec::as_slice).collect();
+        let (columns, table) = tabulate(&contexts)?;
+        Self::learn(columns, &table, outputs, Array2::eye(outputs.ncols()).view(), choice)
+    }
+
+    /// Learns a map from tabulated contexts (M, Q). `metric` (P, P) turns errors of the outputs into that of a movement.
+    pub(crate) fn learn(
+        columns: Vec<ContextColumn>,
+        contexts: &Array2<f64>,
+        outputs: ArrayView2<f64>,
+        metric: ArrayView2<f64>,
+        choice: MapChoice,
+    ) -> Result<Self> {
+        let data = Data::of(columns, contexts, outputs)?;
+        if data.inputs.nrows() > MOST && matches!(choice, MapChoice::Given(MapKind::Gp | MapKind::Polynomial)) {
+            let (name, value) = ("contexts", data.inputs.nrows() as f64);
+            let allowed = "different contexts: at most 1024 for this map; round them, or take map=\"linear\"";
+            return Err(Error::Range { name, value, allowed });
+        }
+        let (candidate, errors) = choose(choice, &data.shown(), metric)?;
+        Ok(data.map(candidate, errors))
+    }
+
+    /// The same map again, from the data that it was learnt from.
+    pub(crate) fn restore(
+        columns: Vec<ContextColumn>,
+        contexts: &Array2<f64>,
+        outputs: ArrayView2<f64>,
+        recipe: Recipe,
+    ) -> Result<Self> {
+        let data = Data::of(columns, contexts, outputs)?;
+        let Recipe { kind, kernel, ratios, errors } = recipe;
+        let candidate = Candidate::with(kind, kernel, &data.shown(), |_, _| ratios)?;
+        Ok(data.map(candidate, errors))
+    }
+
+    pub(crate) fn recipe(&self) -> Recipe {
+        let Self { kind, kernel, ratios, errors, .. } = self.clone();
+        Recipe { kind, kernel, ratios, errors }
+    }
+
+    /// What each value of a context means.
+    pub fn columns(&self) -> &[ContextColumn] {
+        &self.columns
+    }
+
+    /// The context that numbers (Q,) stand for, labels given by their index among the [`ContextMap::columns`].
+    ///
+    /// # Errors
+    /// A number that is no index of a label.
+    pub fn context(&self, numbers: &[f64]) -> Result<Vec<ContextValue>> {
+        let columns = self.columns.iter().enumerate();
+        columns.zip(numbers).map(|((q, column), &number)| column.value(q, number)).collect()
+    }
+
+    /// Number of context values Q.
+    pub fn n_inputs(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// What kind of map it is.
+    pub fn kind(&self) -> MapKind {
+        self.kind
+    }
+
+    /// Mean squared error of each map that was tried, at contexts left out: in closed form, with the constants of all.
+    pub fn errors(&self) -> &[(MapKind, f64)] {
+        &self.errors
+    }
+
+    /// Degrees of freedom from which the covariance is known.
+    pub fn freedom(&self) -> usize {
+        self.freedom
+    }
+
+    /// The outputs for a context (Q,), with their covariance: that of the mean, of what the context does not tell, and
+    /// of one movement among those of a context.
+    ///
+    /// # Errors
+    /// A context of another length, a label never shown, or a number that is not finite.
+    pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<Expected> {
+        let context: Vec<ContextValue> = context.iter().cloned().map(Into::into).collect();
+        let context = numbers(&self.columns, &context)?;
+        let place = self.kriging.place(&self.scale.features(&context));
+        let mean = (place.flat.dot(&self.flat) + place.rest.dot(&self.rest)).to_vec();
+        let covariance = self.noise.as_ref().map(|noise| {
+            let spread: Vec<f64> =
+                self.ratios.iter().map(|&ratio| (1.0 + self.kriging.variance(&place, ratio)).sqrt()).collect();
+            let grown = Array2::from_shape_fn(noise.dim(), |(i, j)| noise[[i, j]] * spread[i] * spread[j]);
+            match &self.within {
+                Some(within) => grown + within,
+                None => grown,
+            }
+        });
+        if mean.iter().chain(covariance.iter().flatten()).any(|x| !x.is_finite()) {
+            return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
+        }
+        Ok(Expected { mean, covariance, outside: self.scale.outside(&context) })
+    }
+}
+
+impl std::fmt::Display for ContextMap {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}", self.kind)?;
+        if let Some(Kernel::Matern { length }) = self.kernel {
+            write!(f, " of length {length:.2}")?;
+        }
+        for (k, (kind, error)) in self.errors.iter().filter(|(_, error)| error.is_finite()).enumerate() {
+            let before = if k == 0 { "; left-out error of" } else { "," };
+            write!(f, "{before} {} {error:.3e}", kind.name())?;
+        }
+        Ok(())
+    }
+}
+
+/// Contexts that differ, what was shown in each on average, and how much that scattered.
+struct Data {
+    columns: Vec<ContextColumn>,
+    scale: Scale,
+    inputs: Array2<f64>,
+    means: Array2<f64>,
+    /// Pooled covariance of demonstrations of one context, with its degrees of freedom; the mean of one over their
+    /// number is the share of it that an average keeps.
+    within: Option<(Array2<f64>, usize)>,
+    kept: f64,
+}
+
+impl Data {
+    fn of(columns: Vec<ContextColumn>, contexts: &Array2<f64>, outputs: ArrayView2<f64>) -> Result<Self> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        let mut known = HashMap::new();
+        for (m, row) in contexts.rows().into_iter().enumerate() {
+            // Zero of either sign is one context.
+            let key: Vec<u64> = row.iter().map(|value| (value + 0.0).to_bits()).collect();
+            let group = *known.entry(key).or_insert(groups.len());
+            if group == groups.len() {
+                groups.push(Vec::new());
+            }
+            groups[group].push(m);
+        }
+        let firsts: Vec<usize> = groups.iter().map(|group| group[0]).collect();
+        let distinct = contexts.select(Axis(0), &firsts);
+        let scale = Scale::of(&columns, &distinct)?;
+        let features: Vec<f64> = distinct.rows().into_iter().flat_map(|row| scale.features(&row.to_vec())).collect();
+        let inputs =
+            Array2::from_shape_fn((groups.len(), scale.n_features()), |(i, f)| features[i * scale.n_features() + f]);
+        let mut means = Array2::zeros((groups.len(), outputs.ncols()));
+        let mut scatter = Array2::zeros((outputs.ncols(), outputs.ncols()));
+        for (group, mut mean) in groups.iter().zip(means.rows_mut()) {
+            let shown = outputs.select(Axis(0), group);
+            mean.assign(&shown.mean_axis(Axis(0)).unwrap_or_default());
+            if group.len() > 1 {
+                let deviations = &shown - &mean;
+                scatter += &deviations.t().dot(&deviations);
+            }
+        }
+        let freedom = contexts.nrows() - groups.len();
+        let within = (freedom > 0).then(|| (scatter / freedom as f64, freedom));
+        let kept = groups.iter().map(|group| 1.0 / group.len() as f64).sum::<f64>() / groups.len() as f64;
+        Ok(Self { columns, scale, inputs, means, within, kept })
+    }
+
+    fn shown(&self) -> Shown<'_> {
+        Shown { inputs: self.inputs.view(), n_inputs: self.scale.n_inputs(), outputs: self.means.view() }
+    }
+
+    fn map(self, candidate: Candidate, errors: Vec<(MapKind, f64)>) -> ContextMap {
+        let Candidate { kind, kernel, kriging, values, ratios } = candidate;
+        let (noise, freedom) = match (kriging.freedom(), &self.within) {
+            // As many coefficients as contexts: what is left is the noise of the averages.
+            (0, None) => (None, 0),
+            (0, Some((within, freedom))) => (Some(within * self.kept), *freedom),
+            (freedom, _) => {
+                let innovations = kriging.innovations(&values, &ratios);
+                (Some(innovations.t().dot(&innovations) / freedom as f64), freedom)
+            }
+        };
+        let within = self.within.map(|(within, _)| within * (1.0 - self.kept));
+        let rest = kriging.coefficients(&values, &ratios);
+        let (columns, scale, flat) = (self.columns, self.scale, values.flat);
+        ContextMap { columns, scale, kind, kernel, ratios, errors, kriging, flat, rest, noise, within, freedom }
+    }
+}

@@ -1,0 +1,197 @@
+"""Contexts lead to movements: by which map, how surely, and how far from what was shown."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import ContextMap, Demonstration
+
+TIME = np.linspace(0, 1, 51)[:, None]
+BASE = TIME**3 * (10 - 15 * TIME + 6 * TIME**2) * [1.0, 0.5]
+BENDS = [(TIME * (1 - TIME)) ** 3 * [0.0, 64.0], np.sin(np.pi * TIME) ** 4 * [1.0, 0.0]]
+
+
+def bent(first: float, second: float = 0.0) -> np.ndarray:
+    """Return a reach that is bent in two ways."""
+    return BASE + first * BENDS[0] + second * BENDS[1]
+
+
+def curved(heights: np.ndarray, **options: object) -> pdmp.Model:
+    """Return a model whose movements depend on the height, but not in proportion."""
+    movements = [bent(np.sin(3 * h), h**2) for h in heights]
+    return pdmp.fit(movements, dt=0.02, contexts=heights[:, None], **options)
+
+
+def test_auto_follows_what_is_no_line() -> None:
+    """A height between those shown is met where a line goes astray."""
+    heights = np.linspace(0, 1, 9)
+    wanted = bent(np.sin(3 * 0.56), 0.56**2)
+    off = {
+        name: np.abs(curved(heights, map=name).rollout(context=[0.56], dt=0.02).position - wanted)
+        for name in ("auto", "linear")
+    }
+    assert off["auto"].max() < 0.02 < 0.2 < off["linear"].max()
+
+
+def test_auto_says_what_it_chose_and_why() -> None:
+    """The kind is the one of least error at contexts left out, where others are clearly worse."""
+    chosen = curved(np.linspace(0, 1, 9)).map
+    assert chosen is not None
+    errors = dict(chosen.errors)
+    assert set(errors) == {"gp", "polynomial", "linear"}
+    assert chosen.kind == "gp" and errors["gp"] < 0.2 * min(errors["linear"], errors["polynomial"])
+    assert "Gaussian process" in repr(chosen) and "left-out error" in repr(chosen)
+
+
+@pytest.mark.parametrize("name", ["linear", "polynomial", "gp", "auto"])
+def test_models_with_a_map_survive_a_file(name: str, tmp_path: pytest.TempPathFactory) -> None:
+    """Predictions of a model loaded or unpickled are those of the one saved, to the last bit."""
+    model = curved(np.linspace(0, 1, 7), map=name)
+    model.save(tmp_path / "model.safetensors")
+    for other in (pdmp.load(tmp_path / "model.safetensors"), pickle.loads(pickle.dumps(model))):
+        a, b = model.predict([0.4]), other.predict([0.4])
+        np.testing.assert_array_equal(a.style, b.style)
+        np.testing.assert_array_equal(a.covariance, b.covariance)
+        for bound, same in zip(model.band([0.4]), other.band([0.4]), strict=True):
+            np.testing.assert_array_equal(bound, same)
+        assert repr(model.map) == repr(other.map)
+
+
+def labelled() -> pdmp.Model:
+    """Return a model of two manners, each at several heights, that remembers them by name."""
+    demos = [
+        Demonstration(bent(height, lean), dt=0.02, context=[manner, height])
+        for manner, lean in (("proud", 0.8), ("tired", -0.8))
+        for height in (0.1, 0.3, 0.5, 0.7)
+    ]
+    return pdmp.fit(demos, map="linear")
+
+
+def test_labels_stand_beside_numbers() -> None:
+    """A manner and a height never shown together are met."""
+    made = labelled().rollout(context=["tired", 0.6], dt=0.02).position
+    np.testing.assert_allclose(made, bent(0.6, -0.8), atol=1e-3)
+
+
+def test_labels_come_back_as_they_were() -> None:
+    """Model and demonstration show labels by name."""
+    model = labelled()
+    assert model.contexts[0] == ["proud", 0.1]
+    demo = Demonstration(BASE, dt=0.02, context=["proud", 0.1])
+    assert pickle.loads(pickle.dumps(demo)).context == ["proud", 0.1]
+    assert "context ['proud', 0.1]" in repr(demo)
+
+
+@pytest.mark.parametrize(
+    ("context", "message"),
+    [
+        (["shy", 0.1], r'context\[0\] = "shy": never shown; the labels are proud, tired'),
+        ([1.0, 0.1], r"context\[0\] = 1: never shown"),
+        (["proud", "high"], r'context\[1\] = "high": a number is expected'),
+        (["proud"], "context has length 1, expected 2"),
+        (["proud", np.nan], r"context\[1\] = NaN"),
+    ],
+)
+def test_strange_contexts_are_refused(context: list[object], message: str) -> None:
+    """A label never shown is refused with those that were."""
+    with pytest.raises(ValueError, match=message):
+        labelled().predict(context)
+
+
+def test_labels_and_numbers_do_not_mix_in_a_column() -> None:
+    """A value is a label in all demonstrations or in none."""
+    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 1 labels and 2 numbers"):
+        pdmp.fit([BASE] * 3, dt=0.02, contexts=[[0.1], ["high"], [0.2]])
+
+
+def test_contexts_far_away_are_flagged() -> None:
+    """How far a context lies outside is told in ranges of those shown."""
+    model = curved(np.linspace(0.2, 0.7, 6))
+    np.testing.assert_allclose(model.predict([0.45]).outside, [0.0])
+    found = model.predict([1.7])
+    np.testing.assert_allclose(found.outside, [2.0])
+    assert "outside of the demonstrated contexts by 2.00 of their range" in repr(found)
+
+
+def test_process_does_not_run_away_and_says_so() -> None:
+    """Far away the Gaussian process stays where it is, with all the variance there is."""
+    model = curved(np.linspace(0, 1, 12), map="gp")
+    near, far = model.predict([0.5]), model.predict([100.0])
+    np.testing.assert_allclose(far.style, model.predict([1000.0]).style, rtol=1e-9)
+    assert np.all(np.diag(far.covariance)[:2] > 10 * np.diag(near.covariance)[:2])
+
+
+def test_one_context_value_only_predicts_the_mean() -> None:
+    """Repetitions of one condition give its mean, with their scatter; another one is outside."""
+    movements = [bent(b) for b in (0.2, 0.3, 0.4)]
+    model = pdmp.fit(movements, dt=0.02, contexts=[[1.0]] * 3)
+    found = model.predict([2.0])
+    np.testing.assert_allclose(found.style, model.styles.mean(axis=0), atol=1e-12)
+    assert np.isinf(found.outside[0])
+
+
+def test_band_holds_what_it_promises() -> None:
+    """Nine tenths of the numbers of new movements lie within a band of 0.9."""
+    rng = np.random.default_rng(3)
+
+    def noisy(height: float) -> np.ndarray:
+        return bent(height + 0.1 * rng.normal(), 0.1 * rng.normal())
+
+    inside = []
+    for _ in range(12):
+        heights = rng.uniform(0, 1, 14)
+        movements = [noisy(h) for h in heights]
+        model = pdmp.fit(movements, dt=0.02, contexts=heights[:, None])
+        for height in (0.3, 0.5, 0.7):
+            lower, upper = model.band([height], dt=0.02)
+            new = noisy(height)
+            moving = slice(10, 41)  # at the ends all movements are alike
+            within = (lower <= new) & (new <= upper)
+            inside.append(within[moving].mean())
+    assert 0.82 < np.mean(inside) < 0.97
+
+
+def test_band_surrounds_the_rollout_and_grows_with_its_level() -> None:
+    """Bounds lie evenly about the predicted movement."""
+    rng = np.random.default_rng(1)
+    heights = np.linspace(0, 1, 9)
+    movements = [bent(h + 0.05 * rng.normal(), 0.05 * rng.normal()) for h in heights]
+    model = pdmp.fit(movements, dt=0.02, contexts=heights[:, None], n_styles=1)
+    made = model.rollout(context=[0.4], dt=0.02).position
+    narrow, wide = model.band([0.4], level=0.5, dt=0.02), model.band([0.4], level=0.99, dt=0.02)
+    np.testing.assert_allclose((wide[0] + wide[1]) / 2, made, atol=1e-12)
+    assert np.all(wide[1] - wide[0] >= narrow[1] - narrow[0])
+    with pytest.raises(ValueError, match="level = 1: must lie between 0 and 1"):
+        model.band([0.4], level=1.0)
+
+
+def test_map_alone_agrees_with_least_squares() -> None:
+    """The linear map is numpy's least squares, with any units of the contexts."""
+    rng = np.random.default_rng(0)
+    contexts, outputs = rng.normal(size=(20, 3)) * [1, 1e3, 1e-3], rng.normal(size=(20, 2))
+    design = np.column_stack([np.ones(20), contexts])
+    expected = design @ np.linalg.lstsq(design, outputs, rcond=None)[0]
+    found, covariance = ContextMap(contexts, outputs, "linear").predict(contexts)
+    np.testing.assert_allclose(found, expected, atol=1e-10)
+    assert covariance.shape == (20, 2, 2) and np.all(np.linalg.eigvalsh(covariance) > 0)
+
+
+def test_map_agrees_with_scikit_learn() -> None:
+    """With the same length and noise, the process is that of scikit-learn about a wide constant."""
+    gaussian = pytest.importorskip("sklearn.gaussian_process")
+    kernels = gaussian.kernels
+    contexts = np.linspace(0, 1, 15)[:, None]
+    outputs = np.sin(6 * contexts) + 0.05 * np.cos(40 * contexts)
+    found = ContextMap(contexts, outputs, "gp")
+    spread = contexts.std()
+    kernel = (
+        kernels.ConstantKernel(1e4)
+        + kernels.ConstantKernel(1.0) * kernels.Matern(length_scale=spread, nu=2.5)
+        + kernels.WhiteKernel(0.01)
+    )
+    peer = gaussian.GaussianProcessRegressor(kernel, n_restarts_optimizer=2, random_state=0)
+    peer.fit(contexts, outputs)
+    at = np.linspace(0.1, 0.9, 9)[:, None]
+    np.testing.assert_allclose(found.predict(at)[0][:, 0], peer.predict(at).ravel(), atol=0.05)
