@@ -1,0 +1,131 @@
+"""Demonstrations as predictors see them: with contexts, and read over normalised time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pdmp._native import Demonstration
+
+Array: TypeAlias = NDArray[np.float64]
+Kind: TypeAlias = Literal["discrete", "rhythmic"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """M demonstrations of one skill under known contexts."""
+
+    demos: tuple[Demonstration, ...]
+    contexts: Array  # (M, Q)
+    kind: Kind
+    durations: Array  # (M,) [s], or periods
+    sampled: Array  # positions over normalised time (M, C, D), both ends if discrete
+
+    @property
+    def n_demos(self) -> int:
+        """Number of demonstrations M."""
+        return len(self.demos)
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples C over a movement."""
+        return int(self.sampled.shape[1])
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
+        """Return some of them."""
+        demos = tuple(self.demos[row] for row in rows)
+        chosen = (array[rows] for array in (self.contexts, self.durations, self.sampled))
+        contexts, durations, sampled = chosen
+        return Recordings(demos, contexts, self.kind, durations, sampled)
+
+
+def recordings(
+    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
+    contexts: ArrayLike | None,
+    *,
+    kind: Kind,
+    dt: float | None,
+    period: ArrayLike | None,
+    n_samples: int,
+) -> Recordings:
+    """Check demonstrations and contexts, and read each demonstration over its own duration."""
+    if kind not in ("discrete", "rhythmic"):
+        raise ValueError(f'kind = "{kind}": must be "discrete" or "rhythmic"')
+    if n_samples < 4:
+        raise ValueError(f"n_samples = {n_samples}: must be at least 4")
+    given = tuple(
+        demo if isinstance(demo, Demonstration) else Demonstration(demo, dt=dt)
+        for demo in list(demos)  # type: ignore[arg-type]
+    )
+    if not given:
+        raise ValueError("demos is empty: pass at least two demonstrations")
+    for m, demo in enumerate(given):
+        if demo.n_dofs != given[0].n_dofs:
+            raise ValueError(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
+    if kind == "discrete" and period is not None:
+        raise ValueError("period does not apply to discrete demonstrations: leave it out")
+    periods = np.full(len(given), np.nan) if period is None else np.asarray(period, float)
+    if periods.ndim and len(periods) != len(given):
+        raise ValueError(
+            f"period has length {len(periods)}, expected {len(given)}: one value per demonstration"
+        )
+    periods = np.broadcast_to(periods, len(given))
+    read = [_read(demo, m, kind, dt, periods[m], n_samples) for m, demo in enumerate(given)]
+    durations, sampled = (np.array(values) for values in zip(*read, strict=True))
+    return Recordings(given, _contexts(given, contexts), kind, durations, sampled)
+
+
+def _read(
+    demo: Demonstration, m: int, kind: Kind, dt: float | None, period: float, n_samples: int
+) -> tuple[float, Array]:
+    """Return the duration [s] and the positions (C, D), linear between the samples."""
+    interval = demo.dt if demo.dt is not None else dt
+    if demo.time is not None:
+        time = demo.time - demo.time[0]
+    elif interval is not None:
+        time = interval * np.arange(demo.n_samples)
+    else:
+        raise ValueError(f"demo {m}: no sampling interval: pass dt= in seconds")
+    if kind == "discrete":
+        duration, wrap = float(time[-1]), None
+    else:
+        if np.isnan(period) and interval is None:
+            raise ValueError(f"demo {m}: a time-stamped cycle: pass period= in seconds")
+        duration = float(interval * demo.n_samples if np.isnan(period) else period)  # type: ignore[operator]
+        if duration <= time[-1]:
+            raise ValueError(
+                f"demo {m}: period = {duration:g}: must exceed the last time stamp, {time[-1]:g} s"
+            )
+        wrap = duration
+    at = np.linspace(0, duration, n_samples, endpoint=kind == "discrete")
+    return duration, np.transpose(
+        [np.interp(at, time, column, period=wrap) for column in demo.position.T]
+    )
+
+
+def _contexts(demos: Sequence[Demonstration], contexts: ArrayLike | None) -> Array:
+    """Return the checked contexts (M, Q)."""
+    values: Any = contexts
+    if contexts is None:
+        values = [demo.context for demo in demos]
+        for m, context in enumerate(values):
+            if context is None:
+                raise ValueError(f"demo {m} has no context: pass contexts=")
+            if len(context) != len(values[0]):
+                raise ValueError(
+                    f"demo {m}: context has length {len(context)}, expected {len(values[0])}"
+                )
+    array = np.asarray(values, float)
+    if array.ndim != 2:
+        raise ValueError(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
+    if len(array) != len(demos):
+        raise ValueError(
+            f"contexts has length {len(array)}, expected {len(demos)}: one value per demonstration"
+        )
+    for m, q in np.argwhere(~np.isfinite(array))[:1]:
+        raise ValueError(f"contexts[{m}, {q}] = {array[m, q]}: must be finite: leave the demo out")
+    return array

@@ -1,0 +1,170 @@
+"""What was found: errors by split, their means, and tables of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan, sqrt
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+
+from pdmp.evaluation.predictors import Forecast
+from pdmp.evaluation.recordings import Array, Recordings
+from pdmp.evaluation.splits import Reach, Split
+
+REFERENCE = "mean demonstration"
+BAND = 0.9
+WIDTH = NormalDist().inv_cdf((1 + BAND) / 2)  # deviations from the mean to the edge of the band
+HEADER = ("predictor", "E", "± sd", "E / mean's", "± se", f"in {BAND:.0%} band", "duration off")
+
+
+class Scores(NamedTuple):
+    """Figures of one predictor, one per split (S,)."""
+
+    error: Array  # E, mean over the demonstrations held out, in the squared unit of the positions
+    duration: Array  # |T̂ - T| / T
+    coverage: Array  # share of the positions inside the band; NaN where no variance is known
+
+
+class Summary(NamedTuple):
+    """Means over splits."""
+
+    n: int
+    error: float
+    deviation: float
+    standard_error: float
+    relative: float  # to the mean demonstration's
+    relative_error: float  # standard error of `relative`
+    coverage: float
+    duration: float
+
+
+class Comparison(NamedTuple):
+    """One predictor's E less another's, over the same splits."""
+
+    differences: Array  # (S,)
+    mean: float
+    standard_error: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation:
+    """Errors of several predictors on demonstrations that they were not shown."""
+
+    recordings: Recordings
+    splits: tuple[Split, ...]
+    forecasts: dict[str, list[list[Forecast]]]  # by predictor, split, demonstration held out
+    scores: dict[str, Scores]
+    left_out: dict[str, str]  # predictors that could not learn, and why
+
+    def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
+        """Return the means of one predictor over the splits of one reach, or all."""
+        rows = self._rows(reach)
+        error, duration, coverage = (values[rows] for values in self.scores[predictor])
+        reference = self.scores[REFERENCE].error[rows]
+        relative = error.mean() / reference.mean() if reference.mean() > 0 else nan
+        return Summary(
+            len(error),
+            float(error.mean()),
+            _deviation(error),
+            _standard_error(error),
+            float(relative),
+            # Of a ratio of means, to first order.
+            _standard_error(error - relative * reference) / float(reference.mean()),
+            float(coverage.mean()),
+            float(duration.mean()),
+        )
+
+    def compare(self, a: str, b: str, reach: Reach | None = None) -> Comparison:
+        """Return E of `a` less E of `b`, split by split; negative where `a` is better."""
+        rows = self._rows(reach)
+        differences = (self.scores[a].error - self.scores[b].error)[rows]
+        return Comparison(differences, float(differences.mean()), _standard_error(differences))
+
+    def reaches(self) -> list[Reach]:
+        """Return the sorts of splits that there are."""
+        present = {split.reach for split in self.splits}
+        return [reach for reach in ("interpolation", "extrapolation") if reach in present]
+
+    def table(self, reach: Reach) -> list[list[str]]:
+        """Return the rows of a table over the splits of one reach, below `HEADER`."""
+        rows = []
+        for name in self.scores:
+            found = self.summary(name, reach)
+            figures = (found.error, found.deviation, found.relative, found.relative_error)
+            shares = (found.coverage, found.duration)
+            rows.append([name, *map(_number, figures), *map(_percent, shares)])
+        return rows
+
+    def markdown(self) -> str:
+        """Return the tables in Markdown."""
+        lines = []
+        for reach in self.reaches():
+            align = ["---"] + ["--:"] * (len(HEADER) - 1)
+            cells = [HEADER, align, *self.table(reach)]
+            lines += [f"**{self._title(reach)}**", ""]
+            lines += ["| " + " | ".join(row) + " |" for row in cells] + [""]
+        return "\n".join([*lines, *self._notes()])
+
+    def __repr__(self) -> str:
+        """Return the tables as text."""
+        lines = []
+        for reach in self.reaches():
+            cells = [HEADER, *self.table(reach)]
+            widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+            lines.append(self._title(reach))
+            for first, *others in cells:
+                padded = [f"{o:>{w}}" for o, w in zip(others, widths[1:], strict=True)]
+                lines.append("  ".join([f"{first:<{widths[0]}}", *padded]))
+            lines.append("")
+        return "\n".join([*lines, *self._notes()]).rstrip()
+
+    def _title(self, reach: Reach) -> str:
+        rows = self._rows(reach)
+        held = sum(len(self.splits[row].test) for row in rows)
+        return f"{reach}: {len(rows)} folds, {held} demonstrations"
+
+    def _notes(self) -> list[str]:
+        return [f"left out: {name}, for {reason}" for name, reason in self.left_out.items()]
+
+    def _rows(self, reach: Reach | None) -> list[int]:
+        rows = [k for k, split in enumerate(self.splits) if reach in (None, split.reach)]
+        if not rows:
+            raise ValueError(f'reach = "{reach}": no split is of this sort')
+        return rows
+
+
+def score(
+    recordings: Recordings, splits: Sequence[Split], forecasts: Sequence[Sequence[Forecast]]
+) -> Scores:
+    """Compare forecasts with the demonstrations held out."""
+    rows = []
+    for split, made in zip(splits, forecasts, strict=True):
+        each = []
+        for m, forecast in zip(split.test, made, strict=True):
+            gap = forecast.position - recordings.sampled[m]
+            inside = nan
+            if forecast.variance is not None:
+                inside = float(np.mean(gap**2 <= WIDTH**2 * forecast.variance))
+            off = abs(forecast.duration / recordings.durations[m] - 1)
+            each.append((np.sum(gap**2, axis=1).mean(), off, inside))
+        rows.append(np.mean(each, axis=0))
+    return Scores(*np.transpose(rows))
+
+
+def _deviation(values: Array) -> float:
+    return float(values.std(ddof=1)) if len(values) > 1 else nan
+
+
+def _standard_error(values: Array) -> float:
+    return _deviation(values) / sqrt(len(values))
+
+
+def _number(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.3g}"
+
+
+def _percent(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.0%}"
