@@ -12,7 +12,7 @@ from pdmp.evaluation.baselines import (
 from pdmp.evaluation.predictors import PDMP, Forecast, Predictor
 from pdmp.evaluation.recordings import Recordings
 from pdmp.evaluation.result import Comparison, Evaluation, Scores, Summary
-from pdmp.evaluation.run import baselines, evaluate
+from pdmp.evaluation.run import baselines, evaluate, over_styles
 from pdmp.evaluation.splits import Split
 
 __all__ = [
@@ -34,4 +34,5 @@ __all__ = [
     "Summary",
     "baselines",
     "evaluate",
+    "over_styles",
 ]

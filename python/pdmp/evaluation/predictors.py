@@ -45,32 +45,32 @@ class PDMP:
             **self.settings,
         )
         n_samples = recordings.n_samples
+        jacobian = _jacobian(model, recordings)
 
         def foresee(context: Array) -> Forecast:
-            duration = model.predict(context).duration
-            dt = interval(duration, recordings)
+            predicted = model.predict(context)
+            dt = interval(predicted.duration, recordings)
             position = model.rollout(context=context, dt=dt).position[:n_samples]
-            return Forecast(position, duration, _variance(model, context, dt, n_samples))
+            variance = None
+            if predicted.covariance is not None:
+                spread = jacobian @ predicted.covariance[:-1, :-1]
+                variance = np.sum(spread * jacobian, axis=2)
+            return Forecast(position, predicted.duration, variance)
 
         return foresee
 
 
-def _variance(model: Model, context: Array, dt: float, n_samples: int) -> Array | None:
-    """Return the variance of a predicted movement, which is linear in all but the duration."""
-    predicted = model.predict(context)
-    if predicted.covariance is None:
-        return None
-    tau = model.tau * predicted.duration / model.durations[model.nominal]
+def _jacobian(model: Model, recordings: Recordings) -> Array:
+    """Return the derivatives (C, D, P) by all that a context predicts but the duration.
+
+    Over normalised time they are the same for every duration.
+    """
+    dt = interval(float(model.durations[model.nominal]), recordings)
     if model.kind == "discrete":
-        parts = [
-            model.style_jacobian(dt, tau=tau, start=predicted.start),
-            model.goal_jacobian(dt, tau=tau),
-            model.start_jacobian(dt, tau=tau),
-        ]
+        parts = [model.style_jacobian(dt), model.goal_jacobian(dt), model.start_jacobian(dt)]
     else:
-        parts = [model.style_jacobian(dt, tau=tau), model.anchor_jacobian(dt, tau=tau)]
-    jacobian = np.concatenate(parts, axis=2)[:n_samples]
-    return np.sum((jacobian @ predicted.covariance[:-1, :-1]) * jacobian, axis=2)
+        parts = [model.style_jacobian(dt), model.anchor_jacobian(dt)]
+    return np.concatenate(parts, axis=2)[: recordings.n_samples]
 
 
 def periods(recordings: Recordings) -> dict[str, Array]:

@@ -35,6 +35,11 @@ class Recordings:
         """Number of samples C over a movement."""
         return int(self.sampled.shape[1])
 
+    @property
+    def names(self) -> list[str]:
+        """Names of the degrees of freedom, as in a model."""
+        return self.demos[0].names or [f"dof{d}" for d in range(self.sampled.shape[2])]
+
     def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
         """Return some of them."""
         demos = tuple(self.demos[row] for row in rows)

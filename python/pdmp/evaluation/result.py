@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pdmp.evaluation.predictors import Forecast
+from pdmp.evaluation.predictors import Forecast, Predictor
 from pdmp.evaluation.recordings import Array, Recordings
 from pdmp.evaluation.splits import Reach, Split
 
@@ -55,14 +55,21 @@ class Evaluation:
 
     recordings: Recordings
     splits: tuple[Split, ...]
+    predictors: dict[str, Predictor]
     forecasts: dict[str, list[list[Forecast]]]  # by predictor, split, demonstration held out
     scores: dict[str, Scores]
     left_out: dict[str, str]  # predictors that could not learn, and why
 
+    def score(self, predictor: str) -> Scores:
+        """Return the figures of one predictor, split by split."""
+        if predictor not in self.scores:
+            raise ValueError(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
+        return self.scores[predictor]
+
     def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
         """Return the means of one predictor over the splits of one reach, or all."""
         rows = self._rows(reach)
-        error, duration, coverage = (values[rows] for values in self.scores[predictor])
+        error, duration, coverage = (values[rows] for values in self.score(predictor))
         reference = self.scores[REFERENCE].error[rows]
         relative = error.mean() / reference.mean() if reference.mean() > 0 else nan
         return Summary(
@@ -80,7 +87,7 @@ class Evaluation:
     def compare(self, a: str, b: str, reach: Reach | None = None) -> Comparison:
         """Return E of `a` less E of `b`, split by split; negative where `a` is better."""
         rows = self._rows(reach)
-        differences = (self.scores[a].error - self.scores[b].error)[rows]
+        differences = (self.score(a).error - self.score(b).error)[rows]
         return Comparison(differences, float(differences.mean()), _standard_error(differences))
 
     def reaches(self) -> list[Reach]:

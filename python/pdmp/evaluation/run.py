@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,6 +36,11 @@ def baselines() -> dict[str, Predictor]:
     }
 
 
+def over_styles(most: int, **settings: Any) -> dict[str, Predictor]:
+    """Return primitives with J = 1 … `most` style parameters, by name."""
+    return {f"PDMP, J = {j}": PDMP(n_styles=j, **settings) for j in range(1, most + 1)}
+
+
 def evaluate(
     demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
     *,
@@ -55,14 +61,15 @@ def evaluate(
         chosen = checked(splits, read.n_demos)
     if predictors is None:
         predictors = baselines() | {"PDMP": PDMP()}
+    tried = {REFERENCE: MeanDemonstration()} | dict(predictors)
     forecasts, left_out = {}, {}
-    for name, predictor in ({REFERENCE: MeanDemonstration()} | dict(predictors)).items():
+    for name, predictor in tried.items():
         try:
             forecasts[name] = _foreseen(predictor, read, chosen)
         except ImportError as reason:
             left_out[name] = str(reason)
     scores = {name: score(read, chosen, made) for name, made in forecasts.items()}
-    return Evaluation(read, tuple(chosen), forecasts, scores, left_out)
+    return Evaluation(read, tuple(chosen), tried, forecasts, scores, left_out)
 
 
 def _foreseen(

@@ -1,0 +1,54 @@
+"""``make report`` prints the table and draws figures into report/; ``--write`` writes docs too."""
+
+import argparse
+from pathlib import Path
+from time import perf_counter
+
+from pdmp import plot
+from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
+from report.sets import Question, questions
+from report.text import text
+
+ROOT = Path(__file__).resolve().parents[2]
+FIGURES = ROOT / "report"
+CURVES = {"raise_hand, whole", "walking_force, subject 0"}
+PRIMITIVES = {"PDMP, J by spectrum": PDMP(), "PDMP, full J": PDMP(spectrum=1.0)}
+
+
+def main() -> None:
+    """Answer every question at hand."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--write", action="store_true", help="write docs/report.md")
+    write = arguments.parse_args().write
+    answers: list[tuple[Question, Evaluation]] = []
+    for question in questions():
+        begin = perf_counter()
+        answers.append((question, answer(question)))
+        print(f"{question.name}: {perf_counter() - begin:.1f} s")
+        print(answers[-1][1], end="\n\n", flush=True)
+    report = text(answers)
+    if write:
+        (ROOT / "docs" / "report.md").write_text(report, encoding="utf-8")
+    print(report)
+
+
+def answer(question: Question) -> Evaluation:
+    """Evaluate all predictors on one question, and draw what they foresee."""
+    given = {"contexts": question.contexts} | question.options
+    found = evaluate(question.demos, predictors=baselines() | PRIMITIVES, **given)
+    figure = plot.held_out(found, "PDMP, J by spectrum", unit=question.unit)
+    plot.save(figure, FIGURES / f"{slug(question.name)}.png")
+    if question.name in CURVES:
+        curve = evaluate(question.demos, predictors=over_styles(8), **given)
+        figure = plot.prediction_error(curve, unit=question.unit)
+        plot.save(figure, FIGURES / f"{slug(question.name)}_styles.png")
+    return found
+
+
+def slug(name: str) -> str:
+    """Return a name for a file."""
+    return name.replace(", ", "_").replace(" ", "_")
+
+
+if __name__ == "__main__":
+    main()
