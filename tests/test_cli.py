@@ -13,7 +13,7 @@ from pdmp import demos
 from pdmp.cli import main
 from synthetic import DT, loops, reaches
 
-COMMANDS = ["fit", "rollout", "info", "plot", "demo"]
+COMMANDS = ["fit", "rollout", "evaluate", "info", "plot", "demo"]
 
 
 @pytest.fixture

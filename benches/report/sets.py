@@ -36,7 +36,7 @@ def questions() -> Iterator[Question]:
 
 
 def raised_hands() -> Iterator[Question]:
-    """A hand goes up, stays and returns; or its rise alone."""
+    """Raise a hand, hold it, and bring it back; or the rise alone."""
     index = rows("raise_hand_bandai")
     demos = list(read_folder(DATA / "raise_hand_bandai", columns=ARM).values())
     heights = numbers(index, "hold_height_m")
@@ -61,7 +61,7 @@ def high_and_low() -> Iterator[Question]:
 
 
 def walking_forces() -> Iterator[Question]:
-    """Force under the foot of five people, over the speed of their walk."""
+    """Load the ground, as five people do who walk at many speeds."""
     index = rows("walking_force_speed")
     demos = list(read_folder(DATA / "walking_force_speed").values())
     speeds = numbers(index, "speed_m_s")
@@ -86,7 +86,7 @@ def doors() -> Iterator[Question]:
 
 
 def styled_walks() -> Iterator[Question]:
-    """Strides of ten styles of walking, right foot to right foot; a recording has one speed."""
+    """Walk in ten styles, right foot to right foot; a recording has one speed."""
     speeds = {row["id"]: float(row["speed_m_s"]) for row in rows("walk_styles_bandai")}
     demos, contexts = [], []
     for stride in rows("walk_styles_bandai", "strides.csv"):
@@ -100,7 +100,7 @@ def styled_walks() -> Iterator[Question]:
 
 
 def runners() -> Iterator[Question]:
-    """Strides of runners of different age, height and mass."""
+    """Run, as runners of different age, height and mass do."""
     index = rows("running_strides")
     strides = list(read_folder(DATA / "running_strides").values())
     seen: dict[str, int] = {}
@@ -117,7 +117,7 @@ def runners() -> Iterator[Question]:
 
 
 def pushes() -> Iterator[Question]:
-    """A planar arm pushes an object to a target."""
+    """Push an object to a target with a planar arm."""
     index = rows("arm3_pushing")
     demos = list(read_folder(DATA / "arm3_pushing").values())
     places = numbers(index, "object_x", "object_y", "target_x", "target_y")

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from pdmp._native import factorise, fit
-from pdmp.evaluation.linear import LinearMap
-from pdmp.evaluation.predictors import Foresee, Forecast, interval, periods
+from pdmp.evaluation.linear import LinearMap, lasting
+from pdmp.evaluation.predictors import Forecast, Foresee
 from pdmp.evaluation.recordings import Array, Recordings
 
 
@@ -47,21 +47,21 @@ class MovedGoal:
         """Learn from the demonstration of median duration."""
         nominal = np.argsort(recordings.durations, kind="stable")[recordings.n_demos // 2]
         alone = recordings[np.array([nominal])]
-        model = fit(alone.demos, kind=recordings.kind, **periods(alone))
+        model = fit(alone.demos, kind=alone.kind, period=alone.periods)
         discrete = recordings.kind == "discrete"
         sampled = recordings.sampled
         ends = [sampled[:, -1], sampled[:, 0]] if discrete else [sampled.mean(axis=1)]
         moved = LinearMap(recordings.contexts, np.concatenate(ends, axis=1))
-        lasting = LinearMap(recordings.contexts, np.log(recordings.durations)[:, None])
+        duration_of = lasting(recordings)
 
         def foresee(context: Array) -> Forecast:
-            duration = float(np.exp(lasting(context)[0]))
+            duration = duration_of(context)
             places = np.split(moved(context), len(ends))
             names = ("goal", "start") if discrete else ("anchor",)
             made = model.rollout(
                 **dict(zip(names, places, strict=True)),  # type: ignore[arg-type]
                 tau=model.tau * duration / model.durations[0],
-                dt=interval(duration, recordings),
+                dt=recordings.interval(duration),
             )
             return Forecast(made.position[: recordings.n_samples], duration)
 
@@ -108,7 +108,7 @@ class RadialWeights:
         radial = np.exp(-0.5 * (distance / width) ** 2)
         radial /= radial.sum(axis=1, keepdims=True)
         gram = radial.T @ radial + self.ridge * np.eye(self.n_weights)
-        weights = np.linalg.solve(gram, radial.T @ recordings.sampled)  # (M, N, D)
+        weights: Array = np.linalg.solve(gram, radial.T @ recordings.sampled)  # (M, N, D)
         n_dofs = weights.shape[2]
         basis = np.kron(radial.T, np.eye(n_dofs))
         return weights.reshape(recordings.n_demos, -1), np.zeros(n * n_dofs), basis
@@ -124,7 +124,7 @@ class LinearWeights:
         """Encode and regress; the variance is that of what is left of the positions."""
         weights, offset, basis = self.encoding(recordings)
         chosen = LinearMap(recordings.contexts, weights)
-        lasting = LinearMap(recordings.contexts, np.log(recordings.durations)[:, None])
+        duration_of = lasting(recordings)
         shape = recordings.sampled.shape[1:]
         fitted = (offset + chosen(recordings.contexts) @ basis).reshape(-1, *shape)
         squares = np.sum((recordings.sampled - fitted) ** 2, axis=0)
@@ -132,7 +132,7 @@ class LinearWeights:
         def foresee(context: Array) -> Forecast:
             return Forecast(
                 (offset + chosen(context) @ basis).reshape(shape),
-                float(np.exp(lasting(context)[0])),
+                duration_of(context),
                 squares * chosen.spread(context) if chosen.freedom > 0 else None,
             )
 
@@ -164,7 +164,7 @@ class ProcessWeights:
                 return process.fit((recordings.contexts - centre) / unit, outputs)
 
         processes = [learnt(outputs) for outputs in weights.T]
-        lasting = learnt(np.log(recordings.durations))
+        logarithm = learnt(np.log(recordings.durations))
         shape = recordings.sampled.shape[1:]
 
         def foresee(context: Array) -> Forecast:
@@ -173,7 +173,7 @@ class ProcessWeights:
             mean, deviation = np.array(found)[:, :, 0].T
             return Forecast(
                 (offset + mean @ basis).reshape(shape),
-                float(np.exp(lasting.predict(at)[0])),
+                float(np.exp(logarithm.predict(at)[0])),
                 (deviation**2 @ basis**2).reshape(shape),
             )
 

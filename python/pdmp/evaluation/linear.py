@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from pdmp.evaluation.recordings import Array
+from pdmp.evaluation.recordings import Array, Recordings
 
 
 class LinearMap:
@@ -27,3 +29,9 @@ class LinearMap:
         """Return the variance of a new output for a context, over the sum of squared residuals."""
         offset = context - self.centre
         return float(1 + 1 / self.n_demos + offset @ self.inverse_scatter @ offset) / self.freedom
+
+
+def lasting(recordings: Recordings) -> Callable[[Array], float]:
+    """Return what foresees the duration [s] from a context; its logarithm is linear in that."""
+    logarithm = LinearMap(recordings.contexts, np.log(recordings.durations)[:, None])
+    return lambda context: float(np.exp(logarithm(context)[0]))

@@ -12,25 +12,50 @@ from pdmp.evaluation.recordings import Array, Recordings
 
 
 class Forecast(NamedTuple):
-    """A movement foreseen for a context."""
+    """A movement foreseen for a context.
 
-    position: Array  # over normalised time (C, D)
-    duration: float  # [s], or the period
-    variance: Array | None = None  # of each position (C, D), where it is known
+    Attributes
+    ----------
+    position : ndarray (C, D)
+        Over normalised time, at the samples of `Recordings.sampled`.
+    duration : float
+        Duration, or period [s].
+    variance : ndarray (C, D), optional
+        Of each position of a new movement in this context, where the predictor knows it.
+    """
+
+    position: Array
+    duration: float
+    variance: Array | None = None
 
 
 Foresee: TypeAlias = Callable[[Array], Forecast]
 
 
 class Predictor(Protocol):
-    """Something that learns to foresee movements."""
+    """Something that learns to foresee movements.
+
+    Examples
+    --------
+    >>> class First:
+    ...     def fit(self, recordings):
+    ...         position, duration = recordings.sampled[0], recordings.durations[0]
+    ...         return lambda context: Forecast(position, duration)
+    >>> pdmp.evaluate(demos, contexts=heights, predictors={"first": First()})
+    """
 
     def fit(self, recordings: Recordings) -> Foresee:
         """Learn from recordings, and return what foresees a movement from a context (Q,)."""
 
 
 class PDMP:
-    """The primitive with its context map, learnt by `pdmp.fit` with the settings given."""
+    """The primitive with its context map, learnt by `pdmp.fit` with the settings given.
+
+    Parameters
+    ----------
+    **settings
+        Arguments of `pdmp.fit` other than demonstrations, kind, contexts and period.
+    """
 
     def __init__(self, **settings: Any) -> None:
         self.settings = settings
@@ -41,7 +66,7 @@ class PDMP:
             recordings.demos,
             kind=recordings.kind,
             contexts=recordings.contexts,
-            **periods(recordings),
+            period=recordings.periods,
             **self.settings,
         )
         n_samples = recordings.n_samples
@@ -49,7 +74,7 @@ class PDMP:
 
         def foresee(context: Array) -> Forecast:
             predicted = model.predict(context)
-            dt = interval(predicted.duration, recordings)
+            dt = recordings.interval(predicted.duration)
             position = model.rollout(context=context, dt=dt).position[:n_samples]
             variance = None
             if predicted.covariance is not None:
@@ -65,19 +90,9 @@ def _jacobian(model: Model, recordings: Recordings) -> Array:
 
     Over normalised time they are the same for every duration.
     """
-    dt = interval(float(model.durations[model.nominal]), recordings)
+    dt = recordings.interval(float(model.durations[model.nominal]))
     if model.kind == "discrete":
         parts = [model.style_jacobian(dt), model.goal_jacobian(dt), model.start_jacobian(dt)]
     else:
         parts = [model.style_jacobian(dt), model.anchor_jacobian(dt)]
     return np.concatenate(parts, axis=2)[: recordings.n_samples]
-
-
-def periods(recordings: Recordings) -> dict[str, Array]:
-    """Return what `fit` must be told of the durations."""
-    return {"period": recordings.durations} if recordings.kind == "rhythmic" else {}
-
-
-def interval(duration: float, recordings: Recordings) -> float:
-    """Return the interval [s] between the C samples of a movement."""
-    return duration / (recordings.n_samples - (recordings.kind == "discrete"))

@@ -11,19 +11,33 @@ from numpy.typing import ArrayLike, NDArray
 
 from pdmp._native import Demonstration
 
-Array: TypeAlias = NDArray[np.float64]
+Array: TypeAlias = NDArray[Any]  # of float64
 Kind: TypeAlias = Literal["discrete", "rhythmic"]
 
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """M demonstrations of one skill under known contexts."""
+    """M demonstrations of one skill under known contexts.
+
+    Attributes
+    ----------
+    demos : tuple of Demonstration
+        As they were given, each with its own rate.
+    contexts : ndarray (M, Q)
+        The condition of each.
+    kind : str
+        "discrete", or "rhythmic": each demonstration is one cycle.
+    durations : ndarray (M,)
+        Durations, or periods [s].
+    sampled : ndarray (M, C, D)
+        Positions over normalised time: C samples of each, both ends among them if discrete.
+    """
 
     demos: tuple[Demonstration, ...]
-    contexts: Array  # (M, Q)
+    contexts: Array
     kind: Kind
-    durations: Array  # (M,) [s], or periods
-    sampled: Array  # positions over normalised time (M, C, D), both ends if discrete
+    durations: Array
+    sampled: Array
 
     @property
     def n_demos(self) -> int:
@@ -34,6 +48,15 @@ class Recordings:
     def n_samples(self) -> int:
         """Number of samples C over a movement."""
         return int(self.sampled.shape[1])
+
+    @property
+    def periods(self) -> Array | None:
+        """Periods (M,) [s] of rhythmic demonstrations, as `pdmp.fit` takes them."""
+        return self.durations if self.kind == "rhythmic" else None
+
+    def interval(self, duration: float) -> float:
+        """Return the time [s] between two of C samples of a movement."""
+        return duration / (self.n_samples - (self.kind == "discrete"))
 
     @property
     def names(self) -> list[str]:

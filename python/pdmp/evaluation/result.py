@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan, sqrt
-from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -16,33 +15,57 @@ from pdmp.evaluation.splits import Reach, Split
 
 REFERENCE = "mean demonstration"
 BAND = 0.9
-WIDTH = NormalDist().inv_cdf((1 + BAND) / 2)  # deviations from the mean to the edge of the band
+WIDTH = 1.6448536269514722  # deviations from the mean of a normal variable to the edge of the band
 HEADER = ("predictor", "E", "± sd", "E / mean's", "± se", f"in {BAND:.0%} band", "duration off")
 
 
 class Scores(NamedTuple):
-    """Figures of one predictor, one per split (S,)."""
+    """Figures of one predictor: means over the demonstrations of each of S splits.
 
-    error: Array  # E, mean over the demonstrations held out, in the squared unit of the positions
-    duration: Array  # |T̂ - T| / T
-    coverage: Array  # share of the positions inside the band; NaN where no variance is known
+    Attributes
+    ----------
+    error : ndarray (S,)
+        E, in the squared unit of the positions.
+    duration : ndarray (S,)
+        |T̂ - T| / T.
+    coverage : ndarray (S,)
+        Share of the positions inside the 90 % band; NaN where no variance is known.
+    """
+
+    error: Array
+    duration: Array
+    coverage: Array
 
 
 class Summary(NamedTuple):
-    """Means over splits."""
+    """Means of one predictor over n splits.
+
+    Attributes
+    ----------
+    n : int
+        Number of splits.
+    error, deviation, standard_error : float
+        Mean of E, its standard deviation and its standard error; the latter NaN for one split.
+    relative, relative_error : float
+        Mean E over that of the mean demonstration, and its standard error.
+    coverage : float
+        Share of the positions inside the 90 % band; NaN where no variance is known.
+    duration : float
+        |T̂ - T| / T.
+    """
 
     n: int
     error: float
     deviation: float
     standard_error: float
-    relative: float  # to the mean demonstration's
-    relative_error: float  # standard error of `relative`
+    relative: float
+    relative_error: float
     coverage: float
     duration: float
 
 
 class Comparison(NamedTuple):
-    """One predictor's E less another's, over the same splits."""
+    """One predictor's E less another's on the same splits: each, their mean, its standard error."""
 
     differences: Array  # (S,)
     mean: float
@@ -51,14 +74,31 @@ class Comparison(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
-    """Errors of several predictors on demonstrations that they were not shown."""
+    """Errors of several predictors on demonstrations that they were not shown.
+
+    Attributes
+    ----------
+    recordings : Recordings
+        The demonstrations, read over normalised time.
+    splits : tuple of Split
+        Which were learnt from and which held out. Of a fold with conditions of both reaches, each
+        reach is a split.
+    predictors : dict of str to Predictor
+        What was tried.
+    forecasts : dict of str to list of list of Forecast
+        By predictor, split and demonstration held out.
+    scores : dict of str to Scores
+        Figures of each predictor, split by split.
+    left_out : dict of str to str
+        Predictors that could not be tried, and why.
+    """
 
     recordings: Recordings
     splits: tuple[Split, ...]
     predictors: dict[str, Predictor]
-    forecasts: dict[str, list[list[Forecast]]]  # by predictor, split, demonstration held out
+    forecasts: dict[str, list[list[Forecast]]]
     scores: dict[str, Scores]
-    left_out: dict[str, str]  # predictors that could not learn, and why
+    left_out: dict[str, str]
 
     def score(self, predictor: str) -> Scores:
         """Return the figures of one predictor, split by split."""
@@ -71,15 +111,16 @@ class Evaluation:
         rows = self._rows(reach)
         error, duration, coverage = (values[rows] for values in self.score(predictor))
         reference = self.scores[REFERENCE].error[rows]
-        relative = error.mean() / reference.mean() if reference.mean() > 0 else nan
+        level = float(reference.mean()) or nan
+        relative = float(error.mean()) / level
         return Summary(
             len(error),
             float(error.mean()),
             _deviation(error),
             _standard_error(error),
-            float(relative),
+            relative,
             # Of a ratio of means, to first order.
-            _standard_error(error - relative * reference) / float(reference.mean()),
+            _standard_error(error - relative * reference) / level,
             float(coverage.mean()),
             float(duration.mean()),
         )

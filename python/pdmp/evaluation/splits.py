@@ -111,7 +111,7 @@ def checked(splits: Iterable[Sequence[object]], n_demos: int) -> list[Split]:
             rows.append(indices.astype(np.intp))
         if both := sorted(set(rows[0].tolist()) & set(rows[1].tolist())):
             raise ValueError(f"splits[{k}]: demonstration {both[0]} is in train and in test")
-        found.append(Split(rows[0], rows[1], split[2]))  # type: ignore[arg-type]
+        found.append(Split(rows[0], rows[1], split[2]))
     if not found:
         raise ValueError("splits is empty: pass at least one")
     return found

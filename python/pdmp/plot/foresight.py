@@ -73,8 +73,8 @@ def prediction_error(
             level = evaluation.summary(name, reach).error
             axes.axhline(level, color=color, linestyle="--", linewidth=1, label=name)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.set_ylim(bottom=0)
         dress(axes, "number of style parameters J", "", reach)
+    panels[0].set_ylim(bottom=0)
     panels[0].set_ylabel(f"E [{unit}²]" if unit else "E")
     legend(figure, panels[0])
     return figure
@@ -85,8 +85,8 @@ def held_out(
 ) -> Figure:
     """Draw what was foreseen with its 90 % band, and the demonstrations held out.
 
-    One column for interpolation and one for extrapolation, each the fold of median E; one row per
-    degree of freedom, of more than six those that vary most.
+    One column for interpolation and one for extrapolation, each with the first condition of the
+    fold of median E; one row per degree of freedom, of more than six those that vary most.
 
     Parameters
     ----------
@@ -118,27 +118,20 @@ def held_out(
     for column, reach in zip(grid.T, reaches, strict=True):
         rows = [k for k, split in enumerate(evaluation.splits) if split.reach == reach]
         middle = rows[int(np.argsort(score.error[rows], kind="stable")[(len(rows) - 1) // 2])]
-        split = evaluation.splits[middle]
+        test, made = evaluation.splits[middle].test, evaluation.forecasts[predictor][middle][0]
+        context = recordings.contexts[test[0]]
+        shown = test[(recordings.contexts[test] == context).all(axis=1)]
         for axes, dof in zip(column, dofs, strict=True):
-            for m, made in zip(split.test, evaluation.forecasts[predictor][middle], strict=True):
-                axes.plot(
-                    at, recordings.sampled[m, :, dof], color=GREY, linewidth=1.5, label="held out"
-                )
-                mean = made.position[:, dof]
-                if made.variance is not None:
-                    half = WIDTH * np.sqrt(made.variance[:, dof])
-                    axes.fill_between(
-                        at,
-                        mean - half,
-                        mean + half,
-                        color=BLUE,
-                        alpha=0.15,
-                        linewidth=0,
-                        label=f"{BAND:.0%} band",
-                    )
-                axes.plot(at, mean, color=BLUE, linewidth=1.2, label="foreseen")
+            for trace in recordings.sampled[shown, :, dof]:
+                axes.plot(at, trace, color=GREY, linewidth=1.5, label="held out")
+            mean = made.position[:, dof]
+            if made.variance is not None:
+                half = WIDTH * np.sqrt(made.variance[:, dof])
+                band = {"color": BLUE, "alpha": 0.15, "linewidth": 0}
+                axes.fill_between(at, mean - half, mean + half, label=f"{BAND:.0%} band", **band)
+            axes.plot(at, mean, color=BLUE, linewidth=1.2, label="foreseen")
             dress(axes, "", f"{names[dof]} [{unit}]" if unit else names[dof])
-        column[0].set_title(reach)
+        column[0].set_title(f"{reach}, context {' '.join(f'{value:.3g}' for value in context)}")
         column[-1].set_xlabel("share of the duration")
     legend(figure, grid[0, 0])
     return figure
