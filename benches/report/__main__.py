@@ -7,12 +7,12 @@ from time import perf_counter
 from pdmp import plot
 from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
 from report.sets import Question, questions
-from report.text import text
+from report.text import PRIMITIVE, text
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "report"
 CURVES = {"raise_hand, whole", "walking_force, subject 0"}
-PRIMITIVES = {"PDMP, J by spectrum": PDMP(), "PDMP, full J": PDMP(spectrum=1.0)}
+PRIMITIVES = {PRIMITIVE: PDMP(), "PDMP, full J": PDMP(spectrum=1.0)}
 
 
 def main() -> None:
@@ -36,7 +36,7 @@ def answer(question: Question) -> Evaluation:
     """Evaluate all predictors on one question, and draw what they foresee."""
     given = {"contexts": question.contexts} | question.options
     found = evaluate(question.demos, predictors=baselines() | PRIMITIVES, **given)
-    figure = plot.held_out(found, "PDMP, J by spectrum", unit=question.unit)
+    figure = plot.held_out(found, PRIMITIVE, unit=question.unit)
     plot.save(figure, FIGURES / f"{slug(question.name)}.png")
     if question.name in CURVES:
         curve = evaluate(question.demos, predictors=over_styles(8), **given)

@@ -175,7 +175,7 @@ class Evaluation:
         return f"{reach}: {len(rows)} folds, {held} demonstrations"
 
     def _notes(self) -> list[str]:
-        return [f"left out: {name}, for {reason}" for name, reason in self.left_out.items()]
+        return [f"left out: {name}: {reason}" for name, reason in self.left_out.items()]
 
     def _rows(self, reach: Reach | None) -> list[int]:
         rows = [k for k, split in enumerate(self.splits) if reach in (None, split.reach)]
