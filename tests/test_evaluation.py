@@ -179,7 +179,8 @@ def test_comparison_is_paired() -> None:
 
 def test_cycles_are_foreseen() -> None:
     """Over phase, a primitive of loops foresees the one between two others."""
-    found = pdmp.evaluate(loops(), contexts=[[0.0], [0.5], [1.0]], kind="rhythmic")
+    contexts, tried = [[0.0], [0.5], [1.0]], {"PDMP": PDMP()}
+    found = pdmp.evaluate(loops(), contexts=contexts, predictors=tried, kind="rhythmic")
     assert found.summary("PDMP", "interpolation").error < 1e-6
     assert found.recordings.durations == pytest.approx([2, 2, 2])
 

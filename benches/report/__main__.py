@@ -1,8 +1,8 @@
 """``make report`` prints the table and draws figures into report/; ``--write`` writes docs too."""
 
 import argparse
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from time import perf_counter
 
 from pdmp import plot
 from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
@@ -20,12 +20,12 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--write", action="store_true", help="write docs/report.md")
     write = arguments.parse_args().write
+    asked = list(questions())
     answers: list[tuple[Question, Evaluation]] = []
-    for question in questions():
-        begin = perf_counter()
-        answers.append((question, answer(question)))
-        print(f"{question.name}: {perf_counter() - begin:.1f} s")
-        print(answers[-1][1], end="\n\n", flush=True)
+    with ProcessPoolExecutor() as pool:
+        for question, found in zip(asked, pool.map(answer, asked), strict=True):
+            print(f"{question.name}\n\n{found}\n", flush=True)
+            answers.append((question, found))
     report = text(answers)
     if write:
         (ROOT / "docs" / "report.md").write_text(report, encoding="utf-8")

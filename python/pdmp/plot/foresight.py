@@ -111,6 +111,7 @@ def held_out(
     names = recordings.names
     spread = np.ptp(recordings.sampled, axis=(0, 1))
     dofs = np.sort(np.argsort(-spread, kind="stable")[:MOST_DOFS])
+    whole = "duration" if recordings.kind == "discrete" else "period"
     reaches = evaluation.reaches()
     figure = canvas(figure, 4.2 * len(reaches), 1.7 * len(dofs) + 0.8)
     grid = figure.subplots(len(dofs), len(reaches), squeeze=False, sharex=True, sharey="row")
@@ -132,6 +133,6 @@ def held_out(
             axes.plot(at, mean, color=BLUE, linewidth=1.2, label="foreseen")
             dress(axes, "", f"{names[dof]} [{unit}]" if unit else names[dof])
         column[0].set_title(f"{reach}, context {' '.join(f'{value:.3g}' for value in context)}")
-        column[-1].set_xlabel("share of the duration")
+        column[-1].set_xlabel(f"share of the {whole}")
     legend(figure, grid[0, 0])
     return figure
