@@ -24,6 +24,7 @@ from pdmp.evaluation.splits import within_hull
 from synthetic import loops, reaches
 
 HEIGHTS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
+CONTEXTS = [[height] for height in HEIGHTS]
 
 
 def arches(heights: list[float], noise: float = 0.0) -> list[np.ndarray]:
@@ -191,6 +192,14 @@ def test_contexts_of_demonstrations_are_used() -> None:
     np.testing.assert_allclose(found.recordings.contexts[:, 0], [-0.2, -0.1, 0, 0.1, 0.2])
 
 
+def test_rate_is_given_to_demonstrations_without() -> None:
+    """Bare arrays and demonstrations without a rate come to the same."""
+    bare, held = arches(HEIGHTS), [pdmp.Demonstration(one) for one in arches(HEIGHTS)]
+    options = {"dt": 0.01, "contexts": CONTEXTS, "predictors": {"PDMP": PDMP(n_styles=2)}}
+    scores = [pdmp.evaluate(demos, **options).score("PDMP").error for demos in (bare, held)]
+    np.testing.assert_array_equal(*scores)
+
+
 @pytest.fixture(scope="module")
 def found() -> Evaluation:
     """Return an evaluation of all there is."""
@@ -222,7 +231,11 @@ def test_import_does_not_wait_for_evaluation() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-CONTEXTS = [[height] for height in HEIGHTS]
+CYCLES: list[tuple[dict[str, Any], str]] = [
+    ({}, "demo 0: a time-stamped cycle: pass period= in seconds"),
+    ({"period": 1.0}, "demo 0: period = 1: must exceed the last time stamp, 1 s"),
+    ({"period": [2.0] * 5}, "period has length 5, expected 6: one value per demonstration"),
+]
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"contexts": None}, "demo 0 has no context: pass contexts="),
     ({"contexts": CONTEXTS[:4]}, "contexts has length 4, expected 6: one value per demonstration"),
@@ -248,6 +261,14 @@ def test_bad_input_is_refused(option: dict[str, Any], message: str) -> None:
     """One error that names the argument, the numbers and the mend."""
     with pytest.raises(ValueError, match=message):
         pdmp.evaluate(arches(HEIGHTS), **({"dt": 0.01, "contexts": CONTEXTS} | option))
+
+
+@pytest.mark.parametrize(("option", "message"), CYCLES, ids=str)
+def test_bad_periods_are_refused(option: dict[str, Any], message: str) -> None:
+    """Cycles with time stamps need a period beyond the last of them."""
+    stamped = [pdmp.Demonstration(one, time=np.linspace(0, 1, 101)) for one in arches(HEIGHTS)]
+    with pytest.raises(ValueError, match=message):
+        pdmp.evaluate(stamped, kind="rhythmic", contexts=CONTEXTS, **option)
 
 
 def test_forecast_of_another_shape_is_refused() -> None:

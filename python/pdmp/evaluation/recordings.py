@@ -85,10 +85,7 @@ def recordings(
         raise ValueError(f'kind = "{kind}": must be "discrete" or "rhythmic"')
     if n_samples < 4:
         raise ValueError(f"n_samples = {n_samples}: must be at least 4")
-    given = tuple(
-        demo if isinstance(demo, Demonstration) else Demonstration(demo, dt=dt)
-        for demo in list(demos)  # type: ignore[arg-type]
-    )
+    given = tuple(_rated(demo, dt) for demo in list(demos))  # type: ignore[arg-type]
     if not given:
         raise ValueError("demos is empty: pass at least two demonstrations")
     for m, demo in enumerate(given):
@@ -102,37 +99,41 @@ def recordings(
             f"period has length {len(periods)}, expected {len(given)}: one value per demonstration"
         )
     periods = np.broadcast_to(periods, len(given))
-    read = [_read(demo, m, kind, dt, periods[m], n_samples) for m, demo in enumerate(given)]
+    read = [_read(demo, m, kind, periods[m], n_samples) for m, demo in enumerate(given)]
     durations, sampled = (np.array(values) for values in zip(*read, strict=True))
     return Recordings(given, _contexts(given, contexts), kind, durations, sampled)
 
 
+def _rated(demo: Demonstration | ArrayLike, dt: float | None) -> Demonstration:
+    """Return a demonstration, with the rate that is given for those without."""
+    if not isinstance(demo, Demonstration):
+        return Demonstration(demo, dt=dt)
+    if demo.time is not None or dt is None:
+        return demo
+    own = {"goal": demo.goal, "context": demo.context, "names": demo.names}
+    return Demonstration(demo.position, dt=dt, **own)  # type: ignore[arg-type]
+
+
 def _read(
-    demo: Demonstration, m: int, kind: Kind, dt: float | None, period: float, n_samples: int
+    demo: Demonstration, m: int, kind: Kind, period: float, n_samples: int
 ) -> tuple[float, Array]:
     """Return the duration [s] and the positions (C, D), linear between the samples."""
-    interval = demo.dt if demo.dt is not None else dt
-    if demo.time is not None:
-        time = demo.time - demo.time[0]
-    elif interval is not None:
-        time = interval * np.arange(demo.n_samples)
-    else:
+    if demo.time is None:
         raise ValueError(f"demo {m}: no sampling interval: pass dt= in seconds")
-    if kind == "discrete":
-        duration, wrap = float(time[-1]), None
-    else:
-        if np.isnan(period) and interval is None:
+    time = demo.time - demo.time[0]
+    duration, wrap = float(time[-1]), None
+    if kind == "rhythmic":
+        if np.isnan(period) and demo.dt is None:
             raise ValueError(f"demo {m}: a time-stamped cycle: pass period= in seconds")
-        duration = float(interval * demo.n_samples if np.isnan(period) else period)  # type: ignore[operator]
-        if duration <= time[-1]:
+        wrap = float((demo.dt or 0) * demo.n_samples if np.isnan(period) else period)
+        if wrap <= duration:
             raise ValueError(
-                f"demo {m}: period = {duration:g}: must exceed the last time stamp, {time[-1]:g} s"
+                f"demo {m}: period = {wrap:g}: must exceed the last time stamp, {duration:g} s"
             )
-        wrap = duration
+        duration = wrap
     at = np.linspace(0, duration, n_samples, endpoint=kind == "discrete")
-    return duration, np.transpose(
-        [np.interp(at, time, column, period=wrap) for column in demo.position.T]
-    )
+    columns = [np.interp(at, time, column, period=wrap) for column in demo.position.T]
+    return duration, np.transpose(columns)
 
 
 def _contexts(demos: Sequence[Demonstration], contexts: ArrayLike | None) -> Array:

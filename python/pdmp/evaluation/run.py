@@ -94,7 +94,7 @@ def evaluate(
     kind : str
         "discrete", or "rhythmic": each demonstration is one cycle.
     dt : float, optional
-        Sampling interval of bare arrays [s].
+        Sampling interval [s] of demonstrations that hold none.
     period : array_like, optional
         Periods [s] of time-stamped cycles, one or M.
     n_samples : int
