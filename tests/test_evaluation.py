@@ -116,6 +116,15 @@ def test_full_primitive_is_principal_components() -> None:
     assert abs(found.compare("PDMP", "PCA").mean) < 1e-6
 
 
+def test_both_maps_are_one_where_contexts_leave_a_choice() -> None:
+    """Of two contexts of other units that vary together, both maps make the same of each."""
+    contexts = [[height, 1000 * height] for height in HEIGHTS]
+    pair = {"PDMP": PDMP(n_styles=2), "PCA": LinearWeights(Components())}
+    found = pdmp.evaluate(arches(HEIGHTS), dt=0.01, contexts=contexts, predictors=pair)
+    for name in pair:
+        assert found.summary(name).relative < 1e-7
+
+
 def test_band_of_known_width_covers_its_share() -> None:
     """With the true variance, nine tenths of the positions lie inside the 90 % band."""
     found = evaluated({"known": Known(0.05)}, noise=0.05)

@@ -27,12 +27,12 @@ the column J is that of all demonstrations of a question together.
 E = (1/T) Σ‖ŷ(t) − y(t)‖² over normalised time, as a share of what the mean demonstration leaves, ±
 standard error over folds: at 1 the context told nothing, at 0 all.
 """
-PRIMITIVE_ITSELF = f"""\
+PRIMITIVE_ITSELF = """\
 ## The primitive itself
 
-E of {PRIMITIVE} ± standard deviation over folds; share of the positions inside its 90 % band; how
-far off the duration is; and E less that of the Gaussian processes on principal components, on the
-same folds, ± standard error: negative where the primitive is better.
+E with J by spectrum, ± standard deviation over folds; share of the positions inside its 90 % band;
+how far off the duration is; and E less that of the Gaussian processes on principal components, on
+the same folds, ± standard error: negative where the primitive is better.
 """
 
 

@@ -10,16 +10,20 @@ from pdmp.evaluation.recordings import Array, Recordings
 
 
 class LinearMap:
-    """Least squares of minimum norm from contexts (M, Q) to outputs (M, P)."""
+    """Least squares of minimum norm from contexts (M, Q) to outputs (M, P).
+
+    The norm is taken of contexts scaled to unit size, as in the primitive's own map.
+    """
 
     def __init__(self, contexts: Array, outputs: Array) -> None:
-        self.centre = contexts.mean(axis=0)
+        self.centre, self.mean = contexts.mean(axis=0), outputs.mean(axis=0)
         offsets = contexts - self.centre
-        self.mean = outputs.mean(axis=0)
-        self.slopes, _, rank, _ = np.linalg.lstsq(offsets, outputs - self.mean)
-        self.inverse_scatter = np.linalg.pinv(offsets.T @ offsets)
-        self.n_demos = len(contexts)
-        self.freedom = self.n_demos - 1 - int(rank)
+        sizes = np.abs(offsets).max(axis=0)
+        unit = np.where(sizes > 0, sizes, 1)
+        self.inverse, _, rank, _ = np.linalg.lstsq(offsets / unit, np.eye(len(offsets)))
+        self.inverse /= unit[:, None]
+        self.slopes = self.inverse @ (outputs - self.mean)
+        self.freedom = len(offsets) - 1 - int(rank)
 
     def __call__(self, context: Array) -> Array:
         """Return the outputs (..., P) for contexts (..., Q)."""
@@ -27,8 +31,8 @@ class LinearMap:
 
     def spread(self, context: Array) -> float:
         """Return the variance of a new output for a context, over the sum of squared residuals."""
-        offset = context - self.centre
-        return float(1 + 1 / self.n_demos + offset @ self.inverse_scatter @ offset) / self.freedom
+        influence = (context - self.centre) @ self.inverse
+        return float(1 + 1 / len(influence) + influence @ influence) / self.freedom
 
 
 def lasting(recordings: Recordings) -> Callable[[Array], float]:

@@ -17,7 +17,15 @@ NEAR = 1e-6  # distance, in ranges of the contexts, at which a context counts as
 
 
 class Split(NamedTuple):
-    """Demonstrations to learn from and to predict, by index."""
+    """Demonstrations to learn from and to predict.
+
+    Attributes
+    ----------
+    train, test : ndarray of int
+        Their indices.
+    reach : str
+        "interpolation" or "extrapolation": where the contexts of `test` lie.
+    """
 
     train: Rows
     test: Rows
@@ -70,7 +78,8 @@ def within_hull(point: Array, points: Array) -> bool:
     """Say whether a point (Q,) is a convex combination of others (K, Q).
 
     Weight moves between two points at a time, from the one farthest against the way to the one
-    farthest along it, until the combination is there or a plane parts it from the point.
+    farthest along it, until the combination is there or a plane parts it from the point. One so
+    near the surface that neither is found counts as inside.
     """
     spread = np.ptp(points, axis=0)
     offset = (points - point) / np.where(spread > 0, spread, 1)
