@@ -93,7 +93,7 @@ def styled_walks() -> Iterator[Question]:
         if stride["id"].startswith("walk") and stride["foot"] == "r":
             whole = walk(stride["id"])
             start, end = int(stride["start_frame"]), int(stride["end_frame"])
-            demos.append(cycle(whole.position[start:end], float(stride["duration_s"])))
+            demos.append(cycle(whole.position[start:end], float(stride["duration_s"]), whole.names))
             contexts.append([speeds[stride["id"]]])
     options = {"kind": "rhythmic"}
     yield Question("walk_styles", "speed", "rad", demos, np.array(contexts), options)
@@ -110,7 +110,7 @@ def runners() -> Iterator[Question]:
         if seen[row["runner"]] <= STRIDES:
             members.append(k)
     # The last of 101 points is the first of the next stride.
-    demos = [cycle(strides[k].position[:-1], 1.0) for k in members]
+    demos = [cycle(strides[k].position[:-1], 1.0, strides[k].names) for k in members]
     contexts = numbers(index, "age", "height_cm", "mass_kg")[members]
     options = {"kind": "rhythmic"}
     yield Question("running_strides", "age, height, mass", "rad", demos, contexts, options)

@@ -61,7 +61,7 @@ class Recordings:
     @property
     def names(self) -> list[str]:
         """Names of the degrees of freedom, as in a model."""
-        return self.demos[0].names or [f"dof{d}" for d in range(self.sampled.shape[2])]
+        return self.demos[0].names or [f"y{d}" for d in range(self.sampled.shape[2])]
 
     def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
         """Return some of them."""
