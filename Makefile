@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 # The bindings are compiled against the interpreter that will import them.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test check bench bench-peers bench-scaling bench-bases rtsan capi header clean needs
+.PHONY: demo test check bench bench-peers bench-scaling bench-bases report rtsan capi header clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to demo/
 	$(BIN)/pdmp demo -o demo
@@ -37,6 +37,9 @@ bench-scaling: .venv/with-peers  ## Draws how the time to learn grows with the d
 
 bench-bases: .venv/with-demo  ## How well each basis reproduces and foresees the recordings at hand
 	OMP_NUM_THREADS=1 $(BIN)/python benches/bases.py
+
+report: .venv/with-test  ## How well movements are foreseen from their context, on the recordings at hand; figures into report/
+	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report
 
 # The sanitizer may not touch build scripts, which a named target spares. A compiler without it says why.
 rtsan: | needs  ## Runs the control loop under the real-time sanitizer of a nightly compiler, where there is one

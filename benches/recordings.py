@@ -108,9 +108,9 @@ def thinned(demo: Demonstration) -> Demonstration:
     return Demonstration(demo.position[::step], time=demo.time[::step])
 
 
-def cycle(position: np.ndarray, period: float) -> Demonstration:
+def cycle(position: np.ndarray, period: float, names: list[str] | None = None) -> Demonstration:
     """Return one cycle, whose first sample follows upon the last."""
-    return Demonstration(position, dt=period / len(position))
+    return Demonstration(position, dt=period / len(position), names=names)
 
 
 def styled_walks() -> Iterator[Demonstration]:

@@ -11,9 +11,10 @@ import pytest
 import pdmp
 from pdmp import demos
 from pdmp.cli import main
+from pdmp.evaluation import PDMP, baselines
 from synthetic import DT, loops, reaches
 
-COMMANDS = ["fit", "rollout", "info", "plot", "demo"]
+COMMANDS = ["fit", "rollout", "evaluate", "info", "plot", "demo"]
 
 
 @pytest.fixture
@@ -107,6 +108,19 @@ def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
     expected = pdmp.load(model_file).rollout(context=[0.15])
     made = demos.read_csv(path, columns=["x", "y"])
     np.testing.assert_array_equal(made.position, expected.position)
+
+
+def test_evaluate_tells_what_the_library_finds(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The table is printed, and with a folder, written beside two figures."""
+    out = tmp_path / "evaluation"
+    assert run("evaluate", folder, "--context", "bend", "--styles", 2, "-o", out) == 0
+    written = {path.name for path in out.iterdir()}
+    assert written == {"evaluation.md", "held_out.png", "prediction_error.png"}
+    recordings = demos.read([folder], context=["bend"])
+    predictors = baselines() | {"PDMP": PDMP(n_styles=2)}
+    assert repr(pdmp.evaluate(recordings, predictors=predictors)) in capsys.readouterr().out
 
 
 def test_info_tells_kind_names_and_styles(

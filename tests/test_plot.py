@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 import pdmp
 from pdmp import plot
+from pdmp.evaluation import Evaluation, over_styles
 from synthetic import loops, reaches
 
 
@@ -21,6 +22,12 @@ def model() -> pdmp.Model:
 def rhythmic() -> pdmp.Model:
     """Return a rhythmic model of three loops."""
     return pdmp.fit(loops(), kind="rhythmic", n_styles=2)
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> Evaluation:
+    """Return what primitives with one and two styles foresee of reaches held out."""
+    return pdmp.evaluate(reaches(), predictors=over_styles(2))
 
 
 def labels_of(figure: Figure) -> set[str]:
@@ -108,6 +115,32 @@ def test_phase_portrait_needs_a_rhythmic_model(model: pdmp.Model) -> None:
     """A discrete primitive has no limit cycle."""
     with pytest.raises(ValueError, match="discrete primitive has no limit cycle"):
         plot.phase_portrait(model)
+
+
+def test_prediction_error_is_drawn_over_the_styles(evaluation: Evaluation) -> None:
+    """One panel a reach: a point per J with its deviation, and the mean demonstration's level."""
+    figure = plot.prediction_error(evaluation, unit="m")
+    assert [axes.get_title() for axes in figure.axes] == ["interpolation", "extrapolation"]
+    assert labels_of(figure) == {"number of style parameters J", "E [m²]", ""}
+    for axes in figure.axes:
+        (curve,) = axes.containers
+        assert curve.lines[0].get_xdata().tolist() == [1, 2]
+
+
+def test_prediction_error_needs_numbers_of_styles() -> None:
+    """Predictors without J have no place on the axis."""
+    with pytest.raises(ValueError, match="no PDMP with n_styles among mean demonstration"):
+        plot.prediction_error(pdmp.evaluate(reaches(), predictors={}))
+
+
+def test_held_out_movements_have_a_column_per_reach(evaluation: Evaluation) -> None:
+    """A panel for each degree of freedom: the recording, the forecast and its band."""
+    figure = plot.held_out(evaluation, "PDMP, J = 2", unit="m")
+    titles = [axes.get_title() for axes in figure.axes[:2]]
+    assert titles[0].startswith("interpolation, context ")
+    assert len(figure.axes) == 4
+    for axes in figure.axes:
+        assert (len(axes.lines), len(axes.collections)) == (2, 1)
 
 
 def test_given_figure_is_drawn_on(model: pdmp.Model) -> None:

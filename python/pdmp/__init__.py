@@ -10,6 +10,8 @@ T. Matsubara, S.-H. Hyon, J. Morimoto, "Learning parametric dynamic movement pri
 multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
 """
 
+from typing import TYPE_CHECKING
+
 from pdmp._native import (
     GP,
     ContextMap,
@@ -35,6 +37,19 @@ from pdmp._native import (
 from pdmp.arguments import as_demonstrated, blend
 from pdmp.pacing import Run, Tick
 
+if TYPE_CHECKING:
+    from pdmp.evaluation import evaluate
+else:
+
+    def __getattr__(name):
+        """Import `evaluate` when it is first asked for: a control loop has no use for it."""
+        if name != "evaluate":
+            raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
+        from pdmp.evaluation import evaluate
+
+        return evaluate
+
+
 __all__ = [
     "GP",
     "ContextMap",
@@ -57,6 +72,7 @@ __all__ = [
     "__version__",
     "as_demonstrated",
     "blend",
+    "evaluate",
     "factorise",
     "fit",
     "load",

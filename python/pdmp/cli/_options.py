@@ -1,6 +1,7 @@
 """Options that several commands share."""
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
+from typing import Any
 
 
 def add_reading(parser: ArgumentParser) -> None:
@@ -11,3 +12,55 @@ def add_reading(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--dt", type=float, metavar="S", help="sampling interval [s], in place of time stamps"
     )
+
+
+def add_learning(parser: ArgumentParser) -> None:
+    """Add the options that tell how a primitive is learnt."""
+    parser.add_argument(
+        "--context", nargs="+", metavar="NAME", help="columns of index.csv that make the context"
+    )
+    parser.add_argument(
+        "--map",
+        choices=["auto", "linear", "polynomial", "gp"],
+        default="auto",
+        help="what leads from contexts to movements; default: auto",
+    )
+    parser.add_argument(
+        "--kind",
+        choices=["discrete", "rhythmic"],
+        default="discrete",
+        help="from start to goal (default), or one cycle per demonstration",
+    )
+    parser.add_argument("--period", type=float, metavar="S", help="period of rhythmic ones [s]")
+    parser.add_argument("--styles", type=int, metavar="J", help="number of style parameters")
+    parser.add_argument(
+        "--spectrum",
+        type=float,
+        default=0.9,
+        metavar="SHARE",
+        help="without --styles: share of the singular-value sum to keep; default: 0.9",
+    )
+    parser.add_argument(
+        "--basis",
+        choices=["gp", "ngnet"],
+        default="gp",
+        help="Gaussian process (default) or normalised Gaussian network",
+    )
+    parser.add_argument(
+        "--smoothing", type=_smoothing, metavar="HZ", help="cut-off [Hz], or auto; default: none"
+    )
+
+
+def settings(options: Namespace) -> dict[str, Any]:
+    """Return what `pdmp.fit` is told beside kind and period."""
+    return {
+        "map": options.map,
+        "n_styles": options.styles,
+        "spectrum": options.spectrum,
+        "basis": options.basis,
+        "smoothing": options.smoothing,
+    }
+
+
+def _smoothing(text: str) -> str | float:
+    return text if text == "auto" else float(text)

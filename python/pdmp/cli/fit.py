@@ -22,39 +22,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help="model to write")
     _options.add_reading(parser)
-    parser.add_argument(
-        "--context", nargs="+", metavar="NAME", help="columns of index.csv that make the context"
-    )
-    parser.add_argument(
-        "--map",
-        choices=["auto", "linear", "polynomial", "gp"],
-        default="auto",
-        help="what leads from contexts to movements; default: auto",
-    )
-    parser.add_argument(
-        "--kind",
-        choices=["discrete", "rhythmic"],
-        default="discrete",
-        help="from start to goal (default), or one cycle per demonstration",
-    )
-    parser.add_argument("--period", type=float, metavar="S", help="period of rhythmic ones [s]")
-    parser.add_argument("--styles", type=int, metavar="J", help="number of style parameters")
-    parser.add_argument(
-        "--spectrum",
-        type=float,
-        default=0.9,
-        metavar="SHARE",
-        help="without --styles: share of the singular-value sum to keep; default: 0.9",
-    )
-    parser.add_argument(
-        "--basis",
-        choices=["gp", "ngnet"],
-        default="gp",
-        help="Gaussian process (default) or normalised Gaussian network",
-    )
-    parser.add_argument(
-        "--smoothing", type=_smoothing, metavar="HZ", help="cut-off [Hz], or auto; default: none"
-    )
+    _options.add_learning(parser)
 
 
 def run(options: Namespace) -> None:
@@ -70,16 +38,8 @@ def run(options: Namespace) -> None:
             recordings,
             kind=options.kind,
             period=options.period,
-            map=options.map,
-            n_styles=options.styles,
-            spectrum=options.spectrum,
-            basis=options.basis,
-            smoothing=options.smoothing,
+            **_options.settings(options),
             progress=show,
         )
     model.save(options.output)
     print(f"{options.output}: {model!r}")
-
-
-def _smoothing(text: str) -> str | float:
-    return text if text == "auto" else float(text)

@@ -7,10 +7,17 @@ from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
 from pdmp._native import PdmpError, __version__
-from pdmp.cli import demo, fit, info, plot, rollout
+from pdmp.cli import demo, evaluate, fit, info, plot, rollout
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
-COMMANDS = {"fit": fit, "rollout": rollout, "info": info, "plot": plot, "demo": demo}
+COMMANDS = {
+    "fit": fit,
+    "rollout": rollout,
+    "evaluate": evaluate,
+    "info": info,
+    "plot": plot,
+    "demo": demo,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -5,8 +5,18 @@ of its own, and returns it; `save` writes it: `plot.save(plot.spectrum(model), "
 """
 
 from pdmp.plot._canvas import save
+from pdmp.plot.foresight import held_out, prediction_error
 from pdmp.plot.movements import demonstrations, fan
 from pdmp.plot.rhythm import phase_portrait
 from pdmp.plot.space import spectrum, styles
 
-__all__ = ["demonstrations", "fan", "phase_portrait", "save", "spectrum", "styles"]
+__all__ = [
+    "demonstrations",
+    "fan",
+    "held_out",
+    "phase_portrait",
+    "prediction_error",
+    "save",
+    "spectrum",
+    "styles",
+]

@@ -1,0 +1,1 @@
+"""How well movements are foreseen from their context: the primitive beside simpler predictors."""

@@ -1,0 +1,58 @@
+"""``make report`` prints the table and draws figures into report/; ``--write`` writes docs too."""
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from pdmp import plot
+from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
+from report.sets import Question, questions
+from report.text import PRIMITIVE, text
+
+ROOT = Path(__file__).resolve().parents[2]
+FIGURES = ROOT / "report"
+CURVES = {"raise_hand, whole", "walking_force, subject 0"}
+PRIMITIVES = {
+    PRIMITIVE: PDMP(),
+    "PDMP, full J": PDMP(spectrum=1.0),
+    "PDMP, linear": PDMP(map="linear"),
+}
+
+
+def main() -> None:
+    """Answer every question at hand."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--write", action="store_true", help="write docs/report.md")
+    write = arguments.parse_args().write
+    asked = list(questions())
+    answers: list[tuple[Question, Evaluation]] = []
+    with ProcessPoolExecutor() as pool:
+        for question, found in zip(asked, pool.map(answer, asked), strict=True):
+            print(f"{question.name}\n\n{found}\n", flush=True)
+            answers.append((question, found))
+    report = text(answers)
+    if write:
+        (ROOT / "docs" / "report.md").write_text(report, encoding="utf-8")
+    print(report)
+
+
+def answer(question: Question) -> Evaluation:
+    """Evaluate all predictors on one question, and draw what they foresee."""
+    given = {"contexts": question.contexts} | question.options
+    found = evaluate(question.demos, predictors=baselines() | PRIMITIVES, **given)
+    figure = plot.held_out(found, PRIMITIVE, unit=question.unit)
+    plot.save(figure, FIGURES / f"{slug(question.name)}.png")
+    if question.name in CURVES:
+        curve = evaluate(question.demos, predictors=over_styles(8), **given)
+        figure = plot.prediction_error(curve, unit=question.unit)
+        plot.save(figure, FIGURES / f"{slug(question.name)}_styles.png")
+    return found
+
+
+def slug(name: str) -> str:
+    """Return a name for a file."""
+    return name.replace(", ", "_").replace(" ", "_")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""Sets of recordings with a numeric context, each as one question or several."""
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pdmp import Demonstration
+from pdmp.demos import read_csv, read_folder
+from recordings import ARM, DATA, HAND, at_hand, cycle
+
+LEGS = [f"{side}_{angle}" for side in "rl" for angle in ("hip_flex", "knee_flex", "ank_dorsi")]
+MOST = 120  # demonstrations of a question: Gaussian processes take a second each beyond
+STRIDES = 3  # of each runner
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Demonstrations, and what they are to be foreseen from."""
+
+    name: str
+    context: str
+    unit: str
+    demos: list[Demonstration]
+    contexts: np.ndarray  # (M, Q)
+    options: dict[str, Any] = field(default_factory=dict)  # of `pdmp.evaluate`
+
+
+def questions() -> Iterator[Question]:
+    """Give every question whose recordings are at hand."""
+    for source, ask in ASKED.items():
+        if at_hand(source):
+            yield from ask()
+
+
+def raised_hands() -> Iterator[Question]:
+    """Raise a hand, hold it, and bring it back; or the rise alone."""
+    index = rows("raise_hand_bandai")
+    demos = list(read_folder(DATA / "raise_hand_bandai", columns=ARM).values())
+    heights = numbers(index, "hold_height_m")
+    yield Question("raise_hand, whole", "height held", "rad", demos, heights)
+    rises = cut(demos, numbers(index, "rise_start_s", "rise_end_s"))
+    yield Question("raise_hand, rise", "height held", "rad", rises, heights)
+
+
+def high_and_low() -> Iterator[Question]:
+    """Grab something high, or deposit something on the floor: three actors of different size."""
+    index = rows("arms_hdm05")
+    demos = list(read_folder(DATA / "arms_hdm05", columns=ARM).values())
+    columns = {"grabHighR": "peak_height_m", "depositFloorR": "low_height_m"}
+    heights, chosen = np.full((len(index), 1), np.nan), {}
+    for motion, column in columns.items():
+        chosen[motion] = [k for k, row in enumerate(index) if row["motion"] == motion]
+        heights[chosen[motion]] = numbers(index, column)[chosen[motion]]
+    chosen["both"] = sum(chosen.values(), [])
+    for name, members in chosen.items():
+        some = [demos[k] for k in members]
+        yield Question(f"arms_hdm05, {name}", "height of the target", "rad", some, heights[members])
+
+
+def walking_forces() -> Iterator[Question]:
+    """Load the ground, as five people do who walk at many speeds."""
+    index = rows("walking_force_speed")
+    demos = list(read_folder(DATA / "walking_force_speed").values())
+    speeds = numbers(index, "speed_m_s")
+    subjects = np.array([row["subject"] for row in index])
+    for subject in np.unique(subjects):
+        members = np.flatnonzero(subjects == subject)
+        some = [demos[k] for k in members]
+        yield Question(f"walking_force, subject {subject}", "speed", "BW", some, speeds[members])
+    step = -(-len(demos) // MOST)
+    yield Question("walking_force, all", "speed", "BW", demos[::step], speeds[::step])
+
+
+def doors() -> Iterator[Question]:
+    """Reach for the handle of a door that is somewhere else each time, and open it."""
+    index = rows("door_adroit")
+    demos = list(read_folder(DATA / "door_adroit", columns=HAND).values())
+    places = numbers(index, "door_x", "door_y", "door_z")
+    ends = numbers(index, "latch_turns_at_s")
+    reaches = cut(demos, np.hstack([0 * ends, ends]))
+    yield Question("door_adroit, reach", "place of the door", "rad", reaches, places)
+    yield Question("door_adroit, whole", "place of the door", "rad", demos, places)
+
+
+def styled_walks() -> Iterator[Question]:
+    """Walk in ten styles, right foot to right foot; a recording has one speed."""
+    speeds = {row["id"]: float(row["speed_m_s"]) for row in rows("walk_styles_bandai")}
+    demos, contexts = [], []
+    for stride in rows("walk_styles_bandai", "strides.csv"):
+        if stride["id"].startswith("walk") and stride["foot"] == "r":
+            whole = walk(stride["id"])
+            start, end = int(stride["start_frame"]), int(stride["end_frame"])
+            demos.append(cycle(whole.position[start:end], float(stride["duration_s"]), whole.names))
+            contexts.append([speeds[stride["id"]]])
+    options = {"kind": "rhythmic"}
+    yield Question("walk_styles", "speed", "rad", demos, np.array(contexts), options)
+
+
+def runners() -> Iterator[Question]:
+    """Run, as runners of different age, height and mass do."""
+    index = rows("running_strides")
+    strides = list(read_folder(DATA / "running_strides").values())
+    seen: dict[str, int] = {}
+    members = []
+    for k, row in enumerate(index):
+        seen[row["runner"]] = seen.get(row["runner"], 0) + 1
+        if seen[row["runner"]] <= STRIDES:
+            members.append(k)
+    # The last of 101 points is the first of the next stride.
+    demos = [cycle(strides[k].position[:-1], 1.0, strides[k].names) for k in members]
+    contexts = numbers(index, "age", "height_cm", "mass_kg")[members]
+    options = {"kind": "rhythmic"}
+    yield Question("running_strides", "age, height, mass", "rad", demos, contexts, options)
+
+
+def pushes() -> Iterator[Question]:
+    """Push an object to a target with a planar arm."""
+    index = rows("arm3_pushing")
+    demos = list(read_folder(DATA / "arm3_pushing").values())
+    places = numbers(index, "object_x", "object_y", "target_x", "target_y")
+    yield Question("arm3_pushing", "object and target", "rad", demos, places)
+
+
+ASKED = {
+    "raise_hand_bandai": raised_hands,
+    "arms_hdm05": high_and_low,
+    "walking_force_speed": walking_forces,
+    "door_adroit": doors,
+    "walk_styles_bandai": styled_walks,
+    "running_strides": runners,
+    "arm3_pushing": pushes,
+}
+
+
+def rows(source: str, name: str = "index.csv") -> list[dict[str, str]]:
+    """Read a table of a set."""
+    with open(DATA / source / name, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def numbers(index: list[dict[str, str]], *columns: str) -> np.ndarray:
+    """Return columns of a table (M, Q)."""
+    return np.array([[float(row[column]) for column in columns] for row in index])
+
+
+def cut(demos: list[Demonstration], bounds: np.ndarray) -> list[Demonstration]:
+    """Return what lies between two times [s] of each demonstration."""
+    parts = []
+    for demo, (begin, end) in zip(demos, bounds, strict=True):
+        kept = (demo.time >= begin - 1e-3) & (demo.time <= end + 1e-3)
+        parts.append(Demonstration(demo.position[kept], time=demo.time[kept], names=demo.names))
+    return parts
+
+
+def walk(name: str) -> Demonstration:
+    """Read one recording of a walk: the right arm and what flexes the legs."""
+    folder = DATA / "walk_styles_bandai" / "demos"
+    return read_csv(folder / f"{name}.csv", columns=[*ARM, *LEGS])

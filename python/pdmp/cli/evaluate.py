@@ -1,0 +1,57 @@
+"""Foresee demonstrations that are held out, with a primitive and with simpler predictors.
+
+Prints how large the errors are. With a folder, figures and the tables in Markdown are written too.
+
+example: pdmp evaluate recordings/ --columns q1 q2 q3 --context height_m -o evaluation
+"""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from pdmp import demos
+from pdmp._files import replacing
+from pdmp.cli import _options
+
+MOST_STYLES = 8  # of the figure of E over J
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument("paths", nargs="+", metavar="PATH", help="folder with an index.csv")
+    parser.add_argument(
+        "-o", "--output", metavar="FOLDER", help="where to write figures and tables"
+    )
+    _options.add_reading(parser)
+    _options.add_learning(parser)
+    parser.add_argument("--unit", default="", help="unit of the positions")
+
+
+def run(options: Namespace) -> None:
+    """Read, evaluate, tell, draw."""
+    from pdmp.evaluation import PDMP, baselines, evaluate, over_styles
+
+    recordings = demos.read(
+        options.paths, columns=options.columns, dt=options.dt, context=options.context
+    )
+    settings = _options.settings(options)
+    tried = {"kind": options.kind, "period": options.period}
+    found = evaluate(recordings, predictors=baselines() | {"PDMP": PDMP(**settings)}, **tried)
+    print(found)
+    if options.output is None:
+        return
+    from pdmp import plot
+
+    most = min(MOST_STYLES, *(len(split.train) for split in found.splits))
+    del settings["n_styles"]
+    curve = evaluate(recordings, predictors=over_styles(most, **settings), **tried)
+    folder = Path(options.output)
+    figures = {
+        "held_out": plot.held_out(found, "PDMP", unit=options.unit),
+        "prediction_error": plot.prediction_error(curve, unit=options.unit),
+    }
+    for name, figure in figures.items():
+        plot.save(figure, folder / f"{name}.png")
+    with replacing(folder / "evaluation.md") as draft:
+        draft.write_text(found.markdown(), encoding="utf-8")
+    for path in sorted(folder.glob("*")):
+        print(path)

@@ -1,0 +1,160 @@
+"""Demonstrations as predictors see them: with contexts, and read over normalised time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pdmp._native import Demonstration
+
+Array: TypeAlias = NDArray[Any]  # of float64
+Kind: TypeAlias = Literal["discrete", "rhythmic"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """M demonstrations of one skill under known contexts.
+
+    Attributes
+    ----------
+    demos : tuple of Demonstration
+        As they were given, each with its own rate.
+    contexts : ndarray (M, Q)
+        The condition of each.
+    kind : str
+        "discrete", or "rhythmic": each demonstration is one cycle.
+    durations : ndarray (M,)
+        Durations, or periods [s].
+    sampled : ndarray (M, C, D)
+        Positions over normalised time: C samples of each, both ends among them if discrete.
+    """
+
+    demos: tuple[Demonstration, ...]
+    contexts: Array
+    kind: Kind
+    durations: Array
+    sampled: Array
+
+    @property
+    def n_demos(self) -> int:
+        """Number of demonstrations M."""
+        return len(self.demos)
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples C over a movement."""
+        return int(self.sampled.shape[1])
+
+    @property
+    def periods(self) -> Array | None:
+        """Periods (M,) [s] of rhythmic demonstrations, as `pdmp.fit` takes them."""
+        return self.durations if self.kind == "rhythmic" else None
+
+    def interval(self, duration: float) -> float:
+        """Return the time [s] between two of C samples of a movement."""
+        return duration / (self.n_samples - (self.kind == "discrete"))
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the degrees of freedom, as in a model."""
+        return self.demos[0].names or [f"y{d}" for d in range(self.sampled.shape[2])]
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
+        """Return some of them."""
+        demos = tuple(self.demos[row] for row in rows)
+        chosen = (array[rows] for array in (self.contexts, self.durations, self.sampled))
+        contexts, durations, sampled = chosen
+        return Recordings(demos, contexts, self.kind, durations, sampled)
+
+
+def recordings(
+    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
+    contexts: ArrayLike | None,
+    *,
+    kind: Kind,
+    dt: float | None,
+    period: ArrayLike | None,
+    n_samples: int,
+) -> Recordings:
+    """Check demonstrations and contexts, and read each demonstration over its own duration."""
+    if kind not in ("discrete", "rhythmic"):
+        raise ValueError(f'kind = "{kind}": must be "discrete" or "rhythmic"')
+    if n_samples < 4:
+        raise ValueError(f"n_samples = {n_samples}: must be at least 4")
+    given = tuple(_rated(demo, dt) for demo in list(demos))  # type: ignore[arg-type]
+    if not given:
+        raise ValueError("demos is empty: pass at least two demonstrations")
+    for m, demo in enumerate(given):
+        if demo.n_dofs != given[0].n_dofs:
+            raise ValueError(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
+    if kind == "discrete" and period is not None:
+        raise ValueError("period does not apply to discrete demonstrations: leave it out")
+    periods = np.full(len(given), np.nan) if period is None else np.asarray(period, float)
+    if periods.ndim and len(periods) != len(given):
+        raise ValueError(
+            f"period has length {len(periods)}, expected {len(given)}: one value per demonstration"
+        )
+    periods = np.broadcast_to(periods, len(given))
+    read = [_read(demo, m, kind, periods[m], n_samples) for m, demo in enumerate(given)]
+    durations, sampled = (np.array(values) for values in zip(*read, strict=True))
+    return Recordings(given, _contexts(given, contexts), kind, durations, sampled)
+
+
+def _rated(demo: Demonstration | ArrayLike, dt: float | None) -> Demonstration:
+    """Return a demonstration, with the rate that is given for those without."""
+    if not isinstance(demo, Demonstration):
+        return Demonstration(demo, dt=dt)
+    if demo.time is not None or dt is None:
+        return demo
+    own = {"goal": demo.goal, "context": demo.context, "names": demo.names}
+    return Demonstration(demo.position, dt=dt, **own)  # type: ignore[arg-type]
+
+
+def _read(
+    demo: Demonstration, m: int, kind: Kind, period: float, n_samples: int
+) -> tuple[float, Array]:
+    """Return the duration [s] and the positions (C, D), linear between the samples."""
+    if demo.time is None:
+        raise ValueError(f"demo {m}: no sampling interval: pass dt= in seconds")
+    time = demo.time - demo.time[0]
+    duration, wrap = float(time[-1]), None
+    if kind == "rhythmic":
+        if np.isnan(period) and demo.dt is None:
+            raise ValueError(f"demo {m}: a time-stamped cycle: pass period= in seconds")
+        wrap = float((demo.dt or 0) * demo.n_samples if np.isnan(period) else period)
+        if wrap <= duration:
+            raise ValueError(
+                f"demo {m}: period = {wrap:g}: must exceed the last time stamp, {duration:g} s"
+            )
+        duration = wrap
+    at = np.linspace(0, duration, n_samples, endpoint=kind == "discrete")
+    columns = [np.interp(at, time, column, period=wrap) for column in demo.position.T]
+    return duration, np.transpose(columns)
+
+
+def _contexts(demos: Sequence[Demonstration], contexts: ArrayLike | None) -> Array:
+    """Return the checked contexts (M, Q)."""
+    values: Any = contexts
+    if contexts is None:
+        values = [demo.context for demo in demos]
+        for m, context in enumerate(values):
+            if context is None:
+                raise ValueError(f"demo {m} has no context: pass contexts=")
+            if len(context) != len(values[0]):
+                raise ValueError(
+                    f"demo {m}: context has length {len(context)}, expected {len(values[0])}"
+                )
+    array = np.asarray(values, float)
+    if array.ndim != 2:
+        raise ValueError(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
+    if len(array) != len(demos):
+        raise ValueError(
+            f"contexts has length {len(array)}, expected {len(demos)}: one value per demonstration"
+        )
+    for m, q in np.argwhere(~np.isfinite(array))[:1]:
+        raise ValueError(f"contexts[{m}, {q}] = {array[m, q]}: must be finite: leave the demo out")
+    return array

@@ -1,0 +1,216 @@
+"""What was found: errors by split, their means, and tables of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from pdmp.evaluation.predictors import BAND, WIDTH, Forecast, Predictor
+from pdmp.evaluation.recordings import Array, Recordings
+from pdmp.evaluation.splits import Reach, Split
+
+REFERENCE = "mean demonstration"
+HEADER = ("predictor", "E", "± sd", "E / mean's", "± se", f"in {BAND:.0%} band", "duration off")
+
+
+class Scores(NamedTuple):
+    """Figures of one predictor: means over the demonstrations of each of S splits.
+
+    Attributes
+    ----------
+    error : ndarray (S,)
+        E, in the squared unit of the positions.
+    duration : ndarray (S,)
+        |T̂ - T| / T.
+    coverage : ndarray (S,)
+        Share of the positions inside the 90 % band; NaN where no variance is known.
+    """
+
+    error: Array
+    duration: Array
+    coverage: Array
+
+
+class Summary(NamedTuple):
+    """Means of one predictor over n splits.
+
+    Attributes
+    ----------
+    n : int
+        Number of splits.
+    error, deviation, standard_error : float
+        Mean of E, its standard deviation and its standard error; the latter NaN for one split.
+    relative, relative_error : float
+        Mean E over that of the mean demonstration, and its standard error.
+    coverage : float
+        Share of the positions inside the 90 % band; NaN where no variance is known.
+    duration : float
+        |T̂ - T| / T.
+    """
+
+    n: int
+    error: float
+    deviation: float
+    standard_error: float
+    relative: float
+    relative_error: float
+    coverage: float
+    duration: float
+
+
+class Comparison(NamedTuple):
+    """One predictor's E less another's on the same splits: each, their mean, its standard error."""
+
+    differences: Array  # (S,)
+    mean: float
+    standard_error: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation:
+    """Errors of several predictors on demonstrations that they were not shown.
+
+    Attributes
+    ----------
+    recordings : Recordings
+        The demonstrations, read over normalised time.
+    splits : tuple of Split
+        Which were learnt from and which held out. Of a fold with conditions of both reaches, each
+        reach is a split.
+    predictors : dict of str to Predictor
+        What was tried.
+    forecasts : dict of str to list of list of Forecast
+        By predictor, split and demonstration held out.
+    scores : dict of str to Scores
+        Figures of each predictor, split by split.
+    left_out : dict of str to str
+        Predictors that could not be tried, and why.
+    """
+
+    recordings: Recordings
+    splits: tuple[Split, ...]
+    predictors: dict[str, Predictor]
+    forecasts: dict[str, list[list[Forecast]]]
+    scores: dict[str, Scores]
+    left_out: dict[str, str]
+
+    def score(self, predictor: str) -> Scores:
+        """Return the figures of one predictor, split by split."""
+        if predictor not in self.scores:
+            raise ValueError(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
+        return self.scores[predictor]
+
+    def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
+        """Return the means of one predictor over the splits of one reach, or all."""
+        rows = self._rows(reach)
+        error, duration, coverage = (values[rows] for values in self.score(predictor))
+        reference = self.scores[REFERENCE].error[rows]
+        level = float(reference.mean()) or nan
+        relative = float(error.mean()) / level
+        return Summary(
+            len(error),
+            float(error.mean()),
+            _deviation(error),
+            _standard_error(error),
+            relative,
+            # Of a ratio of means, to first order.
+            _standard_error(error - relative * reference) / level,
+            float(coverage.mean()),
+            float(duration.mean()),
+        )
+
+    def compare(self, a: str, b: str, reach: Reach | None = None) -> Comparison:
+        """Return E of `a` less E of `b`, split by split; negative where `a` is better."""
+        rows = self._rows(reach)
+        differences = (self.score(a).error - self.score(b).error)[rows]
+        return Comparison(differences, float(differences.mean()), _standard_error(differences))
+
+    def reaches(self) -> list[Reach]:
+        """Return the sorts of splits that there are."""
+        present = {split.reach for split in self.splits}
+        return [reach for reach in ("interpolation", "extrapolation") if reach in present]
+
+    def table(self, reach: Reach) -> list[list[str]]:
+        """Return the rows of a table over the splits of one reach, below `HEADER`."""
+        rows = []
+        for name in self.scores:
+            found = self.summary(name, reach)
+            figures = (found.error, found.deviation, found.relative, found.relative_error)
+            shares = (found.coverage, found.duration)
+            rows.append([name, *map(_number, figures), *map(_percent, shares)])
+        return rows
+
+    def markdown(self) -> str:
+        """Return the tables in Markdown."""
+        lines = []
+        for reach in self.reaches():
+            align = ["---"] + ["--:"] * (len(HEADER) - 1)
+            cells = [HEADER, align, *self.table(reach)]
+            lines += [f"**{self._title(reach)}**", ""]
+            lines += ["| " + " | ".join(row) + " |" for row in cells] + [""]
+        return "\n".join([*lines, *self._notes()])
+
+    def __repr__(self) -> str:
+        """Return the tables as text."""
+        lines = []
+        for reach in self.reaches():
+            cells = [HEADER, *self.table(reach)]
+            widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+            lines.append(self._title(reach))
+            for first, *others in cells:
+                padded = [f"{o:>{w}}" for o, w in zip(others, widths[1:], strict=True)]
+                lines.append("  ".join([f"{first:<{widths[0]}}", *padded]))
+            lines.append("")
+        return "\n".join([*lines, *self._notes()]).rstrip()
+
+    def _title(self, reach: Reach) -> str:
+        rows = self._rows(reach)
+        held = sum(len(self.splits[row].test) for row in rows)
+        return f"{reach}: {len(rows)} folds, {held} demonstrations"
+
+    def _notes(self) -> list[str]:
+        return [f"left out: {name}: {reason}" for name, reason in self.left_out.items()]
+
+    def _rows(self, reach: Reach | None) -> list[int]:
+        rows = [k for k, split in enumerate(self.splits) if reach in (None, split.reach)]
+        if not rows:
+            raise ValueError(f'reach = "{reach}": no split is of this sort')
+        return rows
+
+
+def score(
+    recordings: Recordings, splits: Sequence[Split], forecasts: Sequence[Sequence[Forecast]]
+) -> Scores:
+    """Compare forecasts with the demonstrations held out."""
+    rows = []
+    for split, made in zip(splits, forecasts, strict=True):
+        each = []
+        for m, forecast in zip(split.test, made, strict=True):
+            gap = forecast.position - recordings.sampled[m]
+            inside = nan
+            if forecast.variance is not None:
+                inside = float(np.mean(gap**2 <= WIDTH**2 * forecast.variance))
+            off = abs(forecast.duration / recordings.durations[m] - 1)
+            each.append((np.sum(gap**2, axis=1).mean(), off, inside))
+        rows.append(np.mean(each, axis=0))
+    return Scores(*np.transpose(rows))
+
+
+def _deviation(values: Array) -> float:
+    return float(values.std(ddof=1)) if len(values) > 1 else nan
+
+
+def _standard_error(values: Array) -> float:
+    return _deviation(values) / sqrt(len(values))
+
+
+def _number(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.3g}"
+
+
+def _percent(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.0%}"

@@ -1,0 +1,158 @@
+"""Predictors, tried on demonstrations that they were not shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from pdmp._native import Demonstration
+from pdmp.evaluation.baselines import (
+    Components,
+    LinearWeights,
+    MeanDemonstration,
+    MovedGoal,
+    NearestDemonstration,
+    ProcessWeights,
+    RadialWeights,
+)
+from pdmp.evaluation.predictors import PDMP, Forecast, Foresee, Predictor
+from pdmp.evaluation.recordings import Kind, Recordings, recordings
+from pdmp.evaluation.result import REFERENCE, Evaluation, score
+from pdmp.evaluation.splits import Split, checked, held_out
+
+
+def baselines() -> dict[str, Predictor]:
+    """Return what a primitive is measured against, by name.
+
+    All maps from contexts are linear least squares but those of the Gaussian processes, for which
+    scikit-learn must be installed; `Evaluation.left_out` tells where it is not.
+    """
+    return {
+        REFERENCE: MeanDemonstration(),
+        "nearest demonstration": NearestDemonstration(),
+        "one demonstration, goal moved": MovedGoal(),
+        "PCA, linear map": LinearWeights(Components()),
+        "ProMP weights, linear map": LinearWeights(RadialWeights()),
+        "PCA, Gaussian processes": ProcessWeights(Components()),
+    }
+
+
+def over_styles(most: int, **settings: Any) -> dict[str, Predictor]:
+    """Return primitives with J = 1 … `most` style parameters, by name.
+
+    Parameters
+    ----------
+    most : int
+        The largest J; at most the demonstrations that a fold leaves to learn from.
+    **settings
+        Other arguments of `pdmp.fit`.
+    """
+    return {f"PDMP, J = {j}": PDMP(n_styles=j, **settings) for j in range(1, most + 1)}
+
+
+def evaluate(
+    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
+    *,
+    contexts: ArrayLike | None = None,
+    predictors: Mapping[str, Predictor] | None = None,
+    splits: Iterable[Sequence[object]] | None = None,
+    kind: Kind = "discrete",
+    dt: float | None = None,
+    period: ArrayLike | None = None,
+    n_samples: int = 101,
+    max_folds: int = 12,
+) -> Evaluation:
+    """Learn from some demonstrations, and measure how well the others are foreseen.
+
+    The error of a movement ŷ foreseen for the context of a demonstration y is, over C samples of
+    normalised time (of phase, if rhythmic) and all degrees of freedom together,
+
+        E = (1/C) Σ ‖ŷ(t) - y(t)‖²;
+
+    that of a fold is the mean over its demonstrations. How far off the duration is counts apart, as
+    |T̂ - T| / T. Demonstrations of equal context are one condition. Each condition is held out in
+    turn; where there are more than `max_folds`, each fold of neighbouring ones: the fold of most
+    conditions is halved along its longest side until there are so many. What lies inside the convex
+    hull of the contexts learnt from is interpolation, of one context their range; the rest is
+    extrapolation.
+
+    Parameters
+    ----------
+    demos : sequence of Demonstration, sequence of array_like (T_m, D), or array_like (M, T, D)
+        The demonstrations, as for `pdmp.fit`.
+    contexts : array_like (M, Q), optional
+        The condition of each; those that the demonstrations hold by default.
+    predictors : mapping of str to Predictor, optional
+        What is tried, by name; by default `evaluation.baselines()` and the primitive,
+        `evaluation.PDMP()`. The mean demonstration is always tried, for the others to be compared
+        with.
+    splits : iterable of (train, test, reach), optional
+        Indices to learn from, indices to foresee, and "interpolation" or "extrapolation", in place
+        of the folds.
+    kind : str
+        "discrete", or "rhythmic": each demonstration is one cycle.
+    dt : float, optional
+        Sampling interval [s] of demonstrations that hold none.
+    period : array_like, optional
+        Periods [s] of time-stamped cycles, one or M.
+    n_samples : int
+        C, the samples over each movement, linear between those recorded.
+    max_folds : int
+        The most folds that conditions are parted into.
+
+    Returns
+    -------
+    Evaluation
+        Printed, it is a table.
+
+    Raises
+    ------
+    ValueError
+        Contexts or splits that do not fit the demonstrations, fewer than two conditions, or a
+        forecast of another shape.
+
+    References
+    ----------
+    T. Matsubara, S.-H. Hyon, J. Morimoto (2011), Section 4.1.2 and Fig. 4,
+    https://doi.org/10.1016/j.neunet.2011.02.004
+
+    Examples
+    --------
+    >>> found = pdmp.evaluate(demos, contexts=heights)
+    >>> print(found)
+    >>> found.compare("PDMP", "PCA, linear map")
+    """
+    read = recordings(demos, contexts, kind=kind, dt=dt, period=period, n_samples=n_samples)
+    folds = held_out(read.contexts, max_folds) if splits is None else checked(splits, read.n_demos)
+    chosen = baselines() | {"PDMP": PDMP()} if predictors is None else dict(predictors)
+    tried = {REFERENCE: MeanDemonstration()} | chosen
+    forecasts, left_out = {}, {}
+    for name, predictor in tried.items():
+        try:
+            forecasts[name] = _foreseen(name, predictor, read, folds)
+        except ImportError as reason:
+            left_out[name] = str(reason)
+    scores = {name: score(read, folds, made) for name, made in forecasts.items()}
+    return Evaluation(read, tuple(folds), tried, forecasts, scores, left_out)
+
+
+def _foreseen(
+    name: str, predictor: Predictor, read: Recordings, splits: Sequence[Split]
+) -> list[list[Forecast]]:
+    """Return what a predictor foresees, split by split; it learns once from the same rows."""
+    learnt: dict[bytes, Foresee] = {}
+    forecasts = []
+    for split in splits:
+        key = split.train.tobytes()
+        if key not in learnt:
+            learnt[key] = predictor.fit(read[split.train])
+        forecasts.append([learnt[key](read.contexts[m]) for m in split.test])
+        for forecast in forecasts[-1]:
+            if forecast.position.shape != read.sampled.shape[1:]:
+                raise ValueError(
+                    f"predictors: '{name}' foresees positions of shape {forecast.position.shape}, "
+                    f"expected (C, D) = {read.sampled.shape[1:]}"
+                )
+    return forecasts

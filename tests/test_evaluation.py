@@ -1,0 +1,299 @@
+"""Forecasts of movements held out are measured as the paper measures them."""
+
+import re
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp.evaluation import (
+    PDMP,
+    Components,
+    Evaluation,
+    Forecast,
+    LinearWeights,
+    MovedGoal,
+    NearestDemonstration,
+    Recordings,
+    baselines,
+)
+from pdmp.evaluation.splits import within_hull
+from synthetic import loops, reaches
+
+HEIGHTS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
+CONTEXTS = [[height] for height in HEIGHTS]
+
+
+def arches(heights: list[float], noise: float = 0.0) -> list[np.ndarray]:
+    """Return planar movements (101, 2) that are linear in their height."""
+    s = np.linspace(0, 1, 101)
+    random = np.random.default_rng(0)
+    reach = s**3 * (10 - 15 * s + 6 * s**2)
+    arch = 64 * (s * (1 - s)) ** 3
+    clean = [np.column_stack([(1 + h) * reach + h, h * arch]) for h in heights]
+    return [position + noise * random.standard_normal(position.shape) for position in clean]
+
+
+class Known:
+    """A predictor that knows the family, and by how much it varies."""
+
+    def __init__(self, deviation: float | None = None) -> None:
+        self.deviation = deviation
+
+    def fit(self, recordings: Recordings) -> Any:
+        """Learn nothing."""
+
+        def foresee(context: np.ndarray) -> Forecast:
+            (position,) = arches([context[0]])
+            variance = None if self.deviation is None else np.full_like(position, self.deviation**2)
+            return Forecast(position, 1.0, variance)
+
+        return foresee
+
+
+def evaluated(predictors: dict[str, Any], heights: list[float] = HEIGHTS, **options: Any) -> Any:
+    """Return an evaluation of predictors on arches."""
+    noise = options.pop("noise", 0.0)
+    contexts = [[height] for height in heights]
+    demos = arches(heights, noise)
+    return pdmp.evaluate(demos, dt=0.01, contexts=contexts, predictors=predictors, **options)
+
+
+def test_perfect_forecasts_have_no_error() -> None:
+    """E, its spread and how far off the duration is are 0."""
+    found = evaluated({"known": Known()}).summary("known")
+    assert (found.error, found.deviation, found.relative) == (0, 0, 0)
+    assert found.duration < 1e-12
+
+
+def test_error_is_the_papers() -> None:
+    """A forecast that is off by (a, b) at every sample has E = a² + b²."""
+
+    class Off(Known):
+        def fit(self, recordings: Recordings) -> Any:
+            foresee = super().fit(recordings)
+            return lambda context: Forecast(foresee(context).position + [0.3, -0.4], 2.0)
+
+    found = evaluated({"off": Off()}).summary("off")
+    assert found.error == pytest.approx(0.25)
+    assert found.duration == pytest.approx(1.0)
+
+
+def test_mean_demonstration_is_the_measure() -> None:
+    """Its relative error is 1, and it is there without being asked for."""
+    found = evaluated({})
+    for reach in found.reaches():
+        summary = found.summary("mean demonstration", reach)
+        assert (summary.relative, summary.relative_error) == (1, 0)
+
+
+def test_linear_family_is_foreseen() -> None:
+    """Primitive and principal components have no error; one demonstration moved has."""
+    linear = {"PDMP": PDMP(n_styles=2), "PCA": LinearWeights(Components())}
+    found = evaluated(linear | {"one": MovedGoal()})
+    for name in linear:
+        assert found.summary(name).relative < 1e-7
+    assert found.summary("one").relative > 1e-3
+
+
+def test_full_primitive_is_principal_components() -> None:
+    """With every style and one linear map, both are the same linear predictor of positions.
+
+    What is left is how closely the landscape is interpolated: 3e-6 by a smooth process.
+    """
+    contexts = [[height**2] for height in HEIGHTS]
+    smooth = PDMP(map="linear", spectrum=1.0, basis=pdmp.GP("squared_exponential", noise=1e-10))
+    pair = {"PDMP": smooth, "PCA": LinearWeights(Components(1.0))}
+    found = pdmp.evaluate(arches(HEIGHTS), dt=0.01, contexts=contexts, predictors=pair)
+    for ours, theirs in zip(*(found.forecasts[name] for name in pair), strict=True):
+        for a, b in zip(ours, theirs, strict=True):
+            np.testing.assert_allclose(a.position, b.position, atol=1e-5)
+            np.testing.assert_allclose(a.variance, b.variance, atol=1e-6)
+    assert found.summary("PCA").relative > 1e-3
+    assert abs(found.compare("PDMP", "PCA").mean) < 1e-6
+
+
+def test_both_maps_are_one_where_contexts_leave_a_choice() -> None:
+    """Of two contexts of other units that vary together, both maps make the same of each."""
+    contexts = [[height, 1000 * height] for height in HEIGHTS]
+    pair = {"PDMP": PDMP(n_styles=2), "PCA": LinearWeights(Components())}
+    found = pdmp.evaluate(arches(HEIGHTS), dt=0.01, contexts=contexts, predictors=pair)
+    for name in pair:
+        assert found.summary(name).relative < 1e-7
+
+
+def test_band_of_known_width_covers_its_share() -> None:
+    """With the true variance, nine tenths of the positions lie inside the 90 % band."""
+    found = evaluated({"known": Known(0.05)}, noise=0.05)
+    assert found.summary("known").coverage == pytest.approx(0.9, abs=0.03)
+
+
+@pytest.mark.parametrize("name", ["PCA, linear map", "PDMP"])
+def test_learnt_band_covers_its_share(name: str) -> None:
+    """The variance that is learnt from residuals is about that of a new movement."""
+    heights = list(np.linspace(0, 0.5, 40))
+    found = evaluated({name: (baselines() | {"PDMP": PDMP()})[name]}, heights, noise=0.02)
+    assert found.summary(name).coverage == pytest.approx(0.9, abs=0.07)
+
+
+def test_each_condition_is_held_out_once() -> None:
+    """Its demonstrations go together, and the two outermost are extrapolation."""
+    found = evaluated({}, [*HEIGHTS, *HEIGHTS])
+    assert [split.reach for split in found.splits] == (
+        ["extrapolation"] + ["interpolation"] * 4 + ["extrapolation"]
+    )
+    for k, split in enumerate(found.splits):
+        assert split.test.tolist() == [k, k + 6]
+        assert sorted([*split.train, *split.test]) == list(range(12))
+
+
+def test_many_conditions_are_held_out_with_their_neighbours() -> None:
+    """No more folds than asked for, each an interval."""
+    heights = list(np.random.default_rng(0).permutation(100) / 200)
+    found = evaluated({}, heights, max_folds=7)
+    assert len(found.splits) == 7
+    for split in found.splits:
+        inside = found.recordings.contexts[split.test]
+        others = found.recordings.contexts[split.train]
+        assert not np.any((others > inside.min()) & (others < inside.max()))
+
+
+def test_hull_tells_interpolation_from_extrapolation() -> None:
+    """In the plane, a point within the corners is inside, one beside an edge is not."""
+    corners = np.array([[0.0, 0.0], [100.0, 0.0], [0.0, 1.0]])
+    for point, expected in (([30, 0.3], True), ([0, 1], True), ([50, 0.5], True)):
+        assert within_hull(np.array(point, float), corners) == expected
+    for point in ([51, 0.51], [-1, 0.5], [0, 1.01]):
+        assert not within_hull(np.array(point, float), corners)
+
+
+def test_splits_can_be_given() -> None:
+    """The paper's own: three conditions to learn from, one between them and one beyond."""
+    splits = [([0, 2, 3], [1], "interpolation"), ([0, 2, 3], [4, 5], "extrapolation")]
+    found = evaluated({"nearest": NearestDemonstration()}, splits=splits)
+    assert [found.summary("nearest", reach).n for reach in found.reaches()] == [1, 1]
+    assert np.isnan(found.summary("nearest", "interpolation").standard_error)
+
+
+def test_comparison_is_paired() -> None:
+    """Differences are split by split, and their standard error is that of their mean."""
+    found = evaluated({"nearest": NearestDemonstration()})
+    compared = found.compare("nearest", "mean demonstration")
+    expected = found.score("nearest").error - found.score("mean demonstration").error
+    np.testing.assert_array_equal(compared.differences, expected)
+    assert compared.standard_error == pytest.approx(expected.std(ddof=1) / np.sqrt(6))
+
+
+def test_cycles_are_foreseen() -> None:
+    """Over phase, a primitive of loops foresees the one between two others."""
+    contexts, tried = [[0.0], [0.5], [1.0]], {"PDMP": PDMP()}
+    found = pdmp.evaluate(loops(), contexts=contexts, predictors=tried, kind="rhythmic")
+    assert found.summary("PDMP", "interpolation").error < 1e-6
+    assert found.recordings.durations == pytest.approx([2, 2, 2])
+
+
+def test_contexts_of_demonstrations_are_used() -> None:
+    """What the recordings hold needs not be given again."""
+    found = pdmp.evaluate(reaches(), predictors={})
+    np.testing.assert_allclose(found.recordings.contexts[:, 0], [-0.2, -0.1, 0, 0.1, 0.2])
+
+
+def test_rate_is_given_to_demonstrations_without() -> None:
+    """Bare arrays and demonstrations without a rate come to the same."""
+    bare, held = arches(HEIGHTS), [pdmp.Demonstration(one) for one in arches(HEIGHTS)]
+    options = {"dt": 0.01, "contexts": CONTEXTS, "predictors": {"PDMP": PDMP(n_styles=2)}}
+    scores = [pdmp.evaluate(demos, **options).score("PDMP").error for demos in (bare, held)]
+    np.testing.assert_array_equal(*scores)
+
+
+@pytest.fixture(scope="module")
+def found() -> Evaluation:
+    """Return an evaluation of all there is."""
+    return pdmp.evaluate(reaches())
+
+
+def test_evaluation_prints_a_table(found: Evaluation) -> None:
+    """Each predictor has a line under each reach, as text and as Markdown."""
+    for text in (repr(found), found.markdown()):
+        assert re.search("interpolation: 3 folds, 3 demonstrations", text)
+        for name in found.scores:
+            assert len(re.findall(rf"^\W*{name}\b", text, re.MULTILINE)) == 2
+
+
+def test_missing_library_leaves_its_predictor_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others are tried, and the reason is told."""
+    monkeypatch.setitem(sys.modules, "sklearn.gaussian_process", None)
+    found = pdmp.evaluate(reaches())
+    assert "PDMP" in found.scores
+    assert "left out: PCA, Gaussian processes: scikit-learn is not installed" in repr(found)
+
+
+def test_import_does_not_wait_for_evaluation() -> None:
+    """The rooms of evaluation are entered when `evaluate` is first asked for."""
+    code = (
+        "import sys, pdmp; assert 'pdmp.evaluation' not in sys.modules; "
+        "pdmp.evaluate; assert 'pdmp.evaluation' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+CYCLES: list[tuple[dict[str, Any], str]] = [
+    ({}, "demo 0: a time-stamped cycle: pass period= in seconds"),
+    ({"period": 1.0}, "demo 0: period = 1: must exceed the last time stamp, 1 s"),
+    ({"period": [2.0] * 5}, "period has length 5, expected 6: one value per demonstration"),
+]
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"contexts": None}, "demo 0 has no context: pass contexts="),
+    ({"contexts": CONTEXTS[:4]}, "contexts has length 4, expected 6: one value per demonstration"),
+    ({"contexts": HEIGHTS}, r"contexts has shape \[6\], expected two axes \(M, Q\)"),
+    ({"contexts": [*CONTEXTS[:5], [np.nan]]}, r"contexts\[5, 0\] = nan: must be finite"),
+    ({"contexts": [[1.0]] * 6}, "contexts: one condition in 6 demonstrations: at least 2"),
+    ({"max_folds": 1}, "max_folds = 1: must be at least 2"),
+    ({"n_samples": 3}, "n_samples = 3: must be at least 4"),
+    ({"kind": "circular"}, 'kind = "circular": must be "discrete" or "rhythmic"'),
+    ({"period": 1.0}, "period does not apply to discrete"),
+    ({"dt": None}, "no sampling interval: pass dt= in seconds"),
+    ({"splits": []}, "splits is empty"),
+    ({"splits": [([0], [1])]}, r"splits\[0\]: must be \(train, test,"),
+    ({"splits": [([0], [], "interpolation")]}, r"splits\[0\]: test must be one or more indices"),
+    ({"splits": [([0, 6], [1], "interpolation")]}, r"train index 6 must lie between 0 and 5"),
+    ({"splits": [([0], [-1], "interpolation")]}, r"test index -1 must lie between 0 and 5"),
+    ({"splits": [([0, 1], [1], "interpolation")]}, r"demonstration 1 is in train and in test"),
+]
+
+
+@pytest.mark.parametrize(("option", "message"), BAD, ids=str)
+def test_bad_input_is_refused(option: dict[str, Any], message: str) -> None:
+    """One error that names the argument, the numbers and the mend."""
+    with pytest.raises(ValueError, match=message):
+        pdmp.evaluate(arches(HEIGHTS), **({"dt": 0.01, "contexts": CONTEXTS} | option))
+
+
+@pytest.mark.parametrize(("option", "message"), CYCLES, ids=str)
+def test_bad_periods_are_refused(option: dict[str, Any], message: str) -> None:
+    """Cycles with time stamps need a period beyond the last of them."""
+    stamped = [pdmp.Demonstration(one, time=np.linspace(0, 1, 101)) for one in arches(HEIGHTS)]
+    with pytest.raises(ValueError, match=message):
+        pdmp.evaluate(stamped, kind="rhythmic", contexts=CONTEXTS, **option)
+
+
+def test_forecast_of_another_shape_is_refused() -> None:
+    """A predictor of the user's own is told what was expected of it."""
+
+    class Short(Known):
+        def fit(self, recordings: Recordings) -> Any:
+            return lambda context: Forecast(np.zeros((5, 2)), 1.0)
+
+    with pytest.raises(ValueError, match=r"'short' foresees positions of shape \(5, 2\), expected"):
+        evaluated({"short": Short()})
+
+
+def test_unknown_names_are_refused(found: Evaluation) -> None:
+    """Predictors and reaches that are not there are told with those that are."""
+    with pytest.raises(ValueError, match="predictor = 'none': must be one of mean demonstration, "):
+        found.summary("none")
+    with pytest.raises(ValueError, match='reach = "nowhere"'):
+        found.summary("PDMP", "nowhere")
