@@ -220,8 +220,14 @@ pdmp_status pdmp_model_demonstration(const pdmp_model *model,
                                      pdmp_buffer numbers,
                                      pdmp_text error);
 
-/// Conditions of the movement predicted for a context (n_contexts), by the linear map of Section 4.1.2: style, goal and
-/// start or anchor, and tau.
+/// A label that a value of the contexts may be, both counted from 0, in UTF-8. It lives as long as the model, and is NULL
+/// past the last, and where the value is a number. In a context a label is given by its index.
+const char *pdmp_model_label(const pdmp_model *model,
+                             size_t value,
+                             size_t label);
+
+/// Conditions of the movement predicted for a context (n_contexts), as in Section 4.1.2: style, goal and start or anchor,
+/// and tau. A label is given by its index, see pdmp_model_label.
 ///
 /// They are written to `numbers`, which has room for pdmp_info.n_conditions of them, and `conditions` points there.
 ///
