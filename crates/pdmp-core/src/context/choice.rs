@@ -87,9 +87,7 @@ impl Candidate {
     pub(super) fn of(kind: MapKind, shown: &Shown) -> Result<Self> {
         match kind {
             MapKind::Linear => Self::with(kind, None, shown, |_, _| vec![0.0; shown.outputs.ncols()]),
-            MapKind::Polynomial => {
-                Self::with(kind, Some(Kernel::Quadratic), shown, |kriging, values| ratios(kriging, values))
-            }
+            MapKind::Polynomial => Self::with(kind, Some(Kernel::Quadratic), shown, ratios),
             MapKind::Gp => {
                 let lively = lively(shown.outputs);
                 let mut best: Option<(f64, Kernel)> = None;
@@ -106,7 +104,7 @@ impl Candidate {
                         best = Some((total, kernel));
                     }
                 }
-                Self::with(kind, best.map(|(_, kernel)| kernel), shown, |kriging, values| ratios(kriging, values))
+                Self::with(kind, best.map(|(_, kernel)| kernel), shown, ratios)
             }
         }
     }
