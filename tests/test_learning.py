@@ -64,8 +64,8 @@ def filtered(model: pdmp.Model, spline: Any, centre: np.ndarray, u: np.ndarray) 
 def test_singular_values_are_those_of_the_targets_of_reaches() -> None:
     """Targets f = y' - z, made here by scipy from the resampled demonstrations, factorise alike."""
     demos = reaches()
-    model = pdmp.fit(demos, n_styles=3)
-    n = demos[model.nominal].n_samples
+    n = 120
+    model = pdmp.fit(demos, n_styles=3, n_samples=n)
     targets = []
     for demo in demos:
         own = interpolate.CubicSpline(np.linspace(0, 1, demo.n_samples), demo.position)
@@ -79,7 +79,7 @@ def test_singular_values_are_those_of_the_targets_of_reaches() -> None:
 
 def test_singular_values_are_those_of_the_targets_of_loops() -> None:
     """On a circle, z is the periodic steady state, here the second turn of two."""
-    model = pdmp.fit(loops(), kind="rhythmic", n_styles=2)
+    model = pdmp.fit(loops(), kind="rhythmic", n_styles=2, n_samples=100)
     u = np.linspace(0, 2 * np.pi, 100, endpoint=False)
     targets = []
     for demo in loops():
@@ -89,6 +89,19 @@ def test_singular_values_are_those_of_the_targets_of_loops() -> None:
         targets.append((spline(u, 1) - z).ravel())
     sigma = np.linalg.svd(targets, compute_uv=False)
     np.testing.assert_allclose(model.singular_values, sigma, rtol=1e-6, atol=1e-9 * sigma[0])
+
+
+def test_sharp_turns_between_few_samples_are_kept() -> None:
+    """What jumps within a sample is given back, though its target shows only between samples."""
+    u = np.linspace(0, 1, 101)[:, None]
+    demos = [size * (u > 0.005) * (1.5 + np.cos(9 * u)) * (1 - u) for size in (1, 2, 3)]
+    model = pdmp.fit(demos, dt=0.01, spectrum=1.0)
+    coarse = pdmp.fit(demos, dt=0.01, spectrum=1.0, n_samples=101)
+    off = [
+        np.abs(each.rollout(**pdmp.as_demonstrated(each, 2), dt=0.01).position - demos[2]).max()
+        for each in (model, coarse)
+    ]
+    assert off[0] < 0.02 < 0.1 < off[1]
 
 
 @pytest.mark.parametrize("n_styles", [1, 3, 5])

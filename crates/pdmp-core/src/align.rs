@@ -8,6 +8,9 @@ use crate::phase::Kind;
 use crate::smooth::{Smoothing, smooth};
 use crate::spline::Knots;
 
+/// Fewest steps of the aligned demonstrations, unless their number is given: each step of the nominal one is divided into
+/// as many as it takes. The target between a few samples, where a movement turns sharply, is more than they show.
+const FINE: usize = 150;
 /// Most samples after alignment.
 const MOST_SAMPLES: usize = 1_000_000;
 
@@ -24,7 +27,8 @@ pub struct Alignment {
     pub smoothing: Smoothing,
     /// Index of the nominal demonstration; otherwise the one of median duration.
     pub nominal: Option<usize>,
-    /// Samples C; otherwise as many as the nominal demonstration has.
+    /// Samples C; otherwise as many as the nominal demonstration has, and the same with equal parts of its steps where
+    /// these are fewer than 150.
     pub n_samples: Option<usize>,
 }
 
@@ -86,7 +90,8 @@ impl Alignment {
         }
         let durations: Vec<f64> = clocks.iter().map(|clock| clock.duration).collect();
         let nominal = self.nominal_of(&durations)?;
-        let n_samples = self.n_samples.unwrap_or(demos[nominal].n_samples());
+        let steps = self.kind.steps(demos[nominal].n_samples());
+        let n_samples = self.n_samples.unwrap_or(self.kind.samples(steps * FINE.div_ceil(steps)));
         if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&n_samples) {
             let value = n_samples as f64;
             return Err(Error::Range { name: "n_samples", value, allowed: "must lie between 4 and 1e6" });

@@ -46,7 +46,8 @@ use crate::model::Model;
 /// nominal : int, optional
 ///     Index of the nominal demonstration; otherwise the one of median duration.
 /// n_samples : int, optional
-///     Samples C after alignment; otherwise as many as the nominal demonstration has.
+///     Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
+///     than 150.
 /// dof_scale : None, "range" or (D,) array_like
 ///     Unit of each degree of freedom in the factorisation.
 /// tau : float, optional
