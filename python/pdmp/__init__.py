@@ -10,6 +10,7 @@ T. Matsubara, S.-H. Hyon, J. Morimoto, "Learning parametric dynamic movement pri
 multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
 """
 
+from pdmp import demos, plot
 from pdmp._native import (
     GP,
     Controller,
@@ -55,7 +56,9 @@ __all__ = [
     "__version__",
     "as_demonstrated",
     "blend",
+    "demos",
     "factorise",
     "fit",
     "load",
+    "plot",
 ]
