@@ -140,13 +140,13 @@ def test_cut_off_is_where_as_much_is_taken_off_as_there_is_noise() -> None:
     position = np.column_stack([np.sin(2 * np.pi * t), np.cos(4 * np.pi * t)]) + noise
     demo = pdmp.Demonstration(position, dt=0.005, names=["hip", "knee"], units=["rad", "rad"])
     figure = plot.cut_off(demo)
-    assert labels_of(figure) == {"cut-off [Hz]", "RMS off hip [rad]", "RMS off knee [rad]"}
-    for axes in figure.axes:
+    assert labels_of(figure) == {"cut-off [Hz]", "RMS [rad]"}
+    for axes, name in zip(figure.axes, ["hip", "knee"], strict=True):
         dot = next(line for line in axes.lines if line.get_label() == "as much taken off")
         ((frequency, level),) = dot.get_xydata()
         assert level == pytest.approx(0.01, rel=0.15)
         assert 2 < frequency < 20
-        assert axes.get_title() == f"{frequency:.2g} Hz"
+        assert axes.get_title() == f"{name}: {frequency:.2g} Hz"
     smooth = pdmp.demos.lowpass(demo, frequency).position - position + noise
     assert np.std(smooth) < 0.5 * np.std(noise)
 

@@ -88,7 +88,7 @@ def grid_panels(labels: Sequence[str], x: str, figure: Figure | None) -> tuple[F
     """Return a figure and a panel per degree of freedom over `x`, laid out as a grid."""
     n_columns = min(len(labels), 3 if len(labels) < 13 else 5)
     n_rows = ceil(len(labels) / n_columns)
-    figure = canvas(figure, 3.2 * n_columns, 1.9 * n_rows + 0.5)
+    figure = canvas(figure, max(3.2 * n_columns, 5.5), 1.9 * n_rows + 0.5)
     panels = figure.subplots(n_rows, n_columns, sharex=True, squeeze=False).ravel()
     for axes, label in zip(panels, labels, strict=False):
         dress(axes, "", label)

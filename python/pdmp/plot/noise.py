@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pdmp._native import Demonstration, residuals
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, dof_labels, grid_panels, legend
+from pdmp.plot._canvas import BLUE, GREY, ORANGE, grid_panels, legend
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SAMPLES = 80
+SAMPLES = 200
 # Shares of half the sampling rate: as far as the filter goes, and where noise alone is left.
 HIGHEST = 0.9
 NOISE = (0.3, 0.7)
+# Height of a panel, in levels of noise: movement goes far beyond.
+TOP = 5.0
 
 
 def cut_off(demo: Demonstration, *, figure: Figure | None = None) -> Figure:
@@ -54,17 +56,21 @@ def cut_off(demo: Demonstration, *, figure: Figure | None = None) -> Figure:
     frequencies = np.geomspace(lowest, HIGHEST * half_rate, SAMPLES)
     off = residuals(demo, frequencies)
     names = demo.names or [f"y{d}" for d in range(demo.n_dofs)]
-    labels = dof_labels([f"RMS off {name}" for name in names], demo.units or [""] * demo.n_dofs)
+    labels = [f"RMS [{unit}]" if unit else "RMS" for unit in demo.units or [""] * demo.n_dofs]
     figure, panels = grid_panels(labels, "cut-off [Hz]", figure)
     alone = (frequencies > NOISE[0] * half_rate) & (frequencies < NOISE[1] * half_rate)
-    for axes, residual in zip(panels, off.T, strict=True):
-        slope, noise = np.polyfit(frequencies[alone], residual[alone], 1)
-        chosen = np.interp(-noise, -residual, frequencies)
+    for axes, name, residual in zip(panels, names, off.T, strict=True):
         axes.plot(frequencies, residual, color=BLUE, label="taken off")
-        axes.plot(frequencies, noise + slope * frequencies, "--", color=ORANGE, label="noise alone")
-        axes.axhline(noise, color=GREY, linewidth=0.8, label="noise in the recording")
+        axes.set_title(name)
+        slope, noise = np.polyfit(frequencies[alone], residual[alone], 1)
+        if noise <= 0:  # nothing is taken off what stands still
+            continue
+        chosen = np.interp(-noise, -residual, frequencies)
+        line = noise + slope * frequencies
+        axes.plot(frequencies, line, "--", color=ORANGE, label="noise alone")
+        axes.axhline(noise, color=GREY, linewidth=0.8, label="noise there is")
         axes.plot(chosen, noise, "o", color=ORANGE, label="as much taken off")
-        axes.set_xscale("log")
-        axes.set_title(f"{chosen:.2g} Hz")
+        axes.set_title(f"{name}: {chosen:.2g} Hz")
+        axes.set_ylim(0, TOP * noise)
     legend(figure, panels[0])
     return figure

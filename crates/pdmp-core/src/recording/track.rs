@@ -14,8 +14,8 @@ use super::repetition::vertex;
 /// How far from where it is expected a cycle is looked for, in periods.
 const REACH: f64 = 0.25;
 
-/// How far outside the recording a bound is one at its very end, in periods, or half a sample.
-const SLACK: f64 = 0.03;
+/// How far outside the recording a bound is one at its very end, in samples.
+const SLACK: f64 = 1.0;
 
 /// A cyclic recording: traits (n, F) and its period in samples.
 pub(super) struct Track<'a> {
@@ -40,14 +40,13 @@ impl Track<'_> {
     /// Where cycles such as the template (W, F) begin, about each period after `from`.
     fn search(&self, template: ArrayView2<f64>, from: f64) -> Vec<f64> {
         let end = (self.traits.nrows() - 1) as f64;
-        let slack = (SLACK * self.period).max(0.5);
         let (mut bounds, mut expected) = (Vec::new(), from);
         loop {
             let found = self.locate(template, expected);
-            if found > end + slack {
+            if found > end + SLACK {
                 return bounds;
             }
-            if found >= -slack {
+            if found >= -SLACK {
                 bounds.push(found.clamp(0.0, end));
             }
             expected = found + self.period;
