@@ -15,7 +15,9 @@ def reaches() -> list[pdmp.Demonstration]:
         forward = (1 + bend) * s**3 * (10 - 15 * s + 6 * s**2)
         sideways = bend * 64 * (s * (1 - s)) ** 3
         position = np.column_stack([forward, sideways])
-        demos.append(pdmp.Demonstration(position, dt=DT, context=[bend], names=["x", "y"]))
+        demos.append(
+            pdmp.Demonstration(position, dt=DT, context=[bend], names=["x", "y"], units=["m", "m"])
+        )
     return demos
 
 
@@ -24,7 +26,9 @@ def loops() -> list[pdmp.Demonstration]:
     phi = np.linspace(0, 2 * np.pi, 100, endpoint=False)
     return [
         pdmp.Demonstration(
-            np.column_stack([np.cos(phi), (1 - k) * np.sin(phi) + k * np.sin(2 * phi)]), dt=DT
+            np.column_stack([np.cos(phi), (1 - k) * np.sin(phi) + k * np.sin(2 * phi)]),
+            dt=DT,
+            units=["m", "m"],
         )
         for k in (0.0, 0.5, 1.0)
     ]

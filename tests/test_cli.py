@@ -63,6 +63,20 @@ def test_fit_takes_single_files(folder: Path, tmp_path: Path) -> None:
     assert (model.n_demos, list(model.names)) == (3, ["y"])
 
 
+def test_fit_and_plot_bridge_gaps_and_keep_units(folder: Path, tmp_path: Path) -> None:
+    """With --max-gap, an empty field is interpolated; units go into model and table."""
+    path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"
+    for file in (folder / "demos").glob("*.csv"):
+        lines = file.read_text().replace("t,x,y", "t,x [m],y").splitlines()
+        lines[20] = lines[20].rsplit(",", 1)[0] + ","
+        file.write_text("\n".join(lines))
+    assert run("fit", folder, "-o", path) == 1
+    assert run("fit", folder, "--max-gap", 0.05, "-o", path) == 0
+    assert run("rollout", path, "-o", out) == 0
+    assert out.read_text(encoding="utf-8").startswith("t,x [m],y,x_velocity [m/s],")
+    assert run("plot", path, folder, "--max-gap", 0.05, "-o", tmp_path / "figures") == 0
+
+
 def test_fit_learns_rhythmic_ones(tmp_path: Path) -> None:
     """The kind is handed on."""
     archive, path = tmp_path / "loops.npz", tmp_path / "model.safetensors"
@@ -129,7 +143,12 @@ def test_info_tells_kind_names_and_styles(
     """The most asked of a model file is told, a line each."""
     assert run("info", model_file) == 0
     text = capsys.readouterr().out
-    for expected in (r"kind +discrete", r"DoFs +2: x, y", r"styles +2, .*%", r"demonstrations +5"):
+    for expected in (
+        r"kind +discrete",
+        r"DoFs +2: x \[m\], y \[m\]",
+        r"styles +2, .*%",
+        r"demonstrations +5",
+    ):
         assert re.search(expected, text)
 
 

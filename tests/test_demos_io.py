@@ -1,6 +1,7 @@
 """Demonstrations come in from files whole or with one clear error; trajectories go out whole."""
 
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +78,7 @@ def test_csv_bears_what_spreadsheets_write(tmp_path: Path) -> None:
         ("x,y\n1,2\n", "no column 't' with the time among x, y: .* pass dt="),
         (TABLE.replace("20", "2O"), "line 3, column 'y': '2O' is not a number"),
         (TABLE.replace("30", ""), "line 4, column 'y': '' is not a number"),
-        (TABLE.replace("40", "nan"), "line 5, column 'y': nan is not finite"),
+        (TABLE.replace("40", "nan"), "line 5, column 'y': nan is not finite: pass max_gap="),
         (TABLE + "0.5,5\n", "line 6: 2 fields, expected 3"),
         ("t,x\n0,1\n0.1,2\n", "2 samples"),
         (TABLE.replace("0.2", "0.1"), "time"),
@@ -204,7 +205,7 @@ def test_read_takes_files_and_folders_together(folder: Path) -> None:
 
 def test_read_refuses_what_it_does_not_know(tmp_path: Path) -> None:
     """Another suffix is refused with those that are read."""
-    with pytest.raises(ValueError, match=r"expected a \.csv file, an \.npz file or a folder"):
+    with pytest.raises(ValueError, match=r"expected a \.csv, \.bvh or \.npz file or a folder"):
         demos.read([tmp_path / "demo.txt"])
 
 
@@ -253,3 +254,145 @@ def test_each_dof_needs_a_name(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="names has length 1, expected 2"):
         demos.write_csv(tmp_path / "out.csv", pdmp.fit(reaches()).rollout(), ["x"])
     assert os.listdir(tmp_path) == []
+
+
+def test_written_csv_keeps_units(tmp_path: Path) -> None:
+    """Headers tell the units that are known, and reading takes them off the names."""
+    model = pdmp.fit(reaches())
+    demos.write_csv(tmp_path / "out.csv", model.rollout(), model.names, model.units)
+    header = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert header.startswith("t,x [m],y [m],x_velocity [m/s],")
+    demo = demos.read_csv(tmp_path / "out.csv", columns=["y", "x_velocity"])
+    assert (demo.names, demo.units) == (["y", "x_velocity"], ["m", "m/s"])
+
+
+def test_csv_headers_tell_units(tmp_path: Path) -> None:
+    """Names go without them, and a time in ms comes in s."""
+    path = tmp_path / "demo.csv"
+    path.write_text("t [ms],knee [rad],height[m],count\n0,1,2,3\n1,1,2,3\n2,1,2,3\n3,1,2,3\n")
+    demo = demos.read_csv(path)
+    assert (demo.names, demo.units) == (["knee", "height", "count"], ["rad", "m", ""])
+    np.testing.assert_allclose(demo.time, [0, 0.001, 0.002, 0.003])
+    path.write_text("t [min],x\n0,1\n1,1\n2,1\n3,1\n")
+    with pytest.raises(ValueError, match=r"demo\.csv, column 't': its unit is 'min': expected s"):
+        demos.read_csv(path)
+    path.write_text("t,x [m],x [rad]\n")
+    with pytest.raises(ValueError, match="two columns are called 'x'"):
+        demos.read_csv(path)
+
+
+@pytest.mark.parametrize("gap", ["", "nan", "NaN"])
+def test_csv_gaps_are_interpolated_up_to_a_length(tmp_path: Path, gap: str) -> None:
+    """From the sample before to the one after; what is longer is refused with its place."""
+    path = tmp_path / "demo.csv"
+    rows = [f"{0.1 * k:.1f},{k},{gap if k in (3, 4) else k**3}" for k in range(8)]
+    path.write_text("\n".join(["t,x,y", *rows]))
+    filled = demos.read_csv(path, max_gap=0.3).position
+    np.testing.assert_allclose(filled[:, 1], np.arange(8.0) ** 3, atol=1e-9)
+    place = r"demo\.csv: column 'y': no sample between t = 0\.2 s and t = 0\.5 s"
+    with pytest.raises(ValueError, match=place):
+        demos.read_csv(path, max_gap=0.2)
+    with pytest.raises(ValueError, match=r"demo\.csv, line 5, column 'y'"):
+        demos.read_csv(path)
+    with pytest.raises(ValueError, match="max_gap = -1"):
+        demos.read_csv(path, columns=["x"], max_gap=-1)
+
+
+def test_npz_has_units_and_gaps(tmp_path: Path) -> None:
+    """The array units goes with names; NaN is a gap, refused where none is allowed."""
+    path = tmp_path / "demos.npz"
+    holed = np.arange(16.0).reshape(8, 2) / 10
+    holed[3, 1] = np.nan
+    np.savez(path, reach=holed, names=["x", "yaw"], units=["m", "rad"])
+    (demo,) = demos.read_npz(path, dt=0.1, max_gap=0.2, columns=["yaw"]).values()
+    assert demo.units == ["rad"]
+    np.testing.assert_allclose(demo.position[:, 0], np.arange(8) * 0.2 + 0.1)
+    with pytest.raises(ValueError, match=r"npz, 'reach': column 'yaw': no sample between t = 0\.2"):
+        demos.read_npz(path, dt=0.1)
+    np.savez(path, reach=holed, names=["x", "yaw"], units=["m"])
+    with pytest.raises(ValueError, match=r"'reach': shape \(8, 2\), expected \(T, 1\)"):
+        demos.read_npz(path, dt=0.1)
+
+
+BVH = """HIERARCHY
+ROOT Hips
+{
+\tOFFSET 0 0 0
+\tCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+
+\tJOINT Left Leg
+\t{
+\t\tOFFSET 0 -40 0
+\t\tCHANNELS 4 Yposition Zrotation Xrotation Yrotation
+\t\tEnd Site
+\t\t{
+\t\t\tOFFSET 0 -40 0
+\t\t}
+\t}
+}
+MOTION
+Frames:\t4
+Frame Time: 0.01
+0 90 0 10 20 30 1 100 -170 5
+0 91 1 10 20 30 1 110 -180 5
+0 92 2 10 20 30 1 120 -190 5
+0 93 3 10 20 30 1 130 -200 5"""
+
+
+@pytest.fixture
+def bvh(tmp_path: Path) -> Path:
+    """Return a BVH file of two joints and four frames, without an end of its last line."""
+    path = tmp_path / "leg.bvh"
+    path.write_text(BVH)
+    return path
+
+
+def test_bvh_gives_every_channel_as_it_is_written(bvh: Path) -> None:
+    """Angles come in rad, beyond half a turn too; positions as they are, of any joint."""
+    demo = demos.read_bvh(bvh)
+    assert demo.dt == 0.01
+    assert demo.names is not None
+    assert demo.names[1] == "Hips.Yposition"
+    assert demo.names[6:] == [f"Left Leg.{channel}" for channel in BVH.split("4 ")[1].split()[:4]]
+    np.testing.assert_array_equal(demo.position[:, 1], [90, 91, 92, 93])
+    np.testing.assert_allclose(np.rad2deg(demo.position[:, 8]), [-170, -180, -190, -200])
+    assert demo.units == [""] * 3 + ["rad"] * 3 + [""] + ["rad"] * 3
+
+
+def test_bvh_is_read_wherever_csv_is(bvh: Path) -> None:
+    """Among files, and in a folder under the id of its index."""
+    (demo,) = demos.read([bvh], columns=["Left Leg.Zrotation"])
+    assert demo.position.shape == (4, 1)
+    (bvh.parent / "demos").mkdir()
+    bvh.rename(bvh.parent / "demos" / "leg.bvh")
+    (bvh.parent / "index.csv").write_text("id,speed\nleg,1.5\n")
+    demo = demos.read_folder(bvh.parent, context=["speed"])["leg"]
+    assert demo.context == [1.5]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (BVH, "", "not a whole BVH file"),
+        ("}\nMOTION", "}}\nMOTION", "not a whole BVH file"),
+        ("CHANNELS 4", "CHANNEL 4", "not a whole BVH file"),
+        ("Frames:\t4", "Frames:\t5", "holds 4 frames, but announces 5"),
+        ("-190 5", "-190", r"frame 2: 9 numbers, expected 10"),
+        ("-190", "l90", r"frame 2, 'Left Leg\.Xrotation': 'l90' is not a number"),
+        ("Time: 0.01", "Time: 0", "dt = 0"),
+    ],
+)
+def test_bad_bvh_is_refused_with_file_and_place(
+    bvh: Path, old: str, new: str, message: str
+) -> None:
+    """Whatever is wrong, the error is a ValueError that names the file and where to look."""
+    bvh.write_text(BVH.replace(old, new))
+    with pytest.raises(ValueError, match=rf"leg\.bvh.*{message}"):
+        demos.read_bvh(bvh)
+
+
+def test_missing_bvh_package_is_named(bvh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the extra, one sentence says what to install."""
+    monkeypatch.setitem(sys.modules, "bvh", None)
+    with pytest.raises(ImportError, match=r"^BVH files need .*: pip install 'pdmp\[bvh\]'$"):
+        demos.read_bvh(bvh)

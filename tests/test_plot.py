@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -37,7 +38,7 @@ def labels_of(figure: Figure) -> set[str]:
 
 def test_demonstrations_stand_beside_reproductions(model: pdmp.Model) -> None:
     """The path panel has a line for each demonstration and one for its reproduction."""
-    figure = plot.demonstrations(model, reaches(), unit="m")
+    figure = plot.demonstrations(model, reaches())
     assert len(figure.axes[0].lines) == 2 * model.n_demos
     assert labels_of(figure) == {"x [m]", "y [m]", "time [s]"}
 
@@ -91,7 +92,7 @@ def test_styles_of_any_dimension_can_be_drawn(n_styles: int) -> None:
 def test_fan_has_a_movement_per_share(model: pdmp.Model) -> None:
     """As many movements as asked for, and a bar that names the two ends."""
     ends = [{"style": model.styles[m]} for m in (0, 4)]
-    figure = plot.fan(model, *ends, n=6, ends=("left", "right"), unit="m")
+    figure = plot.fan(model, *ends, n=6, ends=("left", "right"))
     assert len(figure.axes[0].lines) == 6
     ticks = [text.get_text() for text in figure.axes[-1].get_yticklabels()]
     assert ticks == ["left", "half way", "right"]
@@ -106,7 +107,7 @@ def test_fan_needs_two_ends(model: pdmp.Model) -> None:
 
 def test_phase_portrait_shows_cycles_and_how_one_is_joined(rhythmic: pdmp.Model) -> None:
     """Each panel has the cycle of every demonstration and one movement from rest."""
-    figure = plot.phase_portrait(rhythmic, unit="m")
+    figure = plot.phase_portrait(rhythmic)
     assert [len(axes.lines) for axes in figure.axes] == [rhythmic.n_demos + 1] * rhythmic.n_dofs
     assert "velocity [m/s]" in labels_of(figure)
 
@@ -162,3 +163,28 @@ def test_missing_matplotlib_is_named(model: pdmp.Model, monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(ImportError, match=r"pip install 'pdmp\[plot\]'"):
         plot.spectrum(model)
+
+
+def test_cut_off_is_where_as_much_is_taken_off_as_there_is_noise() -> None:
+    """The line of noise alone, followed to 0 Hz, tells its level; the dot lies on both curves."""
+    rng = np.random.default_rng(2)
+    t = np.arange(2000) * 0.005
+    noise = 0.01 * rng.standard_normal((2000, 2))
+    position = np.column_stack([np.sin(2 * np.pi * t), np.cos(4 * np.pi * t)]) + noise
+    demo = pdmp.Demonstration(position, dt=0.005, names=["hip", "knee"], units=["rad", "rad"])
+    figure = plot.cut_off(demo)
+    assert labels_of(figure) == {"cut-off [Hz]", "RMS [rad]"}
+    for axes, name in zip(figure.axes, ["hip", "knee"], strict=True):
+        dot = next(line for line in axes.lines if line.get_label() == "as much taken off")
+        ((frequency, level),) = dot.get_xydata()
+        assert level == pytest.approx(0.01, rel=0.15)
+        assert 2 < frequency < 20
+        assert axes.get_title() == f"{name}: {frequency:.2g} Hz"
+    smooth = pdmp.demos.lowpass(demo, frequency).position - position + noise
+    assert np.std(smooth) < 0.5 * np.std(noise)
+
+
+def test_cut_off_needs_a_clock() -> None:
+    """Frequencies are per second."""
+    with pytest.raises(ValueError, match="does not tell when"):
+        plot.cut_off(pdmp.Demonstration(np.zeros((9, 1))))

@@ -1,5 +1,6 @@
 """Recordings of people load, are learnt, given back, and predicted from their context."""
 
+import csv
 from pathlib import Path
 from typing import Any
 
@@ -113,3 +114,59 @@ def test_running_strides_are_given_back() -> None:
     model = pdmp.fit(demos, kind="rhythmic", n_styles=len(demos))
     assert worst_error(model, demos) <= 5e-3
     assert_finite(model.rollout(model.styles.mean(axis=0), duration=5.0))
+
+
+def strides() -> dict[str, list[float]]:
+    """Return the durations [s] of the strides of each walk that has several."""
+    path = DATA / "walk_styles_bandai" / "strides.csv"
+    if not path.is_file():
+        pytest.skip(f"{path} is not there: the recordings' licences forbid copying them here")
+    durations: dict[str, list[float]] = {}
+    with path.open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            durations.setdefault(row["id"], []).append(float(row["duration_s"]))
+    return {name: found for name, found in durations.items() if len(found) > 1}
+
+
+def test_cycles_of_walks_last_as_long_as_their_strides() -> None:
+    """Raw recordings of whole bodies, pelvis walking off, have the period of their foot strikes.
+
+    Of 22, three repeat themselves too little for all their degrees of freedom to tell; two of these
+    are refused, and the third repeats itself after two strides.
+    """
+    refused, doubled = [], []
+    for name, durations in strides().items():
+        recording = pdmp.demos.read_csv(DATA / "walk_styles_bandai" / "demos" / f"{name}.csv")
+        try:
+            cycles = pdmp.demos.cycles(recording)
+        except ValueError as error:
+            assert "no period" in str(error)
+            refused.append(name)
+            continue
+        share = np.median(cycles.periods) / np.mean(durations)
+        if share > 1.5:
+            doubled.append(name)
+        else:
+            assert share == pytest.approx(1, abs=0.03), name
+    assert refused == ["walk_not-confident_001", "walk_sad_002"]
+    assert doubled == ["walk_not-confident_002"]
+
+
+def test_bvh_walks_give_the_period_of_their_strides() -> None:
+    """Joints with positions, which few parsers read, come in whole."""
+    name = "walk_normal_001"
+    durations = strides()[name]
+    path = DATA / "walk_styles_bandai" / "raw" / f"dataset-1_{name}.bvh"
+    recording = pdmp.demos.unwrap(pdmp.demos.read_bvh(path))
+    assert recording.n_dofs == 132
+    assert pdmp.demos.period(recording) == pytest.approx(np.mean(durations), rel=0.03)
+
+
+def test_walks_of_two_gaits_become_one_rhythmic_primitive() -> None:
+    """Walks and runs of one person, at their own periods, are learnt in one phase."""
+    demos = recordings("walk_run_cmu35", 1)
+    cycles = pdmp.demos.cycles(demos)
+    assert set(cycles.recordings) == set(range(len(demos)))
+    model = pdmp.fit(cycles, kind="rhythmic", n_styles=3)
+    assert (cycles.periods < 0.8).sum() == sum(demo.n_samples < 50 for demo in demos)
+    assert_finite(model.rollout(duration=3.0))

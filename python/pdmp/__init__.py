@@ -12,6 +12,7 @@ multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.n
 
 from typing import TYPE_CHECKING
 
+from pdmp import demos, plot
 from pdmp._native import (
     GP,
     ContextMap,
@@ -72,8 +73,10 @@ __all__ = [
     "__version__",
     "as_demonstrated",
     "blend",
+    "demos",
     "evaluate",
     "factorise",
     "fit",
     "load",
+    "plot",
 ]

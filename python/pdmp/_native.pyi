@@ -38,9 +38,17 @@ __all__ = [
     "Status",
     "Trajectory",
     "__version__",
+    "cut",
+    "cycles",
     "factorise",
+    "fill",
     "fit",
     "load",
+    "lowpass",
+    "period",
+    "resample",
+    "residuals",
+    "trim",
 ]
 __version__: str
 
@@ -59,6 +67,7 @@ class Demonstration:
         goal: ArrayLike | None = None,  # (D,)
         context: _Context | None = None,  # (Q,)
         names: Sequence[str] | None = None,  # D of them
+        units: Sequence[str] | None = None,  # D of them
     ) -> Demonstration: ...
     def __getnewargs_ex__(self) -> tuple[tuple[_Array], dict[str, Any]]: ...
     @property
@@ -73,6 +82,8 @@ class Demonstration:
     def context(self) -> _Array | list[float | str] | None: ...
     @property
     def names(self) -> list[str] | None: ...
+    @property
+    def units(self) -> list[str] | None: ...
     @property
     def n_samples(self) -> int: ...
     @property
@@ -108,6 +119,24 @@ def factorise(
     spectrum: float = 0.9,
 ) -> Factors: ...
 def load(path: str | PathLike[str]) -> Model: ...
+def resample(demo: Demonstration, dt: float) -> Demonstration: ...
+def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration: ...
+def cut(demo: Demonstration, times: ArrayLike) -> list[Demonstration]: ...  # one fewer than times
+def lowpass(demo: Demonstration, cut_off: float) -> Demonstration: ...
+def residuals(demo: Demonstration, cut_offs: ArrayLike) -> _Array: ...  # (K, D)
+def period(demo: Demonstration) -> float: ...
+def fill(
+    position: ArrayLike,  # (T, D)
+    time: ArrayLike,  # (T,)
+    names: Sequence[str],  # D of them
+    turns: Sequence[float],  # D of them; 0 where no angle
+    max_gap: float,
+) -> _Array: ...  # (T, D)
+def cycles(
+    recordings: Sequence[Demonstration],
+    events: Sequence[ArrayLike] | None,  # one (K,) for each recording
+    average: bool,
+) -> tuple[list[Demonstration], _Array, list[int], list[tuple[int, float, float, str]]]: ...
 
 @final
 class Model:
@@ -131,6 +160,8 @@ class Model:
     def mu(self) -> float | None: ...  # None if discrete
     @property
     def names(self) -> list[str]: ...
+    @property
+    def units(self) -> list[str]: ...  # "" where unknown
     @property
     def nominal(self) -> int: ...
     @property

@@ -55,6 +55,6 @@ def _demonstrations(path: Path) -> list[Demonstration]:
     except ImportError:
         raise ImportError("handwriting needs scipy: pip install 'pdmp[demo]'") from None
     return [
-        Demonstration(recording["pos"].T, time=recording["t"], names=["x", "y"])
+        Demonstration(recording["pos"].T, time=recording["t"], names=["x", "y"], units=["mm", "mm"])
         for recording in loadmat(path, simplify_cells=True)["demos"]
     ]

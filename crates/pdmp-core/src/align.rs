@@ -32,6 +32,15 @@ pub struct Alignment {
     pub n_samples: Option<usize>,
 }
 
+/// Checks a duration in seconds: far outside, squares of rates would leave the range of numbers.
+pub(crate) fn check_duration(value: f64) -> Result<()> {
+    if (1e-9..=1e9).contains(&value) {
+        return Ok(());
+    }
+    let allowed = "seconds from start to end must lie between 1e-9 and 1e9; check dt or time";
+    Err(Error::Range { name: "duration", value, allowed })
+}
+
 /// Demonstrations that can be read as samples of one phase, each when it is asked for.
 #[derive(Debug)]
 pub(crate) struct Aligned<'a> {
@@ -138,11 +147,7 @@ impl Alignment {
             }
             clock = Clock { duration: period, extent: period / clock.ticks.unit(), ..clock };
         }
-        // Far outside, squares of rates would leave the range of numbers.
-        if !(1e-9..=1e9).contains(&clock.duration) {
-            let allowed = "seconds from start to end must lie between 1e-9 and 1e9; check dt or time";
-            return Err(Error::Range { name: "duration", value: clock.duration, allowed });
-        }
+        check_duration(clock.duration)?;
         Ok(clock)
     }
 

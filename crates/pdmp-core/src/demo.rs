@@ -7,7 +7,7 @@ use crate::error::{Error, LARGEST, Result, check_number, check_positive};
 /// Fewest samples that carry a cubic spline with not-a-knot ends.
 pub const LEAST_SAMPLES: usize = 4;
 
-/// Longest name of a DoF, in bytes.
+/// Longest name or unit of a DoF, in bytes.
 const LONGEST_NAME: usize = 1000;
 
 /// When the samples of a demonstration were taken.
@@ -62,6 +62,7 @@ pub struct Demonstration {
     goal: Option<Vec<f64>>,
     context: Option<Vec<ContextValue>>,
     names: Option<Vec<String>>,
+    units: Option<Vec<String>>,
 }
 
 impl Demonstration {
@@ -84,7 +85,7 @@ impl Demonstration {
             Sampling::Uniform { dt } => check_positive("dt", *dt)?,
             Sampling::Stamped { time } => check_time(time, found)?,
         }
-        Ok(Self { position, sampling, goal: None, context: None, names: None })
+        Ok(Self { position, sampling, goal: None, context: None, names: None, units: None })
     }
 
     /// Sets the point attractor of this movement (D,); without it, the last sample serves.
@@ -124,6 +125,36 @@ impl Demonstration {
         Ok(self)
     }
 
+    /// Sets the units of the degrees of freedom (D,), such as "rad"; "" where one is not known.
+    ///
+    /// # Errors
+    /// A number of units other than D, or one longer than 1000 bytes.
+    pub fn with_units(mut self, units: Vec<String>) -> Result<Self> {
+        if units.len() != self.n_dofs() {
+            let (expected, found) = (self.n_dofs(), units.len());
+            return Err(Error::Length { name: "units", expected, found, per: "DoF" });
+        }
+        if units.iter().any(|unit| unit.len() > LONGEST_NAME) {
+            return Err(Error::Arguments("units must have at most 1000 bytes each"));
+        }
+        self.units = Some(units);
+        Ok(self)
+    }
+
+    /// The same movement with other samples: its labels, goal and context stay.
+    ///
+    /// # Errors
+    /// As for [`Demonstration::new`].
+    pub(crate) fn sampled(&self, position: Array2<f64>, sampling: Sampling) -> Result<Self> {
+        let Self { goal, context, names, units, .. } = self.clone();
+        Ok(Self { goal, context, names, units, ..Self::new(position, sampling)? })
+    }
+
+    /// A part of the movement, which ends elsewhere: without the goal.
+    pub(crate) fn part(&self, position: Array2<f64>, sampling: Sampling) -> Result<Self> {
+        Ok(Self { goal: None, ..self.sampled(position, sampling)? })
+    }
+
     /// Positions (T, D).
     pub fn position(&self) -> ArrayView2<'_, f64> {
         self.position.view()
@@ -147,6 +178,11 @@ impl Demonstration {
     /// The names given to the degrees of freedom (D,).
     pub fn names(&self) -> Option<&[String]> {
         self.names.as_deref()
+    }
+
+    /// The units given to the degrees of freedom (D,).
+    pub fn units(&self) -> Option<&[String]> {
+        self.units.as_deref()
     }
 
     /// Number of samples T.
@@ -210,7 +246,7 @@ pub(crate) fn check_matrix(name: &'static str, matrix: ArrayView2<f64>) -> Resul
     Ok(())
 }
 
-fn check_time(time: &[f64], n_samples: usize) -> Result<()> {
+pub(crate) fn check_time(time: &[f64], n_samples: usize) -> Result<()> {
     crate::error::check_vector("time", time, n_samples, "sample")?;
     // Stamps closer than this are one instant to a spline: slopes between them would leave the range of numbers.
     let least = 1e-12 * (time[n_samples - 1] - time[0]).max(0.0);

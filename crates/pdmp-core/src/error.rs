@@ -125,6 +125,31 @@ pub enum Error {
         /// The value before it, in seconds.
         previous: f64,
     },
+    /// Samples that are missing over too long a time.
+    #[error("column '{column}': {}", Gap(*from, *to, *max_gap))]
+    Gap {
+        /// Name of the column.
+        column: String,
+        /// Time of the last sample before the gap, in seconds; −∞ where there is none.
+        from: f64,
+        /// Time of the first sample after the gap, in seconds; ∞ where there is none.
+        to: f64,
+        /// The longest gap that is interpolated, in seconds.
+        max_gap: f64,
+    },
+    /// A recording that does not repeat itself.
+    #[error(
+        "no period: the recording repeats itself best after {lag:.3} s, with a correlation of {share:.2}, below {least}; \
+         keep the DoFs that repeat, or tell when each cycle begins with events="
+    )]
+    Aperiodic {
+        /// Where the recording resembles itself most, in seconds.
+        lag: f64,
+        /// The mean correlation of all DoFs there.
+        share: f64,
+        /// The least correlation of a periodic recording.
+        least: f64,
+    },
     /// Too few samples to carry a cubic.
     #[error("position has {found} samples: at least {least} are needed; record at a higher rate")]
     Samples {
@@ -212,6 +237,27 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+}
+
+/// Where samples are missing, and what can be done about it.
+struct Gap(f64, f64, f64);
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Gap(from, to, max_gap) = *self;
+        match (from.is_finite(), to.is_finite()) {
+            (true, true) => write!(
+                f,
+                "no sample between t = {from} s and t = {to} s: that is longer than max_gap = {max_gap} s; raise max_gap, \
+                 or cut the recording there"
+            ),
+            (false, true) => write!(f, "no sample before t = {to} s, where none can be interpolated: cut the rows out"),
+            (true, false) => {
+                write!(f, "no sample after t = {from} s, where none can be interpolated: cut the rows out")
+            }
+            (false, false) => write!(f, "no sample at all: leave the column out"),
+        }
+    }
 }
 
 /// A number as a person would write it: whole ones plainly, very large and small ones with an exponent.

@@ -47,6 +47,7 @@ struct Constants {
     alpha_z: f64,
     beta_z: f64,
     names: Vec<String>,
+    units: Vec<String>,
     nominal: usize,
     n_samples: usize,
     smoothing: Smoothing,
@@ -89,6 +90,7 @@ impl Model {
             alpha_z: self.attractor.alpha_z,
             beta_z: self.attractor.beta_z,
             names: self.names.clone(),
+            units: self.units.clone(),
             nominal: self.demonstrated.nominal,
             n_samples: self.learnt.n_samples,
             smoothing: self.learnt.smoothing,
@@ -266,7 +268,9 @@ impl Reader<'_> {
         if n_demos == 0 || n_styles == 0 || n_dofs == 0 || n_values < n_styles {
             return Err(bad("an array is empty"));
         }
-        if !(2..=MOST_CELLS + 1).contains(&n_knots) || constants.names.len() != n_dofs {
+        if !(2..=MOST_CELLS + 1).contains(&n_knots)
+            || [&constants.names, &constants.units].iter().any(|labels| labels.len() != n_dofs)
+        {
             return Err(bad("the landscape does not fit the rest"));
         }
         if constants.nominal >= n_demos || constants.n_samples < crate::LEAST_SAMPLES {
@@ -313,11 +317,12 @@ impl Reader<'_> {
             left_over: None,
             basis: constants.basis.clone(),
         };
-        let (tau, names) = (constants.tau, constants.names.clone());
+        let (tau, names, units) = (constants.tau, constants.names.clone(), constants.units.clone());
         let (cycle, responses) = Default::default();
         let map = None;
-        let mut model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle, responses }
-            .with_cycle();
+        let mut model =
+            Model { attractor, landscape, tau, names, units, ranges, demonstrated, learnt, map, cycle, responses }
+                .with_cycle();
         if let Some(map) = &constants.map {
             model.map = Some(self.map(map, &model)?);
             let [n_samples, _] = self.shape("left_over")?;

@@ -122,7 +122,8 @@ pub fn fit(
 ) -> Result<Model> {
     options.styles.check(demos.len(), "demonstrations")?;
     let aligned = options.alignment.align(demos)?;
-    let (contexts, names) = (contexts_of(demos, options.contexts.as_deref())?, names_of(demos)?);
+    let contexts = contexts_of(demos, options.contexts.as_deref())?;
+    let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
     let threads = options.threads;
     let mut targeting = |share| proceed(Stage::Targets, share);
@@ -163,7 +164,7 @@ pub fn fit(
     let Constants { attractor, tau, .. } = constants;
     let (cycle, responses) = Default::default();
     let map = None;
-    let model = Model { attractor, landscape, tau, names, ranges, demonstrated, learnt, map, cycle, responses };
+    let model = Model { attractor, landscape, tau, names, units, ranges, demonstrated, learnt, map, cycle, responses };
     let mut model = Arc::new(model.with_cycle());
     if let (Some(columns), Some(contexts)) = (columns, &model.demonstrated.contexts) {
         let (outputs, metric) = (model.outputs(), model.metric()?);
@@ -344,13 +345,26 @@ fn contexts_of(
     contexts.map(|contexts| tabulate(&contexts)).transpose()
 }
 
-/// Names of the DoFs: those of the demonstrations if they carry any, which must agree.
-fn names_of(demos: &[Demonstration]) -> Result<Vec<String>> {
-    let Some(names) = demos.iter().find_map(Demonstration::names) else {
-        return Ok((0..demos.first().map_or(0, Demonstration::n_dofs)).map(|d| format!("y{d}")).collect());
-    };
-    match demos.iter().position(|demo| demo.names().is_some_and(|other| other != names)) {
-        Some(m) => Err(Error::Arguments("names differ from those of the other demonstrations").in_demo(m)),
-        None => Ok(names.to_vec()),
+/// Names and units of the DoFs: those of the demonstrations if they carry any, which must agree.
+fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
+    let n_dofs = demos.first().map_or(0, Demonstration::n_dofs);
+    let names = agreed(demos, Demonstration::names, "names differ from those of the other demonstrations")?;
+    let units = agreed(demos, Demonstration::units, "units differ from those of the other demonstrations")?;
+    Ok((
+        names.unwrap_or_else(|| (0..n_dofs).map(|d| format!("y{d}")).collect()),
+        units.unwrap_or_else(|| vec![String::new(); n_dofs]),
+    ))
+}
+
+/// What all demonstrations that tell it tell alike.
+fn agreed(
+    demos: &[Demonstration],
+    told: impl Fn(&Demonstration) -> Option<&[String]>,
+    otherwise: &'static str,
+) -> Result<Option<Vec<String>>> {
+    let Some(first) = demos.iter().find_map(&told) else { return Ok(None) };
+    match demos.iter().position(|demo| told(demo).is_some_and(|other| other != first)) {
+        Some(m) => Err(Error::Arguments(otherwise).in_demo(m)),
+        None => Ok(Some(first.to_vec())),
     }
 }

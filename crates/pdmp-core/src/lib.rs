@@ -81,6 +81,7 @@ mod lanes;
 mod model;
 mod perturbation;
 mod phase;
+pub mod recording;
 mod responses;
 mod rollout;
 mod series;

@@ -60,6 +60,7 @@ pub struct Model {
     pub(crate) landscape: Landscape,
     pub(crate) tau: f64,
     pub(crate) names: Vec<String>,
+    pub(crate) units: Vec<String>,
     pub(crate) ranges: Vec<f64>,
     pub(crate) demonstrated: Demonstrated,
     pub(crate) learnt: Learnt,
@@ -144,6 +145,11 @@ impl Model {
     /// Names of the DoFs (D,).
     pub fn names(&self) -> &[String] {
         &self.names
+    }
+
+    /// Units of the DoFs (D,); "" where one is not known.
+    pub fn units(&self) -> &[String] {
+        &self.units
     }
 
     /// Largest range of each DoF within one demonstration (D,).

@@ -26,6 +26,8 @@ use crate::error::raise;
 ///     The condition under which the movement was made, such as an obstacle's height.
 /// names : sequence of str, optional
 ///     One name per degree of freedom.
+/// units : sequence of str, optional
+///     One unit per degree of freedom, such as "rad" or "m"; "" where it is not known.
 ///
 /// Raises
 /// ------
@@ -38,7 +40,7 @@ pub(crate) struct Demonstration(pub(crate) pdmp_core::Demonstration);
 #[pymethods]
 impl Demonstration {
     #[new]
-    #[pyo3(signature = (position, *, dt=None, time=None, goal=None, context=None, names=None))]
+    #[pyo3(signature = (position, *, dt=None, time=None, goal=None, context=None, names=None, units=None))]
     fn new(
         position: &Bound<'_, PyAny>,
         dt: Option<f64>,
@@ -46,6 +48,7 @@ impl Demonstration {
         goal: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
         names: Option<Vec<String>>,
+        units: Option<Vec<String>>,
     ) -> PyResult<Self> {
         let sampling = match (dt, optional("time", time)?) {
             (Some(_), Some(_)) => return Err(PyValueError::new_err("pass dt or time, not both")),
@@ -63,6 +66,9 @@ impl Demonstration {
         }
         if let Some(names) = names {
             demo = demo.with_names(names).map_err(raise)?;
+        }
+        if let Some(units) = units {
+            demo = demo.with_units(units).map_err(raise)?;
         }
         Ok(Self(demo))
     }
@@ -113,6 +119,12 @@ impl Demonstration {
         self.0.names().map(<[String]>::to_vec)
     }
 
+    /// Units of the degrees of freedom, if they were given.
+    #[getter]
+    fn units(&self) -> Option<Vec<String>> {
+        self.0.units().map(<[String]>::to_vec)
+    }
+
     /// Number of samples T.
     #[getter]
     fn n_samples(&self) -> usize {
@@ -135,6 +147,7 @@ impl Demonstration {
         options.set_item("goal", self.goal(py))?;
         options.set_item("context", self.context(py)?)?;
         options.set_item("names", self.names())?;
+        options.set_item("units", self.units())?;
         Ok(((self.position(py),), options))
     }
 

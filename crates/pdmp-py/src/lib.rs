@@ -13,6 +13,7 @@ mod fit;
 mod jacobian;
 mod model;
 mod prediction;
+mod recording;
 
 use pyo3::prelude::*;
 
@@ -40,5 +41,13 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
     module.add_function(wrap_pyfunction!(factor::factorise, module)?)?;
     module.add_function(wrap_pyfunction!(model::load, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::resample, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::trim, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::cut, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::lowpass, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::residuals, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::period, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::fill, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::cycles, module)?)?;
     Ok(())
 }

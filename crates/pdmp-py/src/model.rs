@@ -113,6 +113,12 @@ impl Model {
         self.0.names().to_vec()
     }
 
+    /// Units of the degrees of freedom; "" where one is not known.
+    #[getter]
+    fn units(&self) -> Vec<String> {
+        self.0.units().to_vec()
+    }
+
     /// Index of the nominal demonstration.
     #[getter]
     fn nominal(&self) -> usize {

@@ -12,6 +12,18 @@ def add_reading(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--dt", type=float, metavar="S", help="sampling interval [s], in place of time stamps"
     )
+    parser.add_argument(
+        "--max-gap",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="longest gap [s] that is interpolated; default: none is",
+    )
+
+
+def reading(options: Namespace) -> dict[str, Any]:
+    """Return the arguments of `pdmp.demos.read` that these options are."""
+    return {name: getattr(options, name) for name in ("columns", "dt", "max_gap")}
 
 
 def add_learning(parser: ArgumentParser) -> None:

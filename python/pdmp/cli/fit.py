@@ -18,7 +18,7 @@ def arguments(parser: ArgumentParser) -> None:
         "paths",
         nargs="+",
         metavar="PATH",
-        help="CSV file (one demonstration), NPZ file (several) or folder with an index.csv",
+        help="CSV or BVH file (one demonstration), NPZ file (several) or folder with an index.csv",
     )
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help="model to write")
     _options.add_reading(parser)
@@ -30,9 +30,7 @@ def run(options: Namespace) -> None:
     folder = Path(options.output).absolute().parent
     if not folder.is_dir():
         raise FileNotFoundError(f"{folder}: no such folder; make it first")
-    recordings = demos.read(
-        options.paths, columns=options.columns, dt=options.dt, context=options.context
-    )
+    recordings = demos.read(options.paths, context=options.context, **_options.reading(options))
     with progress() as show:
         model = pdmp.fit(
             recordings,

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import pdmp
+from pdmp.plot._canvas import dof_labels
 
 MOST = 40  # singular values that are printed
 
@@ -30,7 +31,7 @@ def run(options: Namespace) -> None:
         "kind": model.kind,
         "demonstrations": f"{model.n_demos}, nominal {model.nominal}",
         "durations": f"{model.durations.min():g} to {model.durations.max():g} s",
-        "DoFs": f"{model.n_dofs}: {', '.join(model.names)}",
+        "DoFs": f"{model.n_dofs}: {', '.join(dof_labels(model.names, model.units))}",
         "styles": f"{model.n_styles}, which leave out {model.left_out:.1%} of the targets' RMS",
         "singular values": _several(model.singular_values),
         "basis": f"{model.basis}; table error {model.table_error:.1e}",

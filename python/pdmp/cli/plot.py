@@ -2,7 +2,7 @@
 
 With the demonstrations that it learnt from, they are drawn against their reproductions too.
 
-example: pdmp plot reach.safetensors recordings/ --columns q1 q2 q3 --unit rad -o figures
+example: pdmp plot reach.safetensors recordings/ --columns q1 q2 q3 -o figures
 """
 
 from argparse import ArgumentParser, Namespace
@@ -19,7 +19,6 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("paths", nargs="*", metavar="PATH", help="its demonstrations, as for fit")
     parser.add_argument("-o", "--output", required=True, metavar="FOLDER", help="where to write")
     _options.add_reading(parser)
-    parser.add_argument("--unit", default="", help="unit of the positions")
 
 
 def run(options: Namespace) -> None:
@@ -34,14 +33,13 @@ def run(options: Namespace) -> None:
             model,
             *(pdmp.as_demonstrated(model, end) for end in ends),
             ends=(f"demo {ends[0]}", f"demo {ends[1]}"),
-            unit=options.unit,
         ),
     }
     if model.kind == "rhythmic":
-        figures["phase_portrait"] = plot.phase_portrait(model, unit=options.unit)
+        figures["phase_portrait"] = plot.phase_portrait(model)
     if options.paths:
-        recordings = demos.read(options.paths, columns=options.columns, dt=options.dt)
-        figures["demonstrations"] = plot.demonstrations(model, recordings, unit=options.unit)
+        recordings = demos.read(options.paths, **_options.reading(options))
+        figures["demonstrations"] = plot.demonstrations(model, recordings)
     for name, figure in figures.items():
         path = Path(options.output, f"{name}.png")
         plot.save(figure, path)

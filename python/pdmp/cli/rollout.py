@@ -41,7 +41,7 @@ def run(options: Namespace) -> None:
     names = ("style", "context", "goal", "start", "anchor", "amplitude", "tau", "dt", "duration")
     given |= {name: value for name in names if (value := getattr(options, name)) is not None}
     trajectory = model.rollout(**given)
-    demos.write_csv(options.output, trajectory, model.names)
+    demos.write_csv(options.output, trajectory, model.names, model.units)
     print(f"{options.output}: {len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
 
 

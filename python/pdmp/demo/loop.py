@@ -57,7 +57,7 @@ def draw_control(
     model: pdmp.Model, arguments: Mapping[str, Any], runs: Mapping[str, Run]
 ) -> Figure:
     """Draw what each command made of the movement."""
-    figure, columns = movement_panels(model, list(runs), "mm", None)
+    figure, columns = movement_panels(model, list(runs), None)
     longest = DT * max(len(run.ticks) for run in runs.values())
     plain = model.rollout(**arguments, dt=DT, duration=longest)
     for panels, run in zip(columns, runs.values(), strict=True):

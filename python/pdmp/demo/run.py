@@ -77,10 +77,10 @@ def run_demo(
         runs = {name: control(model, means[RUN], command) for name, command in commands.items()}
     with timed(times, "draw"):
         figures = {
-            "demonstrations": plot.demonstrations(model, demos, labels=labels, unit="mm"),
+            "demonstrations": plot.demonstrations(model, demos, labels=labels),
             "spectrum": plot.spectrum(model),
             "styles": plot.styles(model, labels),
-            "fan": plot.fan(model, here, there, ends=BLENDED, unit="mm"),
+            "fan": plot.fan(model, here, there, ends=BLENDED),
             "control": draw_control(model, means[RUN], runs),
         }
         for name, figure in figures.items():

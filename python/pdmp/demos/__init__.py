@@ -1,7 +1,8 @@
-"""Demonstrations from files, and trajectories to files.
+"""Recordings into demonstrations, and trajectories to files.
 
 A CSV file is one demonstration: a header row with names, then one sample a row. By default the
-column `t` holds the time in s and every other column is a degree of freedom.
+column `t` holds the time in s and every other column is a degree of freedom. A header such as
+`knee [rad]` tells name and unit.
 
 An NPZ file holds several, in one of two layouts, without pickled objects:
 
@@ -10,14 +11,44 @@ An NPZ file holds several, in one of two layouts, without pickled objects:
 - `y` (ΣT, D) with all samples one demonstration after another, `start` (M + 1,) with the row where
   each begins and the last ends, and the time stamps `t` (ΣT,), if any.
 
-Either may have `names` (D,) of the degrees of freedom.
+Either may have `names` (D,) and `units` (D,) of the degrees of freedom.
+
+A BVH file is one demonstration, whose degrees of freedom are the channels of its skeleton.
 
 A folder holds an `index.csv`, one row per demonstration with its name under `id` and whatever else
-is known of it, beside `demos/<id>.csv` files or a `demos.npz` in the order of the index.
+is known of it, beside `demos/<id>.csv` or `demos/<id>.bvh` files or a `demos.npz` in the order of
+the index.
+
+What was read may be prepared: `unwrap` angles, take noise off by `lowpass`, `resample` evenly,
+`trim` to the movement or `cut` at given times. From cyclic recordings `cycles` makes what a
+rhythmic primitive is learnt from::
+
+    cycles = pdmp.demos.cycles(pdmp.demos.read_csv("walk.csv"))
+    model = pdmp.fit(cycles, kind="rhythmic")
 """
 
+from pdmp._native import cut, lowpass, period, resample, trim
+from pdmp.demos.angles import unwrap
 from pdmp.demos.archive import read_npz
+from pdmp.demos.bvh import read_bvh
+from pdmp.demos.cyclic import Cycles, Rejected, cycles
 from pdmp.demos.folder import read, read_folder
 from pdmp.demos.table import read_csv, write_csv
 
-__all__ = ["read", "read_csv", "read_folder", "read_npz", "write_csv"]
+__all__ = [
+    "Cycles",
+    "Rejected",
+    "cut",
+    "cycles",
+    "lowpass",
+    "period",
+    "read",
+    "read_bvh",
+    "read_csv",
+    "read_folder",
+    "read_npz",
+    "resample",
+    "trim",
+    "unwrap",
+    "write_csv",
+]

@@ -1,16 +1,36 @@
-"""A demonstration whose errors name the file it came from."""
+"""A demonstration from what a file holds, with errors that name the file."""
 
+from collections.abc import Sequence
+from math import tau
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._native import Demonstration
+from pdmp._native import Demonstration, fill
+
+TURNS = {"rad": tau, "deg": 360.0, "°": 360.0}
 
 
-def demonstration(source: Path | str, position: NDArray[Any], **given: Any) -> Demonstration:
-    """Return `Demonstration(position, **given)`, with `source` before the text of its errors."""
+def demonstration(
+    source: Path | str,
+    position: NDArray[Any],
+    *,
+    dt: float | None,
+    time: NDArray[Any] | None,
+    names: Sequence[str] | None,
+    units: Sequence[str] | None,
+    max_gap: float,
+    context: Sequence[float | str] | None = None,
+) -> Demonstration:
+    """Return a demonstration with its gaps filled, and `source` before the text of its errors."""
+    n_samples, n_dofs = position.shape
+    columns = [f"y{d}" for d in range(n_dofs)] if names is None else names
+    turns = [TURNS.get(unit, 0.0) for unit in units or [""] * n_dofs]
+    clock = np.arange(n_samples) * (dt or 1.0) if time is None else time
     try:
-        return Demonstration(position, **given)
+        whole = fill(position, clock, columns, turns, max_gap)
+        return Demonstration(whole, dt=dt, time=time, context=context, names=names, units=units)
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from None

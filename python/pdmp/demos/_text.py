@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -18,7 +19,7 @@ def rows(path: Path) -> Iterator[tuple[int, list[str]]]:
                     continue
                 if not header:
                     header = fields
-                    _check_header(path, reader.line_num, header)
+                    check_names(path, reader.line_num, header)
                 elif len(fields) != len(header):
                     raise ValueError(
                         f"{path}, line {reader.line_num}: {len(fields)} fields, "
@@ -33,6 +34,23 @@ def rows(path: Path) -> Iterator[tuple[int, list[str]]]:
         raise ValueError(f"{path}: empty: expected a header row with names, then one sample a row")
 
 
+def label(field: str) -> tuple[str, str]:
+    """Return name and unit of a header field such as `knee [rad]`; the unit is "" without one."""
+    found = re.fullmatch(r"(.*\S)\s*\[([^][]*)\]", field)
+    return (found[1], found[2].strip()) if found else (field, "")
+
+
+def check_names(path: Path, line: int, names: Sequence[str]) -> None:
+    """Check that the first row names the columns, each by a name of its own."""
+    for name in names:
+        if not name or _parsed(name) is not None:
+            raise ValueError(
+                f"{path}, line {line}: '{name}' is not a name: the first row must name the columns"
+            )
+        if names.count(name) > 1:
+            raise ValueError(f"{path}, line {line}: two columns are called '{name}': rename one")
+
+
 def column(path: Path, header: Sequence[str], name: str) -> int:
     """Return the index of the column called `name`."""
     if name not in header:
@@ -40,15 +58,17 @@ def column(path: Path, header: Sequence[str], name: str) -> int:
     return header.index(name)
 
 
-def number(path: Path, line: int, name: str, field: str) -> float:
-    """Return the finite number in a field of the column called `name`."""
+def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) -> float:
+    """Return the finite number in a field of the column called `name`, or NaN for a gap."""
     value = _parsed(field)
+    if gaps and (not field or (value is not None and math.isnan(value))):
+        return math.nan
     if value is None:
         raise ValueError(f"{path}, line {line}, column '{name}': '{field}' is not a number")
     if not math.isfinite(value):
         raise ValueError(
             f"{path}, line {line}, column '{name}': {field} is not finite: "
-            "fill the gap or cut the row out first"
+            "pass max_gap= to interpolate what is NaN, or cut the row out"
         )
     return value
 
@@ -63,13 +83,3 @@ def _parsed(field: str) -> float | None:
         return float(field)
     except ValueError:
         return None
-
-
-def _check_header(path: Path, line: int, header: Sequence[str]) -> None:
-    for name in header:
-        if not name or _parsed(name) is not None:
-            raise ValueError(
-                f"{path}, line {line}: '{name}' is not a name: the first row must name the columns"
-            )
-        if header.count(name) > 1:
-            raise ValueError(f"{path}, line {line}: two columns are called '{name}': rename one")

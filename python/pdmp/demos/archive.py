@@ -20,6 +20,7 @@ def read_npz(
     *,
     columns: Sequence[str] | None = None,
     dt: float | None = None,
+    max_gap: float = 0.0,
 ) -> dict[str, Demonstration]:
     """Read the demonstrations in an NPZ file, by name ("0", "1", … where they have none).
 
@@ -31,17 +32,20 @@ def read_npz(
         Names of the degrees of freedom to keep, in this order; all by default.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
+    max_gap : float
+        Longest gap [s] that is interpolated, from the sample before to the one after; by default
+        none is. A gap is NaN.
 
     Raises
     ------
     ValueError
-        A layout other than these, a name that is missing, neither time stamps nor `dt`, or what
-        `Demonstration` refuses.
+        A layout other than these, a name that is missing, neither time stamps nor `dt`, a gap that
+        is longer than `max_gap` or at an end, or what `Demonstration` refuses.
     OSError
         A file that cannot be read.
     """
     return {
-        name: demonstration(f"{path}, '{name}'", position, **given)
+        name: demonstration(f"{path}, '{name}'", position, max_gap=max_gap, **given)
         for name, position, given in recordings(Path(path), columns, dt)
     }
 
@@ -51,20 +55,30 @@ def recordings(
 ) -> Iterator[tuple[str, NDArray[Any], dict[str, Any]]]:
     """Yield name, positions (T, D) and the other arguments of each demonstration in the file."""
     arrays = _arrays(path)
-    names = [str(name) for name in arrays.pop("names")] if "names" in arrays else None
+    names, units = _labels(arrays, "names"), _labels(arrays, "units")
     if columns is not None and names is None:
         raise ValueError(f"{path}: no array 'names' to tell which columns are {', '.join(columns)}")
     for name, position, time in _parts(path, arrays):
-        if position.ndim != 2 or (names is not None and position.shape[1] != len(names)):
-            expected = "D" if names is None else len(names)
-            raise ValueError(f"{path}, '{name}': shape {position.shape}, expected (T, {expected})")
+        for labels in (names, units):
+            expected = "D" if labels is None else len(labels)
+            if position.ndim != 2 or expected not in (position.shape[1], "D"):
+                shape = position.shape
+                raise ValueError(f"{path}, '{name}': shape {shape}, expected (T, {expected})")
         if dt is None and time is None:
             raise ValueError(f"{path}, '{name}': no time stamps: pass dt=")
-        kept = names
+        kept = list(range(position.shape[1]))
         if columns is not None and names is not None:
-            kept = list(columns)
-            position = position[:, [_text.column(path, names, column) for column in kept]]
-        yield name, position, {"dt": dt, "time": time if dt is None else None, "names": kept}
+            kept = [_text.column(path, names, column) for column in columns]
+        given = {
+            kind: None if labels is None else [labels[k] for k in kept]
+            for kind, labels in (("names", names), ("units", units))
+        }
+        yield name, position[:, kept], {"dt": dt, "time": time if dt is None else None, **given}
+
+
+def _labels(arrays: dict[str, NDArray[Any]], kind: str) -> list[str] | None:
+    """Take the names or units of the degrees of freedom out of the arrays."""
+    return [str(label) for label in arrays.pop(kind)] if kind in arrays else None
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:

@@ -1,14 +1,18 @@
 """Folders with an index, and several files and folders at once."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from pdmp._native import Demonstration
 from pdmp.demos import _text
 from pdmp.demos._recording import demonstration
 from pdmp.demos.archive import read_npz, recordings
+from pdmp.demos.bvh import read_bvh
 from pdmp.demos.table import read_csv
+
+READERS: dict[str, Callable[..., Demonstration]] = {".csv": read_csv, ".bvh": read_bvh}
 
 
 def read(
@@ -16,9 +20,10 @@ def read(
     *,
     columns: Sequence[str] | None = None,
     dt: float | None = None,
+    max_gap: float = 0.0,
     context: Sequence[str] | None = None,
 ) -> list[Demonstration]:
-    """Read every demonstration in CSV files, NPZ files and folders, in the order given.
+    """Read every demonstration in CSV, BVH and NPZ files and folders, in the order given.
 
     Parameters
     ----------
@@ -28,6 +33,8 @@ def read(
         Names of the degrees of freedom to keep, in this order; all by default.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
+    max_gap : float
+        Longest gap [s] that is interpolated; by default none is.
     context : sequence of str, optional
         Columns of the folders' index whose numbers or labels make the context (Q,).
 
@@ -41,15 +48,17 @@ def read(
     demos: list[Demonstration] = []
     for path in map(Path, paths):
         if path.is_dir():
-            demos += read_folder(path, columns=columns, dt=dt, context=context).values()
+            found = read_folder(path, columns=columns, dt=dt, max_gap=max_gap, context=context)
+            demos += found.values()
         elif context is not None:
             raise ValueError(f"{path}: a context is read from the index.csv of a folder: pass one")
-        elif path.suffix.lower() == ".csv":
-            demos.append(read_csv(path, columns=columns, dt=dt))
+        elif path.suffix.lower() in READERS:
+            reader = READERS[path.suffix.lower()]
+            demos.append(reader(path, columns=columns, dt=dt, max_gap=max_gap))
         elif path.suffix.lower() == ".npz":
-            demos += read_npz(path, columns=columns, dt=dt).values()
+            demos += read_npz(path, columns=columns, dt=dt, max_gap=max_gap).values()
         else:
-            raise ValueError(f"{path}: expected a .csv file, an .npz file or a folder")
+            raise ValueError(f"{path}: expected a .csv, .bvh or .npz file or a folder")
     return demos
 
 
@@ -58,6 +67,7 @@ def read_folder(
     *,
     columns: Sequence[str] | None = None,
     dt: float | None = None,
+    max_gap: float = 0.0,
     context: Sequence[str] | None = None,
 ) -> dict[str, Demonstration]:
     """Read the demonstrations that a folder's `index.csv` lists, by their ids.
@@ -70,6 +80,8 @@ def read_folder(
         Names of the degrees of freedom to keep, in this order; all by default.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
+    max_gap : float
+        Longest gap [s] that is interpolated; by default none is.
     context : sequence of str, optional
         Columns of the index whose numbers or labels make the context (Q,) of each demonstration.
 
@@ -77,7 +89,7 @@ def read_folder(
     ------
     ValueError
         An index without `id`, or with one twice, a context that is not a finite number, or what
-        `read_csv` and `read_npz` refuse.
+        `read_csv`, `read_bvh` and `read_npz` refuse.
     OSError
         A file that cannot be read.
     """
@@ -85,8 +97,9 @@ def read_folder(
     contexts = _contexts(path / "index.csv", context or [])
     archive = path / "demos.npz"
     if not archive.exists():
+        options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
         return {
-            name: read_csv(path / "demos" / f"{name}.csv", columns=columns, dt=dt, context=values)
+            name: _read_one(path / "demos", name, context=values, **options)
             for name, values in contexts.items()
         }
     found = list(recordings(archive, columns, dt))
@@ -95,9 +108,17 @@ def read_folder(
             f"{archive}: holds {len(found)} demonstrations, but index.csv lists {len(contexts)}"
         )
     return {
-        name: demonstration(f"{archive}, '{name}'", position, context=values, **given)
+        name: demonstration(
+            f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **given
+        )
         for (name, values), (_, position, given) in zip(contexts.items(), found, strict=True)
     }
+
+
+def _read_one(folder: Path, name: str, **options: Any) -> Demonstration:
+    """Read the one file of that name, a CSV file where there is none."""
+    suffix = next((suffix for suffix in READERS if (folder / f"{name}{suffix}").exists()), ".csv")
+    return READERS[suffix](folder / f"{name}{suffix}", **options)
 
 
 def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str] | None]:

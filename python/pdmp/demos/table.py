@@ -12,6 +12,8 @@ from pdmp._native import Demonstration, Trajectory
 from pdmp.demos import _text
 from pdmp.demos._recording import demonstration
 
+SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3}
+
 
 def read_csv(
     path: str | PathLike[str],
@@ -19,9 +21,12 @@ def read_csv(
     columns: Sequence[str] | None = None,
     time: str = "t",
     dt: float | None = None,
+    max_gap: float = 0.0,
     context: Sequence[float | str] | None = None,
 ) -> Demonstration:
     """Read one demonstration from a CSV file.
+
+    A column headed `knee [rad]` is called `knee`, and its unit is rad.
 
     Parameters
     ----------
@@ -30,46 +35,75 @@ def read_csv(
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all but `time` by default.
     time : str
-        Column of the time stamps [s].
+        Column of the time stamps, in s unless its header tells ms.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
+    max_gap : float
+        Longest gap [s] that is interpolated, from the sample before to the one after; by default
+        none is. A gap is an empty field or NaN.
     context : sequence of float or str, optional
         Context (Q,) of the demonstration.
 
     Raises
     ------
     ValueError
-        A field that is not a finite number, a column that is missing, or what `Demonstration`
-        refuses; names file, line and column.
+        A field that is not a finite number, a gap that is longer than `max_gap` or at an end, a
+        column that is missing, or what `Demonstration` refuses; names file, column, and line or
+        time.
     OSError
         A file that cannot be read.
     """
     path = Path(path)
     lines = _text.rows(path)
-    _, header = next(lines)
+    first, fields = next(lines)
+    header, units = zip(*map(_text.label, fields), strict=True)
+    _text.check_names(path, first, header)
     if dt is None and time not in header:
         raise ValueError(
             f"{path}: no column '{time}' with the time among {', '.join(header)}: "
             "name it with time=, or pass dt="
         )
     names = list(columns) if columns is not None else [name for name in header if name != time]
-    wanted = names if dt is not None else [*names, time]
-    where = [_text.column(path, header, name) for name in wanted]
-    numbers = [
-        [_text.number(path, line, header[k], fields[k]) for k in where] for line, fields in lines
-    ]
-    samples = np.array(numbers).reshape(len(numbers), len(where))
-    position, stamps = np.split(samples, [len(names)], axis=1)
-    stamped = None if dt is not None else stamps[:, 0]
-    return demonstration(path, position, dt=dt, time=stamped, context=context, names=names)
+    where = [_text.column(path, header, name) for name in names]
+    clock = None if dt is not None else _text.column(path, header, time)
+    numbers: list[list[float]] = []
+    stamps: list[float] = []
+    for line, row in lines:
+        numbers.append(
+            [_text.number(path, line, header[k], row[k], gaps=max_gap > 0) for k in where]
+        )
+        if clock is not None:
+            stamps.append(_text.number(path, line, time, row[clock]))
+    return demonstration(
+        path,
+        np.array(numbers).reshape(len(numbers), len(names)),
+        dt=dt,
+        time=None if clock is None else np.array(stamps) * _second(path, time, units[clock]),
+        names=names,
+        units=[units[k] for k in where] if any(units[k] for k in where) else None,
+        max_gap=max_gap,
+        context=context,
+    )
 
 
-def write_csv(path: str | PathLike[str], trajectory: Trajectory, names: Sequence[str]) -> None:
+def _second(path: Path, name: str, unit: str) -> float:
+    """Return how many seconds the unit of a time column is."""
+    if unit not in SECONDS:
+        raise ValueError(f"{path}, column '{name}': its unit is '{unit}': expected s or ms")
+    return SECONDS[unit]
+
+
+def write_csv(
+    path: str | PathLike[str],
+    trajectory: Trajectory,
+    names: Sequence[str],
+    units: Sequence[str] | None = None,
+) -> None:
     """Write a trajectory as CSV; `read_csv` with `columns=names` reads its positions back.
 
     The columns are `t` [s], then the position of each degree of freedom under its name, then
-    velocities under `<name>_velocity` and accelerations under `<name>_acceleration`. Numbers keep
-    every bit. The file appears when it is complete.
+    velocities under `<name>_velocity` and accelerations under `<name>_acceleration`, with the units
+    that are known in brackets. Numbers keep every bit. The file appears when it is complete.
 
     Parameters
     ----------
@@ -79,18 +113,28 @@ def write_csv(path: str | PathLike[str], trajectory: Trajectory, names: Sequence
         What a rollout returned.
     names : sequence of str
         Names of the D degrees of freedom, such as `Model.names`.
+    units : sequence of str, optional
+        Their units, such as `Model.units`; "" where one is not known.
 
     Raises
     ------
     ValueError
-        A number of names other than D.
+        A number of names or units other than D.
     OSError
         A file that cannot be written.
     """
     n_dofs = trajectory.position.shape[1]
-    if len(names) != n_dofs:
-        raise ValueError(f"names has length {len(names)}, expected {n_dofs}: one name per DoF")
-    header = [f"{name}{suffix}" for suffix in ("", "_velocity", "_acceleration") for name in names]
+    units = [""] * n_dofs if units is None else units
+    for kind, given in (("name", names), ("unit", units)):
+        if len(given) != n_dofs:
+            raise ValueError(
+                f"{kind}s has length {len(given)}, expected {n_dofs}: one {kind} per DoF"
+            )
+    header = [
+        f"{name}{suffix} [{unit}{per}]" if unit else f"{name}{suffix}"
+        for suffix, per in (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
+        for name, unit in zip(names, units, strict=True)
+    ]
     columns = (trajectory.time, trajectory.position, trajectory.velocity, trajectory.acceleration)
     with replacing(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -51,22 +51,25 @@ def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def dof_labels(model: Model, unit: str) -> list[str]:
+def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
     """Return the names of the degrees of freedom, with the unit where it is known."""
-    return [f"{name} [{unit}]" if unit else name for name in model.names]
+    return [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
 
 
 def movement_panels(
-    model: Model, titles: Sequence[str], unit: str, figure: Figure | None
+    model: Model, titles: Sequence[str], figure: Figure | None
 ) -> tuple[Figure, list[list[Axes]]]:
     """Return a figure and, per title, a column of panels for `draw_movement`.
 
     The path comes first where there are two degrees of freedom; then each of them over time, in a
     grid where they are many.
     """
-    labels = dof_labels(model, unit)
+    labels = dof_labels(model.names, model.units)
     if len(titles) == 1 and model.n_dofs > 4:
-        return _grid_panels(labels, titles[0], figure)
+        figure, panels = grid_panels(labels, "time [s]", figure)
+        if titles[0]:
+            figure.suptitle(titles[0])
+        return figure, [panels]
     has_path = model.n_dofs == 2
     heights = [3.6] * has_path + [1.7] * model.n_dofs
     figure = canvas(figure, max(3.2 * len(titles), 5.5), sum(heights) + 0.5)
@@ -81,24 +84,20 @@ def movement_panels(
     return figure, [list(column) for column in grid.T]
 
 
-def _grid_panels(
-    labels: Sequence[str], title: str, figure: Figure | None
-) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure and one column of panels laid out as a grid, for many degrees of freedom."""
-    n_columns = 3 if len(labels) < 13 else 5
+def grid_panels(labels: Sequence[str], x: str, figure: Figure | None) -> tuple[Figure, list[Axes]]:
+    """Return a figure and a panel per degree of freedom over `x`, laid out as a grid."""
+    n_columns = min(len(labels), 3 if len(labels) < 13 else 5)
     n_rows = ceil(len(labels) / n_columns)
-    figure = canvas(figure, 3.2 * n_columns, 1.9 * n_rows + 0.5)
+    figure = canvas(figure, max(3.2 * n_columns, 5.5), 1.9 * n_rows + 0.5)
     panels = figure.subplots(n_rows, n_columns, sharex=True, squeeze=False).ravel()
     for axes, label in zip(panels, labels, strict=False):
         dress(axes, "", label)
     for axes in panels[len(labels) - n_columns : len(labels)]:
-        axes.set_xlabel("time [s]")
+        axes.set_xlabel(x)
         axes.xaxis.set_tick_params(labelbottom=True)
     for axes in panels[len(labels) :]:
         axes.set_axis_off()
-    if title:
-        figure.suptitle(title)
-    return figure, [list(panels[: len(labels)])]
+    return figure, list(panels[: len(labels)])
 
 
 def draw_movement(

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pdmp.evaluation import PDMP, Evaluation
-from pdmp.evaluation.predictors import BAND, WIDTH
 from pdmp.plot._canvas import BLUE, GREY, PALETTE, canvas, dress, legend
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from pdmp.evaluation import Evaluation
 
 MOST_DOFS = 6
 
@@ -41,6 +41,8 @@ def prediction_error(
     ImportError
         matplotlib is not installed.
     """
+    from pdmp.evaluation import PDMP  # evaluation is not needed where nothing is evaluated
+
     styles = {}
     for name, predictor in evaluation.predictors.items():
         if isinstance(predictor, PDMP) and predictor.settings.get("n_styles") is not None:
@@ -106,6 +108,11 @@ def held_out(
     ImportError
         matplotlib is not installed.
     """
+    from pdmp.evaluation.predictors import (
+        BAND,
+        WIDTH,
+    )  # evaluation is not needed where nothing is evaluated
+
     score = evaluation.score(predictor)
     recordings = evaluation.recordings
     names = recordings.names

@@ -23,7 +23,6 @@ def demonstrations(
     demos: Sequence[Demonstration],
     *,
     labels: Sequence[str] | None = None,
-    unit: str = "",
     figure: Figure | None = None,
 ) -> Figure:
     """Draw the demonstrations and what the model makes of them, one column per label.
@@ -38,8 +37,6 @@ def demonstrations(
         The M demonstrations, in the order of the fit.
     labels : sequence of str, optional
         What each of the M demonstrations shows.
-    unit : str
-        Unit of the positions, such as "mm".
     figure : matplotlib.figure.Figure, optional
         Where to draw.
 
@@ -58,7 +55,7 @@ def demonstrations(
                 "one per demonstration of the fit"
             )
     titles = list(dict.fromkeys(labels))
-    figure, columns = movement_panels(model, titles, unit, figure)
+    figure, columns = movement_panels(model, titles, figure)
     for m, (demo, label) in enumerate(zip(demos, labels, strict=True)):
         panels = columns[titles.index(label)]
         duration = model.durations[m]
@@ -82,7 +79,6 @@ def fan(
     *,
     n: int = 9,
     ends: tuple[str, str] = ("a", "b"),
-    unit: str = "",
     figure: Figure | None = None,
 ) -> Figure:
     """Draw the movements from one style to another.
@@ -98,8 +94,6 @@ def fan(
         Number of movements, at least 2.
     ends : tuple of str
         Names of `a` and `b`.
-    unit : str
-        Unit of the positions, such as "mm".
     figure : matplotlib.figure.Figure, optional
         Where to draw.
 
@@ -115,7 +109,7 @@ def fan(
     shares = np.linspace(0, 1, n)
     dt = model.durations.min() / SAMPLES
     rollouts = [model.rollout(**blend(a, b, share), dt=dt) for share in shares]
-    figure, (panels,) = movement_panels(model, [""], unit, figure)
+    figure, (panels,) = movement_panels(model, [""], figure)
     from matplotlib.cm import ScalarMappable
 
     shade = ScalarMappable(cmap=gradient())

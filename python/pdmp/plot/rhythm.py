@@ -16,15 +16,13 @@ SAMPLES = 500
 PERIODS = 4
 
 
-def phase_portrait(model: Model, *, unit: str = "", figure: Figure | None = None) -> Figure:
+def phase_portrait(model: Model, *, figure: Figure | None = None) -> Figure:
     """Draw velocity over position: the limit cycles, and how a movement from rest joins one.
 
     Parameters
     ----------
     model : Model
         A rhythmic primitive.
-    unit : str
-        Unit of the positions, such as "rad".
     figure : matplotlib.figure.Figure, optional
         Where to draw.
 
@@ -50,7 +48,8 @@ def phase_portrait(model: Model, *, unit: str = "", figure: Figure | None = None
     joining = model.rollout(
         start=centre, velocity=0 * centre, duration=PERIODS * period, dt=period / SAMPLES
     )
-    for dof, (axes, label) in enumerate(zip(panels, dof_labels(model, unit), strict=False)):
+    labels = dof_labels(model.names, model.units)
+    for dof, (axes, label, unit) in enumerate(zip(panels, labels, model.units, strict=False)):
         for cycle in cycles:
             axes.plot(
                 cycle.position[:, dof],

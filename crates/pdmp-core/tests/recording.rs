@@ -1,0 +1,375 @@
+//! What is done to recordings before a primitive is learnt from them.
+
+use std::f64::consts::{PI, TAU};
+
+use approx::{assert_abs_diff_eq, assert_relative_eq};
+use ndarray::{Array1, Array2, Axis, concatenate, s};
+use pdmp_core::recording::{self, Cycles, Keep, Reason};
+use pdmp_core::{Demonstration, FitOptions, Kind, Result, Sampling};
+use proptest::prelude::*;
+
+const DT: f64 = 0.01;
+
+/// Evenly distributed numbers in [−1, 1), of Knuth's linear congruential generator.
+fn noise(mut state: u64) -> impl FnMut() -> f64 {
+    move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// Both hips, a knee and the pelvis' height at a phase of a walk, in rad and m.
+fn pose(phi: f64) -> [f64; 4] {
+    let knee = 0.5 - 0.4 * phi.cos() + 0.3 * (2.0 * phi + 1.0).sin();
+    [0.4 * phi.sin(), -0.4 * phi.sin(), knee, 0.9 + 0.02 * (2.0 * phi).cos()]
+}
+
+/// A walk whose phase is `phi` at time t.
+fn walk(time: &[f64], phi: impl Fn(f64) -> f64) -> Array2<f64> {
+    Array2::from_shape_fn((time.len(), 4), |(c, d)| pose(phi(time[c]))[d])
+}
+
+fn even(n: usize) -> Vec<f64> {
+    (0..n).map(|c| c as f64 * DT).collect()
+}
+
+fn recorded(position: Array2<f64>) -> Demonstration {
+    Demonstration::new(position, Sampling::Uniform { dt: DT }).unwrap()
+}
+
+fn one(recording: Demonstration) -> Result<Cycles> {
+    recording::cycles(&[recording], None, Keep::Each)
+}
+
+/// Largest jump from the last sample of a cycle to the first, over the largest between neighbours.
+fn seam(cycle: &Demonstration) -> f64 {
+    let y = cycle.position();
+    let step = |a: usize, b: usize| (&y.row(b) - &y.row(a)).iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let n = y.nrows();
+    step(n - 1, 0) / (1..n).map(|c| step(c - 1, c)).fold(0.0, f64::max)
+}
+
+/// Both legs together repeat after a stride, though the pelvis does after each step.
+#[test]
+fn the_period_of_a_walk_is_a_stride_and_no_step() {
+    for period in [0.713, 1.0, 1.377] {
+        let recording = recorded(walk(&even(400), |t| TAU * t / period + 1.0));
+        assert_relative_eq!(recording::period(&recording).unwrap(), period, max_relative = 1e-3);
+    }
+}
+
+/// A harmonic much larger than the fundamental is not taken for it.
+#[test]
+fn the_period_is_not_that_of_a_harmonic() {
+    for harmonic in [2.0, 3.0, 5.0] {
+        let y = |t: f64| 0.3 * (TAU * t).sin() + (TAU * harmonic * t).sin();
+        let recording = recorded(Array1::from_iter(even(450).into_iter().map(y)).insert_axis(Axis(1)));
+        assert_relative_eq!(recording::period(&recording).unwrap(), 1.0, max_relative = 1e-3);
+    }
+}
+
+/// Neither noise at a high rate nor irregular stamps nor drift hide the period.
+#[test]
+fn the_period_is_found_through_noise_drift_and_irregular_stamps() {
+    let (n, mut random) = (2000, noise(3));
+    let time: Vec<f64> = (0..n).map(|c| 5.0 + (c as f64 + 0.4 * random()) * 0.002).collect();
+    let mut position = walk(&time, |t| TAU * t / 1.1);
+    for (mut row, t) in position.rows_mut().into_iter().zip(&time) {
+        row.iter_mut().for_each(|y| *y += 0.03 * random() + 0.5 * t);
+    }
+    let recording = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
+    assert_relative_eq!(recording::period(&recording).unwrap(), 1.1, max_relative = 5e-3);
+}
+
+/// A reach repeats nothing, and the error tells how little.
+#[test]
+fn what_has_no_period_is_refused_with_the_figure() {
+    let mut random = noise(1);
+    let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+    let reaching = Array2::from_shape_fn((200, 2), |(c, d)| reach(c as f64 / 199.0) * [1.0, -0.3][d]);
+    let noisy = Array2::from_shape_fn((200, 3), |_| random());
+    for position in [reaching, noisy] {
+        let message = one(recorded(position)).unwrap_err().to_string();
+        assert!(message.starts_with("demo 0: no period") && message.contains("below 0.5"), "{message}");
+    }
+    let message = recording::period(&recorded(Array2::ones((50, 2)))).unwrap_err().to_string();
+    assert!(message.contains("stands still"), "{message}");
+}
+
+/// Strides whose cadence swings by 7 % are cut where they end, to 2 % of a stride; even ones would miss by a fifth.
+#[test]
+fn cycles_end_where_they_end_however_the_cadence_varies() {
+    // The phase of a cadence that swings by 7 % over seventeen strides.
+    let phi = |t: f64| TAU * t + 1.2 * (TAU * t / 17.0).sin();
+    let found = one(recorded(walk(&even(1000), phi))).unwrap();
+    assert_eq!((found.kept.len(), found.rejected.len()), (9, 0));
+    let mut start = 0.0;
+    for cycle in &found.kept {
+        let end = start + cycle.period;
+        assert_abs_diff_eq!(phi(end) - phi(start), TAU, epsilon = 0.02 * TAU);
+        start = end;
+    }
+}
+
+/// A recording that ends with its last cycle loses none of it.
+#[test]
+fn a_recording_of_whole_cycles_is_used_up() {
+    let found = one(recorded(walk(&even(301), |t| TAU * t))).unwrap();
+    assert_eq!(found.kept.len(), 3);
+    for cycle in found.kept {
+        assert_relative_eq!(cycle.period, 1.0, max_relative = 1e-3);
+        let Sampling::Uniform { dt } = cycle.demo.sampling() else { panic!("no interval") };
+        assert_relative_eq!(dt * cycle.demo.n_samples() as f64, cycle.period, max_relative = 1e-12);
+    }
+}
+
+/// Drift of half the range in a cycle is distributed: neither a jump nor a change of the mean is left.
+#[test]
+fn drifting_cycles_are_closed_without_a_jump() {
+    let mut position = walk(&even(500), |t| TAU * t);
+    for (c, mut row) in position.rows_mut().into_iter().enumerate() {
+        row.mapv_inplace(|y| y + 0.4 * c as f64 * DT);
+    }
+    let found = one(recorded(position)).unwrap();
+    assert_eq!(found.kept.len(), 4);
+    for (k, cycle) in found.kept.iter().enumerate() {
+        assert!(seam(&cycle.demo) < 1.1, "{}", seam(&cycle.demo));
+        let mean = cycle.demo.position().mean_axis(Axis(0)).unwrap();
+        assert_abs_diff_eq!(mean[0], 0.4 * (k as f64 + 0.5), epsilon = 5e-3);
+    }
+}
+
+/// Recordings that begin anywhere give cycles that begin where those of the first do.
+#[test]
+fn cycles_of_all_recordings_begin_in_one_phase() {
+    let recordings: Vec<_> = [(1.0, 0.4), (1.2, 3.0), (0.9, 5.5)]
+        .map(|(period, phase)| recorded(walk(&even(450), |t| TAU * t / period + phase)))
+        .into();
+    let found = recording::cycles(&recordings, None, Keep::Mean).unwrap();
+    assert_eq!(found.kept.len(), 3);
+    for cycle in &found.kept {
+        for (d, y) in pose(0.4).into_iter().enumerate() {
+            assert_abs_diff_eq!(cycle.demo.position()[[0, d]], y, epsilon = 0.02);
+        }
+    }
+}
+
+/// One stride of another shape and one of another duration are rejected, each with its reason.
+#[test]
+fn odd_cycles_are_rejected_with_a_reason() {
+    let limp = |t: f64| if (3.0..4.0).contains(&t) { 0.5 * (TAU * t).sin().powi(3) } else { 0.0 };
+    let mut position = walk(&even(801), |t| TAU * t);
+    position.column_mut(2).iter_mut().zip(even(801)).for_each(|(y, t)| *y += limp(t));
+    let found = one(recorded(position)).unwrap();
+    assert_eq!((found.kept.len(), found.rejected.len()), (7, 1));
+    assert_abs_diff_eq!(found.rejected[0].start, 3.0, epsilon = 0.02);
+    assert!(matches!(found.rejected[0].reason, Reason::Shape { .. }));
+
+    // The fourth stride takes a fifth longer.
+    let phi = |t: f64| TAU * if t < 3.0 { t } else { f64::max(3.0 + (t - 3.0) / 1.2, t - 0.2) };
+    let found = one(recorded(walk(&even(821), phi))).unwrap();
+    assert_eq!(found.rejected.len(), 1);
+    assert_relative_eq!(found.rejected[0].period, 1.2, max_relative = 0.03);
+    assert!(matches!(found.rejected[0].reason, Reason::Period { .. }));
+    assert!(found.rejected[0].reason.to_string().contains("median period is 1.0"));
+}
+
+/// Cycles begin at the events that are given, to the last bit.
+#[test]
+fn events_tell_when_cycles_begin() {
+    let events = vec![0.25, 1.26, 2.24, 3.25];
+    let recording = recorded(walk(&even(400), |t| TAU * t));
+    let found = recording::cycles(std::slice::from_ref(&recording), Some(&[events]), Keep::Each).unwrap();
+    let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
+    assert_abs_diff_eq!(&periods[..], &[1.01, 0.98, 1.01][..], epsilon = 1e-12);
+
+    for (events, wrong) in [(vec![0.5], "at least"), (vec![1.0, 0.5], "must increase"), (vec![1.0, 9.0], "within")] {
+        let message =
+            recording::cycles(std::slice::from_ref(&recording), Some(&[events]), Keep::Each).unwrap_err().to_string();
+        assert!(message.starts_with("demo 0: events") && message.contains(wrong), "{message}");
+    }
+}
+
+/// The cycles of a raw recording are what a rhythmic primitive is learnt from, with a mean goal and units left out.
+#[test]
+fn a_rhythmic_primitive_is_learnt_from_a_raw_recording() {
+    let labels = |of: [&str; 4]| of.map(String::from).to_vec();
+    let recording = recorded(walk(&even(520), |t| TAU * t / 1.3))
+        .with_names(labels(["hip", "other hip", "knee", "height"]))
+        .and_then(|demo| demo.with_units(labels(["rad", "rad", "rad", "m"])))
+        .and_then(|demo| demo.with_context(vec![1.4]))
+        .and_then(|demo| demo.with_goal(vec![0.0; 4]))
+        .unwrap();
+    let demos: Vec<_> = one(recording).unwrap().kept.into_iter().map(|cycle| cycle.demo).collect();
+    let model = pdmp_core::fit(&demos, &FitOptions::new(Kind::Rhythmic), &mut |_, _| Ok(())).unwrap();
+    assert_relative_eq!(model.duration(), 1.3, max_relative = 1e-2);
+    assert_eq!(model.units(), ["rad", "rad", "rad", "m"]);
+    assert_eq!(demos[0].context(), Some(&[1.4][..]));
+    let loaded = pdmp_core::Model::from_bytes(&model.to_bytes().unwrap()).unwrap();
+    assert_eq!(loaded.units(), model.units());
+}
+
+/// A cubic is resampled exactly, whatever the stamps, and the first and last times stay where dt divides the duration.
+#[test]
+fn resampling_is_exact_for_cubics_at_irregular_stamps() {
+    let time: Vec<f64> =
+        (0..41).map(|c| 2.0 + c as f64 * 0.05 + 0.01 * (c as f64).sin() * f64::from(c % 40 != 0)).collect();
+    let cubic = |t: f64| t * t * t - 3.0 * t;
+    let position = Array1::from_iter(time.iter().map(|&t| cubic(t))).insert_axis(Axis(1));
+    let recording = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
+    let even = recording::resample(&recording, 0.02).unwrap();
+    assert_eq!((even.n_samples(), even.sampling()), (101, &Sampling::Uniform { dt: 0.02 }));
+    for (c, y) in even.position().column(0).iter().enumerate() {
+        assert_abs_diff_eq!(*y, cubic(2.0 + c as f64 * 0.02), epsilon = 1e-9);
+    }
+    for (dt, wrong) in [(0.0, "positive"), (1.0, "fewer than 4"), (1e-300, "memory")] {
+        let message = recording::resample(&recording, dt).unwrap_err().to_string();
+        assert!(message.contains(wrong), "{message}");
+    }
+}
+
+/// Parts begin and end at the times given, and meet there.
+#[test]
+fn parts_meet_at_the_times_that_cut_them() {
+    let recording = recorded(walk(&even(300), |t| TAU * t)).with_goal(vec![0.0; 4]).unwrap();
+    let parts = recording::cut(&recording, &[0.333, 1.0, 2.7]).unwrap();
+    let [first, second] = &parts[..] else { panic!("{} parts", parts.len()) };
+    assert_abs_diff_eq!(first.position().row(0)[0], 0.4 * (TAU * 0.333).sin(), epsilon = 1e-6);
+    assert_eq!(first.position().row(first.n_samples() - 1), second.position().row(0));
+    assert_eq!(first.goal(), None);
+    let message = recording::cut(&recording, &[0.5, 0.51]).unwrap_err().to_string();
+    assert!(message.contains("times = 0.51: a part must last"), "{message}");
+}
+
+/// Rest before and after a reach is cut off, to the sample in which the threshold is passed.
+#[test]
+fn trimming_leaves_the_movement() {
+    let share = |t: f64| ((t - 1.0) / 1.5).clamp(0.0, 1.0);
+    let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+    // Both DoFs move alike: the threshold is that of each, whatever their units.
+    let position = Array2::from_shape_fn((400, 2), |(c, d)| [1.0, 1e-3][d] * reach(share(c as f64 * DT)));
+    let trimmed = recording::trim(&recorded(position.clone()), 0.05).unwrap();
+    // Speed 30 s²(1 − s)² is at 5 % of its peak 1.875 where s(1 − s) = √0.003125.
+    let edge = 0.5 - (0.25 - 0.003125f64.sqrt()).sqrt();
+    let expected = 1.5 * (1.0 - 2.0 * edge) / DT;
+    assert_abs_diff_eq!(trimmed.n_samples() as f64, expected, epsilon = 2.0);
+    assert!(recording::trim(&recorded(position), 1.0).unwrap_err().to_string().contains("threshold = 1"));
+    assert!(recording::trim(&recorded(Array2::zeros((9, 2))), 0.05).unwrap_err().to_string().contains("stands still"));
+}
+
+/// A sine at the cut-off keeps half its amplitude, where it was: without lag.
+#[test]
+fn the_low_pass_halves_a_sine_at_the_cut_off_without_lag() {
+    let sine = |t: f64| (TAU * 5.0 * t).sin();
+    let position = Array1::from_iter(even(1001).into_iter().map(sine)).insert_axis(Axis(1));
+    let filtered = recording::lowpass(&recorded(position.clone()), 5.0).unwrap();
+    for c in 100..900 {
+        assert_abs_diff_eq!(filtered.position()[[c, 0]], 0.5 * sine(c as f64 * DT), epsilon = 1e-3);
+    }
+    let residuals = recording::residuals(&recorded(position.clone()), &[0.5, 5.0, 45.0]).unwrap();
+    assert_relative_eq!(residuals[[0, 0]], 0.5f64.sqrt(), max_relative = 1e-2);
+    assert_relative_eq!(residuals[[1, 0]], 0.5 * 0.5f64.sqrt(), max_relative = 2e-2);
+    assert!(residuals[[2, 0]] < 1e-3);
+    let message = recording::lowpass(&recorded(position), 80.0).unwrap_err().to_string();
+    assert_eq!(message, "cut_off = 80: must lie below half the sampling rate");
+}
+
+/// Gaps up to the length are interpolated, and what was there stays as it was.
+#[test]
+fn short_gaps_are_interpolated_and_nothing_else_changes() {
+    let time = even(100);
+    let whole = walk(&time, |t| TAU * t);
+    let mut holed = whole.clone();
+    holed.slice_mut(s![40..44, 0]).fill(f64::NAN);
+    holed[[70, 2]] = f64::NAN;
+    let names = ["a", "b", "c", "d"].map(String::from);
+    let filled = recording::fill(holed.clone(), &time, &names, &[0.0; 4], 0.05).unwrap();
+    for (place, y) in filled.indexed_iter() {
+        let tolerance = if holed[place].is_nan() { 1e-4 } else { 0.0 };
+        assert_abs_diff_eq!(*y, whole[place], epsilon = tolerance);
+    }
+    let message = recording::fill(holed, &time, &names, &[0.0; 4], 0.04).unwrap_err().to_string();
+    assert!(message.contains("column 'a': no sample between t = 0.39 s and t = 0.44 s"), "{message}");
+}
+
+/// What cannot be interpolated is refused: gaps at an end, columns of nothing, lengths that are none.
+#[test]
+fn gaps_that_cannot_be_filled_are_refused() {
+    let (time, names) = (even(10), [String::from("knee")]);
+    let refusal = |gap: std::ops::Range<usize>, max_gap: f64| {
+        let mut position = Array2::zeros((10, 1));
+        position.slice_mut(s![gap, 0]).fill(f64::NAN);
+        recording::fill(position, &time, &names, &[0.0], max_gap).unwrap_err().to_string()
+    };
+    assert!(refusal(0..2, 1.0).contains("'knee': no sample before t = 0.02 s"));
+    assert!(refusal(7..10, 1.0).contains("'knee': no sample after t = 0.06 s"));
+    assert!(refusal(0..10, 1.0).contains("'knee': no sample at all"));
+    assert!(refusal(1..8, 1.0).contains("3 samples"));
+    assert!(refusal(4..5, f64::NAN).contains("max_gap"));
+}
+
+/// A gap through which an angle wraps is filled with the way that goes on, not with the way back.
+#[test]
+fn angles_are_filled_across_the_wrap() {
+    let time = even(60);
+    let angle = |c: usize| 0.1 * c as f64;
+    let wrapped = |c: usize| (angle(c) + PI).rem_euclid(TAU) - PI;
+    let mut position = Array2::from_shape_fn((60, 1), |(c, _)| wrapped(c));
+    position.slice_mut(s![29..34, 0]).fill(f64::NAN);
+    let filled = recording::fill(position, &time, &[String::from("yaw")], &[TAU], 0.1).unwrap();
+    for c in 29..34 {
+        let turns = (filled[[c, 0]] - angle(c)) / TAU;
+        assert_abs_diff_eq!(turns, turns.round(), epsilon = 1e-9);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    /// Whatever the period, the phase, the units and the drift, cycles are closed, of the period, and of finite numbers.
+    #[test]
+    fn cycles_are_closed_and_as_long_as_the_period(
+        period in 0.4f64..1.6, phase in 0.0f64..TAU, unit in -6..6, drift in -1.0f64..1.0,
+    ) {
+        let scale = 10f64.powi(unit);
+        let mut position = walk(&even(400), |t| TAU * t / period + phase);
+        for (c, mut row) in position.rows_mut().into_iter().enumerate() {
+            row.mapv_inplace(|y| scale * (y + drift * c as f64 * DT));
+        }
+        let found = one(recorded(position)).unwrap();
+        prop_assert!(found.kept.len() >= 2);
+        for cycle in found.kept {
+            prop_assert!((cycle.period / period - 1.0).abs() < 0.01, "{} of {period}", cycle.period);
+            prop_assert!(seam(&cycle.demo) < 1.5, "{}", seam(&cycle.demo));
+        }
+    }
+
+    /// What is trimmed, cut or resampled is made of finite numbers, whatever the stamps.
+    #[test]
+    fn nothing_but_finite_numbers_comes_out(
+        steps in prop::collection::vec(1e-3..1.0, 8..40), seed: u64, exponent in -100..100,
+    ) {
+        let mut random = noise(seed);
+        let time: Vec<f64> = steps.iter().scan(0.0, |t, h| { *t += h; Some(*t) }).collect();
+        let scale = 10f64.powi(exponent);
+        let position = Array2::from_shape_fn((time.len(), 2), |_| scale * random());
+        let (first, last) = (time[0], time[time.len() - 1]);
+        let recording = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
+        let mut made = vec![recording::resample(&recording, (last - first) / 20.0).unwrap()];
+        made.extend(recording::trim(&recording, 0.05));
+        made.extend(recording::cut(&recording, &[first, last]).unwrap());
+        made.extend(recording::lowpass(&recording, 0.3 / ((last - first) / steps.len() as f64)));
+        for demo in made {
+            prop_assert!(demo.position().iter().all(|y| y.is_finite()));
+        }
+    }
+}
+
+/// Degrees of freedom at rest neither repeat nor fail to.
+#[test]
+fn columns_at_rest_have_no_say() {
+    let moving = walk(&even(400), |t| TAU * t / 1.3);
+    let resting = Array2::from_elem((400, 3), 7.25);
+    let position = concatenate![Axis(1), moving, resting];
+    assert_relative_eq!(recording::period(&recorded(position)).unwrap(), 1.3, max_relative = 1e-3);
+}

@@ -1,0 +1,209 @@
+//! From recordings to demonstrations.
+
+use numpy::IntoPyArray;
+use pdmp_core::recording;
+use pdmp_core::recording::Keep;
+use pyo3::prelude::*;
+
+use crate::convert::{Matrix, Vector, matrix, to_numpy, vector};
+use crate::demo::Demonstration;
+use crate::error::raise;
+
+/// Sample a recording anew, at even intervals.
+///
+/// The cubic spline through the samples at t₀, t₀ + dt, … as far as the recording goes; the clock of what is returned
+/// starts at 0. Of irregular time stamps it makes even ones. Frequencies above 1/(2 dt) are to be taken off first, by
+/// `lowpass`.
+///
+/// Parameters
+/// ----------
+/// demo : Demonstration
+///     A recording with `dt` or `time`.
+/// dt : float
+///     Sampling interval in s.
+///
+/// Returns
+/// -------
+/// Demonstration
+///     With its names, units, context and goal.
+///
+/// Raises
+/// ------
+/// ValueError
+///     An interval that is not positive or leaves fewer than four samples, or a recording without times.
+#[pyfunction]
+pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: f64) -> PyResult<Demonstration> {
+    py.detach(|| recording::resample(&demo.0, dt)).map(Demonstration).map_err(raise)
+}
+
+/// Keep the part of a recording in which there is movement.
+///
+/// That is from the first to the last sample whose speed is at least the share `threshold` of the largest, with the
+/// speed of all degrees of freedom together, v² = Σ_d (ẏ_d / (max y_d − min y_d))².
+///
+/// Parameters
+/// ----------
+/// demo : Demonstration
+///     A recording with `dt` or `time`.
+/// threshold : float
+///     Share of the peak speed, between 0 and 1.
+///
+/// Returns
+/// -------
+/// Demonstration
+///     With its names, units, context and goal. Time stamps stay as they are.
+///
+/// Raises
+/// ------
+/// ValueError
+///     A threshold that is no share, or a recording that stands still, moves for fewer than four samples, or has no
+///     times.
+#[pyfunction]
+#[pyo3(signature = (demo, threshold=0.05))]
+pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: f64) -> PyResult<Demonstration> {
+    py.detach(|| recording::trim(&demo.0, threshold)).map(Demonstration).map_err(raise)
+}
+
+/// Cut a recording at given times into one movement from each to the next.
+///
+/// Each is the cubic spline through the recording, sampled evenly and about as densely as that, with both ends: it
+/// begins and ends at the very times that are given.
+///
+/// Parameters
+/// ----------
+/// demo : Demonstration
+///     A recording with `dt` or `time`.
+/// times : (K,) array_like
+///     At least two times in s of the recording's clock, increasing.
+///
+/// Returns
+/// -------
+/// list of Demonstration
+///     K − 1 of them, with the names, units and context.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Times that do not increase or lie outside, a part shorter than three sampling intervals, or a recording without
+///     times.
+#[pyfunction]
+pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>) -> PyResult<Vec<Demonstration>> {
+    let times = vector("times", times)?;
+    let parts = py.detach(|| recording::cut(&demo.0, &times)).map_err(raise)?;
+    Ok(parts.into_iter().map(Demonstration).collect())
+}
+
+/// Filter a recording by a low-pass without phase lag.
+///
+/// It is the cubic smoothing spline: of a sine of frequency f the share 1/(1 + (f/f_c)⁴) is left, half at the cut-off
+/// f_c. `pdmp.plot.cut_off` draws what helps to choose that.
+///
+/// Parameters
+/// ----------
+/// demo : Demonstration
+///     A recording with `dt` or `time`, even or not.
+/// cut_off : float
+///     Cut-off frequency in Hz.
+///
+/// Returns
+/// -------
+/// Demonstration
+///     At the same times, with its names, units, context and goal.
+///
+/// Raises
+/// ------
+/// ValueError
+///     A cut-off that is not positive, not below half the sampling rate or below a ten-thousandth of it, or a recording
+///     without times.
+///
+/// References
+/// ----------
+/// C. H. Reinsch, Smoothing by spline functions, Numerische Mathematik 10 (1967), https://doi.org/10.1007/BF02162161
+#[pyfunction]
+pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: f64) -> PyResult<Demonstration> {
+    py.detach(|| recording::lowpass(&demo.0, cut_off)).map(Demonstration).map_err(raise)
+}
+
+/// What `lowpass` takes off at each of K cut-offs [Hz]: root mean squares (K, D), in the unit of each degree of freedom.
+#[pyfunction]
+pub(crate) fn residuals<'py>(
+    py: Python<'py>,
+    demo: &Demonstration,
+    cut_offs: &Bound<'py, PyAny>,
+) -> PyResult<Matrix<'py>> {
+    let cut_offs = vector("cut_offs", cut_offs)?;
+    let residuals = py.detach(|| recording::residuals(&demo.0, &cut_offs)).map_err(raise)?;
+    Ok(residuals.into_pyarray(py))
+}
+
+/// Find the period of a cyclic recording.
+///
+/// Positions and velocities of all degrees of freedom, each less its linear trend, are correlated with themselves k
+/// samples later; A(k) is the mean of these correlations. The period is the first peak of A that is as high as the
+/// highest, but for what varies from cycle to cycle; half a cycle, and the period of a harmonic, make lower ones, and
+/// an odd cycle is no matter. A parabola finds it to a part of a sample.
+///
+/// Parameters
+/// ----------
+/// demo : Demonstration
+///     A recording of at least one cycle and a half, with `dt` or `time`.
+///
+/// Returns
+/// -------
+/// float
+///     The period in s.
+///
+/// Raises
+/// ------
+/// ValueError
+///     A recording whose highest peak is below 0.5, that stands still, or has no times.
+///
+/// References
+/// ----------
+/// P. McLeod, G. Wyvill, A smarter way to find pitch, International Computer Music Conference 2005
+#[pyfunction]
+pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
+    py.detach(|| recording::period(&demo.0)).map_err(raise)
+}
+
+/// Positions (T, D) with NaN interpolated in gaps up to `max_gap` seconds; `turns` (D,) of angles, 0 of others.
+#[pyfunction]
+pub(crate) fn fill<'py>(
+    py: Python<'py>,
+    position: &Bound<'py, PyAny>,
+    time: &Bound<'py, PyAny>,
+    names: Vec<String>,
+    turns: Vec<f64>,
+    max_gap: f64,
+) -> PyResult<Matrix<'py>> {
+    let (position, time) = (matrix("position", "(T, D)", position)?, vector("time", time)?);
+    let filled = recording::fill(position, &time, &names, &turns, max_gap).map_err(raise)?;
+    Ok(filled.into_pyarray(py))
+}
+
+/// A cycle that was left out: index of its recording, start and period in s, and the reason.
+type Rejected = (usize, f64, f64, String);
+/// Cycles, their periods (K,) in s, the indices of their recordings, and the rejected.
+type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<usize>, Vec<Rejected>);
+
+/// Cuts recordings into cycles: what `pdmp.demos.cycles` calls.
+#[pyfunction]
+pub(crate) fn cycles<'py>(
+    py: Python<'py>,
+    recordings: Vec<Demonstration>,
+    events: Option<Vec<Bound<'py, PyAny>>>,
+    average: bool,
+) -> PyResult<Found<'py>> {
+    let recordings: Vec<_> = recordings.into_iter().map(|demo| demo.0).collect();
+    let vectors = |events: Vec<Bound<'py, PyAny>>| events.iter().map(|times| vector("events", times)).collect();
+    let events: Option<Vec<Vec<f64>>> = events.map(vectors).transpose()?;
+    let keep = if average { Keep::Mean } else { Keep::Each };
+    let found = py.detach(|| recording::cycles(&recordings, events.as_deref(), keep)).map_err(raise)?;
+    let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
+    let of = found.kept.iter().map(|cycle| cycle.recording).collect();
+    let rejected =
+        found.rejected.iter().map(|cycle| (cycle.recording, cycle.start, cycle.period, cycle.reason.to_string()));
+    let rejected = rejected.collect();
+    let demos = found.kept.into_iter().map(|cycle| Demonstration(cycle.demo)).collect();
+    Ok((demos, to_numpy(py, &periods), of, rejected))
+}
