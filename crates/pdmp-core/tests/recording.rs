@@ -204,7 +204,7 @@ fn a_rhythmic_primitive_is_learnt_from_a_raw_recording() {
     let model = pdmp_core::fit(&demos, &FitOptions::new(Kind::Rhythmic), &mut |_, _| Ok(())).unwrap();
     assert_relative_eq!(model.duration(), 1.3, max_relative = 1e-2);
     assert_eq!(model.units(), ["rad", "rad", "rad", "m"]);
-    assert_eq!(demos[0].context(), Some(&[1.4][..]));
+    assert_eq!(demos[0].context(), Some(&[1.4.into()][..]));
     let loaded = pdmp_core::Model::from_bytes(&model.to_bytes().unwrap()).unwrap();
     assert_eq!(loaded.units(), model.units());
 }
