@@ -183,15 +183,17 @@ pub(crate) fn fill<'py>(
 
 /// A cycle that was left out: index of its recording, start and period in s, and the reason.
 type Rejected = (usize, f64, f64, String);
+/// Cycles, their periods (K,) in s, the indices of their recordings, and the rejected.
+type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<usize>, Vec<Rejected>);
 
-/// Cycles, their periods (K,) in s and the indices of their recordings, and the rejected.
+/// Cuts recordings into cycles: what `pdmp.demos.cycles` calls.
 #[pyfunction]
 pub(crate) fn cycles<'py>(
     py: Python<'py>,
     recordings: Vec<Demonstration>,
     events: Option<Vec<Bound<'py, PyAny>>>,
     average: bool,
-) -> PyResult<(Vec<Demonstration>, Vector<'py>, Vec<usize>, Vec<Rejected>)> {
+) -> PyResult<Found<'py>> {
     let recordings: Vec<_> = recordings.into_iter().map(|demo| demo.0).collect();
     let vectors = |events: Vec<Bound<'py, PyAny>>| events.iter().map(|times| vector("events", times)).collect();
     let events: Option<Vec<Vec<f64>>> = events.map(vectors).transpose()?;
