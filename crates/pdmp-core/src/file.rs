@@ -200,8 +200,12 @@ impl Model {
             }
             None => return Err(bad("no schema version")),
         }
-        let Sealed { crc32, model, .. } = serde_json::from_str(json).map_err(|error| Error::File(error.to_string()))?;
-        Reader { tensors }.model(model, crc32)
+        let sealed: Sealed = serde_json::from_str(json).map_err(|error| Error::File(error.to_string()))?;
+        // One text alone is written for these constants: a flipped bit may leave another that means the same.
+        if serde_json::to_string(&sealed).ok().as_deref() != Some(json.as_str()) {
+            return Err(bad("damaged: its constants are not written as they were"));
+        }
+        Reader { tensors }.model(sealed.model, sealed.crc32)
     }
 }
 

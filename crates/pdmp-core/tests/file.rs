@@ -36,14 +36,6 @@ fn a_saved_model_moves_alike() {
     }
 }
 
-/// Whether a file is refused, or means the same: a flipped bit may turn the e of an exponent into E.
-fn noticed(bytes: &[u8]) -> bool {
-    match Model::from_bytes(bytes) {
-        Err(error) => matches!(error, Error::File(_)),
-        Ok(model) => model.to_bytes().unwrap() == *BYTES,
-    }
-}
-
 proptest! {
     /// One flipped bit, anywhere, is noticed.
     #[test]
@@ -51,7 +43,7 @@ proptest! {
         let mut bytes = BYTES.clone();
         let place = place.index(bytes.len());
         bytes[place] ^= 1 << bit;
-        prop_assert!(noticed(&bytes), "byte {place}, bit {bit}");
+        prop_assert!(matches!(Model::from_bytes(&bytes), Err(Error::File(_))), "byte {place}, bit {bit}");
     }
 
     /// In the header too, where every byte means something.
@@ -59,7 +51,7 @@ proptest! {
     fn a_flipped_bit_in_the_header_is_refused(place in 0..2000usize, bit in 0..8u8) {
         let mut bytes = BYTES.clone();
         bytes[place] ^= 1 << bit;
-        prop_assert!(noticed(&bytes), "byte {place}, bit {bit}");
+        prop_assert!(matches!(Model::from_bytes(&bytes), Err(Error::File(_))), "byte {place}, bit {bit}");
     }
 
     /// A truncated file is refused, wherever it was cut.
