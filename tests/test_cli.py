@@ -124,6 +124,17 @@ def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(made.position, expected.position)
 
 
+def test_evaluate_fills_gaps_when_told(folder: Path) -> None:
+    """A missing field is refused by its place, and interpolated up to a stated length."""
+    path = folder / "demos" / "2.csv"
+    lines = path.read_text().split("\n")
+    lines[30] = lines[30].rsplit(",", 1)[0] + ","
+    path.write_text("\n".join(lines))
+    given = ("evaluate", folder, "--context", "bend", "--styles", 2)
+    assert run(*given) != 0
+    assert run(*given, "--max-gap", 2.5 * DT) == 0
+
+
 def test_evaluate_tells_what_the_library_finds(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -203,6 +203,13 @@ def test_contexts_of_demonstrations_are_used() -> None:
     np.testing.assert_allclose(found.recordings.contexts[:, 0], [-0.2, -0.1, 0, 0.1, 0.2])
 
 
+def test_units_stay_where_a_rate_is_given() -> None:
+    """What else a demonstration without a rate holds is kept."""
+    demos = [pdmp.Demonstration(arch, units=["m", "m"]) for arch in arches(HEIGHTS)]
+    found = pdmp.evaluate(demos, dt=0.01, contexts=CONTEXTS, predictors={})
+    assert all(demo.units == ["m", "m"] for demo in found.recordings.demos)
+
+
 def test_rate_is_given_to_demonstrations_without() -> None:
     """Bare arrays and demonstrations without a rate come to the same."""
     bare, held = arches(HEIGHTS), [pdmp.Demonstration(one) for one in arches(HEIGHTS)]

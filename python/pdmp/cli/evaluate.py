@@ -30,9 +30,7 @@ def run(options: Namespace) -> None:
     """Read, evaluate, tell, draw."""
     from pdmp.evaluation import PDMP, baselines, evaluate, over_styles
 
-    recordings = demos.read(
-        options.paths, columns=options.columns, dt=options.dt, context=options.context
-    )
+    recordings = demos.read(options.paths, context=options.context, **_options.reading(options))
     settings = _options.settings(options)
     tried = {"kind": options.kind, "period": options.period}
     found = evaluate(recordings, predictors=baselines() | {"PDMP": PDMP(**settings)}, **tried)

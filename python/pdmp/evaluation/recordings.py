@@ -110,8 +110,8 @@ def _rated(demo: Demonstration | ArrayLike, dt: float | None) -> Demonstration:
         return Demonstration(demo, dt=dt)
     if demo.time is not None or dt is None:
         return demo
-    own = {"goal": demo.goal, "context": demo.context, "names": demo.names}
-    return Demonstration(demo.position, dt=dt, **own)  # type: ignore[arg-type]
+    (position,), rest = demo.__getnewargs_ex__()
+    return Demonstration(position, **rest | {"dt": dt})
 
 
 def _read(
