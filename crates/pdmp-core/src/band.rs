@@ -14,7 +14,7 @@ use crate::context::{Prediction, outputs};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::phase::Kind;
-use crate::responses::{Curves, Derivative};
+use crate::responses::{Curves, Derivative, Responses};
 use crate::rollout::Timing;
 
 /// Steps of a movement over which errors are averaged.
@@ -28,30 +28,28 @@ struct Sensitivity<'a> {
 
 impl Sensitivity<'_> {
     /// Indices and values of the outputs that move DoF `d` at sample `k`.
-    fn of(&self, k: usize, d: usize) -> Vec<(usize, f64)> {
+    fn of(&self, k: usize, d: usize) -> impl Iterator<Item = (usize, f64)> + Clone {
         let (n_styles, n_dofs) = (self.curves.styles.len(), self.curves.start.ncols());
-        let styles = self.curves.styles.iter().enumerate().map(|(j, curve)| (j, curve[[k, d]]));
+        let styles = self.curves.styles.iter().enumerate().map(move |(j, curve)| (j, curve[[k, d]]));
         let start = self.curves.start[[k, d]];
-        let places = match self.kind {
-            Kind::Discrete => vec![(n_styles + d, 1.0 - start), (n_styles + n_dofs + d, start)],
-            Kind::Rhythmic => vec![(n_styles + d, 1.0)],
+        let (centre, start) = match self.kind {
+            Kind::Discrete => (1.0 - start, Some((n_styles + n_dofs + d, start))),
+            Kind::Rhythmic => (1.0, None),
         };
-        styles.chain(places).collect()
+        styles.chain([(n_styles + d, centre)]).chain(start)
     }
 
     /// Positions (T, D) for the outputs of one movement.
     fn positions(&self, outputs: ArrayView1<f64>) -> Array2<f64> {
-        Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| {
-            self.of(k, d).iter().map(|&(i, x)| outputs[i] * x).sum()
-        })
+        Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| self.of(k, d).map(|(i, x)| outputs[i] * x).sum())
     }
 
     /// Variances (T, D) for a covariance of the outputs.
     fn variances(&self, covariance: &Array2<f64>) -> Array2<f64> {
         Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| {
             let active = self.of(k, d);
-            let row = |i: usize| active.iter().map(|&(j, y)| covariance[[i, j]] * y).sum::<f64>();
-            active.iter().map(|&(i, x)| x * row(i)).sum::<f64>().max(0.0)
+            let row = |i: usize| active.clone().map(|(j, y)| covariance[[i, j]] * y).sum::<f64>();
+            active.clone().map(|(i, x)| x * row(i)).sum::<f64>().max(0.0)
         })
     }
 }
@@ -68,14 +66,14 @@ impl Model {
     /// duration that is off by all of itself counts as much as the nominal movement's own variation.
     pub(crate) fn metric(self: &Arc<Self>) -> Result<Array2<f64>> {
         let (kind, outputs) = (self.kind(), self.outputs());
-        let responses = self.phases(&mut |_| Ok(()))?;
+        let responses = self.phases()?;
         let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind };
         let (length, n_dofs) = sensitivity.curves.start.dim();
         let mut metric = Array2::zeros((outputs.ncols(), outputs.ncols()));
         for (k, d) in (0..length).flat_map(|k| (0..n_dofs).map(move |d| (k, d))) {
             let active = sensitivity.of(k, d);
-            for &(i, x) in &active {
-                active.iter().for_each(|&(j, y)| metric[[i, j]] += x * y / length as f64);
+            for (i, x) in active.clone() {
+                active.clone().for_each(|(j, y)| metric[[i, j]] += x * y / length as f64);
             }
         }
         let nominal = sensitivity.positions(outputs.row(self.demonstrated.nominal));
@@ -86,7 +84,7 @@ impl Model {
     /// Variance (S, D) over the phase of what the styles leave out of the demonstrations.
     pub(crate) fn left_over(self: &Arc<Self>, aligned: Aligned) -> Result<Array2<f64>> {
         let (kind, outputs) = (self.kind(), self.outputs());
-        let responses = self.phases(&mut |_| Ok(()))?;
+        let responses = self.phases()?;
         let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind };
         let n_samples = kind.samples(STEPS);
         let aligned = aligned.resampled(n_samples);
@@ -101,11 +99,8 @@ impl Model {
     }
 
     /// Responses over the demonstrated duration, in as many steps as errors are averaged over.
-    fn phases(
-        self: &Arc<Self>,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Arc<crate::responses::Responses>> {
-        self.responses(self.tau, Timing { dt: self.duration() / STEPS as f64, duration: None }, proceed)
+    fn phases(self: &Arc<Self>) -> Result<Arc<Responses>> {
+        self.responses(self.tau, Timing { dt: self.duration() / STEPS as f64, duration: None }, &mut |_| Ok(()))
     }
 
     /// Bounds (T, D) within which a new movement of the predicted condition lies at each phase, with the probability

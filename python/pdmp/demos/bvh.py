@@ -23,7 +23,7 @@ def read_bvh(
     columns: Sequence[str] | None = None,
     dt: float | None = None,
     max_gap: float = 0.0,
-    context: Sequence[float] | None = None,
+    context: Sequence[float | str] | None = None,
 ) -> Demonstration:
     """Read one demonstration from a BVH file; needs the extra `bvh`.
 
@@ -41,7 +41,7 @@ def read_bvh(
         Sampling interval [s], in place of the file's frame time.
     max_gap : float
         Longest gap [s], of NaN, that is interpolated; by default none is.
-    context : sequence of float, optional
+    context : sequence of float or str, optional
         Context (Q,) of the demonstration.
 
     Raises

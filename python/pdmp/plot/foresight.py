@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pdmp.plot._canvas import BLUE, GREY, PALETTE, canvas, dress, legend
+from pdmp.plot._canvas import BLUE, GREY, PALETTE, canvas, dof_labels, dress, legend
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,7 +41,8 @@ def prediction_error(
     ImportError
         matplotlib is not installed.
     """
-    from pdmp.evaluation import PDMP  # evaluation is not needed where nothing is evaluated
+    # Who draws no evaluation does not import it.
+    from pdmp.evaluation import PDMP
 
     styles = {}
     for name, predictor in evaluation.predictors.items():
@@ -108,14 +109,12 @@ def held_out(
     ImportError
         matplotlib is not installed.
     """
-    from pdmp.evaluation.predictors import (
-        BAND,
-        WIDTH,
-    )  # evaluation is not needed where nothing is evaluated
+    # Who draws no evaluation does not import it.
+    from pdmp.evaluation.predictors import BAND, WIDTH
 
     score = evaluation.score(predictor)
     recordings = evaluation.recordings
-    names = recordings.names
+    labels = dof_labels(recordings.names, [unit] * len(recordings.names))
     spread = np.ptp(recordings.sampled, axis=(0, 1))
     dofs = np.sort(np.argsort(-spread, kind="stable")[:MOST_DOFS])
     whole = "duration" if recordings.kind == "discrete" else "period"
@@ -138,7 +137,7 @@ def held_out(
                 band = {"color": BLUE, "alpha": 0.15, "linewidth": 0}
                 axes.fill_between(at, mean - half, mean + half, label=f"{BAND:.0%} band", **band)
             axes.plot(at, mean, color=BLUE, linewidth=1.2, label="foreseen")
-            dress(axes, "", f"{names[dof]} [{unit}]" if unit else names[dof])
+            dress(axes, "", labels[dof])
         column[0].set_title(f"{reach}, context {' '.join(f'{value:.3g}' for value in context)}")
         column[-1].set_xlabel(f"share of the {whole}")
     legend(figure, grid[0, 0])

@@ -90,21 +90,24 @@ impl Candidate {
             MapKind::Polynomial => Self::with(kind, Some(Kernel::Quadratic), shown, ratios),
             MapKind::Gp => {
                 let lively = lively(shown.outputs);
-                let mut best: Option<(f64, Kernel)> = None;
-                for k in 0..LENGTHS {
+                let at_length = |k: usize| {
                     let length = 0.25 * 32f64.powf(k as f64 / (LENGTHS - 1) as f64);
-                    let kernel = Kernel::Matern { length };
-                    let kriging = Kriging::new(shown.inputs, shown.n_inputs, false, Some(kernel))?;
-                    let values = kriging.project(shown.outputs);
+                    let candidate = Self::with(kind, Some(Kernel::Matern { length }), shown, |_, _| Vec::new())?;
                     // Weak: a factor of e to either side of two spreads costs half a unit.
                     let prior = -0.5 * (length.ln() - 0.7).powi(2);
-                    let evidence = Evidence::new(&kriging, &values).best();
-                    let total: f64 = lively.iter().map(|&p| evidence[p].1 + prior).sum();
-                    if best.is_none_or(|(most, _)| total > most) {
-                        best = Some((total, kernel));
+                    let evidence = Evidence::new(&candidate.kriging, &candidate.values).best();
+                    Ok((lively.iter().map(|&p| evidence[p].1 + prior).sum::<f64>(), candidate))
+                };
+                let mut best = at_length(0)?;
+                for k in 1..LENGTHS {
+                    let found = at_length(k)?;
+                    if found.0 > best.0 {
+                        best = found;
                     }
                 }
-                Self::with(kind, best.map(|(_, kernel)| kernel), shown, ratios)
+                let (_, mut chosen) = best;
+                chosen.ratios = ratios(&chosen.kriging, &chosen.values);
+                Ok(chosen)
             }
         }
     }

@@ -96,16 +96,15 @@ impl Kriging {
 
     /// What each value lacks of its prediction from all others (n, P), in closed form.
     pub(super) fn left_out(&self, values: &Values, ratios: &[f64]) -> Array2<f64> {
-        let mut errors = match &self.smooth {
-            None => values.rest.clone(),
-            Some(smooth) => smooth.basis.dot(&(&values.rest * &smooth.shrinkage(ratios))),
-        };
-        let weights = match &self.smooth {
+        let (mut errors, weights) = match &self.smooth {
             None => {
                 let leverages = self.flat.map_axis(Axis(1), |row| 1.0 - row.dot(&row)).insert_axis(Axis(1));
-                leverages.broadcast(errors.dim()).map(|weights| weights.to_owned()).unwrap_or_default()
+                (values.rest.clone(), leverages + Array2::<f64>::zeros(values.rest.dim()))
             }
-            Some(smooth) => smooth.basis.mapv(|b| b * b).dot(&smooth.shrinkage(ratios)),
+            Some(smooth) => {
+                let shrinkage = smooth.shrinkage(ratios);
+                (smooth.basis.dot(&(&values.rest * &shrinkage)), smooth.basis.mapv(|b| b * b).dot(&shrinkage))
+            }
         };
         // A place that the others say nothing about has no prediction from them.
         errors.zip_mut_with(&weights, |error, &weight| {

@@ -120,8 +120,8 @@ impl ContextMap {
     }
 
     pub(crate) fn recipe(&self) -> Recipe {
-        let Self { kind, kernel, ratios, errors, .. } = self.clone();
-        Recipe { kind, kernel, ratios, errors }
+        let (ratios, errors) = (self.ratios.clone(), self.errors.clone());
+        Recipe { kind: self.kind, kernel: self.kernel, ratios, errors }
     }
 
     /// What each value of a context means.

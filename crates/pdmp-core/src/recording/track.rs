@@ -2,8 +2,8 @@
 //!
 //! A cycle is looked for about a period after the one before, where a template of one cycle, repeated without end,
 //! agrees best with the recording: by the mean over all traits of Pearson's correlation within half a period on either
-//! side, weighted by nearness. The first template is the first cycle; the second, by which the bounds are found for good, is the mean of all,
-//! turned to the phase of the nominal recording by circular cross-correlation with its mean cycle.
+//! side, weighted by nearness. The first template is the first cycle; the second, by which the bounds are found for good,
+//! is the mean of all, turned to the phase of the nominal recording by circular cross-correlation with its mean cycle.
 
 use std::f64::consts::TAU;
 
