@@ -58,10 +58,10 @@ repetitions, {demos} demonstrations; at most ten a group, of at most 400 samples
 - *Fit*: time of `pdmp.fit`, all four steps: median over groups.
 
 The defaults follow from it. The Gaussian process reproduces best and needs no N. Matérn-5/2
-reproduces closer than 3/2 on 12 of the 15 sets, by up to a third, and is smoother; 3/2 foresees
-as well, knows better how well, and learns a little faster. The squared exponential is too sure
-of itself, and dense. Of a network, 75 to 100 functions do better on long recordings, but cycles
-of twenty samples are fewer than that: 50, 1.2 wide, serve both.
+reproduces closer than 3/2 on 12 of the 15 sets, by up to a half, and is smoother; 3/2 foresees
+as well and knows better how well. The squared exponential is too sure of itself, and dense. Of a
+network, 75 to 100 functions reproduce closer, but cycles of twenty samples they foresee worse: 50,
+1.2 wide, serve both.
 """
 
 
