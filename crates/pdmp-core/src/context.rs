@@ -1,7 +1,7 @@
 //! From a condition to a movement (Section 4.1.2): the linear map U: h ↦ β[h, 1]ᵀ.
 //!
-//! The paper predicts the style alone. Goal, start, anchor and duration vary with the condition too, so one least
-//! squares problem predicts them together. The duration enters by its logarithm and so stays positive.
+//! The paper predicts the style alone. Goal, start, anchor and timing vary with the condition too, so one least squares
+//! problem predicts them together. Times enter by their logarithms and so stay positive.
 
 use faer::Mat;
 use faer::linalg::solvers::Svd;
@@ -38,24 +38,26 @@ pub struct Prediction {
     pub start: Option<Vec<f64>>,
     /// Anchor (D,), rhythmic.
     pub anchor: Option<Vec<f64>>,
-    /// Duration or period, in seconds.
+    /// Time in each segment of the movement (K,), in seconds.
+    pub timing: Vec<f64>,
+    /// Duration or period, in seconds: the sum of the timing.
     pub duration: f64,
-    /// Covariance (P, P) of a new movement's style, goal and start or anchor, and duration, in this order; `None` where
-    /// the demonstrations leave no degree of freedom to estimate it.
+    /// Covariance (P, P) of a new movement's style, goal and start or anchor, and timing, in this order; `None` where the
+    /// demonstrations leave no degree of freedom to estimate it.
     pub covariance: Option<Array2<f64>>,
 }
 
-/// The outputs of the map (M, P): style, goal and start or anchor, logarithm of the duration.
+/// The outputs of the map (M, P): style, goal and start or anchor, logarithms of the timing (M, K).
 pub(crate) fn outputs(
     kind: Kind,
     styles: ArrayView2<f64>,
     [goals, starts, anchors]: [ArrayView2<f64>; 3],
-    durations: &[f64],
+    timings: ArrayView2<f64>,
 ) -> Array2<f64> {
-    let logarithm = Array1::from_iter(durations.iter().map(|t| t.ln())).insert_axis(Axis(1));
+    let logarithms = timings.mapv(f64::ln);
     let parts = match kind {
-        Kind::Discrete => vec![styles, goals, starts, logarithm.view()],
-        Kind::Rhythmic => vec![styles, anchors, logarithm.view()],
+        Kind::Discrete => vec![styles, goals, starts, logarithms.view()],
+        Kind::Rhythmic => vec![styles, anchors, logarithms.view()],
     };
     // Row counts are equal by construction.
     concatenate(Axis(1), &parts).unwrap_or_default()
@@ -109,18 +111,21 @@ impl ContextMap {
         check_vector("context", context, self.n_inputs(), "context value")?;
         let offset = Array1::from_vec(context.to_vec()) - &self.centre;
         let output = (&self.intercept + self.slopes.dot(&offset)).to_vec();
-        let n = output.len();
-        let duration = output[n - 1].exp();
+        let first = n_styles + n_dofs * if kind == Kind::Discrete { 2 } else { 1 };
+        let timing: Vec<f64> = output[first..].iter().map(|logarithm| logarithm.exp()).collect();
+        let duration: f64 = timing.iter().sum();
         let covariance = self.residual.as_ref().map(|residual| {
             let leverage = 1.0 / self.n_demos as f64 + offset.dot(&self.inverse_scatter.dot(&offset));
             let mut covariance = residual * (1.0 + leverage);
-            // dT = T d(ln T).
-            covariance.row_mut(n - 1).mapv_inplace(|x| x * duration);
-            covariance.column_mut(n - 1).mapv_inplace(|x| x * duration);
+            // dt = t d(ln t).
+            for (k, seconds) in timing.iter().enumerate() {
+                covariance.row_mut(first + k).mapv_inplace(|x| x * seconds);
+                covariance.column_mut(first + k).mapv_inplace(|x| x * seconds);
+            }
             covariance
         });
         let mut numbers = output.iter().chain(covariance.iter().flatten());
-        if !(numbers.all(|x| x.is_finite()) && duration.is_finite() && duration > 0.0) {
+        if !(numbers.all(|x| x.is_finite()) && duration.is_finite() && timing.iter().all(|&t| t > 0.0)) {
             return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
         }
         let part = |k: usize| Some(output[n_styles + k * n_dofs..n_styles + (k + 1) * n_dofs].to_vec());
@@ -128,7 +133,7 @@ impl ContextMap {
             Kind::Discrete => (part(0), part(1), None),
             Kind::Rhythmic => (None, None, part(0)),
         };
-        Ok(Prediction { style: output[..n_styles].to_vec(), goal, start, anchor, duration, covariance })
+        Ok(Prediction { style: output[..n_styles].to_vec(), goal, start, anchor, timing, duration, covariance })
     }
 }
 

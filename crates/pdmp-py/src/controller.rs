@@ -244,7 +244,7 @@ impl Controller {
         tau: Option<f64>,
         context: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing: None };
         let conditions = arguments.in_context(self.inner.model(), context)?;
         let result = self.inner.reset(&conditions);
         self.command(py, result)

@@ -12,6 +12,7 @@ mod fit;
 mod jacobian;
 mod model;
 mod prediction;
+mod warp;
 
 use pyo3::prelude::*;
 
@@ -29,6 +30,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<basis::GpRegression>()?;
     module.add_class::<basis::NGnet>()?;
     module.add_class::<basis::NGnetRegression>()?;
+    module.add_class::<warp::Warp>()?;
     module.add_class::<factor::Factors>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<batch::RolloutChunks>()?;
