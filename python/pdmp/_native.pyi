@@ -37,6 +37,7 @@ __all__ = [
     "RolloutChunks",
     "Status",
     "Trajectory",
+    "Warp",
     "__version__",
     "cut",
     "cycles",
@@ -104,6 +105,8 @@ def fit(
     nominal: int | None = None,
     n_samples: int | None = None,
     dof_scale: Literal["range"] | ArrayLike | None = None,  # (D,)
+    alignment: Literal["linear", "warp"] | Warp = "linear",
+    events: ArrayLike | None = None,  # (M, E)
     tau: float | None = None,
     alpha_z: float = 25.0,
     beta_z: float | None = None,
@@ -177,6 +180,10 @@ class Model:
     @property
     def anchors(self) -> _Array: ...  # (M, D)
     @property
+    def breaks(self) -> _Array: ...  # (K+1,), K = 1 where time is scaled linearly
+    @property
+    def timings(self) -> _Array: ...  # (M, K)
+    @property
     def durations(self) -> _Array: ...  # (M,)
     @property
     def contexts(self) -> _Array | list[list[float | str]] | None: ...  # (M, Q)
@@ -196,6 +203,7 @@ class Model:
         anchor: ArrayLike | None = None,
         amplitude: float = 1.0,
         tau: float | None = None,
+        timing: ArrayLike | None = None,  # (K,), in place of tau
         dt: float = 0.01,
         duration: float | None = None,
         context: _Context | None = None,  # (Q,)
@@ -274,8 +282,10 @@ class Model:
         *,
         dt: float | None = None,
         period: float | None = None,
+        events: ArrayLike | None = None,  # (E,)
     ) -> _Array: ...  # (J,)
     def landscape(self, u: ArrayLike) -> _Array: ...  # (len(u), J, D)
+    def tau_at(self, phase: float, timing: ArrayLike) -> float: ...  # timing (K,)
     def predict(self, context: _Context) -> Prediction: ...
     def band(
         self,
@@ -297,6 +307,7 @@ class Model:
         *,
         anchor: ArrayLike | None = None,
         amplitude: float = 1.0,
+        timing: ArrayLike | None = None,  # (K,)
         context: _Context | None = None,
     ) -> Controller: ...
     def to_bytes(self) -> bytes: ...
@@ -331,7 +342,9 @@ class Prediction:
     @property
     def anchor(self) -> _Array | None: ...  # (D,); None if discrete
     @property
-    def duration(self) -> float: ...
+    def timing(self) -> _Array: ...  # (K,)
+    @property
+    def duration(self) -> float: ...  # the sum of the timing
     @property
     def covariance(self) -> _Array | None: ...  # of all of these in this order, (P, P)
     @property
@@ -400,6 +413,7 @@ class Controller:
         anchor: ArrayLike | None = None,
         amplitude: float = 1.0,
         tau: float | None = None,
+        timing: ArrayLike | None = None,  # (K,)
         context: _Context | None = None,
     ) -> None: ...
     @property
@@ -474,6 +488,15 @@ class GPRegression:
     @property
     def log_likelihood(self) -> float: ...  # summed over the outputs
     def predict(self, u: ArrayLike) -> tuple[_Array, _Array]: ...  # mean, variance (len(u), P)
+
+@final
+class Warp:
+    def __new__(cls, segments: int = 8, slope: float = 2.5) -> Warp: ...
+    @property
+    def segments(self) -> int: ...
+    @property
+    def slope(self) -> float: ...
+    def __getnewargs__(self) -> tuple[int, float]: ...
 
 @final
 class NGnet:

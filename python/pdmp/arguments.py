@@ -22,7 +22,7 @@ def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
     Returns
     -------
     dict
-        `style` (J,), `tau` [s], and `goal` and `start` (D,) of a discrete or `anchor` (D,) of a
+        `style` (J,), `tau` [s] or, where time was not scaled linearly, `timing` (K,) [s], and `goal` and `start` (D,) of a discrete or `anchor` (D,) of a
         rhythmic primitive, for `Model.rollout` and `Model.controller`.
 
     Raises
@@ -40,8 +40,12 @@ def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
     for row in rows:
         if not 0 <= row < model.n_demos:
             raise ValueError(f"demos: {row} must lie between 0 and {model.n_demos - 1}")
-    share = model.durations[rows].mean() / model.durations[model.nominal]
-    arguments = {"style": model.styles[rows].mean(axis=0), "tau": float(model.tau * share)}
+    arguments = {"style": model.styles[rows].mean(axis=0)}
+    timing = model.timings[rows].mean(axis=0)
+    if len(timing) > 1:
+        arguments["timing"] = timing
+    else:
+        arguments["tau"] = float(model.tau * timing[0] / model.durations[model.nominal])
     if model.kind == "discrete":
         arguments["goal"] = model.goals[rows].mean(axis=0)
         arguments["start"] = model.starts[rows].mean(axis=0)

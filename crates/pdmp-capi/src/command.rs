@@ -95,6 +95,7 @@ impl pdmp_conditions {
             amplitude: unsafe { self.amplitude.as_ref() }.copied(),
             // SAFETY: NULL or valid.
             tau: unsafe { self.tau.as_ref() }.copied(),
+            timing: None,
         })
     }
 

@@ -199,6 +199,7 @@ pub unsafe extern "C" fn pdmp_model_demonstration(
             goal: discrete.then(|| shown.goals.row(demonstration).to_vec()),
             start: discrete.then(|| shown.starts.row(demonstration).to_vec()),
             anchor: (!discrete).then(|| shown.anchors.row(demonstration).to_vec()),
+            timing: shown.timings.row(demonstration).to_vec(),
             duration: shown.durations[demonstration],
             covariance: None,
             freedom: 0,
@@ -273,7 +274,9 @@ unsafe fn lay_down(
             return Err(Fault::Null("numbers"));
         }
         numbers.check("numbers", n_conditions(model), "style dimension, two per DoF and one for tau")?;
-        let predicted: Conditions = model.conditions(&predict(model)?);
+        let predicted = model.conditions(&predict(model)?);
+        let tau = Some(predicted.time_constant(model)?);
+        let predicted = Conditions { tau, timing: None, ..predicted };
         // SAFETY: style, at most two vectors of the DoFs and tau fit.
         conditions.write(unsafe { pdmp_conditions::put(&predicted, numbers.data) });
         Ok(PDMP_OK)

@@ -2,7 +2,8 @@
 //! its styles leave out.
 //!
 //! At one phase y = Σⱼ sⱼRⱼ + g(1 − E) + y(0)E, or Σⱼ sⱼRⱼ + y_a about an anchor, is linear in what a map predicts.
-//! A movement is compared with another at equal phase, so that its duration plays no part.
+//! A movement is compared with another at an equal share of its duration: where time is scaled linearly that is equal
+//! phase, and else the timing moves the phase.
 
 use std::sync::Arc;
 
@@ -12,18 +13,20 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use crate::align::Aligned;
 use crate::context::{Prediction, outputs};
 use crate::error::{Error, Result};
-use crate::model::Model;
+use crate::model::{Conditions, Model};
 use crate::phase::Kind;
 use crate::responses::{Curves, Derivative, Responses};
 use crate::rollout::Timing;
 
 /// Steps of a movement over which errors are averaged.
-const STEPS: usize = 100;
+pub(crate) const STEPS: usize = 100;
 
-/// Positions per unit of each output but the duration.
+/// Positions per unit of each output.
 struct Sensitivity<'a> {
     curves: &'a Curves,
     kind: Kind,
+    /// Those (T, D) per second of each segment's time; none at equal phase.
+    paces: Vec<Array2<f64>>,
 }
 
 impl Sensitivity<'_> {
@@ -36,7 +39,9 @@ impl Sensitivity<'_> {
             Kind::Discrete => (1.0 - start, Some((n_styles + n_dofs + d, start))),
             Kind::Rhythmic => (1.0, None),
         };
-        styles.chain([(n_styles + d, centre)]).chain(start)
+        let first = n_styles + n_dofs * if self.kind == Kind::Discrete { 2 } else { 1 };
+        let paces = self.paces.iter().enumerate().map(move |(i, pace)| (first + i, pace[[k, d]]));
+        styles.chain([(n_styles + d, centre)]).chain(start).chain(paces)
     }
 
     /// Positions (T, D) for the outputs of one movement.
@@ -59,15 +64,15 @@ impl Model {
     pub(crate) fn outputs(&self) -> Array2<f64> {
         let shown = &self.demonstrated;
         let places = [shown.goals.view(), shown.starts.view(), shown.anchors.view()];
-        outputs(self.kind(), shown.styles.view(), places, &shown.durations)
+        outputs(self.kind(), shown.styles.view(), places, shown.timings.view())
     }
 
     /// The matrix (P, P) that makes errors of the outputs into the mean square of the movement's, summed over DoFs. A
-    /// duration that is off by all of itself counts as much as the nominal movement's own variation.
+    /// timing that is off by all of itself counts as much as the nominal movement's own variation.
     pub(crate) fn metric(self: &Arc<Self>) -> Result<Array2<f64>> {
         let (kind, outputs) = (self.kind(), self.outputs());
         let responses = self.phases()?;
-        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind };
+        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind, paces: Vec::new() };
         let (length, n_dofs) = sensitivity.curves.start.dim();
         let mut metric = Array2::zeros((outputs.ncols(), outputs.ncols()));
         for (k, d) in (0..length).flat_map(|k| (0..n_dofs).map(move |d| (k, d))) {
@@ -77,7 +82,9 @@ impl Model {
             }
         }
         let nominal = sensitivity.positions(outputs.row(self.demonstrated.nominal));
-        metric[[outputs.ncols() - 1, outputs.ncols() - 1]] = nominal.var_axis(Axis(0), 0.0).sum();
+        let n_segments = self.demonstrated.timings.ncols();
+        let variation = nominal.var_axis(Axis(0), 0.0).sum() / n_segments as f64;
+        metric.diag_mut().slice_mut(ndarray::s![outputs.ncols() - n_segments..]).fill(variation);
         Ok(metric)
     }
 
@@ -85,7 +92,7 @@ impl Model {
     pub(crate) fn left_over(self: &Arc<Self>, aligned: Aligned) -> Result<Array2<f64>> {
         let (kind, outputs) = (self.kind(), self.outputs());
         let responses = self.phases()?;
-        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind };
+        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind, paces: Vec::new() };
         let n_samples = kind.samples(STEPS);
         let aligned = aligned.resampled(n_samples);
         let mut sum = Array2::zeros((n_samples, self.n_dofs()));
@@ -103,15 +110,42 @@ impl Model {
         self.responses(self.tau, Timing { dt: self.duration() / STEPS as f64, duration: None }, &mut |_| Ok(()))
     }
 
-    /// Bounds (T, D) within which a new movement of the predicted condition lies at each phase, with the probability
-    /// `level` for each number by itself: the samples of [`Model::rollout`] with the prediction's conditions,
+    /// Positions (S, D) of a predicted movement per second of the time in each of its segments, at an equal share of its
+    /// duration: y′ ∂p/∂T_k, with ∂p/∂T_k = −(∂s/∂T_k)/(∂s/∂p) of that share s(p). None where time is linear.
+    fn paces(self: &Arc<Self>, conditions: &Conditions, timing: &[f64]) -> Result<Vec<Array2<f64>>> {
+        if timing.len() == 1 {
+            return Ok(Vec::new());
+        }
+        let duration = self.duration();
+        let nominal = Conditions { timing: None, ..conditions.clone() };
+        let velocity = self.rollout(&nominal, Timing { dt: duration / STEPS as f64, duration: None })?.velocity;
+        let time = self.warping_function(timing)?;
+        let pace = |segment: usize| {
+            let step = 1e-4 * timing[segment];
+            let [less, more] = [-step, step].map(|by| {
+                let mut timing = timing.to_vec();
+                timing[segment] += by;
+                self.warping_function(&timing)
+            });
+            let (less, more) = (less?, more?);
+            Ok(Array2::from_shape_fn(velocity.dim(), |(k, d)| {
+                let phase = k as f64 / STEPS as f64;
+                let share = (more.share(phase) - less.share(phase)) / (2.0 * step);
+                -velocity[[k, d]] * duration * share * time.duration() / time.slope(phase)
+            }))
+        };
+        (0..timing.len()).map(pace).collect()
+    }
+
+    /// Bounds (T, D) within which a new movement of the predicted condition lies at each share of its duration, with the
+    /// probability `level` for each number by itself: the samples of [`Model::rollout`] with the prediction's conditions,
     ///
     /// ```text
     /// y ± t·√(aᵀΣa + v),
     /// ```
     ///
-    /// with the covariance Σ of the prediction, a = ∂y/∂(style, goal, start), the variance v that the styles leave out
-    /// of the demonstrations, and Student's quantile t for the prediction's degrees of freedom.
+    /// with the covariance Σ of the prediction, a = ∂y/∂(style, goal, start, timing), the variance v that the styles leave
+    /// out of the demonstrations, and Student's quantile t for the prediction's degrees of freedom.
     ///
     /// # Errors
     /// A prediction without covariance, or a level that is no probability; else as for a rollout.
@@ -125,13 +159,16 @@ impl Model {
         let left_over = self.learnt.left_over.as_ref().ok_or(Error::Arguments("the model knows no contexts"))?;
         let conditions = self.conditions(prediction);
         let centre = self.rollout(&conditions, timing)?.position;
-        let tau = conditions.tau.unwrap_or(self.tau);
-        let responses = self.responses(tau, timing, &mut |_| Ok(()))?;
-        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind: self.kind() };
-        let mut width = sensitivity.variances(covariance);
-        let step = timing.dt * STEPS as f64 / (self.duration() * tau / self.tau);
+        let responses = self.phases()?;
+        let (curves, kind) = (responses.of(Derivative::Position), self.kind());
+        let sensitivity = Sensitivity { curves, kind, paces: self.paces(&conditions, &prediction.timing)? };
+        // Of a cycle, the last of the responses is the first of the next one.
+        let variances = &sensitivity.variances(covariance).slice(ndarray::s![..left_over.nrows(), ..]) + left_over;
+        let time = self.warping_function(&prediction.timing)?;
+        let mut width = Array2::zeros(centre.dim());
         for (k, mut width) in width.rows_mut().into_iter().enumerate() {
-            width += &at(left_over, k as f64 * step, self.kind());
+            let [phase, ..] = time.phase(k as f64 * timing.dt);
+            width.assign(&at(&variances, phase * STEPS as f64, self.kind()));
         }
         let student = StudentsT::new(0.0, 1.0, prediction.freedom.max(1) as f64)
             .map_err(|_| Error::Arguments("no degree of freedom is left"))?;

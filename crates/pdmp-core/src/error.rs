@@ -150,6 +150,29 @@ pub enum Error {
         /// The least correlation of a periodic recording.
         least: f64,
     },
+    /// Events out of order, or outside the demonstration.
+    #[error(
+        "events[{index}] = {time} s must come after {before} s, the start or the event before, and before {end} s, the end, \
+         by more than 1e-6 of the duration: sort the events, in the time of the demonstration"
+    )]
+    Event {
+        /// Index of the offending event.
+        index: usize,
+        /// Its time, in seconds.
+        time: f64,
+        /// The event before it, or the start, in seconds.
+        before: f64,
+        /// The end of the demonstration, in seconds.
+        end: f64,
+    },
+    /// More segments of a warp than the samples tell apart.
+    #[error("segments = {segments}: must lie between 1 and {most}, half the fewest samples of a demonstration")]
+    Segments {
+        /// The segments asked for.
+        segments: usize,
+        /// The most that are possible.
+        most: usize,
+    },
     /// Too few samples to carry a cubic.
     #[error("position has {found} samples: at least {least} are needed; record at a higher rate")]
     Samples {

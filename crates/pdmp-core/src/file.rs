@@ -8,11 +8,13 @@ use std::fs;
 use std::io::{Read, Write};
 use std::path::Path;
 
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
+use crate::align::{Template, Warp};
 use crate::attractor::Attractor;
+use crate::band::STEPS;
 use crate::context::{ContextColumn, ContextMap, Kernel, MapKind, Recipe};
 use crate::error::{Error, LARGEST, Result};
 use crate::landscape::Landscape;
@@ -22,7 +24,7 @@ use crate::smooth::Smoothing;
 use crate::tabulate::{Jets, MOST_CELLS};
 
 /// Version of the file's layout.
-const SCHEMA: u32 = 3;
+const SCHEMA: u32 = 4;
 /// The metadata key.
 const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.
@@ -51,6 +53,8 @@ struct Constants {
     nominal: usize,
     n_samples: usize,
     smoothing: Smoothing,
+    /// Bound of the slopes, where time was warped.
+    slope: Option<f64>,
     left_out: f64,
     basis: String,
     table_error: f64,
@@ -94,6 +98,7 @@ impl Model {
             nominal: self.demonstrated.nominal,
             n_samples: self.learnt.n_samples,
             smoothing: self.learnt.smoothing,
+            slope: self.learnt.template.as_ref().map(|template| template.slope),
             left_out: self.learnt.left_out,
             basis: self.learnt.basis.clone(),
             table_error: self.landscape.error(),
@@ -127,13 +132,18 @@ impl Model {
             matrix("goals", &demonstrated.goals),
             matrix("starts", &demonstrated.starts),
             matrix("anchors", &demonstrated.anchors),
-            vector("durations", &demonstrated.durations),
+            vector("breaks", &demonstrated.breaks),
+            matrix("timings", &demonstrated.timings),
             vector("singular_values", &self.learnt.singular_values),
             vector("dof_scale", &self.learnt.dof_scale),
             vector("ranges", &self.ranges),
             ("landscape.values", knots.clone(), values),
             ("landscape.slopes", knots, slopes),
         ];
+        if let Some(template) = &self.learnt.template {
+            arrays.push(vector("template.unit", &template.unit));
+            arrays.push(matrix("template.shape", &template.shape));
+        }
         if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
             arrays.push(matrix("contexts", contexts));
             arrays.push(vector("map.ratios", &map.recipe().ratios));
@@ -269,7 +279,8 @@ impl Reader<'_> {
         let [n_demos, n_styles] = self.shape("styles")?;
         let [n_knots, _, n_dofs] = self.shape("landscape.values")?;
         let [n_values] = self.shape("singular_values")?;
-        if n_demos == 0 || n_styles == 0 || n_dofs == 0 || n_values < n_styles {
+        let [_, n_segments] = self.shape("timings")?;
+        if n_segments == 0 || n_demos == 0 || n_styles == 0 || n_dofs == 0 || n_values < n_styles {
             return Err(bad("an array is empty"));
         }
         if !(2..=MOST_CELLS + 1).contains(&n_knots)
@@ -296,12 +307,22 @@ impl Reader<'_> {
         let (values, slopes) = (knots("landscape.values")?, knots("landscape.slopes")?);
         let knots = Jets { n_outputs: n_styles * n_dofs, values, slopes };
         let landscape = Landscape::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
+        let breaks = self.array("breaks", &[n_segments + 1])?;
+        if breaks[0] != 0.0 || breaks[n_segments] != 1.0 || breaks.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err(bad("breaks do not increase from 0 to 1"));
+        }
+        let timings = self.matrix("timings", (n_demos, n_segments))?;
+        if timings.iter().any(|seconds| *seconds <= 0.0) {
+            return Err(bad("a time is not positive"));
+        }
         let demonstrated = Demonstrated {
             styles: self.matrix("styles", (n_demos, n_styles))?,
             goals: self.matrix("goals", (n_demos, n_dofs))?,
             starts: self.matrix("starts", (n_demos, n_dofs))?,
             anchors: self.matrix("anchors", (n_demos, n_dofs))?,
-            durations: self.positive("durations", n_demos)?,
+            breaks,
+            durations: timings.sum_axis(Axis(1)).to_vec(),
+            timings,
             contexts,
             nominal: constants.nominal,
         };
@@ -315,6 +336,7 @@ impl Reader<'_> {
         let learnt = Learnt {
             n_samples: constants.n_samples,
             smoothing: constants.smoothing,
+            template: self.template(&constants, n_segments, n_dofs)?,
             dof_scale,
             singular_values,
             left_out: constants.left_out,
@@ -329,15 +351,20 @@ impl Reader<'_> {
                 .with_cycle();
         if let Some(map) = &constants.map {
             model.map = Some(self.map(map, &model)?);
-            let [n_samples, _] = self.shape("left_over")?;
-            let left_over = self.matrix("left_over", (n_samples, n_dofs))?;
-            if n_samples == 0 || left_over.iter().any(|x| *x < 0.0) {
+            let left_over = self.matrix("left_over", (model.kind().samples(STEPS), n_dofs))?;
+            if left_over.iter().any(|x| *x < 0.0) {
                 return Err(bad("left_over holds no variances"));
             }
             model.learnt.left_over = Some(left_over);
         }
         self.verify(&constants, &model, crc32)?;
         Ok(model)
+    }
+
+    fn template(&self, constants: &Constants, n_segments: usize, n_dofs: usize) -> Result<Option<Template>> {
+        let Some(slope) = constants.slope else { return Ok(None) };
+        let shape = self.matrix("template.shape", (Template::cells(n_segments), n_dofs))?;
+        Ok(Some(Template { slope, unit: self.positive("template.unit", n_dofs)?, shape }))
     }
 
     /// The map, had again from what was demonstrated.
@@ -392,6 +419,8 @@ impl Constants {
             Canonical::Discrete { alpha_x, u_end } => (alpha_x, u_end),
             Canonical::Rhythmic { mu } => (mu, 1.0),
         };
+        let slope = self.slope.unwrap_or(1.0);
+        Warp { segments: 1, slope }.check(1).map_err(|error| Error::File(error.to_string()))?;
         for (name, value) in
             [("tau", self.tau), ("alpha_z", self.alpha_z), ("beta_z", self.beta_z), ("alpha_x or mu", a), ("u_end", b)]
         {

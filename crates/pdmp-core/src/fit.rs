@@ -7,7 +7,7 @@ use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use ndarray::{Array2, s};
 
-use crate::align::{Aligned, Alignment};
+use crate::align::{Aligned, Alignment, TimeScaling};
 use crate::attractor::Attractor;
 use crate::basis::{Basis, Domain, Gp};
 use crate::context::{ContextColumn, ContextMap, MapChoice, tabulate};
@@ -67,7 +67,15 @@ impl FitOptions {
     pub fn new(kind: Kind) -> Self {
         let smoothing = Smoothing::Interpolate;
         Self {
-            alignment: Alignment { kind, dt: None, period: Vec::new(), smoothing, nominal: None, n_samples: None },
+            alignment: Alignment {
+                kind,
+                dt: None,
+                period: Vec::new(),
+                smoothing,
+                nominal: None,
+                n_samples: None,
+                time_scaling: TimeScaling::Linear,
+            },
             contexts: None,
             map: MapChoice::Auto,
             styles: StyleCount::Spectrum(0.9),
@@ -86,7 +94,9 @@ impl FitOptions {
 /// Where a fit is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Steps 1 and 2, demonstration by demonstration.
+    /// The warps of step 1, where time is not scaled linearly.
+    Align,
+    /// The rest of step 1, and step 2, demonstration by demonstration.
     Targets,
     /// Step 3.
     Factorise,
@@ -100,6 +110,7 @@ impl Stage {
     /// The name shown to a user.
     pub fn name(self) -> &'static str {
         match self {
+            Stage::Align => "align",
             Stage::Targets => "targets",
             Stage::Factorise => "factorise",
             Stage::Regress => "regress",
@@ -121,15 +132,18 @@ pub fn fit(
     proceed: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
     options.styles.check(demos.len(), "demonstrations")?;
-    let aligned = options.alignment.align(demos)?;
+    let mut aligned = options.alignment.align(demos)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
     let threads = options.threads;
+    let mut aligning = |share| proceed(Stage::Align, share);
+    let unit = options.dof_scale.given(demos[0].n_dofs())?;
+    let template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut aligning)?;
     let mut targeting = |share| proceed(Stage::Targets, share);
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
-    let dof_scale = scale_of(&options.dof_scale, &ranges)?;
+    let dof_scale = options.dof_scale.of(&ranges);
     targets.scale(&dof_scale);
     let Targets { forcing, goals, starts, anchors, .. } = targets;
 
@@ -147,14 +161,16 @@ pub fn fit(
     let shape = (factors.basis.nrows(), demos[0].n_dofs());
     let landscape = Landscape::compile(constants.canonical, shape, regression.as_ref(), threads, &mut compiling)?;
 
-    let (durations, nominal) = (aligned.durations.clone(), aligned.nominal);
+    let durations = aligned.durations();
+    let (breaks, timings, nominal) = (aligned.breaks.clone(), aligned.timings.clone(), aligned.nominal);
     let (columns, contexts) = contexts.unzip();
     let left_out = factors.left_out();
     let Factors { styles, singular_values, .. } = factors;
-    let demonstrated = Demonstrated { styles, goals, starts, anchors, durations, contexts, nominal };
+    let demonstrated = Demonstrated { styles, goals, starts, anchors, breaks, timings, durations, contexts, nominal };
     let learnt = Learnt {
         n_samples: clock.len(),
         smoothing: options.alignment.smoothing,
+        template,
         dof_scale,
         singular_values,
         left_out,
@@ -178,11 +194,18 @@ pub fn fit(
 
 /// The style (J,) of a demonstration that the model was not fitted to: least squares on its target.
 ///
-/// `dt` in seconds and `period` serve as in a fit.
+/// `dt` in seconds and `period` serve as in a fit. Its time is scaled as that of the others was: where theirs was warped
+/// so is this one's, and where they had events it needs its own (E,), in seconds.
 ///
 /// # Errors
-/// A demonstration that does not fit the model.
-pub fn style_of(model: &Model, demo: &Demonstration, dt: Option<f64>, period: Option<f64>) -> Result<Vec<f64>> {
+/// A demonstration that does not fit the model, or events where the others had none.
+pub fn style_of(
+    model: &Model,
+    demo: &Demonstration,
+    dt: Option<f64>,
+    period: Option<f64>,
+    events: Option<&[f64]>,
+) -> Result<Vec<f64>> {
     let n_dofs = model.n_dofs();
     if demo.n_dofs() != n_dofs {
         let (expected, found) = (n_dofs, demo.n_dofs());
@@ -195,8 +218,21 @@ pub fn style_of(model: &Model, demo: &Demonstration, dt: Option<f64>, period: Op
         smoothing: model.learnt.smoothing,
         nominal: None,
         n_samples: Some(model.learnt.n_samples),
+        time_scaling: TimeScaling::Linear,
     };
-    let aligned = alignment.align(std::slice::from_ref(demo))?;
+    let mut aligned = alignment.align(std::slice::from_ref(demo))?;
+    let by_events = model.learnt.template.is_none() && model.demonstrated.timings.ncols() > 1;
+    match (&model.learnt.template, events) {
+        (None, Some(events)) if by_events => aligned.register_to(&model.demonstrated.breaks, events)?,
+        (None, None) if by_events => {
+            return Err(Error::Arguments("the model was fitted with events: pass events= of this demonstration too"));
+        }
+        (_, Some(_)) => {
+            return Err(Error::Arguments("the model was fitted without events: leave out events="));
+        }
+        (Some(template), None) => aligned.warp_to(template)?,
+        (None, None) => {}
+    }
     let mut target = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;
     let scale = &model.learnt.dof_scale;
     target.scale(scale);
@@ -240,7 +276,7 @@ struct Constants {
 
 impl Constants {
     fn of(options: &FitOptions, aligned: &Aligned) -> Result<Self> {
-        let duration = aligned.durations[aligned.nominal];
+        let duration = aligned.durations()[aligned.nominal];
         let attractor = Attractor { alpha_z: options.alpha_z, beta_z: options.beta_z.unwrap_or(options.alpha_z / 4.0) };
         check_rate("alpha_z", attractor.alpha_z)?;
         check_rate("beta_z", attractor.beta_z)?;
@@ -306,19 +342,26 @@ fn check_rate(name: &'static str, value: f64) -> Result<()> {
     }
 }
 
-fn scale_of(scale: &DofScale, ranges: &[f64]) -> Result<Vec<f64>> {
-    match scale {
-        DofScale::Unit => Ok(vec![1.0; ranges.len()]),
-        // A DoF at rest has no range; it has no target to be scaled either.
-        DofScale::Range => Ok(ranges.iter().map(|&range| if range > 0.0 { range } else { 1.0 }).collect()),
-        DofScale::Given(scale) => {
-            check_vector("dof_scale", scale, ranges.len(), "DoF")?;
-            match scale.iter().find(|value| !(1e-100..=1e100).contains(*value)) {
-                Some(&value) => {
-                    Err(Error::Range { name: "dof_scale", value, allowed: "must lie between 1e-100 and 1e100" })
-                }
-                None => Ok(scale.clone()),
+impl DofScale {
+    /// The units (D,) that were given, if any were.
+    fn given(&self, n_dofs: usize) -> Result<Option<&[f64]>> {
+        let Self::Given(scale) = self else { return Ok(None) };
+        check_vector("dof_scale", scale, n_dofs, "DoF")?;
+        match scale.iter().find(|value| !(1e-100..=1e100).contains(*value)) {
+            Some(&value) => {
+                Err(Error::Range { name: "dof_scale", value, allowed: "must lie between 1e-100 and 1e100" })
             }
+            None => Ok(Some(scale)),
+        }
+    }
+
+    /// The units (D,) of DoFs with such ranges.
+    fn of(&self, ranges: &[f64]) -> Vec<f64> {
+        match self {
+            Self::Unit => vec![1.0; ranges.len()],
+            // A DoF at rest has no range; it has no target to be scaled either.
+            Self::Range => ranges.iter().map(|&range| if range > 0.0 { range } else { 1.0 }).collect(),
+            Self::Given(scale) => scale.clone(),
         }
     }
 }

@@ -91,7 +91,7 @@ mod tabulate;
 mod targets;
 mod threads;
 
-pub use align::Alignment;
+pub use align::{Alignment, Template, TimeScaling, Warp};
 pub use attractor::Attractor;
 pub use batch::{Batch, BatchConditions, Chunks, Rows};
 pub use command::{Command, Coupling, Motion};

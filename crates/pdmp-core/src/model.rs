@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use ndarray::Array2;
 
+use crate::align::{Template, WarpingFunction};
 use crate::attractor::{Attractor, State};
 use crate::context::{ContextMap, Prediction};
 use crate::demo::ContextValue;
@@ -25,7 +26,11 @@ pub struct Demonstrated {
     pub starts: Array2<f64>,
     /// Means (M, D), about which a cycle oscillates.
     pub anchors: Array2<f64>,
-    /// Durations or periods (M,), in seconds.
+    /// Phases (K+1,) from 0 to 1 that divide the movement into segments; K = 1 where time is scaled linearly.
+    pub breaks: Vec<f64>,
+    /// Timings (M, K): the time spent in each segment, in seconds.
+    pub timings: Array2<f64>,
+    /// Durations or periods (M,), in seconds: the sums of the timings.
     pub durations: Vec<f64>,
     /// Contexts (M, Q), labels as their index among [`ContextMap::columns`].
     pub contexts: Option<Array2<f64>>,
@@ -40,6 +45,8 @@ pub struct Learnt {
     pub n_samples: usize,
     /// What was done about measurement noise.
     pub smoothing: Smoothing,
+    /// What time was warped to, if it was.
+    pub template: Option<Template>,
     /// Unit of each DoF in the factorisation (D,).
     pub dof_scale: Vec<f64>,
     /// Singular values of the targets, in decreasing order: all, or the first J alone, where [`crate::Factors`] did not
@@ -89,6 +96,9 @@ pub struct Conditions {
     pub amplitude: Option<f64>,
     /// Time constant τ, in seconds.
     pub tau: Option<f64>,
+    /// Time in each segment of the movement (K,), in seconds, in place of τ. A rollout follows it; a controller, whose τ
+    /// can be set at any tick, takes its sum: see [`Model::tau_at`].
+    pub timing: Option<Vec<f64>>,
 }
 
 impl Model {
@@ -189,15 +199,54 @@ impl Model {
         Prediction::of(map.predict(context)?, map.freedom(), self.kind(), self.n_styles(), self.n_dofs())
     }
 
-    /// The conditions of a prediction, with τ scaled to the predicted duration.
+    /// The conditions of a prediction, timing included.
     pub fn conditions(&self, prediction: &Prediction) -> Conditions {
         Conditions {
             style: Some(prediction.style.clone()),
             goal: prediction.goal.clone(),
             anchor: prediction.anchor.clone(),
             start: prediction.start.clone(),
-            tau: Some(self.tau * prediction.duration / self.duration()),
+            timing: Some(prediction.timing.clone()),
             ..Conditions::default()
+        }
+    }
+
+    /// The time constant τ = dt/du in seconds at a phase, x or φ, of a movement with the given timing (K,).
+    ///
+    /// A loop that sets it at every tick follows the timing. Past its end a discrete movement goes on at the last rate.
+    ///
+    /// # Errors
+    /// A timing that does not fit the model, or a phase outside [0, 1] or [0, 2π).
+    pub fn tau_at(&self, phase: f64, timing: &[f64]) -> Result<f64> {
+        let extent = self.canonical().extent();
+        let clock = self.canonical().clock_at(phase);
+        // Long after the end x is zero, and the clock infinite.
+        if !(phase.is_finite() && clock >= 0.0) {
+            let allowed = "must lie in [0, 1] where discrete, in [0, 2π) where rhythmic";
+            return Err(Error::Range { name: "phase", value: phase, allowed });
+        }
+        Ok(self.warping_function(timing)?.slope(clock / extent) / extent)
+    }
+
+    /// Time over phase for a timing (K,).
+    ///
+    /// # Errors
+    /// Another number of times than the movement has segments, or one that is not within a millionfold of the nominal
+    /// demonstration's.
+    pub(crate) fn warping_function(&self, timing: &[f64]) -> Result<WarpingFunction> {
+        self.check_timing(timing)?;
+        Ok(WarpingFunction::new(self.kind(), &self.demonstrated.breaks, timing))
+    }
+
+    fn check_timing(&self, timing: &[f64]) -> Result<()> {
+        let nominal = self.demonstrated.timings.row(self.demonstrated.nominal);
+        check_vector("timing", timing, nominal.len(), "segment between breaks")?;
+        match timing.iter().zip(nominal).find(|(time, own)| !(1e-6..=1e6).contains(&(*time / *own))) {
+            Some((&value, _)) => {
+                let allowed = "seconds must be positive, within a millionfold of the nominal demonstration's";
+                Err(Error::Range { name: "timing", value, allowed })
+            }
+            None => Ok(()),
         }
     }
 
@@ -251,8 +300,7 @@ impl Conditions {
                 check_vector(name, value, model.n_dofs(), "DoF")?;
             }
         }
-        let tau = self.tau.unwrap_or(model.tau);
-        check_tau(tau, model.tau)?;
+        let tau = self.time_constant(model)?;
         let amplitude = self.amplitude.unwrap_or(1.0);
         check_amplitude(amplitude)?;
         let start = match (&self.start, kind) {
@@ -264,6 +312,24 @@ impl Conditions {
             None => demonstrated.styles.row(nominal).to_vec(),
         };
         Ok(Complete { style, centre, start, velocity: self.velocity.clone(), amplitude, tau })
+    }
+
+    /// τ in seconds: as given, that of a movement as long as the timing, or the nominal demonstration's.
+    ///
+    /// # Errors
+    /// Both of them, a τ that is not positive, or a timing that does not fit the model.
+    pub fn time_constant(&self, model: &Model) -> Result<f64> {
+        let tau = match (self.tau, &self.timing) {
+            (Some(_), Some(_)) => {
+                return Err(Error::Arguments("pass tau or timing, not both: a timing tells the duration"));
+            }
+            (None, Some(timing)) => {
+                model.check_timing(timing)?;
+                model.tau * timing.iter().sum::<f64>() / model.duration()
+            }
+            (tau, None) => tau.unwrap_or(model.tau),
+        };
+        check_tau(tau, model.tau).map(|()| tau)
     }
 }
 

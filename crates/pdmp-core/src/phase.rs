@@ -95,6 +95,14 @@ impl Canonical {
         (0..n_samples).map(|c| self.extent() * (c as f64 / steps)).collect()
     }
 
+    /// The clock at a phase: −ln(x)/α_x where discrete, φ itself where rhythmic.
+    pub(crate) fn clock_at(&self, phase: f64) -> f64 {
+        match *self {
+            Canonical::Discrete { alpha_x, .. } => -phase.ln() / alpha_x,
+            Canonical::Rhythmic { .. } => phase,
+        }
+    }
+
     /// The phase at clock `u`: x in (0, 1], or φ in [0, 2π).
     pub fn phase(&self, u: f64) -> f64 {
         match *self {

@@ -1,7 +1,9 @@
-//! One whole trajectory: the control loop run at once.
+//! One whole trajectory: the control loop run at once, in linear time or in that of a timing.
 
 use std::sync::Arc;
 
+use crate::align::WarpingFunction;
+use crate::command::Command;
 use crate::controller::Controller;
 use crate::demo::{Trajectory, zeros};
 use crate::error::{Error, Result, check_positive};
@@ -17,7 +19,7 @@ const MOST_STEPS: f64 = 1e7;
 pub struct Timing {
     /// Interval between samples.
     pub dt: f64,
-    /// Length of the rollout; otherwise the demonstrated duration scaled by τ, or one period.
+    /// Length of the rollout; otherwise the demonstrated duration scaled by τ, the sum of the timing, or one period.
     pub duration: Option<f64>,
 }
 
@@ -64,8 +66,10 @@ impl Model {
         timing: Timing,
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Trajectory> {
-        let steps = timing.steps(self, conditions.tau.unwrap_or(self.tau))?;
-        let mut controller = Controller::new(Arc::clone(self), timing.dt, conditions, Some(0.0))?;
+        let steps = timing.steps(self, conditions.time_constant(self)?)?;
+        let mut clock = Clock::of(self, conditions)?;
+        let conditions = clock.conditions(conditions);
+        let mut controller = Controller::new(Arc::clone(self), timing.dt, &conditions, Some(0.0))?;
         let shape = (steps + 1, self.n_dofs());
         let mut trajectory = Trajectory {
             time: (0..=steps).map(|k| k as f64 * timing.dt).collect(),
@@ -78,14 +82,79 @@ impl Model {
                 proceed(k as f64 / (steps + 1) as f64)?;
             }
             if k > 0 {
-                controller.step()?;
+                clock.step(&mut controller, trajectory.time[k])?;
             }
             for d in 0..self.n_dofs() {
+                let (velocity, acceleration) = (controller.velocity()[d], controller.acceleration()[d]);
                 trajectory.position[[k, d]] = controller.position()[d];
-                trajectory.velocity[[k, d]] = controller.velocity()[d];
-                trajectory.acceleration[[k, d]] = controller.acceleration()[d];
+                [trajectory.velocity[[k, d]], trajectory.acceleration[[k, d]]] = clock.paced(velocity, acceleration);
             }
         }
         Ok(trajectory)
+    }
+}
+
+/// What drives a rollout: time itself, or time warped to the nominal demonstration's by a timing.
+///
+/// With u(t) in place of t/τ the movement is the same function of u, ẏ = y′u̇ and ÿ = y″u̇² + y′ü.
+enum Clock {
+    Linear,
+    Warped {
+        warp: WarpingFunction,
+        /// Seconds of the nominal time per unit of phase.
+        extent: f64,
+        /// Phase p, ṗ and p̈.
+        phase: [f64; 3],
+    },
+}
+
+impl Clock {
+    fn of(model: &Model, conditions: &Conditions) -> Result<Self> {
+        let Some(timing) = conditions.timing.as_ref().filter(|timing| timing.len() > 1) else {
+            return Ok(Self::Linear);
+        };
+        let warp = model.warping_function(timing)?;
+        let phase = warp.phase(0.0);
+        Ok(Self::Warped { warp, extent: model.tau * model.canonical().extent(), phase })
+    }
+
+    /// The conditions in the time of the controller.
+    fn conditions(&self, given: &Conditions) -> Conditions {
+        match self {
+            Self::Linear => given.clone(),
+            Self::Warped { extent, phase: [_, rate, _], .. } => Conditions {
+                timing: None,
+                velocity: given
+                    .velocity
+                    .as_ref()
+                    .map(|velocity| velocity.iter().map(|v| v / (extent * rate)).collect()),
+                ..given.clone()
+            },
+        }
+    }
+
+    /// Takes the controller to a time, in seconds.
+    fn step(&mut self, controller: &mut Controller, time: f64) -> Result<()> {
+        match self {
+            Self::Linear => controller.step(),
+            Self::Warped { warp, extent, phase } => {
+                let before = phase[0];
+                *phase = warp.phase(time);
+                let dt = Some((phase[0] - before) * *extent);
+                controller.step_with(&Command { dt, ..Command::default() })
+            }
+        }
+        .map(drop)
+    }
+
+    /// Velocity and acceleration from those of the controller.
+    fn paced(&self, velocity: f64, acceleration: f64) -> [f64; 2] {
+        match self {
+            Self::Linear => [velocity, acceleration],
+            Self::Warped { extent, phase: [_, rate, bend], .. } => {
+                let (pace, change) = (extent * rate, extent * bend);
+                [velocity * pace, acceleration * pace * pace + velocity * change]
+            }
+        }
     }
 }

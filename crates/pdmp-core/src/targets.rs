@@ -49,7 +49,7 @@ impl Targets {
         threads: Threads,
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
-        let (n_demos, n_dofs) = (aligned.durations.len(), aligned.demo(0).n_dofs());
+        let (n_demos, n_dofs) = (aligned.n_demos(), aligned.demo(0).n_dofs());
         let mut targets = Self {
             forcing: zeros("targets", (n_demos, aligned.n_samples * n_dofs))?,
             starts: Array2::zeros((n_demos, n_dofs)),

@@ -82,11 +82,11 @@ fn a_bomb_of_a_header_is_refused() {
 #[test]
 fn another_version_is_refused_by_number() {
     let text = String::from_utf8_lossy(&BYTES).into_owned();
-    let place = text.find("schema\\\":3").unwrap();
+    let place = text.find("schema\\\":4").unwrap();
     let mut bytes = BYTES.clone();
     bytes[place + "schema\\\":".len()] = b'7';
     let message = Model::from_bytes(&bytes).unwrap_err().to_string();
-    assert!(message.contains("version 7") && message.contains("reads version 3"), "{message}");
+    assert!(message.contains("version 7") && message.contains("reads version 4"), "{message}");
 }
 
 /// What cannot be written or read is told with its path, and an older file survives.

@@ -99,7 +99,7 @@ fn style_of_finds_demonstrations_again() {
     let demos = reaches();
     let model = learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(3), ..options(Kind::Discrete) });
     for (m, demo) in demos.iter().enumerate() {
-        let style = style_of(&model, demo, None, None).unwrap();
+        let style = style_of(&model, demo, None, None, None).unwrap();
         for (j, s) in style.iter().enumerate() {
             assert!((s - model.demonstrated().styles[[m, j]]).abs() < 2e-3, "{m} {j} {s}");
         }

@@ -361,7 +361,7 @@ fn context_predicts_what_was_shown() {
     assert!(distance(prediction.goal.as_ref().unwrap(), goals.row(2).as_slice().unwrap()) < 1e-9);
     assert!((prediction.duration - REACH.demonstrated().durations[2]).abs() < 0.01);
     let conditions = REACH.conditions(&prediction);
-    assert!((conditions.tau.unwrap() - prediction.duration).abs() < 1e-12);
+    assert!((conditions.time_constant(&REACH).unwrap() - prediction.duration).abs() < 1e-12);
     assert!(matches!(CYCLE.predict(&[0.3]), Err(Error::Arguments(_))));
     assert!(REACH.predict(&[0.3, 0.1]).is_err() && REACH.predict(&[f64::NAN]).is_err());
 }

@@ -16,6 +16,7 @@ pub(crate) struct Arguments<'a, 'py> {
     pub(crate) anchor: Option<&'a Bound<'py, PyAny>>,
     pub(crate) amplitude: f64,
     pub(crate) tau: Option<f64>,
+    pub(crate) timing: Option<&'a Bound<'py, PyAny>>,
 }
 
 impl Arguments<'_, '_> {
@@ -28,6 +29,7 @@ impl Arguments<'_, '_> {
             velocity: optional("velocity", self.velocity)?,
             amplitude: Some(self.amplitude),
             tau: self.tau,
+            timing: optional("timing", self.timing)?,
         })
     }
 
@@ -51,7 +53,9 @@ impl Arguments<'_, '_> {
             start: given.start.or(predicted.start),
             velocity: given.velocity,
             amplitude: given.amplitude,
-            tau: given.tau.or(predicted.tau),
+            // A tau that is given takes the place of the predicted timing.
+            timing: given.timing.or(predicted.timing.filter(|_| given.tau.is_none())),
+            tau: given.tau,
         })
     }
 }

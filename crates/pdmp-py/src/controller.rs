@@ -221,15 +221,16 @@ impl Controller {
     ///
     /// Parameters
     /// ----------
-    /// style, goal, start, velocity, anchor, amplitude, tau, context
-    ///     As in `Model.rollout`: what is not given is that of the nominal demonstration, not what was commanded before.
+    /// style, goal, start, velocity, anchor, amplitude, tau, timing, context
+    ///     As in `Model.controller`: what is not given is that of the nominal demonstration, not what was commanded before.
     ///
     /// Raises
     /// ------
     /// ValueError
     ///     What `Model.rollout` refuses; the movement then goes on as it was.
     #[pyo3(signature = (
-        *, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, context=None
+        *, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, timing=None,
+        context=None
     ))]
     #[allow(clippy::too_many_arguments)]
     fn reset(
@@ -242,9 +243,10 @@ impl Controller {
         anchor: Option<&Bound<'_, PyAny>>,
         amplitude: f64,
         tau: Option<f64>,
+        timing: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing };
         let conditions = arguments.in_context(self.inner.model(), context)?;
         let result = self.inner.reset(&conditions);
         self.command(py, result)

@@ -2,17 +2,20 @@
 
 use std::sync::Arc;
 
-use ndarray::{ArrayD, Axis, Ix2};
+use ndarray::{Array2, ArrayD, Axis, Ix2};
 use pdmp_core::basis::Basis;
-use pdmp_core::{Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Sampling, Smoothing, Stage, StyleCount};
+use pdmp_core::{
+    Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Sampling, Smoothing, Stage, StyleCount, TimeScaling,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::basis::{Gp, NGnet};
-use crate::convert::{array, count, numbers};
+use crate::convert::{array, count, matrix, numbers};
 use crate::demo::Demonstration;
 use crate::error::{detached, raise};
 use crate::model::Model;
+use crate::warp::Warp;
 
 /// Learn one movement primitive from several demonstrations.
 ///
@@ -49,7 +52,13 @@ use crate::model::Model;
 ///     Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
 ///     than 150.
 /// dof_scale : None, "range" or (D,) array_like
-///     Unit of each degree of freedom in the factorisation.
+///     Unit of each degree of freedom in the factorisation; if given as numbers, in a warp of time too.
+/// alignment : {"linear", "warp"} or Warp
+///     How time is scaled to that of the nominal demonstration: linearly, or by the monotone warp that brings the
+///     demonstrations closest to each other, where they pause or hurry in different places.
+/// events : (M, E) array_like, optional
+///     Times in s of E landmarks in each demonstration, from its first sample or of its time stamps, in place of a
+///     warp: all are aligned to those of the nominal demonstration.
 /// tau : float, optional
 ///     Time constant in s, discrete; otherwise the nominal duration.
 /// alpha_z, beta_z : float
@@ -82,11 +91,11 @@ use crate::model::Model;
 #[pyfunction]
 #[pyo3(signature = (
     demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, spectrum=0.9, basis=None,
-    smoothing=None, nominal=None, n_samples=None, dof_scale=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None,
-    mu=1.0, threads=None, progress=None
+    smoothing=None, nominal=None, n_samples=None, dof_scale=None, alignment=None, events=None, tau=None, alpha_z=25.0,
+    beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
 ), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, spectrum=0.9, \
-    basis='gp', smoothing=None, nominal=None, n_samples=None, dof_scale=None, tau=None, alpha_z=25.0, beta_z=None, \
-    alpha_x=None, mu=1.0, threads=None, progress=None)")]
+    basis='gp', smoothing=None, nominal=None, n_samples=None, dof_scale=None, alignment='linear', events=None, \
+    tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -103,6 +112,8 @@ pub(crate) fn fit(
     nominal: Option<isize>,
     n_samples: Option<isize>,
     dof_scale: Option<&Bound<'_, PyAny>>,
+    alignment: Option<&Bound<'_, PyAny>>,
+    events: Option<&Bound<'_, PyAny>>,
     tau: Option<f64>,
     alpha_z: f64,
     beta_z: Option<f64>,
@@ -120,6 +131,7 @@ pub(crate) fn fit(
             smoothing: smoothing_of(smoothing)?,
             nominal: nominal.map(|n| count("nominal", n)).transpose()?,
             n_samples: n_samples.map(|n| count("n_samples", n)).transpose()?,
+            time_scaling: time_scaling_of(alignment, events)?,
         },
         contexts: contexts.map(crate::convert::contexts).transpose()?,
         map: map_of(map)?,
@@ -217,6 +229,32 @@ fn basis_of(basis: Option<&Bound<'_, PyAny>>) -> PyResult<Basis> {
         _ => {
             let wanted = "must be \"gp\", \"ngnet\", pdmp.GP(...) or pdmp.NGnet(...)";
             Err(PyValueError::new_err(format!("basis = {}: {wanted}", basis.repr()?)))
+        }
+    }
+}
+
+fn time_scaling_of(alignment: Option<&Bound<'_, PyAny>>, events: Option<&Bound<'_, PyAny>>) -> PyResult<TimeScaling> {
+    let alignment = alignment.map_or(Ok(TimeScaling::Linear), alignment_of)?;
+    let events: Option<Array2<f64>> = events.map(|events| matrix("events", "(M, E)", events)).transpose()?;
+    match (alignment, events) {
+        (TimeScaling::Linear, Some(events)) => Ok(TimeScaling::Events(events)),
+        (_, Some(_)) => {
+            Err(PyValueError::new_err("pass a warp as alignment or events, not both: events align by themselves"))
+        }
+        (alignment, None) => Ok(alignment),
+    }
+}
+
+fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
+    if let Ok(warp) = alignment.cast::<Warp>() {
+        return Ok(TimeScaling::Warp(warp.get().0.clone()));
+    }
+    match alignment.extract::<String>().as_deref() {
+        Ok("linear") => Ok(TimeScaling::Linear),
+        Ok("warp") => Ok(TimeScaling::Warp(Default::default())),
+        _ => {
+            let wanted = "must be \"linear\", \"warp\" or pdmp.Warp(...)";
+            Err(PyValueError::new_err(format!("alignment = {}: {wanted}", alignment.repr()?)))
         }
     }
 }

@@ -43,7 +43,8 @@ impl Model {
         tau: Option<f64>,
         duration: Option<f64>,
     ) -> PyResult<Cube<'py>> {
-        let arguments = Arguments { style: None, goal: None, start, velocity, anchor: None, amplitude, tau };
+        let arguments =
+            Arguments { style: None, goal: None, start, velocity, anchor: None, amplitude, tau, timing: None };
         self.jacobian(py, Variable::Style, derivative, arguments, Timing { dt, duration })
     }
 
@@ -144,5 +145,5 @@ impl Model {
 
 /// Arguments of which only start and time constant matter.
 fn from<'a, 'py>(start: Option<&'a Bound<'py, PyAny>>, tau: Option<f64>) -> Arguments<'a, 'py> {
-    Arguments { style: None, goal: None, start, velocity: None, anchor: None, amplitude: 1.0, tau }
+    Arguments { style: None, goal: None, start, velocity: None, anchor: None, amplitude: 1.0, tau, timing: None }
 }

@@ -12,7 +12,7 @@ use pyo3::types::{PyBytes, PyList};
 use crate::conditions::Arguments;
 use crate::context::ContextMap;
 use crate::controller::Controller;
-use crate::convert::{Cube, Matrix, Vector, shown_context, to_numpy, vector};
+use crate::convert::{Cube, Matrix, Vector, optional, shown_context, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
 use crate::error::{interruptible, raise};
 use crate::prediction::Prediction;
@@ -162,7 +162,19 @@ impl Model {
         self.0.demonstrated().anchors.to_pyarray(py)
     }
 
-    /// Durations or periods of the demonstrations (M,) in s.
+    /// Phases (K+1,) from 0 to 1 that divide the movement into segments; K = 1 where time is scaled linearly.
+    #[getter]
+    fn breaks<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        to_numpy(py, &self.0.demonstrated().breaks)
+    }
+
+    /// Timings of the demonstrations (M, K): the time in s that each spends in each segment.
+    #[getter]
+    fn timings<'py>(&self, py: Python<'py>) -> Matrix<'py> {
+        self.0.demonstrated().timings.to_pyarray(py)
+    }
+
+    /// Durations or periods of the demonstrations (M,) in s: the sums of their timings.
     #[getter]
     fn durations<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, &self.0.demonstrated().durations)
@@ -221,12 +233,16 @@ impl Model {
     ///     Amplitude r₀, rhythmic; 1 as demonstrated.
     /// tau : float, optional
     ///     Time constant in s.
+    /// timing : array_like, (K,), optional
+    ///     Time in s in each segment between `breaks`, in place of `tau`: time over phase is the monotone cubic through
+    ///     them, in place of t = tau u, and y the same function of phase. Past the end the last rate goes on.
     /// dt : float
     ///     Interval between samples in s.
     /// duration : float, optional
-    ///     Length in s; otherwise the demonstrated duration scaled by `tau`, one period if rhythmic.
+    ///     Length in s; otherwise the demonstrated duration scaled by `tau`, or the sum of `timing`; one period if
+    ///     rhythmic.
     /// context : array_like, (Q,), optional
-    ///     Predicts style, goal, start or anchor, and tau, where they are not given.
+    ///     Predicts style, goal, start or anchor, and timing, where they are not given.
     ///
     /// Returns
     /// -------
@@ -238,8 +254,8 @@ impl Model {
     /// ValueError
     ///     A wrong length, a number that is not finite, or an argument of the other kind of primitive.
     #[pyo3(signature = (
-        style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, dt=0.01,
-        duration=None, context=None
+        style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, timing=None,
+        dt=0.01, duration=None, context=None
     ))]
     #[allow(clippy::too_many_arguments)]
     fn rollout(
@@ -252,11 +268,12 @@ impl Model {
         anchor: Option<&Bound<'_, PyAny>>,
         amplitude: f64,
         tau: Option<f64>,
+        timing: Option<&Bound<'_, PyAny>>,
         dt: f64,
         duration: Option<f64>,
         context: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Trajectory> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing };
         let conditions = arguments.in_context(&self.0, context)?;
         let trajectory =
             interruptible(py, |proceed| self.0.rollout_with(&conditions, Timing { dt, duration }, proceed))?;
@@ -271,19 +288,23 @@ impl Model {
     ///     A movement of the same degrees of freedom.
     /// dt, period : float, optional
     ///     As in `fit`.
+    /// events : array_like, (E,), optional
+    ///     Times of its events in s, if the model was fitted with events; where time was warped, its own is too.
     ///
     /// Returns
     /// -------
     /// ndarray, (J,)
-    #[pyo3(signature = (demonstration, *, dt=None, period=None))]
+    #[pyo3(signature = (demonstration, *, dt=None, period=None, events=None))]
     fn style_of<'py>(
         &self,
         py: Python<'py>,
         demonstration: &Demonstration,
         dt: Option<f64>,
         period: Option<f64>,
+        events: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
-        let style = py.detach(|| style_of(&self.0, &demonstration.0, dt, period)).map_err(raise)?;
+        let events = optional("events", events)?;
+        let style = py.detach(|| style_of(&self.0, &demonstration.0, dt, period, events.as_deref())).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
 
@@ -307,6 +328,26 @@ impl Model {
             }
         }
         Ok(landscape.into_pyarray(py))
+    }
+
+    /// The time constant in s at a phase of a movement with the given timing.
+    ///
+    /// A control loop that sets it at every tick follows the timing, as `rollout` does:
+    /// `controller.tau = model.tau_at(controller.phase, timing)`, with `transition=0`.
+    ///
+    /// Parameters
+    /// ----------
+    /// phase : float
+    ///     Phase of a controller: x in (0, 1] where discrete, φ in rad where rhythmic.
+    /// timing : array_like, (K,)
+    ///     Time in s in each segment between `breaks`.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A timing that does not fit the model, or a phase out of range.
+    fn tau_at(&self, phase: f64, timing: &Bound<'_, PyAny>) -> PyResult<f64> {
+        self.0.tau_at(phase, &vector("timing", timing)?).map_err(raise)
     }
 
     /// The movement for a condition, as in Section 4.1.2.
@@ -387,8 +428,8 @@ impl Model {
     /// ----------
     /// dt : float
     ///     Length of a tick in s.
-    /// style, goal, start, velocity, tau, anchor, amplitude, context
-    ///     As in `rollout`.
+    /// style, goal, start, velocity, tau, timing, anchor, amplitude, context
+    ///     As in `rollout`; of a timing the loop takes the sum, and follows it where `tau_at` sets its pace.
     /// transition : float, optional
     ///     Time to 99 % in s of a changed style, goal, anchor or tau; 0 switches at once. A tenth of the nominal
     ///     duration (discrete) or a quarter of the period (rhythmic) otherwise.
@@ -398,7 +439,7 @@ impl Model {
     /// Controller
     #[pyo3(signature = (
         dt=0.001, style=None, goal=None, start=None, velocity=None, tau=None, transition=None, *, anchor=None,
-        amplitude=1.0, context=None
+        amplitude=1.0, timing=None, context=None
     ))]
     #[allow(clippy::too_many_arguments)]
     fn controller(
@@ -413,9 +454,10 @@ impl Model {
         transition: Option<f64>,
         anchor: Option<&Bound<'_, PyAny>>,
         amplitude: f64,
+        timing: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Controller> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing };
         let conditions = arguments.in_context(&self.0, context)?;
         let controller = pdmp_core::Controller::new(Arc::clone(&self.0), dt, &conditions, transition).map_err(raise)?;
         Controller::new(py, controller)

@@ -16,10 +16,12 @@ pub(crate) struct Prediction {
     start: Option<Py<PyArray1<f64>>>,
     /// Anchor (D,), rhythmic.
     anchor: Option<Py<PyArray1<f64>>>,
-    /// Duration or period in s.
+    /// Time in each segment of the movement (K,) in s.
+    timing: Py<PyArray1<f64>>,
+    /// Duration or period in s: the sum of the timing.
     duration: f64,
-    /// Covariance (P, P) of style, goal and start or anchor, and duration, in this order, for a new movement; None
-    /// where the demonstrations leave no degree of freedom to estimate it.
+    /// Covariance (P, P) of style, goal and start or anchor, and timing, in this order, for a new movement; None where
+    /// the demonstrations leave no degree of freedom to estimate it.
     covariance: Option<Py<PyArray2<f64>>>,
     /// Degrees of freedom from which the covariance is known.
     freedom: usize,
@@ -36,6 +38,7 @@ impl Prediction {
             goal: optional(prediction.goal),
             start: optional(prediction.start),
             anchor: optional(prediction.anchor),
+            timing: to_numpy(py, &prediction.timing).unbind(),
             duration: prediction.duration,
             covariance: prediction.covariance.map(|covariance| covariance.into_pyarray(py).unbind()),
             freedom: prediction.freedom,

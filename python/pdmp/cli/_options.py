@@ -44,6 +44,12 @@ def add_learning(parser: ArgumentParser) -> None:
         help="from start to goal (default), or one cycle per demonstration",
     )
     parser.add_argument("--period", type=float, metavar="S", help="period of rhythmic ones [s]")
+    parser.add_argument(
+        "--alignment",
+        choices=["linear", "warp"],
+        default="linear",
+        help="how time is scaled to that of the nominal demonstration; default: linear",
+    )
     parser.add_argument("--styles", type=int, metavar="J", help="number of style parameters")
     parser.add_argument(
         "--spectrum",
@@ -67,6 +73,7 @@ def settings(options: Namespace) -> dict[str, Any]:
     """Return what `pdmp.fit` is told beside kind and period."""
     return {
         "map": options.map,
+        "alignment": options.alignment,
         "n_styles": options.styles,
         "spectrum": options.spectrum,
         "basis": options.basis,

@@ -38,6 +38,8 @@ def run(options: Namespace) -> None:
     """Load, roll out, write."""
     model = pdmp.load(options.model)
     given = pdmp.as_demonstrated(model, options.demo) if options.demo is not None else {}
+    if options.tau is not None:
+        given.pop("timing", None)
     names = ("style", "context", "goal", "start", "anchor", "amplitude", "tau", "dt", "duration")
     given |= {name: value for name in names if (value := getattr(options, name)) is not None}
     trajectory = model.rollout(**given)

@@ -1,6 +1,6 @@
 //! The movement that a map predicts.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
+use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
 use super::Expected;
 use crate::error::{Error, Result};
@@ -17,10 +17,12 @@ pub struct Prediction {
     pub start: Option<Vec<f64>>,
     /// Anchor (D,), rhythmic.
     pub anchor: Option<Vec<f64>>,
-    /// Duration or period, in seconds.
+    /// Time in each segment of the movement (K,), in seconds.
+    pub timing: Vec<f64>,
+    /// Duration or period, in seconds: the sum of the timing.
     pub duration: f64,
-    /// Covariance (P, P) of a new movement's style, goal and start or anchor, and duration, in this order; `None` where
-    /// the demonstrations leave no degree of freedom to estimate it.
+    /// Covariance (P, P) of a new movement's style, goal and start or anchor, and timing, in this order; `None` where the
+    /// demonstrations leave no degree of freedom to estimate it.
     pub covariance: Option<Array2<f64>>,
     /// Degrees of freedom from which the covariance is known.
     pub freedom: usize,
@@ -29,17 +31,17 @@ pub struct Prediction {
     pub outside: Vec<f64>,
 }
 
-/// The outputs of the map (M, P): style, goal and start or anchor, logarithm of the duration.
+/// The outputs of the map (M, P): style, goal and start or anchor, logarithms of the timing (M, K).
 pub(crate) fn outputs(
     kind: Kind,
     styles: ArrayView2<f64>,
     [goals, starts, anchors]: [ArrayView2<f64>; 3],
-    durations: &[f64],
+    timings: ArrayView2<f64>,
 ) -> Array2<f64> {
-    let logarithm = Array1::from_iter(durations.iter().map(|t| t.ln())).insert_axis(Axis(1));
+    let logarithms = timings.mapv(f64::ln);
     let parts = match kind {
-        Kind::Discrete => vec![styles, goals, starts, logarithm.view()],
-        Kind::Rhythmic => vec![styles, anchors, logarithm.view()],
+        Kind::Discrete => vec![styles, goals, starts, logarithms.view()],
+        Kind::Rhythmic => vec![styles, anchors, logarithms.view()],
     };
     // Row counts are equal by construction.
     concatenate(Axis(1), &parts).unwrap_or_default()
@@ -49,18 +51,21 @@ impl Prediction {
     /// The movement whose outputs are expected.
     ///
     /// # Errors
-    /// A duration that overflows.
+    /// Times that overflow.
     pub(crate) fn of(expected: Expected, freedom: usize, kind: Kind, n_styles: usize, n_dofs: usize) -> Result<Self> {
         let Expected { mean, mut covariance, outside } = expected;
-        let n = mean.len();
-        let duration = mean[n - 1].exp();
+        let first = n_styles + n_dofs * if kind == Kind::Discrete { 2 } else { 1 };
+        let timing: Vec<f64> = mean[first..].iter().map(|logarithm| logarithm.exp()).collect();
+        let duration: f64 = timing.iter().sum();
         if let Some(covariance) = &mut covariance {
-            // dT = T d(ln T).
-            covariance.row_mut(n - 1).mapv_inplace(|x| x * duration);
-            covariance.column_mut(n - 1).mapv_inplace(|x| x * duration);
+            // dt = t d(ln t).
+            for (k, seconds) in timing.iter().enumerate() {
+                covariance.row_mut(first + k).mapv_inplace(|x| x * seconds);
+                covariance.column_mut(first + k).mapv_inplace(|x| x * seconds);
+            }
         }
         let finite = covariance.iter().flatten().all(|x| x.is_finite());
-        if !(finite && duration.is_finite() && duration > 0.0) {
+        if !(finite && duration.is_finite() && timing.iter().all(|&time| time > 0.0)) {
             return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
         }
         let part = |k: usize| Some(mean[n_styles + k * n_dofs..n_styles + (k + 1) * n_dofs].to_vec());
@@ -69,6 +74,6 @@ impl Prediction {
             Kind::Rhythmic => (None, None, part(0)),
         };
         let style = mean[..n_styles].to_vec();
-        Ok(Self { style, goal, start, anchor, duration, covariance, freedom, outside })
+        Ok(Self { style, goal, start, anchor, timing, duration, covariance, freedom, outside })
     }
 }

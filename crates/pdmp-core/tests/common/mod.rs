@@ -87,7 +87,7 @@ pub(crate) fn tick(controller: &mut Controller, command: &Command) -> Result<Sta
     Ok(status)
 }
 
-/// All that a demonstration was learnt with: its style, goal or anchor, start and τ.
+/// All that a demonstration was learnt with: its style, goal or anchor, start and timing.
 pub(crate) fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
     let demonstrated = model.demonstrated();
     let row = |matrix: &Array2<f64>| Some(matrix.row(m).to_vec());
@@ -97,7 +97,7 @@ pub(crate) fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
         goal: row(&demonstrated.goals).filter(|_| discrete),
         anchor: row(&demonstrated.anchors).filter(|_| !discrete),
         start: row(&demonstrated.starts).filter(|_| discrete),
-        tau: Some(model.tau() * demonstrated.durations[m] / model.duration()),
+        timing: row(&demonstrated.timings),
         ..Default::default()
     }
 }

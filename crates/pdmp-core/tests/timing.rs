@@ -1,0 +1,398 @@
+//! Time beyond linear scaling: warps and events are found, kept and played back.
+#![allow(missing_docs)]
+
+mod common;
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use common::*;
+use ndarray::{Array2, array};
+use pdmp_core::{
+    Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Sampling, Status, StyleCount, Threads,
+    TimeScaling, Timing, Warp, fit, style_of,
+};
+use proptest::prelude::*;
+
+/// A movement with much to tell its phase by, of amplitude `a`, at the phase `p`; it closes where it is a cycle.
+fn shape(kind: Kind, a: f64, p: f64) -> [f64; 2] {
+    match kind {
+        Kind::Discrete => [a * minimum_jerk(p) + a * 0.3 * (9.0 * p).sin(), 0.5 * a * (5.0 * p).cos()],
+        Kind::Rhythmic => [a * (TAU * p).sin() + 0.4 * a * (2.0 * TAU * p).cos(), a * (TAU * p).cos()],
+    }
+}
+
+/// The phase at a share of the time, in the unit of the phase: K segments of slopes that average to one.
+fn phase_at(slopes: &[f64], share: f64) -> f64 {
+    let n = slopes.len() as f64;
+    let mut start = 0.0;
+    for (k, slope) in slopes.iter().enumerate() {
+        if share * n <= start + slope || k + 1 == slopes.len() {
+            return (k as f64 + (share * n - start) / slope) / n;
+        }
+        start += slope;
+    }
+    share
+}
+
+/// A demonstration that spends `slopes` times the linear time in each segment.
+fn warped(kind: Kind, a: f64, slopes: &[f64], duration: f64) -> Demonstration {
+    let n = 201;
+    let steps = if kind == Kind::Discrete { n - 1 } else { n };
+    let position = Array2::from_shape_fn((n, 2), |(c, d)| shape(kind, a, phase_at(slopes, c as f64 / steps as f64))[d]);
+    Demonstration::new(position, Sampling::Uniform { dt: duration / steps as f64 }).unwrap()
+}
+
+fn with(kind: Kind, time_scaling: TimeScaling) -> FitOptions {
+    let mut options = options(kind);
+    options.alignment.nominal = Some(0);
+    options.alignment.time_scaling = time_scaling;
+    options
+}
+
+fn by_warp(kind: Kind) -> FitOptions {
+    with(kind, TimeScaling::Warp(Warp::default()))
+}
+
+const KINDS: [Kind; 2] = [Kind::Discrete, Kind::Rhythmic];
+const EVEN: [f64; 8] = [1.0; 8];
+const UNEVEN: [f64; 8] = [1.4, 0.7, 0.5, 0.6, 1.9, 1.4, 0.9, 0.6];
+const SLOWER: [f64; 8] = [0.6, 0.8, 1.5, 1.6, 1.2, 0.7, 0.6, 1.0];
+
+/// Warps within the bounds are found back to within a step of the grid, whatever the amplitude and the duration.
+#[test]
+fn known_warps_are_found_back() {
+    for kind in KINDS {
+        for a in [1.0, 0.3, 2.5] {
+            let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, a, &UNEVEN, 1.3), warped(kind, a, &SLOWER, 0.8)];
+            let model = learn(&demos, &by_warp(kind));
+            let timings = &model.demonstrated().timings;
+            for (m, (slopes, duration)) in [(EVEN, 1.0), (UNEVEN, 1.3), (SLOWER, 0.8)].iter().enumerate() {
+                let (mut found, mut true_time) = (0.0, 0.0);
+                for k in 0..8 {
+                    found += timings[[m, k]] / duration;
+                    true_time += slopes[k] / 8.0;
+                    assert!((found - true_time).abs() < 1.01 / 80.0, "{kind} {a} {m} {k}: {found} {true_time}");
+                }
+            }
+        }
+    }
+}
+
+/// Demonstrations that are alike, however long and large, are not warped: the model is the linear one, but for its breaks.
+#[test]
+fn demonstrations_that_are_alike_are_not_warped() {
+    for kind in KINDS {
+        let demos: Vec<_> = [1.0, 0.5, 2.0].iter().map(|&a| warped(kind, a, &EVEN, 1.0 + a)).collect();
+        let (model, linear) = (learn(&demos, &by_warp(kind)), learn(&demos, &with(kind, TimeScaling::Linear)));
+        for (timing, duration) in model.demonstrated().timings.rows().into_iter().zip([2.0, 1.5, 3.0]) {
+            assert!(timing.iter().all(|seconds| (seconds - duration / 8.0).abs() < 1e-12));
+        }
+        assert_eq!(model.demonstrated().styles, linear.demonstrated().styles);
+        let (timing, nominal) = (Timing { dt: 0.01, duration: None }, Conditions::default());
+        assert_eq!(model.rollout(&nominal, timing).unwrap(), linear.rollout(&nominal, timing).unwrap());
+    }
+}
+
+/// One segment is linear scaling, to the last bit of the model.
+#[test]
+fn one_segment_is_linear() {
+    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
+        let one = learn(&demos, &with(kind, TimeScaling::Warp(Warp::new(1, 2.5).unwrap())));
+        let linear = learn(&demos, &with(kind, TimeScaling::Linear));
+        assert_eq!(one.demonstrated(), linear.demonstrated());
+        let timing = Timing { dt: 0.01, duration: None };
+        let nominal = Conditions::default();
+        assert_eq!(one.rollout(&nominal, timing).unwrap(), linear.rollout(&nominal, timing).unwrap());
+        assert_eq!(linear.demonstrated().breaks, [0.0, 1.0]);
+        assert_eq!(linear.demonstrated().timings.column(0).to_vec(), linear.demonstrated().durations);
+        let timed = Conditions { timing: Some(vec![1.7]), ..Default::default() };
+        let scaled = Conditions { tau: Some(linear.tau() * 1.7 / linear.duration()), ..Default::default() };
+        assert_eq!(linear.rollout(&timed, timing).unwrap(), linear.rollout(&scaled, timing).unwrap());
+    }
+}
+
+/// Played back in its own timing, every demonstration is given back, as it is with linear scaling.
+#[test]
+fn every_demonstration_is_given_back_in_its_own_timing() {
+    for kind in KINDS {
+        // Smooth in time, as recordings are: the corners of the warps above are no movement's.
+        let demos: Vec<_> = [(1.0, 0.0), (0.8, 0.08), (1.3, -0.1), (0.9, 0.05)]
+            .iter()
+            .map(|&(a, bend)| {
+                let position = Array2::from_shape_fn((401, 2), |(c, d)| {
+                    let s = c as f64 / if kind == Kind::Discrete { 400.0 } else { 401.0 };
+                    shape(kind, a, s + bend * (TAU * s).sin())[d]
+                });
+                Demonstration::new(position, Sampling::Uniform { dt: 0.004 * a }).unwrap()
+            })
+            .collect();
+        let events = Array2::from_shape_fn((4, 2), |(m, e)| {
+            let duration = demos[m].n_samples() as f64 * 0.004 * [1.0, 0.8, 1.3, 0.9][m];
+            duration * [0.3 + 0.02 * m as f64, 0.7 - 0.05 * m as f64][e]
+        });
+        let error = |time_scaling| {
+            let model = learn(&demos, &FitOptions { styles: StyleCount::Given(4), ..with(kind, time_scaling) });
+            (0..demos.len()).map(|m| reproduction_error(&model, &demos, m)).fold(0.0, f64::max)
+        };
+        let (linear, warp) = (error(TimeScaling::Linear), error(TimeScaling::Warp(Warp::default())));
+        let events = error(TimeScaling::Events(events));
+        assert!(linear <= 1e-4 && warp <= 1e-4 && events <= 1e-4, "{kind}: {linear:e} {warp:e} {events:e}");
+    }
+}
+
+/// Events of all demonstrations fall on the breaks, which are where the nominal one has them.
+#[test]
+fn events_fall_on_their_breaks() {
+    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
+        let linear = learn(&demos, &with(kind, TimeScaling::Linear));
+        let durations = &linear.demonstrated().durations;
+        let events = Array2::from_shape_fn((demos.len(), 2), |(m, e)| {
+            durations[m] * [0.25 + 0.03 * m as f64, 0.6 + 0.02 * m as f64][e]
+        });
+        let model = learn(&demos, &with(kind, TimeScaling::Events(events.clone())));
+        let shown = model.demonstrated();
+        assert!((shown.breaks[1] - 0.25).abs() < 1e-14 && (shown.breaks[2] - 0.6).abs() < 1e-14);
+        for m in 0..demos.len() {
+            assert!((shown.timings[[m, 0]] - events[[m, 0]]).abs() < 1e-14);
+            assert!((shown.timings[[m, 0]] + shown.timings[[m, 1]] - events[[m, 1]]).abs() < 1e-14);
+            assert!((shown.durations[m] - durations[m]).abs() < 1e-14);
+            // The event is an instant of the recording and a phase of the movement, where all demonstrations have theirs.
+            let at = Timing { dt: events[[m, 0]], duration: Some(events[[m, 0]]) };
+            let conditions = conditions_of(&model, m);
+            let there = model.rollout(&conditions, at).unwrap().position.row(1).to_vec();
+            let still = Conditions { timing: None, ..conditions };
+            let at = 0.25 * model.duration();
+            let same = model.rollout(&still, Timing { dt: at, duration: Some(at) }).unwrap().position.row(1).to_vec();
+            assert!(there.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-9));
+        }
+    }
+}
+
+/// A rollout in a timing is the linear one read along it, and its velocity and acceleration are those of its position.
+#[test]
+fn a_timed_rollout_is_the_movement_along_its_timing() {
+    for kind in KINDS {
+        let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3), warped(kind, 1.1, &SLOWER, 0.8)];
+        let model = learn(&demos, &by_warp(kind));
+        let timing: Vec<f64> = SLOWER.iter().map(|slope| slope * 0.2).collect();
+        for velocity in [None, Some(vec![0.7, -0.2])] {
+            let start = (kind == Kind::Rhythmic).then(|| vec![0.1, 0.2]);
+            let timed = Conditions { timing: Some(timing.clone()), velocity, start, ..Default::default() };
+            // Past the end, too, but for the instants at which acceleration jumps: it is smooth in between.
+            let dt = 1e-3;
+            let made = model.rollout(&timed, Timing { dt, duration: Some(1.9) }).unwrap();
+            let scale = made.acceleration.iter().fold(0.0f64, |most, a| most.max(a.abs()));
+            let mut worst = 0.0f64;
+            for k in 1..made.time.len() - 1 {
+                for d in 0..2 {
+                    let [before, here, after] = [k - 1, k, k + 1].map(|k| made.position[[k, d]]);
+                    let slope = (after - before) / (2.0 * dt);
+                    assert!((slope - made.velocity[[k, d]]).abs() < 1e-3 * scale, "{kind} {k} {d}");
+                    let near_break = (0..=16).any(|i| {
+                        let at = timing.iter().cycle().take(i).sum::<f64>();
+                        (made.time[k] - at).abs() < 1.5 * dt
+                    });
+                    if !near_break {
+                        let bend = (after - 2.0 * here + before) / (dt * dt);
+                        worst = worst.max((bend - made.acceleration[[k, d]]).abs() / scale);
+                    }
+                }
+            }
+            assert!(worst < 2e-2, "{kind}: {worst:e}");
+            if let Some(velocity) = &timed.velocity {
+                assert!((made.velocity[[0, 0]] - velocity[0]).abs() < 1e-12);
+                assert!((made.velocity[[0, 1]] - velocity[1]).abs() < 1e-12);
+            }
+        }
+        // As long as the timing, unless told otherwise.
+        let timed = Conditions { timing: Some(timing.clone()), ..Default::default() };
+        assert_eq!(model.rollout(&timed, Timing { dt: 0.01, duration: None }).unwrap().time.len(), 161);
+    }
+}
+
+/// A timing in the proportions of the nominal one is a τ.
+#[test]
+fn a_nominal_timing_is_linear_time() {
+    for kind in KINDS {
+        let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3)];
+        let model = learn(&demos, &by_warp(kind));
+        let timed = Conditions { timing: Some(vec![0.2; 8]), ..Default::default() };
+        let scaled = Conditions { tau: Some(1.6 * model.tau()), ..Default::default() };
+        let [timed, scaled] =
+            [timed, scaled].map(|conditions| model.rollout(&conditions, Timing { dt: 0.01, duration: None }).unwrap());
+        for (a, b) in [(timed.position, scaled.position), (timed.velocity, scaled.velocity)] {
+            assert!((a - b).iter().all(|difference| difference.abs() < 1e-9));
+        }
+    }
+}
+
+/// A loop whose τ is that of the timing at every tick plays the demonstration back in its timing.
+#[test]
+fn a_loop_follows_a_timing_by_its_tau() {
+    for kind in KINDS {
+        let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3)];
+        let model = learn(&demos, &by_warp(kind));
+        let conditions = conditions_of(&model, 1);
+        let timing = conditions.timing.clone().unwrap();
+        let made = model.rollout(&conditions, Timing { dt: 1e-3, duration: None }).unwrap().position;
+        let at = |phase: f64| model.tau_at(phase, &timing).unwrap();
+        let tau = Some(at(if kind == Kind::Discrete { 1.0 } else { 0.0 }));
+        let conditions = Conditions { tau, timing: None, ..conditions };
+        let mut controller = Controller::new(Arc::clone(&model), 1e-3, &conditions, Some(0.0)).unwrap();
+        for k in 1..made.nrows() {
+            assert!(controller.step().unwrap() == Status::Working || k + 100 > made.nrows());
+            controller.set_tau(at(controller.phase())).unwrap();
+            let off = (0..2).map(|d| (controller.position()[d] - made[[k, d]]).abs()).fold(0.0, f64::max);
+            assert!(off < 2e-2, "{kind} {k}: {off}");
+        }
+    }
+}
+
+/// The timing is predicted with the rest, and a controller takes its sum.
+#[test]
+fn timings_are_predicted_from_contexts() {
+    let kind = Kind::Discrete;
+    let slow = |h: f64| (0..8).map(|k| if k < 4 { 1.0 + h } else { 1.0 - h }).collect::<Vec<f64>>();
+    let heights = [0.0, 0.1, 0.2, 0.3, 0.4];
+    let demos: Vec<_> = heights.iter().map(|&h| warped(kind, 1.0, &slow(h), 1.0 + h)).collect();
+    let contexts = Some(heights.iter().map(|&h| vec![h.into()]).collect());
+    let model = learn(&demos, &FitOptions { contexts, ..by_warp(kind) });
+    let found = model.predict(&[0.25]).unwrap();
+    let first: f64 = found.timing[..4].iter().sum();
+    assert!((first - 1.25 * 1.25 / 2.0).abs() < 0.02, "{first}");
+    assert!((found.duration - 1.25).abs() < 0.02);
+    assert_eq!(found.duration, found.timing.iter().sum::<f64>());
+    let size = model.n_styles() + 2 * model.n_dofs() + 8;
+    assert_eq!(found.covariance.as_ref().unwrap().dim(), (size, size));
+    let conditions = model.conditions(&found);
+    assert_eq!(conditions.timing.as_ref(), Some(&found.timing));
+    let controller = Controller::new(Arc::clone(&model), 1e-3, &conditions, None).unwrap();
+    assert!((controller.tau() / model.tau() - found.duration / model.duration()).abs() < 1e-12);
+}
+
+/// A new demonstration is timed as the others were: by the template, or by its own events.
+#[test]
+fn style_of_finds_warped_demonstrations_again() {
+    for kind in KINDS {
+        let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.7, &UNEVEN, 1.3), warped(kind, 1.4, &SLOWER, 0.8)];
+        let events = array![[0.4], [0.5], [0.3]];
+        for time_scaling in [TimeScaling::Warp(Warp::default()), TimeScaling::Events(events.clone())] {
+            let by_events = matches!(time_scaling, TimeScaling::Events(_));
+            let model = learn(&demos, &FitOptions { styles: StyleCount::Given(3), ..with(kind, time_scaling) });
+            for (m, demo) in demos.iter().enumerate() {
+                let own = events.row(m).to_vec();
+                let style = style_of(&model, demo, None, None, by_events.then_some(&own)).unwrap();
+                for (j, s) in style.iter().enumerate() {
+                    assert!((s - model.demonstrated().styles[[m, j]]).abs() < 5e-3, "{kind} {m} {j} {s}");
+                }
+            }
+            let wrong = style_of(&model, &demos[1], None, None, (!by_events).then_some(&[0.5])).unwrap_err();
+            assert!(wrong.to_string().contains("events="), "{wrong}");
+        }
+    }
+}
+
+/// The model file keeps breaks, timings and the template; the number of threads changes no bit of it.
+#[test]
+fn a_warped_model_is_saved_and_does_not_depend_on_threads() {
+    for kind in KINDS {
+        let demos: Vec<_> = (0..7)
+            .map(|m| {
+                let share = m as f64 / 6.0;
+                let slopes: Vec<f64> = UNEVEN.iter().map(|slope| 1.0 + share * (slope - 1.0)).collect();
+                warped(kind, 1.0 - 0.5 * share, &slopes, 1.0 + share)
+            })
+            .collect();
+        let bytes = |n| {
+            let threads = Threads::new(n).unwrap();
+            learn(&demos, &FitOptions { threads, ..by_warp(kind) }).to_bytes().unwrap()
+        };
+        let one = bytes(1);
+        assert!([2, 3, 8].iter().all(|&n| bytes(n) == one));
+        let model = Arc::new(Model::from_bytes(&one).unwrap());
+        assert_eq!(model.to_bytes().unwrap(), one);
+        assert_eq!(model.demonstrated().breaks.len(), 9);
+        assert!(model.learnt().template.is_some());
+        assert!(style_of(&model, &demos[3], None, None, None).is_ok());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Whatever the demonstrations, slopes stay within their bounds, and times add up to the durations.
+    #[test]
+    fn slopes_stay_within_their_bounds(
+        noise in prop::collection::vec(-1.0..1.0f64, 240), segments in 1..12usize, slope in 1.0..10.0f64,
+        size in -140..140i32, rhythmic in any::<bool>(),
+    ) {
+        let kind = if rhythmic { Kind::Rhythmic } else { Kind::Discrete };
+        let demo = |values: &[f64], scale: f64| {
+            let position = Array2::from_shape_fn((values.len() / 2, 2), |(c, d)| scale * values[2 * c + d]);
+            Demonstration::new(position, Sampling::Uniform { dt: 0.02 }).unwrap()
+        };
+        let scale = 10f64.powi(size);
+        let demos = [demo(&noise[..60], scale), demo(&noise[60..140], 0.0), demo(&noise[140..], scale)];
+        let warp = Warp::new(segments, slope).unwrap();
+        let model = learn(&demos, &with(kind, TimeScaling::Warp(warp)));
+        let shown = model.demonstrated();
+        prop_assert_eq!(shown.timings.dim(), (3, segments));
+        for (timing, duration) in shown.timings.rows().into_iter().zip(&shown.durations) {
+            let linear = duration / segments as f64;
+            for seconds in timing {
+                prop_assert!((1.0 / slope - 1e-9..=slope + 1e-9).contains(&(seconds / linear)), "{}", seconds / linear);
+            }
+        }
+        let made = model.rollout(&conditions_of(&model, 2), Timing { dt: 0.01, duration: None }).unwrap();
+        prop_assert!(made.position.iter().chain(&made.velocity).chain(&made.acceleration).all(|x| x.is_finite()));
+    }
+}
+
+/// What cannot be a warp, events or a timing is refused with its numbers and the mend.
+#[test]
+fn bad_timings_are_refused() {
+    let demos = reaches();
+    let refused =
+        |time_scaling| fit(&demos, &with(Kind::Discrete, time_scaling), &mut |_, _| Ok(())).unwrap_err().to_string();
+    for (segments, slope, message) in [
+        (0, 2.5, "segments = 0: must be at least 1, which is linear"),
+        (46, 2.5, "segments = 46: must lie between 1 and 45, half the fewest samples of a demonstration"),
+        (8, 0.9, "slope = 0.9: must lie between 1, which is linear, and 10"),
+        (8, f64::NAN, "slope = NaN: must lie between 1, which is linear, and 10"),
+    ] {
+        assert_eq!(refused(TimeScaling::Warp(Warp { segments, slope })), message);
+    }
+    let events = |rows: [[f64; 2]; 5]| refused(TimeScaling::Events(Array2::from_shape_fn((5, 2), |(m, e)| rows[m][e])));
+    let good = [0.3, 0.6];
+    let message = events([good, good, [0.6, 0.3], good, good]);
+    assert!(message.starts_with("demo 2: events[1] = 0.3 s must come after 0.6 s"), "{message}");
+    let message = events([good, good, good, good, [0.3, 1.08]]);
+    assert!(message.starts_with("demo 4: events[1] = 1.08 s must come after 0.3 s"), "{message}");
+    let message = events([[0.0, 0.3], good, good, good, good]);
+    assert!(message.starts_with("demo 0: events[0] = 0 s must come after 0 s, the start"), "{message}");
+    assert!(events([good, [0.1, f64::NAN], good, good, good]).starts_with("demo 1: events[1] = NaN s"));
+    let wrong = |shape: (usize, usize)| refused(TimeScaling::Events(Array2::from_elem(shape, 0.5)));
+    assert_eq!(wrong((4, 1)), "events has length 4, expected 5: one value per demonstration");
+    assert!(wrong((5, 0)).contains("pass an array of shape (M, E)"));
+
+    let model = learn(&demos, &by_warp(Kind::Discrete));
+    let refused = |conditions: Conditions| {
+        let error: Error = model.rollout(&conditions, Timing { dt: 0.01, duration: None }).unwrap_err();
+        error.to_string()
+    };
+    let timed = |timing: &[f64]| refused(Conditions { timing: Some(timing.to_vec()), ..Default::default() });
+    assert_eq!(timed(&[0.1; 7]), "timing has length 7, expected 8: one value per segment between breaks");
+    for bad in [0.0, -0.1, 1e9] {
+        let mut timing = [0.1; 8];
+        timing[3] = bad;
+        assert!(timed(&timing).contains("timing = ") && timed(&timing).contains("seconds must be positive"));
+    }
+    assert!(timed(&[f64::NAN; 8]).contains("timing[0] = NaN: every number must be finite"));
+    let both = Conditions { timing: Some(vec![0.1; 8]), tau: Some(1.0), ..Default::default() };
+    assert!(refused(both).starts_with("pass tau or timing, not both"));
+    assert!(model.tau_at(0.0, &[0.1; 8]).unwrap() > 0.0, "long after the end");
+    for phase in [-0.1, 1.1, f64::NAN] {
+        assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] where discrete"));
+    }
+}
