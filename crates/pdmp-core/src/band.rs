@@ -11,7 +11,7 @@ use ndarray::{Array1, Array2, ArrayView1, Axis};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::align::Aligned;
-use crate::context::{Prediction, outputs};
+use crate::context::{Prediction, outputs, relative_changes};
 use crate::error::{Error, Result};
 use crate::model::{Conditions, Model};
 use crate::phase::Kind;
@@ -82,9 +82,10 @@ impl Model {
             }
         }
         let nominal = sensitivity.positions(outputs.row(self.demonstrated.nominal));
-        let n_segments = self.demonstrated.timings.ncols();
-        let variation = nominal.var_axis(Axis(0), 0.0).sum() / n_segments as f64;
-        metric.diag_mut().slice_mut(ndarray::s![outputs.ncols() - n_segments..]).fill(variation);
+        let changes = relative_changes(&self.demonstrated.timings.row(self.demonstrated.nominal).to_vec());
+        let (first, variation) = (outputs.ncols() - changes.nrows(), nominal.var_axis(Axis(0), 0.0).sum());
+        let timing = changes.t().dot(&changes) * (variation / changes.nrows() as f64);
+        metric.slice_mut(ndarray::s![first.., first..]).assign(&timing);
         Ok(metric)
     }
 

@@ -146,7 +146,9 @@ impl Model {
         }
         if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
             arrays.push(matrix("contexts", contexts));
-            arrays.push(vector("map.ratios", &map.recipe().ratios));
+            let recipe = map.recipe();
+            arrays.push(matrix("map.directions", &recipe.directions));
+            arrays.push(vector("map.ratios", &recipe.ratios));
             arrays.extend(self.learnt.left_over.as_ref().map(|left_over| matrix("left_over", left_over)));
         }
         arrays
@@ -387,7 +389,8 @@ impl Reader<'_> {
             return Err(bad("the map's constants are out of range"));
         }
         let errors = map.errors.iter().map(|&(kind, error)| (kind, error.unwrap_or(f64::INFINITY))).collect();
-        let recipe = Recipe { kind: map.kind, kernel: map.kernel, ratios, errors };
+        let directions = self.matrix("map.directions", (outputs.ncols(), outputs.ncols()))?;
+        let recipe = Recipe { kind: map.kind, kernel: map.kernel, directions, ratios, errors };
         ContextMap::restore(map.columns.clone(), contexts, outputs.view(), recipe)
             .map_err(|error| Error::File(error.to_string()))
     }

@@ -12,9 +12,9 @@ use crate::fit::map_of;
 /// A map from contexts to outputs, with the covariance of what it predicts.
 ///
 /// What `fit` learns from contexts to style, goal, start and duration (Section 4.1.2 of the paper), for any outputs:
-/// y = φ(h)ᵀβ + f(h) + ε. "linear" is least squares, φ = (1, h) and no f; "polynomial" and "gp" have a constant and a
-/// Gaussian process f, with the kernel of the polynomials of second degree or Matérn-5/2. Their constants are found by
-/// restricted maximum likelihood, the ratio of f to the noise for each output. Numbers are compared by their spread,
+/// y = φ(h)ᵀβ + f(h) + ε for each principal component. "linear" is least squares, φ = (1, h) and no f; "polynomial" and "gp" have a constant and a
+/// Gaussian process f, with the kernel of the polynomials of second degree or Matérn-5/2. The ratio of f to the noise is
+/// found by restricted maximum likelihood, for each component; the length, by the error at contexts left out. Numbers are compared by their spread,
 /// labels by whether they are the same; repetitions of one context are averaged and count once.
 ///
 /// Parameters
@@ -24,8 +24,8 @@ use crate::fit::map_of;
 /// outputs : (M, P) array_like
 ///     What was shown in each.
 /// map : {"auto", "linear", "polynomial", "gp"}
-///     "auto" is the Gaussian process, unless another map is better at contexts left out by more than one standard
-///     error.
+///     "auto" is the Gaussian process, unless another map is better at contexts left out by more than two standard
+///     errors.
 ///
 /// Raises
 /// ------

@@ -37,7 +37,7 @@ use crate::warp::Warp;
 /// map : {"auto", "linear", "polynomial", "gp"}
 ///     What leads from contexts to movements: least squares as in the paper, ridge regression on polynomials of second
 ///     degree, or a Gaussian process. "auto" is the process, unless another is better at contexts left out by more
-///     than one standard error; `model.map` tells.
+///     than two standard errors; `model.map` tells.
 /// n_styles : int, optional
 ///     Style dimension J; otherwise from `spectrum`.
 /// spectrum : float

@@ -1,4 +1,4 @@
-//! How a map is chosen: ratios and length by evidence, the kind of map by its error at contexts left out.
+//! How a map is chosen: the ratios by evidence, length and kind of map by the error at contexts left out.
 
 use std::fmt;
 
@@ -9,11 +9,13 @@ use super::kernel::Kernel;
 use super::kriging::{Kriging, Values};
 use crate::error::Result;
 
-/// Lengths that are tried, in units of the contexts' spread: from a quarter to eight.
-const LENGTHS: usize = 9;
+/// Lengths that are tried, in units of the contexts' spread.
+const LENGTHS: [f64; 9] = [8.0, 5.2, 3.4, 2.2, 1.4, 0.92, 0.59, 0.39, 0.25];
 /// Grid of ln(ρ·mean λ), and how far the search goes on from its best.
 const GRID: (f64, f64, f64) = (-7.0, 16.0, 0.5);
 const HALVINGS: usize = 12;
+/// Standard errors that tell for sure that another map is better than the process.
+const CLEARLY: f64 = 2.0;
 /// Fewest contexts between which a choice is made.
 const FEWEST: usize = 4;
 /// Most contexts of a map whose cost grows with their cube.
@@ -27,7 +29,7 @@ pub enum MapKind {
     Linear,
     /// Ridge regression on polynomials of second degree, the penalty of each output by its evidence.
     Polynomial,
-    /// A Gaussian process (Matérn-5/2), length and the noise of each output by their evidence.
+    /// A Gaussian process (Matérn-5/2), the noise of each output by its evidence, the length by the error left out.
     Gp,
 }
 
@@ -58,7 +60,8 @@ impl fmt::Display for MapKind {
 /// How the map from contexts is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MapChoice {
-    /// The Gaussian process, unless another map is better at contexts left out by more than one standard error.
+    /// The Gaussian process, unless another map has a smaller error at contexts left out, by a share of the two errors
+    /// that is above zero by more than two standard errors.
     #[default]
     Auto,
     /// This one.
@@ -89,25 +92,19 @@ impl Candidate {
             MapKind::Linear => Self::with(kind, None, shown, |_, _| vec![0.0; shown.outputs.ncols()]),
             MapKind::Polynomial => Self::with(kind, Some(Kernel::Quadratic), shown, ratios),
             MapKind::Gp => {
-                let lively = lively(shown.outputs);
-                let at_length = |k: usize| {
-                    let length = 0.25 * 32f64.powf(k as f64 / (LENGTHS - 1) as f64);
-                    let candidate = Self::with(kind, Some(Kernel::Matern { length }), shown, |_, _| Vec::new())?;
-                    // Weak: a factor of e to either side of two spreads costs half a unit.
-                    let prior = -0.5 * (length.ln() - 0.7).powi(2);
-                    let evidence = Evidence::new(&candidate.kriging, &candidate.values).best();
-                    Ok((lively.iter().map(|&p| evidence[p].1 + prior).sum::<f64>(), candidate))
+                let of_length = |length| {
+                    let candidate = Self::with(kind, Some(Kernel::Matern { length }), shown, ratios)?;
+                    Ok((candidate.errors().sum(), candidate))
                 };
-                let mut best = at_length(0)?;
-                for k in 1..LENGTHS {
-                    let found = at_length(k)?;
-                    if found.0 > best.0 {
+                // From the longest down: what few contexts cannot tell is left smooth.
+                let mut best = of_length(LENGTHS[0])?;
+                for &length in &LENGTHS[1..] {
+                    let found = of_length(length)?;
+                    if found.0 < best.0 {
                         best = found;
                     }
                 }
-                let (_, mut chosen) = best;
-                chosen.ratios = ratios(&chosen.kriging, &chosen.values);
-                Ok(chosen)
+                Ok(best.1)
             }
         }
     }
@@ -125,22 +122,18 @@ impl Candidate {
         Ok(Self { kind, kernel, kriging, values, ratios })
     }
 
-    /// Squared errors at each context left out (n,), by the metric (P, P).
-    fn errors(&self, metric: ArrayView2<f64>) -> Array1<f64> {
+    /// Squared errors at each context left out (n,).
+    fn errors(&self) -> Array1<f64> {
         let errors = self.kriging.left_out(&self.values, &self.ratios);
         if errors.iter().any(|error| !error.is_finite()) {
             return Array1::from_elem(errors.nrows(), f64::INFINITY);
         }
-        (errors.dot(&metric) * &errors).sum_axis(Axis(1))
+        errors.map_axis(Axis(1), |row| row.dot(&row))
     }
 }
 
 /// The map of a choice, and the error of each that was tried at contexts left out.
-pub(super) fn choose(
-    choice: MapChoice,
-    shown: &Shown,
-    metric: ArrayView2<f64>,
-) -> Result<(Candidate, Vec<(MapKind, f64)>)> {
+pub(super) fn choose(choice: MapChoice, shown: &Shown) -> Result<(Candidate, Vec<(MapKind, f64)>)> {
     let n = shown.inputs.nrows();
     let kinds = match choice {
         MapChoice::Given(kind) => vec![kind],
@@ -150,15 +143,16 @@ pub(super) fn choose(
     let mut candidates = Vec::with_capacity(kinds.len());
     for kind in kinds {
         let candidate = Candidate::of(kind, shown)?;
-        let errors = candidate.errors(metric);
+        let errors = candidate.errors();
         candidates.push((candidate, errors));
     }
     let tried: Vec<_> = candidates.iter().map(|(candidate, errors)| (candidate.kind, mean(errors))).collect();
     let reference = candidates[0].1.clone();
     let better = |errors: &Array1<f64>| {
-        let gain = &reference - errors;
+        // In shares, each context has its say: the ends, where errors are largest, would drown the others.
+        let gain = (&reference - errors) / (&reference + errors).mapv(|sum| sum.max(f64::MIN_POSITIVE));
         let spread = (&gain - mean(&gain)).mapv(|x| x * x).sum() / (n * (n - 1).max(1)) as f64;
-        mean(&gain) > spread.sqrt()
+        mean(errors) < mean(&reference) && mean(&gain) > CLEARLY * spread.sqrt()
     };
     let best = (1..candidates.len())
         .filter(|&k| better(&candidates[k].1))
@@ -169,16 +163,6 @@ pub(super) fn choose(
 
 fn mean(values: &Array1<f64>) -> f64 {
     values.mean().unwrap_or(0.0)
-}
-
-/// Outputs that vary at all.
-fn lively(outputs: ArrayView2<f64>) -> Vec<usize> {
-    let varies = |column: ndarray::ArrayView1<f64>| {
-        let mean = column.mean().unwrap_or(0.0);
-        let size = column.fold(0.0f64, |most, y| most.max(y.abs()));
-        column.iter().any(|y| (y - mean).abs() > 1e-9 * size)
-    };
-    (0..outputs.ncols()).filter(|&p| varies(outputs.column(p))).collect()
 }
 
 /// The ratio ρ of each output, by its evidence.

@@ -5,6 +5,7 @@
 //! one context are averaged, and every context counts once: what they share beyond their context must not weigh by
 //! how often it was shown.
 
+mod axes;
 mod choice;
 mod kernel;
 mod kriging;
@@ -20,10 +21,11 @@ use ndarray::{Array2, ArrayView2, Axis};
 pub use choice::{MapChoice, MapKind};
 pub(crate) use kernel::Kernel;
 pub use prediction::Prediction;
-pub(crate) use prediction::outputs;
+pub(crate) use prediction::{outputs, relative_changes};
 pub use space::ContextColumn;
 pub(crate) use space::tabulate;
 
+use axes::Axes;
 use choice::{Candidate, MOST, Shown, choose};
 use kriging::Kriging;
 use space::{Scale, numbers};
@@ -38,6 +40,8 @@ pub struct ContextMap {
     scale: Scale,
     kind: MapKind,
     kernel: Option<Kernel>,
+    axes: Axes,
+    /// The ratio of signal to noise of each component (P,), as all that follows is of components.
     ratios: Vec<f64>,
     errors: Vec<(MapKind, f64)>,
     kriging: Kriging,
@@ -56,6 +60,7 @@ pub struct ContextMap {
 pub(crate) struct Recipe {
     pub(crate) kind: MapKind,
     pub(crate) kernel: Option<Kernel>,
+    pub(crate) directions: Array2<f64>,
     pub(crate) ratios: Vec<f64>,
     pub(crate) errors: Vec<(MapKind, f64)>,
 }
@@ -102,8 +107,10 @@ impl ContextMap {
             let allowed = "different contexts: at most 1024 for this map; round them, or take map=\"linear\"";
             return Err(Error::Range { name, value, allowed });
         }
-        let (candidate, errors) = choose(choice, &data.shown(), metric)?;
-        Ok(data.map(candidate, errors))
+        let axes = Axes::principal(data.means.view(), metric)?;
+        let data = data.along(&axes);
+        let (candidate, errors) = choose(choice, &data.shown())?;
+        Ok(data.map(axes, candidate, errors))
     }
 
     /// The same map again, from the data that it was learnt from.
@@ -113,15 +120,16 @@ impl ContextMap {
         outputs: ArrayView2<f64>,
         recipe: Recipe,
     ) -> Result<Self> {
-        let data = Data::of(columns, contexts, outputs)?;
-        let Recipe { kind, kernel, ratios, errors } = recipe;
+        let Recipe { kind, kernel, directions, ratios, errors } = recipe;
+        let axes = Axes::new(directions)?;
+        let data = Data::of(columns, contexts, outputs)?.along(&axes);
         let candidate = Candidate::with(kind, kernel, &data.shown(), |_, _| ratios)?;
-        Ok(data.map(candidate, errors))
+        Ok(data.map(axes, candidate, errors))
     }
 
     pub(crate) fn recipe(&self) -> Recipe {
-        let (ratios, errors) = (self.ratios.clone(), self.errors.clone());
-        Recipe { kind: self.kind, kernel: self.kernel, ratios, errors }
+        let (directions, ratios, errors) = (self.axes.directions.clone(), self.ratios.clone(), self.errors.clone());
+        Recipe { kind: self.kind, kernel: self.kernel, directions, ratios, errors }
     }
 
     /// What each value of a context means.
@@ -167,15 +175,16 @@ impl ContextMap {
         let context: Vec<ContextValue> = context.iter().cloned().map(Into::into).collect();
         let context = numbers(&self.columns, &context)?;
         let place = self.kriging.place(&self.scale.features(&context));
-        let mean = (place.flat.dot(&self.flat) + place.rest.dot(&self.rest)).to_vec();
+        let components = place.flat.dot(&self.flat) + place.rest.dot(&self.rest);
+        let mean = components.dot(&self.axes.directions).to_vec();
         let covariance = self.noise.as_ref().map(|noise| {
             let spread: Vec<f64> =
                 self.ratios.iter().map(|&ratio| (1.0 + self.kriging.variance(&place, ratio)).sqrt()).collect();
             let grown = Array2::from_shape_fn(noise.dim(), |(i, j)| noise[[i, j]] * spread[i] * spread[j]);
-            match &self.within {
+            self.axes.covariance(&match &self.within {
                 Some(within) => grown + within,
                 None => grown,
-            }
+            })
         });
         if mean.iter().chain(covariance.iter().flatten()).any(|x| !x.is_finite()) {
             return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
@@ -245,11 +254,17 @@ impl Data {
         Ok(Self { columns, scale, inputs, means, within, kept })
     }
 
+    /// The same, of components along axes.
+    fn along(self, axes: &Axes) -> Self {
+        let within = self.within.map(|(within, freedom)| (axes.scatter(&within), freedom));
+        Self { means: axes.components(&self.means), within, ..self }
+    }
+
     fn shown(&self) -> Shown<'_> {
         Shown { inputs: self.inputs.view(), n_inputs: self.scale.n_inputs(), outputs: self.means.view() }
     }
 
-    fn map(self, candidate: Candidate, errors: Vec<(MapKind, f64)>) -> ContextMap {
+    fn map(self, axes: Axes, candidate: Candidate, errors: Vec<(MapKind, f64)>) -> ContextMap {
         let Candidate { kind, kernel, kriging, values, ratios } = candidate;
         let (noise, freedom) = match (kriging.freedom(), &self.within) {
             // As many coefficients as contexts: what is left is the noise of the averages.
@@ -263,6 +278,6 @@ impl Data {
         let within = self.within.map(|(within, _)| within * (1.0 - self.kept));
         let rest = kriging.coefficients(&values, &ratios);
         let (columns, scale, flat) = (self.columns, self.scale, values.flat);
-        ContextMap { columns, scale, kind, kernel, ratios, errors, kriging, flat, rest, noise, within, freedom }
+        ContextMap { columns, scale, kind, kernel, axes, ratios, errors, kriging, flat, rest, noise, within, freedom }
     }
 }

@@ -31,20 +31,34 @@ pub struct Prediction {
     pub outside: Vec<f64>,
 }
 
-/// The outputs of the map (M, P): style, goal and start or anchor, logarithms of the timing (M, K).
+/// The outputs of the map (M, P): style, goal and start or anchor, and the timing (M, K) as logarithms: that of the
+/// duration, and those of each segment's time relative to the last one's.
 pub(crate) fn outputs(
     kind: Kind,
     styles: ArrayView2<f64>,
     [goals, starts, anchors]: [ArrayView2<f64>; 3],
     timings: ArrayView2<f64>,
 ) -> Array2<f64> {
-    let logarithms = timings.mapv(f64::ln);
+    let last = timings.ncols() - 1;
+    let logarithms = Array2::from_shape_fn(timings.dim(), |(m, k)| match k {
+        0 => timings.row(m).sum().ln(),
+        _ => (timings[[m, k - 1]] / timings[[m, last]]).ln(),
+    });
     let parts = match kind {
         Kind::Discrete => vec![styles, goals, starts, logarithms.view()],
         Kind::Rhythmic => vec![styles, anchors, logarithms.view()],
     };
     // Row counts are equal by construction.
     concatenate(Axis(1), &parts).unwrap_or_default()
+}
+
+/// Relative change of each time (K,) in a timing per unit of the outputs that it is foreseen by (K,).
+pub(crate) fn relative_changes(timing: &[f64]) -> Array2<f64> {
+    let duration: f64 = timing.iter().sum();
+    Array2::from_shape_fn((timing.len(), timing.len()), |(k, output)| match output {
+        0 => 1.0,
+        i => f64::from(u8::from(k == i - 1)) - timing[i - 1] / duration,
+    })
 }
 
 impl Prediction {
@@ -55,14 +69,17 @@ impl Prediction {
     pub(crate) fn of(expected: Expected, freedom: usize, kind: Kind, n_styles: usize, n_dofs: usize) -> Result<Self> {
         let Expected { mean, mut covariance, outside } = expected;
         let first = n_styles + n_dofs * if kind == Kind::Discrete { 2 } else { 1 };
-        let timing: Vec<f64> = mean[first..].iter().map(|logarithm| logarithm.exp()).collect();
-        let duration: f64 = timing.iter().sum();
+        let duration = mean[first].exp();
+        let weights: Vec<f64> = mean[first + 1..].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
+        let whole: f64 = weights.iter().sum();
+        let timing: Vec<f64> = weights.iter().map(|weight| duration * weight / whole).collect();
         if let Some(covariance) = &mut covariance {
-            // dt = t d(ln t).
-            for (k, seconds) in timing.iter().enumerate() {
-                covariance.row_mut(first + k).mapv_inplace(|x| x * seconds);
-                covariance.column_mut(first + k).mapv_inplace(|x| x * seconds);
+            let changes = relative_changes(&timing);
+            let mut seconds = Array2::eye(mean.len());
+            for ((k, i), change) in changes.indexed_iter() {
+                seconds[[first + k, first + i]] = timing[k] * change;
             }
+            *covariance = seconds.dot(covariance).dot(&seconds.t());
         }
         let finite = covariance.iter().flatten().all(|x| x.is_finite());
         if !(finite && duration.is_finite() && timing.iter().all(|&time| time > 0.0)) {

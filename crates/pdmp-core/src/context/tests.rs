@@ -14,9 +14,9 @@ fn linear(numbers: &[f64], outputs: &Array2<f64>) -> ContextMap {
 /// Data on a line are predicted exactly, inside the range and outside, and `Auto` sees that they are on a line.
 #[test]
 fn linear_data_are_predicted_exactly() {
-    let h = array![[0.0], [0.3], [0.45], [0.9]];
-    let outputs = h.dot(&array![[2.0, -1.0, 0.5, 0.1]]) + 0.7;
-    let map = ContextMap::fit(&contexts(&[0.0, 0.3, 0.45, 0.9]), outputs.view(), MapChoice::Auto).unwrap();
+    let h = [0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9];
+    let outputs = Array2::from_shape_fn((7, 1), |(m, _)| h[m]).dot(&array![[2.0, -1.0, 0.5, 0.1]]) + 0.7;
+    let map = ContextMap::fit(&contexts(&h), outputs.view(), MapChoice::Auto).unwrap();
     assert_eq!(map.kind(), MapKind::Linear);
     for at in [0.6, 2.0] {
         let found = map.predict(&[at]).unwrap();

@@ -1,0 +1,76 @@
+//! The axes along which outputs are foreseen: those along which movements vary.
+//!
+//! Each output has a signal and a noise of its own. Styles, goals and starts of a movement are not what should have
+//! them: they say the same thing several times, and styles are ordered by what they force, not by how far they move.
+//! The principal components of the movements themselves vary independently, and the errors of each count alike.
+
+use faer::linalg::solvers::DenseSolveCore;
+use faer::{Mat, Side};
+use ndarray::{Array2, ArrayView2, Axis};
+
+use crate::error::{Error, Result};
+
+/// Least size of a movement per unit of an output, relative to the largest: what moves nothing is foreseen too.
+const FLOOR: f64 = 1e-5;
+
+/// Coordinates in which outputs are a mean and independent components.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Axes {
+    /// Outputs per unit of each component, by rows (P, P), and the inverse of that.
+    pub(super) directions: Array2<f64>,
+    components: Array2<f64>,
+}
+
+impl Axes {
+    /// The principal axes of outputs (n, P), whose errors e count eᵀGe with the `metric` G (P, P).
+    pub(super) fn principal(outputs: ArrayView2<f64>, metric: ArrayView2<f64>) -> Result<Self> {
+        let (sizes, vectors) = eigen(metric)?;
+        let largest = sizes.iter().fold(0.0f64, |most, size| most.max(*size)).max(f64::MIN_POSITIVE);
+        let sizes: Vec<f64> = sizes.iter().map(|size| size.max(largest * FLOOR * FLOOR).sqrt()).collect();
+        // In these coordinates every error counts alike, and stays so where they are rotated.
+        let scaled = |power: i32| Array2::from_shape_fn(vectors.dim(), |(p, k)| vectors[[p, k]] * sizes[k].powi(power));
+        let deviations = (&outputs - &outputs.mean_axis(Axis(0)).unwrap_or_default()).dot(&scaled(1));
+        let (_, rotation) = eigen(deviations.t().dot(&deviations).view())?;
+        // In rows, as a file gives them: sums are then the same to the last bit.
+        Self::new(rotation.t().dot(&scaled(-1).t()).as_standard_layout().into_owned())
+    }
+
+    /// The axes of known directions (P, P).
+    ///
+    /// # Errors
+    /// Directions that do not span the outputs.
+    pub(super) fn new(directions: Array2<f64>) -> Result<Self> {
+        let n = directions.nrows();
+        let inverse = Mat::from_fn(n, n, |i, j| directions[[i, j]]).partial_piv_lu().inverse();
+        let components = Array2::from_shape_fn((n, n), |(i, j)| inverse[(i, j)]);
+        if components.iter().any(|x| !x.is_finite()) {
+            return Err(Error::Fit("the axes of the map from contexts depend on each other".to_string()));
+        }
+        Ok(Self { directions, components })
+    }
+
+    /// Components (n, P) of outputs (n, P).
+    pub(super) fn components(&self, outputs: &Array2<f64>) -> Array2<f64> {
+        outputs.dot(&self.components)
+    }
+
+    /// Covariance of the components of outputs whose covariance is known.
+    pub(super) fn scatter(&self, covariance: &Array2<f64>) -> Array2<f64> {
+        self.components.t().dot(covariance).dot(&self.components)
+    }
+
+    /// Covariance of the outputs whose components have a known one.
+    pub(super) fn covariance(&self, scatter: &Array2<f64>) -> Array2<f64> {
+        self.directions.t().dot(scatter).dot(&self.directions)
+    }
+}
+
+/// Eigenvalues and, by columns, eigenvectors of a symmetric matrix.
+fn eigen(matrix: ArrayView2<f64>) -> Result<(Vec<f64>, Array2<f64>)> {
+    let n = matrix.nrows();
+    let found = Mat::from_fn(n, n, |i, j| matrix[[i, j]])
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|_| Error::Fit(format!("the eigenvalues of a covariance of {n} outputs did not converge")))?;
+    let values = found.S().column_vector().iter().copied().collect();
+    Ok((values, Array2::from_shape_fn((n, n), |(i, k)| found.U()[(i, k)])))
+}

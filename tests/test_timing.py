@@ -1,0 +1,164 @@
+"""Time beyond linear scaling: warps and events, their timing kept, predicted and played back."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import Demonstration, Warp
+
+N = 201
+SHARES = np.linspace(0, 1, N)
+
+
+def reach(phase: np.ndarray, height: float = 0.3) -> np.ndarray:
+    """Return a reach over an obstacle at phases in [0, 1]."""
+    rise = phase**3 * (10 - 15 * phase + 6 * phase**2)
+    return np.column_stack([rise, height * 64 * (phase - phase**2) ** 3, np.sin(6 * phase)])
+
+
+def hurried(bend: float) -> np.ndarray:
+    """Return phases that run ahead of time by up to `bend` / 3 half way."""
+    return SHARES + bend * SHARES * (1 - SHARES)
+
+
+def demos(bends: list[float], heights: list[float] | None = None) -> list[Demonstration]:
+    """Return reaches of 1 s each that hurry in different places."""
+    heights = [0.3] * len(bends) if heights is None else heights
+    return [
+        Demonstration(reach(hurried(bend), height), dt=1 / (N - 1), context=[bend])
+        for bend, height in zip(bends, heights, strict=True)
+    ]
+
+
+def test_what_differs_in_time_alone_has_one_singular_value() -> None:
+    """A warp leaves nothing to tell one movement from another that is the same at other times."""
+    shown = demos([0.0, 0.4, -0.4, 0.2, -0.2])
+    linear, warped = (pdmp.fit(shown, nominal=0, alignment=a) for a in ("linear", "warp"))
+
+    def rest(model: pdmp.Model) -> float:
+        return np.linalg.norm(model.singular_values[1:]) / model.singular_values[0]
+
+    assert rest(warped) < 0.1 * rest(linear)
+    assert linear.timings.shape == (5, 1) and warped.timings.shape == (5, 8)
+    np.testing.assert_allclose(warped.timings.sum(axis=1), warped.durations)
+    np.testing.assert_allclose(warped.durations, linear.durations, rtol=1e-12)
+
+
+@pytest.mark.parametrize("alignment", ["warp", Warp(5, slope=3)])
+def test_demonstrations_are_played_back_in_their_own_time(alignment: str | Warp) -> None:
+    """What `as_demonstrated` gives repeats a demonstration, hurry and all."""
+    shown = demos([0.0, 0.4, -0.4], [0.3, 0.2, 0.4])
+    model = pdmp.fit(shown, nominal=0, alignment=alignment, n_styles=3)
+    for m, demo in enumerate(shown):
+        made = model.rollout(**pdmp.as_demonstrated(model, m), dt=1 / (N - 1))
+        np.testing.assert_allclose(made.position, demo.position, atol=0.01)
+        rates = np.gradient(made.position, made.time, axis=0)
+        np.testing.assert_allclose(rates[2:-2], made.velocity[2:-2], atol=0.05)
+    style = model.style_of(shown[1])
+    np.testing.assert_allclose(style, model.styles[1], atol=0.01)
+
+
+def test_events_are_met_at_one_phase() -> None:
+    """Landmarks of all demonstrations fall on those of the nominal one."""
+    shown = demos([0.0, 0.4, -0.4])
+    phases = np.array([0.25, 0.7])
+    events = np.array([np.interp(phases, hurried(bend), SHARES) for bend in (0.0, 0.4, -0.4)])
+    model = pdmp.fit(shown, nominal=0, events=events, n_styles=3)
+    np.testing.assert_allclose(model.breaks, [0, *phases, 1])
+    np.testing.assert_allclose(np.cumsum(model.timings, axis=1)[:, :2], events)
+    np.testing.assert_allclose(
+        model.style_of(shown[2], events=events[2]), model.styles[2], atol=0.01
+    )
+    with pytest.raises(ValueError, match="pass events= of this demonstration"):
+        model.style_of(shown[2])
+
+
+def test_timing_is_foreseen_from_the_context() -> None:
+    """Where hurry goes with the context, a context never shown has its own, and a band about it."""
+    model = pdmp.fit(demos(list(np.linspace(-0.4, 0.4, 9))), nominal=4, alignment="warp")
+    found = model.predict([0.15])
+    assert found.timing.shape == (8,) and found.duration == pytest.approx(1, abs=1e-6)
+    size = model.n_styles + 2 * model.n_dofs + 8
+    assert found.covariance.shape == (size, size)
+    made = model.rollout(context=[0.15], dt=1 / (N - 1)).position
+    np.testing.assert_allclose(made, reach(hurried(0.15)), atol=0.02)
+    lower, upper = model.band([0.15], dt=1 / (N - 1))
+    np.testing.assert_allclose((lower + upper) / 2, made, atol=1e-12)
+
+
+def test_a_band_knows_that_timing_is_uncertain() -> None:
+    """Hurry that the context does not tell is in the band: nine tenths of new movements are too."""
+    rng = np.random.default_rng(5)
+    inside = []
+    for _ in range(6):
+        bends = list(rng.uniform(-0.5, 0.5, 14))
+        shown = demos(bends, list(np.linspace(0.2, 0.4, 14)))
+        heights = np.linspace(0.2, 0.4, 14)[:, None]
+        model = pdmp.fit(shown, contexts=heights, alignment="warp")
+        lower, upper = model.band([0.3], dt=1 / (N - 1))
+        for bend in rng.uniform(-0.5, 0.5, 10):
+            new = reach(hurried(bend))
+            inside.append(((lower <= new) & (new <= upper))[40:-40].mean())
+    assert 0.8 < np.mean(inside) < 0.99
+
+
+def test_a_loop_follows_a_timing() -> None:
+    """A controller whose tau is set at every tick is where the rollout is."""
+    model = pdmp.fit(demos([0.0, 0.4, -0.4]), nominal=0, alignment="warp")
+    given = pdmp.as_demonstrated(model, 1)
+    planned = model.rollout(**given, dt=0.001).position
+    controller = model.controller(dt=0.001, **given, transition=0)
+    for row in planned[1:]:
+        controller.tau = model.tau_at(controller.phase, given["timing"])
+        controller.step()
+        np.testing.assert_allclose(controller.position, row, atol=0.01)
+
+
+def test_timing_survives_a_file() -> None:
+    """A model loaded plays back what the one saved does, to the last bit."""
+    model = pdmp.fit(demos([0.0, 0.4, -0.4]), alignment="warp")
+    other = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(other.breaks, model.breaks)
+    np.testing.assert_array_equal(other.timings, model.timings)
+    a, b = (m.rollout(**pdmp.as_demonstrated(m, 1), dt=0.01) for m in (model, other))
+    np.testing.assert_array_equal(a.position, b.position)
+    np.testing.assert_array_equal(other.style_of(demos([0.3])[0]), model.style_of(demos([0.3])[0]))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"alignment": "elastic"}, 'alignment = \'elastic\': must be "linear", "warp" or pdmp.Warp'),
+        ({"alignment": Warp(101)}, "segments = 101: must lie between 1 and 100"),
+        ({"events": [[0.5], [0.5]]}, "events has length 2, expected 3: one value per demonstration"),
+        ({"events": [[0.5, 0.4]] * 3}, r"events\[1\] = 0.4 s must come after 0.5 s"),
+        ({"events": [[np.nan]] * 3}, "events"),
+        ({"events": [[0.5]] * 3, "alignment": "warp"}, "events align by themselves"),
+    ],
+)
+def test_what_cannot_align_is_refused(options: dict[str, object], message: str) -> None:
+    """A mistaken alignment is named, with what it should be."""
+    with pytest.raises(ValueError, match=message):
+        pdmp.fit(demos([0.0, 0.4, -0.4]), **options)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"), [((0,), "segments = 0"), ((8, 0.5), "slope = 0.5")]
+)
+def test_warps_out_of_range_are_refused(arguments: tuple[float, ...], message: str) -> None:
+    """A warp of no segment, or one that could not even be linear, is none."""
+    with pytest.raises(ValueError, match=message):
+        Warp(*arguments)
+
+
+def test_tau_and_timing_exclude_each_other() -> None:
+    """A movement has one pace or a pace for each segment."""
+    model = pdmp.fit(demos([0.0, 0.4, -0.4]), alignment="warp")
+    with pytest.raises(ValueError, match="pass tau or timing, not both"):
+        model.rollout(tau=1.0, timing=model.timings[0])
+    with pytest.raises(ValueError, match="timing has length 2, expected 8"):
+        model.rollout(timing=[0.5, 0.5])
+    with pytest.raises(ValueError, match="timing"):
+        model.rollout(timing=[-1.0] + [0.1] * 7)
