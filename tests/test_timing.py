@@ -130,9 +130,12 @@ def test_timing_survives_a_file() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"alignment": "elastic"}, 'alignment = \'elastic\': must be "linear", "warp" or pdmp.Warp'),
+        (
+            {"alignment": "elastic"},
+            'alignment = \'elastic\': must be "linear", "warp" or pdmp.Warp',
+        ),
         ({"alignment": Warp(101)}, "segments = 101: must lie between 1 and 100"),
-        ({"events": [[0.5], [0.5]]}, "events has length 2, expected 3: one value per demonstration"),
+        ({"events": [[0.5], [0.5]]}, "events has length 2, expected 3: one value per demo"),
         ({"events": [[0.5, 0.4]] * 3}, r"events\[1\] = 0.4 s must come after 0.5 s"),
         ({"events": [[np.nan]] * 3}, "events"),
         ({"events": [[0.5]] * 3, "alignment": "warp"}, "events align by themselves"),

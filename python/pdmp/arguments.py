@@ -22,8 +22,9 @@ def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
     Returns
     -------
     dict
-        `style` (J,), `tau` [s] or, where time was not scaled linearly, `timing` (K,) [s], and `goal` and `start` (D,) of a discrete or `anchor` (D,) of a
-        rhythmic primitive, for `Model.rollout` and `Model.controller`.
+        `style` (J,); `tau` [s] or, where time was not scaled linearly, `timing` (K,) [s]; `goal`
+        and `start` (D,) of a discrete or `anchor` (D,) of a rhythmic primitive: for `Model.rollout`
+        and `Model.controller`.
 
     Raises
     ------
