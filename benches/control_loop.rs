@@ -144,6 +144,6 @@ pub(crate) fn primitive(n_dofs: usize, n_styles: usize) -> Arc<Model> {
     };
     let demos: Vec<_> = (0..10).map(demonstration).collect();
     let basis = Basis::NGnet(NGnet::default());
-    let options = FitOptions { styles: StyleCount::Given(n_styles), basis, ..FitOptions::new(Kind::Discrete) };
+    let options = FitOptions { styles: StyleCount::Given(n_styles).into(), basis, ..FitOptions::new(Kind::Discrete) };
     Arc::new(fit(&demos, &options, &mut |_, _| Ok(())).expect("a fit"))
 }

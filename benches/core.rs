@@ -16,14 +16,14 @@ use pdmp_core::{
 };
 
 fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
-    let mut options = FitOptions { styles: StyleCount::Given(3), basis, ..FitOptions::new(Kind::Discrete) };
+    let mut options = FitOptions { styles: StyleCount::Given(3).into(), basis, ..FitOptions::new(Kind::Discrete) };
     options.alignment.smoothing = smoothing;
     options
 }
 
 fn learn(n_styles: usize) -> Arc<Model> {
     let options = options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate);
-    let options = FitOptions { styles: StyleCount::Given(n_styles), ..options };
+    let options = FitOptions { styles: StyleCount::Given(n_styles).into(), ..options };
     Arc::new(fit(&movements(40, 1001), &options, &mut |_, _| Ok(())).expect("a fit"))
 }
 

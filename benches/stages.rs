@@ -61,13 +61,13 @@ fn main() {
         return;
     }
     let network = FitOptions {
-        styles: StyleCount::Given(3),
+        styles: StyleCount::Given(3).into(),
         basis: Basis::NGnet(NGnet::default()),
         ..FitOptions::new(Kind::Discrete)
     };
     let mut smoothed = network.clone();
     smoothed.alignment.smoothing = Smoothing::Auto;
-    let process = FitOptions { styles: StyleCount::Given(3), ..FitOptions::new(Kind::Discrete) };
+    let process = FitOptions { styles: StyleCount::Given(3).into(), ..FitOptions::new(Kind::Discrete) };
 
     let demos = movements(20, 1001);
     heading("Milliseconds of a fit, M = 20, C = 1001, D = 7, J = 3");
@@ -78,8 +78,8 @@ fn main() {
     let demos = movements(5000, 200);
     let before = most_memory();
     heading("Milliseconds of a fit, M = 5000, C = 200, D = 7");
-    row("NGnet, J = 5", 3, &demos, &FitOptions { styles: StyleCount::Given(5), ..network.clone() });
-    row("NGnet, J by spectrum", 3, &demos, &FitOptions { styles: StyleCount::Spectrum(0.9), ..network });
+    row("NGnet, J = 5", 3, &demos, &FitOptions { styles: StyleCount::Given(5).into(), ..network.clone() });
+    row("NGnet, J by spectrum", 3, &demos, &FitOptions { styles: StyleCount::Spectrum(0.9).into(), ..network });
     if let (Some(before), Some(after)) = (before, most_memory()) {
         println!("\nMost memory: {after}, of which {before} before the first of these fits.");
     }

@@ -195,3 +195,66 @@ def test_map_agrees_with_scikit_learn() -> None:
     peer.fit(contexts, outputs)
     at = np.linspace(0.1, 0.9, 9)[:, None]
     np.testing.assert_allclose(found.predict(at)[0][:, 0], peer.predict(at).ravel(), atol=0.05)
+
+
+def scattered(rng: np.random.Generator, n: int = 16) -> tuple[list[np.ndarray], np.ndarray]:
+    """Return movements that the height bends in two ways, and chance in three others."""
+    heights = rng.uniform(0, 1, n)
+    chance = [np.sin(k * np.pi * TIME) ** 2 * [1.0, (-1.0) ** k] for k in (3, 4, 5)]
+    movements = [
+        bent(np.sin(3 * h), h**2) + sum(0.02 * rng.normal() * shape for shape in chance)
+        for h in heights
+    ]
+    return movements, heights[:, None]
+
+
+def test_styles_are_as_many_as_contexts_foresee() -> None:
+    """What contexts do not tell needs no style; the spectrum cannot know."""
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        movements, heights = scattered(rng)
+        options = {"dt": 0.02, "contexts": heights}
+        assert pdmp.fit(movements, n_styles="auto", **options).n_styles <= 3
+        assert pdmp.fit(movements, spectrum=0.99, **options).n_styles >= 5
+
+
+@pytest.mark.parametrize("kind", ["discrete", "rhythmic"])
+def test_styles_are_those_of_cross_validation(kind: str) -> None:
+    """Models fitted without one fold after the other come to the same number."""
+    rng = np.random.default_rng(4)
+    movements, heights = scattered(rng, 10)
+    if kind == "rhythmic":
+        movements = [(m - m.mean(axis=0))[:-1] * np.sin(np.pi * TIME[:-1]) for m in movements]
+    options = {"kind": kind, "dt": 0.02, "map": "linear", "alpha_z": 25.0}
+    errors = np.empty((10, 9))
+    for m, height in enumerate(heights):
+        kept = [k for k in range(10) if k != m]
+        for j in range(9):
+            model = pdmp.fit(
+                [movements[k] for k in kept],
+                contexts=heights[kept],
+                n_styles=j + 1,
+                nominal=0,
+                **options,
+            )
+            made = model.rollout(context=height, dt=0.02).position[: len(movements[m])]
+            errors[m, j] = ((made - movements[m]) ** 2).sum(axis=1).mean()
+    best = errors.mean(axis=0).argmin()
+    more = errors - errors[:, [best]]
+    close = more.mean(axis=0) <= more.std(axis=0, ddof=1) / np.sqrt(10)
+    found = pdmp.fit(movements, contexts=heights, n_styles="auto", nominal=0, **options)
+    assert found.n_styles == 1 + close.argmax()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"n_styles": "auto"}, "goes by contexts: pass contexts"),
+        ({"n_styles": "auto", "contexts": [[0.0], [0.0], [1.0]]}, "three different contexts"),
+        ({"n_styles": "most"}, 'n_styles = "most": must be a number, "auto" or None'),
+    ],
+)
+def test_styles_that_cannot_be_chosen_are_refused(options: dict[str, object], message: str) -> None:
+    """A choice by contexts needs some that differ."""
+    with pytest.raises(ValueError, match=message):
+        pdmp.fit([bent(0.1), bent(0.2), bent(0.3)], dt=0.02, **options)

@@ -4,10 +4,10 @@ import argparse
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from pdmp import plot
+from pdmp import Warp, plot
 from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
 from report.sets import Question, questions
-from report.text import PRIMITIVE, text
+from report.text import FORESEEN, PRIMITIVE, WARPED, text
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "report"
@@ -15,7 +15,9 @@ CURVES = {"raise_hand, whole", "walking_force, subject 0"}
 PRIMITIVES = {
     PRIMITIVE: PDMP(),
     "PDMP, full J": PDMP(spectrum=1.0),
-    "PDMP, linear": PDMP(map="linear"),
+    "PDMP, linear map": PDMP(map="linear"),
+    FORESEEN: PDMP(n_styles="auto"),
+    WARPED: PDMP(alignment=Warp(4)),
 }
 
 

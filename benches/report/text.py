@@ -1,14 +1,17 @@
 """The report as Markdown."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import pdmp
-from pdmp.evaluation import Evaluation
+from pdmp import Warp
+from pdmp.evaluation import Evaluation, baselines
 from pdmp.evaluation.result import REFERENCE
 from report.sets import Question
 
 PRIMITIVE = "PDMP"
-PROCESSES = "PCA, Gaussian processes"
+FORESEEN = "PDMP, J foreseen"
+WARPED = "PDMP, warped time"
 INTRODUCTION = """\
 # Movements foreseen from their context
 
@@ -18,10 +21,10 @@ in turn, or, where there are more than twelve, each of twelve folds of neighbour
 are learnt from, and the movement is foreseen from the context alone. What lies outside the convex
 hull of the contexts learnt from is extrapolation.
 
-The primitive aligns demonstrations by linear time scaling, and its map from context to style, goal,
-start or anchor, and duration is the one that it chooses by itself. Its J keeps nine tenths of the
-sum of the singular values. The columns J and map are those of all demonstrations of a question
-together.
+The primitive aligns demonstrations by linear time scaling, its J keeps nine tenths of the sum of
+the singular values, and its map from context to style, goal, start or anchor, and duration is the
+one that it chooses by itself. Beside it stand four that differ in one of these: all J, the linear
+map, J by cross-validation (`n_styles="auto"`), and a time warp of four segments.
 
 ## Error beside simpler predictors
 
@@ -31,33 +34,49 @@ standard error over folds: at 1 the context told nothing, at 0 all.
 PRIMITIVE_ITSELF = """\
 ## The primitive itself
 
-E with J by spectrum, ± standard deviation over folds; share of the positions inside its 90 % band;
-how far off the duration is; and E less that of the Gaussian processes on principal components, on
-the same folds, ± standard error: negative where the primitive is better.
+J and map of all demonstrations together, and J by cross-validation; E with J by spectrum, ±
+standard deviation over folds; share of the positions inside its 90 % band; how far off the duration
+is; and E less that of the best of the simpler predictors, on the same folds, ± standard error:
+negative where the primitive is better.
+"""
+TIME = """\
+## Linear and warped time
+
+What a time warp makes of the spectrum of all demonstrations: the share of the sum of the singular
+values that the first three have, with time scaled linearly and with time warped; and E of the
+primitive with warped time less that with linear time, on the same folds, ± standard error. Both
+errors are over normalised time, in which a warped movement must meet the moments too.
 """
 
 
 def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
     """Write the tables of all answers."""
     names = [name for name in answers[0][1].predictors if name != REFERENCE]
-    errors, itself = [], []
+    errors, itself, time = [], [], []
     for question, found in answers:
+        chosen, shares = choices(question), spectra(question)
         for reach in found.reaches():
             splits = [split for split in found.splits if split.reach == reach]
             held = sum(len(split.test) for split in splits)
             asked = [question.name, reach]
-            shares = [relative(found, name, reach) for name in names]
-            errors.append([*asked, question.context, f"{len(splits)}, {held}", *shares])
-            itself.append([*asked, *choices(question), *primitive(question, found, reach)])
+            over_mean = [relative(found, name, reach) for name in names]
+            errors.append([*asked, question.context, f"{len(splits)}, {held}", *over_mean])
+            itself.append([*asked, *chosen, *primitive(question, found, reach)])
+            if question.options.get("kind") != "rhythmic":
+                gained = difference(found, WARPED, PRIMITIVE, reach)
+                time.append([*asked, *shares, f"{gained} {question.unit}²"])
+    primitives = ["J", "J foreseen", "map", "E", "inside", "duration", "best other", "difference"]
+    spectrum = ["first three, linear", "first three, warped", "difference"]
     return "\n".join(
         [
             INTRODUCTION,
             *table(["recordings", "reach", "context", "folds, demos", *names], errors),
             "",
             PRIMITIVE_ITSELF,
-            *table(
-                ["recordings", "reach", "J", "map", "E", "inside", "duration", "difference"], itself
-            ),
+            *table(["recordings", "reach", *primitives], itself),
+            "",
+            TIME,
+            *table(["recordings", "reach", *spectrum], time),
             "",
         ]
     )
@@ -77,18 +96,37 @@ def primitive(question: Question, found: Evaluation, reach: str) -> Iterable[str
     yield f"{summary.error:.2g} ± {summary.deviation:.1g} {question.unit}²"
     yield f"{summary.coverage:.0%}"
     yield f"{summary.duration:.0%}"
-    if PROCESSES in found.left_out:
-        yield "–"
-    else:
-        compared = found.compare(PRIMITIVE, PROCESSES, reach)
-        yield f"{compared.mean:.2g} ± {compared.standard_error:.1g}"
+    others = [name for name in baselines() if name not in found.left_out]
+    best = min(others, key=lambda name: found.summary(name, reach).error)
+    yield best
+    yield difference(found, PRIMITIVE, best, reach)
 
 
-def choices(question: Question) -> tuple[str, str]:
-    """Write J and the map of a primitive of all demonstrations."""
+def difference(found: Evaluation, one: str, other: str, reach: str) -> str:
+    """Write E of one less that of the other, on the same folds."""
+    compared = found.compare(one, other, reach)
+    return f"{compared.mean:.2g} ± {compared.standard_error:.1g}"
+
+
+def choices(question: Question) -> tuple[str, str, str]:
+    """Write J, J by cross-validation, and the map of a primitive of all demonstrations."""
+    model = learnt(question)
+    return str(model.n_styles), str(learnt(question, n_styles="auto").n_styles), model.map.kind
+
+
+def spectra(question: Question) -> tuple[str, str]:
+    """Write the share of the first three singular values, in linear and in warped time."""
+    values = [
+        learnt(question, alignment=alignment).singular_values for alignment in ("linear", Warp(4))
+    ]
+    linear, warped = (f"{found[:3].sum() / found.sum():.1%}" for found in values)
+    return linear, warped
+
+
+def learnt(question: Question, **settings: Any) -> pdmp.Model:
+    """Learn from all demonstrations."""
     kind = question.options.get("kind", "discrete")
-    model = pdmp.fit(question.demos, kind=kind, contexts=question.contexts)
-    return str(model.n_styles), model.map.kind
+    return pdmp.fit(question.demos, kind=kind, contexts=question.contexts, **settings)
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:

@@ -98,7 +98,7 @@ def fit(
     period: ArrayLike | None = None,  # one, or (M,)
     contexts: _Contexts | None = None,  # (M, Q)
     map: _Map = "auto",
-    n_styles: int | None = None,
+    n_styles: int | Literal["auto"] | None = None,
     spectrum: float = 0.9,
     basis: Literal["gp", "ngnet"] | GP | NGnet = "gp",
     smoothing: Literal["auto"] | float | None = None,

@@ -1,63 +1,25 @@
 //! How a predicted movement may turn out: the covariance of its conditions, seen through the responses to each, and what
 //! its styles leave out.
 //!
-//! At one phase y = Σⱼ sⱼRⱼ + g(1 − E) + y(0)E, or Σⱼ sⱼRⱼ + y_a about an anchor, is linear in what a map predicts.
 //! A movement is compared with another at an equal share of its duration: where time is scaled linearly that is equal
 //! phase, and else the timing moves the phase.
 
 use std::sync::Arc;
 
-use ndarray::{Array1, Array2, ArrayView1, Axis};
+use ndarray::{Array1, Array2};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::align::Aligned;
-use crate::context::{Prediction, outputs, relative_changes};
+use crate::context::{Prediction, outputs};
 use crate::error::{Error, Result};
 use crate::model::{Conditions, Model};
 use crate::phase::Kind;
-use crate::responses::{Curves, Derivative, Responses};
+use crate::responses::{Derivative, Responses};
 use crate::rollout::Timing;
+use crate::sensitivity::Sensitivity;
 
 /// Steps of a movement over which errors are averaged.
 pub(crate) const STEPS: usize = 100;
-
-/// Positions per unit of each output.
-struct Sensitivity<'a> {
-    curves: &'a Curves,
-    kind: Kind,
-    /// Those (T, D) per second of each segment's time; none at equal phase.
-    paces: Vec<Array2<f64>>,
-}
-
-impl Sensitivity<'_> {
-    /// Indices and values of the outputs that move DoF `d` at sample `k`.
-    fn of(&self, k: usize, d: usize) -> impl Iterator<Item = (usize, f64)> + Clone {
-        let (n_styles, n_dofs) = (self.curves.styles.len(), self.curves.start.ncols());
-        let styles = self.curves.styles.iter().enumerate().map(move |(j, curve)| (j, curve[[k, d]]));
-        let start = self.curves.start[[k, d]];
-        let (centre, start) = match self.kind {
-            Kind::Discrete => (1.0 - start, Some((n_styles + n_dofs + d, start))),
-            Kind::Rhythmic => (1.0, None),
-        };
-        let first = n_styles + n_dofs * if self.kind == Kind::Discrete { 2 } else { 1 };
-        let paces = self.paces.iter().enumerate().map(move |(i, pace)| (first + i, pace[[k, d]]));
-        styles.chain([(n_styles + d, centre)]).chain(start).chain(paces)
-    }
-
-    /// Positions (T, D) for the outputs of one movement.
-    fn positions(&self, outputs: ArrayView1<f64>) -> Array2<f64> {
-        Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| self.of(k, d).map(|(i, x)| outputs[i] * x).sum())
-    }
-
-    /// Variances (T, D) for a covariance of the outputs.
-    fn variances(&self, covariance: &Array2<f64>) -> Array2<f64> {
-        Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| {
-            let active = self.of(k, d);
-            let row = |i: usize| active.clone().map(|(j, y)| covariance[[i, j]] * y).sum::<f64>();
-            active.clone().map(|(i, x)| x * row(i)).sum::<f64>().max(0.0)
-        })
-    }
-}
 
 impl Model {
     /// What a map is to predict (M, P).
@@ -67,33 +29,18 @@ impl Model {
         outputs(self.kind(), shown.styles.view(), places, shown.timings.view())
     }
 
-    /// The matrix (P, P) that makes errors of the outputs into the mean square of the movement's, summed over DoFs. A
-    /// timing that is off by all of itself counts as much as the nominal movement's own variation.
+    /// The matrix (P, P) that makes errors of the outputs into those of the movement.
     pub(crate) fn metric(self: &Arc<Self>) -> Result<Array2<f64>> {
-        let (kind, outputs) = (self.kind(), self.outputs());
         let responses = self.phases()?;
-        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind, paces: Vec::new() };
-        let (length, n_dofs) = sensitivity.curves.start.dim();
-        let mut metric = Array2::zeros((outputs.ncols(), outputs.ncols()));
-        for (k, d) in (0..length).flat_map(|k| (0..n_dofs).map(move |d| (k, d))) {
-            let active = sensitivity.of(k, d);
-            for (i, x) in active.clone() {
-                active.clone().for_each(|(j, y)| metric[[i, j]] += x * y / length as f64);
-            }
-        }
-        let nominal = sensitivity.positions(outputs.row(self.demonstrated.nominal));
-        let changes = relative_changes(&self.demonstrated.timings.row(self.demonstrated.nominal).to_vec());
-        let (first, variation) = (outputs.ncols() - changes.nrows(), nominal.var_axis(Axis(0), 0.0).sum());
-        let timing = changes.t().dot(&changes) * (variation / changes.nrows() as f64);
-        metric.slice_mut(ndarray::s![first.., first..]).assign(&timing);
-        Ok(metric)
+        let sensitivity = Sensitivity::new(self.kind(), responses.of(Derivative::Position), Vec::new());
+        Ok(sensitivity.metric(self.outputs().view(), self.demonstrated.timings.view()))
     }
 
     /// Variance (S, D) over the phase of what the styles leave out of the demonstrations.
     pub(crate) fn left_over(self: &Arc<Self>, aligned: Aligned) -> Result<Array2<f64>> {
         let (kind, outputs) = (self.kind(), self.outputs());
         let responses = self.phases()?;
-        let sensitivity = Sensitivity { curves: responses.of(Derivative::Position), kind, paces: Vec::new() };
+        let sensitivity = Sensitivity::new(kind, responses.of(Derivative::Position), Vec::new());
         let n_samples = kind.samples(STEPS);
         let aligned = aligned.resampled(n_samples);
         let mut sum = Array2::zeros((n_samples, self.n_dofs()));
@@ -162,7 +109,7 @@ impl Model {
         let centre = self.rollout(&conditions, timing)?.position;
         let responses = self.phases()?;
         let (curves, kind) = (responses.of(Derivative::Position), self.kind());
-        let sensitivity = Sensitivity { curves, kind, paces: self.paces(&conditions, &prediction.timing)? };
+        let sensitivity = Sensitivity::new(kind, curves, self.paces(&conditions, &prediction.timing)?);
         // Of a cycle, the last of the responses is the first of the next one.
         let variances = &sensitivity.variances(covariance).slice(ndarray::s![..left_over.nrows(), ..]) + left_over;
         let time = self.warping_function(&prediction.timing)?;

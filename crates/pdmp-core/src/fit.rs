@@ -14,6 +14,7 @@ use crate::context::{ContextColumn, ContextMap, MapChoice, tabulate};
 use crate::demo::{ContextValue, Demonstration, check_context};
 use crate::error::{Error, Result, check_positive, check_vector};
 use crate::factor::{Factors, StyleCount};
+use crate::foresight::Foresight;
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
 use crate::phase::{Canonical, Kind};
@@ -42,7 +43,7 @@ pub struct FitOptions {
     /// What leads from contexts to movements.
     pub map: MapChoice,
     /// Style dimension J.
-    pub styles: StyleCount,
+    pub styles: StyleChoice,
     /// Function approximator of the landscape.
     pub basis: Basis,
     /// Unit of each DoF in the factorisation.
@@ -78,7 +79,7 @@ impl FitOptions {
             },
             contexts: None,
             map: MapChoice::Auto,
-            styles: StyleCount::Spectrum(0.9),
+            styles: StyleCount::Spectrum(0.9).into(),
             basis: Basis::Gp(Gp::default()),
             dof_scale: DofScale::Unit,
             tau: None,
@@ -88,6 +89,22 @@ impl FitOptions {
             mu: 1.0,
             threads: Threads::available(),
         }
+    }
+}
+
+/// How the number of styles J is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StyleChoice {
+    /// By number, or by the spectrum.
+    Given(StyleCount),
+    /// The fewest that foresee movements, in contexts held out, with an error above the least that any number has by no
+    /// more than the standard error of the difference: cross-validation over the contexts, in at most ten folds.
+    Auto,
+}
+
+impl From<StyleCount> for StyleChoice {
+    fn from(count: StyleCount) -> Self {
+        Self::Given(count)
     }
 }
 
@@ -131,7 +148,9 @@ pub fn fit(
     options: &FitOptions,
     proceed: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
-    options.styles.check(demos.len(), "demonstrations")?;
+    if let StyleChoice::Given(count) = options.styles {
+        count.check(demos.len(), "demonstrations")?;
+    }
     let mut aligned = options.alignment.align(demos)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     let (names, units) = labels_of(demos)?;
@@ -145,10 +164,21 @@ pub fn fit(
     let ranges = targets.ranges();
     let dof_scale = options.dof_scale.of(&ranges);
     targets.scale(&dof_scale);
-    let Targets { forcing, goals, starts, anchors, .. } = targets;
 
     let mut factorising = |share| proceed(Stage::Factorise, share);
-    let factors = Factors::of(forcing.view(), options.styles, &mut factorising)?;
+    let factors = match options.styles {
+        StyleChoice::Given(count) => Factors::of(targets.forcing.view(), count, &mut factorising)?,
+        StyleChoice::Auto => {
+            let (columns, numbers) = contexts.as_ref().ok_or(Error::Arguments(
+                "n_styles = \"auto\" goes by contexts: pass contexts, a number, or None to go by the spectrum",
+            ))?;
+            let all = Factors::of(targets.forcing.view(), StyleCount::Spectrum(1.0), &mut factorising)?;
+            let foresight = Foresight::new(&aligned, &targets, &all, constants.attractor, constants.canonical)?;
+            let n_styles = foresight.styles(columns, numbers, options.map, &mut factorising)?;
+            all.leading(n_styles)
+        }
+    };
+    let Targets { forcing, goals, starts, anchors, .. } = targets;
     drop(forcing);
 
     proceed(Stage::Regress, 0.0)?;

@@ -142,7 +142,7 @@ fn ticks_solve_the_equations() {
     };
     let seven = reaches().iter().map(wide).collect();
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Discrete, seven), (Kind::Rhythmic, cycles())] {
-        let model = learn(&demos, &FitOptions { styles: StyleCount::Given(2), ..options(kind) });
+        let model = learn(&demos, &FitOptions { styles: StyleCount::Given(2).into(), ..options(kind) });
         for tau in [model.tau(), 0.3 / model.duration() * model.tau()] {
             for live in [false, true] {
                 for (dt, bound) in [(1e-3, 1e-8), (1e-2, 1e-6)] {

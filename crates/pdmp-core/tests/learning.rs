@@ -11,8 +11,10 @@ use pdmp_core::{Canonical, DofScale, Error, Kind, Sampling, StyleCount, Timing, 
 fn every_reach_is_reproduced() {
     let demos = reaches();
     for basis in [options(Kind::Discrete).basis, gp()] {
-        let model =
-            learn(&demos, &pdmp_core::FitOptions { basis, styles: StyleCount::Given(5), ..options(Kind::Discrete) });
+        let model = learn(
+            &demos,
+            &pdmp_core::FitOptions { basis, styles: StyleCount::Given(5).into(), ..options(Kind::Discrete) },
+        );
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
             assert!(error <= 1e-4, "{}: {error:e}", model.learnt().basis);
@@ -25,8 +27,10 @@ fn every_reach_is_reproduced() {
 fn every_cycle_is_reproduced_without_a_transient() {
     let demos = cycles();
     for basis in [options(Kind::Rhythmic).basis, gp()] {
-        let model =
-            learn(&demos, &pdmp_core::FitOptions { basis, styles: StyleCount::Given(4), ..options(Kind::Rhythmic) });
+        let model = learn(
+            &demos,
+            &pdmp_core::FitOptions { basis, styles: StyleCount::Given(4).into(), ..options(Kind::Rhythmic) },
+        );
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
             assert!(error <= 1e-4, "{}: {error:e}", model.learnt().basis);
@@ -38,7 +42,8 @@ fn every_cycle_is_reproduced_without_a_transient() {
 #[test]
 fn spectrum_rule_finds_the_intrinsic_dimension() {
     // y is affine in (h, h²): three dimensions at the most.
-    let model = learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(5), ..options(Kind::Discrete) });
+    let model =
+        learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(5).into(), ..options(Kind::Discrete) });
     let sigma = &model.learnt().singular_values;
     assert!(sigma[2] > 1e-6 * sigma[0] && sigma[3] < 1e-6 * sigma[0], "{sigma:?}");
 }
@@ -97,7 +102,8 @@ fn own_time_stamps_are_respected() {
 #[test]
 fn style_of_finds_demonstrations_again() {
     let demos = reaches();
-    let model = learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(3), ..options(Kind::Discrete) });
+    let model =
+        learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(3).into(), ..options(Kind::Discrete) });
     for (m, demo) in demos.iter().enumerate() {
         let style = style_of(&model, demo, None, None, None).unwrap();
         for (j, s) in style.iter().enumerate() {
@@ -187,8 +193,11 @@ fn dof_scale_weighs_units_and_keeps_the_movement() {
             pdmp_core::Demonstration::new(position, demo.sampling().clone()).unwrap()
         })
         .collect();
-    let scaled =
-        pdmp_core::FitOptions { dof_scale: DofScale::Range, styles: StyleCount::Given(5), ..options(Kind::Discrete) };
+    let scaled = pdmp_core::FitOptions {
+        dof_scale: DofScale::Range,
+        styles: StyleCount::Given(5).into(),
+        ..options(Kind::Discrete)
+    };
     let model = learn(&demos, &scaled);
     for (m, demo) in demos.iter().enumerate() {
         let timing = Timing { dt: 0.01, duration: None };
@@ -212,6 +221,6 @@ fn bad_demonstrations_are_refused_by_name() {
     assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
     assert!(message(&[], &options).contains("at least one demonstration"));
     assert!(message(&demos[1..], &options).contains("pass dt="));
-    let options = pdmp_core::FitOptions { styles: StyleCount::Given(2), ..options };
+    let options = pdmp_core::FitOptions { styles: StyleCount::Given(2).into(), ..options };
     assert!(message(&demos[..1], &options).contains("n_styles = 2: must lie between 1 and 1"));
 }

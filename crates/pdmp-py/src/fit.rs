@@ -5,7 +5,8 @@ use std::sync::Arc;
 use ndarray::{Array2, ArrayD, Axis, Ix2};
 use pdmp_core::basis::Basis;
 use pdmp_core::{
-    Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Sampling, Smoothing, Stage, StyleCount, TimeScaling,
+    Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Sampling, Smoothing, Stage, StyleChoice, StyleCount,
+    TimeScaling,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -38,8 +39,10 @@ use crate::warp::Warp;
 ///     What leads from contexts to movements: least squares as in the paper, ridge regression on polynomials of second
 ///     degree, or a Gaussian process. "auto" is the process, unless another is better at contexts left out by more
 ///     than two standard errors; `model.map` tells.
-/// n_styles : int, optional
-///     Style dimension J; otherwise from `spectrum`.
+/// n_styles : int or "auto", optional
+///     Style dimension J; otherwise from `spectrum`. "auto" is by what contexts foresee: the fewest styles whose error at
+///     contexts held out (cross-validation, at most ten folds) is above the least of all by no more than the standard
+///     error of the difference.
 /// spectrum : float
 ///     Keep the fewest singular values whose sum exceeds this share of the sum of all.
 /// basis : {"gp", "ngnet"}, GP or NGnet
@@ -105,7 +108,7 @@ pub(crate) fn fit(
     period: Option<&Bound<'_, PyAny>>,
     contexts: Option<&Bound<'_, PyAny>>,
     map: &str,
-    n_styles: Option<isize>,
+    n_styles: Option<&Bound<'_, PyAny>>,
     spectrum: f64,
     basis: Option<&Bound<'_, PyAny>>,
     smoothing: Option<&Bound<'_, PyAny>>,
@@ -135,7 +138,7 @@ pub(crate) fn fit(
         },
         contexts: contexts.map(crate::convert::contexts).transpose()?,
         map: map_of(map)?,
-        styles: style_count(n_styles, spectrum)?,
+        styles: style_choice(n_styles, spectrum)?,
         basis: basis_of(basis)?,
         dof_scale: dof_scale_of(dof_scale)?,
         tau,
@@ -151,6 +154,19 @@ pub(crate) fn fit(
     };
     let model = detached(py, show, |proceed| pdmp_core::fit(&demos, &options, proceed))?;
     Ok(Model(Arc::new(model)))
+}
+
+fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, spectrum: f64) -> PyResult<StyleChoice> {
+    let Some(n_styles) = n_styles else { return style_count(None, spectrum).map(StyleChoice::Given) };
+    if let Ok(name) = n_styles.extract::<String>() {
+        let wanted = "must be a number, \"auto\" or None";
+        return if name == "auto" {
+            Ok(StyleChoice::Auto)
+        } else {
+            Err(PyValueError::new_err(format!("n_styles = {name:?}: {wanted}")))
+        };
+    }
+    style_count(Some(n_styles.extract()?), spectrum).map(StyleChoice::Given)
 }
 
 /// J as given, or from a share of the spectrum.

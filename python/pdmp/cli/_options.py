@@ -50,7 +50,12 @@ def add_learning(parser: ArgumentParser) -> None:
         default="linear",
         help="how time is scaled to that of the nominal demonstration; default: linear",
     )
-    parser.add_argument("--styles", type=int, metavar="J", help="number of style parameters")
+    parser.add_argument(
+        "--styles",
+        type=_styles,
+        metavar="J",
+        help="number of style parameters, or auto: as few as foresee movements in other contexts",
+    )
     parser.add_argument(
         "--spectrum",
         type=float,
@@ -79,6 +84,10 @@ def settings(options: Namespace) -> dict[str, Any]:
         "basis": options.basis,
         "smoothing": options.smoothing,
     }
+
+
+def _styles(text: str) -> str | int:
+    return text if text == "auto" else int(text)
 
 
 def _smoothing(text: str) -> str | float:

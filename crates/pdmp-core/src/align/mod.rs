@@ -63,7 +63,7 @@ pub enum TimeScaling {
 }
 
 /// Demonstrations that can be read as samples of one phase, each when it is asked for.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Aligned<'a> {
     demos: &'a [Demonstration],
     clocks: Vec<Clock<'a>>,

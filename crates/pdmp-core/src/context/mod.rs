@@ -27,7 +27,7 @@ pub(crate) use space::tabulate;
 
 use axes::Axes;
 use choice::{Candidate, MOST, Shown, choose};
-use kriging::Kriging;
+use kriging::{Kriging, Place};
 use space::{Scale, numbers};
 
 use crate::demo::{ContextValue, check_matrix};
@@ -175,8 +175,7 @@ impl ContextMap {
         let context: Vec<ContextValue> = context.iter().cloned().map(Into::into).collect();
         let context = numbers(&self.columns, &context)?;
         let place = self.kriging.place(&self.scale.features(&context));
-        let components = place.flat.dot(&self.flat) + place.rest.dot(&self.rest);
-        let mean = components.dot(&self.axes.directions).to_vec();
+        let mean = self.mean(&place);
         let covariance = self.noise.as_ref().map(|noise| {
             let spread: Vec<f64> =
                 self.ratios.iter().map(|&ratio| (1.0 + self.kriging.variance(&place, ratio)).sqrt()).collect();
@@ -191,6 +190,33 @@ impl ContextMap {
         }
         Ok(Expected { mean, covariance, outside: self.scale.outside(&context) })
     }
+}
+
+impl ContextMap {
+    /// The outputs (P,) for a context as numbers (Q,), labels as their index.
+    pub(crate) fn expect(&self, numbers: &[f64]) -> Vec<f64> {
+        self.mean(&self.kriging.place(&self.scale.features(numbers)))
+    }
+
+    fn mean(&self, place: &Place) -> Vec<f64> {
+        (place.flat.dot(&self.flat) + place.rest.dot(&self.rest)).dot(&self.axes.directions).to_vec()
+    }
+}
+
+/// Demonstrations of equal contexts (M, Q), in the order of the first of each.
+pub(crate) fn alike(contexts: &Array2<f64>) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    let mut known = HashMap::new();
+    for (m, row) in contexts.rows().into_iter().enumerate() {
+        // Zero of either sign is one context.
+        let key: Vec<u64> = row.iter().map(|value| (value + 0.0).to_bits()).collect();
+        let group = *known.entry(key).or_insert(groups.len());
+        if group == groups.len() {
+            groups.push(Vec::new());
+        }
+        groups[group].push(m);
+    }
+    groups
 }
 
 impl std::fmt::Display for ContextMap {
@@ -221,17 +247,7 @@ struct Data {
 
 impl Data {
     fn of(columns: Vec<ContextColumn>, contexts: &Array2<f64>, outputs: ArrayView2<f64>) -> Result<Self> {
-        let mut groups: Vec<Vec<usize>> = Vec::new();
-        let mut known = HashMap::new();
-        for (m, row) in contexts.rows().into_iter().enumerate() {
-            // Zero of either sign is one context.
-            let key: Vec<u64> = row.iter().map(|value| (value + 0.0).to_bits()).collect();
-            let group = *known.entry(key).or_insert(groups.len());
-            if group == groups.len() {
-                groups.push(Vec::new());
-            }
-            groups[group].push(m);
-        }
+        let groups = alike(contexts);
         let firsts: Vec<usize> = groups.iter().map(|group| group[0]).collect();
         let distinct = contexts.select(Axis(0), &firsts);
         let scale = Scale::of(&columns, &distinct)?;

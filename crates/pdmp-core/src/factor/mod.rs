@@ -112,6 +112,15 @@ impl Factors {
         left / left.hypot(kept.sqrt())
     }
 
+    /// The first J of these factors, where more were had.
+    pub(crate) fn leading(mut self, n_styles: usize) -> Self {
+        self.error =
+            self.singular_values[n_styles..self.styles.ncols()].iter().fold(self.error, |sum, s| sum.hypot(*s));
+        self.styles = self.styles.slice(ndarray::s![.., ..n_styles]).to_owned();
+        self.basis = self.basis.slice(ndarray::s![..n_styles, ..]).to_owned();
+        self
+    }
+
     /// The leading J factors of the targets F (M, C·D).
     ///
     /// `proceed` is asked between the passes over F whether to go on, and told the share that is done.

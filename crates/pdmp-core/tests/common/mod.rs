@@ -54,7 +54,11 @@ pub(crate) fn cycles() -> Vec<Demonstration> {
 
 /// A network, which fits in a moment, and nearly all of the spectrum.
 pub(crate) fn options(kind: Kind) -> FitOptions {
-    FitOptions { styles: StyleCount::Spectrum(0.9999), basis: Basis::NGnet(NGnet::default()), ..FitOptions::new(kind) }
+    FitOptions {
+        styles: StyleCount::Spectrum(0.9999).into(),
+        basis: Basis::NGnet(NGnet::default()),
+        ..FitOptions::new(kind)
+    }
 }
 
 pub(crate) fn gp() -> Basis {
@@ -67,9 +71,9 @@ pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model>
 
 /// Reaches and cycles learnt with two styles.
 pub(crate) static REACH: LazyLock<Arc<Model>> =
-    LazyLock::new(|| learn(&reaches(), &FitOptions { styles: StyleCount::Given(2), ..options(Kind::Discrete) }));
+    LazyLock::new(|| learn(&reaches(), &FitOptions { styles: StyleCount::Given(2).into(), ..options(Kind::Discrete) }));
 pub(crate) static CYCLE: LazyLock<Arc<Model>> =
-    LazyLock::new(|| learn(&cycles(), &FitOptions { styles: StyleCount::Given(2), ..options(Kind::Rhythmic) }));
+    LazyLock::new(|| learn(&cycles(), &FitOptions { styles: StyleCount::Given(2).into(), ..options(Kind::Rhythmic) }));
 
 pub(crate) fn timing(dt: f64, duration: f64) -> Timing {
     Timing { dt, duration: Some(duration) }
