@@ -306,3 +306,36 @@ def test_unknown_names_are_refused(found: Evaluation) -> None:
         found.summary("none")
     with pytest.raises(ValueError, match='reach = "nowhere"'):
         found.summary("PDMP", "nowhere")
+
+
+def mannered() -> tuple[list[np.ndarray], list[list[float | str]]]:
+    """Return movements of two manners, each at several heights."""
+    contexts = [[manner, h] for manner in ("proud", "tired") for h in HEIGHTS]
+    lean = {"proud": 0.5, "tired": -0.5}
+    bow = np.sin(np.pi * np.linspace(0, 1, 101))[:, None] ** 3 * [0.0, 1.0]
+    movements = [arches([h])[0] + lean[manner] * bow for manner, h in contexts]
+    return movements, contexts
+
+
+def test_labels_are_conditions_too() -> None:
+    """A label tells of a condition beside numbers, to primitives and all others alike."""
+    movements, contexts = mannered()
+    predictors = baselines() | {"PDMP": PDMP(map="linear")}
+    found = pdmp.evaluate(movements, contexts=contexts, dt=0.01, predictors=predictors)
+    assert {split.reach for split in found.splits} == {"interpolation", "extrapolation"}
+    assert sum(len(split.test) for split in found.splits) == len(movements)
+    for name in ("PDMP", "PCA, linear map"):
+        assert found.summary(name, "interpolation").relative < 1e-4
+    for name in ("nearest demonstration", "PCA, Gaussian processes"):
+        assert name in found.left_out or found.summary(name, "interpolation").relative < 0.3
+
+
+def test_labels_held_out_altogether_are_refused() -> None:
+    """Nothing tells of a label that is nowhere learnt from; and labels are no numbers."""
+    movements, contexts = mannered()
+    manners = [[manner] for manner, _ in contexts]
+    with pytest.raises(ValueError, match="is held out altogether"):
+        pdmp.evaluate(movements, contexts=manners, dt=0.01)
+    mixed = [[0.1], *manners[1:]]
+    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 numbers"):
+        pdmp.evaluate(movements, contexts=mixed, dt=0.01)

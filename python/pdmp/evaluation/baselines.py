@@ -29,11 +29,12 @@ class NearestDemonstration:
 
     def fit(self, recordings: Recordings) -> Foresee:
         """Keep them all."""
-        deviation = recordings.contexts.std(axis=0)
+        shown = recordings.numbers(recordings.contexts)
+        deviation = shown.std(axis=0)
         unit = np.where(deviation > 0, deviation, 1)
 
         def foresee(context: Array) -> Forecast:
-            distance = np.sum(((recordings.contexts - context) / unit) ** 2, axis=1)
+            distance = np.sum(((shown - recordings.numbers(context[None])) / unit) ** 2, axis=1)
             near = np.argmin(distance)
             return Forecast(recordings.sampled[near], float(recordings.durations[near]))
 
@@ -51,12 +52,12 @@ class MovedGoal:
         discrete = recordings.kind == "discrete"
         sampled = recordings.sampled
         ends = [sampled[:, -1], sampled[:, 0]] if discrete else [sampled.mean(axis=1)]
-        moved = ContextMap(recordings.contexts, np.concatenate(ends, axis=1), "linear")
+        moved = ContextMap(recordings.contexts.tolist(), np.concatenate(ends, axis=1), "linear")
         duration_of = _lasting(recordings)
 
         def foresee(context: Array) -> Forecast:
             duration = duration_of(context)
-            places = np.split(moved.predict([context])[0][0], len(ends))
+            places = np.split(moved.predict([context.tolist()])[0][0], len(ends))
             names = ("goal", "start") if discrete else ("anchor",)
             made = model.rollout(
                 **dict(zip(names, places, strict=True)),  # type: ignore[arg-type]
@@ -123,12 +124,12 @@ class LinearWeights:
     def fit(self, recordings: Recordings) -> Foresee:
         """Encode and regress; the variance is that of the weights."""
         weights, offset, basis = self.encoding(recordings)
-        chosen = ContextMap(recordings.contexts, weights, "linear")
+        chosen = ContextMap(recordings.contexts.tolist(), weights, "linear")
         duration_of = _lasting(recordings)
         shape = recordings.sampled.shape[1:]
 
         def foresee(context: Array) -> Forecast:
-            mean, covariance = chosen.predict([context])
+            mean, covariance = chosen.predict([context.tolist()])
             variance = None
             if covariance is not None:
                 variance = np.sum(basis * (covariance[0] @ basis), axis=0).reshape(shape)
@@ -152,7 +153,8 @@ class ProcessWeights:
         except ImportError:
             raise ImportError("scikit-learn is not installed") from None
         weights, offset, basis = self.encoding(recordings)
-        centre, deviation = recordings.contexts.mean(axis=0), recordings.contexts.std(axis=0)
+        shown = recordings.numbers(recordings.contexts)
+        centre, deviation = shown.mean(axis=0), shown.std(axis=0)
         unit = np.where(deviation > 0, deviation, 1)
         kernel = ConstantKernel() * RBF(np.ones(len(unit))) + WhiteKernel(0.1)
 
@@ -160,14 +162,14 @@ class ProcessWeights:
             process = GaussianProcessRegressor(kernel, normalize_y=True)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # hyperparameters at their bounds serve too
-                return process.fit((recordings.contexts - centre) / unit, outputs)
+                return process.fit((shown - centre) / unit, outputs)
 
         processes = [learnt(outputs) for outputs in weights.T]
         logarithm = learnt(np.log(recordings.durations))
         shape = recordings.sampled.shape[1:]
 
         def foresee(context: Array) -> Forecast:
-            at = ((context - centre) / unit)[None]
+            at = (recordings.numbers(context[None]) - centre) / unit
             found = [process.predict(at, return_std=True) for process in processes]
             mean, deviation = np.array(found)[:, :, 0].T
             return Forecast(
@@ -182,5 +184,5 @@ class ProcessWeights:
 def _lasting(recordings: Recordings) -> Callable[[Array], float]:
     """Return what foresees the duration [s] from a context; its logarithm is linear in that."""
     logarithms = np.log(recordings.durations)[:, None]
-    chosen = ContextMap(recordings.contexts, logarithms, "linear")
-    return lambda context: float(np.exp(chosen.predict([context])[0][0, 0]))
+    chosen = ContextMap(recordings.contexts.tolist(), logarithms, "linear")
+    return lambda context: float(np.exp(chosen.predict([context.tolist()])[0][0, 0]))

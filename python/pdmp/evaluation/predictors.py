@@ -66,19 +66,20 @@ class PDMP:
         model = fit(
             recordings.demos,
             kind=recordings.kind,
-            contexts=recordings.contexts,
+            contexts=recordings.contexts.tolist(),
             period=recordings.periods,
             **self.settings,
         )
         n_samples = recordings.n_samples
 
         def foresee(context: Array) -> Forecast:
-            predicted = model.predict(context)
+            condition = context.tolist()
+            predicted = model.predict(condition)
             dt = recordings.interval(predicted.duration)
-            position = model.rollout(context=context, dt=dt).position[:n_samples]
+            position = model.rollout(context=condition, dt=dt).position[:n_samples]
             variance = None
             if predicted.covariance is not None:
-                lower, upper = model.band(context, level=BAND, dt=dt)
+                lower, upper = model.band(condition, level=BAND, dt=dt)
                 variance = ((upper - lower)[:n_samples] / (2 * WIDTH)) ** 2
             return Forecast(position, predicted.duration, variance)
 

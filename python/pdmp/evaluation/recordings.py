@@ -24,7 +24,9 @@ class Recordings:
     demos : tuple of Demonstration
         As they were given, each with its own rate.
     contexts : ndarray (M, Q)
-        The condition of each.
+        The condition of each: of float64, or of objects where some of its values are labels.
+    labels : tuple of Q lists of str or None
+        The labels of each context value, in alphabetical order; None for a number.
     kind : str
         "discrete", or "rhythmic": each demonstration is one cycle.
     durations : ndarray (M,)
@@ -35,9 +37,20 @@ class Recordings:
 
     demos: tuple[Demonstration, ...]
     contexts: Array
+    labels: tuple[list[str] | None, ...]
     kind: Kind
     durations: Array
     sampled: Array
+
+    def numbers(self, contexts: Array) -> Array:
+        """Return contexts (B, Q) as numbers (B, F): each label has a column, 1 where it is."""
+        columns = []
+        for values, labels in zip(contexts.T, self.labels, strict=True):
+            if labels is None:
+                columns.append(values.astype(float))
+            else:
+                columns += [(values == label).astype(float) for label in labels]
+        return np.column_stack(columns)
 
     @property
     def n_demos(self) -> int:
@@ -68,12 +81,12 @@ class Recordings:
         demos = tuple(self.demos[row] for row in rows)
         chosen = (array[rows] for array in (self.contexts, self.durations, self.sampled))
         contexts, durations, sampled = chosen
-        return Recordings(demos, contexts, self.kind, durations, sampled)
+        return Recordings(demos, contexts, self.labels, self.kind, durations, sampled)
 
 
 def recordings(
     demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
-    contexts: ArrayLike | None,
+    contexts: ArrayLike | Sequence[Sequence[float | str]] | None,
     *,
     kind: Kind,
     dt: float | None,
@@ -101,7 +114,9 @@ def recordings(
     periods = np.broadcast_to(periods, len(given))
     read = [_read(demo, m, kind, periods[m], n_samples) for m, demo in enumerate(given)]
     durations, sampled = (np.array(values) for values in zip(*read, strict=True))
-    return Recordings(given, _contexts(given, contexts), kind, durations, sampled)
+    conditions = _contexts(given, contexts)
+    labels = tuple(_labels(q, values) for q, values in enumerate(conditions.T))
+    return Recordings(given, conditions, labels, kind, durations, sampled)
 
 
 def _rated(demo: Demonstration | ArrayLike, dt: float | None) -> Demonstration:
@@ -136,7 +151,7 @@ def _read(
     return duration, np.transpose(columns)
 
 
-def _contexts(demos: Sequence[Demonstration], contexts: ArrayLike | None) -> Array:
+def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
     """Return the checked contexts (M, Q)."""
     values: Any = contexts
     if contexts is None:
@@ -148,13 +163,29 @@ def _contexts(demos: Sequence[Demonstration], contexts: ArrayLike | None) -> Arr
                 raise ValueError(
                     f"demo {m}: context has length {len(context)}, expected {len(values[0])}"
                 )
-    array = np.asarray(values, float)
+    # Beside a label, numpy would make labels of the numbers.
+    labelled = any(isinstance(value, str) for value in np.asarray(values, object).ravel())
+    array = np.asarray(values, object if labelled else float)
     if array.ndim != 2:
         raise ValueError(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
     if len(array) != len(demos):
         raise ValueError(
             f"contexts has length {len(array)}, expected {len(demos)}: one value per demonstration"
         )
-    for m, q in np.argwhere(~np.isfinite(array))[:1]:
+    finite = [[isinstance(value, str) or np.isfinite(value) for value in row] for row in array]
+    for m, q in np.argwhere(~np.array(finite))[:1]:
         raise ValueError(f"contexts[{m}, {q}] = {array[m, q]}: must be finite: leave the demo out")
     return array
+
+
+def _labels(q: int, values: Array) -> list[str] | None:
+    """Return the labels of one context value of all demonstrations, or None for a number."""
+    labels = sorted({value for value in values if isinstance(value, str)})
+    if not labels:
+        return None
+    if numbers := sum(not isinstance(value, str) for value in values):
+        raise ValueError(
+            f"contexts[:, {q}] holds {len(values) - numbers} labels and {numbers} numbers: "
+            "write all of them as labels, or all as numbers"
+        )
+    return labels

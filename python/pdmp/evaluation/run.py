@@ -55,7 +55,7 @@ def over_styles(most: int, **settings: Any) -> dict[str, Predictor]:
 def evaluate(
     demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
     *,
-    contexts: ArrayLike | None = None,
+    contexts: ArrayLike | Sequence[Sequence[float | str]] | None = None,
     predictors: Mapping[str, Predictor] | None = None,
     splits: Iterable[Sequence[object]] | None = None,
     kind: Kind = "discrete",
@@ -82,7 +82,7 @@ def evaluate(
     ----------
     demos : sequence of Demonstration, sequence of array_like (T_m, D), or array_like (M, T, D)
         The demonstrations, as for `pdmp.fit`.
-    contexts : array_like (M, Q), optional
+    contexts : array_like (M, Q), or M lists of Q numbers and labels, optional
         The condition of each; those that the demonstrations hold by default.
     predictors : mapping of str to Predictor, optional
         What is tried, by name; by default `evaluation.baselines()` and the primitive,
@@ -110,8 +110,8 @@ def evaluate(
     Raises
     ------
     ValueError
-        Contexts or splits that do not fit the demonstrations, fewer than two conditions, or a
-        forecast of another shape.
+        Contexts or splits that do not fit the demonstrations, fewer than two conditions, a label
+        that a split holds out altogether, or a forecast of another shape.
 
     References
     ----------
@@ -125,7 +125,11 @@ def evaluate(
     >>> found.compare("PDMP", "PCA, linear map")
     """
     read = recordings(demos, contexts, kind=kind, dt=dt, period=period, n_samples=n_samples)
-    folds = held_out(read.contexts, max_folds) if splits is None else checked(splits, read.n_demos)
+    if splits is None:
+        folds = held_out(read.numbers(read.contexts), max_folds)
+    else:
+        folds = checked(splits, read.n_demos)
+    _check_labels(read, folds)
     chosen = baselines() | {"PDMP": PDMP()} if predictors is None else dict(predictors)
     tried = {REFERENCE: MeanDemonstration()} | chosen
     forecasts, left_out = {}, {}
@@ -156,3 +160,15 @@ def _foreseen(
                     f"expected (C, D) = {read.sampled.shape[1:]}"
                 )
     return forecasts
+
+
+def _check_labels(read: Recordings, splits: Sequence[Split]) -> None:
+    """Refuse to foresee what nothing tells of: a label that is nowhere learnt from."""
+    for q in (q for q, labels in enumerate(read.labels) if labels):
+        for split in splits:
+            column = read.contexts[:, q]
+            if unseen := sorted(set(column[split.test]) - set(column[split.train])):
+                raise ValueError(
+                    f'contexts[:, {q}]: "{unseen[0]}" is held out altogether, and nothing tells of '
+                    "it: show it in several conditions, or pass splits= that leave some of it"
+                )

@@ -138,7 +138,8 @@ def held_out(
                 axes.fill_between(at, mean - half, mean + half, label=f"{BAND:.0%} band", **band)
             axes.plot(at, mean, color=BLUE, linewidth=1.2, label="foreseen")
             dress(axes, "", labels[dof])
-        column[0].set_title(f"{reach}, context {' '.join(f'{value:.3g}' for value in context)}")
+        shown_as = (v if isinstance(v, str) else f"{v:.3g}" for v in context)
+        column[0].set_title(f"{reach}, context {' '.join(shown_as)}")
         column[-1].set_xlabel(f"share of the {whole}")
     legend(figure, grid[0, 0])
     return figure
