@@ -422,6 +422,36 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
     }
 }
 
+/// Labels are told in order, and stand in a context by their index.
+#[test]
+fn labels_of_contexts_are_told_and_taken_by_index() {
+    let manners = ["shy", "proud", "shy", "tired", "proud"];
+    let contexts = manners.iter().zip([0.0, 0.1, 0.2, 0.3, 0.4]).map(|(&m, h)| vec![m.into(), h.into()]).collect();
+    let rust = learn(&reaches(), &pdmp_core::FitOptions { contexts: Some(contexts), ..options(Kind::Discrete) });
+    let (status, model, _) = load(&rust.to_bytes().unwrap());
+    assert_eq!(status, PDMP_OK);
+    // SAFETY: it was just made, and `Box` is what `pdmp_model_free` takes.
+    let model = unsafe { Box::from_raw(model) };
+    let label = |value, label| {
+        let text = pdmp_model_label(Some(&model), value, label);
+        // SAFETY: NULL, or a text that lives as long as the model.
+        (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_str().unwrap())
+    };
+    assert_eq!([0, 1, 2, 3].map(|k| label(0, k)), [Some("proud"), Some("shy"), Some("tired"), None]);
+    assert_eq!([label(1, 0), label(2, 0)], [None; 2]);
+    assert!(pdmp_model_label(None, 0, 0).is_null());
+
+    let mut numbers = vec![f64::NAN; info(&model).n_conditions];
+    let (room, mut told) = (buffer(&mut numbers), MaybeUninit::uninit());
+    let context = vector(&[2.0, 0.25]);
+    // SAFETY: the room is as long as it tells.
+    let mut predict = |context| unsafe { pdmp_model_predict(Some(&model), context, Some(&mut told), room, UNWANTED) };
+    assert_eq!(predict(vector(&[3.0, 0.25])), PDMP_RANGE);
+    assert_eq!(predict(context), PDMP_OK);
+    let expected = rust.predict(&["tired".into(), pdmp_core::ContextValue::from(0.25)]).unwrap();
+    assert_eq!(numbers[..rust.n_styles()], expected.style[..]);
+}
+
 #[test]
 fn a_model_is_described_and_its_controllers_outlive_it() {
     let rust = learn(&reaches(), &options(Kind::Discrete));

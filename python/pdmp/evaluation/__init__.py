@@ -6,6 +6,7 @@ from pdmp.evaluation.baselines import (
     MeanDemonstration,
     MovedGoal,
     NearestDemonstration,
+    PeerWeights,
     ProcessWeights,
     RadialWeights,
 )
@@ -25,6 +26,7 @@ __all__ = [
     "MeanDemonstration",
     "MovedGoal",
     "NearestDemonstration",
+    "PeerWeights",
     "Predictor",
     "ProcessWeights",
     "RadialWeights",

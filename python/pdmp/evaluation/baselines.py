@@ -115,6 +115,27 @@ class RadialWeights:
         return weights.reshape(recordings.n_demos, -1), np.zeros(n * n_dofs), basis
 
 
+class PeerWeights:
+    """Weights of a ProMP, as the library movement_primitives has them."""
+
+    def __init__(self, n_weights: int = 20) -> None:
+        self.n_weights = n_weights
+
+    def __call__(self, recordings: Recordings) -> tuple[Array, Array, Array]:
+        """Regress each movement, and ask for that of each weight."""
+        try:
+            from movement_primitives.promp import ProMP
+        except ImportError:
+            raise ImportError("movement_primitives is not installed") from None
+        n_samples, n_dofs = recordings.sampled.shape[1:]
+        time = np.linspace(0, 1, n_samples)
+        peer = ProMP(n_dofs, self.n_weights)
+        weights = np.array([peer.weights(time, movement) for movement in recordings.sampled])
+        units = np.eye(weights.shape[1])
+        basis = np.array([peer.trajectory_from_weights(time, unit).ravel() for unit in units])
+        return weights, np.zeros(n_samples * n_dofs), basis
+
+
 class LinearWeights:
     """Weights of each movement, and a linear map that foresees them."""
 

@@ -14,6 +14,7 @@ from pdmp.evaluation.baselines import (
     MeanDemonstration,
     MovedGoal,
     NearestDemonstration,
+    PeerWeights,
     ProcessWeights,
     RadialWeights,
 )
@@ -27,7 +28,8 @@ def baselines() -> dict[str, Predictor]:
     """Return what a primitive is measured against, by name.
 
     All maps from contexts are linear least squares but those of the Gaussian processes, for which
-    scikit-learn must be installed; `Evaluation.left_out` tells where it is not.
+    scikit-learn must be installed, as must movement_primitives for its ProMP; `Evaluation.left_out`
+    tells which is not.
     """
     return {
         REFERENCE: MeanDemonstration(),
@@ -35,6 +37,7 @@ def baselines() -> dict[str, Predictor]:
         "one demonstration, goal moved": MovedGoal(),
         "PCA, linear map": LinearWeights(Components()),
         "ProMP weights, linear map": LinearWeights(RadialWeights()),
+        "movement_primitives' ProMP": LinearWeights(PeerWeights()),
         "PCA, Gaussian processes": ProcessWeights(Components()),
     }
 
