@@ -338,8 +338,11 @@ proptest! {
         }
         let found = one(recorded(position)).unwrap();
         prop_assert!(found.kept.len() >= 2);
-        for cycle in found.kept {
-            prop_assert!((cycle.period / period - 1.0).abs() < 0.01, "{} of {period}", cycle.period);
+        let last = found.kept.len() - 1;
+        for (k, cycle) in found.kept.into_iter().enumerate() {
+            // What lies beyond the ends can only be guessed.
+            let close = if k == 0 || k == last { 0.05 } else { 0.01 };
+            prop_assert!((cycle.period / period - 1.0).abs() < close, "{} of {period}", cycle.period);
             prop_assert!(seam(&cycle.demo) < 1.5, "{}", seam(&cycle.demo));
         }
     }
