@@ -110,52 +110,33 @@ impl Inverse {
     /// The forcing that makes the output system follow a movement (step 2 of Section 3.2), f = y′ − z, in the place of
     /// the movement's positions.
     ///
-    /// `position` and `slope` = dy/du (C·D, by rows) are samples of one cubic spline, and `attractor` (D,) is the goal or
-    /// anchor. z solves Eq. (1) driven by that spline, exactly: from z(0) = 0, or, for a `periodic` movement whose C
-    /// samples make one turn, on its periodic steady state.
-    pub(crate) fn target(&self, position: &mut [f64], slope: &[f64], attractor: &[f64], periodic: bool) {
-        let n_dofs = attractor.len();
-        let n = position.len() / n_dofs;
-        let row = |c: usize| c * n_dofs..(c + 1) * n_dofs;
-        let mut z = vec![0.0; n_dofs];
+    /// `position` and `slope` = dy/du (C,) are samples of one cubic spline, and `attractor` is the goal or anchor. z
+    /// solves Eq. (1) driven by that spline, exactly: from z(0) = 0, or, for a `periodic` movement whose C samples make
+    /// one turn, on its periodic steady state.
+    pub(crate) fn target<T: Real>(&self, position: &mut [T], slope: &[T], attractor: T, periodic: bool) {
+        let n = position.len();
+        let jet = |y: T, dy: T| Jet { value: attractor - y, slope: T::default() - dy };
+        let mut z = T::default();
         if periodic {
-            for c in 0..n {
-                let next = (c + 1) % n;
-                self.step(
-                    &mut z,
-                    attractor,
-                    [&position[row(c)], &position[row(next)]],
-                    [&slope[row(c)], &slope[row(next)]],
-                );
+            for (c, next) in (0..n).zip((1..n).chain([0])) {
+                z = self.step(z, [c, next].map(|c| jet(position[c], slope[c])));
             }
-            let turns = -(self.m * n as f64).exp_m1();
-            z.iter_mut().for_each(|z| *z /= turns);
+            z = z * (1.0 / -(self.m * n as f64).exp_m1());
         }
-        let mut now = z.clone();
-        for c in 0..n {
-            now.copy_from_slice(&z);
-            if c + 1 < n {
-                let slopes = [&slope[row(c)], &slope[row(c + 1)]];
-                self.step(&mut z, attractor, [&position[row(c)], &position[row(c + 1)]], slopes);
-            }
-            for ((target, slope), z) in position[row(c)].iter_mut().zip(&slope[row(c)]).zip(&now) {
-                *target = slope - z;
-            }
+        let mut from = jet(position[0], slope[0]);
+        for c in 1..n {
+            let to = jet(position[c], slope[c]);
+            position[c - 1] = slope[c - 1] - z;
+            z = self.step(z, [from, to]);
+            from = to;
         }
+        position[n - 1] = slope[n - 1] - z;
     }
 
-    /// z one step on, given position and slope at both ends of it.
+    /// z one step on, given g − y at both ends of it.
     #[inline(always)]
-    fn step(&self, z: &mut [f64], attractor: &[f64], [y, y_next]: [&[f64]; 2], [dy, dy_next]: [&[f64]; 2]) {
-        let n = z.len();
-        let (attractor, y, y_next, dy, dy_next) = (&attractor[..n], &y[..n], &y_next[..n], &dy[..n], &dy_next[..n]);
-        for d in 0..n {
-            let jets = [
-                Jet { value: attractor[d] - y[d], slope: -dy[d] },
-                Jet { value: attractor[d] - y_next[d], slope: -dy_next[d] },
-            ];
-            z[d] = self.decay * z[d] + weigh(&self.weights, jets);
-        }
+    fn step<T: Real>(&self, z: T, driving: [Jet<T>; 2]) -> T {
+        z * self.decay + weigh(&self.weights, driving)
     }
 }
 
@@ -350,7 +331,7 @@ mod tests {
         let dy = u.mapv(|u| 3.0 * (3.0 * u).cos() + 0.2).to_vec();
         let goal = 0.9;
         let mut w = y.clone();
-        system.inverse(h).target(&mut w, &dy, &[goal], false);
+        system.inverse(h).target(&mut w, &dy, goal, false);
         let propagator = system.propagator(h);
         let slope = |c: usize| {
             let (from, to) = (c.saturating_sub(1), (c + 1).min(n - 1));
@@ -372,7 +353,7 @@ mod tests {
         let h = std::f64::consts::TAU / n as f64;
         let u = Array1::from_iter((0..n).map(|c| c as f64 * h));
         let (mut f, dy) = (u.mapv(|u| (2.0 * u).sin()).to_vec(), u.mapv(|u| 2.0 * (2.0 * u).cos()).to_vec());
-        system.inverse(h).target(&mut f, &dy, &[0.0], true);
+        system.inverse(h).target(&mut f, &dy, 0.0, true);
         let (alpha, beta) = (8.0, 2.0);
         for c in 0..n {
             let (sin, cos) = (2.0 * u[c]).sin_cos();

@@ -4,7 +4,7 @@
 //! and runs in full registers whatever D is. An operation rounds each lane as it would round a number alone: results do
 //! not depend on the machine's width.
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Mul, Range, Sub};
 
 /// Four DoFs, as they lie in memory, and as every processor can take them.
 pub(crate) type Lanes = wide::f64x4;
@@ -67,6 +67,47 @@ pub(crate) fn pack(values: &[f64]) -> Vec<Lanes> {
 /// Writes a vector over another of its length.
 pub(crate) fn repack(lanes: &mut [Lanes], values: &[f64]) {
     bytemuck::cast_slice_mut(lanes)[..values.len()].copy_from_slice(values);
+}
+
+/// Up to four numbers, padded with zeros. A call to copy so few would cost more than most of what is done with them.
+#[inline(always)]
+pub(crate) fn padded(numbers: &[f64]) -> Lanes {
+    Lanes::new(match *numbers {
+        [] => [0.0; WIDTH],
+        [a] => [a, 0.0, 0.0, 0.0],
+        [a, b] => [a, b, 0.0, 0.0],
+        [a, b, c] => [a, b, c, 0.0],
+        [a, b, c, d, ..] => [a, b, c, d],
+    })
+}
+
+/// Writes the first numbers of four, as many as there is room for.
+#[inline(always)]
+pub(crate) fn unpad(lanes: Lanes, numbers: &mut [f64]) {
+    match (numbers, lanes.to_array()) {
+        ([], _) => {}
+        ([a], [x, ..]) => *a = x,
+        ([a, b], [x, y, ..]) => (*a, *b) = (x, y),
+        ([a, b, c], [x, y, z, _]) => (*a, *b, *c) = (x, y, z),
+        ([a, b, c, d, ..], lanes) => [*a, *b, *c, *d] = lanes,
+    }
+}
+
+/// Takes the DoFs of one group out of rows (k, `n`): what is a loop over samples for one DoF is one for four.
+pub(crate) fn gather(rows: &[f64], n: usize, group: usize, column: &mut [Lanes]) {
+    let dofs = dofs(n, group);
+    column.iter_mut().zip(rows.chunks_exact(n)).for_each(|(lanes, row)| *lanes = padded(&row[dofs.clone()]));
+}
+
+/// Puts the DoFs of one group back into rows (k, `n`).
+pub(crate) fn scatter(column: &[Lanes], n: usize, group: usize, rows: &mut [f64]) {
+    let dofs = dofs(n, group);
+    column.iter().zip(rows.chunks_exact_mut(n)).for_each(|(lanes, row)| unpad(*lanes, &mut row[dofs.clone()]));
+}
+
+/// The DoFs, of `n`, that one group holds.
+fn dofs(n: usize, group: usize) -> Range<usize> {
+    group * WIDTH..n.min((group + 1) * WIDTH)
 }
 
 /// The first `n` numbers of groups.

@@ -6,15 +6,17 @@
 //! y(t) = y_k + (t − t_k)[ṡ_k + r(3δ − 2ṡ_k − ṡ_o) + r²(ṡ_k + ṡ_o − 2δ)]
 //! ```
 //!
-//! and the slopes ṡ follow from the continuity of the second derivative: one tridiagonal system for all columns, and for
-//! all splines over the same knots, solved in O(n). Every coefficient is a ratio of intervals, and no value is squared:
-//! neither the unit of time nor that of the values matters.
+//! and the slopes ṡ follow from the continuity of the second derivative: one tridiagonal system for all splines over the
+//! same knots, solved in O(n), for one DoF or for four side by side. Every coefficient is a ratio of intervals, and no
+//! value is squared: neither the unit of time nor that of the values matters.
 //!
 //! C. de Boor, A Practical Guide to Splines, Springer 1978, chapter IV.
 
+use ndarray::Array2;
+
+use crate::lanes::{Lanes, Real, gather, groups, scatter};
+
 /// Knots of cubic splines, with the system that the slopes solve, factorised.
-///
-/// Values and slopes at the knots lie by rows: those of all D columns at the first knot, then at the next.
 #[derive(Clone, Debug)]
 pub(crate) struct Knots {
     /// Times of the n knots; those of periodic splines repeat the first a period later.
@@ -32,7 +34,8 @@ struct Condition {
     rises: [f64; 2],
 }
 
-/// A row of the factorised system.
+/// A row of the factorised system, divided by its pivot: either substitution is a multiplication and a subtraction a row,
+/// for which the next row waits.
 #[derive(Clone, Copy, Debug)]
 struct Equation {
     /// Weights of the rises over two neighbouring intervals.
@@ -84,7 +87,7 @@ impl Knots {
 
         let last = -top / 2.0;
         let mut correction = vec![0.0; n];
-        (correction[0], correction[n - 1]) = (-2.0, bottom);
+        (correction[0], correction[n - 1]) = (-2.0 * equations[0].scale, bottom * equations[n - 1].scale);
         for i in 1..n {
             correction[i] -= equations[i].lower * correction[i - 1];
         }
@@ -99,60 +102,51 @@ impl Knots {
         self.equations.len()
     }
 
-    /// Writes the `slopes` (n·D) at the knots of the spline through `values` (n·D).
-    pub(crate) fn slopes(&self, values: &[f64], slopes: &mut [f64]) {
+    /// Writes the `slopes` (n,) at the knots of the spline through `values` (n,).
+    pub(crate) fn slopes<T: Real>(&self, values: &[T], slopes: &mut [T]) {
         let n = self.len();
-        let n_dofs = values.len() / n;
-        let value = |i: usize| &values[i * n_dofs..][..n_dofs];
-        for (i, equation) in self.equations.iter().enumerate() {
+        let mut before = T::default();
+        for (i, Equation { rises: [left, right], lower, .. }) in self.equations.iter().enumerate() {
             let [from, at, to] = match self.seam {
                 None if i == 0 => [0, 1, 2],
                 None if i == n - 1 => [n - 3, n - 2, n - 1],
                 Some(_) if i == 0 => [n - 1, 0, 1],
                 Some(_) if i == n - 1 => [n - 2, n - 1, 0],
                 _ => [i - 1, i, i + 1],
-            };
-            let ([left, right], [from, at, to]) = (equation.rises, [from, at, to].map(value));
-            let (before, slope) = slopes.split_at_mut(i * n_dofs);
-            let slope = &mut slope[..n_dofs];
-            for d in 0..n_dofs {
-                slope[d] = left * (at[d] - from[d]) + right * (to[d] - at[d]);
             }
-            if i > 0 {
-                take_off(slope, equation.lower, &before[(i - 1) * n_dofs..]);
-            }
+            .map(|knot| values[knot]);
+            before = (at - from) * *left + (to - at) * *right - before * *lower;
+            slopes[i] = before;
         }
         substitute_back(&self.equations, slopes);
         if let Some(Seam { last, correction }) = &self.seam {
-            let mut along = slopes[..n_dofs].to_vec();
-            take_off(&mut along, -last, &slopes[(n - 1) * n_dofs..]);
-            for (slope, x) in slopes.chunks_exact_mut(n_dofs).zip(correction) {
-                take_off(slope, *x, &along);
-            }
+            let along = slopes[0] + slopes[n - 1] * *last;
+            slopes.iter_mut().zip(correction).for_each(|(slope, x)| *slope = *slope - along * *x);
         }
     }
 
-    /// Writes to `out` (k·D) what the spline of such `values` and `slopes` (n·D) is worth at `times` (k), which do not
+    /// Writes to `out` (k,) what the spline of such `values` and `slopes` (n,) is worth at `times` (k,), which do not
     /// decrease. At the knots the values come out bit for bit, and beyond them the end cubics continue.
-    pub(crate) fn sample(&self, values: &[f64], slopes: &[f64], times: impl IntoIterator<Item = f64>, out: &mut [f64]) {
-        let n_dofs = values.len() / self.len();
+    pub(crate) fn sample<T: Real>(
+        &self,
+        values: &[T],
+        slopes: &[T],
+        times: impl IntoIterator<Item = f64>,
+        out: &mut [T],
+    ) {
         let mut right = 1;
-        for (t, out) in times.into_iter().zip(out.chunks_exact_mut(n_dofs)) {
+        for (t, out) in times.into_iter().zip(out) {
             while right + 1 < self.time.len() && self.time[right] <= t {
                 right += 1;
             }
             let [near, far] = self.by_distance(t, right);
             let (x, per_width) = (t - self.time[near], 1.0 / (self.time[far] - self.time[near]));
             let r = x * per_width;
-            let [near, far] = [near, far].map(|knot| knot % self.len() * n_dofs);
-            let [y, y_far] = [near, far].map(|first| &values[first..][..n_dofs]);
-            let [slope, slope_far] = [near, far].map(|first| &slopes[first..][..n_dofs]);
-            for d in 0..n_dofs {
-                let chord = (y_far[d] - y[d]) * per_width;
-                let (bend, twist) =
-                    (3.0 * chord - 2.0 * slope[d] - slope_far[d], slope[d] + slope_far[d] - 2.0 * chord);
-                out[d] = y[d] + x * (slope[d] + r * (bend + r * twist));
-            }
+            let [near, far] = [near, far].map(|knot| knot % self.len());
+            let (y, [slope, slope_far]) = (values[near], [near, far].map(|knot| slopes[knot]));
+            let chord = (values[far] - y) * per_width;
+            let (bend, twist) = (chord * 3.0 - slope * 2.0 - slope_far, slope + slope_far - chord * 2.0);
+            *out = y + (slope + (bend + twist * r) * r) * x;
         }
     }
 
@@ -161,6 +155,52 @@ impl Knots {
     fn by_distance(&self, t: f64, right: usize) -> [usize; 2] {
         let left = right - 1;
         if t - self.time[left] < self.time[right] - t { [left, right] } else { [right, left] }
+    }
+}
+
+/// Splines of all DoFs of a movement, over the same knots.
+#[derive(Clone, Debug)]
+pub(crate) struct Splines {
+    knots: Knots,
+    n_dofs: usize,
+    /// Values and slopes (n,) at the knots, for each group of DoFs.
+    groups: Vec<[Vec<Lanes>; 2]>,
+}
+
+impl Splines {
+    /// Through values (n·D) at the knots, by rows: those of all D DoFs at the first knot, then at the next.
+    pub(crate) fn through(knots: Knots, rows: &[f64], n_dofs: usize) -> Self {
+        let of = |group| {
+            let [mut values, mut slopes] = [(); 2].map(|()| vec![Lanes::ZERO; knots.len()]);
+            gather(rows, n_dofs, group, &mut values);
+            knots.slopes(&values, &mut slopes);
+            [values, slopes]
+        };
+        let groups = (0..groups(n_dofs)).map(of).collect();
+        Self { knots, n_dofs, groups }
+    }
+
+    /// Number of DoFs D.
+    pub(crate) fn n_dofs(&self) -> usize {
+        self.n_dofs
+    }
+
+    /// Slopes (n, D) at the knots.
+    pub(crate) fn slopes(&self) -> Array2<f64> {
+        let mut rows = Array2::zeros((self.knots.len(), self.n_dofs));
+        for (group, [_, slopes]) in self.groups.iter().enumerate() {
+            scatter(slopes, self.n_dofs, group, rows.as_slice_mut().unwrap_or_default());
+        }
+        rows
+    }
+
+    /// Writes to `rows` (k·D) what the splines are worth at `times` (k), as [`Knots::sample`] does for one DoF.
+    pub(crate) fn sample(&self, times: impl Iterator<Item = f64> + Clone, rows: &mut [f64]) {
+        let mut sampled = vec![Lanes::ZERO; rows.len() / self.n_dofs];
+        for (group, [values, slopes]) in self.groups.iter().enumerate() {
+            self.knots.sample(values, slopes, times.clone(), &mut sampled);
+            scatter(&sampled, self.n_dofs, group, rows);
+        }
     }
 }
 
@@ -185,45 +225,34 @@ fn end_condition(outer: f64, inner: f64) -> ([f64; 2], [f64; 2]) {
 /// end slope is eliminated.
 fn factorise(conditions: &[Condition]) -> Vec<Equation> {
     let mut equations: Vec<Equation> = Vec::with_capacity(conditions.len());
-    for &Condition { slopes: [below, diagonal, upper], rises } in conditions {
-        let (lower, eliminated) = equations.last().map_or((0.0, 0.0), |above| {
-            let lower = below * above.scale;
-            (lower, lower * above.upper)
-        });
-        equations.push(Equation { rises, lower, upper, scale: 1.0 / (diagonal - eliminated) });
+    for &Condition { slopes: [below, diagonal, above], rises } in conditions {
+        let eliminated = equations.last().map_or(0.0, |before| below * before.upper);
+        let scale = 1.0 / (diagonal - eliminated);
+        equations.push(Equation { rises: rises.map(|w| w * scale), lower: below * scale, upper: above * scale, scale });
     }
     equations
 }
 
-/// Solves the upper half of the system for all columns, in place.
-fn substitute_back(equations: &[Equation], slopes: &mut [f64]) {
-    let n_dofs = slopes.len() / equations.len();
-    for (i, equation) in equations.iter().enumerate().rev() {
-        let (slope, after) = slopes[i * n_dofs..].split_at_mut(n_dofs);
-        if i + 1 < equations.len() {
-            take_off(slope, equation.upper, after);
-        }
-        slope.iter_mut().for_each(|slope| *slope *= equation.scale);
+/// Solves the upper half of the system, in place.
+fn substitute_back<T: Real>(equations: &[Equation], slopes: &mut [T]) {
+    let mut after = T::default();
+    for (slope, equation) in slopes.iter_mut().zip(equations).rev() {
+        after = *slope - after * equation.upper;
+        *slope = after;
     }
-}
-
-/// row −= times · other, as far as the row goes.
-#[inline(always)]
-fn take_off(row: &mut [f64], times: f64, other: &[f64]) {
-    row.iter_mut().zip(other).for_each(|(x, y)| *x -= times * y);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
-    use ndarray::{Array2, ArrayView2, Axis, concatenate};
+    use ndarray::{ArrayView2, Axis, concatenate};
     use proptest::prelude::*;
     use std::f64::consts::TAU;
 
-    /// A spline with its own knots.
+    /// Splines with all that they follow from.
     struct Spline {
-        knots: Knots,
+        splines: Splines,
         period: Option<f64>,
         values: Array2<f64>,
         slopes: Array2<f64>,
@@ -240,27 +269,25 @@ mod tests {
 
         fn over(knots: Knots, period: Option<f64>, values: ArrayView2<f64>) -> Self {
             let values = values.as_standard_layout().to_owned();
-            let mut slopes = Array2::zeros(values.dim());
-            knots.slopes(values.as_slice().unwrap(), slopes.as_slice_mut().unwrap());
-            Self { knots, period, values, slopes }
+            let splines = Splines::through(knots, values.as_slice().unwrap(), values.ncols());
+            Self { period, slopes: splines.slopes(), splines, values }
         }
 
         fn sample(&self, times: &[f64]) -> Array2<f64> {
             let mut out = Array2::zeros((times.len(), self.values.ncols()));
-            let [values, slopes] = [&self.values, &self.slopes].map(|table| table.as_slice().unwrap());
-            self.knots.sample(values, slopes, times.iter().map(|&t| self.turned(t)), out.as_slice_mut().unwrap());
+            self.splines.sample(times.iter().map(|&t| self.turned(t)), out.as_slice_mut().unwrap());
             out
         }
 
         /// The derivative of what is sampled, by the formula that heads this file.
         fn sample_slopes(&self, times: &[f64]) -> Array2<f64> {
             Array2::from_shape_fn((times.len(), self.values.ncols()), |(i, d)| {
-                let (t, time) = (self.turned(times[i]), &self.knots.time);
+                let (t, time) = (self.turned(times[i]), &self.splines.knots.time);
                 let right = time.partition_point(|&knot| knot <= t).clamp(1, time.len() - 1);
-                let [near, far] = self.knots.by_distance(t, right);
+                let [near, far] = self.splines.knots.by_distance(t, right);
                 let width = time[far] - time[near];
                 let r = (t - time[near]) / width;
-                let [near, far] = [near, far].map(|knot| [knot % self.knots.len(), d]);
+                let [near, far] = [near, far].map(|knot| [knot % self.splines.knots.len(), d]);
                 let (chord, [s, o]) =
                     ((self.values[far] - self.values[near]) / width, [near, far].map(|k| self.slopes[k]));
                 s + r * (2.0 * (3.0 * chord - 2.0 * s - o) + 3.0 * r * (s + o - 2.0 * chord))
@@ -268,7 +295,7 @@ mod tests {
         }
 
         fn turned(&self, t: f64) -> f64 {
-            let first = self.knots.time[0];
+            let first = self.splines.knots.time[0];
             match self.period {
                 Some(period) if !(first..first + period).contains(&t) => first + (t - first).rem_euclid(period),
                 _ => t,
@@ -348,6 +375,28 @@ mod tests {
             ] {
                 prop_assert_eq!(spline.sample(&time), &values);
                 prop_assert_eq!(spline.sample_slopes(&time), spline.slopes);
+            }
+        }
+    }
+
+    proptest! {
+        /// However many DoFs share the knots, in groups that are full or not: to the last bit.
+        #[test]
+        fn splines_of_many_dofs_are_those_of_each_alone(
+            time in knots(4..12), n_dofs in 1..=9usize, y in prop::collection::vec(-1.0..1.0, 9 * 12), gap in 0.1..1.0,
+        ) {
+            let values = Array2::from_shape_fn((time.len(), n_dofs), |(i, d)| y[9 * i + d]);
+            let period = time[time.len() - 1] + gap - time[0];
+            let all = |values: ArrayView2<f64>| {
+                [Spline::not_a_knot(&time, values), Spline::periodic(&time, period, values)]
+            };
+            let between: Vec<f64> = time.iter().map(|t| t + 0.03).collect();
+            for (d, one) in values.axis_chunks_iter(Axis(1), 1).enumerate() {
+                for (together, alone) in all(values.view()).iter().zip(all(one)) {
+                    prop_assert_eq!(together.slopes.column(d), alone.slopes.column(0));
+                    let [together, alone] = [together, &alone].map(|spline| spline.sample(&between));
+                    prop_assert_eq!(together.column(d), alone.column(0));
+                }
             }
         }
     }

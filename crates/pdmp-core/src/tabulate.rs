@@ -5,7 +5,7 @@
 use crate::attractor::Jet;
 use crate::basis::Regression;
 use crate::error::Result;
-use crate::lanes::{Lanes, WIDTH};
+use crate::lanes::{Lanes, padded};
 use crate::threads::Threads;
 
 /// Error of the table, relative to the largest forcing, at which cells are halved no more.
@@ -109,11 +109,8 @@ impl Jets {
 
     /// Up to four outputs at a place.
     pub(crate) fn jet(&self, place: usize, first: usize, n: usize) -> Jet<Lanes> {
-        let [value, slope] = [&self.values, &self.slopes].map(|table| {
-            let mut lanes = [0.0; WIDTH];
-            lanes[..n].copy_from_slice(&table[place * self.n_outputs + first..][..n]);
-            Lanes::new(lanes)
-        });
+        let [value, slope] =
+            [&self.values, &self.slopes].map(|table| padded(&table[place * self.n_outputs + first..][..n]));
         Jet { value, slope }
     }
 

@@ -9,6 +9,7 @@ use crate::align::Aligned;
 use crate::attractor::{Attractor, Inverse};
 use crate::demo::zeros;
 use crate::error::Result;
+use crate::lanes::{Lanes, gather, groups, pack, scatter, unpack};
 use crate::phase::{Canonical, Kind};
 use crate::spline::Knots;
 use crate::threads::Threads;
@@ -58,13 +59,13 @@ impl Targets {
             ranges: Array2::zeros((n_demos, n_dofs)),
         };
         let work = Work::new(attractor, canonical, aligned.n_samples);
-        let slopes = || vec![0.0; aligned.n_samples * n_dofs];
-        let learn = |slopes: &mut Vec<f64>, (m, rows): (usize, Rows)| {
+        let columns = || [0, 1].map(|_| vec![Lanes::ZERO; aligned.n_samples]);
+        let learn = |columns: &mut [Vec<Lanes>; 2], (m, rows): (usize, Rows)| {
             aligned.sample(m, rows.forcing)?;
-            work.learn(rows, aligned.demo(m).goal(), slopes);
+            work.learn(rows, aligned.demo(m).goal(), columns);
             Ok(())
         };
-        threads.try_for_each_told(targets.rows().enumerate().collect(), slopes, learn, proceed)?;
+        threads.try_for_each_told(targets.rows().enumerate().collect(), columns, learn, proceed)?;
         Ok(targets)
     }
 
@@ -123,29 +124,29 @@ impl Work {
     /// The output system does not care where a movement takes place, but for rounding: demonstrations are translated to
     /// start at 0, and a DoF that does not move has a target of exactly zero, and its own position as its mean, to the
     /// last digit.
-    fn learn(&self, rows: Rows, given: Option<&[f64]>, slopes: &mut [f64]) {
+    fn learn(&self, rows: Rows, given: Option<&[f64]>, [column, slopes]: &mut [Vec<Lanes>; 2]) {
         let Rows { forcing: position, start, goal, anchor, range } = rows;
         let n_dofs = start.len();
         start.copy_from_slice(&position[..n_dofs]);
         goal.copy_from_slice(given.unwrap_or(&position[position.len() - n_dofs..]));
-        let (mut low, mut high) = (vec![0.0; n_dofs], vec![0.0; n_dofs]);
-        for row in position.chunks_exact_mut(n_dofs) {
-            let so_far = anchor.iter_mut().zip(low.iter_mut().zip(&mut high));
-            for ((y, start), (sum, (low, high))) in row.iter_mut().zip(start.iter()).zip(so_far) {
+        let n_samples = Lanes::splat(column.len() as f64);
+        let goals = pack(goal);
+        let [mut means, mut ranges] = [0, 1].map(|_| vec![Lanes::ZERO; goals.len()]);
+        for group in 0..groups(n_dofs) {
+            gather(position, n_dofs, group, column);
+            let start = column[0];
+            let [mut low, mut high, mut sum] = [Lanes::ZERO; 3];
+            for y in column.iter_mut() {
                 *y -= start;
-                *sum += *y;
-                *low = if *y < *low { *y } else { *low };
-                *high = if *y > *high { *y } else { *high };
+                (low, high, sum) = (low.fast_min(*y), high.fast_max(*y), sum + *y);
             }
+            (means[group], ranges[group]) = (start + sum / n_samples, high - low);
+            let centre = if self.kind == Kind::Discrete { goals[group] } else { means[group] };
+            self.knots.slopes(column, slopes);
+            self.inverse.target(column, slopes, centre - start, self.kind == Kind::Rhythmic);
+            scatter(column, n_dofs, group, position);
         }
-        let n_samples = (position.len() / n_dofs) as f64;
-        for d in 0..n_dofs {
-            anchor[d] = start[d] + anchor[d] / n_samples;
-            range[d] = high[d] - low[d];
-        }
-        let centre = if self.kind == Kind::Discrete { goal } else { anchor };
-        let centre: Vec<f64> = centre.iter().zip(start).map(|(centre, start)| *centre - *start).collect();
-        self.knots.slopes(position, slopes);
-        self.inverse.target(position, slopes, &centre, self.kind == Kind::Rhythmic);
+        anchor.copy_from_slice(unpack(&means, n_dofs));
+        range.copy_from_slice(unpack(&ranges, n_dofs));
     }
 }

@@ -16,7 +16,7 @@ use crate::demo::{Demonstration, LEAST_SAMPLES};
 use crate::error::{Error, Result};
 use crate::phase::Kind;
 use crate::smooth::{Smoothing, smooth};
-use crate::spline::Knots;
+use crate::spline::{Knots, Splines};
 use crate::threads::Threads;
 pub(crate) use clock::check_duration;
 use clock::{Clock, Ticks};
@@ -204,7 +204,7 @@ impl Aligned<'_> {
     }
 
     /// Writes the positions of demonstration `m` at times in its ticks, which do not decrease.
-    fn read(&self, m: usize, times: impl Iterator<Item = f64>, position: &mut [f64]) -> Result<()> {
+    fn read(&self, m: usize, times: impl Iterator<Item = f64> + Clone, position: &mut [f64]) -> Result<()> {
         let Clock { ticks, extent, .. } = self.clocks[m];
         let values = self.smoothed(m)?;
         let own = (0..self.demos[m].n_samples()).map(|c| ticks.at(c)).collect();
@@ -212,9 +212,7 @@ impl Aligned<'_> {
             Kind::Discrete => Knots::not_a_knot(own),
             Kind::Rhythmic => Knots::periodic(own, extent),
         };
-        let mut slopes = vec![0.0; values.len()];
-        knots.slopes(&values, &mut slopes);
-        knots.sample(&values, &slopes, times, position);
+        Splines::through(knots, &values, self.demos[m].n_dofs()).sample(times, position);
         Ok(())
     }
 

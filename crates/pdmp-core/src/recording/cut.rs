@@ -84,7 +84,7 @@ pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
         let allowed = "must lie between 0 and 1: it is a share of the peak speed";
         return Err(Error::Range { name: "threshold", value: threshold, allowed });
     }
-    let (position, slopes) = (demo.position(), Curve::of(demo)?.slopes);
+    let (position, slopes) = (demo.position(), Curve::of(demo)?.splines.slopes());
     let ranges: Vec<f64> = position
         .columns()
         .into_iter()

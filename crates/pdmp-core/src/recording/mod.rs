@@ -26,7 +26,7 @@ use ndarray::Array2;
 use crate::align::check_duration;
 use crate::demo::{Demonstration, Sampling, zeros};
 use crate::error::{Error, Result};
-use crate::spline::Knots;
+use crate::spline::{Knots, Splines};
 
 pub use cut::{cut, resample, trim};
 pub use cycles::{Cycle, Cycles, Keep, Rejected, cycles};
@@ -53,19 +53,15 @@ fn clock(demo: &Demonstration) -> Result<Vec<f64>> {
 /// A recording between its samples.
 struct Curve {
     time: Vec<f64>,
-    knots: Knots,
-    values: Vec<f64>,
-    slopes: Array2<f64>,
+    splines: Splines,
 }
 
 impl Curve {
     fn of(demo: &Demonstration) -> Result<Self> {
         let time = clock(demo)?;
-        let knots = Knots::not_a_knot(time.clone());
         let values: Vec<f64> = demo.position().iter().copied().collect();
-        let mut slopes = Array2::zeros(demo.position().raw_dim());
-        knots.slopes(&values, slopes.as_slice_mut().unwrap_or_default());
-        Ok(Self { time, knots, values, slopes })
+        let splines = Splines::through(Knots::not_a_knot(time.clone()), &values, demo.n_dofs());
+        Ok(Self { time, splines })
     }
 
     fn first(&self) -> f64 {
@@ -83,10 +79,9 @@ impl Curve {
 
     /// Positions (n, D) at n even times from `from` to `to`, both included.
     fn sample(&self, from: f64, to: f64, n: usize) -> Result<Array2<f64>> {
-        let mut position = zeros("position", (n, self.slopes.ncols()))?;
+        let mut position = zeros("position", (n, self.splines.n_dofs()))?;
         let times = (0..n).map(|c| from + (to - from) * (c as f64 / (n - 1) as f64));
-        let slopes = self.slopes.as_slice().unwrap_or_default();
-        self.knots.sample(&self.values, slopes, times, position.as_slice_mut().unwrap_or_default());
+        self.splines.sample(times, position.as_slice_mut().unwrap_or_default());
         Ok(position)
     }
 }

@@ -35,7 +35,7 @@ use crate::error::{Error, Result};
 use crate::recording::Curve;
 use crate::recording::odd::median;
 use crate::smooth::{Smoothing, smooth};
-use crate::spline::Knots;
+use crate::spline::{Knots, Splines};
 
 /// Longest period, as a share of the recording: it must hold one cycle and a half.
 const LONGEST: f64 = 2.0 / 3.0;
@@ -61,16 +61,14 @@ pub fn period(demo: &Demonstration) -> Result<f64> {
 
 /// Traits (n, 2D) of a recording at n even times: positions, then velocities. Those that are constant are zero.
 pub(super) fn traits(curve: &Curve) -> Result<Array2<f64>> {
-    let (n, n_dofs) = curve.slopes.dim();
+    let n = curve.time.len();
     let time: Vec<f64> = (0..n).map(|c| c as f64).collect();
     let mut position = curve.sample(curve.first(), curve.last(), n)?;
     position.columns_mut().into_iter().for_each(standardise);
     // Noise would drown the velocities of a recording at a high rate.
     let smoothed = smooth(Smoothing::Auto, &time, None, position.view())?;
     let smoothed: Vec<f64> = smoothed.iter().copied().collect();
-    let mut slopes = vec![0.0; n * n_dofs];
-    Knots::not_a_knot(time).slopes(&smoothed, &mut slopes);
-    let mut velocity = Array2::from_shape_fn((n, n_dofs), |(c, d)| slopes[c * n_dofs + d]);
+    let mut velocity = Splines::through(Knots::not_a_knot(time), &smoothed, position.ncols()).slopes();
     velocity.columns_mut().into_iter().for_each(standardise);
     let traits = concatenate![Axis(1), position, velocity];
     if traits.iter().all(|x| *x == 0.0) {
