@@ -124,6 +124,26 @@ def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(made.position, expected.position)
 
 
+def test_warped_models_are_told_and_repeat_demonstrations(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With --alignment and --styles auto the fit is the library's; --tau overrides a timing."""
+    path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"
+    options = ("--context", "bend", "--alignment", "warp", "--styles", "auto")
+    assert run("fit", folder, *options, "-o", path) == 0
+    recordings = demos.read([folder], context=["bend"])
+    expected = pdmp.fit(recordings, alignment="warp", n_styles="auto")
+    model = pdmp.load(path)
+    np.testing.assert_array_equal(model.styles, expected.styles)
+    assert run("info", path) == 0
+    assert re.search(r"timing +8 segments", capsys.readouterr().out)
+    assert run("rollout", path, "--demo", 2, "-o", out) == 0
+    made = model.rollout(**pdmp.as_demonstrated(model, 2))
+    np.testing.assert_array_equal(demos.read_csv(out, columns=["x", "y"]).position, made.position)
+    assert run("rollout", path, "--demo", 2, "--tau", 2 * model.tau, "-o", out) == 0
+    assert demos.read_csv(out).time[-1] == pytest.approx(2 * model.durations[model.nominal], 0.02)
+
+
 def test_evaluate_fills_gaps_when_told(folder: Path) -> None:
     """A missing field is refused by its place, and interpolated up to a stated length."""
     path = folder / "demos" / "2.csv"
@@ -201,7 +221,15 @@ def test_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["dance"], ["fit"], ["rollout", "m", "--style", "1", "--demo", "0"]]
+    "arguments",
+    [
+        [],
+        ["dance"],
+        ["fit"],
+        ["fit", "f", "--styles", "many", "-o", "m"],
+        ["fit", "f", "--smoothing", "much", "-o", "m"],
+        ["rollout", "m", "--style", "1", "--demo", "0"],
+    ],
 )
 def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
     """Usage errors are told from all others by their exit code."""

@@ -1,6 +1,6 @@
 """Options that several commands share."""
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import Any
 
 
@@ -87,8 +87,14 @@ def settings(options: Namespace) -> dict[str, Any]:
 
 
 def _styles(text: str) -> str | int:
-    return text if text == "auto" else int(text)
+    try:
+        return text if text == "auto" else int(text)
+    except ValueError:
+        raise ArgumentTypeError(f'"{text}" is neither a whole number nor auto') from None
 
 
 def _smoothing(text: str) -> str | float:
-    return text if text == "auto" else float(text)
+    try:
+        return text if text == "auto" else float(text)
+    except ValueError:
+        raise ArgumentTypeError(f'"{text}" is neither a frequency [Hz] nor auto') from None

@@ -38,6 +38,8 @@ def run(options: Namespace) -> None:
         "tau": f"{model.tau:g} s",
         "constants": constants,
     }
+    if len(model.breaks) > 2:
+        lines["timing"] = f"{len(model.breaks) - 1} segments"
     if model.contexts is not None:
         columns = zip(*model.contexts, strict=True)
         lines["contexts"] = ", ".join(_extent(column) for column in columns)
