@@ -24,12 +24,18 @@ pub(super) struct Axes {
 impl Axes {
     /// The principal axes of outputs (n, P), whose errors e count eᵀGe with the `metric` G (P, P).
     pub(super) fn principal(outputs: ArrayView2<f64>, metric: ArrayView2<f64>) -> Result<Self> {
-        let (sizes, vectors) = eigen(metric)?;
-        let largest = sizes.iter().fold(0.0f64, |most, size| most.max(*size)).max(f64::MIN_POSITIVE);
+        // Styles, goals and times come in units of their own, which may be far apart.
+        let units = metric.diag().mapv(|g| if g > 0.0 { g.sqrt() } else { 1.0 });
+        let balanced = Array2::from_shape_fn(metric.dim(), |(p, q)| metric[[p, q]] / units[p] / units[q]);
+        let (sizes, vectors) = eigen(balanced.view())?;
+        let largest = sizes.iter().fold(f64::MIN_POSITIVE, |most, size| most.max(*size));
         let sizes: Vec<f64> = sizes.iter().map(|size| size.max(largest * FLOOR * FLOOR).sqrt()).collect();
         // In these coordinates every error counts alike, and stays so where they are rotated.
-        let scaled = |power: i32| Array2::from_shape_fn(vectors.dim(), |(p, k)| vectors[[p, k]] * sizes[k].powi(power));
-        let deviations = (&outputs - &outputs.mean_axis(Axis(0)).unwrap_or_default()).dot(&scaled(1));
+        let scaled = |power: i32| {
+            Array2::from_shape_fn(vectors.dim(), |(p, k)| vectors[[p, k]] * (units[p] * sizes[k]).powi(power))
+        };
+        let mut deviations = (&outputs - &outputs.mean_axis(Axis(0)).unwrap_or_default()).dot(&scaled(1));
+        deviations /= deviations.fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
         let (_, rotation) = eigen(deviations.t().dot(&deviations).view())?;
         // In rows, as a file gives them: sums are then the same to the last bit.
         Self::new(rotation.t().dot(&scaled(-1).t()).as_standard_layout().into_owned())

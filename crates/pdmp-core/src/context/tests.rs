@@ -159,3 +159,24 @@ fn repetitions_count_once() {
     let added = 0.09 * (1.0 - (1.0 / 3.0 + 2.0) / 3.0);
     assert_relative_eq!(often.covariance.unwrap()[[0, 0]], once.covariance.unwrap()[[0, 0]] + added, epsilon = 1e-12);
 }
+
+/// What is foreseen does not depend on the units of the outputs, however far apart.
+#[test]
+fn units_of_outputs_do_not_matter() {
+    let h: Vec<f64> = (0..9).map(|k| k as f64 / 8.0).collect();
+    let (columns, table) = tabulate(&contexts(&h).iter().map(Vec::as_slice).collect::<Vec<_>>()).unwrap();
+    let outputs = Array2::from_shape_fn((9, 2), |(m, p)| (4.0 * h[m] + p as f64).sin() + 0.1 * (31.0 * h[m]).cos());
+    let metric = array![[2.0, 0.6], [0.6, 1.0]];
+    let foreseen = |units: [f64; 2]| {
+        let outputs = &outputs * &ndarray::Array1::from(units.to_vec());
+        let metric = Array2::from_shape_fn((2, 2), |(p, q)| metric[[p, q]] / units[p] / units[q]);
+        let map = ContextMap::learn(columns.clone(), &table, outputs.view(), metric.view(), MapChoice::Auto).unwrap();
+        std::array::from_fn::<_, 2, _>(|p| map.expect(&[0.4])[p] / units[p])
+    };
+    let plain = foreseen([1.0, 1.0]);
+    for units in [[1e-3, 1e6], [1.0, 1e140], [1e140, 1e-140]] {
+        for (p, value) in foreseen(units).into_iter().enumerate() {
+            assert_relative_eq!(value, plain[p], epsilon = 1e-9);
+        }
+    }
+}
