@@ -1,6 +1,7 @@
 """Options that several commands share."""
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable
 from typing import Any
 
 
@@ -52,7 +53,7 @@ def add_learning(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--styles",
-        type=_styles,
+        type=_or_auto(int, "whole number"),
         metavar="J",
         help="number of style parameters, or auto: as few as foresee movements in other contexts",
     )
@@ -70,7 +71,10 @@ def add_learning(parser: ArgumentParser) -> None:
         help="Gaussian process (default) or normalised Gaussian network",
     )
     parser.add_argument(
-        "--smoothing", type=_smoothing, metavar="HZ", help="cut-off [Hz], or auto; default: none"
+        "--smoothing",
+        type=_or_auto(float, "frequency [Hz]"),
+        metavar="HZ",
+        help="cut-off [Hz], or auto; default: none",
     )
 
 
@@ -86,15 +90,13 @@ def settings(options: Namespace) -> dict[str, Any]:
     }
 
 
-def _styles(text: str) -> str | int:
-    try:
-        return text if text == "auto" else int(text)
-    except ValueError:
-        raise ArgumentTypeError(f'"{text}" is neither a whole number nor auto') from None
+def _or_auto(read: Callable[[str], Any], wanted: str) -> Callable[[str], Any]:
+    """Return what reads an argument that may be auto instead."""
 
+    def value(text: str) -> Any:
+        try:
+            return text if text == "auto" else read(text)
+        except ValueError:
+            raise ArgumentTypeError(f'"{text}" is neither a {wanted} nor auto') from None
 
-def _smoothing(text: str) -> str | float:
-    try:
-        return text if text == "auto" else float(text)
-    except ValueError:
-        raise ArgumentTypeError(f'"{text}" is neither a frequency [Hz] nor auto') from None
+    return value
