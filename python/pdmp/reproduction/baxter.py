@@ -1,0 +1,151 @@
+"""The arm of Baxter, a robot with two arms of seven joints, of which the paper's four are used.
+
+The model is that of robosuite 1.5.2 (MIT licence), read as it lies in its wheel: nothing of robosuite is
+imported, and what it depends on need not be installed.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    import mujoco
+
+Array = NDArray[np.float64]
+
+JOINTS = ("s0", "s1", "e0", "e1")
+"""Three joints of the shoulder and one of the elbow, the paper's q1 to q4."""
+DIRECTIONS = np.array([1.0, -1.0, 1.0, -1.0])
+"""q = direction · angle: Baxter counts the pitch of the shoulder and the bending of the elbow the other way.
+
+So read, the goal that the paper prints is a hand on a table before the body, with the elbow out by no more than
+the 15° by which people differ from one another; every other choice of signs puts it above the head, behind the
+back or far to the side.
+"""
+MOUTH = np.array([0.20, 0.0, 0.55])
+"""Where a mouth would be, below Baxter's screen [m]."""
+
+
+def mjcf() -> Path:
+    """Return the file of the model.
+
+    Raises
+    ------
+    ImportError
+        The wheel of robosuite is not installed.
+    """
+    package = find_spec("robosuite")
+    if package is None or package.origin is None:
+        raise ImportError(
+            "the model of the robot is not installed: pip install --no-deps robosuite==1.5.2"
+        )
+    return Path(package.origin).parent / "models" / "assets" / "robots" / "baxter" / "robot.xml"
+
+
+def specification() -> mujoco.MjSpec:
+    """Return the model, to be added to.
+
+    Raises
+    ------
+    ImportError
+        MuJoCo or the model is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise ImportError("the robot needs MuJoCo: pip install 'pdmp[reproduce]'") from None
+    return mujoco.MjSpec.from_file(str(mjcf()))
+
+
+class Arm:
+    """Kinematics of one arm, the wrist straight.
+
+    Parameters
+    ----------
+    side : {"right", "left"}
+        Which arm.
+    """
+
+    def __init__(self, side: str = "right") -> None:
+        import mujoco
+
+        self._model = specification().compile()
+        self._data: Any = mujoco.MjData(self._model)
+        joints = [self._model.joint(f"{side}_{joint}") for joint in JOINTS]
+        self._addresses = [joint.qposadr[0] for joint in joints]
+        limits = DIRECTIONS * np.array([joint.range for joint in joints]).T
+        self.lowest, self.highest = limits.min(axis=0), limits.max(axis=0)
+        bodies = ("lower_shoulder", "lower_elbow", "hand")
+        self._bodies = [self._model.body(f"{side}_{body}").id for body in bodies]
+        self._kinematics = mujoco.mj_kinematics
+
+    def places(self, q: ArrayLike) -> Array:
+        """Return where shoulder, elbow and hand are (3, 3) [m] at joint angles q (4,) [rad]."""
+        self._data.qpos[self._addresses] = DIRECTIONS * q
+        self._kinematics(self._model, self._data)
+        return np.array(self._data.xpos[self._bodies])
+
+    def hands(self, path: ArrayLike) -> Array:
+        """Return where the hand is (T, 3) [m] along joint angles (T, 4) [rad]."""
+        return np.array([self.places(q)[2] for q in np.asarray(path)])
+
+    def swivel(self, q: ArrayLike) -> float:
+        """Return the angle [rad] of the elbow about the line from shoulder to hand.
+
+        It is zero where the plane of the arm holds the mouth, on the other side of that line: a
+        hand so held would be brought to the mouth by bending the elbow alone. People reach within
+        some 5° of that (Kim, Miller, Byl, Abrams, Rosen, IEEE Transactions on Biomedical
+        Engineering 59, 2012, 1770-1779, doi:10.1109/TBME.2012.2194489).
+        """
+        return _swivel(self.places(q))
+
+    def reach(self, hands: Array, swivels: Array, near: ArrayLike) -> Array:
+        """Return joint angles (T, 4) [rad] that bring the hand along a path, with the elbow as asked.
+
+        Least squares of the hand's distance [m] and of 0.1 m times the sine of half the swivel's
+        error, twice: from each solution to the next, the first from `near`.
+
+        Parameters
+        ----------
+        hands : (T, 3) array
+            Path of the hand [m].
+        swivels : (T,) array
+            Angles of the elbow [rad], as `swivel` counts them.
+        near : (4,) array_like
+            Joint angles near those of the first place.
+
+        Raises
+        ------
+        ValueError
+            A place that the arm does not reach within its joint limits.
+        """
+        from scipy.optimize import least_squares
+
+        def gaps(q: Array, hand: Array, swivel: float) -> Array:
+            places = self.places(q)
+            return np.append(places[2] - hand, 0.2 * np.sin(0.5 * (_swivel(places) - swivel)))
+
+        q, path = np.asarray(near, dtype=float), []
+        for hand, swivel in zip(hands, swivels, strict=True):
+            solution = least_squares(gaps, q, method="lm", xtol=1e-12, args=(hand, swivel))
+            q = solution.x
+            inside = np.all((self.lowest <= q) & (q <= self.highest))
+            if not inside or np.linalg.norm(solution.fun) > 1e-6:
+                raise ValueError(
+                    f"hands: {np.round(hand, 3)} m, with the elbow at {swivel:.2f} rad, is out of reach"
+                )
+            path.append(q)
+        return np.array(path)
+
+
+def _swivel(places: Array) -> float:
+    shoulder, elbow, hand = places
+    axis = (hand - shoulder) / np.linalg.norm(hand - shoulder)
+    away, out = shoulder - MOUTH, elbow - shoulder
+    away, out = away - axis * (axis @ away), out - axis * (axis @ out)
+    return float(np.arctan2(np.cross(away, out) @ axis, away @ out))
