@@ -7,7 +7,7 @@ from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
 from pdmp._native import PdmpError, __version__
-from pdmp.cli import demo, evaluate, fit, info, plot, rollout
+from pdmp.cli import demo, evaluate, fit, info, plot, reproduce, rollout
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 COMMANDS = {
@@ -17,6 +17,7 @@ COMMANDS = {
     "info": info,
     "plot": plot,
     "demo": demo,
+    "reproduce": reproduce,
 }
 
 

@@ -1,10 +1,11 @@
 """The tables of the report, in Markdown."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 import pdmp
+from pdmp._tables import table
 from pdmp.demo.loop import Run
 
 
@@ -12,7 +13,7 @@ def spectrum_table(model: pdmp.Model) -> str:
     """Tell how much of the singular-value sum each style parameter adds, and two left out."""
     shares = model.singular_values / model.singular_values.sum()
     sums = shares.cumsum()
-    return _table(
+    return table(
         ["singular value", "share", "sum"],
         ([k + 1, f"{shares[k]:.1%}", f"{sums[k]:.1%}"] for k in range(model.n_styles + 2)),
     )
@@ -24,7 +25,7 @@ def error_table(
     members: Mapping[str, Sequence[int]],
 ) -> str:
     """Tell the mean error of the reproductions of each shape, with each of the models."""
-    return _table(
+    return table(
         ["shape", *(f"error, J = {model.n_styles}" for model in models)],
         (
             [
@@ -38,7 +39,7 @@ def error_table(
 
 def loop_table(runs: Mapping[str, Run]) -> str:
     """Tell where each loop ended and how long its ticks took."""
-    return _table(
+    return table(
         ["control loop at 1 kHz", "left to the goal", "mean tick", "worst tick"],
         (
             [name, f"{run.left:.1e} mm", f"{run.ticks.mean():.2f} µs", f"{run.ticks.max():.1f} µs"]
@@ -49,9 +50,7 @@ def loop_table(runs: Mapping[str, Run]) -> str:
 
 def time_table(times: Mapping[str, float]) -> str:
     """Tell how long each part took."""
-    return _table(
-        ["part", "time"], ([name, f"{1e3 * time:.1f} ms"] for name, time in times.items())
-    )
+    return table(["part", "time"], ([name, f"{1e3 * time:.1f} ms"] for name, time in times.items()))
 
 
 def _error(model: pdmp.Model, demos: Sequence[pdmp.Demonstration], m: int) -> float:
@@ -60,8 +59,3 @@ def _error(model: pdmp.Model, demos: Sequence[pdmp.Demonstration], m: int) -> fl
     dt = model.durations[m] / (len(position) - 1)
     gap = model.rollout(**pdmp.as_demonstrated(model, m), dt=dt).position - position
     return float(np.sqrt(np.mean(gap**2)) / np.ptp(position, axis=0).max())
-
-
-def _table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)

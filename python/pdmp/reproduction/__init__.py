@@ -1,1 +1,8 @@
-"""The figures of Matsubara, Hyon and Morimoto (2011), made with this library on a simulated robot."""
+"""The paper's figures, made with this library: generators, a robot in MuJoCo, and other methods.
+
+The paper is Matsubara, Hyon, Morimoto, Neural Networks 24 (2011).
+"""
+
+from pdmp.reproduction.run import FIGURES, reproduce
+
+__all__ = ["FIGURES", "reproduce"]

@@ -1,31 +1,31 @@
 """The arm of Baxter, a robot with two arms of seven joints, of which the paper's four are used.
 
-The model is that of robosuite 1.5.2 (MIT licence), read as it lies in its wheel: nothing of robosuite is
-imported, and what it depends on need not be installed.
+The model is that of robosuite 1.5.2 (MIT licence), read as it lies in its wheel: nothing of
+robosuite is imported, and what it depends on need not be installed.
 """
 
 from __future__ import annotations
 
+import os
+import sys
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-if TYPE_CHECKING:
-    import mujoco
 
 Array = NDArray[np.float64]
 
 JOINTS = ("s0", "s1", "e0", "e1")
 """Three joints of the shoulder and one of the elbow, the paper's q1 to q4."""
-DIRECTIONS = np.array([1.0, -1.0, 1.0, -1.0])
-"""q = direction · angle: Baxter counts the pitch of the shoulder and the bending of the elbow the other way.
+DIRECTIONS = {"right": np.array([1.0, -1.0, 1.0, -1.0]), "left": np.array([-1.0, -1.0, -1.0, -1.0])}
+"""q = direction · angle, so that the same q of both arms are mirror images.
 
-So read, the goal that the paper prints is a hand on a table before the body, with the elbow out by no more than
-the 15° by which people differ from one another; every other choice of signs puts it above the head, behind the
-back or far to the side.
+Baxter counts the pitch of the shoulder and the bending of the elbow the other way than the paper
+prints them. So read, the goal that it prints is a hand on a table before the body, with the elbow
+as far out as people hold it, give or take 15°; with other signs it is above the head, behind the
+back, or far to the side.
 """
 MOUTH = np.array([0.20, 0.0, 0.55])
 """Where a mouth would be, below Baxter's screen [m]."""
@@ -47,19 +47,33 @@ def mjcf() -> Path:
     return Path(package.origin).parent / "models" / "assets" / "robots" / "baxter" / "robot.xml"
 
 
-def specification() -> mujoco.MjSpec:
-    """Return the model, to be added to.
+def engine() -> Any:
+    """Return the module of MuJoCo.
+
+    Raises
+    ------
+    ImportError
+        It is not installed.
+    """
+    # It settles what it draws with when it is imported; without a screen, not on a window.
+    if sys.platform == "linux" and "DISPLAY" not in os.environ:
+        os.environ.setdefault("MUJOCO_GL", "egl")
+    try:
+        import mujoco
+    except ImportError:
+        raise ImportError("the robot needs MuJoCo: pip install 'pdmp[reproduce]'") from None
+    return mujoco
+
+
+def specification() -> Any:
+    """Return the model, a `mujoco.MjSpec` to be added to.
 
     Raises
     ------
     ImportError
         MuJoCo or the model is not installed.
     """
-    try:
-        import mujoco
-    except ImportError:
-        raise ImportError("the robot needs MuJoCo: pip install 'pdmp[reproduce]'") from None
-    return mujoco.MjSpec.from_file(str(mjcf()))
+    return engine().MjSpec.from_file(str(mjcf()))
 
 
 class Arm:
@@ -72,13 +86,13 @@ class Arm:
     """
 
     def __init__(self, side: str = "right") -> None:
-        import mujoco
-
+        mujoco = engine()
         self._model = specification().compile()
         self._data: Any = mujoco.MjData(self._model)
         joints = [self._model.joint(f"{side}_{joint}") for joint in JOINTS]
+        self._directions = DIRECTIONS[side]
         self._addresses = [joint.qposadr[0] for joint in joints]
-        limits = DIRECTIONS * np.array([joint.range for joint in joints]).T
+        limits = self._directions * np.array([joint.range for joint in joints]).T
         self.lowest, self.highest = limits.min(axis=0), limits.max(axis=0)
         bodies = ("lower_shoulder", "lower_elbow", "hand")
         self._bodies = [self._model.body(f"{side}_{body}").id for body in bodies]
@@ -86,7 +100,7 @@ class Arm:
 
     def places(self, q: ArrayLike) -> Array:
         """Return where shoulder, elbow and hand are (3, 3) [m] at joint angles q (4,) [rad]."""
-        self._data.qpos[self._addresses] = DIRECTIONS * q
+        self._data.qpos[self._addresses] = self._directions * q
         self._kinematics(self._model, self._data)
         return np.array(self._data.xpos[self._bodies])
 
@@ -105,7 +119,7 @@ class Arm:
         return _swivel(self.places(q))
 
     def reach(self, hands: Array, swivels: Array, near: ArrayLike) -> Array:
-        """Return joint angles (T, 4) [rad] that bring the hand along a path, with the elbow as asked.
+        """Return joint angles (T, 4) [rad] that bring hand and elbow along a path.
 
         Least squares of the hand's distance [m] and of 0.1 m times the sine of half the swivel's
         error, twice: from each solution to the next, the first from `near`.
@@ -136,8 +150,9 @@ class Arm:
             q = solution.x
             inside = np.all((self.lowest <= q) & (q <= self.highest))
             if not inside or np.linalg.norm(solution.fun) > 1e-6:
+                place = np.round(hand, 3)
                 raise ValueError(
-                    f"hands: {np.round(hand, 3)} m, with the elbow at {swivel:.2f} rad, is out of reach"
+                    f"hands: {place} m is out of reach with the elbow at {swivel:.2f} rad"
                 )
             path.append(q)
         return np.array(path)

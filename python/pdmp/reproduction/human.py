@@ -1,17 +1,20 @@
 """People who reach over boxes: where their hands go, how long they take, how much they vary.
 
-The recordings of the paper were never published. What stands in for them is made from what others measured:
+The recordings of the paper were never published. What stands in for them is made from what others
+measured:
 
-- The hand moves with minimum jerk through points on its way, when it is at them included: Flash, Hogan, Journal of
-  Neuroscience 5, 1985, 1688-1703. Without an obstacle its path is straight.
-- The points are over the upper edges of the obstacle, and as far from them whatever its size: Dean, Brüwer,
-  Experimental Brain Research 97, 1994, 497-514.
-- Longer paths are made faster, and take little longer: duration grows with the root of the path's length
-  (isochrony: Viviani, Schneider, Journal of Experimental Psychology: HPP 17, 1991, 198-218).
-- Trials vary by noise that grows with the effort, by a constant noise, and in their duration: Harris, Wolpert,
-  Nature 394, 1998, 780-784; van Beers, Haggard, Wolpert, Journal of Neurophysiology 91, 2004, 1050-1063.
+- The hand moves with minimum jerk through points on its way, when it is at them included: Flash,
+  Hogan, Journal of Neuroscience 5, 1985, 1688-1703. Without an obstacle its path is straight.
+- The points are over the upper edges of the obstacle, and as far from them whatever its size: Dean,
+  Brüwer, Experimental Brain Research 97, 1994, 497-514.
+- Longer paths are made faster, and take little longer: duration grows with the root of the path's
+  length (isochrony: Viviani, Schneider, Journal of Experimental Psychology: HPP 17, 1991, 198-218).
+- Trials vary by noise that grows with the effort, by a constant noise, and in their duration:
+  Harris, Wolpert, Nature 394, 1998, 780-784; van Beers, Haggard, Wolpert, Journal of
+  Neurophysiology 91, 2004, 1050-1063.
 
-The kinds are theirs; the numbers below are of the size they report, and were set before any result was seen.
+The kinds are theirs; the numbers below are ours, such that all trials clear their boxes on the
+robot, whose arm is thicker than a person's. They were set before anything was learnt from them.
 """
 
 from __future__ import annotations
@@ -65,11 +68,14 @@ class Task:
 
 @dataclass(frozen=True)
 class Reach:
-    """One trial: the hand over time (T, 3) [m], and how far the elbow is off its usual angle [rad]."""
+    """One trial."""
 
     hand: Array
+    """The hand over time (T, 3) [m]."""
     elbow: float
+    """How far the elbow is off its usual angle [rad]."""
     dt: float
+    """Time between two samples [s]."""
 
 
 def reach(task: Task, height: float, noise: Generator) -> Reach:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
 from pdmp.reproduction.baxter import Arm
-from pdmp.reproduction.human import Task, reach
+from pdmp.reproduction.human import RESTING, Task, reach
 
 Array = NDArray[np.float64]
 
@@ -18,7 +20,7 @@ START = np.array([0.30, -0.55, 0.0])  # m, of the hand, from where it ends
 HEIGHTS = (0.0, 0.15, 0.30, 0.45, 0.60)  # m: none to four boxes
 TRAINED = (0.0, 0.30, 0.45)  # m
 TRIALS = 3
-CONSTANTS = {"alpha_z": 1.5, "beta_z": 1.5, "alpha_x": 0.5, "tau": 0.3}
+CONSTANTS: dict[str, Any] = {"alpha_z": 1.5, "beta_z": 1.5, "alpha_x": 0.5, "tau": 0.3}
 """As printed; the damping ratio is √(α_z/β_z)/2 = 0.5."""
 NAMES = ["q1", "q2", "q3", "q4"]
 
@@ -30,13 +32,25 @@ class Reaching:
     arm: Arm
     task: Task
     start: Array  # rad
+    goal: Array  # rad
     demos: list[pdmp.Demonstration]
+
+    def left(self, hand: Array, goal: Array | None = None) -> float:
+        """Return how far a hand (3,) [m] is from where it belongs at a goal [rad], in mm."""
+        place = self.arm.places(self.goal if goal is None else goal)[2]
+        return 1e3 * float(np.linalg.norm(hand - place))
+
+    def side_view(self, hands: Array) -> tuple[Array, Array]:
+        """Return how far hands (T, 3) are on the way from start to goal, and how high, in m."""
+        way = (hands - self.task.start) @ self.task.forward
+        return way, hands[:, 2] - self.task.goal[2] + RESTING
 
     def of(self, heights: tuple[float, ...]) -> list[pdmp.Demonstration]:
         """Return the demonstrations over obstacles of these heights [m]."""
         return [demo for demo in self.demos if height_of(demo) in heights]
 
 
+@cache
 def demonstrate(seed: int = 2011) -> Reaching:
     """Let a person reach over every obstacle, and bring that to the robot's right arm."""
     arm = Arm()
@@ -60,9 +74,14 @@ def demonstrate(seed: int = 2011) -> Reaching:
                     units=["rad"] * len(NAMES),
                 )
             )
-    return Reaching(arm, task, start, demos)
+    return Reaching(arm, task, start, GOAL, demos)
 
 
 def height_of(demo: pdmp.Demonstration) -> float:
     """Return the height of the obstacle that was reached over [m]."""
     return float(np.asarray(demo.context)[0])
+
+
+def duration_of(demo: pdmp.Demonstration) -> float:
+    """Return how long a demonstration lasts [s]."""
+    return (demo.n_samples - 1) * float(np.asarray(demo.dt))

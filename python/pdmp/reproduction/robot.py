@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp.reproduction.baxter import DIRECTIONS, JOINTS, specification
+from pdmp.reproduction.baxter import DIRECTIONS, JOINTS, engine, specification
 from pdmp.reproduction.human import BOX, RESTING, Task
 
 Array = NDArray[np.float64]
@@ -19,6 +19,8 @@ STIFFNESS, DAMPING = 900.0, 60.0  # per s², per s: errors vanish in 0.2 s, crit
 GRIP, GRIP_DAMPING = 4000.0, 100.0  # N m/rad, N m s/rad: a hand that holds a joint fast
 BOX_MASS = 0.5  # kg
 TABLE = np.array([0.80, 1.10, 0.04])  # m
+RESTING_ARM = {"s0": 0.0, "s1": 0.9, "e0": 0.0, "e1": 0.6}  # rad, as Baxter counts
+WOOD, SHADES = (0.72, 0.62, 0.48, 1), ((0.95, 0.60, 0.25, 1), (0.84, 0.37, 0.0, 1))
 
 
 @dataclass
@@ -31,9 +33,14 @@ class Log:
     touching: list[bool] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)  # of MuJoCo, for pictures
 
+    def rows(self) -> tuple[Array, Array]:
+        """Return what the joints were told and what they did, (T, D) each [rad]."""
+        return np.array(self.commanded), np.array(self.measured)
+
     def tracking_error(self) -> float:
         """Return the largest distance of a joint from its command [rad]."""
-        return float(np.abs(np.array(self.commanded) - self.measured).max())
+        told, done = self.rows()
+        return float(np.abs(told - done).max())
 
     def contact(self) -> float:
         """Return for how long the robot touched a box [s]."""
@@ -60,14 +67,14 @@ class Robot:
     """
 
     def __init__(self, start: ArrayLike, task: Task | None = None, n_boxes: int = 0) -> None:
-        import mujoco
-
+        mujoco = engine()
         q = np.array(start, dtype=float)
         sides = ("right", "left")[: len(q) // len(JOINTS)]
         names = [f"{side}_{joint}" for side in sides for joint in JOINTS]
         specified = specification()
         specified.option.timestep = DT
         _light(specified)
+        _free_the_arms(specified)
         if task is not None:
             _furnish(specified, task, n_boxes)
         self._mujoco = mujoco
@@ -78,11 +85,13 @@ class Robot:
         self._motors = model.actuator_trnid[:, 0]
         # The motors' joints come before the boxes: one degree of freedom, one coordinate each.
         self._driven = model.jnt_dofadr[self._motors]
-        self._signs = np.tile(DIRECTIONS, len(sides))
+        self._signs = np.concatenate([DIRECTIONS[side] for side in sides])
         self._is_box = np.array([_root(model, g).startswith("box") for g in range(model.ngeom)])
         self._is_robot = np.array([_root(model, g) == "base" for g in range(model.ngeom)])
         self._hand = model.body("right_hand").id
         self._grip: tuple[int, float] | None = None
+        for side, joint in product(("right", "left"), JOINTS):
+            self.data.joint(f"{side}_{joint}").qpos = RESTING_ARM[joint]
         self.data.qpos[self._moved] = self._signs * q
         self._target = self.data.qpos[self._driven].copy()
         self.log = Log()
@@ -142,24 +151,34 @@ class Robot:
 
 def _furnish(specified: Any, task: Task, n_boxes: int) -> None:
     """Put a table below start and goal, and a pile of boxes half way."""
-    import mujoco
-
-    box = mujoco.mjtGeom.mjGEOM_BOX
+    box = engine().mjtGeom.mjGEOM_BOX
     forward = task.forward
     turned = [0, 0, float(np.arctan2(forward[1], forward[0]))]
     top = task.middle - [0, 0, RESTING]
     specified.compiler.degree = False
-    table = specified.worldbody.add_geom(type=box, size=0.5 * TABLE, rgba=[0.72, 0.62, 0.48, 1])
+    # Pictures show group 1, where the robot's meshes are; what they collide as is group 0.
+    table = specified.worldbody.add_geom(type=box, size=0.5 * TABLE, rgba=WOOD, group=1)
     table.pos = top + [0.05, 0, -0.5 * TABLE[2]]
     for k in range(n_boxes):
         body = specified.worldbody.add_body(name=f"box_{k}", euler=turned)
         body.pos = top + [0, 0, (k + 0.5) * BOX[2]]
         body.add_freejoint()
-        shade = [0.84, 0.37, 0.0, 1] if k % 2 else [0.95, 0.60, 0.25, 1]
-        body.add_geom(type=box, size=0.5 * BOX, mass=BOX_MASS, rgba=shade)
+        body.add_geom(type=box, size=0.5 * BOX, mass=BOX_MASS, rgba=SHADES[k % 2], group=1)
+
+
+def _free_the_arms(specified: Any) -> None:
+    """Let the upper arms pass through the convex hull that stands for the torso.
+
+    Lowered arms are inside of it while their shells are five centimetres from the robot's own.
+    """
+    for side, part in product(("right", "left"), ("upper_elbow", "lower_elbow")):
+        specified.add_exclude(bodyname1="torso", bodyname2=f"{side}_{part}")
 
 
 def _light(specified: Any) -> None:
+    mujoco = engine()
+    sky = specified.add_texture(type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=16, height=96)
+    sky.builtin, sky.rgb1, sky.rgb2 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, [1, 1, 1], [1, 1, 1]
     specified.worldbody.add_light(pos=[1.5, -1.5, 2.5], dir=[-0.5, 0.5, -1.0])
     specified.worldbody.add_light(pos=[1.5, 1.5, 2.5], dir=[-0.5, -0.5, -1.0])
 
@@ -171,10 +190,9 @@ def _root(model: Any, geom: int) -> str:
 
 def boxes(height: float) -> int:
     """Return how many boxes make this height [m]."""
-    return round(height / BOX[2])
+    return round(height / float(BOX[2]))
 
 
-def play(robot: Robot, states: Sequence[tuple[Array, Array, Array]]) -> None:
-    """Drive the robot along positions, velocities and accelerations, a tick each."""
-    for state in states:
-        robot.move(*state)
+def pile(height: float) -> str:
+    """Return what a pile of this height [m] is, in words."""
+    return {0: "no box", 1: "1 box"}.get(boxes(height), f"{boxes(height)} boxes")

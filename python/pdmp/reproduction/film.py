@@ -1,0 +1,69 @@
+"""Pictures of the robot, where there is something to draw them with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pdmp.plot._canvas import canvas
+from pdmp.reproduction.baxter import engine
+from pdmp.reproduction.robot import DT, Robot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDTH, HEIGHT = 320, 300  # pixels
+AZIMUTH, ELEVATION, DISTANCE = 140.0, -18.0, 2.3  # °, °, m
+CENTRE = (0.35, -0.25, 0.05)  # m
+
+
+class NoRenderer(Exception):
+    """There is nothing to draw with; the reason is its text."""
+
+
+def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]]) -> Figure:
+    """Draw how robots stood at some times [s], a row for each.
+
+    Raises
+    ------
+    NoRenderer
+        MuJoCo cannot draw here.
+    """
+    n_columns = max(len(times) for _, times in rows.values())
+    figure = canvas(None, 2.1 * n_columns, 2.2 * len(rows))
+    grid = figure.subplots(len(rows), n_columns, squeeze=False)
+    for row, (name, (robot, times)) in zip(grid, rows.items(), strict=True):
+        for axes, time, picture in zip(row, times, _pictures(robot, times), strict=True):
+            axes.imshow(picture)
+            axes.set_xticks([])
+            axes.set_yticks([])
+            axes.set_title(f"{time:.2f} s", fontsize=8)
+        row[0].set_ylabel(name, fontsize=9)
+    return figure
+
+
+def _pictures(robot: Robot, times: Sequence[float]) -> list[Any]:
+    mujoco = engine()
+    try:
+        renderer = mujoco.Renderer(robot.model, HEIGHT, WIDTH)
+    except (
+        Exception
+    ) as error:  # what a missing library or driver raises differs from one to another
+        raise NoRenderer(
+            f"MuJoCo cannot draw here ({error}); MUJOCO_GL=osmesa or egl may"
+        ) from None
+    camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
+    camera.lookat[:] = CENTRE
+    camera.azimuth, camera.elevation, camera.distance = AZIMUTH, ELEVATION, DISTANCE
+    option.geomgroup[:] = [0, 1, 0, 0, 0, 0]
+    data, states = mujoco.MjData(robot.model), robot.log.states
+    pictures = []
+    for time in times:
+        data.qpos[:] = states[min(round(time / DT), len(states) - 1)]
+        mujoco.mj_forward(robot.model, data)
+        renderer.update_scene(data, camera, option)
+        pictures.append(np.array(renderer.render()))
+    renderer.close()
+    return pictures

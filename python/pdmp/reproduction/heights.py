@@ -1,0 +1,192 @@
+"""Fig. 4: heights of obstacles that were never shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pdmp
+from pdmp._tables import table
+from pdmp.demos import resample
+from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, legend
+from pdmp.reproduction import paths
+from pdmp.reproduction.loop import PACE, NewGoal, reach_over
+from pdmp.reproduction.reaching import (
+    CONSTANTS,
+    HEIGHTS,
+    TRAINED,
+    Reaching,
+    demonstrate,
+    duration_of,
+    height_of,
+)
+from pdmp.reproduction.robot import DT, Robot, pile
+from pdmp.reproduction.section import Section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+TESTED = tuple(height for height in HEIGHTS if height not in TRAINED)
+N_SAMPLES = 201
+MOVED = np.array([0.12, 0.0, 0.0])  # m, of the hand: where the goal goes in mid-movement
+MOVED_AT = 0.4  # of the demonstrated duration
+
+
+def learn(reaching: Reaching, n_styles: int) -> pdmp.Model:
+    """Learn from the reaches over none, two and three boxes, and U: h ↦ β[h, 1]."""
+    return pdmp.fit(reaching.of(TRAINED), n_styles=n_styles, map="linear", **CONSTANTS)
+
+
+def error(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration, style: Array) -> float:
+    """Return E = (1/T) Σ ‖ŷ − y‖² [rad²] of a movement in this style, in aligned time."""
+    duration = float(model.durations[model.nominal])
+    made = model.rollout(
+        style,
+        goal=reaching.goal,
+        start=reaching.start,
+        dt=duration / (N_SAMPLES - 1),
+        duration=duration,
+    )
+    return float(np.mean(np.sum((made.position - aligned(demo)) ** 2, axis=1)))
+
+
+def aligned(demo: pdmp.Demonstration) -> Array:
+    """Return a demonstration at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
+    return resample(demo, duration_of(demo) / (N_SAMPLES - 1)).position
+
+
+@dataclass(frozen=True)
+class Errors:
+    """E of the test demonstrations by J, (J, 6) each [rad²]."""
+
+    foreseen: Array
+    """In the style that U foresees from the height."""
+    fitted: Array
+    """In the style of the demonstration itself: what J styles can express at best."""
+
+
+def errors(reaching: Reaching, most: int = 9) -> Errors:
+    """Return the errors of one to `most` styles on the heights that were not trained."""
+    tests = reaching.of(TESTED)
+    foreseen, fitted = [], []
+    for n_styles in range(1, most + 1):
+        model = learn(reaching, n_styles)
+        styles = [model.predict([height_of(demo)]).style for demo in tests]
+        foreseen.append([error(model, reaching, *pair) for pair in zip(tests, styles, strict=True)])
+        fitted.append([error(model, reaching, demo, model.style_of(demo)) for demo in tests])
+    return Errors(np.array(foreseen), np.array(fitted))
+
+
+def foresee(model: pdmp.Model, reaching: Reaching, height: float, *events: NewGoal) -> Robot:
+    """Reach over a height [m] in the style that is foreseen for it."""
+    style = model.predict([height]).style
+    return reach_over(model, reaching, height, style, *events)
+
+
+def new_goal(model: pdmp.Model, reaching: Reaching) -> NewGoal:
+    """Return a goal a hand's breadth farther away, given in mid-movement."""
+    usual = np.array([reaching.arm.swivel(reaching.goal)])
+    place = (reaching.task.goal + MOVED)[None]
+    goal = reaching.arm.reach(place, usual, reaching.goal)[0]
+    return NewGoal(MOVED_AT * lasting(model), goal)
+
+
+def lasting(model: pdmp.Model) -> float:
+    """Return how long the nominal demonstration lasts at the robot's pace [s]."""
+    return float(model.durations[model.nominal] * PACE / model.tau)
+
+
+def figure_4() -> Section:
+    """Reproduce Fig. 4."""
+    reaching = demonstrate()
+    found = errors(reaching)
+    model = learn(reaching, 3)
+    command = new_goal(model, reaching)
+    robots = {height: foresee(model, reaching, height) for height in TESTED}
+    moved = {height: foresee(model, reaching, height, command) for height in TESTED}
+    by_styles = []
+    for n_styles in range(1, 5):
+        tried = learn(reaching, n_styles)
+        contacts = [foresee(tried, reaching, height).log.contact() for height in TESTED]
+        by_styles.append([n_styles, *(f"{contact:.3f} s" for contact in contacts)])
+    text = [
+        "Learnt from nine reaches over none, two and three boxes; six over one box and over four "
+        "are foreseen by U(h) = β[h, 1]. E in 10⁻³ rad², mean ± standard deviation over the six; "
+        "at best is in the style of the reach itself.",
+        table(
+            ["J", "E foreseen", "E at best"],
+            (
+                [n + 1, *(f"{1e3 * row.mean():.1f} ± {1e3 * row.std():.1f}" for row in rows)]
+                for n, rows in enumerate(zip(found.foreseen, found.fitted, strict=True))
+            ),
+        ),
+        "For how long the foreseen movement touches a box, on the robot:",
+        table(["J", *map(pile, TESTED)], by_styles),
+        "With J = 3, what is left to the goal, as printed or moved in mid-movement:",
+        table(
+            ["", "as printed", "moved", "largest tracking error"],
+            (
+                [
+                    pile(height),
+                    f"{reaching.left(robots[height].log.hands[-1]):.2f} mm",
+                    f"{reaching.left(moved[height].log.hands[-1], command.goal):.2f} mm",
+                    f"{1e3 * robots[height].log.tracking_error():.1f} mrad",
+                ]
+                for height in TESTED
+            ),
+        ),
+    ]
+    return Section(
+        "Fig. 4: heights never shown",
+        text,
+        {
+            "fig4_errors": draw_errors(found),
+            "fig4_paths": draw_paths(reaching, robots, moved, command),
+        },
+    )
+
+
+def draw_errors(found: Errors) -> Figure:
+    """Draw E over J."""
+    figure = canvas(None, 5.2, 3.8)
+    axes = figure.subplots()
+    n_styles = np.arange(1, len(found.foreseen) + 1)
+    for rows, color, label in (
+        (found.foreseen, BLUE, "foreseen from the height"),
+        (found.fitted, ORANGE, "at best"),
+    ):
+        mean, spread = rows.mean(axis=1), rows.std(axis=1)
+        axes.errorbar(n_styles, mean, spread, color=color, marker="o", capsize=3, label=label)
+    dress(axes, "number of styles J", "E [rad²]", "prediction error on heights never shown")
+    axes.set_ylim(bottom=0)
+    axes.legend(frameon=False)
+    return figure
+
+
+def draw_paths(
+    reaching: Reaching, robots: dict[float, Robot], moved: dict[float, Robot], command: NewGoal
+) -> Figure:
+    """Draw the hand from the side, as foreseen and as shown."""
+    figure = canvas(None, 9.5, 4.6)
+    panels = figure.subplots(1, len(robots), sharey=True)
+    for axes, height in zip(panels, robots, strict=True):
+        paths.draw_boxes(axes, reaching, height)
+        for demo in reaching.of((height,)):
+            hands = reaching.arm.hands(demo.position)
+            paths.draw_hand(axes, reaching, hands, color=GREY, linestyle=":", label="shown")
+        foreseen, turned = (np.array(robot[height].log.hands) for robot in (robots, moved))
+        paths.draw_hand(axes, reaching, foreseen, color=BLUE, label="foreseen, J = 3")
+        after = turned[round(command.time / DT) :]
+        look: dict[str, Any] = {"color": PALETTE[2], "marker": "^", "markevery": 250}
+        paths.draw_hand(axes, reaching, after, **look, label="goal moved")
+        way, up = reaching.side_view(reaching.arm.hands([command.goal]))
+        axes.plot(way, up, "*", color=PALETTE[2], markersize=12, label="new goal")
+        paths.dress_side(axes, pile(height))
+    panels[0].set_ylim(bottom=0)
+    legend(figure, panels[0])
+    return figure

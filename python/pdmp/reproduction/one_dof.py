@@ -1,0 +1,167 @@
+"""Fig. 2: one degree of freedom, and what style, goal and time constant do to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+import pdmp
+from pdmp._tables import table
+from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, gradient, legend
+from pdmp.reproduction.section import Section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+N_DEMOS, N_STYLES = 20, 3
+N_SAMPLES = 201
+SHARES = np.linspace(0, 1, 7)
+
+
+@dataclass(frozen=True)
+class Example:
+    """One of the two kinds: its demonstrations, and what is changed in them."""
+
+    title: str
+    model: pdmp.Model
+    demos: list[Array]
+    durations: Array
+    moved: Callable[[dict[str, Any]], dict[str, Any]]
+    """Goal or anchor elsewhere."""
+
+    def shown(self, m: int) -> tuple[Array, Array]:
+        """Return time [s] and position of a demonstration."""
+        span = self.durations[m]
+        ends = self.model.kind == "discrete"
+        return np.linspace(0, span, N_SAMPLES, endpoint=ends), self.demos[m][:, 0]
+
+    def error(self, m: int) -> float:
+        """Return the RMSE of the reproduction of a demonstration, over its range."""
+        time, position = self.shown(m)
+        made = self.model.rollout(**pdmp.as_demonstrated(self.model, m), dt=time[1])
+        gap = made.position[:N_SAMPLES, 0] - position
+        return float(np.sqrt(np.mean(gap**2)) / np.ptp(position))
+
+
+def discrete(noise: Generator) -> Example:
+    """Learn reaches of three dimensions: how far, and how much of two detours."""
+    s = np.linspace(0, 1, N_SAMPLES)
+    straight = s**3 * (10 - 15 * s + 6 * s**2)
+    detour = (4 * s * (1 - s)) ** 3
+    shapes = np.column_stack([straight, detour, detour * (1 - 2 * s) * 2])
+    weights = noise.normal([1.0, 0.0, 0.0], [0.15, 0.35, 0.45], (N_DEMOS, 3))
+    demos = [(shapes @ row)[:, None] for row in weights]
+    durations = noise.uniform(0.8, 1.2, N_DEMOS)
+    model = pdmp.fit(_timed(demos, durations / (N_SAMPLES - 1)), n_styles=N_STYLES)
+    return Example(
+        "discrete", model, demos, durations, lambda a: {**a, "goal": np.asarray(a["goal"]) + 0.4}
+    )
+
+
+def rhythmic(noise: Generator) -> Example:
+    """Learn cycles of three dimensions: how much of three waves."""
+    phase = 2 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES
+    shapes = np.column_stack([np.sin(phase), np.cos(2 * phase), np.sin(3 * phase)])
+    weights = noise.normal([1.0, 0.0, 0.0], [0.3, 0.3, 0.2], (N_DEMOS, 3))
+    demos = [(shapes @ row)[:, None] for row in weights]
+    periods = noise.uniform(0.8, 1.2, N_DEMOS)
+    timed = _timed(demos, periods / N_SAMPLES)
+    model = pdmp.fit(timed, kind="rhythmic", n_styles=N_STYLES)
+    return Example(
+        "rhythmic", model, demos, periods, lambda a: {**a, "anchor": np.asarray(a["anchor"]) + 1.0}
+    )
+
+
+def extremes(model: pdmp.Model) -> tuple[int, int]:
+    """Return the two demonstrations whose styles are farthest from each other."""
+    gaps = np.linalg.norm(model.styles[:, None] - model.styles, axis=2)
+    first, second = np.unravel_index(np.argmax(gaps), gaps.shape)
+    return int(first), int(second)
+
+
+def figure_2(seed: int = 2011) -> Section:
+    """Reproduce Fig. 2."""
+    noise = np.random.default_rng(seed)
+    examples = [discrete(noise), rhythmic(noise)]
+    rows = []
+    for example in examples:
+        model = example.model
+        first, second = extremes(model)
+        moved = example.moved(pdmp.as_demonstrated(model, first))
+        end = model.rollout(**moved, dt=0.001, duration=5.0).position
+        missed = abs(end[-1, 0] - moved["goal"][0]) if "goal" in moved else np.nan
+        rows.append(
+            [
+                example.title,
+                f"{model.singular_values[3] / model.singular_values[0]:.1e}",
+                f"{example.error(first):.1e}",
+                f"{example.error(second):.1e}",
+                f"{max(example.error(m) for m in range(N_DEMOS)):.1e}",
+                "—" if np.isnan(missed) else f"{missed:.1e}",
+            ]
+        )
+    text = [
+        f"{N_DEMOS} demonstrations of each kind, J = {N_STYLES}. Errors are RMSE over the range of "
+        "the demonstration.",
+        table(
+            ["", "σ₄/σ₁", "error s1", "error s2", "worst of all", "left to a moved goal after 5 s"],
+            rows,
+        ),
+    ]
+    return Section("Fig. 2: one degree of freedom", text, {"fig2": draw(examples)})
+
+
+def draw(examples: Sequence[Example]) -> Figure:
+    """Draw demonstrations, reproductions under other goals and paces, and styles in between."""
+    figure = canvas(None, 12.0, 6.8)
+    grid = figure.subplots(len(examples), 3)
+    for row, example in zip(grid, examples, strict=True):
+        model = example.model
+        n_periods = 1 if model.kind == "discrete" else 2
+        shown, made, between = row
+        for m in range(N_DEMOS):
+            shown.plot(*example.shown(m), color=GREY, linewidth=0.9)
+        first, second = (pdmp.as_demonstrated(model, m) for m in extremes(model))
+        for m, end, color, line in zip(
+            extremes(model), (first, second), (BLUE, ORANGE), ("--", ":"), strict=True
+        ):
+            label = f"shown, s{1 if color == BLUE else 2}"
+            time, position = example.shown(m)
+            for turn in range(n_periods):
+                made.plot(
+                    time + turn * example.durations[m],
+                    position,
+                    color="black",
+                    linestyle=line,
+                    linewidth=1.3,
+                    zorder=3,
+                    label=label if turn == 0 else None,
+                )
+            slower = {**end, "tau": 1.5 * end["tau"]}
+            for arguments, width in ((end, 3.0), (example.moved(end), 1.0), (slower, 1.0)):
+                span = 1.2 * n_periods * example.durations[m] * arguments["tau"] / end["tau"]
+                path = model.rollout(**arguments, dt=0.002, duration=span)
+                made.plot(path.time, path.position, color=color, linewidth=width)
+        for share in SHARES:
+            arguments = pdmp.blend(first, second, float(share))
+            span = 1.2 * n_periods * model.durations[model.nominal]
+            path = model.rollout(**arguments, dt=0.002, duration=span)
+            between.plot(path.time, path.position, color=gradient()(share), linewidth=1.3)
+        made.plot([], [], color=PALETTE[0], label="s1: own, goal moved, 1.5 τ")
+        made.plot([], [], color=PALETTE[1], label="s2: own, goal moved, 1.5 τ")
+        titles = ("demonstrations", "two styles, goals, time constants", "from s1 to s2")
+        for axes, title in zip(row, titles, strict=True):
+            dress(axes, "time [s]", "position [–]", f"{example.title}: {title}")
+    legend(figure, grid[0, 1])
+    return figure
+
+
+def _timed(demos: Sequence[Array], intervals: Array) -> list[pdmp.Demonstration]:
+    return [pdmp.Demonstration(demo, dt=dt) for demo, dt in zip(demos, intervals, strict=True)]

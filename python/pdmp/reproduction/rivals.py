@@ -1,0 +1,252 @@
+"""What the paper argues with: other ways to learn the same reaches, on the same robot.
+
+- a DMP of one demonstration, whose goal and pace can be changed, and nothing else;
+- principal components of the joint trajectories themselves, as many as there are styles, played
+  back in time;
+- a library of movements from which a new DMP is learnt for every height, by locally weighted
+  regression (Gams, Ude, IEEE-RAS International Conference on Humanoid Robots, 2009, 28-33).
+
+All learn from the nine reaches over none, two and three boxes, and meet one box and four.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pdmp
+from pdmp._tables import table
+from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, legend
+from pdmp.reproduction.heights import N_SAMPLES, TESTED, aligned, lasting, learn, new_goal
+from pdmp.reproduction.loop import PACE, Held, Movement, NewGoal, drive, from_rest
+from pdmp.reproduction.reaching import (
+    CONSTANTS,
+    TRAINED,
+    Reaching,
+    demonstrate,
+    duration_of,
+    height_of,
+)
+from pdmp.reproduction.robot import DT, Robot, boxes, pile
+from pdmp.reproduction.section import Section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[Any]  # of float64
+
+N_STYLES = 3
+WIDTH = 0.45  # m, of the library's kernel: the range of heights shown
+HELD_JOINT, HELD_FOR = 3, 0.5  # the elbow; s
+HELD_AT = 0.3  # of the demonstrated duration
+
+
+class Rival(Protocol):
+    """A way to learn: from demonstrations to what makes a movement for a height [m]."""
+
+    def __call__(self, reaching: Reaching) -> Callable[[float], Movement]:
+        """Learn from the training reaches."""
+
+
+def styles(reaching: Reaching) -> Callable[[float], Movement]:
+    """Learn one primitive with three styles, foreseen from the height."""
+    model = learn(reaching, N_STYLES)
+    return lambda height: from_rest(model, reaching, model.predict([height]).style)
+
+
+def one_demonstration(reaching: Reaching) -> Callable[[float], Movement]:
+    """Learn a DMP from the demonstration of median duration."""
+    nominal = learn(reaching, N_STYLES).nominal
+    model = pdmp.fit([reaching.of(TRAINED)[nominal]], n_styles=1, **CONSTANTS)
+    return lambda height: from_rest(model, reaching, model.styles[0])
+
+
+def library(reaching: Reaching) -> Callable[[float], Movement]:
+    """Keep all demonstrations, and learn a DMP for each height from those shown near it.
+
+    The target is linear in the trajectory, so that the weighted regression of all targets is the
+    regression of the weighted mean; the kernel is (1 − (|h − hᵐ|/width)³)³.
+    """
+    shown = reaching.of(TRAINED)
+    paths = np.array([aligned(demo) for demo in shown])
+    heights = np.array([height_of(demo) for demo in shown])
+    duration = np.median([duration_of(demo) for demo in shown])
+
+    def synthesise(height: float) -> Movement:
+        near = np.clip(1 - (np.abs(heights - height) / WIDTH) ** 3, 0, None) ** 3
+        mean = np.tensordot(near / near.sum(), paths, axes=1)
+        model = pdmp.fit([mean], dt=duration / (N_SAMPLES - 1), n_styles=1, **CONSTANTS)
+        return from_rest(model, reaching, model.styles[0])
+
+    return synthesise
+
+
+@dataclass
+class Recording:
+    """A trajectory that is played back in time, whatever happens; `goal` changes nothing."""
+
+    trajectory: tuple[Array, Array, Array]
+    goal: Array
+    tick: int = 0
+
+    def step(self, *, measured: Array | None = None) -> pdmp.Status:
+        """Go on to the next sample, or stay at the last."""
+        self.tick = min(self.tick + 1, len(self.trajectory[0]) - 1)
+        ended = self.tick == len(self.trajectory[0]) - 1
+        return pdmp.Status.FINISHED if ended else pdmp.Status.WORKING
+
+    @property
+    def position(self) -> Array:
+        """Joint angles (4,) [rad]."""
+        return self._row(0)
+
+    @property
+    def velocity(self) -> Array:
+        """Joint velocities (4,) [rad/s]."""
+        return self._row(1)
+
+    @property
+    def acceleration(self) -> Array:
+        """Joint accelerations (4,) [rad/s²]."""
+        return self._row(2)
+
+    def _row(self, derivative: int) -> Array:
+        return np.asarray(self.trajectory[derivative][self.tick])
+
+
+def components(reaching: Reaching) -> Callable[[float], Movement]:
+    """Learn principal components of the trajectories, and their weights from the height."""
+    from scipy.interpolate import CubicSpline
+
+    shown = reaching.of(TRAINED)
+    flat = np.array([aligned(demo).ravel() for demo in shown])
+    mean = flat.mean(axis=0)
+    factors = pdmp.factorise(flat - mean, n_styles=N_STYLES)
+    chosen = pdmp.ContextMap([[height_of(demo)] for demo in shown], factors.styles, "linear")
+    duration = np.median([duration_of(demo) for demo in shown]) * PACE / CONSTANTS["tau"]
+
+    def play(height: float) -> Movement:
+        weights = chosen.predict([[height]])[0][0]
+        path = (mean + weights @ factors.basis).reshape(N_SAMPLES, -1)
+        spline = CubicSpline(np.linspace(0, duration, N_SAMPLES), path, bc_type="clamped")
+        # A recording cannot wait for the robot to come to rest; it stays where it ends.
+        times = np.minimum(np.arange(0, duration + 1.0, DT), duration)
+        moving = (times < duration)[:, None]
+        rows = (spline(times), moving * spline(times, 1), moving * spline(times, 2))
+        return Recording(rows, reaching.goal)
+
+    return play
+
+
+RIVALS: dict[str, Rival] = {
+    "PDMP, J = 3": styles,
+    "DMP of one demonstration": one_demonstration,
+    "principal components, 3": components,
+    "library of DMPs": library,
+}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What became of one rival at one height: left alone, to a goal that moves, and held."""
+
+    alone: Robot
+    moved: Robot
+    held: Robot
+    command: NewGoal
+    grip: Held
+    new_style: float
+    """How long it takes to have the movement for a height [ms]."""
+
+    def leap(self) -> float:
+        """Return the largest joint speed once let go, over the largest when left alone."""
+        return _fastest(self.held, after=self.grip.end) / _fastest(self.alone)
+
+
+def attempt(rival: Rival, reaching: Reaching, height: float) -> Trial:
+    """Let one rival reach over a height [m]."""
+    movement_for = rival(reaching)
+    began = perf_counter()
+    movement_for(height)
+    took = 1e3 * (perf_counter() - began)
+    model = learn(reaching, N_STYLES)
+    command = new_goal(model, reaching)
+    start = HELD_AT * lasting(model)
+    grip = Held(HELD_JOINT, start, start + HELD_FOR)
+
+    def run(*events: NewGoal | Held, feedback: bool = False) -> Robot:
+        movement = movement_for(height)
+        robot = Robot(movement.position, reaching.task, boxes(height))
+        return drive(robot, movement, events, feedback=feedback)
+
+    return Trial(run(), run(command), run(grip, feedback=True), command, grip, took)
+
+
+def comparison() -> Section:
+    """Compare what the paper compares in words."""
+    reaching = demonstrate()
+    trials = {
+        (name, height): attempt(rival, reaching, height)
+        for name, rival in RIVALS.items()
+        for height in TESTED
+    }
+    rows = [
+        [
+            name,
+            pile(height),
+            f"{trial.alone.log.contact():.3f} s",
+            f"{reaching.left(trial.alone.log.hands[-1]):.1f} mm",
+            f"{reaching.left(trial.moved.log.hands[-1], trial.command.goal):.1f} mm",
+            f"{trial.leap():.1f}",
+            f"{trial.held.log.contact():.3f} s",
+            f"{trial.new_style:.1f} ms",
+        ]
+        for (name, height), trial in trials.items()
+    ]
+    header = [
+        "",
+        "over",
+        "touches a box for",
+        "left to the goal",
+        "left to a goal moved on the way",
+        "speed once let go",
+        "touches when held",
+        "time to a new style",
+    ]
+    text = [
+        "All learn from the reaches over none, two and three boxes. Held: the elbow, for half a "
+        "second on its way; speed once let go is the largest of any joint, over the largest of the "
+        "same movement undisturbed.",
+        table(header, rows),
+    ]
+    held = {name: trials[name, TESTED[0]] for name in ("PDMP, J = 3", "principal components, 3")}
+    return Section("What the paper argues with", text, {"held": draw_held(held)})
+
+
+def draw_held(trials: dict[str, Trial]) -> Figure:
+    """Draw what the elbow was told and did while it was held and after."""
+    figure = canvas(None, 9.5, 3.8)
+    panels = figure.subplots(1, len(trials), sharey=True)
+    for axes, (name, trial) in zip(panels, trials.items(), strict=True):
+        told, done = (rows[:, HELD_JOINT] for rows in trial.held.log.rows())
+        time = DT * np.arange(1, len(told) + 1)
+        within = time < trial.grip.end + 3.0
+        axes.axvspan(trial.grip.start, trial.grip.end, color=ORANGE, alpha=0.2, label="held")
+        undisturbed = trial.alone.log.rows()[0][: within.sum(), HELD_JOINT]
+        axes.plot(time[: len(undisturbed)], undisturbed, color=GREY, ls=":", label="undisturbed")
+        axes.plot(time[within], told[within], color=GREY, linewidth=3, label="commanded")
+        axes.plot(time[within], done[within], color=BLUE, label="measured")
+        dress(axes, "time [s]", "q4 [rad]", name)
+    legend(figure, panels[0])
+    return figure
+
+
+def _fastest(robot: Robot, after: float = 0.0) -> float:
+    """Return the largest speed of a joint from some time on [rad/s]."""
+    _, done = robot.log.rows()
+    return float(np.abs(np.diff(done[round(after / DT) :], axis=0)).max() / DT)

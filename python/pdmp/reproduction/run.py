@@ -1,0 +1,77 @@
+"""Making the figures, and the files they go to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+
+from pdmp import plot
+from pdmp._files import replacing
+from pdmp.reproduction.heights import figure_4
+from pdmp.reproduction.one_dof import figure_2
+from pdmp.reproduction.rivals import comparison
+from pdmp.reproduction.section import Section
+from pdmp.reproduction.styles import figure_3
+from pdmp.reproduction.walking import figure_5
+
+FIGURES = ("fig2", "fig3", "fig4", "fig5", "comparison")
+
+
+def reproduce(
+    figure: str,
+    folder: str | PathLike[str],
+    recordings: str | PathLike[str] | None = None,
+    progress: Callable[[str], object] | None = None,
+) -> str:
+    """Make a figure of Matsubara, Hyon and Morimoto (2011), or all of them, and their numbers.
+
+    Parameters
+    ----------
+    figure : {"fig2", "fig3", "fig4", "fig5", "comparison", "all"}
+        Which one; the comparison is with what the paper argues with.
+    folder : path
+        Where its pictures go, and its tables: `fig3.md` for "fig3".
+    recordings : path, optional
+        Folder of CSV files, one person walking in each, with a column `t` [s] and columns
+        `r_sh1, r_sh2, r_sh3, r_elb, l_sh1, …` [rad]; "fig5" then learns from them as well.
+    progress : callable, optional
+        Called with the name of each figure that is begun.
+
+    Returns
+    -------
+    str
+        The tables, in Markdown.
+
+    Raises
+    ------
+    ValueError
+        A figure that there is not; recordings in which too few arms swing.
+    ImportError
+        The extra `reproduce` or the model of the robot is not installed.
+    OSError
+        A file that cannot be read or written.
+    """
+    makers: dict[str, Callable[[], Section]] = {
+        "fig2": figure_2,
+        "fig3": figure_3,
+        "fig4": figure_4,
+        "fig5": lambda: figure_5(recordings),
+        "comparison": comparison,
+    }
+    if figure != "all" and figure not in makers:
+        raise ValueError(f'figure = "{figure}": must be one of {", ".join(makers)}, all')
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    reports = []
+    for name in makers if figure == "all" else [figure]:
+        if progress is not None:
+            progress(name)
+        section = makers[name]()
+        reports.append("\n\n".join([f"# {section.title}", *section.text]))
+        for file, picture in section.figures.items():
+            plot.save(picture, folder / f"{file}.png")
+        images = "\n\n".join(f"![{file}]({file}.png)" for file in section.figures)
+        with replacing(folder / f"{name}.md") as draft:
+            draft.write_text(f"{reports[-1]}\n\n{images}\n", encoding="utf-8")
+    return "\n\n".join(reports)

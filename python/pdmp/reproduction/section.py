@@ -1,0 +1,18 @@
+"""A part of the report: what one figure of the paper came to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass
+class Section:
+    """A title, paragraphs and tables in Markdown, and figures by the name of their file."""
+
+    title: str
+    text: list[str]
+    figures: dict[str, Figure] = field(default_factory=dict)
