@@ -9,10 +9,16 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 # The bindings are compiled against the interpreter that will import them.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test check bench bench-peers bench-scaling bench-bases report rtsan capi header clean needs
+# The robot's model is read from a wheel whose dependencies, gigabytes of them, are not needed.
+ROBOT := robosuite==1.5.2
+
+.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases report rtsan capi header clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to demo/
 	$(BIN)/pdmp demo -o demo
+
+reproduce: .venv/with-reproduce  ## The paper's figures, on a simulated robot, into reproduction/
+	$(BIN)/pdmp reproduce all -o reproduction
 
 test: .venv/with-test  ## Runs every test, Rust and Python
 	cargo test --release --workspace
@@ -61,11 +67,12 @@ header: | needs  ## Makes pdmp.h anew from the sources of the C ABI
 
 clean:  ## Removes what the targets above made
 	cargo clean
-	rm -rf .venv demo dist python/pdmp/_native*.so
+	rm -rf .venv demo reproduction dist python/pdmp/_native*.so
 
 .venv/with-%: $(SOURCES) | $(BIN)/python
 	@echo 'building the extension and installing what "$*" needs: some minutes the first time'
-	$(BIN)/pip install --quiet --editable '.[$*]'
+	$(BIN)/pip install --quiet --no-warn-conflicts --editable '.[$*]'
+	$(if $(filter reproduce test dev,$*),$(BIN)/pip install --quiet --no-deps $(ROBOT))
 	@touch $@
 
 $(BIN)/python: | needs

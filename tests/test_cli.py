@@ -14,7 +14,7 @@ from pdmp.cli import main
 from pdmp.evaluation import PDMP, baselines
 from synthetic import DT, loops, reaches
 
-COMMANDS = ["fit", "rollout", "evaluate", "info", "plot", "demo"]
+COMMANDS = ["fit", "rollout", "evaluate", "info", "plot", "demo", "reproduce"]
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,14 +47,9 @@ def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]]) -> Figure:
 
 def _pictures(robot: Robot, times: Sequence[float]) -> list[Any]:
     mujoco = engine()
-    try:
-        renderer = mujoco.Renderer(robot.model, HEIGHT, WIDTH)
-    except (
-        Exception
-    ) as error:  # what a missing library or driver raises differs from one to another
-        raise NoRenderer(
-            f"MuJoCo cannot draw here ({error}); MUJOCO_GL=osmesa or egl may"
-        ) from None
+    if reason := _missing():
+        raise NoRenderer(f"MuJoCo cannot draw here ({reason}); MUJOCO_GL=osmesa or egl may")
+    renderer = mujoco.Renderer(robot.model, HEIGHT, WIDTH)
     camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
     camera.lookat[:] = CENTRE
     camera.azimuth, camera.elevation, camera.distance = AZIMUTH, ELEVATION, DISTANCE
@@ -67,3 +63,14 @@ def _pictures(robot: Robot, times: Sequence[float]) -> list[Any]:
         pictures.append(np.array(renderer.render()))
     renderer.close()
     return pictures
+
+
+@cache
+def _missing() -> str:
+    """Try to draw, and return why it fails; once only, since a second attempt may end the process."""
+    mujoco = engine()
+    try:
+        mujoco.Renderer(mujoco.MjSpec().compile(), 1, 1).close()
+    except Exception as error:  # what a missing library or driver raises differs among them
+        return str(error) or type(error).__name__
+    return ""

@@ -119,7 +119,7 @@ def minimum_jerk(points: Array, late: float = 0.0) -> Callable[[Array], Array]:
         return make_interp_spline(times, points, k=5, bc_type=(rest, rest))
 
     def jerk(apart: float) -> float:
-        third = spline(apart)(np.linspace(0, 1, 400), nu=3)
+        third = spline(apart)((np.arange(400) + 0.5) / 400, nu=3)
         return float(np.sum(third**2))
 
     best = minimize_scalar(jerk, bounds=(0.02, 0.4), method="bounded").x

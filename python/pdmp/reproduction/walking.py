@@ -123,6 +123,7 @@ class _Cycle:
 
 def figure_5(recordings: str | PathLike[str] | None = None) -> Section:
     """Reproduce Fig. 5, with generated cycles on the robot, and with recordings if there are."""
+    walks = None if recordings is None else recorded(Path(recordings))
     names = list(STYLES)
     model = learn(demonstrate())
     chosen = [names.index(name) for name in ("normal", "marching", "girly")]
@@ -139,8 +140,8 @@ def figure_5(recordings: str | PathLike[str] | None = None) -> Section:
         figures["fig5_robot"] = film.strip(_instants(model, robot, chosen, names))
     except film.NoRenderer as reason:
         text.append(f"No pictures of the robot: {reason}.")
-    if recordings is not None:
-        told, figures["fig5_recorded"] = _recorded(Path(recordings))
+    if walks is not None:
+        told, figures["fig5_recorded"] = walks
         text += told
     return Section("Fig. 5: stylised arm swing", text, figures)
 
@@ -183,7 +184,7 @@ def _instants(
     return {name: (robot, list(n * LASTING - 4 + stride)) for name, n in spells.items()}
 
 
-def _recorded(folder: Path) -> tuple[list[str], Figure]:
+def recorded(folder: Path) -> tuple[list[str], Figure]:
     """Learn from recordings of people who walk, one mean stride of each."""
     files = sorted(folder.glob("*.csv"))
     if not files:
