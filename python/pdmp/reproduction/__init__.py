@@ -1,6 +1,14 @@
-"""The paper's figures, made with this library: generators, a robot in MuJoCo, and other methods.
+"""The paper's figures, made with this library on a simulated robot.
 
-The paper is Matsubara, Hyon, Morimoto, Neural Networks 24 (2011).
+The paper is Matsubara, Hyon, Morimoto, Neural Networks 24 (2011). What lives where, each importing
+from above::
+
+    human, swing            how people reach and swing their arms
+    baxter, robot, film     the robot's kinematics, its physics, and pictures of it
+    reaching, loop          the demonstrations on the robot, and the control loop
+    one_dof, styles, heights, walking      Fig. 2 to 5, one each
+    rivals                  other methods at the same task
+    section, paths, run     what the figures share, and the command
 """
 
 from pdmp.reproduction.run import FIGURES, reproduce
