@@ -2,6 +2,7 @@
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -228,6 +229,12 @@ def test_command_writes_tables_and_figures(
     assert capsys.readouterr().out.strip() in (tmp_path / "fig2.md").read_text(encoding="utf-8")
 
 
+def test_another_seed_is_another_person(tmp_path: Path) -> None:
+    """The same seed gives the same tables, another one others."""
+    first, again, other = (reproduce("fig2", tmp_path, seed=seed) for seed in (1, 1, 2))
+    assert first == again != other
+
+
 def test_recordings_of_walks_are_learnt(tmp_path: Path) -> None:
     """From raw recordings; those in which no arm swings are named."""
     noise = np.random.default_rng(5)
@@ -252,10 +259,11 @@ def test_recordings_of_walks_are_learnt(tmp_path: Path) -> None:
             {"figure": "fig6"},
             'figure = "fig6": must be one of fig2, fig3, fig4, fig5, comparison, all',
         ),
+        ({"figure": "fig2", "seed": -1}, "seed = -1: must not be negative"),
         ({"figure": "fig5", "recordings": "nowhere"}, "recordings: nowhere has no CSV file"),
     ],
 )
-def test_bad_requests_are_named(arguments: dict[str, str], message: str, tmp_path: Path) -> None:
+def test_bad_requests_are_named(arguments: dict[str, Any], message: str, tmp_path: Path) -> None:
     """What there is not."""
     with pytest.raises(ValueError, match=message):
         reproduce(folder=tmp_path, **arguments)

@@ -7,6 +7,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from pdmp.reproduction import FIGURES, reproduce
+from pdmp.reproduction.section import SEED
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -24,6 +25,13 @@ def arguments(parser: ArgumentParser) -> None:
         help="where pictures and tables go; default: reproduction",
     )
     parser.add_argument(
+        "--seed",
+        type=int,
+        default=SEED,
+        metavar="N",
+        help="of the noise in the demonstrations, another person as it were; default: %(default)s",
+    )
+    parser.add_argument(
         "--recordings",
         metavar="FOLDER",
         help="for fig5, CSV files of people walking: t [s]; r_sh1, r_sh2, r_sh3, r_elb, l_sh1, … "
@@ -37,6 +45,7 @@ def run(options: Namespace) -> None:
         options.figure,
         options.output,
         options.recordings,
+        options.seed,
         progress=lambda name: print(f"making {name}", file=sys.stderr),
     )
     print(report)

@@ -76,6 +76,10 @@ def specification() -> Any:
     return engine().MjSpec.from_file(str(mjcf()))
 
 
+class OutOfReach(ValueError):
+    """A place that the arm does not reach within its joint limits."""
+
+
 class Arm:
     """Kinematics of one arm, the wrist straight.
 
@@ -135,7 +139,7 @@ class Arm:
 
         Raises
         ------
-        ValueError
+        OutOfReach
             A place that the arm does not reach within its joint limits.
         """
         from scipy.optimize import least_squares
@@ -151,7 +155,7 @@ class Arm:
             inside = np.all((self.lowest <= q) & (q <= self.highest))
             if not inside or np.linalg.norm(solution.fun) > 1e-6:
                 place = np.round(hand, 3)
-                raise ValueError(
+                raise OutOfReach(
                     f"hands: {place} m is out of reach with the elbow at {swivel:.2f} rad"
                 )
             path.append(q)

@@ -67,7 +67,7 @@ def _pictures(robot: Robot, times: Sequence[float]) -> list[Any]:
 
 @cache
 def _missing() -> str:
-    """Try to draw, and return why it fails; once only, since a second attempt may end the process."""
+    """Try to draw, and return why it fails; once, since a second attempt may end the process."""
     mujoco = engine()
     try:
         mujoco.Renderer(mujoco.MjSpec().compile(), 1, 1).close()

@@ -24,7 +24,7 @@ from pdmp.reproduction.reaching import (
     height_of,
 )
 from pdmp.reproduction.robot import DT, Robot, pile
-from pdmp.reproduction.section import Section
+from pdmp.reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -101,9 +101,9 @@ def lasting(model: pdmp.Model) -> float:
     return float(model.durations[model.nominal] * PACE / model.tau)
 
 
-def figure_4() -> Section:
+def figure_4(seed: int = SEED) -> Section:
     """Reproduce Fig. 4."""
-    reaching = demonstrate()
+    reaching = demonstrate(seed)
     found = errors(reaching)
     model = learn(reaching, 3)
     command = new_goal(model, reaching)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import pdmp
 from pdmp._tables import table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, gradient, legend
-from pdmp.reproduction.section import Section
+from pdmp.reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,7 +86,7 @@ def extremes(model: pdmp.Model) -> tuple[int, int]:
     return int(first), int(second)
 
 
-def figure_2(seed: int = 2011) -> Section:
+def figure_2(seed: int = SEED) -> Section:
     """Reproduce Fig. 2."""
     noise = np.random.default_rng(seed)
     examples = [discrete(noise), rhythmic(noise)]

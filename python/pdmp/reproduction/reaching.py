@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -10,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.reproduction.baxter import Arm
+from pdmp.reproduction.baxter import Arm, OutOfReach
 from pdmp.reproduction.human import RESTING, Task, reach
+from pdmp.reproduction.section import SEED
 
 Array = NDArray[np.float64]
 
@@ -51,8 +53,16 @@ class Reaching:
 
 
 @cache
-def demonstrate(seed: int = 2011) -> Reaching:
-    """Let a person reach over every obstacle, and bring that to the robot's right arm."""
+def demonstrate(seed: int = SEED) -> Reaching:
+    """Let a person reach over every obstacle, and bring that to the robot's right arm.
+
+    A trial that the robot cannot follow, with the elbow at its limit, is made anew.
+
+    Parameters
+    ----------
+    seed : int
+        Which person, as it were: that of the noise.
+    """
     arm = Arm()
     usual, end = arm.swivel(GOAL), arm.places(GOAL)[2]
     task = Task(end + START, end)
@@ -62,9 +72,12 @@ def demonstrate(seed: int = 2011) -> Reaching:
     demos = []
     for height in HEIGHTS:
         for _ in range(TRIALS):
-            trial = reach(task, height, noise)
-            elbow = np.full(len(trial.hand), usual + trial.elbow)
-            joints = arm.reach(trial.hand, elbow, start)
+            joints = None
+            while joints is None:
+                trial = reach(task, height, noise)
+                elbow = np.full(len(trial.hand), usual + trial.elbow)
+                with suppress(OutOfReach):
+                    joints = arm.reach(trial.hand, elbow, start)
             demos.append(
                 pdmp.Demonstration(
                     position=joints,

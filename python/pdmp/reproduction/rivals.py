@@ -33,7 +33,7 @@ from pdmp.reproduction.reaching import (
     height_of,
 )
 from pdmp.reproduction.robot import DT, Robot, boxes, pile
-from pdmp.reproduction.section import Section
+from pdmp.reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -187,9 +187,9 @@ def attempt(rival: Rival, reaching: Reaching, height: float) -> Trial:
     return Trial(run(), run(command), run(grip, feedback=True), command, grip, took)
 
 
-def comparison() -> Section:
+def comparison(seed: int = SEED) -> Section:
     """Compare what the paper compares in words."""
-    reaching = demonstrate()
+    reaching = demonstrate(seed)
     trials = {
         (name, height): attempt(rival, reaching, height)
         for name, rival in RIVALS.items()

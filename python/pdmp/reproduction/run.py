@@ -11,7 +11,7 @@ from pdmp._files import replacing
 from pdmp.reproduction.heights import figure_4
 from pdmp.reproduction.one_dof import figure_2
 from pdmp.reproduction.rivals import comparison
-from pdmp.reproduction.section import Section
+from pdmp.reproduction.section import SEED, Section
 from pdmp.reproduction.styles import figure_3
 from pdmp.reproduction.walking import figure_5
 
@@ -22,6 +22,7 @@ def reproduce(
     figure: str,
     folder: str | PathLike[str],
     recordings: str | PathLike[str] | None = None,
+    seed: int = SEED,
     progress: Callable[[str], object] | None = None,
 ) -> str:
     """Make a figure of Matsubara, Hyon and Morimoto (2011), or all of them, and their numbers.
@@ -35,6 +36,8 @@ def reproduce(
     recordings : path, optional
         Folder of CSV files, one person walking in each, with a column `t` [s] and columns
         `r_sh1, r_sh2, r_sh3, r_elb, l_sh1, …` [rad]; "fig5" then learns from them as well.
+    seed : int
+        Of the noise in the demonstrations: another person, as it were.
     progress : callable, optional
         Called with the name of each figure that is begun.
 
@@ -46,21 +49,23 @@ def reproduce(
     Raises
     ------
     ValueError
-        A figure that there is not; recordings in which too few arms swing.
+        A figure that there is not; a negative seed; recordings in which too few arms swing.
     ImportError
         The extra `reproduce` or the model of the robot is not installed.
     OSError
         A file that cannot be read or written.
     """
     makers: dict[str, Callable[[], Section]] = {
-        "fig2": figure_2,
-        "fig3": figure_3,
-        "fig4": figure_4,
-        "fig5": lambda: figure_5(recordings),
-        "comparison": comparison,
+        "fig2": lambda: figure_2(seed),
+        "fig3": lambda: figure_3(seed),
+        "fig4": lambda: figure_4(seed),
+        "fig5": lambda: figure_5(recordings, seed),
+        "comparison": lambda: comparison(seed),
     }
     if figure != "all" and figure not in makers:
         raise ValueError(f'figure = "{figure}": must be one of {", ".join(makers)}, all')
+    if seed < 0:
+        raise ValueError(f"seed = {seed}: must not be negative")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     reports = []

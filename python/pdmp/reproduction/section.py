@@ -9,6 +9,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+SEED = 2011
+
+
 @dataclass
 class Section:
     """A title, paragraphs and tables in Markdown, and figures by the name of their file."""

@@ -14,7 +14,7 @@ from pdmp.reproduction import film, paths
 from pdmp.reproduction.loop import reach_over
 from pdmp.reproduction.reaching import CONSTANTS, HEIGHTS, Reaching, demonstrate, height_of
 from pdmp.reproduction.robot import Robot, pile
-from pdmp.reproduction.section import Section
+from pdmp.reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,9 +52,9 @@ def touched(model: pdmp.Model, reaching: Reaching) -> list[float]:
     ]
 
 
-def figure_3() -> Section:
+def figure_3(seed: int = SEED) -> Section:
     """Reproduce Fig. 3."""
-    reaching = demonstrate()
+    reaching = demonstrate(seed)
     model = learn(reaching)
     shares = model.singular_values / model.singular_values.sum()
     robots = {

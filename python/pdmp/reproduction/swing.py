@@ -27,6 +27,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import pdmp
+from pdmp.reproduction.section import SEED
 
 Array = NDArray[np.float64]
 
@@ -83,7 +84,7 @@ def cycle(style: Style, noise: Generator) -> Array:
     return np.hstack([_arm(style, phase, noise), _arm(style, phase + np.pi, noise)])
 
 
-def demonstrate(seed: int = 2011) -> list[pdmp.Demonstration]:
+def demonstrate(seed: int = SEED) -> list[pdmp.Demonstration]:
     """Return a cycle of each style."""
     noise = np.random.default_rng(seed)
     return [

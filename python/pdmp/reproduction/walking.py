@@ -17,7 +17,7 @@ from pdmp.demos import cycles, read_csv
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress
 from pdmp.reproduction import film
 from pdmp.reproduction.robot import DT, Robot
-from pdmp.reproduction.section import Section
+from pdmp.reproduction.section import SEED, Section
 from pdmp.reproduction.swing import NAMES, STYLES, demonstrate
 
 if TYPE_CHECKING:
@@ -121,11 +121,11 @@ class _Cycle:
         return float(np.abs(controller.position - here).max() / self._range)
 
 
-def figure_5(recordings: str | PathLike[str] | None = None) -> Section:
+def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) -> Section:
     """Reproduce Fig. 5, with generated cycles on the robot, and with recordings if there are."""
     walks = None if recordings is None else recorded(Path(recordings))
     names = list(STYLES)
-    model = learn(demonstrate())
+    model = learn(demonstrate(seed))
     chosen = [names.index(name) for name in ("normal", "marching", "girly")]
     commands = switches(model, chosen, names)
     robot = Robot(model.rollout(**commands[0].command).position[0])
