@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+from ctypes.util import find_library
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -53,15 +54,20 @@ def engine() -> Any:
     Raises
     ------
     ImportError
-        It is not installed.
+        It is not installed, or asked by `MUJOCO_GL` to draw with what is not there.
     """
-    # It settles what it draws with when it is imported; without a screen, not on a window.
+    # It settles what it draws with when it is imported, and on a window if not told otherwise.
     if sys.platform == "linux" and "DISPLAY" not in os.environ:
-        os.environ.setdefault("MUJOCO_GL", "egl")
+        os.environ.setdefault("MUJOCO_GL", _windowless())
     try:
         import mujoco
     except ImportError:
         raise ImportError("the robot needs MuJoCo: pip install 'pdmp[reproduce]'") from None
+    except (AttributeError, OSError, RuntimeError) as error:
+        asked = os.environ.get("MUJOCO_GL", "")
+        raise ImportError(
+            f'MuJoCo cannot start with MUJOCO_GL="{asked}" ({error}): leave it unset'
+        ) from None
     return mujoco
 
 
@@ -160,6 +166,13 @@ class Arm:
                 )
             path.append(q)
         return np.array(path)
+
+
+def _windowless() -> str:
+    """Name what MuJoCo may draw with; asked for what is missing, it could not even be imported."""
+    if find_library("EGL") and (find_library("OpenGL") or find_library("GL")):
+        return "egl"
+    return "osmesa" if find_library("OSMesa") else "disable"
 
 
 def _swivel(places: Array) -> float:

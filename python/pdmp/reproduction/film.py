@@ -48,7 +48,7 @@ def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]]) -> Figure:
 def _pictures(robot: Robot, times: Sequence[float]) -> list[Any]:
     mujoco = engine()
     if reason := _missing():
-        raise NoRenderer(f"MuJoCo cannot draw here ({reason}); MUJOCO_GL=osmesa or egl may")
+        raise NoRenderer(f"MuJoCo cannot draw here ({reason}): install EGL or OSMesa")
     renderer = mujoco.Renderer(robot.model, HEIGHT, WIDTH)
     camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
     camera.lookat[:] = CENTRE
