@@ -11,6 +11,8 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 # The robot's model is read from a wheel whose dependencies, gigabytes of them, are not needed.
 ROBOT := robosuite==1.5.2
+# Recordings of people walking, where they are at hand, for Fig. 5.
+WALKS := $(wildcard ../shared/data/walk_styles_bandai/demos)
 
 .PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases report rtsan capi header clean needs
 
@@ -18,7 +20,7 @@ demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and
 	$(BIN)/pdmp demo -o demo
 
 reproduce: .venv/with-reproduce  ## The paper's figures, on a simulated robot, into reproduction/
-	$(BIN)/pdmp reproduce all -o reproduction
+	$(BIN)/pdmp reproduce all -o reproduction $(if $(WALKS),--recordings $(WALKS))
 
 test: .venv/with-test  ## Runs every test, Rust and Python
 	cargo test --release --workspace

@@ -102,11 +102,6 @@ class Robot:
         """Joint angles (D,) [rad]."""
         return np.array(self._signs * self.data.qpos[self._moved])
 
-    @property
-    def velocity(self) -> Array:
-        """Joint velocities (D,) [rad/s]."""
-        return np.array(self._signs * self.data.qvel[self._moved])
-
     def hold(self, joint: int | None) -> None:
         """Grip the joint of this index where it is, or let go."""
         if joint is None:
@@ -176,6 +171,7 @@ def _free_the_arms(specified: Any) -> None:
 
 
 def _light(specified: Any) -> None:
+    """Add two lamps, and a white background."""
     mujoco = engine()
     sky = specified.add_texture(type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=16, height=96)
     sky.builtin, sky.rgb1, sky.rgb2 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, [1, 1, 1], [1, 1, 1]
