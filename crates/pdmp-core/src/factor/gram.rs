@@ -2,11 +2,12 @@
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use super::{ACCURACY, product};
+use super::{ACCURACY, PANEL, product, turned};
 use crate::error::Result;
 
 /// Singular values below this share of σ₁ are not taken from the Gram matrix: an eigenvector is off by ε·(σ₁/σ)².
@@ -16,7 +17,7 @@ pub(super) const SMALL: f64 = 1e-3;
 /// where they vanish. Nothing where the iteration does not converge.
 pub(super) struct Gram {
     matrix: Mat<f64>,
-    vectors: Mat<f64>,
+    pub(super) vectors: Mat<f64>,
     pub(super) values: Vec<f64>,
 }
 
@@ -28,15 +29,9 @@ impl Gram {
         let mut matrix = Mat::zeros(k, k);
         for start in (0..length).step_by(most) {
             proceed(start as f64 / length as f64)?;
-            let part = wide.subcols(start, most.min(length - start));
-            let (lower, dense) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-            matmul(matrix.as_mut(), lower, Accum::Add, part, dense, part.transpose(), dense, 1.0, Par::Seq);
+            add_square(matrix.as_mut(), wide.subcols(start, most.min(length - start)));
         }
-        for j in 0..k {
-            for i in 0..j {
-                matrix[(i, j)] = matrix[(j, i)];
-            }
-        }
+        mirror(&mut matrix);
         let (mut ascending, mut vectors) = (Diag::zeros(k), Mat::zeros(k, k));
         let scratch = self_adjoint_evd_scratch::<f64>(k, ComputeEigenvectors::Yes, Par::Seq, Default::default());
         let mut memory = MemBuffer::new(scratch);
@@ -47,6 +42,38 @@ impl Gram {
         }
         let values: Vec<f64> = ascending.column_vector().iter().rev().map(|l| l.max(0.0).sqrt()).collect();
         Ok(Some(Self { matrix, vectors, values }))
+    }
+
+    /// The triangle R with V·Rᵀ·R·Vᵀ = A·Aᵀ for the eigenvectors V, as exact as by reflections; nothing where they are
+    /// too far from singular vectors for that.
+    ///
+    /// VᵀA has all but orthogonal rows b: of P = VᵀA·AᵀV, scaled by their lengths to a diagonal of ones, no eigenvalue
+    /// is far from one, so that it has a Cholesky factor to the last digits however much the lengths differ
+    /// (CholeskyQR2: Yamamoto, Nakatsukasa, Yanagisawa, Fukaya, ETNA 44 (2015) 306–326).
+    pub(super) fn triangle(
+        &self,
+        wide: MatRef<f64>,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Option<Mat<f64>>> {
+        let (k, length) = wide.shape();
+        let (mut products, mut part) = (Mat::zeros(k, k), vec![0.0; k * PANEL.min(length)]);
+        for start in (0..length).step_by(PANEL) {
+            proceed(start as f64 / length as f64)?;
+            let rows = turned(&mut part, self.vectors.as_ref(), wide.subcols(start, PANEL.min(length - start)));
+            add_square(products.as_mut(), rows);
+        }
+        let lengths: Vec<f64> = (0..k).map(|j| products[(j, j)].sqrt()).collect();
+        let mut scaled = Mat::from_fn(k, k, |i, j| products[(i.max(j), i.min(j))] / (lengths[i] * lengths[j]));
+        let off: f64 = (0..k).flat_map(|j| (0..j).map(move |i| (i, j))).map(|at| scaled[at].powi(2)).sum();
+        // Where a row vanishes, this is no number.
+        if off.is_nan() || off > 0.1 {
+            return Ok(None);
+        }
+        let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(k, Par::Seq, Default::default()));
+        let stack = MemStack::new(&mut memory);
+        let factor = cholesky_in_place(scaled.as_mut(), Default::default(), Par::Seq, stack, Default::default());
+        let upper = |i: usize, j: usize| if i <= j { scaled[(j, i)] * lengths[j] } else { 0.0 };
+        Ok(factor.is_ok().then(|| Mat::from_fn(k, k, upper)))
     }
 
     /// The first `kept` vectors, if the leading J among them are singular vectors: not below [`SMALL`]·σ₁, and with
@@ -61,5 +88,20 @@ impl Gram {
         };
         let sound = |j: usize| values[j] >= SMALL * first && residual(j) <= ACCURACY * first * values[j];
         (0..n_styles).all(sound).then_some(vectors)
+    }
+}
+
+/// Adds A·Aᵀ to the lower half of a square.
+pub(super) fn add_square(square: MatMut<f64>, a: MatRef<f64>) {
+    let (lower, dense) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    matmul(square, lower, Accum::Add, a, dense, a.transpose(), dense, 1.0, Par::Seq);
+}
+
+/// Copies the lower half of a square to the upper.
+fn mirror(square: &mut Mat<f64>) {
+    for j in 0..square.ncols() {
+        for i in 0..j {
+            square[(i, j)] = square[(j, i)];
+        }
     }
 }

@@ -1,15 +1,16 @@
 //! Truncated singular value decomposition of the stacked targets (step 3 of Section 3.2).
 //!
-//! Everything works on the short side of F: K = min(M, C·D) singular vectors of length K, found in one of three ways.
+//! Everything works on the short side of F: K = min(M, C·D) singular vectors of length K, found in one of four ways.
 //!
 //! | way | when | cost | residuals ‖F·v − σ·u‖ of the J kept |
 //! |---|---|---|---|
 //! | `krylov` | J is given, and J + 8, rounded up to a multiple of 8, is at most K/16 | 4·M·C·D·(J + 8) a step, 2 to 10 steps | 1e-12·σ₁ |
 //! | `gram` | σ_J ≥ σ₁/1000, else nothing is lost but the time | K·M·C·D + 10·K³ | 1e-11·σ₁ |
-//! | `reflect` | always | 2·K·M·C·D + 30·K³ | 1e-15·σ₁ times a modest factor |
+//! | `gram`, twice | cosines between the images of its vectors have squares that sum up to 0.1 or less | 3·K·M·C·D + 30·K³ more, all of it products | 1e-15·σ₁ times a modest factor |
+//! | `reflect` | always | 2·K·M·C·D + 30·K³ | the same |
 //!
-//! They are tried in this order. Each of the first two measures what it found, and leaves the work to the next where
-//! it is not good enough; the last cannot fail. No random numbers, no threads: the same answer every time.
+//! They are tried in this order. Each but the last measures what it found, and leaves the work to the next where it is
+//! not good enough; the last cannot fail. No random numbers, no threads: the same answer every time.
 
 mod gram;
 mod krylov;
@@ -159,19 +160,23 @@ struct Library<'a> {
     squares: f64,
 }
 
-/// What the leading vectors of the short side make of the targets.
+/// What the leading vectors of the short side make of the targets: S, and the first J rows of SᵀF.
 struct Projection {
     styles: Mat<f64>,
     basis: Array2<f64>,
-    /// Products of the rows of SᵀF.
-    products: Mat<f64>,
 }
+
+/// Products of the rows of SᵀF with those before them, below the diagonal.
+struct Products(Mat<f64>);
 
 impl<'a> Library<'a> {
     /// None where all are zero.
     fn of(targets: ArrayView2<'a, f64>) -> Result<Option<Self>> {
-        let largest = targets.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let squares = squares(targets);
+        if targets.is_standard_layout() && (1e-40..1e40).contains(&squares) {
+            return Ok(Some(Self { targets: targets.into(), scale: 1.0, squares }));
+        }
+        let largest = targets.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         // What is not a number hides from the largest, but not from the squares.
         if !(squares.is_finite() && largest <= LARGEST) {
             check_matrix("targets", targets)?;
@@ -181,9 +186,6 @@ impl<'a> Library<'a> {
         }
         // A power of two changes no digit.
         let scale = if (1e-20..1e20).contains(&largest) { 1.0 } else { largest.log2().floor().exp2() };
-        if targets.is_standard_layout() && scale == 1.0 {
-            return Ok(Some(Self { targets: targets.into(), scale, squares }));
-        }
         let mut scaled = zeros("targets", targets.dim())?;
         scaled.zip_mut_with(&targets, |to, from| *to = from / scale);
         let squares = self::squares(scaled.view());
@@ -207,9 +209,9 @@ impl<'a> Library<'a> {
         if let StyleCount::Given(n_styles) = styles
             && let Some(vectors) = krylov::leading(wide, n_styles, &mut |share| proceed(share / 3.0))?
         {
-            let projection = self.project(vectors, n_styles)?;
-            if projection.is_sound(n_styles) {
-                let values = projection.norms();
+            let (projection, products) = self.measured(vectors, n_styles)?;
+            if products.are_sound(&projection.styles, n_styles) {
+                let values = products.norms();
                 let left = self.squares - values.iter().map(|s| s * s).sum::<f64>();
                 return Ok(self.finish(projection, n_styles, values, left + ROUNDING * self.squares));
             }
@@ -219,32 +221,49 @@ impl<'a> Library<'a> {
             // Of few demonstrations all factors cost little, and give all singular values their digits.
             let kept = if k <= 64 { k } else { n_styles };
             if let Some(vectors) = gram.leading(n_styles, kept) {
-                let projection = self.project(vectors, n_styles)?;
-                if projection.is_sound(n_styles) {
-                    let mut values = projection.norms();
+                let (projection, products) = self.measured(vectors, n_styles)?;
+                if products.are_sound(&projection.styles, n_styles) {
+                    let mut values = products.norms();
                     values.extend(&gram.values[kept..]);
                     let left = self.squares - values[..n_styles].iter().map(|s| s * s).sum::<f64>();
                     return Ok(self.finish(projection, n_styles, values, left + ROUNDING * self.squares));
                 }
             }
+            if let Some(triangle) = gram.triangle(wide, &mut |share| proceed((2.0 + share) / 3.0))? {
+                return self.of_triangle(styles, triangle.as_ref(), Some(gram.vectors.as_ref()));
+            }
         }
         self.exact(styles, &mut |share| proceed((2.0 + share) / 3.0))
     }
 
-    /// All singular values to the last digits, and factors to match: Aᵀ = Q·R, R = U·Σ·Vᵀ, of which Q and U are not
-    /// needed.
+    /// The way that cannot fail.
     fn exact(&self, styles: StyleCount, proceed: &mut dyn FnMut(f64) -> Result<()>) -> Result<Factors> {
         let triangle = reflect::triangle(self.wide(), proceed)?;
-        let small::Svd { sigma: values, v, .. } = small::Svd::of(triangle.as_ref());
+        self.of_triangle(styles, triangle.as_ref(), None)
+    }
+
+    /// All singular values to the last digits, and factors to match: Aᵀ·X = Q·R, R = U·Σ·Vᵀ, of which Q and U are not
+    /// needed; X is a `frame` of orthonormal columns, or one.
+    fn of_triangle(&self, styles: StyleCount, triangle: MatRef<f64>, frame: Option<MatRef<f64>>) -> Result<Factors> {
+        let small::Svd { sigma: values, v, .. } = small::Svd::of(triangle);
         let n_styles = styles.among(&values);
-        let projection = self.project(v.subcols(0, n_styles).to_owned(), n_styles)?;
+        let v = v.subcols(0, n_styles);
+        let vectors = frame.map_or_else(|| v.to_owned(), |frame| product(frame, v));
+        let projection = self.project(vectors, n_styles, |_| ())?;
         let left = values[n_styles..].iter().map(|s| s * s).sum::<f64>();
         Ok(self.finish(projection, n_styles, values, left + ROUNDING * ROUNDING * self.squares))
     }
 
-    /// S and F_basis = SᵀF from the singular vectors of the short side, and the products of all rows of SᵀF, of which
-    /// the first J are kept.
-    fn project(&self, vectors: Mat<f64>, n_styles: usize) -> Result<Projection> {
+    /// S and F_basis = SᵀF from the singular vectors of the short side, and the products of all rows of SᵀF.
+    fn measured(&self, vectors: Mat<f64>, n_styles: usize) -> Result<(Projection, Products)> {
+        let mut products = Mat::zeros(vectors.ncols(), vectors.ncols());
+        let projection = self.project(vectors, n_styles, |rows| gram::add_square(products.as_mut(), rows))?;
+        Ok((projection, Products(products)))
+    }
+
+    /// S and F_basis = SᵀF from the singular vectors of the short side; `look` sees all rows of SᵀF, of which the first
+    /// J are kept, some columns at a time.
+    fn project(&self, vectors: Mat<f64>, n_styles: usize, mut look: impl FnMut(MatRef<f64>)) -> Result<Projection> {
         let targets = self.matrix();
         let (rows, columns) = targets.shape();
         // F·v = σ·u: in decreasing order, as they come, dividing by σ is no more than making them orthonormal.
@@ -259,25 +278,22 @@ impl<'a> Library<'a> {
             }
         }
         let found = styles.ncols();
-        let (mut basis, mut products) = (zeros("basis", (n_styles, columns))?, Mat::zeros(found, found));
+        let mut basis = zeros("basis", (n_styles, columns))?;
         let mut part = vec![0.0; found * PANEL.min(columns)];
         for start in (0..columns).step_by(PANEL) {
             let width = PANEL.min(columns - start);
             let part = &mut part[..found * width];
             // A target that is zero throughout stays so: a DoF at rest is not moved by what rounding leaves of it.
-            let into = MatMut::from_row_major_slice_mut(part, found, width);
-            matmul(into, Accum::Replace, styles.transpose(), targets.subcols(start, width), 1.0, Par::Seq);
-            let rows = MatRef::from_row_major_slice(part, found, width);
-            matmul(products.as_mut(), Accum::Add, rows, rows.transpose(), 1.0, Par::Seq);
+            look(turned(part, styles.as_ref(), targets.subcols(start, width)));
             let whole = basis.as_slice_mut().unwrap_or_default().chunks_exact_mut(columns);
             whole.zip(part.chunks_exact(width)).for_each(|(row, part)| row[start..start + width].copy_from_slice(part));
         }
-        Ok(Projection { styles, basis, products })
+        Ok(Projection { styles, basis })
     }
 
     /// Undoes the scale; `left` is the square of what they do not tell of F.
     fn finish(&self, projection: Projection, n_styles: usize, values: Vec<f64>, left: f64) -> Factors {
-        let Projection { styles, mut basis, .. } = projection;
+        let Projection { styles, mut basis } = projection;
         if self.scale != 1.0 {
             basis *= self.scale;
         }
@@ -308,27 +324,35 @@ fn product(a: MatRef<f64>, x: MatRef<f64>) -> Mat<f64> {
     transposed.transpose().to_owned()
 }
 
+/// Xᵀ·A, row by row, in a place that is large enough.
+fn turned<'a>(part: &'a mut [f64], x: MatRef<f64>, a: MatRef<f64>) -> MatRef<'a, f64> {
+    let (rows, columns) = (x.ncols(), a.ncols());
+    let part = &mut part[..rows * columns];
+    matmul(MatMut::from_row_major_slice_mut(part, rows, columns), Accum::Replace, x.transpose(), a, 1.0, Par::Seq);
+    MatRef::from_row_major_slice(part, rows, columns)
+}
+
 /// Columns of F that are projected at once, which stay at hand for both products.
 const PANEL: usize = 1024;
 
 /// Relative rounding of a sum of squares, with a margin.
 const ROUNDING: f64 = 1e-13;
 
-impl Projection {
+impl Products {
     fn norms(&self) -> Vec<f64> {
-        (0..self.products.nrows()).map(|j| self.products[(j, j)].sqrt()).collect()
+        (0..self.0.nrows()).map(|j| self.0[(j, j)].sqrt()).collect()
     }
 
     /// Whether the J leading columns of S are orthonormal and the rows of F_basis orthogonal.
-    fn is_sound(&self, n_styles: usize) -> bool {
+    fn are_sound(&self, styles: &Mat<f64>, n_styles: usize) -> bool {
         let sigma = self.norms();
-        let styles = self.styles.subcols(0, n_styles);
+        let styles = styles.subcols(0, n_styles);
         let gram = product(styles.transpose(), styles);
         (0..n_styles).all(|j| {
             (gram[(j, j)] - 1.0).abs() <= 1e-12
                 && (0..j).all(|i| {
                     let floor = sigma[i].max(gram::SMALL * sigma[0]);
-                    gram[(i, j)].abs() <= 1e-12 && self.products[(i, j)].abs() <= ACCURACY * sigma[0] * floor
+                    gram[(i, j)].abs() <= 1e-12 && self.0[(j, i)].abs() <= ACCURACY * sigma[0] * floor
                 })
         })
     }

@@ -373,3 +373,45 @@ proptest! {
         }
     }
 }
+
+/// The triangle from the Gram matrix has the singular values of the construction as reflections do, and the factors are
+/// as exact; where they fall too far there may be none.
+#[test]
+fn graded_libraries_have_a_triangle_of_products() {
+    let cases = [
+        vec![1.0; 6],
+        decaying(6, 0.1),
+        decaying(12, 0.3),
+        decaying(20, 0.5),
+        decaying(6, 1e-3),
+        vec![1.0, 0.5, 0.25, 0.0, 0.0, 0.0],
+    ];
+    for sigma in cases {
+        let targets = matrix(sigma.len(), 3000, &sigma);
+        let library = Library::of(targets.view()).unwrap().unwrap();
+        let gram = Gram::of(library.wide(), &mut go).unwrap().unwrap();
+        let Some(triangle) = gram.triangle(library.wide(), &mut go).unwrap() else {
+            assert!(sigma[sigma.len() - 1] < 1e-8, "{sigma:?}");
+            continue;
+        };
+        let n_styles = StyleCount::Given(sigma.len());
+        let factors = library.of_triangle(n_styles, triangle.as_ref(), Some(gram.vectors.as_ref())).unwrap();
+        check(&targets, &factors);
+        for (j, sigma) in sigma.iter().enumerate() {
+            assert!((factors.singular_values[j] - sigma).abs() < 1e-14);
+            let residual = targets.dot(&factors.basis.row(j)) - &factors.styles.column(j) * (sigma * sigma);
+            assert!(residual.dot(&residual).sqrt() < 1e-14);
+        }
+    }
+}
+
+/// Where a demonstration stands still, its direction has no image whose length could be divided by.
+#[test]
+fn vanishing_rows_have_no_triangle_of_products() {
+    let mut targets = matrix(6, 3000, &[1.0; 6]);
+    targets.row_mut(2).fill(0.0);
+    let library = Library::of(targets.view()).unwrap().unwrap();
+    let gram = Gram::of(library.wide(), &mut go).unwrap().unwrap();
+    assert!(gram.triangle(library.wide(), &mut go).unwrap().is_none());
+    check(&targets, &of(&targets, StyleCount::Given(6)));
+}
