@@ -93,6 +93,12 @@ pub(crate) fn unpad(lanes: Lanes, numbers: &mut [f64]) {
     }
 }
 
+/// Writes the numbers of groups, as many as there is room for.
+#[inline(always)]
+pub(crate) fn copy(lanes: &[Lanes], numbers: &mut [f64]) {
+    numbers.chunks_mut(WIDTH).zip(lanes).for_each(|(numbers, lanes)| unpad(*lanes, numbers));
+}
+
 /// Takes the DoFs of one group out of rows (k, `n`): what is a loop over samples for one DoF is one for four.
 pub(crate) fn gather(rows: &[f64], n: usize, group: usize, column: &mut [Lanes]) {
     let dofs = dofs(n, group);

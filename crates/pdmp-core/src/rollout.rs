@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use ndarray::Array2;
+
 use crate::align::WarpingFunction;
-use crate::command::Command;
+use crate::command::{Command, Motion};
 use crate::controller::Controller;
 use crate::demo::{Trajectory, zeros};
 use crate::error::{Error, Result, check_positive};
@@ -77,18 +79,19 @@ impl Model {
             velocity: zeros("rollout", shape)?,
             acceleration: zeros("rollout", shape)?,
         };
-        for k in 0..=steps {
+        let Trajectory { time, position, velocity, acceleration } = &mut trajectory;
+        let rows = |array| Array2::as_slice_mut(array).unwrap_or_default().chunks_exact_mut(self.n_dofs());
+        let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
+        for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
             if k % PORTION == 0 {
                 proceed(k as f64 / (steps + 1) as f64)?;
             }
             if k > 0 {
-                clock.step(&mut controller, trajectory.time[k])?;
+                clock.step(&mut controller, *time)?;
             }
-            for d in 0..self.n_dofs() {
-                let (velocity, acceleration) = (controller.velocity()[d], controller.acceleration()[d]);
-                trajectory.position[[k, d]] = controller.position()[d];
-                [trajectory.velocity[[k, d]], trajectory.acceleration[[k, d]]] = clock.paced(velocity, acceleration);
-            }
+            let mut motion = Motion { position, velocity, acceleration };
+            controller.read(&mut motion);
+            clock.pace(&mut motion);
         }
         Ok(trajectory)
     }
@@ -147,13 +150,13 @@ impl Clock {
         .map(drop)
     }
 
-    /// Velocity and acceleration from those of the controller.
-    fn paced(&self, velocity: f64, acceleration: f64) -> [f64; 2] {
-        match self {
-            Self::Linear => [velocity, acceleration],
-            Self::Warped { extent, phase: [_, rate, bend], .. } => {
-                let (pace, change) = (extent * rate, extent * bend);
-                [velocity * pace, acceleration * pace * pace + velocity * change]
+    /// Makes the motion of the controller that of the movement.
+    fn pace(&self, motion: &mut Motion) {
+        if let Self::Warped { extent, phase: [_, rate, bend], .. } = self {
+            let (pace, change) = (extent * rate, extent * bend);
+            for (velocity, acceleration) in motion.velocity.iter_mut().zip(motion.acceleration.iter_mut()) {
+                *acceleration = *acceleration * pace * pace + *velocity * change;
+                *velocity *= pace;
             }
         }
     }

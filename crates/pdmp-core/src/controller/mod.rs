@@ -21,7 +21,7 @@ use crate::attractor::{Jet, Propagator, State};
 use crate::command::{Command, Motion};
 use crate::error::{Error, Result, check_positive};
 use crate::follower::{Filter, Follower, Glide};
-use crate::lanes::{Lanes, groups, repack, unpack};
+use crate::lanes::{Lanes, copy, groups, repack, unpack};
 use crate::model::{Complete, Conditions, Model};
 use crate::perturbation::{Held, STILL, widest};
 use crate::phase::{CompensatedSum, Kind};
@@ -239,10 +239,16 @@ impl Controller {
     pub fn update(&mut self, command: &Command, motion: &mut Motion) -> Result<Status> {
         motion.check(self.model.n_dofs())?;
         let status = self.step_with(command)?;
-        motion.position.copy_from_slice(self.position());
-        motion.velocity.copy_from_slice(self.velocity());
-        motion.acceleration.copy_from_slice(self.acceleration());
+        self.read(motion);
         Ok(status)
+    }
+
+    /// Writes the motion, whose vectors have been checked, where the caller wants it.
+    #[inline]
+    pub(crate) fn read(&self, motion: &mut Motion) {
+        copy(&self.position, motion.position);
+        copy(&self.velocity, motion.velocity);
+        copy(&self.acceleration, motion.acceleration);
     }
 
     /// [`Controller::update`] whose motion is read from the controller afterwards.
