@@ -189,7 +189,9 @@ pub fn fit(
 
     let mut compiling = |share| proceed(Stage::Compile, share);
     let shape = (factors.basis.nrows(), demos[0].n_dofs());
-    let landscape = Landscape::compile(constants.canonical, shape, regression.as_ref(), threads, &mut compiling)?;
+    let n_samples = clock.len();
+    let landscape =
+        Landscape::compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
 
     let durations = aligned.durations();
     let (breaks, timings, nominal) = (aligned.breaks.clone(), aligned.timings.clone(), aligned.nominal);
@@ -198,7 +200,7 @@ pub fn fit(
     let Factors { styles, singular_values, .. } = factors;
     let demonstrated = Demonstrated { styles, goals, starts, anchors, breaks, timings, durations, contexts, nominal };
     let learnt = Learnt {
-        n_samples: clock.len(),
+        n_samples,
         smoothing: options.alignment.smoothing,
         template,
         dof_scale,

@@ -71,18 +71,20 @@ fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> Jet<T> {
 }
 
 impl Landscape {
-    /// Compiles a regression of J·D outputs.
+    /// Compiles a regression of J·D outputs on so many samples.
     ///
     /// # Errors
     /// Whatever `proceed` returns, which is told the share of the finest possible table that is done.
     pub(crate) fn compile(
         canonical: Canonical,
         (n_styles, n_dofs): (usize, usize),
+        n_samples: usize,
         regression: &dyn Regression,
         threads: Threads,
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
-        let (mut knots, error) = tabulate(canonical.extent(), n_styles * n_dofs, regression, threads, proceed)?;
+        let steps = canonical.kind().steps(n_samples);
+        let (mut knots, error) = tabulate(canonical.extent(), steps, n_styles * n_dofs, regression, threads, proceed)?;
         if let Canonical::Rhythmic { .. } = canonical {
             knots.close();
         }
@@ -114,8 +116,8 @@ impl Landscape {
         self.canonical
     }
 
-    /// Error between the knots, relative to the largest forcing, estimated from that of a table half as fine: 1e-9 at
-    /// most where 8192 cells suffice.
+    /// Error between the knots, relative to the largest forcing, measured in their middles or estimated from that of a
+    /// table half as fine: 1e-9 at most where 4096 cells suffice.
     pub fn error(&self) -> f64 {
         self.error
     }
@@ -280,7 +282,7 @@ mod tests {
             [(Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 }, 9.0), (Canonical::Rhythmic { mu: 1.0 }, 5.0)]
         {
             let regression = Waves(omega);
-            let table = Landscape::compile(canonical, (1, 3), &regression, Threads::ONE, &mut |_| Ok(())).unwrap();
+            let table = Landscape::compile(canonical, (1, 3), 2, &regression, Threads::ONE, &mut |_| Ok(())).unwrap();
             assert!(table.error() <= TOLERANCE);
             let (mut value, mut slope, mut exact, mut rise) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
             for k in 0..10_007 {
@@ -295,27 +297,27 @@ mod tests {
         }
     }
 
+    #[derive(Debug)]
+    struct Kink(f64);
+
+    impl Regression for Kink {
+        fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
+            let d = u - self.0;
+            (value[0], slope[0]) = (d.abs().powi(3), 3.0 * d * d.abs());
+        }
+
+        fn describe(&self) -> String {
+            "kink".into()
+        }
+    }
+
     /// Where the third derivative jumps, wherever that lies in its cell, the table is about as close as it is to be.
     #[test]
     fn table_is_close_at_a_kink() {
-        #[derive(Debug)]
-        struct Kink(f64);
-
-        impl Regression for Kink {
-            fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
-                let d = u - self.0;
-                (value[0], slope[0]) = (d.abs().powi(3), 3.0 * d * d.abs());
-            }
-
-            fn describe(&self) -> String {
-                "kink".into()
-            }
-        }
-
         for k in 0..100 {
             let kink = Kink((0.5f64.sqrt() + f64::from(k) * 0.618_033_988_75).fract());
             let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
-            let table = Landscape::compile(canonical, (1, 1), &kink, Threads::ONE, &mut |_| Ok(())).unwrap();
+            let table = Landscape::compile(canonical, (1, 1), 2, &kink, Threads::ONE, &mut |_| Ok(())).unwrap();
             for u in (0..=400).map(|i| kink.0 + 1e-5 * f64::from(i - 200)).filter(|u| (0.0..1.0).contains(u)) {
                 let (mut value, mut slope, mut exact, mut rise) = ([0.0], [0.0], [0.0], [0.0]);
                 table.evaluate(u, &mut value, &mut slope);
@@ -325,11 +327,21 @@ mod tests {
         }
     }
 
+    /// Where it jumps at a sample, as a Matérn process does, the cubics on either side are exact.
+    #[test]
+    fn table_is_coarse_where_kinks_are_at_samples() {
+        let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
+        let cells = |n_samples| {
+            Landscape::compile(canonical, (1, 1), n_samples, &Kink(0.3), Threads::ONE, &mut |_| Ok(())).unwrap().cells()
+        };
+        assert!(cells(11) == 160 && cells(12) > 600, "{} {}", cells(11), cells(12));
+    }
+
     /// Past the demonstrated end the forcing is continuous and fades with the phase.
     #[test]
     fn forcing_fades_with_the_phase_after_the_end() {
         let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
-        let table = Landscape::compile(canonical, (1, 1), &Waves(9.0), Threads::ONE, &mut |_| Ok(())).unwrap();
+        let table = Landscape::compile(canonical, (1, 1), 2, &Waves(9.0), Threads::ONE, &mut |_| Ok(())).unwrap();
         let at = |u: f64| {
             let (mut value, mut slope) = ([0.0], [0.0]);
             table.evaluate(u, &mut value, &mut slope);

@@ -1,6 +1,7 @@
 //! A regression read at the knots of a table, as many as a piecewise cubic through them needs.
 //!
-//! Between knots a cubic is off by h⁴/384·|w⁗| at most, and most in the middle of a cell.
+//! Between knots a cubic is off by h⁴/384·|w⁗| at most, and most in the middle of a cell. A Matérn process is smooth
+//! between its samples and has a kink at each: where all samples are knots, a cell or two from one to the next suffice.
 
 use crate::attractor::Jet;
 use crate::basis::Regression;
@@ -10,7 +11,7 @@ use crate::threads::Threads;
 
 /// Error of the table, relative to the largest forcing, at which cells are halved no more.
 pub(crate) const TOLERANCE: f64 = 1e-9;
-/// Cells of the first table.
+/// Fewest cells of the first table.
 const FEWEST_CELLS: usize = 128;
 /// Cells beyond which a table is not refined.
 pub(crate) const MOST_CELLS: usize = 8192;
@@ -28,12 +29,13 @@ pub(crate) struct Jets {
 }
 
 /// Values and slopes (cells + 1, outputs) at both ends of cells that are halved until their midpoints agree, and the error
-/// between the knots, relative to the largest forcing.
+/// between the knots, relative to the largest forcing. What was learnt from samples at equal `steps` is read there too.
 ///
 /// # Errors
 /// Whatever `proceed` returns, which is told the share of the finest possible table that is done.
 pub(crate) fn tabulate(
     extent: f64,
+    steps: usize,
     n_outputs: usize,
     regression: &dyn Regression,
     threads: Threads,
@@ -70,23 +72,41 @@ pub(crate) fn tabulate(
         done += n;
         Ok(())
     };
-    let mut cells = FEWEST_CELLS;
+    let mut cells = coarsest(steps);
     let mut knots = Jets::zeros(cells + 1, n_outputs);
     read(&mut knots, (0, 1), extent / cells as f64)?;
     loop {
         let largest = knots.values.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
-        // The midpoints are paid for and become knots.
-        knots = knots.spread();
+        // The midpoints are paid for and become knots, unless they are not needed.
+        let mut finer = knots.spread();
         cells *= 2;
-        read(&mut knots, (1, 2), extent / cells as f64)?;
-        let error = knots.error_of_every_second(extent / cells as f64) / largest;
-        // That makes the error 16 times smaller where w is smooth, and 8 times at a kink of w″, as a Matérn-3/2 process
-        // has; a quarter is promised.
-        let error = if error <= 4.0 * TOLERANCE { error / 4.0 } else { error };
-        if error <= TOLERANCE || cells >= MOST_CELLS {
+        read(&mut finer, (1, 2), extent / cells as f64)?;
+        let error = finer.error_of_every_second(extent / cells as f64) / largest;
+        if error <= TOLERANCE {
             return Ok((knots, error));
         }
+        // Halving makes the error 16 times smaller where w is smooth, and 8 times at a kink of w″ as a Matérn-3/2
+        // process has; a quarter is promised.
+        if error <= 4.0 * TOLERANCE {
+            return Ok((finer, error / 4.0));
+        }
+        if 2 * cells > MOST_CELLS {
+            return Ok((finer, error));
+        }
+        knots = finer;
     }
+}
+
+/// Cells of the first table, whose halves have a knot at every sample sooner or later, if a table can.
+fn coarsest(steps: usize) -> usize {
+    let mut cells = steps >> steps.trailing_zeros();
+    if 2 * cells > MOST_CELLS {
+        return FEWEST_CELLS;
+    }
+    while cells < FEWEST_CELLS {
+        cells *= 2;
+    }
+    cells
 }
 
 impl Jets {
