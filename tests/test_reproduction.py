@@ -12,8 +12,8 @@ from pdmp.cli import main
 from pdmp.reproduction import film, heights, one_dof, reproduce, rivals, styles, walking
 from pdmp.reproduction import swing as arms
 from pdmp.reproduction.baxter import mjcf
-from pdmp.reproduction.human import BOX, minimum_jerk
-from pdmp.reproduction.loop import reach_over
+from pdmp.reproduction.human import BOX, RESTING, minimum_jerk
+from pdmp.reproduction.loop import NewGoal, from_rest, reach_over
 from pdmp.reproduction.reaching import GOAL, Reaching, demonstrate, height_of
 from pdmp.reproduction.robot import DT, Robot, boxes
 
@@ -40,7 +40,8 @@ def test_one_dof_has_three_dimensions_and_is_reproduced() -> None:
     noise = np.random.default_rng(3)
     for example in (one_dof.discrete(noise), one_dof.rhythmic(noise)):
         values = example.model.singular_values
-        assert values[3] < 1e-12 * values[0] < 1e-3 * values[2]
+        assert values[3] < 1e-12 * values[0]
+        assert values[2] > 0.05 * values[0]
         assert max(example.error(m) for m in range(one_dof.N_DEMOS)) < 1e-5
 
 
@@ -80,7 +81,7 @@ def test_boxes_in_the_way_are_hit(reaching: Reaching, learnt: pdmp.Model) -> Non
     """A movement shown without boxes touches two of them, and throws the upper one down."""
     robot = reach_over(learnt, reaching, 0.30, learnt.styles[0])
     assert robot.log.contact() > 0.01
-    height = robot.data.body("box_1").xpos[2] - (reaching.task.goal[2] - 0.07)
+    height = robot.data.body("box_1").xpos[2] - (reaching.task.goal[2] - RESTING)
     assert height < 1.5 * BOX[2] - 0.01
 
 
@@ -94,14 +95,15 @@ def test_three_styles_are_what_the_spectrum_asks_for(reaching: Reaching) -> None
 def test_error_saturates_at_three_styles(reaching: Reaching) -> None:
     """Further styles change what is foreseen by 2 %; the third halves what styles can do at best.
 
-    As found: E = 0.052 from three styles on; at best 0.028 with two, 0.015 with three.
+    As found: E = 0.043 with one style, 0.057 with two, 0.052 from three on; at best 0.028 with two
+    and 0.012 with three.
     """
     found = heights.errors(reaching, most=6)
-    foreseen, fitted = found.foreseen.mean(axis=1), found.fitted.mean(axis=1)
+    foreseen, best = found.foreseen.mean(axis=1), found.best.mean(axis=1)
     np.testing.assert_allclose(foreseen[3:], foreseen[2], rtol=0.02)
-    assert abs(foreseen[1] / foreseen[2] - 1) > 0.05
-    assert foreseen[2] < 0.06
-    assert fitted[2] < 0.6 * fitted[1] < 0.03
+    assert foreseen[0] < foreseen[2] < 0.95 * foreseen[1] < 0.06
+    assert (np.diff(best) < 0).all()
+    assert best[2] < 0.6 * best[1] < 0.02
 
 
 @pytest.mark.parametrize(("n_styles", "clear"), [(1, 0), (2, 1), (3, 3)])
@@ -136,7 +138,9 @@ def test_four_boxes_are_brushed(reaching: Reaching) -> None:
     The paper's movement clears them; ours meets the elbow's limit on the way. It still arrives.
     """
     robot = heights.foresee(heights.learn(reaching, 3), reaching, 0.60)
-    assert robot.log.contact() < 0.05
+    assert 0 < robot.log.contact() < 0.05
+    assert np.min(robot.log.measured, axis=0)[3] == pytest.approx(reaching.arm.lowest[3], abs=0.01)
+    assert np.min(robot.log.commanded, axis=0)[3] < reaching.arm.lowest[3] - 0.1
     assert reaching.left(robot.log.hands[-1]) < CLOSE
 
 
@@ -191,6 +195,7 @@ def test_switches_converge_within_five_periods() -> None:
     )
     done = walking.swing(model, commands, lasting=9.0)
     assert max(done.off) < 0.03
+    assert min(done.off[1:]) > 0
     apart = [np.ptp(done.position[k : k + 1000], axis=0).max() for k in (7_000, 16_000, 43_000)]
     assert apart[1] > 1.5 * apart[0] > 1.5 * apart[2]
 
@@ -260,7 +265,8 @@ def test_recordings_of_walks_are_learnt(tmp_path: Path) -> None:
             'figure = "fig6": must be one of fig2, fig3, fig4, fig5, comparison, all',
         ),
         ({"figure": "fig2", "seed": -1}, "seed = -1: must not be negative"),
-        ({"figure": "fig5", "recordings": "nowhere"}, "recordings: nowhere has no CSV file"),
+        ({"figure": "fig5", "recordings": "nowhere"}, "recordings: nowhere is not a folder"),
+        ({"figure": "fig3", "recordings": "."}, 'recordings: only "fig5" learns from them'),
     ],
 )
 def test_bad_requests_are_named(arguments: dict[str, Any], message: str, tmp_path: Path) -> None:
@@ -276,6 +282,36 @@ def test_missing_robot_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         mjcf()
 
 
-def test_goal_is_as_printed() -> None:
-    """Section 4.1.1."""
-    assert GOAL.tolist() == [-0.55, -0.97, 0.54, -1.42]
+def test_printed_goal_is_a_hand_on_a_table(reaching: Reaching) -> None:
+    """Before the body, below the elbow, which is about as far out as people hold it."""
+    shoulder, elbow, hand = reaching.arm.places(GOAL)
+    assert hand[0] > 0.3 and abs(hand[1]) < 0.1
+    assert hand[2] < elbow[2] < shoulder[2]
+    assert abs(np.degrees(reaching.arm.swivel(GOAL))) < 20
+    assert (reaching.arm.lowest < GOAL).all() and (reaching.arm.highest > GOAL).all()
+
+
+def test_events_happen_once_at_any_time(reaching: Reaching, learnt: pdmp.Model) -> None:
+    """Also between two ticks."""
+    for time in (0.0125, 0.4005, 1.0):
+        command = NewGoal(time, GOAL + 0.1)
+        movement = from_rest(learnt, reaching, learnt.styles[0])
+        given = []
+        for tick in range(1200):
+            before = movement.goal.copy()
+            command(tick * DT, movement, None)
+            given.append(not np.array_equal(before, movement.goal))
+        assert sum(given) == 1
+
+
+def test_trials_beyond_reach_are_made_anew() -> None:
+    """Of another person, too, all fifteen lie within the limits of the joints."""
+    pytest.importorskip("scipy")
+    try:
+        other = demonstrate(6)
+    except ImportError as reason:
+        pytest.skip(str(reason))
+    assert len(other.demos) == 15
+    for demo in other.demos:
+        assert (demo.position > other.arm.lowest).all()
+        assert (demo.position < other.arm.highest).all()

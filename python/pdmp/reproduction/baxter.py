@@ -25,8 +25,8 @@ DIRECTIONS = {"right": np.array([1.0, -1.0, 1.0, -1.0]), "left": np.array([-1.0,
 
 Baxter counts the pitch of the shoulder and the bending of the elbow the other way than the paper
 prints them. So read, the goal that it prints is a hand on a table before the body, with the elbow
-as far out as people hold it, give or take 15°; with other signs it is above the head, behind the
-back, or far to the side.
+as far out as people hold it, give or take 15°; with no other signs is it that and within the limits
+of the joints.
 """
 MOUTH = np.array([0.20, 0.0, 0.55])
 """Where a mouth would be, below Baxter's screen [m]."""
@@ -61,9 +61,11 @@ def engine() -> Any:
         os.environ.setdefault("MUJOCO_GL", _windowless())
     try:
         import mujoco
-    except ImportError:
-        raise ImportError("the robot needs MuJoCo: pip install 'pdmp[reproduce]'") from None
-    except (AttributeError, OSError, RuntimeError) as error:
+        import scipy  # noqa: F401
+    except ModuleNotFoundError as missing:
+        needed = f"the robot needs {missing.name}: pip install 'pdmp[reproduce]'"
+        raise ImportError(needed) from None
+    except (AttributeError, ImportError, OSError, RuntimeError) as error:
         asked = os.environ.get("MUJOCO_GL", "")
         raise ImportError(
             f'MuJoCo cannot start with MUJOCO_GL="{asked}" ({error}): leave it unset'

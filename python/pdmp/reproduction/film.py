@@ -57,7 +57,7 @@ def _pictures(robot: Robot, times: Sequence[float]) -> list[Any]:
     data, states = mujoco.MjData(robot.model), robot.log.states
     pictures = []
     for time in times:
-        data.qpos[:] = states[min(round(time / DT), len(states) - 1)]
+        data.qpos[:] = states[min(max(round(time / DT) - 1, 0), len(states) - 1)]
         mujoco.mj_forward(robot.model, data)
         renderer.update_scene(data, camera, option)
         pictures.append(np.array(renderer.render()))

@@ -5,8 +5,9 @@ measured:
 
 - The hand moves with minimum jerk through points on its way, when it is at them included: Flash,
   Hogan, Journal of Neuroscience 5, 1985, 1688-1703. Without an obstacle its path is straight.
-- The points are over the upper edges of the obstacle, and as far from them whatever its size: Dean,
-  Brüwer, Experimental Brain Research 97, 1994, 497-514.
+- The points are over the upper edges of the obstacle, as far from them whatever its height: carried
+  over from the plane, where people keep a distance to obstacles (Dean, Brüwer, Experimental Brain
+  Research 97, 1994, 497-514).
 - Longer paths are made faster, and take little longer: duration grows with the root of the path's
   length (isochrony: Viviani, Schneider, Journal of Experimental Psychology: HPP 17, 1991, 198-218).
 - Trials vary by noise that grows with the effort, by a constant noise, and in their duration:

@@ -44,7 +44,7 @@ class NewGoal:
 
     def __call__(self, time: float, movement: Movement, robot: Robot) -> None:
         """Give it, when it is time."""
-        if abs(time - self.time) < 0.5 * DT:
+        if _same_tick(time, self.time):
             movement.goal = self.goal
 
 
@@ -58,10 +58,14 @@ class Held:
 
     def __call__(self, time: float, movement: Movement, robot: Robot) -> None:
         """Grip it or let go, when it is time."""
-        if abs(time - self.start) < 0.5 * DT:
+        if _same_tick(time, self.start):
             robot.hold(self.joint)
-        if abs(time - self.end) < 0.5 * DT:
+        if _same_tick(time, self.end):
             robot.hold(None)
+
+
+def _same_tick(one: float, other: float) -> bool:
+    return round(one / DT) == round(other / DT)
 
 
 def drive(

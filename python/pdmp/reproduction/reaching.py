@@ -22,6 +22,7 @@ START = np.array([0.30, -0.55, 0.0])  # m, of the hand, from where it ends
 HEIGHTS = (0.0, 0.15, 0.30, 0.45, 0.60)  # m: none to four boxes
 TRAINED = (0.0, 0.30, 0.45)  # m
 TRIALS = 3
+MOST_TRIALS = 100
 CONSTANTS: dict[str, Any] = {"alpha_z": 1.5, "beta_z": 1.5, "alpha_x": 0.5, "tau": 0.3}
 """As printed; the damping ratio is √(α_z/β_z)/2 = 0.5."""
 NAMES = ["q1", "q2", "q3", "q4"]
@@ -72,22 +73,25 @@ def demonstrate(seed: int = SEED) -> Reaching:
     demos = []
     for height in HEIGHTS:
         for _ in range(TRIALS):
-            joints = None
-            while joints is None:
-                trial = reach(task, height, noise)
-                elbow = np.full(len(trial.hand), usual + trial.elbow)
-                with suppress(OutOfReach):
-                    joints = arm.reach(trial.hand, elbow, start)
+            joints, dt = _trial(arm, task, height, usual, start, noise)
             demos.append(
                 pdmp.Demonstration(
-                    position=joints,
-                    dt=trial.dt,
-                    context=[height],
-                    names=NAMES,
-                    units=["rad"] * len(NAMES),
+                    joints, dt=dt, context=[height], names=NAMES, units=["rad"] * len(NAMES)
                 )
             )
     return Reaching(arm, task, start, GOAL, demos)
+
+
+def _trial(
+    arm: Arm, task: Task, height: float, usual: float, start: Array, noise: np.random.Generator
+) -> tuple[Array, float]:
+    """Return the joint angles of one reach [rad], and the time between two of them [s]."""
+    for _ in range(MOST_TRIALS):
+        trial = reach(task, height, noise)
+        with suppress(OutOfReach):
+            elbow = np.full(len(trial.hand), usual + trial.elbow)
+            return arm.reach(trial.hand, elbow, start), trial.dt
+    raise OutOfReach(f"height = {height} m: none of {MOST_TRIALS} trials is within the arm's reach")
 
 
 def height_of(demo: pdmp.Demonstration) -> float:

@@ -83,7 +83,8 @@ class Robot:
         moved = [model.joint(name) for name in names]
         self._moved = np.array([joint.qposadr[0] for joint in moved])
         self._motors = model.actuator_trnid[:, 0]
-        # The motors' joints come before the boxes: one degree of freedom, one coordinate each.
+        # The motors' joints come before the boxes, with one degree of freedom and one coordinate
+        # each, in the order of the motors: one index serves for all.
         self._driven = model.jnt_dofadr[self._motors]
         self._signs = np.concatenate([DIRECTIONS[side] for side in sides])
         self._is_box = np.array([_root(model, g).startswith("box") for g in range(model.ngeom)])
@@ -95,7 +96,7 @@ class Robot:
         self.data.qpos[self._moved] = self._signs * q
         self._target = self.data.qpos[self._driven].copy()
         self.log = Log()
-        mujoco.mj_forward(model, self.data)
+        mujoco.mj_step1(model, self.data)
 
     @property
     def position(self) -> Array:
@@ -114,7 +115,6 @@ class Robot:
     def move(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> None:
         """Drive the arms towards a state for one tick: (D,) [rad, rad/s, rad/s²]."""
         model, data, mujoco = self.model, self.data, self._mujoco
-        mujoco.mj_step1(model, data)
         wanted, rate, asked = self._target, np.zeros(model.nv), np.zeros(model.nv)
         wanted[self._moved] = self._signs * position
         rate[self._moved] = self._signs * velocity
@@ -130,6 +130,8 @@ class Robot:
             pull = GRIP * (place - data.qpos[at]) - GRIP_DAMPING * data.qvel[at]
             data.qfrc_applied[at] = pull
         mujoco.mj_step2(model, data)
+        # Where all is now, and what the next torques are made from.
+        mujoco.mj_step1(model, data)
         self._write(position)
 
     def _write(self, position: ArrayLike) -> None:

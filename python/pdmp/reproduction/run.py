@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pdmp import plot
 from pdmp._files import replacing
+from pdmp.plot._canvas import canvas
 from pdmp.reproduction.heights import figure_4
 from pdmp.reproduction.one_dof import figure_2
 from pdmp.reproduction.rivals import comparison
@@ -66,6 +67,11 @@ def reproduce(
         raise ValueError(f'figure = "{figure}": must be one of {", ".join(makers)}, all')
     if seed < 0:
         raise ValueError(f"seed = {seed}: must not be negative")
+    if recordings is not None and figure not in ("fig5", "all"):
+        raise ValueError(f'recordings: only "fig5" learns from them, not "{figure}"')
+    if recordings is not None and not Path(recordings).is_dir():
+        raise ValueError(f"recordings: {recordings} is not a folder")
+    canvas(None, 1, 1)  # tells at once where there is nothing to draw figures with
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     reports = []

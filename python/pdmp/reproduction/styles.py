@@ -118,13 +118,19 @@ def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) 
     styles.plot([], [], color=GREY, linewidth=0.8, label="demonstrations")
     for goal, color in zip(goals(reaching), PALETTE[3:], strict=False):
         for m in SHOWN:
-            moved = model.rollout(model.styles[m], goal=goal, start=reaching.start, duration=4.0)
+            moved = model.rollout(
+                model.styles[m],
+                goal=goal,
+                start=reaching.start,
+                velocity=np.zeros(model.n_dofs),
+                duration=4.0,
+            )
             hands = reaching.arm.hands(moved.position)
             paths.draw_hand(places, reaching, hands, color=color, linewidth=1.2)
         way, height = reaching.side_view(reaching.arm.hands([goal]))
         places.plot(way, height, "*", color=color, markersize=11)
     paths.dress_side(styles, "styles, on the robot")
-    paths.dress_side(places, "goals (stars), in each of these styles")
+    paths.dress_side(places, "goals (stars), each in these styles")
     styles.set_ylim(bottom=0)
     styles.legend(frameon=False, fontsize=8)
     return figure

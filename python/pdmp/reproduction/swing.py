@@ -4,9 +4,9 @@ The recordings of the paper were never published. What stands in for them is mad
 human gait:
 
 - People walk at two steps, so one swing of an arm, per second, whatever their size (MacDougall,
-  Moore, Journal of Applied Physiology 99, 2005, 1164-1173), and make 0.8 to 2 strides per second
-  between slow walking and fast running (Nilsson, Thorstensson, Acta Physiologica Scandinavica 129,
-  1987, 107-114); at some 1.2 they begin to run.
+  Moore, Journal of Applied Physiology 99, 2005, 1164-1173), and make 0.83 to 1.95 strides per
+  second between walking at 1 m/s and running at 8 (Nilsson, Thorstensson, Acta Physiologica
+  Scandinavica 129, 1987, 107-114); at some 1.2 they begin to run.
 - The shoulder swings through about 30° at usual speed, more of it backwards, with the elbow some
   30° bent and bending as the arm comes forward (Murray, Sepic, Barnard, Physical Therapy 47, 1967,
   272-284); both arcs grow with speed.
@@ -15,7 +15,8 @@ human gait:
 - Arms take turns, half a stride apart. In very slow walking they swing with every step, twice a
   stride (Wagenaar, van Emmerik, Journal of Biomechanics 33, 2000, 853-861).
 
-What makes a style is read off these and common experience; it was set before any result was seen.
+What makes a style is read off these and common experience, which also has slower walks; it was set
+before any result was seen.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import pdmp
 from pdmp._tables import table
 from pdmp.demos import cycles, read_csv
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress
+from pdmp.plot._canvas import BLUE, ORANGE, canvas, dress
 from pdmp.reproduction import film
 from pdmp.reproduction.robot import DT, Robot
 from pdmp.reproduction.section import SEED, Section
@@ -30,7 +30,7 @@ CONSTANTS: dict[str, Any] = {"alpha_z": 0.5, "beta_z": 0.5, "mu": 0.1}
 LASTING = 20.0  # s, between switches
 SETTLED = 5  # periods after which a new cycle should be reached
 RECORDED = [f"{side}_{angle}" for side in "rl" for angle in ("sh1", "sh2", "sh3", "elb")]
-FASTEST = 1.95  # Hz, of strides: what repeats itself faster is no gait (see `swing`)
+FASTEST = 1.95  # Hz, of strides: people run no faster unless asked to (see `swing`)
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,15 @@ class Switch:
 
 @dataclass
 class Swinging:
-    """What the arms did."""
+    """What the arms were told."""
 
     position: list[Array] = field(default_factory=list)
     """Joint angles, a row per tick [rad]."""
     off: list[float] = field(default_factory=list)
-    """Share of the new cycle's range by which it is missed in the sixth period after a switch."""
+    """Share of the new cycle's range by which it is missed in the sixth period after a switch.
+
+    Not a number where the next switch comes before that.
+    """
 
 
 def learn(demos: Sequence[pdmp.Demonstration]) -> pdmp.Model:
@@ -85,7 +88,7 @@ def swing(
         for name, value in switch.command.items():
             setattr(controller, name, value)
         cycle = _Cycle(model, controller)
-        since, worst = 0.0, 0.0
+        since, worst = 0.0, np.nan
         for _ in range(round(lasting / DT)):
             controller.step()
             if robot is not None:
@@ -93,7 +96,7 @@ def swing(
             done.position.append(controller.position.copy())
             since += DT / cycle.period
             if SETTLED <= since < SETTLED + 1:
-                worst = max(worst, cycle.off(controller))
+                worst = float(np.fmax(worst, cycle.off(controller)))
         done.off.append(worst)
     return done
 
@@ -111,13 +114,13 @@ class _Cycle:
             tau=controller.tau,
             dt=self.period / n_steps,
         )
-        self._position = made.position[:n_steps]
+        self._phases = 2 * np.pi * np.arange(n_steps + 1) / n_steps
+        self._position = made.position[: n_steps + 1]
         self._range = np.ptp(self._position, axis=0).max()
 
     def off(self, controller: pdmp.Controller) -> float:
         """Return the distance from the cycle at the phase of a controller, over its range."""
-        n_steps = len(self._position)
-        here = self._position[round(controller.phase / (2 * np.pi) * n_steps) % n_steps]
+        here = [np.interp(controller.phase, self._phases, joint) for joint in self._position.T]
         return float(np.abs(controller.position - here).max() / self._range)
 
 
@@ -161,7 +164,6 @@ def draw(
         for joint, name in enumerate(names):
             axes = panels[joint, column - 1]
             axes.axvline(at, color=ORANGE, linewidth=1)
-            axes.axhline(0, color=GREY, linewidth=0.5)
             axes.plot(time, position[rows, joint], color=BLUE, linewidth=1.1)
             dress(axes, "", f"{name} [rad]" if column == 1 else "")
         panels[0, column - 1].set_title(switch.name, fontsize=9)
@@ -202,17 +204,18 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
             continue
         kept.append(recording)
         names.append(file.stem)
-    if len(kept) < 3:
+    if len(kept) < 4:
         raise ValueError(
-            f"recordings: {folder} has {len(kept)} in which arms swing: pass at least 3"
+            f"recordings: {folder} has {len(kept)} in which strides repeat: pass at least 4"
         )
     strides = cycles(kept, average=True)
     model = learn(list(strides))
     by_range = np.argsort([np.ptp(stride.position, axis=0).max() for stride in strides])
+    # The median, one of the wider and the widest: no style is switched to itself.
     chosen = [int(by_range[share * (len(kept) - 1) // 4]) for share in (2, 3, 4)]
     commands = switches(model, chosen, names)
     done = swing(model, commands)
-    without = f", without {', '.join(odd)}, where no arm swings in time" if odd else ""
+    without = f", without {', '.join(odd)}, in which no stride repeats" if odd else ""
     told = [
         f"Recordings of {len(kept)} walks{without}. {_spectrum(model)}",
         _settling(commands, done),

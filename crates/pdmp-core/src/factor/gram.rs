@@ -11,7 +11,7 @@ use super::{ACCURACY, PANEL, product, turned};
 use crate::error::Result;
 
 /// Singular values below this share of σ₁ are not taken from the Gram matrix: an eigenvector is off by ε·(σ₁/σ)².
-pub(super) const SMALL: f64 = 1e-3;
+pub(super) const SMALL: f64 = 1e-4;
 
 /// Eigenvectors (K, K) of A·Aᵀ for A (K, L), and the roots of its eigenvalues, in decreasing order; off by √(K·ε)·σ₁
 /// where they vanish. Nothing where the iteration does not converge.

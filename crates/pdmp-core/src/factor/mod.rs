@@ -5,7 +5,7 @@
 //! | way | when | cost | residuals ‖F·v − σ·u‖ of the J kept |
 //! |---|---|---|---|
 //! | `krylov` | J is given, and J + 8, rounded up to a multiple of 8, is at most K/16 | 4·M·C·D·(J + 8) a step, 2 to 10 steps | 1e-12·σ₁ |
-//! | `gram` | σ_J ≥ σ₁/1000, else nothing is lost but the time | K·M·C·D + 10·K³ | 1e-11·σ₁ |
+//! | `gram` | σ_J ≥ σ₁/10 000, else nothing is lost but the time | K·M·C·D + 10·K³ | 1e-11·σ₁ |
 //! | `gram`, twice | cosines between the images of its vectors have squares that sum up to 0.1 or less | 3·K·M·C·D + 30·K³ more, all of it products | 1e-15·σ₁ times a modest factor |
 //! | `reflect` | always | 2·K·M·C·D + 30·K³ | the same |
 //!
