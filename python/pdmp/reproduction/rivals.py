@@ -203,7 +203,7 @@ def comparison(seed: int = SEED) -> Section:
             f"{reaching.left(trial.moved.log.hands[-1], trial.command.goal):.1f} mm",
             f"{trial.leap():.1f}",
             f"{trial.held.log.contact():.3f} s",
-            f"{trial.new_style:.1f} ms",
+            f"{trial.new_style:.2f} ms",
         ]
         for (name, height), trial in trials.items()
     ]
