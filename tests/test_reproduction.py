@@ -129,7 +129,7 @@ def test_new_heights(reaching: Reaching, n_styles: int, height: float, touches: 
     """What is foreseen for one box clears it with three styles, and not with one."""
     robot = heights.foresee(heights.learn(reaching, n_styles), reaching, height)
     assert (robot.log.contact() > 0) == touches
-    assert reaching.left(robot.log.hands[-1]) < CLOSE
+    assert reaching.miss(robot.log.hands[-1]) < CLOSE
 
 
 def test_four_boxes_are_brushed(reaching: Reaching) -> None:
@@ -141,7 +141,7 @@ def test_four_boxes_are_brushed(reaching: Reaching) -> None:
     assert 0 < robot.log.contact() < 0.05
     assert np.min(robot.log.measured, axis=0)[3] == pytest.approx(reaching.arm.lowest[3], abs=0.01)
     assert np.min(robot.log.commanded, axis=0)[3] < reaching.arm.lowest[3] - 0.1
-    assert reaching.left(robot.log.hands[-1]) < CLOSE
+    assert reaching.miss(robot.log.hands[-1]) < CLOSE
 
 
 def test_every_style_reaches_every_goal(reaching: Reaching, learnt: pdmp.Model) -> None:
@@ -163,9 +163,9 @@ def test_goal_moved_on_the_way_is_reached(reaching: Reaching) -> None:
     """On the robot, whatever the height; and the movement stays as smooth as it was."""
     model = heights.learn(reaching, 3)
     command = heights.new_goal(model, reaching)
-    assert reaching.left(reaching.arm.places(command.goal)[2]) > 100
+    assert reaching.miss(reaching.arm.places(command.goal)[2]) > 100
     robot = heights.foresee(model, reaching, 0.15, command)
-    assert reaching.left(robot.log.hands[-1], command.goal) < CLOSE
+    assert reaching.miss(robot.log.hands[-1], command.goal) < CLOSE
     assert robot.log.contact() == 0
     assert robot.log.tracking_error() < 5e-3
 
@@ -178,11 +178,11 @@ def test_what_the_paper_argues_with(reaching: Reaching) -> None:
         assert trial.alone.log.contact() > 1
     assert components.alone.log.contact() < 0.05
     left = [
-        reaching.left(trial.moved.log.hands[-1], trial.command.goal)
+        reaching.miss(trial.moved.log.hands[-1], trial.command.goal)
         for trial in (primitive, components)
     ]
     assert left[0] < CLOSE < 100 < left[1]
-    assert 2 * primitive.leap() < components.leap()
+    assert 2 * primitive.speed_ratio() < components.speed_ratio()
     assert primitive.held.log.contact() == 0
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pdmp.plot._canvas import canvas
 from pdmp.reproduction.baxter import engine
 from pdmp.reproduction.robot import DT, Robot
+from pdmp.reproduction.section import Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,6 +23,17 @@ CENTRE = (0.35, -0.25, 0.05)  # m
 
 class NoRenderer(Exception):
     """There is nothing to draw with; the reason is its text."""
+
+
+def attach(
+    section: Section, name: str, rows: Mapping[str, tuple[Robot, Sequence[float]]]
+) -> Section:
+    """Add a strip to a section, or the reason why there is none."""
+    try:
+        section.figures[name] = strip(rows)
+    except NoRenderer as reason:
+        section.text.append(f"No pictures of the robot: {reason}.")
+    return section
 
 
 def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]]) -> Figure:

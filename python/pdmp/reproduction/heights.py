@@ -162,8 +162,8 @@ def figure_4(seed: int = SEED) -> Section:
             (
                 [
                     pile(height),
-                    f"{reaching.left(robots[height].log.hands[-1]):.2f} mm",
-                    f"{reaching.left(moved[height].log.hands[-1], command.goal):.2f} mm",
+                    f"{reaching.miss(robots[height].log.hands[-1]):.2f} mm",
+                    f"{reaching.miss(moved[height].log.hands[-1], command.goal):.2f} mm",
                 ]
                 for height in TESTED
             ),

@@ -38,7 +38,7 @@ class Reaching:
     goal: Array  # rad
     demos: list[pdmp.Demonstration]
 
-    def left(self, hand: Array, goal: Array | None = None) -> float:
+    def miss(self, hand: Array, goal: Array | None = None) -> float:
         """Return how far a hand (3,) [m] is from where it belongs at a goal [rad], in mm."""
         place = self.arm.places(self.goal if goal is None else goal)[2]
         return 1e3 * float(np.linalg.norm(hand - place))

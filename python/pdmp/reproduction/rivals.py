@@ -158,7 +158,7 @@ class Trial:
     new_style: float
     """Median time to have the movement for a height, ready for its first tick [ms]."""
 
-    def leap(self) -> float:
+    def speed_ratio(self) -> float:
         """Return the largest joint speed once let go, over the largest when left alone."""
         return _fastest(self.held, after=self.grip.end) / _fastest(self.alone)
 
@@ -199,9 +199,9 @@ def comparison(seed: int = SEED) -> Section:
             name,
             pile(height),
             f"{trial.alone.log.contact():.3f} s",
-            f"{reaching.left(trial.alone.log.hands[-1]):.1f} mm",
-            f"{reaching.left(trial.moved.log.hands[-1], trial.command.goal):.1f} mm",
-            f"{trial.leap():.1f}",
+            f"{reaching.miss(trial.alone.log.hands[-1]):.1f} mm",
+            f"{reaching.miss(trial.moved.log.hands[-1], trial.command.goal):.1f} mm",
+            f"{trial.speed_ratio():.1f}",
             f"{trial.held.log.contact():.3f} s",
             f"{trial.new_style:.2f} ms",
         ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
+from typing import TypeAlias
 
 from pdmp import plot
 from pdmp._files import replacing
@@ -16,13 +17,21 @@ from pdmp.reproduction.section import SEED, Section
 from pdmp.reproduction.styles import figure_3
 from pdmp.reproduction.walking import figure_5
 
-FIGURES = ("fig2", "fig3", "fig4", "fig5", "comparison")
+Folder: TypeAlias = str | PathLike[str]
+MAKERS: dict[str, Callable[[int, Folder | None], Section]] = {
+    "fig2": lambda seed, _: figure_2(seed),
+    "fig3": lambda seed, _: figure_3(seed),
+    "fig4": lambda seed, _: figure_4(seed),
+    "fig5": lambda seed, recordings: figure_5(recordings, seed),
+    "comparison": lambda seed, _: comparison(seed),
+}
+FIGURES = tuple(MAKERS)
 
 
 def reproduce(
     figure: str,
-    folder: str | PathLike[str],
-    recordings: str | PathLike[str] | None = None,
+    folder: Folder,
+    recordings: Folder | None = None,
     seed: int = SEED,
     progress: Callable[[str], object] | None = None,
 ) -> str:
@@ -56,15 +65,8 @@ def reproduce(
     OSError
         A file that cannot be read or written.
     """
-    makers: dict[str, Callable[[], Section]] = {
-        "fig2": lambda: figure_2(seed),
-        "fig3": lambda: figure_3(seed),
-        "fig4": lambda: figure_4(seed),
-        "fig5": lambda: figure_5(recordings, seed),
-        "comparison": lambda: comparison(seed),
-    }
-    if figure != "all" and figure not in makers:
-        raise ValueError(f'figure = "{figure}": must be one of {", ".join(makers)}, all')
+    if figure != "all" and figure not in FIGURES:
+        raise ValueError(f'figure = "{figure}": must be one of {", ".join(FIGURES)}, all')
     if seed < 0:
         raise ValueError(f"seed = {seed}: must not be negative")
     if recordings is not None and figure not in ("fig5", "all"):
@@ -75,10 +77,10 @@ def reproduce(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     reports = []
-    for name in makers if figure == "all" else [figure]:
+    for name in FIGURES if figure == "all" else [figure]:
         if progress is not None:
             progress(name)
-        section = makers[name]()
+        section = MAKERS[name](seed, recordings)
         reports.append("\n\n".join([f"# {section.title}", *section.text]))
         for file, picture in section.figures.items():
             plot.save(picture, folder / f"{file}.png")

@@ -138,15 +138,16 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
         f"tracking error on the robot is {1e3 * robot.log.tracking_error():.1f} mrad.",
         _settling(commands, done),
     ]
-    figures = {"fig5_joints": draw(model, commands, done, NAMES[:4])}
-    try:
-        figures["fig5_robot"] = film.strip(_instants(model, robot, chosen, names))
-    except film.NoRenderer as reason:
-        text.append(f"No pictures of the robot: {reason}.")
+    section = Section(
+        "Fig. 5: stylised arm swing",
+        text,
+        {"fig5_joints": draw(model, commands, done, NAMES[:4])},
+    )
+    film.attach(section, "fig5_robot", _instants(model, robot, chosen, names))
     if walks is not None:
-        told, figures["fig5_recorded"] = walks
-        text += told
-    return Section("Fig. 5: stylised arm swing", text, figures)
+        told, section.figures["fig5_recorded"] = walks
+        section.text += told
+    return section
 
 
 def draw(
