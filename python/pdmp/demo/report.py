@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 import pdmp
+from pdmp._errors import reproduction_error
 from pdmp._tables import table
 from pdmp.demo.loop import Run
 
@@ -30,7 +31,10 @@ def error_table(
         (
             [
                 shape,
-                *(f"{np.mean([_error(model, demos, m) for m in rows]):.1e}" for model in models),
+                *(
+                    f"{np.mean([reproduction_error(model, demos[m], m) for m in rows]):.1e}"
+                    for model in models
+                ),
             ]
             for shape, rows in members.items()
         ),
@@ -51,11 +55,3 @@ def loop_table(runs: Mapping[str, Run]) -> str:
 def time_table(times: Mapping[str, float]) -> str:
     """Tell how long each part took."""
     return table(["part", "time"], ([name, f"{1e3 * time:.1f} ms"] for name, time in times.items()))
-
-
-def _error(model: pdmp.Model, demos: Sequence[pdmp.Demonstration], m: int) -> float:
-    """Return the RMSE of the reproduction of demonstration `m` over the range of its movement."""
-    position = demos[m].position
-    dt = model.durations[m] / (len(position) - 1)
-    gap = model.rollout(**pdmp.as_demonstrated(model, m), dt=dt).position - position
-    return float(np.sqrt(np.mean(gap**2)) / np.ptp(position, axis=0).max())

@@ -11,6 +11,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import pdmp
+from pdmp._errors import reproduction_error
 from pdmp._tables import table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, gradient, legend
 from pdmp.reproduction.section import SEED, Section
@@ -31,23 +32,19 @@ class Example:
 
     title: str
     model: pdmp.Model
-    demos: list[Array]
-    durations: Array
+    demos: list[pdmp.Demonstration]
     moved: Callable[[dict[str, Any]], dict[str, Any]]
     """Goal or anchor elsewhere."""
 
     def shown(self, m: int) -> tuple[Array, Array]:
         """Return time [s] and position of a demonstration."""
-        span = self.durations[m]
+        span = self.model.durations[m]
         ends = self.model.kind == "discrete"
-        return np.linspace(0, span, N_SAMPLES, endpoint=ends), self.demos[m][:, 0]
+        return np.linspace(0, span, N_SAMPLES, endpoint=ends), self.demos[m].position[:, 0]
 
     def error(self, m: int) -> float:
         """Return the RMSE of the reproduction of a demonstration, over its range."""
-        time, position = self.shown(m)
-        made = self.model.rollout(**pdmp.as_demonstrated(self.model, m), dt=time[1])
-        gap = made.position[:N_SAMPLES, 0] - position
-        return float(np.sqrt(np.mean(gap**2)) / np.ptp(position))
+        return reproduction_error(self.model, self.demos[m], m)
 
 
 def discrete(noise: Generator) -> Example:
@@ -57,12 +54,9 @@ def discrete(noise: Generator) -> Example:
     detour = (4 * s * (1 - s)) ** 3
     shapes = np.column_stack([straight, detour, detour * (1 - 2 * s) * 2])
     weights = noise.normal([1.0, 0.0, 0.0], [0.15, 0.35, 0.45], (N_DEMOS, 3))
-    demos = [(shapes @ row)[:, None] for row in weights]
-    durations = noise.uniform(0.8, 1.2, N_DEMOS)
-    model = pdmp.fit(_timed(demos, durations / (N_SAMPLES - 1)), n_styles=N_STYLES)
-    return Example(
-        "discrete", model, demos, durations, lambda a: {**a, "goal": np.asarray(a["goal"]) + 0.4}
-    )
+    demos = _demos(weights @ shapes.T, noise.uniform(0.8, 1.2, N_DEMOS) / (N_SAMPLES - 1))
+    model = pdmp.fit(demos, n_styles=N_STYLES)
+    return Example("discrete", model, demos, lambda a: {**a, "goal": np.asarray(a["goal"]) + 0.4})
 
 
 def rhythmic(noise: Generator) -> Example:
@@ -70,12 +64,10 @@ def rhythmic(noise: Generator) -> Example:
     phase = 2 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES
     shapes = np.column_stack([np.sin(phase), np.cos(2 * phase), np.sin(3 * phase)])
     weights = noise.normal([1.0, 0.0, 0.0], [0.3, 0.3, 0.2], (N_DEMOS, 3))
-    demos = [(shapes @ row)[:, None] for row in weights]
-    periods = noise.uniform(0.8, 1.2, N_DEMOS)
-    timed = _timed(demos, periods / N_SAMPLES)
-    model = pdmp.fit(timed, kind="rhythmic", n_styles=N_STYLES)
+    demos = _demos(weights @ shapes.T, noise.uniform(0.8, 1.2, N_DEMOS) / N_SAMPLES)
+    model = pdmp.fit(demos, kind="rhythmic", n_styles=N_STYLES)
     return Example(
-        "rhythmic", model, demos, periods, lambda a: {**a, "anchor": np.asarray(a["anchor"]) + 1.0}
+        "rhythmic", model, demos, lambda a: {**a, "anchor": np.asarray(a["anchor"]) + 1.0}
     )
 
 
@@ -143,7 +135,7 @@ def draw(examples: Sequence[Example]) -> Figure:
             time, position = example.shown(m)
             for turn in range(n_periods):
                 made.plot(
-                    time + turn * example.durations[m],
+                    time + turn * model.durations[m],
                     position,
                     color="black",
                     linestyle=line,
@@ -153,7 +145,7 @@ def draw(examples: Sequence[Example]) -> Figure:
                 )
             slower = {**end, "tau": 1.5 * end["tau"]}
             for arguments, width in ((end, 3.0), (example.moved(end), 1.0), (slower, 1.0)):
-                span = 1.2 * n_periods * example.durations[m] * arguments["tau"] / end["tau"]
+                span = 1.2 * n_periods * model.durations[m] * arguments["tau"] / end["tau"]
                 path = model.rollout(**arguments, dt=0.002, duration=span)
                 made.plot(path.time, path.position, color=color, linewidth=width)
         for share in SHARES:
@@ -170,5 +162,7 @@ def draw(examples: Sequence[Example]) -> Figure:
     return figure
 
 
-def _timed(demos: Sequence[Array], intervals: Array) -> list[pdmp.Demonstration]:
-    return [pdmp.Demonstration(demo, dt=dt) for demo, dt in zip(demos, intervals, strict=True)]
+def _demos(positions: Array, intervals: Array) -> list[pdmp.Demonstration]:
+    """Return demonstrations of one degree of freedom from the rows of (M, N_SAMPLES)."""
+    pairs = zip(positions, intervals, strict=True)
+    return [pdmp.Demonstration(position[:, None], dt=dt) for position, dt in pairs]
