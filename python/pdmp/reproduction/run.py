@@ -10,22 +10,10 @@ from typing import TypeAlias
 from pdmp import plot
 from pdmp._files import replacing
 from pdmp.plot._canvas import canvas
-from pdmp.reproduction.heights import figure_4
-from pdmp.reproduction.one_dof import figure_2
-from pdmp.reproduction.rivals import comparison
 from pdmp.reproduction.section import SEED, Section
-from pdmp.reproduction.styles import figure_3
-from pdmp.reproduction.walking import figure_5
 
 Folder: TypeAlias = str | PathLike[str]
-MAKERS: dict[str, Callable[[int, Folder | None], Section]] = {
-    "fig2": lambda seed, _: figure_2(seed),
-    "fig3": lambda seed, _: figure_3(seed),
-    "fig4": lambda seed, _: figure_4(seed),
-    "fig5": lambda seed, recordings: figure_5(recordings, seed),
-    "comparison": lambda seed, _: comparison(seed),
-}
-FIGURES = tuple(MAKERS)
+FIGURES = ("fig2", "fig3", "fig4", "fig5", "comparison")
 
 
 def reproduce(
@@ -80,7 +68,7 @@ def reproduce(
     for name in FIGURES if figure == "all" else [figure]:
         if progress is not None:
             progress(name)
-        section = MAKERS[name](seed, recordings)
+        section = _make(name, seed, recordings)
         reports.append("\n\n".join([f"# {section.title}", *section.text]))
         for file, picture in section.figures.items():
             plot.save(picture, folder / f"{file}.png")
@@ -88,3 +76,28 @@ def reproduce(
         with replacing(folder / f"{name}.md") as draft:
             draft.write_text(f"{reports[-1]}\n\n{images}\n", encoding="utf-8")
     return "\n\n".join(reports)
+
+
+def _make(figure: str, seed: int, recordings: Folder | None) -> Section:
+    """Make one of `FIGURES`; its room is imported here, and other commands do not wait for it."""
+    match figure:
+        case "fig2":
+            from pdmp.reproduction.one_dof import figure_2
+
+            return figure_2(seed)
+        case "fig3":
+            from pdmp.reproduction.styles import figure_3
+
+            return figure_3(seed)
+        case "fig4":
+            from pdmp.reproduction.heights import figure_4
+
+            return figure_4(seed)
+        case "fig5":
+            from pdmp.reproduction.walking import figure_5
+
+            return figure_5(recordings, seed)
+        case _:
+            from pdmp.reproduction.rivals import comparison
+
+            return comparison(seed)
