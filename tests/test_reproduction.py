@@ -172,14 +172,17 @@ def test_goal_moved_on_the_way_is_reached(reaching: Reaching) -> None:
 
 def test_what_the_paper_argues_with(reaching: Reaching) -> None:
     """One demonstration knows one height, components no goal, a library nothing beyond its own."""
-    tall = {name: rivals.attempt(rival, reaching, 0.60) for name, rival in rivals.RIVALS.items()}
+    command, grip = rivals.disturbances(reaching)
+    tall = {
+        name: rivals.attempt(rival, reaching, 0.60, command, grip)
+        for name, rival in rivals.RIVALS.items()
+    }
     primitive, single, components, library = tall.values()
     for trial in (single, library):
         assert trial.alone.log.contact() > 1
     assert components.alone.log.contact() < 0.05
     left = [
-        reaching.miss(trial.moved.log.hands[-1], trial.command.goal)
-        for trial in (primitive, components)
+        reaching.miss(trial.moved.log.hands[-1], command.goal) for trial in (primitive, components)
     ]
     assert left[0] < CLOSE < 100 < left[1]
     assert 2 * primitive.speed_ratio() < components.speed_ratio()

@@ -64,8 +64,9 @@ def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
 def best_style(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration) -> Array:
     """Return the style of least E for a demonstration: movements are linear in it."""
     plain = movement(model, reaching, np.zeros(model.n_styles))
-    added = [movement(model, reaching, unit) - plain for unit in np.eye(model.n_styles)]
-    columns = np.reshape(added, (model.n_styles, -1)).T
+    duration = float(model.durations[model.nominal])
+    added = model.style_jacobian(duration / (N_SAMPLES - 1), duration=duration)
+    columns = added.reshape(-1, model.n_styles)
     return np.asarray(np.linalg.lstsq(columns, (aligned(demo) - plain).ravel())[0], dtype=float)
 
 
@@ -120,21 +121,22 @@ def figure_4(seed: int = SEED) -> Section:
     """Reproduce Fig. 4."""
     reaching = demonstrate(seed)
     found = errors(reaching)
-    model = learn(reaching, 3)
-    command = new_goal(model, reaching)
-    robots = {height: foresee(model, reaching, height) for height in TESTED}
-    moved = {height: foresee(model, reaching, height, command) for height in TESTED}
-    by_styles = []
-    for n_styles in range(1, 5):
-        tried = learn(reaching, n_styles)
-        logs = [foresee(tried, reaching, height).log for height in TESTED]
-        by_styles.append(
-            [
-                n_styles,
-                *(f"{log.contact():.3f} s" for log in logs),
-                *(f"{1e3 * log.tracking_error():.0f} mrad" for log in logs),
-            ]
-        )
+    models = {n_styles: learn(reaching, n_styles) for n_styles in range(1, 5)}
+    tried = {
+        n_styles: {height: foresee(model, reaching, height) for height in TESTED}
+        for n_styles, model in models.items()
+    }
+    command = new_goal(models[3], reaching)
+    robots = tried[3]
+    moved = {height: foresee(models[3], reaching, height, command) for height in TESTED}
+    by_styles = [
+        [
+            n_styles,
+            *(f"{robot.log.contact():.3f} s" for robot in reached.values()),
+            *(f"{1e3 * robot.log.tracking_error():.0f} mrad" for robot in reached.values()),
+        ]
+        for n_styles, reached in tried.items()
+    ]
     text = [
         "Learnt from nine reaches over none, two and three boxes; six over one box and over four "
         "are foreseen by U(h) = β[h, 1]. E in 10⁻³ rad², mean ± standard deviation over the six; "

@@ -57,7 +57,7 @@ def joints(robots: Mapping[str, Robot], until: float) -> Figure:
         dress(axes, "", f"{name} [rad]")
     dress(panels[-1], "time [s]", "off by [mrad]")
     for (name, robot), color in zip(robots.items(), PALETTE, strict=False):
-        told, done = (np.array(rows)[: round(until / DT)] for rows in robot.log.rows())
+        told, done = (rows[: round(until / DT)] for rows in robot.log.rows())
         time = DT * np.arange(1, len(told) + 1)
         for axes, command, angle in zip(panels, told.T, done.T, strict=False):
             axes.plot(time, command, color=GREY, linewidth=3, label="commanded")

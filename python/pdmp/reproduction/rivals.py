@@ -67,10 +67,7 @@ def library(reaching: Reaching) -> Callable[[float], Movement]:
     The target is linear in the trajectory, so that the weighted regression of all targets is the
     regression of the weighted mean; the kernel is (1 − (|h − hᵐ|/width)³)³.
     """
-    shown = reaching.of(TRAINED)
-    paths = np.array([aligned(demo) for demo in shown])
-    heights = np.array([height_of(demo) for demo in shown])
-    duration = np.median([duration_of(demo) for demo in shown])
+    paths, heights, duration = _shown(reaching)
 
     def synthesise(height: float) -> Movement:
         near = np.clip(1 - (np.abs(heights - height) / WIDTH) ** 3, 0, None) ** 3
@@ -118,12 +115,12 @@ def components(reaching: Reaching) -> Callable[[float], Movement]:
     """Learn principal components of the trajectories, and their weights from the height."""
     from scipy.interpolate import CubicSpline
 
-    shown = reaching.of(TRAINED)
-    flat = np.array([aligned(demo).ravel() for demo in shown])
+    paths, heights, duration = _shown(reaching)
+    duration *= PACE / CONSTANTS["tau"]
+    flat = paths.reshape(len(paths), -1)
     mean = flat.mean(axis=0)
     factors = pdmp.factorise(flat - mean, n_styles=N_STYLES)
-    chosen = pdmp.ContextMap([[height_of(demo)] for demo in shown], factors.styles, "linear")
-    duration = np.median([duration_of(demo) for demo in shown]) * PACE / CONSTANTS["tau"]
+    chosen = pdmp.ContextMap(heights[:, None], factors.styles, "linear")
 
     def play(height: float) -> Movement:
         weights = chosen.predict([[height]])[0][0]
@@ -153,7 +150,6 @@ class Trial:
     alone: Robot
     moved: Robot
     held: Robot
-    command: NewGoal
     grip: Held
     new_style: float
     """Median time to have the movement for a height, ready for its first tick [ms]."""
@@ -163,7 +159,14 @@ class Trial:
         return _fastest(self.held, after=self.grip.end) / _fastest(self.alone)
 
 
-def attempt(rival: Rival, reaching: Reaching, height: float) -> Trial:
+def disturbances(reaching: Reaching) -> tuple[NewGoal, Held]:
+    """Return what is done to every rival, by the clock of the primitive: goal moved, elbow held."""
+    model = learn(reaching, N_STYLES)
+    start = HELD_AT * lasting(model)
+    return new_goal(model, reaching), Held(HELD_JOINT, start, start + HELD_FOR)
+
+
+def attempt(rival: Rival, reaching: Reaching, height: float, command: NewGoal, grip: Held) -> Trial:
     """Let one rival reach over a height [m]."""
     movement_for = rival(reaching)
     times = []
@@ -171,26 +174,21 @@ def attempt(rival: Rival, reaching: Reaching, height: float) -> Trial:
         began = perf_counter()
         movement_for(height)
         times.append(1e3 * (perf_counter() - began))
-    model = learn(reaching, N_STYLES)
-    command = new_goal(model, reaching)
-    start = HELD_AT * lasting(model)
-    grip = Held(HELD_JOINT, start, start + HELD_FOR)
 
     def run(*events: NewGoal | Held, feedback: bool = False) -> Robot:
         movement = movement_for(height)
         robot = Robot(movement.position, reaching.task, boxes(height))
         return drive(robot, movement, events, feedback=feedback)
 
-    return Trial(
-        run(), run(command), run(grip, feedback=True), command, grip, float(np.median(times))
-    )
+    return Trial(run(), run(command), run(grip, feedback=True), grip, float(np.median(times)))
 
 
 def comparison(seed: int = SEED) -> Section:
     """Compare what the paper compares in words."""
     reaching = demonstrate(seed)
+    command, grip = disturbances(reaching)
     trials = {
-        (name, height): attempt(rival, reaching, height)
+        (name, height): attempt(rival, reaching, height, command, grip)
         for name, rival in RIVALS.items()
         for height in TESTED
     }
@@ -200,7 +198,7 @@ def comparison(seed: int = SEED) -> Section:
             pile(height),
             f"{trial.alone.log.contact():.3f} s",
             f"{reaching.miss(trial.alone.log.hands[-1]):.1f} mm",
-            f"{reaching.miss(trial.moved.log.hands[-1], trial.command.goal):.1f} mm",
+            f"{reaching.miss(trial.moved.log.hands[-1], command.goal):.1f} mm",
             f"{trial.speed_ratio():.1f}",
             f"{trial.held.log.contact():.3f} s",
             f"{trial.new_style:.2f} ms",
@@ -250,3 +248,11 @@ def _fastest(robot: Robot, after: float = 0.0) -> float:
     """Return the largest speed of a joint from some time on [rad/s]."""
     _, done = robot.log.rows()
     return float(np.abs(np.diff(done[round(after / DT) :], axis=0)).max() / DT)
+
+
+def _shown(reaching: Reaching) -> tuple[Array, Array, float]:
+    """Return the training reaches (M, N, D), their heights (M,) [m], and their median duration."""
+    shown = reaching.of(TRAINED)
+    paths = np.array([aligned(demo) for demo in shown])
+    heights = np.array([height_of(demo) for demo in shown])
+    return paths, heights, float(np.median([duration_of(demo) for demo in shown]))
