@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 # The bindings are compiled against the interpreter that will import them.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-# The robot's model is read from a wheel whose dependencies, gigabytes of them, are not needed.
+# The robot's model is read from a wheel whose dependencies are not needed.
 ROBOT := robosuite==1.5.2
 # Recordings of people walking, where they are at hand, for Fig. 5.
 WALKS := $(wildcard ../shared/data/walk_styles_bandai/demos)

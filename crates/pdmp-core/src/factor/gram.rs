@@ -31,7 +31,11 @@ impl Gram {
             proceed(start as f64 / length as f64)?;
             add_square(matrix.as_mut(), wide.subcols(start, most.min(length - start)));
         }
-        mirror(&mut matrix);
+        for j in 0..k {
+            for i in 0..j {
+                matrix[(i, j)] = matrix[(j, i)];
+            }
+        }
         let (mut ascending, mut vectors) = (Diag::zeros(k), Mat::zeros(k, k));
         let scratch = self_adjoint_evd_scratch::<f64>(k, ComputeEigenvectors::Yes, Par::Seq, Default::default());
         let mut memory = MemBuffer::new(scratch);
@@ -95,13 +99,4 @@ impl Gram {
 pub(super) fn add_square(square: MatMut<f64>, a: MatRef<f64>) {
     let (lower, dense) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
     matmul(square, lower, Accum::Add, a, dense, a.transpose(), dense, 1.0, Par::Seq);
-}
-
-/// Copies the lower half of a square to the upper.
-fn mirror(square: &mut Mat<f64>) {
-    for j in 0..square.ncols() {
-        for i in 0..j {
-            square[(i, j)] = square[(j, i)];
-        }
-    }
 }
