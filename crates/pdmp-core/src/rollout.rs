@@ -13,6 +13,8 @@ use crate::model::{Conditions, Model, check_tau};
 
 /// Samples between two questions whether to go on.
 const PORTION: usize = 4096;
+/// Ticks that pass, one right after the other, while memory answers.
+const LEAD: f64 = 16.0;
 /// Most samples of a rollout.
 const MOST_STEPS: f64 = 1e7;
 
@@ -71,7 +73,7 @@ impl Model {
         let steps = timing.steps(self, conditions.time_constant(self)?)?;
         let mut clock = Clock::of(self, conditions)?;
         let conditions = clock.conditions(conditions);
-        let mut controller = Controller::new(Arc::clone(self), timing.dt, &conditions, Some(0.0))?;
+        let mut controller = Controller::new(Arc::clone(self), timing.dt, &conditions, Some(0.0))?.looking_ahead(LEAD);
         let shape = (steps + 1, self.n_dofs());
         let mut trajectory = Trajectory {
             time: (0..=steps).map(|k| k as f64 * timing.dt).collect(),

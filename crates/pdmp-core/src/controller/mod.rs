@@ -84,6 +84,8 @@ pub struct Controller {
     glide: Glide,
     propagator: Propagator,
     series: Series,
+    /// Ticks from now for which the landscape is fetched.
+    lead: f64,
 }
 
 impl Controller {
@@ -132,11 +134,17 @@ impl Controller {
             glide: filter.glide(dt),
             propagator: series.propagator::<Lanes>(1.0 / conditions.tau * dt),
             series,
+            lead: 1.0,
             conditions,
             model,
         };
         controller.begin();
         Ok(controller)
+    }
+
+    /// The same with the landscape fetched so many ticks ahead, for ticks that do not wait for one another.
+    pub(crate) fn looking_ahead(self, lead: f64) -> Self {
+        Self { lead, ..self }
     }
 
     /// Starts again under other conditions.

@@ -207,7 +207,7 @@ impl Controller {
             let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, to);
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
         }
-        landscape.prefetch(self.clock.value() + self.held.pace() * h);
+        landscape.prefetch(self.clock.value() + self.lead * self.held.pace() * h);
         if let Some(before) = levers {
             self.add_perturbation(before);
             self.read_out();
