@@ -168,16 +168,17 @@ impl Functions {
         }
         let both = rows.shares.chunks_exact_mut(n_basis).zip(rows.rises.chunks_exact_mut(n_basis));
         for (&u, (phi, rise)) in u.iter().zip(both) {
-            // With q = Σψ: φ = ψ/q and φ′ = (ψ′ − φq′)/q.
+            // With q = Σψ: φ = ψ/q and φ′ = φ(ln ψ − ln q)′.
             let (mut q, mut dq) = (0.0, 0.0);
             self.for_each(u, |k, psi, rate| {
-                (phi[k], rise[k]) = (psi, psi * rate);
+                (phi[k], rise[k]) = (psi, rate);
                 q += psi;
                 dq += psi * rate;
             });
+            let (share, rate) = (1.0 / q, dq / q);
             for (phi, rise) in phi.iter_mut().zip(rise) {
-                *phi /= q;
-                *rise = (*rise - *phi * dq) / q;
+                *phi *= share;
+                *rise = *phi * (*rise - rate);
             }
         }
     }
@@ -196,6 +197,7 @@ impl Functions {
                 let nearest = (((u - self.first) / self.spacing).round() as usize).min(n_basis - 1);
                 let rate = |k: usize| (centre(k) - u) * precision;
                 let growth = ((u - centre(nearest)) * self.spacing * precision).exp();
+                let decline = 1.0 / growth;
                 let (mut above, mut below) = (1.0, 1.0);
                 visit(nearest, 1.0, rate(nearest));
                 for (k, quotient) in (nearest + 1..n_basis).zip(&self.quotients) {
@@ -203,7 +205,7 @@ impl Functions {
                     visit(k, above, rate(k));
                 }
                 for (k, quotient) in (0..nearest).rev().zip(&self.quotients) {
-                    below *= quotient / growth;
+                    below *= decline * quotient;
                     visit(k, below, rate(k));
                 }
             }
