@@ -10,16 +10,14 @@ use ndarray::{Array1, Array2};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::align::Aligned;
+use crate::conditions::Conditions;
 use crate::context::{Prediction, outputs};
 use crate::error::{Error, Result};
-use crate::model::{Conditions, Model};
+use crate::model::Model;
 use crate::phase::Kind;
 use crate::responses::{Derivative, Responses};
 use crate::rollout::Timing;
-use crate::sensitivity::Sensitivity;
-
-/// Steps of a movement over which errors are averaged.
-pub(crate) const STEPS: usize = 100;
+use crate::sensitivity::{STEPS, Sensitivity};
 
 impl Model {
     /// What a map is to predict (M, P).

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use ndarray::{Array2, Array3, ArrayView1, ArrayViewMut3, Axis, aview1};
 
 use crate::combine::Combination;
+use crate::conditions::{Conditions, LARGEST_STYLE};
 use crate::demo::{check_matrix, zeros};
 use crate::error::{Error, Result, check_vector};
-use crate::model::{Conditions, LARGEST_STYLE, Model};
+use crate::model::Model;
 use crate::phase::Kind;
 use crate::responses::{Derivative, Responses};
 use crate::rollout::Timing;
@@ -267,7 +268,7 @@ fn check_width(name: &'static str, rows: &Array2<f64>, expected: usize, per: &'s
     check_matrix(name, rows.view())
 }
 
-/// Checks styles (B, J) as [`crate::model::check_style`] does one.
+/// Checks styles (B, J) as [`crate::conditions::check_style`] does one.
 fn check_styles(styles: &Array2<f64>, n_styles: usize) -> Result<()> {
     check_width("styles", styles, n_styles, "style dimension")?;
     match styles.indexed_iter().find(|(_, s)| s.abs() > LARGEST_STYLE) {

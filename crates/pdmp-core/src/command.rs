@@ -1,7 +1,8 @@
 //! What the caller owns of a tick: what is commanded, and where the motion is written.
 
+use crate::conditions::{check_amplitude, check_style, check_tau, refuse};
 use crate::error::{Error, Result, check_positive, check_vector};
-use crate::model::{Model, check_amplitude, check_style, check_tau, refuse};
+use crate::model::Model;
 use crate::phase::Kind;
 
 /// All that one tick is told; what is `None` stays as it was.

@@ -8,13 +8,12 @@ use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, Axis, Zip, s};
 
 use crate::align::Aligned;
 use crate::attractor::{Attractor, State};
-use crate::band::STEPS;
 use crate::context::{ContextColumn, ContextMap, MapChoice, alike, outputs};
 use crate::error::{Error, Result};
 use crate::factor::{Factors, StyleCount};
 use crate::phase::{Canonical, Kind};
 use crate::responses::Curves;
-use crate::sensitivity::Sensitivity;
+use crate::sensitivity::{STEPS, Sensitivity};
 use crate::targets::Targets;
 
 /// Most folds that contexts are dealt to, and the fewest different ones.

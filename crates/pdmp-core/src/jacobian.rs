@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use ndarray::{Array3, Axis};
 
+use crate::conditions::{Complete, Conditions, refuse};
 use crate::demo::zeros;
 use crate::error::Result;
-use crate::model::{Complete, Conditions, Model, refuse};
+use crate::model::Model;
 use crate::phase::Kind;
 use crate::responses::{Derivative, Responses};
 use crate::rollout::Timing;

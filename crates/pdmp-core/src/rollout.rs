@@ -6,10 +6,11 @@ use ndarray::Array2;
 
 use crate::align::WarpingFunction;
 use crate::command::{Command, Motion};
+use crate::conditions::{Conditions, check_tau};
 use crate::controller::Controller;
 use crate::demo::{Trajectory, zeros};
 use crate::error::{Error, Result, check_positive};
-use crate::model::{Conditions, Model, check_tau};
+use crate::model::Model;
 
 /// Samples between two questions whether to go on.
 const PORTION: usize = 4096;

@@ -8,6 +8,9 @@ use crate::context::relative_changes;
 use crate::phase::Kind;
 use crate::responses::Curves;
 
+/// Steps of a movement over which errors are averaged.
+pub(crate) const STEPS: usize = 100;
+
 /// Positions per unit of each output.
 pub(crate) struct Sensitivity<'a> {
     curves: &'a Curves,

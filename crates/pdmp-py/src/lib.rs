@@ -11,6 +11,7 @@ mod error;
 mod factor;
 mod fit;
 mod jacobian;
+mod learnt;
 mod model;
 mod prediction;
 mod recording;

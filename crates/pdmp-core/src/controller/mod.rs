@@ -19,10 +19,11 @@ use std::sync::Arc;
 
 use crate::attractor::{Jet, Propagator, State};
 use crate::command::{Command, Motion};
+use crate::conditions::{Complete, Conditions};
 use crate::error::{Error, Result, check_positive};
 use crate::follower::{Filter, Follower, Glide};
 use crate::lanes::{Lanes, copy, groups, repack, unpack};
-use crate::model::{Complete, Conditions, Model};
+use crate::model::Model;
 use crate::perturbation::{Held, STILL, widest};
 use crate::phase::{CompensatedSum, Kind};
 use crate::series::Series;

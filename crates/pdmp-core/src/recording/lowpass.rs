@@ -9,7 +9,7 @@ use crate::smooth::{Smoothing, smooth};
 
 /// The recording through the cubic smoothing spline, a low-pass filter of fourth order without phase lag.
 ///
-/// At the frequency f a sine keeps the share 1/(1 + (f/`cut_off`)⁴), half of its amplitude at the cut-off [Hz].
+/// At the frequency f a sine keeps the share 1/(1 + (f/`cut_off`)⁴), half of its amplitude at the cut-off in Hz.
 ///
 /// # Errors
 /// A cut-off that is not positive, not below half the sampling rate, or far below any movement; a recording without
@@ -18,7 +18,7 @@ pub fn lowpass(demo: &Demonstration, cut_off: f64) -> Result<Demonstration> {
     demo.sampled(filtered(demo, &clock(demo)?, cut_off)?, demo.sampling().clone())
 }
 
-/// What the filter takes off at each of the K `cut_offs` [Hz]: R_kd = √(1/T Σ_c (y_cd − ŷ_cd)²), (K, D), in the unit of
+/// What the filter takes off at each of the K `cut_offs`, in Hz: R_kd = √(1/T Σ_c (y_cd − ŷ_cd)²), (K, D), in the unit of
 /// each DoF.
 ///
 /// D. A. Winter, Biomechanics and Motor Control of Human Movement, Wiley 2009, section 3.4.4: noise makes R a straight

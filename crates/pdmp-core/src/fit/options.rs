@@ -1,0 +1,149 @@
+//! What can be chosen about a fit, and what a fit tells on its way.
+
+use crate::align::{Alignment, TimeScaling};
+use crate::basis::{Basis, Gp};
+use crate::context::MapChoice;
+use crate::demo::ContextValue;
+use crate::error::{Error, Result, check_vector};
+use crate::factor::StyleCount;
+use crate::phase::Kind;
+use crate::smooth::Smoothing;
+use crate::threads::Threads;
+
+/// The unit of each degree of freedom in the factorisation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DofScale {
+    /// As recorded: right where all DoFs have one unit.
+    Unit,
+    /// The range of each DoF, so that all weigh alike.
+    Range,
+    /// Given (D,), in the unit of each DoF.
+    Given(Vec<f64>),
+}
+
+impl DofScale {
+    /// The units (D,) that were given, if any were.
+    pub(super) fn given(&self, n_dofs: usize) -> Result<Option<&[f64]>> {
+        let Self::Given(scale) = self else { return Ok(None) };
+        check_vector("dof_scale", scale, n_dofs, "DoF")?;
+        match scale.iter().find(|value| !(1e-100..=1e100).contains(*value)) {
+            Some(&value) => {
+                Err(Error::Range { name: "dof_scale", value, allowed: "must lie between 1e-100 and 1e100" })
+            }
+            None => Ok(Some(scale)),
+        }
+    }
+
+    /// The units (D,) of DoFs with such ranges.
+    pub(super) fn of(&self, ranges: &[f64]) -> Vec<f64> {
+        match self {
+            Self::Unit => vec![1.0; ranges.len()],
+            // A DoF at rest has no range; it has no target to be scaled either.
+            Self::Range => ranges.iter().map(|&range| if range > 0.0 { range } else { 1.0 }).collect(),
+            Self::Given(scale) => scale.clone(),
+        }
+    }
+}
+
+/// Everything that can be chosen about a fit.
+#[derive(Clone, Debug)]
+pub struct FitOptions {
+    /// How demonstrations are read and aligned.
+    pub alignment: Alignment,
+    /// Conditions of the demonstrations (M rows of Q); otherwise those that they carry.
+    pub contexts: Option<Vec<Vec<ContextValue>>>,
+    /// What leads from contexts to movements.
+    pub map: MapChoice,
+    /// Style dimension J.
+    pub styles: StyleChoice,
+    /// Function approximator of the landscape.
+    pub basis: Basis,
+    /// Unit of each DoF in the factorisation.
+    pub dof_scale: DofScale,
+    /// Time constant τ in seconds, discrete; otherwise the nominal duration.
+    pub tau: Option<f64>,
+    /// α_z of the output system.
+    pub alpha_z: f64,
+    /// β_z of the output system; otherwise α_z/4, critical damping.
+    pub beta_z: Option<f64>,
+    /// α_x of the canonical system, discrete; otherwise x = 0.01 at the end of the nominal demonstration.
+    pub alpha_x: Option<f64>,
+    /// μ of the canonical system, rhythmic.
+    pub mu: f64,
+    /// How many threads may work on it. The model does not depend on it, to the last bit.
+    pub threads: Threads,
+}
+
+impl FitOptions {
+    /// The defaults: as many styles as make up nine tenths of the singular values, a Gaussian process, no smoothing,
+    /// α_z = 25, μ = 1, as many threads as the system allows, and all else from the demonstrations.
+    pub fn new(kind: Kind) -> Self {
+        let smoothing = Smoothing::Interpolate;
+        Self {
+            alignment: Alignment {
+                kind,
+                dt: None,
+                period: Vec::new(),
+                smoothing,
+                nominal: None,
+                n_samples: None,
+                time_scaling: TimeScaling::Linear,
+            },
+            contexts: None,
+            map: MapChoice::Auto,
+            styles: StyleCount::Spectrum(0.9).into(),
+            basis: Basis::Gp(Gp::default()),
+            dof_scale: DofScale::Unit,
+            tau: None,
+            alpha_z: 25.0,
+            beta_z: None,
+            alpha_x: None,
+            mu: 1.0,
+            threads: Threads::available(),
+        }
+    }
+}
+
+/// How the number of styles J is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StyleChoice {
+    /// By number, or by the spectrum.
+    Given(StyleCount),
+    /// The fewest that foresee movements, in contexts held out, with an error above the least that any number has by no
+    /// more than the standard error of the difference: cross-validation over the contexts, in at most ten folds.
+    Auto,
+}
+
+impl From<StyleCount> for StyleChoice {
+    fn from(count: StyleCount) -> Self {
+        Self::Given(count)
+    }
+}
+
+/// Where a fit is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// The warps of step 1, where time is not scaled linearly.
+    Align,
+    /// The rest of step 1, and step 2, demonstration by demonstration.
+    Targets,
+    /// Step 3.
+    Factorise,
+    /// Step 4.
+    Regress,
+    /// Compiling the landscape to its table.
+    Compile,
+}
+
+impl Stage {
+    /// The name shown to a user.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Align => "align",
+            Stage::Targets => "targets",
+            Stage::Factorise => "factorise",
+            Stage::Regress => "regress",
+            Stage::Compile => "compile",
+        }
+    }
+}
