@@ -63,6 +63,17 @@ def test_fit_takes_single_files(folder: Path, tmp_path: Path) -> None:
     assert (model.n_demos, list(model.names)) == (3, ["y"])
 
 
+def test_fit_reads_time_by_its_name(folder: Path, tmp_path: Path) -> None:
+    """With --time, another column than t has the time stamps, and is no degree of freedom."""
+    plain, named = tmp_path / "plain.safetensors", tmp_path / "named.safetensors"
+    assert run("fit", folder, "-o", plain) == 0
+    for file in (folder / "demos").glob("*.csv"):
+        file.write_text(file.read_text().replace("t,x,y", "clock [s],x,y"))
+    assert run("fit", folder, "-o", named) == 1
+    assert run("fit", folder, "--time", "clock", "-o", named) == 0
+    assert named.read_bytes() == plain.read_bytes()
+
+
 def test_fit_and_plot_bridge_gaps_and_keep_units(folder: Path, tmp_path: Path) -> None:
     """With --max-gap, an empty field is interpolated; units go into model and table."""
     path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"

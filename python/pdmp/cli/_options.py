@@ -11,6 +11,9 @@ def add_reading(parser: ArgumentParser) -> None:
         "--columns", nargs="+", metavar="NAME", help="degrees of freedom to keep; default: all"
     )
     parser.add_argument(
+        "--time", default="t", metavar="NAME", help="CSV column of the time stamps; default: t"
+    )
+    parser.add_argument(
         "--dt", type=float, metavar="S", help="sampling interval [s], in place of time stamps"
     )
     parser.add_argument(
@@ -24,7 +27,7 @@ def add_reading(parser: ArgumentParser) -> None:
 
 def reading(options: Namespace) -> dict[str, Any]:
     """Return the arguments of `pdmp.demos.read` that these options are."""
-    return {name: getattr(options, name) for name in ("columns", "dt", "max_gap")}
+    return {name: getattr(options, name) for name in ("columns", "time", "dt", "max_gap")}
 
 
 def add_learning(parser: ArgumentParser) -> None:

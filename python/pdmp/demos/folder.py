@@ -1,6 +1,6 @@
 """Folders with an index, and several files and folders at once."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,13 +12,15 @@ from pdmp.demos.archive import read_npz, recordings
 from pdmp.demos.bvh import read_bvh
 from pdmp.demos.table import read_csv
 
-READERS: dict[str, Callable[..., Demonstration]] = {".csv": read_csv, ".bvh": read_bvh}
+SINGLE = (".csv", ".bvh")
+"""Formats with one demonstration a file."""
 
 
 def read(
     paths: Iterable[str | PathLike[str]],
     *,
     columns: Sequence[str] | None = None,
+    time: str = "t",
     dt: float | None = None,
     max_gap: float = 0.0,
     context: Sequence[str] | None = None,
@@ -31,6 +33,8 @@ def read(
         Files and folders.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
+    time : str
+        Column of the time stamps in CSV files.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
     max_gap : float
@@ -46,17 +50,16 @@ def read(
         A file that cannot be read.
     """
     demos: list[Demonstration] = []
+    options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
     for path in map(Path, paths):
         if path.is_dir():
-            found = read_folder(path, columns=columns, dt=dt, max_gap=max_gap, context=context)
-            demos += found.values()
+            demos += read_folder(path, time=time, context=context, **options).values()
         elif context is not None:
             raise ValueError(f"{path}: a context is read from the index.csv of a folder: pass one")
-        elif path.suffix.lower() in READERS:
-            reader = READERS[path.suffix.lower()]
-            demos.append(reader(path, columns=columns, dt=dt, max_gap=max_gap))
+        elif path.suffix.lower() in SINGLE:
+            demos.append(_read_single(path, time, **options))
         elif path.suffix.lower() == ".npz":
-            demos += read_npz(path, columns=columns, dt=dt, max_gap=max_gap).values()
+            demos += read_npz(path, **options).values()
         else:
             raise ValueError(f"{path}: expected a .csv, .bvh or .npz file or a folder")
     return demos
@@ -66,6 +69,7 @@ def read_folder(
     path: str | PathLike[str],
     *,
     columns: Sequence[str] | None = None,
+    time: str = "t",
     dt: float | None = None,
     max_gap: float = 0.0,
     context: Sequence[str] | None = None,
@@ -78,6 +82,8 @@ def read_folder(
         A folder as `pdmp.demos` describes.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
+    time : str
+        Column of the time stamps in CSV files.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
     max_gap : float
@@ -99,7 +105,7 @@ def read_folder(
     if not archive.exists():
         options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
         return {
-            name: _read_one(path / "demos", name, context=values, **options)
+            name: _read_single(_file(path / "demos", name), time, context=values, **options)
             for name, values in contexts.items()
         }
     found = list(recordings(archive, columns, dt))
@@ -115,10 +121,17 @@ def read_folder(
     }
 
 
-def _read_one(folder: Path, name: str, **options: Any) -> Demonstration:
-    """Read the one file of that name, a CSV file where there is none."""
-    suffix = next((suffix for suffix in READERS if (folder / f"{name}{suffix}").exists()), ".csv")
-    return READERS[suffix](folder / f"{name}{suffix}", **options)
+def _file(folder: Path, name: str) -> Path:
+    """Return the one file of that name, a CSV file where there is none."""
+    paths = [folder / f"{name}{suffix}" for suffix in SINGLE]
+    return next((path for path in paths if path.exists()), paths[0])
+
+
+def _read_single(path: Path, time: str, **options: Any) -> Demonstration:
+    """Read a file of one demonstration; BVH files tell their interval and need no column."""
+    if path.suffix.lower() == ".bvh":
+        return read_bvh(path, **options)
+    return read_csv(path, time=time, **options)
 
 
 def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str] | None]:
