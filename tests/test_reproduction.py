@@ -219,7 +219,7 @@ def test_pictures_show_the_robot_move(reaching: Reaching, learnt: pdmp.Model) ->
     """A strip has a frame per time, and they differ."""
     robot = reach_over(learnt, reaching, 0.30, learnt.styles[7])
     try:
-        figure = film.strip({"two boxes": (robot, [0.0, 1.4, 4.0])})
+        figure = film.strip({"two boxes": (robot, [0.0, 1.4, 4.0])}, film.REACHING)
     except film.NoRenderer as reason:
         pytest.skip(str(reason))
     frames = [axes.get_images()[0].get_array() for axes in figure.axes]

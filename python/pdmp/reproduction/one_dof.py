@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 import pdmp
 from pdmp._errors import reproduction_error
 from pdmp._tables import table
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, gradient, legend
+from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, gradient, legend
 from pdmp.reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -123,43 +124,56 @@ def draw(examples: Sequence[Example]) -> Figure:
     grid = figure.subplots(len(examples), 3)
     for row, example in zip(grid, examples, strict=True):
         model = example.model
-        n_periods = 1 if model.kind == "discrete" else 2
         shown, made, between = row
         for m in range(N_DEMOS):
             shown.plot(*example.shown(m), color=GREY, linewidth=0.9)
+        for m, color, name in zip(extremes(model), (BLUE, ORANGE), ("s1", "s2"), strict=True):
+            _variants(made, example, m, color, name)
+        made.plot([], [], color="black", linestyle=":", label="demonstrated")
+        made.plot([], [], color="black", linewidth=1.0, label="goal moved")
+        made.plot([], [], color="black", linewidth=1.0, linestyle="-.", label="1.5 τ")
         first, second = (pdmp.as_demonstrated(model, m) for m in extremes(model))
-        for m, end, color, line in zip(
-            extremes(model), (first, second), (BLUE, ORANGE), ("--", ":"), strict=True
-        ):
-            label = f"shown, s{1 if color == BLUE else 2}"
-            time, position = example.shown(m)
-            for turn in range(n_periods):
-                made.plot(
-                    time + turn * model.durations[m],
-                    position,
-                    color="black",
-                    linestyle=line,
-                    linewidth=1.3,
-                    zorder=3,
-                    label=label if turn == 0 else None,
-                )
-            slower = {**end, "tau": 1.5 * end["tau"]}
-            for arguments, width in ((end, 3.0), (example.moved(end), 1.0), (slower, 1.0)):
-                span = 1.2 * n_periods * model.durations[m] * arguments["tau"] / end["tau"]
-                path = model.rollout(**arguments, dt=0.002, duration=span)
-                made.plot(path.time, path.position, color=color, linewidth=width)
         for share in SHARES:
-            arguments = pdmp.blend(first, second, float(share))
-            span = 1.2 * n_periods * model.durations[model.nominal]
-            path = model.rollout(**arguments, dt=0.002, duration=span)
+            path = _path(model, pdmp.blend(first, second, float(share)), model.nominal)
             between.plot(path.time, path.position, color=gradient()(share), linewidth=1.3)
-        made.plot([], [], color=PALETTE[0], label="s1: own, goal moved, 1.5 τ")
-        made.plot([], [], color=PALETTE[1], label="s2: own, goal moved, 1.5 τ")
         titles = ("demonstrations", "two styles, goals, time constants", "from s1 to s2")
         for axes, title in zip(row, titles, strict=True):
             dress(axes, "time [s]", "position [–]", f"{example.title}: {title}")
     legend(figure, grid[0, 1])
     return figure
+
+
+def _variants(axes: Axes, example: Example, m: int, color: str, name: str) -> None:
+    """Draw a demonstration, its reproduction, and that elsewhere and slower."""
+    model = example.model
+    own = pdmp.as_demonstrated(model, m)
+    slower = {**own, "tau": 1.5 * own["tau"]}
+    for arguments, width, line in (
+        (own, 3.0, "-"),
+        (example.moved(own), 1.0, "-"),
+        (slower, 1.0, "-."),
+    ):
+        path = _path(model, arguments, m, arguments["tau"] / own["tau"])
+        label = name if arguments is own else None
+        axes.plot(
+            path.time, path.position, color=color, linewidth=width, linestyle=line, label=label
+        )
+    time, position = example.shown(m)
+    for period in range(_n_periods(model)):
+        shifted = time + period * model.durations[m]
+        axes.plot(shifted, position, color="black", linestyle=":", linewidth=1.3, zorder=3)
+
+
+def _path(
+    model: pdmp.Model, arguments: dict[str, Any], m: int, slower: float = 1.0
+) -> pdmp.Trajectory:
+    """Roll out for a little longer than a demonstration takes, or its cycle twice."""
+    span = 1.2 * _n_periods(model) * model.durations[m] * slower
+    return model.rollout(**arguments, dt=0.002, duration=span)
+
+
+def _n_periods(model: pdmp.Model) -> int:
+    return 1 if model.kind == "discrete" else 2
 
 
 def _demos(positions: Array, intervals: Array) -> list[pdmp.Demonstration]:

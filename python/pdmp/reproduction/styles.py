@@ -63,7 +63,7 @@ def figure_3(seed: int = SEED) -> Section:
         )
         for m in SHOWN
     }
-    rows = [
+    lines = [
         [
             name,
             ", ".join(f"{s:.2f}" for s in model.styles[m]),
@@ -83,7 +83,7 @@ def figure_3(seed: int = SEED) -> Section:
         f"{shares[:3].sum():.1%} of the sum, the first four {shares[:4].sum():.1%}. On the robot, "
         "tau = 0.6 s, to the goal as printed:",
         table(
-            ["", "style", "touches a box for", "left to the goal", "largest tracking error"], rows
+            ["", "style", "touches a box for", "left to the goal", "largest tracking error"], lines
         ),
         "How many of the three styles shown over each pile clear it, at the pace of the "
         "demonstrations:",
@@ -97,9 +97,8 @@ def figure_3(seed: int = SEED) -> Section:
             "fig3_joints": paths.joints(robots, until=6.0),
         },
     )
-    return film.attach(
-        section, "fig3_robot", {name: (robot, FRAMES) for name, robot in robots.items()}
-    )
+    rows = {name: (robot, FRAMES) for name, robot in robots.items()}
+    return film.attach(section, "fig3_robot", rows, film.REACHING)
 
 
 def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) -> Figure:

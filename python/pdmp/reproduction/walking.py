@@ -143,7 +143,7 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
         text,
         {"fig5_joints": draw(model, commands, done, NAMES[:4])},
     )
-    film.attach(section, "fig5_robot", _instants(model, robot, chosen, names))
+    film.attach(section, "fig5_robot", _instants(model, robot, chosen, names), film.SWINGING)
     if walks is not None:
         told, section.figures["fig5_recorded"] = walks
         section.text += told
