@@ -26,9 +26,10 @@ test: .venv/with-test  ## Runs every test, Rust and Python
 	cargo test --release --workspace
 	$(BIN)/pytest
 
-check: .venv/with-dev  ## Formatting, lints, types, and the stubs against the module
+check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, and the stubs against the module
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --no-deps --package pdmp-core
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
@@ -69,7 +70,7 @@ header: | needs  ## Makes pdmp.h anew from the sources of the C ABI
 
 clean:  ## Removes what the targets above made
 	cargo clean
-	rm -rf .venv demo reproduction dist python/pdmp/_native*.so
+	rm -rf .venv demo reproduction report dist python/pdmp/_native*.so
 
 .venv/with-%: $(SOURCES) | $(BIN)/python
 	@echo 'building the extension and installing what "$*" needs: some minutes the first time'

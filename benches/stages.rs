@@ -9,13 +9,13 @@ use std::time::{Duration, Instant};
 
 use movements::movements;
 use pdmp_core::basis::{Basis, NGnet};
-use pdmp_core::{Demonstration, FitOptions, Kind, Smoothing, Stage, StyleCount, fit};
+use pdmp_core::{Demonstration, FitOptions, Kind, Smoothing, Stage, StyleCount, TimeScaling, Warp, fit};
 
-const STAGES: [Stage; 4] = [Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile];
+const STAGES: [Stage; 5] = [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile];
 
 /// Time of each stage of one fit: from when it is first told of to the next; the first from the call, the last to the
 /// model.
-fn stages(demos: &[Demonstration], options: &FitOptions) -> [Duration; 4] {
+fn stages(demos: &[Demonstration], options: &FitOptions) -> [Duration; 5] {
     let mut marks = vec![Instant::now()];
     let mut proceed = |stage, _| {
         if STAGES.get(marks.len()) == Some(&stage) {
@@ -31,8 +31,8 @@ fn stages(demos: &[Demonstration], options: &FitOptions) -> [Duration; 4] {
 
 /// A row of the table: the median of each stage over `n` fits, and that of their sums.
 fn row(name: &str, n: usize, demos: &[Demonstration], options: &FitOptions) {
-    let runs: Vec<[Duration; 4]> = (0..n).map(|_| stages(demos, options)).collect();
-    let median = |of: &dyn Fn(&[Duration; 4]) -> Duration| {
+    let runs: Vec<[Duration; 5]> = (0..n).map(|_| stages(demos, options)).collect();
+    let median = |of: &dyn Fn(&[Duration; 5]) -> Duration| {
         let mut times: Vec<Duration> = runs.iter().map(of).collect();
         times.sort();
         format!("{:>9.3}", 1e3 * times[n / 2].as_secs_f64())
@@ -43,8 +43,8 @@ fn row(name: &str, n: usize, demos: &[Demonstration], options: &FitOptions) {
 
 fn heading(title: &str) {
     println!("\n{title}\n");
-    println!("|                       |   targets | factorise |   regress |   compile |       all |");
-    println!("|-----------------------|----------:|----------:|----------:|----------:|----------:|");
+    println!("|                       |     align |   targets | factorise |   regress |   compile |       all |");
+    println!("|-----------------------|----------:|----------:|----------:|----------:|----------:|----------:|");
 }
 
 /// The most memory that this process has held so far, where the system tells it.
@@ -67,12 +67,15 @@ fn main() {
     };
     let mut smoothed = network.clone();
     smoothed.alignment.smoothing = Smoothing::Auto;
+    let mut warped = network.clone();
+    warped.alignment.time_scaling = TimeScaling::Warp(Warp::default());
     let process = FitOptions { styles: StyleCount::Given(3).into(), ..FitOptions::new(Kind::Discrete) };
 
     let demos = movements(20, 1001);
     heading("Milliseconds of a fit, M = 20, C = 1001, D = 7, J = 3");
     row("NGnet", 101, &demos, &network);
     row("NGnet, auto smoothing", 21, &demos, &smoothed);
+    row("NGnet, time warp", 21, &demos, &warped);
     row("GP", 11, &demos, &process);
 
     let demos = movements(5000, 200);
