@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::circle::{Closure, Turn};
-use super::filter::{Gaps, Path, States, Step, covariances, means, product};
+use super::filter::{Gaps, Path, States, Steps, means, product};
 use super::posterior::Form;
 use super::smoother::Smoother;
 use super::state::{Square, drift, rate, stationary};
@@ -31,9 +31,9 @@ impl<const D: usize> Chain<D> {
         let (rate, norm) = turn.map_or((rate::<D>(at.length), 1.0), |turn| (turn.rate, turn.norm));
         let (path, noise) = (Path::new(&self.gaps, rate), at.noise * norm);
         let start = if turn.is_some() { Square::zeros() } else { stationary() };
-        let (steps, settled) = covariances(&path, start, noise, progress)?;
+        let steps = Steps::new(&path, start, noise, progress)?;
         let mut means = means(&path, &steps, &self.targets, progress)?;
-        let mut log_determinant: f64 = steps[..self.u.len()].iter().map(|step| step.spread.ln()).sum();
+        let mut log_determinant = steps.log_spreads(self.u.len());
         let mut closure = None;
         if let Some(turn) = turn {
             let Some(close) = Closure::new(&path, &steps, &self.targets, &mut means, self.n_outputs, progress)? else {
@@ -42,7 +42,7 @@ impl<const D: usize> Chain<D> {
             log_determinant += close.log_determinant - 2.0 * turn.log_determinant::<D>().0;
             closure = Some((turn, close));
         }
-        Ok(Some(Filtered { chain: self, rate, norm, noise, path, steps, settled, means, closure, log_determinant }))
+        Ok(Some(Filtered { chain: self, rate, norm, noise, path, steps, means, closure, log_determinant }))
     }
 
     fn groups(&self) -> usize {
@@ -106,9 +106,7 @@ struct Filtered<'a, const D: usize> {
     /// ν in units of the chain's kernel.
     noise: f64,
     path: Path<D>,
-    /// One a sample, and one where the path ends.
-    steps: Vec<Step<D>>,
-    settled: usize,
+    steps: Steps<D>,
     /// (C + 1, groups).
     means: Vec<States<D>>,
     closure: Option<(Turn, Closure<D>)>,
@@ -121,8 +119,8 @@ impl<const D: usize> Filtered<'_, D> {
     fn variance(&self) -> f64 {
         let groups = self.chain.groups();
         let mut misfit = vec![Lanes::ZERO; groups];
-        for (i, step) in self.steps[..self.chain.u.len()].iter().enumerate() {
-            let (certainty, all) = (1.0 / step.spread, i * groups..(i + 1) * groups);
+        for i in 0..self.chain.u.len() {
+            let (certainty, all) = (1.0 / self.steps.at(i).spread, i * groups..(i + 1) * groups);
             for ((misfit, x), y) in misfit.iter_mut().zip(&self.means[all.clone()]).zip(&self.chain.targets[all]) {
                 let innovation = *y - x[0];
                 *misfit += innovation * innovation * certainty;
@@ -160,7 +158,7 @@ impl<const D: usize> Filtered<'_, D> {
             }
             None => (vec![[Lanes::ZERO; D]; groups], Square::zeros()),
         };
-        Smoother::new(&self.path, &self.steps, self.settled, adjoint, precision)
+        Smoother::new(&self.path, &self.steps, adjoint, precision)
     }
 
     /// The profile and its derivatives.
@@ -183,8 +181,8 @@ impl<const D: usize> Filtered<'_, D> {
                 progress.ask()?;
             }
             let transition = self.path.after(i);
-            let covariance = &self.steps[i + 1].covariance;
-            if i < self.settled || i + 1 == self.chain.u.len() {
+            let covariance = &self.steps.at(i + 1).covariance;
+            if i < self.steps.settled() || i + 1 == self.chain.u.len() {
                 let moved = drift(&(covariance - transition.noise));
                 half_rise = 0.5 * (moved + moved.transpose() + transition.drive * transition.drive.transpose());
             }
@@ -235,8 +233,8 @@ impl<const D: usize> Filtered<'_, D> {
             precisions[i] = smoother.precision;
         }
         self.means.truncate(n_samples * groups);
-        for (i, step) in self.steps[..n_samples].iter().enumerate() {
-            let all = i * groups..(i + 1) * groups;
+        for i in 0..n_samples {
+            let (step, all) = (self.steps.at(i), i * groups..(i + 1) * groups);
             for (x, r) in self.means[all.clone()].iter_mut().zip(&adjoints[all]) {
                 let moved = product(&step.covariance, r);
                 (0..D).for_each(|k| x[k] += moved[k]);
@@ -247,7 +245,7 @@ impl<const D: usize> Filtered<'_, D> {
             rate: self.rate,
             norm: self.norm,
             u: self.chain.u.clone(),
-            covariances: self.steps[..n_samples].iter().map(|step| step.updated(self.noise)).collect(),
+            covariances: self.steps.updated(n_samples, self.noise),
             precisions,
             states: self.means,
             adjoints,

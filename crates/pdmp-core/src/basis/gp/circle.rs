@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Cholesky, RowSVector, SVector};
 
-use super::filter::{Path, States, Step, product};
+use super::filter::{Path, States, Steps, product};
 use super::state::{Square, rate};
 use super::{PORTION, Progress};
 use crate::error::Result;
@@ -78,7 +78,7 @@ impl<const D: usize> Closure<D> {
     /// Finds the first states, and corrects the `means` by what depends on them. None if rounding makes it impossible.
     pub(super) fn new(
         path: &Path<D>,
-        steps: &[Step<D>],
+        steps: &Steps<D>,
         targets: &[Lanes],
         means: &mut [States<D>],
         n_outputs: usize,
@@ -89,10 +89,11 @@ impl<const D: usize> Closure<D> {
         let mut response = Square::identity();
         let mut information = Square::zeros();
         let mut scores = vec![[Lanes::ZERO; D]; groups];
-        for (i, step) in steps[..n_samples].iter().enumerate() {
+        for i in 0..n_samples {
             if (i + 1) % PORTION == 0 {
                 progress.ask()?;
             }
+            let step = steps.at(i);
             responses.push(response);
             let row: RowSVector<f64, D> = response.row(0).into();
             let weighted = row / step.spread;
@@ -106,7 +107,7 @@ impl<const D: usize> Closure<D> {
         }
         responses.push(response);
 
-        let Some((root, of_covariance)) = inverse_root(&steps[n_samples].covariance) else { return Ok(None) };
+        let Some((root, of_covariance)) = inverse_root(&steps.at(n_samples).covariance) else { return Ok(None) };
         let precision = root * root.transpose();
         let gap = Square::identity() - response;
         let lever = precision * gap;

@@ -74,7 +74,6 @@ impl Gaps {
 }
 
 /// What the filter knows of a sample before it is seen.
-#[derive(Clone, Debug)]
 pub(super) struct Step<const D: usize> {
     /// P, covariance of the state.
     pub(super) covariance: Square<D>,
@@ -100,34 +99,61 @@ impl<const D: usize> Step<D> {
     }
 }
 
-/// The covariances that the filter goes through from `start`, one a sample, and one where the path ends.
+/// What the filter goes through along a path: a step for each sample, and one where the path ends.
 ///
-/// On an even path they settle, and from then on are copied; where that is, is returned too.
-pub(super) fn covariances<const D: usize>(
-    path: &Path<D>,
-    start: Square<D>,
-    noise: f64,
-    progress: &mut Progress,
-) -> Result<(Vec<Step<D>>, usize)> {
-    let mut steps = Vec::with_capacity(path.n_samples() + 1);
-    let mut step = Step::new(start, noise);
-    for i in 0..path.n_samples() {
-        if (i + 1) % PORTION == 0 {
-            progress.ask()?;
+/// On an even path they settle.
+pub(super) struct Steps<const D: usize> {
+    /// Those that differ; the last stands for all that follow.
+    different: Vec<Step<D>>,
+}
+
+impl<const D: usize> Steps<D> {
+    pub(super) fn new(path: &Path<D>, start: Square<D>, noise: f64, progress: &mut Progress) -> Result<Self> {
+        let mut different = Vec::new();
+        let mut step = Step::new(start, noise);
+        for i in 0..path.n_samples() {
+            if (i + 1) % PORTION == 0 {
+                progress.ask()?;
+            }
+            let transition = path.after(i);
+            let next = transition.matrix * step.updated(noise) * transition.matrix.transpose() + transition.noise;
+            let next = Step::new(0.5 * (next + next.transpose()), noise);
+            let settled = path.is_even() && have_settled(&step.covariance, &next.covariance);
+            different.push(step);
+            step = next;
+            if settled {
+                break;
+            }
         }
-        let transition = path.after(i);
-        let next = transition.matrix * step.updated(noise) * transition.matrix.transpose() + transition.noise;
-        let next = Step::new(0.5 * (next + next.transpose()), noise);
-        let settled = path.is_even() && have_settled(&step.covariance, &next.covariance);
-        steps.push(step);
-        step = next;
-        if settled {
-            steps.resize(path.n_samples() + 1, step);
-            return Ok((steps, i + 1));
-        }
+        different.push(step);
+        Ok(Self { different })
     }
-    steps.push(step);
-    Ok((steps, path.n_samples()))
+
+    /// Sample from which all steps are alike.
+    pub(super) fn settled(&self) -> usize {
+        self.different.len() - 1
+    }
+
+    pub(super) fn at(&self, i: usize) -> &Step<D> {
+        &self.different[i.min(self.settled())]
+    }
+
+    /// Those of the first `n` samples that differ: the last stands for the rest.
+    fn first(&self, n: usize) -> &[Step<D>] {
+        &self.different[..n.min(self.different.len())]
+    }
+
+    /// Σ ln S over the first `n` samples.
+    pub(super) fn log_spreads(&self, n: usize) -> f64 {
+        let first = self.first(n);
+        let sum: f64 = first.iter().map(|step| step.spread.ln()).sum();
+        sum + (n - first.len()) as f64 * self.at(n).spread.ln()
+    }
+
+    /// Covariances of the first `n` states once their samples are seen, as far as they differ.
+    pub(super) fn updated(&self, n: usize, noise: f64) -> Vec<Square<D>> {
+        self.first(n).iter().map(|step| step.updated(noise)).collect()
+    }
 }
 
 /// Whether nothing but rounding distinguishes two covariances, or two precisions.
@@ -139,17 +165,18 @@ pub(super) fn have_settled<const D: usize>(a: &Square<D>, b: &Square<D>) -> bool
 /// The states that the filter expects at each sample and where the path ends, (C + 1, groups), from zero on.
 pub(super) fn means<const D: usize>(
     path: &Path<D>,
-    steps: &[Step<D>],
+    steps: &Steps<D>,
     targets: &[Lanes],
     progress: &mut Progress,
 ) -> Result<Vec<States<D>>> {
     let n_samples = path.n_samples();
     let groups = targets.len() / n_samples;
     let mut means = vec![[Lanes::ZERO; D]; (n_samples + 1) * groups];
-    for (i, step) in steps[..n_samples].iter().enumerate() {
+    for i in 0..n_samples {
         if (i + 1) % PORTION == 0 {
             progress.ask()?;
         }
+        let step = steps.at(i);
         let matrix = &path.after(i).matrix;
         let (now, next) = means[i * groups..(i + 2) * groups].split_at_mut(groups);
         for ((x, next), y) in now.iter().zip(next).zip(&targets[i * groups..]) {

@@ -6,16 +6,14 @@
 //! A. E. Bryson and M. Frazier, 1963; J. Durbin and S. J. Koopman, Time Series Analysis by State Space Methods, 2nd
 //! edition, Oxford 2012, Section 4.4.
 
-use super::filter::{Path, States, Step, have_settled, transposed};
+use super::filter::{Path, States, Steps, have_settled, transposed};
 use super::state::Square;
 use crate::lanes::Lanes;
 
 /// On its way back along a path.
 pub(super) struct Smoother<'a, const D: usize> {
     path: &'a Path<D>,
-    steps: &'a [Step<D>],
-    /// Sample from which all steps are alike.
-    settled: usize,
+    steps: &'a Steps<D>,
     /// r of each group.
     pub(super) adjoint: Vec<States<D>>,
     /// N.
@@ -28,14 +26,8 @@ pub(super) struct Smoother<'a, const D: usize> {
 
 impl<'a, const D: usize> Smoother<'a, D> {
     /// At the end of the path.
-    pub(super) fn new(
-        path: &'a Path<D>,
-        steps: &'a [Step<D>],
-        settled: usize,
-        adjoint: Vec<States<D>>,
-        precision: Square<D>,
-    ) -> Self {
-        Self { path, steps, settled, adjoint, precision, inverse: 0.0, resting: false }
+    pub(super) fn new(path: &'a Path<D>, steps: &'a Steps<D>, adjoint: Vec<States<D>>, precision: Square<D>) -> Self {
+        Self { path, steps, adjoint, precision, inverse: 0.0, resting: false }
     }
 
     /// Steps back to sample i, from the one after it. `visit` is told the group and (K⁻¹f)ᵢ of its outputs.
@@ -46,7 +38,7 @@ impl<'a, const D: usize> Smoother<'a, D> {
         targets: &[Lanes],
         mut visit: impl FnMut(usize, Lanes),
     ) {
-        let (step, matrix) = (&self.steps[i], &self.path.after(i).matrix);
+        let (step, matrix) = (self.steps.at(i), &self.path.after(i).matrix);
         let certainty = 1.0 / step.spread;
         let groups = self.adjoint.len();
         let all = i * groups..(i + 1) * groups;
@@ -57,7 +49,8 @@ impl<'a, const D: usize> Smoother<'a, D> {
             r[0] += weight;
             visit(group, weight);
         }
-        if self.resting && i >= self.settled {
+        let settled = i >= self.steps.settled();
+        if self.resting && settled {
             return;
         }
         let n = matrix.transpose() * self.precision * matrix;
@@ -69,7 +62,7 @@ impl<'a, const D: usize> Smoother<'a, D> {
             next[(0, k)] -= lever[k];
         }
         next[(0, 0)] += self.inverse;
-        self.resting = self.path.is_even() && i >= self.settled && have_settled(&self.precision, &next);
+        self.resting = self.path.is_even() && settled && have_settled(&self.precision, &next);
         self.precision = 0.5 * (next + next.transpose());
     }
 }

@@ -27,7 +27,7 @@ pub(super) struct Trajectory<const D: usize> {
     pub(super) norm: f64,
     /// Clock of the samples (C,), in order.
     pub(super) u: Vec<f64>,
-    /// P after each sample (C,).
+    /// P after each sample, as far as they differ: the last stands for the rest.
     pub(super) covariances: Vec<Square<D>>,
     /// N before each sample, and where the chain ends (C + 1,).
     pub(super) precisions: Vec<Square<D>>,
@@ -97,7 +97,8 @@ impl<const D: usize> Trajectory<D> {
     pub(super) fn variance(&self, u: f64) -> f64 {
         let place = self.place(u);
         let a = place.since.matrix;
-        let p = a * self.covariances[place.before] * a.transpose() + place.since.noise;
+        let covariance = self.covariances[place.before.min(self.covariances.len() - 1)];
+        let p = a * covariance * a.transpose() + place.since.noise;
         let row = place.until * p.column(0);
         let known = row.dot(&(self.precisions[place.after] * row));
         let columns = self.groups(&place).flat_map(|(value, _)| value.to_array());
