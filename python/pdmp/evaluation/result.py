@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pdmp._tables import table
 from pdmp.evaluation.predictors import BAND, WIDTH, Forecast, Predictor
 from pdmp.evaluation.recordings import Array, Recordings
 from pdmp.evaluation.splits import Reach, Split
@@ -148,10 +149,7 @@ class Evaluation:
         """Return the tables in Markdown."""
         lines = []
         for reach in self.reaches():
-            align = ["---"] + ["--:"] * (len(HEADER) - 1)
-            cells = [HEADER, align, *self.table(reach)]
-            lines += [f"**{self._title(reach)}**", ""]
-            lines += ["| " + " | ".join(row) + " |" for row in cells] + [""]
+            lines += [f"**{self._title(reach)}**", "", table(HEADER, self.table(reach)), ""]
         return "\n".join([*lines, *self._notes()])
 
     def __repr__(self) -> str:
