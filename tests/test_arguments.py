@@ -1,5 +1,7 @@
 """Arguments of a movement: those of demonstrations, and those in between."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,22 @@ def test_blend_ends_at_both() -> None:
     for share, expected in ((0, [0, 1]), (1, [2, 1]), (0.5, [1, 1])):
         np.testing.assert_array_equal(pdmp.blend(a, b, share)["style"], expected)
     assert pdmp.blend(a, b, 0.5)["tau"] == 2.0
+
+
+@pytest.mark.parametrize("demos", [1.0, None, "1", [[0, 1], [1, 0]]])
+def test_index_is_a_whole_number(demos: Any) -> None:
+    """What is no index, or list of them, is told as it was given."""
+    with pytest.raises(ValueError, match="demos = .*: pass the index of a demonstration"):
+        pdmp.as_demonstrated(pdmp.fit(reaches()), demos)
+
+
+def test_blend_refuses_what_has_no_middle() -> None:
+    """Labels, unequal lengths and a share that is no number are refused by name."""
+    for a, b in (("left", "right"), ([1.0], [1.0, 2.0])):
+        with pytest.raises(ValueError, match="style: .* cannot be blended"):
+            pdmp.blend({"style": a}, {"style": b}, 0.5)
+    with pytest.raises(ValueError, match="share = nan: must be finite"):
+        pdmp.blend({"style": [1.0]}, {"style": [2.0]}, float("nan"))
 
 
 def test_blend_refuses_a_name_that_one_lacks() -> None:

@@ -35,6 +35,10 @@ POSITIONS = {
     "scalar": (1.0, r"position has shape \[\], expected two axes"),
     "ragged": ([[1.0, 2.0], [3.0]] * 3, "position is not an array of numbers: .*inhomogeneous"),
     "objects": ([[object()] * 2] * 5, "position is not an array of numbers"),
+    "masked": (
+        np.ma.masked_greater(POSITION, 0.5),
+        "position has masked values: fill them, or cut",
+    ),
     "words": ([["left", "right"]] * 5, "position is not an array of numbers"),
     "strings": (POSITION.astype(str), "position has dtype"),
     "dates": (np.zeros((5, 2), "M8[s]"), "position has dtype"),
@@ -117,3 +121,13 @@ def test_bad_lists_of_demonstrations_are_refused(demos: Callable[[], Any], messa
     """Demonstrations that do not belong together are refused, and the odd one is named."""
     with pytest.raises(ValueError, match=message):
         pdmp.fit(demos(), **RATE)
+
+
+def test_new_demonstration_has_the_labels_of_the_model() -> None:
+    """A style is not found in other units, or of other degrees of freedom, than those learnt."""
+    described = {"dt": 0.02, "names": ["x", "y"], "units": ["m", "m"]}
+    model = pdmp.fit([Demonstration(demo.position, **described) for demo in reaches()])
+    for other in ({"names": ["y", "x"]}, {"units": ["mm", "mm"]}):
+        demo = Demonstration(POSITION, **(described | other))
+        with pytest.raises(ValueError, match=f"{next(iter(other))} differ from those of the model"):
+            model.style_of(demo)

@@ -39,6 +39,8 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"n_samples": 3}, "n_samples = 3: must lie between 4 and 1e6"),
     ({"n_samples": -1}, "n_samples = -1: must not be negative"),
     ({"smoothing": 25.1}, "smoothing = 25.1: must lie below half the sampling rate"),
+    ({"smoothing": True}, 'smoothing = True: must be None, "auto" or a cut-off in Hz'),
+    ({"mu": 3.0}, "mu does not apply to a discrete"),
     ({"smoothing": "strong"}, "smoothing = 'strong': must be None, \"auto\" or a cut-off in Hz"),
     ({"kind": "circular"}, 'kind = "circular": must be "discrete" or "rhythmic"'),
     ({"basis": "rbf"}, 'basis = \'rbf\': must be "gp", "ngnet"'),

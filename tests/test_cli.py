@@ -313,3 +313,24 @@ def test_missing_folder_is_told_before_learning(
     told = capsys.readouterr().err
     assert "no such folder" in told
     assert "learning" not in told
+
+
+def test_contexts_outside_are_told(
+    model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A movement for a context beyond those shown is written, and said to be one."""
+    out = tmp_path / "out.csv"
+    assert run("rollout", model_file, "--context", 0.0, "-o", out) == 0
+    assert capsys.readouterr().err == ""
+    assert run("rollout", model_file, "--context", 1.2, "-o", out) == 0
+    assert "outside of those demonstrated" in capsys.readouterr().err
+
+
+def test_errors_name_options(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is an argument in Python is told as the option that it is here."""
+    assert run("evaluate", folder) == 1
+    assert "pass --context" in capsys.readouterr().err
+    assert run("fit", folder, "-o", tmp_path) == 1
+    assert "a folder" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 import os
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -77,9 +78,11 @@ def test_csv_bears_what_spreadsheets_write(tmp_path: Path) -> None:
         ("t,x,x\n", "two columns are called 'x'"),
         ("x,y\n1,2\n", "no column 't' with the time among x, y: .* pass dt="),
         (TABLE.replace("20", "2O"), "line 3, column 'y': '2O' is not a number"),
-        (TABLE.replace("30", ""), "line 4, column 'y': '' is not a number"),
+        (TABLE.replace("30", ""), "line 4, column 'y': empty: pass max_gap="),
         (TABLE.replace("40", "nan"), "line 5, column 'y': nan is not finite: pass max_gap="),
         (TABLE + "0.5,5\n", "line 6: 2 fields, expected 3"),
+        (TABLE.replace(",", ";"), "line 1: 't;x;y' is one field: separate fields by commas"),
+        (TABLE.replace("t,", "t [h],"), "its unit is 'h': expected s, sec, ms"),
         ("t,x\n0,1\n0.1,2\n", "2 samples"),
         (TABLE.replace("0.2", "0.1"), "time"),
     ],
@@ -132,7 +135,11 @@ def test_npz_gives_demonstrations_stored_one_after_another(tmp_path: Path) -> No
         ({"a": POSITION}, "'a': no time stamps: pass dt="),
         ({"a": POSITION[0], "a.t": TIME}, r"'a': shape \(2,\), expected \(T, D\)"),
         ({"a": POSITION, "a.t": TIME, "names": ["x"]}, r"shape \(4, 2\), expected \(T, 1\)"),
-        ({"y": POSITION, "t": TIME, "start": [0, 9]}, "'start' must rise from 0 to at most 4"),
+        ({"y": POSITION, "t": TIME, "start": [0, 9]}, "'start' must rise from 0 to 4"),
+        ({"y": POSITION, "t": TIME, "start": [0, 2]}, "'start' must rise from 0 to 4"),
+        ({"y": POSITION, "t": TIME, "start": [0, 0.5, 4]}, "in whole numbers, got"),
+        ({"y": POSITION, "t": TIME, "start": ["a", "b"]}, "in whole numbers, got"),
+        ({"a.t": TIME}, "'a.t' has time stamps of nothing"),
         ({"a": np.array([[None]])}, "not an NPZ file of plain arrays"),
         ({"a": POSITION, "a.t": TIME[::-1]}, "'a': time"),
     ],
@@ -190,6 +197,13 @@ def test_context_is_all_numbers_or_all_labels(folder: Path) -> None:
         demos.read_folder(folder, context=["height"])
 
 
+def test_label_must_not_be_missing(folder: Path) -> None:
+    """An empty field is no label of its own."""
+    (folder / "index.csv").write_text("id,hand [side]\na,left\nb,\n")
+    with pytest.raises(ValueError, match=r"index\.csv, line 3, column 'hand': no label"):
+        demos.read_folder(folder, context=["hand"])
+
+
 def test_id_must_be_unique(folder: Path) -> None:
     """Two rows of the index with the same id are refused."""
     (folder / "index.csv").write_text("id\na\na\n")
@@ -201,6 +215,7 @@ def test_read_takes_files_and_folders_together(folder: Path) -> None:
     """Demonstrations come in the order of the paths."""
     single = folder / "demos" / "a.csv"
     assert len(demos.read([single, folder, single])) == 4
+    assert len(demos.read(single)) == 1
 
 
 def test_read_refuses_what_it_does_not_know(tmp_path: Path) -> None:
@@ -215,10 +230,72 @@ def test_context_needs_an_index(table: Path) -> None:
         demos.read([table], context=["height"])
 
 
+def test_names_come_in_a_list(table: Path, folder: Path) -> None:
+    """A text is not taken apart letter by letter."""
+    with pytest.raises(ValueError, match=r"columns = 'xy': pass a list of names, \['xy'\]"):
+        demos.read_csv(table, columns="xy")
+    with pytest.raises(ValueError, match="context = 'height': pass a list"):
+        demos.read_folder(folder, context="height")
+
+
+@pytest.mark.parametrize(
+    ("header", "second"), [("t [ms]", 1e-3), ("t (ms)", 1e-3), ("t [ns]", 1e-9)]
+)
+def test_time_has_its_unit(table: Path, header: str, second: float) -> None:
+    """Time stamps come in the unit that their header tells, in brackets or parentheses."""
+    table.write_text(TABLE.replace("t,", f"{header},", 1))
+    name = header if "(" in header else "t"
+    time = demos.read_csv(table, time=name).time
+    np.testing.assert_allclose(time, second * TIME, rtol=1e-15)
+
+
 def test_missing_file_is_an_os_error(tmp_path: Path) -> None:
     """A file that is not there is no matter of its contents."""
     with pytest.raises(FileNotFoundError):
         demos.read([tmp_path / "none.csv"])
+
+
+@pytest.mark.parametrize("names", [["1", "2"], ["t", "x"], ["x", "x_velocity"], [" ", "x"]])
+def test_csv_that_would_not_be_read_is_not_written(tmp_path: Path, names: list[str]) -> None:
+    """Names that `read_csv` refuses are refused when they are written."""
+    with pytest.raises(ValueError, match="is not a name|two columns are called"):
+        demos.write_csv(tmp_path / "out.csv", pdmp.fit(reaches()).rollout(), names)
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_what_a_link_leads_to_is_replaced(tmp_path: Path) -> None:
+    """A link stays one, in a table as in a model file."""
+    model = pdmp.fit(reaches())
+    for name, write in (
+        ("table", lambda path: demos.write_csv(path, model.rollout(), model.names)),
+        ("model", model.save),
+    ):
+        file, link = tmp_path / name, tmp_path / f"{name}-link"
+        file.write_text("older")
+        link.symlink_to(file)
+        write(link)
+        assert link.is_symlink() and len(file.read_bytes()) > 100
+
+
+def test_pipes_are_written_to(tmp_path: Path) -> None:
+    """A pipe is not replaced by a file: who reads from it gets the table, or the model."""
+    model, pipe = pdmp.fit(reaches()), tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for write in (
+        lambda: demos.write_csv(pipe, model.rollout(), model.names),
+        lambda: model.save(pipe),
+    ):
+        writer = threading.Thread(target=write)
+        writer.start()
+        assert len(pipe.read_bytes()) > 100
+        writer.join()
+    assert pipe.is_fifo()
+
+
+def test_folder_is_no_file(tmp_path: Path) -> None:
+    """A folder in place of a file is told by its own name."""
+    with pytest.raises(IsADirectoryError, match=tmp_path.name):
+        demos.write_csv(tmp_path, pdmp.fit(reaches()).rollout(), ["x", "y"])
 
 
 def test_written_csv_reads_back_to_the_last_bit(tmp_path: Path) -> None:

@@ -301,6 +301,31 @@ def test_forecast_of_another_shape_is_refused() -> None:
         evaluated({"short": Short()})
 
 
+@pytest.mark.parametrize(
+    ("forecast", "message"),
+    [
+        (Forecast(np.full((101, 2), np.nan), 1.0), "a position that is not finite"),
+        (Forecast(np.zeros((101, 2)), 1.0, np.zeros((101, 1))), r"variances of shape \(101, 1\)"),
+        ((np.zeros((101, 2)), 1.0), "a tuple, expected an evaluation.Forecast"),
+    ],
+)
+def test_forecast_that_is_none_is_refused(forecast: Any, message: str) -> None:
+    """What a predictor returns is checked before it is averaged."""
+
+    class Given(Known):
+        def fit(self, recordings: Recordings) -> Any:
+            return lambda context: forecast
+
+    with pytest.raises(ValueError, match=f"'given' foresees {message}"):
+        evaluated({"given": Given()})
+
+
+def test_reference_keeps_its_name() -> None:
+    """No other predictor takes the place of what all are compared with."""
+    with pytest.raises(ValueError, match="'mean demonstration' is always tried"):
+        evaluated({"mean demonstration": Known()})
+
+
 def test_unknown_names_are_refused(found: Evaluation) -> None:
     """Predictors and reaches that are not there are told with those that are."""
     with pytest.raises(ValueError, match="predictor = 'none': must be one of mean demonstration, "):

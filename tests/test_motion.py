@@ -116,6 +116,20 @@ def test_copied_models_move_alike(model: pdmp.Model, again: Callable[[Any], Any]
     assert_same_motion(again(model), model)
 
 
+@pytest.mark.parametrize("again", [copy.copy, lambda it: pickle.loads(pickle.dumps(it))])
+def test_results_can_leave_a_process(again: Callable[[Any], Any]) -> None:
+    """Trajectories, predictions and states come back from a pool as they were."""
+    model = pdmp.fit(reaches())
+    results = {
+        "time position velocity acceleration": model.rollout(),
+        "style goal start timing duration covariance freedom outside": model.predict([0.3]),
+    }
+    for names, result in results.items():
+        for name in names.split():
+            np.testing.assert_array_equal(getattr(again(result), name), getattr(result, name))
+    assert again(Status.FINISHED) == Status.FINISHED != again(Status.WORKING)
+
+
 OBJECTS = [
     Demonstration(np.eye(5), dt=0.1, goal=[1, 2, 3, 4, 5], context=[0.5], names=list("abcde")),
     Demonstration(np.eye(5), time=[0, 1, 3, 4, 9.5]),

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -63,6 +64,23 @@ def test_demonstrations_must_be_those_of_the_fit(model: pdmp.Model) -> None:
     """A demonstration too few is refused."""
     with pytest.raises(ValueError, match="demos has length 4, expected 5"):
         plot.demonstrations(model, reaches()[:4])
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"position": reaches()[0].position[:, :1]}, "demo 0: expected 2 DoFs, found 1"),
+        ({"position": reaches()[0].position, "names": ["y1", "y0"]}, "demo 0: names .* expected"),
+        ({"position": reaches()[0].position, "units": ["mm", "m"]}, "demo 0: units .* expected"),
+    ],
+)
+def test_demonstrations_have_the_dofs_of_the_model(
+    model: pdmp.Model, given: dict[str, Any], message: str
+) -> None:
+    """What has other degrees of freedom is not drawn in their panels."""
+    other = pdmp.Demonstration(given.pop("position"), dt=0.01, **given)
+    with pytest.raises(ValueError, match=message):
+        plot.demonstrations(model, [other] * model.n_demos)
 
 
 def test_spectrum_tells_the_chosen_number_of_styles(model: pdmp.Model) -> None:
@@ -156,6 +174,16 @@ def test_saved_figure_is_a_png(model: pdmp.Model, tmp_path: Path) -> None:
     plot.save(plot.spectrum(model), tmp_path / "new" / "spectrum.png")
     (file,) = (tmp_path / "new").iterdir()
     assert file.read_bytes().startswith(b"\x89PNG")
+
+
+def test_suffix_chooses_the_format(model: pdmp.Model, tmp_path: Path) -> None:
+    """Vectors for a paper are vectors; what matplotlib does not write is refused."""
+    figure = plot.spectrum(model)
+    plot.save(figure, tmp_path / "spectrum.pdf")
+    assert (tmp_path / "spectrum.pdf").read_bytes().startswith(b"%PDF")
+    with pytest.raises(ValueError, match="docx"):
+        plot.save(figure, tmp_path / "spectrum.docx")
+    assert [path.name for path in tmp_path.iterdir()] == ["spectrum.pdf"]
 
 
 def test_missing_matplotlib_is_named(model: pdmp.Model, monkeypatch: pytest.MonkeyPatch) -> None:

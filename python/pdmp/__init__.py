@@ -10,6 +10,7 @@ T. Matsubara, S.-H. Hyon, J. Morimoto, "Learning parametric dynamic movement pri
 multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from pdmp import demos, plot
@@ -40,16 +41,21 @@ from pdmp.arguments import as_demonstrated, blend
 from pdmp.pacing import Run, Tick
 
 if TYPE_CHECKING:
+    from pdmp import datasets, evaluation
     from pdmp.evaluation import evaluate
 else:
 
     def __getattr__(name):
-        """Import `evaluate` when it is first asked for: a control loop has no use for it."""
-        if name != "evaluate":
-            raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
-        from pdmp.evaluation import evaluate
+        """Import what a control loop has no use for when it is first asked for."""
+        if name == "evaluate":
+            return import_module("pdmp.evaluation").evaluate
+        if name in ("datasets", "evaluation"):
+            return import_module(f"pdmp.{name}")
+        raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
 
-        return evaluate
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
 
 
 __all__ = [
@@ -75,8 +81,10 @@ __all__ = [
     "__version__",
     "as_demonstrated",
     "blend",
+    "datasets",
     "demos",
     "evaluate",
+    "evaluation",
     "factorise",
     "fit",
     "load",

@@ -1,5 +1,6 @@
 """Writing files whole or not at all."""
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,13 +11,24 @@ from pathlib import Path
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a path to write to that takes the place of `path` once all went well.
 
-    An error or an interruption leaves what was at `path` before, and nothing beside it.
+    An error or an interruption leaves what was at `path` before, and nothing beside it. What a link
+    leads to is replaced, not the link; a pipe or a device is written to.
     """
     path = Path(path)
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
+    if path.exists() and not path.is_file():
+        yield path
+        return
+    place = path.resolve()
+    draft = place.with_name(f".{place.name}.{os.getpid()}.draft")
     try:
         yield draft
-        os.replace(draft, path)
+        os.replace(draft, place)
+    except OSError as error:
+        if error.filename == str(draft):
+            error.filename = str(path)
+        raise
     finally:
         draft.unlink(missing_ok=True)

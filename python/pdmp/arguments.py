@@ -29,7 +29,7 @@ def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        No index, or one outside the demonstrations.
+        No index, one that is no whole number, or one outside the demonstrations.
 
     Examples
     --------
@@ -38,6 +38,8 @@ def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
     rows = np.atleast_1d(np.asarray(demos))
     if rows.size == 0:
         raise ValueError("demos is empty: pass at least one index")
+    if rows.dtype.kind not in "iu" or rows.ndim > 1:
+        raise ValueError(f"demos = {demos!r}: pass the index of a demonstration, or a list of them")
     for row in rows:
         if not 0 <= row < model.n_demos:
             raise ValueError(f"demos: {row} must lie between 0 and {model.n_demos - 1}")
@@ -68,8 +70,20 @@ def blend(a: Mapping[str, ArrayLike], b: Mapping[str, ArrayLike], share: float) 
     Raises
     ------
     ValueError
-        Names that only one of the two has.
+        Names that only one of the two has, values that are no numbers or differ in shape, or a
+        share that is not finite.
     """
+    if not np.isfinite(share):
+        raise ValueError(f"share = {share}: must be finite")
     if single := sorted(a.keys() ^ b.keys()):
         raise ValueError(f"{', '.join(single)}: given for one of the two only; give it for both")
-    return {name: (1 - share) * np.asarray(a[name]) + share * np.asarray(b[name]) for name in a}
+    blended = {}
+    for name in a:
+        ends = np.asarray(a[name]), np.asarray(b[name])
+        if any(end.dtype.kind not in "iuf" for end in ends) or ends[0].shape != ends[1].shape:
+            raise ValueError(
+                f"{name}: {a[name]!r} and {b[name]!r} cannot be blended: expected numbers, as many "
+                "in both"
+            )
+        blended[name] = (1 - share) * ends[0] + share * ends[1]
+    return blended

@@ -30,6 +30,8 @@ def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstra
     ValueError
         A shape that is not among the 30.
     """
+    if isinstance(shapes, str):
+        raise ValueError(f"shapes = '{shapes}': pass a list of names, ['{shapes}']")
     folder = _folder()
     known = sorted(file.stem for file in folder.glob("*.mat"))
     for shape in shapes or []:

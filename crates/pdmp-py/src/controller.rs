@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyFloat;
 
 use crate::conditions::Arguments;
-use crate::convert::{Vector, refill, to_numpy};
+use crate::convert::{Reduced, Vector, refill, to_numpy};
 use crate::error::raise;
 
 /// Whether a movement goes on (`WORKING`) or has settled on its goal (`FINISHED`).
@@ -18,6 +18,17 @@ pub(crate) enum Status {
     Working,
     #[pyo3(name = "FINISHED")]
     Finished,
+}
+
+#[pymethods]
+impl Status {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        let name = match self {
+            Self::Working => "WORKING",
+            Self::Finished => "FINISHED",
+        };
+        Ok((py.import("builtins")?.getattr("getattr")?, (py.get_type::<Self>(), name).into_pyobject(py)?))
+    }
 }
 
 /// A vector that the loop writes and the user reads without a copy: a read-only array over memory that numpy does not

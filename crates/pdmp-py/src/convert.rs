@@ -9,7 +9,7 @@ use pdmp_core::{ContextValue, Threads};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyString};
+use pyo3::types::{PyList, PyString, PyTuple};
 
 use crate::error::raise;
 
@@ -20,6 +20,9 @@ pub(crate) type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 /// A numpy array of three axes.
 pub(crate) type Cube<'py> = Bound<'py, PyArray3<f64>>;
 
+/// What `__reduce__` returns: a callable, and its arguments.
+pub(crate) type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyTuple>);
+
 /// An array of any dimension, without a copy where it comes as doubles.
 fn doubles<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDyn<'py, f64, AllowTypeChange>> {
     // numpy would drop imaginary parts, and read text and dates as numbers.
@@ -28,6 +31,12 @@ fn doubles<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDy
     {
         let dtype = untyped.dtype();
         return Err(PyValueError::new_err(format!("{name} has dtype {dtype}: expected real numbers")));
+    }
+    // What a mask hides is no number.
+    if let Ok(mask) = value.getattr("mask")
+        && mask.call_method0("any")?.is_truthy()?
+    {
+        return Err(PyValueError::new_err(format!("{name} has masked values: fill them, or cut them out")));
     }
     // Fields of packed records: a view in Rust steps by whole numbers.
     if let Ok(untyped) = value.cast::<PyUntypedArray>()

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::{Matrix, Vector, matrix, optional, shown_context, to_numpy};
+use crate::convert::{Matrix, Reduced, Vector, matrix, optional, shown_context, to_numpy};
 use crate::error::raise;
 
 /// One recorded movement.
@@ -193,6 +193,22 @@ impl Trajectory {
 
 #[pymethods]
 impl Trajectory {
+    /// One of arrays as they were.
+    #[staticmethod]
+    fn _of(
+        time: Py<PyArray1<f64>>,
+        position: Py<PyArray2<f64>>,
+        velocity: Py<PyArray2<f64>>,
+        acceleration: Py<PyArray2<f64>>,
+    ) -> Self {
+        Self { time, position, velocity, acceleration }
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        let arrays = (&self.time, &self.position, &self.velocity, &self.acceleration).into_pyobject(py)?;
+        Ok((py.get_type::<Self>().getattr("_of")?, arrays))
+    }
+
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let shape = self.position.bind(py).getattr("shape")?;
         Ok(format!("<pdmp.Trajectory: (samples, DoFs) = {shape}>"))

@@ -10,6 +10,7 @@ use pdmp_core::{
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyBool;
 
 use crate::basis::{Gp, NGnet};
 use crate::convert::{array, count, matrix, numbers};
@@ -277,7 +278,10 @@ fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
 
 fn smoothing_of(smoothing: Option<&Bound<'_, PyAny>>) -> PyResult<Smoothing> {
     let Some(smoothing) = smoothing else { return Ok(Smoothing::Interpolate) };
-    if let Ok(hz) = smoothing.extract::<f64>() {
+    // True would be a cut-off of 1 Hz.
+    if let Ok(hz) = smoothing.extract::<f64>()
+        && !smoothing.is_instance_of::<PyBool>()
+    {
         return Ok(Smoothing::CutOff { hz });
     }
     match smoothing.extract::<String>().as_deref() {

@@ -11,7 +11,7 @@ use pyo3::types::PyBytes;
 
 use crate::conditions::Arguments;
 use crate::controller::Controller;
-use crate::convert::{Cube, Matrix, Vector, optional, to_numpy, vector};
+use crate::convert::{Cube, Matrix, Reduced, Vector, optional, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
 use crate::error::{interruptible, raise};
 use crate::prediction::Prediction;
@@ -308,8 +308,8 @@ impl Model {
         pdmp_core::Model::from_bytes(data).map(|model| Self(Arc::new(model))).map_err(raise)
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        Ok((py.get_type::<Self>().getattr("from_bytes")?, (self.to_bytes(py)?,)))
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        Ok((py.get_type::<Self>().getattr("from_bytes")?, (self.to_bytes(py)?,).into_pyobject(py)?))
     }
 
     fn __repr__(&self) -> String {

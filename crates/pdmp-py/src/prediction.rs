@@ -3,7 +3,7 @@
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::to_numpy;
+use crate::convert::{Reduced, to_numpy};
 
 /// The movement predicted for a condition; what the kind of primitive does not have is None.
 #[pyclass(frozen, get_all, module = "pdmp")]
@@ -49,6 +49,29 @@ impl Prediction {
 
 #[pymethods]
 impl Prediction {
+    /// One of what another one told.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)]
+    fn _of(
+        style: Py<PyArray1<f64>>,
+        goal: Option<Py<PyArray1<f64>>>,
+        start: Option<Py<PyArray1<f64>>>,
+        anchor: Option<Py<PyArray1<f64>>>,
+        timing: Py<PyArray1<f64>>,
+        duration: f64,
+        covariance: Option<Py<PyArray2<f64>>>,
+        freedom: usize,
+        outside: Py<PyArray1<f64>>,
+    ) -> Self {
+        Self { style, goal, start, anchor, timing, duration, covariance, freedom, outside }
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        let Self { style, goal, start, anchor, timing, duration, covariance, freedom, outside } = self;
+        let told = (style, goal, start, anchor, timing, *duration, covariance, *freedom, outside);
+        Ok((py.get_type::<Self>().getattr("_of")?, told.into_pyobject(py)?))
+    }
+
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let most = self.outside.bind(py).readonly().as_array().fold(0.0f64, |most, outside| most.max(*outside));
         let warning = match most {

@@ -30,26 +30,30 @@ def run(options: Namespace) -> None:
     """Read, evaluate, tell, draw."""
     from pdmp.evaluation import PDMP, baselines, evaluate, over_styles
 
+    folder = options.output and Path(options.output)
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
     recordings = demos.read(options.paths, context=options.context, **_options.reading(options))
     settings = _options.settings(options)
     tried = {"kind": options.kind, "period": options.period}
     found = evaluate(recordings, predictors=baselines() | {"PDMP": PDMP(**settings)}, **tried)
     print(found)
-    if options.output is None:
+    if not folder:
         return
     from pdmp import plot
 
     most = min(MOST_STYLES, *(len(split.train) for split in found.splits))
     del settings["n_styles"]
     curve = evaluate(recordings, predictors=over_styles(most, **settings), **tried)
-    folder = Path(options.output)
     figures = {
         "held_out": plot.held_out(found, "PDMP", unit=options.unit),
         "prediction_error": plot.prediction_error(curve, unit=options.unit),
     }
-    for name, figure in figures.items():
-        plot.save(figure, folder / f"{name}.png")
-    with replacing(folder / "evaluation.md") as draft:
+    table = folder / "evaluation.md"
+    with replacing(table) as draft:
         draft.write_text(found.markdown(), encoding="utf-8")
-    for path in sorted(folder.glob("*")):
+    print(table)
+    for name, figure in figures.items():
+        path = folder / f"{name}.png"
+        plot.save(figure, path)
         print(path)

@@ -27,9 +27,11 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Read, learn, write."""
-    folder = Path(options.output).absolute().parent
-    if not folder.is_dir():
-        raise FileNotFoundError(f"{folder}: no such folder; make it first")
+    output = Path(options.output).absolute()
+    if not output.parent.is_dir():
+        raise FileNotFoundError(f"{output.parent}: no such folder; make it first")
+    if output.is_dir():
+        raise IsADirectoryError(f"{output}: a folder; name a file in it")
     recordings = demos.read(options.paths, context=options.context, **_options.reading(options))
     with progress() as show:
         model = pdmp.fit(

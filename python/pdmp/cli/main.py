@@ -10,6 +10,13 @@ from pdmp._native import PdmpError, __version__
 from pdmp.cli import demo, evaluate, fit, info, plot, reproduce, rollout
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
+_OPTIONS = {
+    "contexts": "--context",
+    "dt": "--dt",
+    "max_gap": "--max-gap",
+    "period": "--period",
+    "time": "--time",
+}
 COMMANDS = {
     "fit": fit,
     "rollout": rollout,
@@ -77,6 +84,8 @@ def _parser() -> ArgumentParser:
 
 
 def _in_one_line(error: Exception) -> str:
+    """Return what an error says, with options in place of the arguments that they are in Python."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    return " ".join(str(error).split())
+    text = " ".join(str(error).split())
+    return re.sub(rf"\b({'|'.join(_OPTIONS)})=", lambda found: _OPTIONS[found[1]], text)

@@ -5,6 +5,7 @@ The style is that of the nominal demonstration unless one of --style, --context 
 example: pdmp rollout reach.safetensors --context 1.45 --goal 0.4 -0.2 0.9 -o reach.csv
 """
 
+import sys
 from argparse import ArgumentParser, Namespace
 
 import pdmp
@@ -43,6 +44,8 @@ def run(options: Namespace) -> None:
     names = ("style", "context", "goal", "start", "anchor", "amplitude", "tau", "dt", "duration")
     given |= {name: value for name in names if (value := getattr(options, name)) is not None}
     trajectory = model.rollout(**given)
+    if options.context is not None and model.predict(options.context).outside.any():
+        print("pdmp: the context lies outside of those demonstrated", file=sys.stderr)
     demos.write_csv(options.output, trajectory, model.names, model.units)
     print(f"{options.output}: {len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
 

@@ -19,6 +19,11 @@ def rows(path: Path) -> Iterator[tuple[int, list[str]]]:
                     continue
                 if not header:
                     header = fields
+                    if len(header) == 1 and re.search("[;\t]", header[0]):
+                        raise ValueError(
+                            f"{path}, line {reader.line_num}: '{header[0]}' is one field: "
+                            "separate fields by commas"
+                        )
                     check_names(path, reader.line_num, header)
                 elif len(fields) != len(header):
                     raise ValueError(
@@ -40,10 +45,17 @@ def label(field: str) -> tuple[str, str]:
     return (found[1], found[2].strip()) if found else (field, "")
 
 
+def listed(argument: str, names: Sequence[str]) -> list[str]:
+    """Return several names as a list; a text would be taken apart letter by letter."""
+    if isinstance(names, str):
+        raise ValueError(f"{argument} = '{names}': pass a list of names, ['{names}']")
+    return list(names)
+
+
 def check_names(path: Path, line: int, names: Sequence[str]) -> None:
     """Check that the first row names the columns, each by a name of its own."""
     for name in names:
-        if not name or _parsed(name) is not None:
+        if not name.strip() or _parsed(name) is not None:
             raise ValueError(
                 f"{path}, line {line}: '{name}' is not a name: the first row must name the columns"
             )
@@ -63,6 +75,11 @@ def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) 
     value = _parsed(field)
     if gaps and (not field or (value is not None and math.isnan(value))):
         return math.nan
+    if not field:
+        raise ValueError(
+            f"{path}, line {line}, column '{name}': empty: pass max_gap= to interpolate what is "
+            "missing, or cut the row out"
+        )
     if value is None:
         raise ValueError(f"{path}, line {line}, column '{name}': '{field}' is not a number")
     if not math.isfinite(value):

@@ -68,7 +68,7 @@ def recordings(
             raise ValueError(f"{path}, '{name}': no time stamps: pass dt=")
         kept = list(range(position.shape[1]))
         if columns is not None and names is not None:
-            kept = [_text.column(path, names, column) for column in columns]
+            kept = [_text.column(path, names, name) for name in _text.listed("columns", columns)]
         given = {
             kind: None if labels is None else [labels[k] for k in kept]
             for kind, labels in (("names", names), ("units", units))
@@ -78,7 +78,10 @@ def recordings(
 
 def _labels(arrays: dict[str, NDArray[Any]], kind: str) -> list[str] | None:
     """Take the names or units of the degrees of freedom out of the arrays."""
-    return [str(label) for label in arrays.pop(kind)] if kind in arrays else None
+    if kind not in arrays:
+        return None
+    labels = np.atleast_1d(arrays.pop(kind)).tolist()
+    return [label.decode() if isinstance(label, bytes) else str(label) for label in labels]
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -100,13 +103,18 @@ def _parts(
         for name, position in arrays.items():
             if not name.endswith(".t"):
                 yield name, position, arrays.get(f"{name}.t")
+            elif name.removesuffix(".t") not in arrays:
+                raise ValueError(f"{path}: '{name}' has time stamps of nothing")
         return
     position, time = arrays["y"], arrays.get("t")
-    start = np.atleast_1d(arrays["start"]).tolist()
-    bounds = [0, *start, len(position)]
-    if len(start) < 2 or any(after < before for before, after in pairwise(bounds)):
+    given = np.atleast_1d(arrays["start"])
+    whole = given.dtype.kind in "iuf" and given.ndim == 1 and (given == np.floor(given)).all()
+    start = given.astype(int).tolist() if whole else []
+    rises = all(before < after for before, after in pairwise(start))
+    if len(start) < 2 or not rises or (start[0], start[-1]) != (0, len(position)):
         raise ValueError(
-            f"{path}: 'start' must rise from 0 to at most {len(position)}, got {start}"
+            f"{path}: 'start' must rise from 0 to {len(position)}, where the last demonstration "
+            f"ends, in whole numbers, got {given.tolist()}"
         )
     for demo, (begin, end) in enumerate(pairwise(start)):
         yield str(demo), position[begin:end], None if time is None else time[begin:end]

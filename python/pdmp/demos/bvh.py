@@ -69,7 +69,7 @@ def read_bvh(
         raise ValueError(
             f"{path}: holds {len(motion.frames)} frames, but announces {n_frames}: export it anew"
         )
-    names = found if columns is None else list(columns)
+    names = found if columns is None else _text.listed("columns", columns)
     where = [_text.column(path, found, name) for name in names]
     position = np.array([_frame(path, k, row, found) for k, row in enumerate(motion.frames)])
     position = position.reshape(n_frames, len(found))[:, where]

@@ -17,7 +17,7 @@ SINGLE = (".csv", ".bvh")
 
 
 def read(
-    paths: Iterable[str | PathLike[str]],
+    paths: str | PathLike[str] | Iterable[str | PathLike[str]],
     *,
     columns: Sequence[str] | None = None,
     time: str = "t",
@@ -29,7 +29,7 @@ def read(
 
     Parameters
     ----------
-    paths : iterable of path
+    paths : path or iterable of path
         Files and folders.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
@@ -50,6 +50,7 @@ def read(
         A file that cannot be read.
     """
     demos: list[Demonstration] = []
+    paths = [paths] if isinstance(paths, (str, PathLike)) else paths
     options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
     for path in map(Path, paths):
         if path.is_dir():
@@ -139,14 +140,18 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
 
     A column without any number holds labels.
     """
-    (_, header), *lines = _text.rows(path)
+    (_, fields), *lines = _text.rows(path)
+    header = [_text.label(field)[0] for field in fields]
     name = _text.column(path, header, "id")
-    where = [_text.column(path, header, column) for column in columns]
+    where = [_text.column(path, header, column) for column in _text.listed("context", columns)]
     labels = {k for k in where if not any(_text.is_number(fields[k]) for _, fields in lines)}
     contexts: dict[str, list[float | str] | None] = {}
     for line, fields in lines:
         if fields[name] in contexts:
             raise ValueError(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
+        for k in labels:
+            if not fields[k]:
+                raise ValueError(f"{path}, line {line}, column '{header[k]}': no label: fill it in")
         values = [
             fields[k] if k in labels else _text.number(path, line, header[k], fields[k])
             for k in where

@@ -12,7 +12,7 @@ from pdmp._native import Demonstration, Trajectory
 from pdmp.demos import _text
 from pdmp.demos._recording import demonstration
 
-SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3}
+SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 
 
 def read_csv(
@@ -35,12 +35,12 @@ def read_csv(
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all but `time` by default.
     time : str
-        Column of the time stamps, in s unless its header tells ms.
+        Column of the time stamps, in s unless its header tells ms, µs or ns.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
     max_gap : float
         Longest gap [s] that is interpolated, from the sample before to the one after; by default
-        none is. A gap is an empty field or NaN.
+        none is. A gap is an empty field or NaN; rows that are missing altogether are none.
     context : sequence of float or str, optional
         Context (Q,) of the demonstration.
 
@@ -63,7 +63,9 @@ def read_csv(
             f"{path}: no column '{time}' with the time among {', '.join(header)}: "
             "name it with time=, or pass dt="
         )
-    names = list(columns) if columns is not None else [name for name in header if name != time]
+    names = [name for name in header if name != time]
+    if columns is not None:
+        names = _text.listed("columns", columns)
     where = [_text.column(path, header, name) for name in names]
     clock = None if dt is not None else _text.column(path, header, time)
     numbers: list[list[float]] = []
@@ -87,9 +89,11 @@ def read_csv(
 
 
 def _second(path: Path, name: str, unit: str) -> float:
-    """Return how many seconds the unit of a time column is."""
+    """Return how many seconds the unit of a time column is, which may stand in parentheses too."""
+    unit = unit or _text.label(name.replace("(", "[").replace(")", "]"))[1]
     if unit not in SECONDS:
-        raise ValueError(f"{path}, column '{name}': its unit is '{unit}': expected s or ms")
+        known = ", ".join(filter(None, SECONDS))
+        raise ValueError(f"{path}, column '{name}': its unit is '{unit}': expected {known}")
     return SECONDS[unit]
 
 
@@ -119,10 +123,11 @@ def write_csv(
     Raises
     ------
     ValueError
-        A number of names or units other than D.
+        A number of names or units other than D, or names that would not be read back.
     OSError
         A file that cannot be written.
     """
+    path, names = Path(path), _text.listed("names", names)
     n_dofs = trajectory.position.shape[1]
     units = [""] * n_dofs if units is None else units
     for kind, given in (("name", names), ("unit", units)):
@@ -130,9 +135,13 @@ def write_csv(
             raise ValueError(
                 f"{kind}s has length {len(given)}, expected {n_dofs}: one {kind} per DoF"
             )
+    suffixes = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
+    _text.check_names(
+        path, 1, ["t", *(f"{name}{suffix}" for suffix, _ in suffixes for name in names)]
+    )
     header = [
         f"{name}{suffix} [{unit}{per}]" if unit else f"{name}{suffix}"
-        for suffix, per in (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
+        for suffix, per in suffixes
         for name, unit in zip(names, units, strict=True)
     ]
     columns = (trajectory.time, trajectory.position, trajectory.velocity, trajectory.acceleration)

@@ -76,6 +76,11 @@ class Recordings:
         """Names of the degrees of freedom, as in a model."""
         return self.demos[0].names or [f"y{d}" for d in range(self.sampled.shape[2])]
 
+    @property
+    def units(self) -> list[str]:
+        """Units of the degrees of freedom, "" where one is not known."""
+        return self.demos[0].units or [""] * self.sampled.shape[2]
+
     def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
         """Return some of them."""
         demos = tuple(self.demos[row] for row in rows)

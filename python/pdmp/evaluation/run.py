@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from pdmp._native import Demonstration
@@ -114,7 +115,8 @@ def evaluate(
     ------
     ValueError
         Contexts or splits that do not fit the demonstrations, fewer than two conditions, a label
-        that a split holds out altogether, or a forecast of another shape.
+        that a split holds out altogether, a predictor that takes the name of the mean
+        demonstration, or a forecast of another shape, or not finite.
 
     References
     ----------
@@ -134,6 +136,8 @@ def evaluate(
         folds = checked(splits, read.n_demos)
     _check_labels(read, folds)
     chosen = baselines() | {"PDMP": PDMP()} if predictors is None else dict(predictors)
+    if not isinstance(chosen.get(REFERENCE, MeanDemonstration()), MeanDemonstration):
+        raise ValueError(f"predictors: '{REFERENCE}' is always tried: give yours another name")
     tried = {REFERENCE: MeanDemonstration()} | chosen
     forecasts, left_out = {}, {}
     for name, predictor in tried.items():
@@ -157,12 +161,27 @@ def _foreseen(
             learnt[key] = predictor.fit(read[split.train])
         forecasts.append([learnt[key](read.contexts[m]) for m in split.test])
         for forecast in forecasts[-1]:
-            if forecast.position.shape != read.sampled.shape[1:]:
-                raise ValueError(
-                    f"predictors: '{name}' foresees positions of shape {forecast.position.shape}, "
-                    f"expected (C, D) = {read.sampled.shape[1:]}"
-                )
+            _check_forecast(name, forecast, read.sampled.shape[1:])
     return forecasts
+
+
+def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> None:
+    if not isinstance(forecast, Forecast):
+        raise ValueError(
+            f"predictors: '{name}' foresees a {type(forecast).__name__}, expected an "
+            "evaluation.Forecast"
+        )
+    for kind in ("position", "variance"):
+        values = getattr(forecast, kind)
+        if kind == "variance" and values is None:
+            continue
+        if np.shape(values) != shape:
+            raise ValueError(
+                f"predictors: '{name}' foresees {kind}s of shape {np.shape(values)}, "
+                f"expected (C, D) = {shape}"
+            )
+        if not np.isfinite(values).all():
+            raise ValueError(f"predictors: '{name}' foresees a {kind} that is not finite")
 
 
 def _check_labels(read: Recordings, splits: Sequence[Split]) -> None:

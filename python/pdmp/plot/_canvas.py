@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import ceil
 from os import PathLike
+from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 # Okabe and Ito's palette, those that read best on white first.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+WIDEST = 20
+"""Characters of an axis label in one line."""
 BLUE, ORANGE, GREY = PALETTE[0], PALETTE[1], "#B8B8B8"
 
 
@@ -52,8 +56,12 @@ def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
 
 
 def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Return the names of the degrees of freedom, with the unit where it is known."""
-    return [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
+    """Return the names of the degrees of freedom, with the unit where it is known.
+
+    Long ones take two lines.
+    """
+    labels = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
+    return [fill(label, WIDEST) for label in labels]
 
 
 def movement_panels(
@@ -125,12 +133,16 @@ def legend(figure: Figure, axes: Axes) -> None:
 
 
 def save(figure: Figure, path: str | PathLike[str]) -> None:
-    """Write a figure as PNG. The file appears when it is complete.
+    """Write a figure in the format of the suffix, PNG without one.
+
+    The file appears when it is complete.
 
     Raises
     ------
+    ValueError
+        A suffix that matplotlib does not know.
     OSError
         A file that cannot be written.
     """
     with replacing(path) as draft:
-        figure.savefig(draft, format="png")
+        figure.savefig(draft, format=Path(path).suffix[1:] or "png")

@@ -98,7 +98,7 @@ def held_out(
     predictor : str
         Whose forecasts.
     unit : str
-        Unit of the positions, such as "rad".
+        Unit of the positions, such as "rad", in place of those of the demonstrations.
     figure : matplotlib.figure.Figure, optional
         Where to draw.
 
@@ -114,7 +114,8 @@ def held_out(
 
     score = evaluation.score(predictor)
     recordings = evaluation.recordings
-    labels = dof_labels(recordings.names, [unit] * len(recordings.names))
+    units = [unit] * len(recordings.names) if unit else recordings.units
+    labels = dof_labels(recordings.names, units)
     spread = np.ptp(recordings.sampled, axis=(0, 1))
     dofs = np.sort(np.argsort(-spread, kind="stable")[:MOST_DOFS])
     whole = "duration" if recordings.kind == "discrete" else "period"

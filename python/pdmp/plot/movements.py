@@ -43,7 +43,8 @@ def demonstrations(
     Raises
     ------
     ValueError
-        A number of demonstrations or labels other than M.
+        A number of demonstrations or labels other than M, or demonstrations of other degrees of
+        freedom than the model's.
     ImportError
         matplotlib is not installed.
     """
@@ -54,6 +55,8 @@ def demonstrations(
                 f"{name} has length {length}, expected {model.n_demos}: "
                 "one per demonstration of the fit"
             )
+    for m, demo in enumerate(demos):
+        _check(model, m, demo)
     titles = list(dict.fromkeys(labels))
     figure, columns = movement_panels(model, titles, figure)
     for m, (demo, label) in enumerate(zip(demos, labels, strict=True)):
@@ -70,6 +73,20 @@ def demonstrations(
         )
     legend(figure, columns[0][0])
     return figure
+
+
+def _check(model: Model, m: int, demo: Demonstration) -> None:
+    """Check that a demonstration has the degrees of freedom of the model."""
+    if not isinstance(demo, Demonstration):
+        raise ValueError(f"demo {m}: expected a pdmp.Demonstration, got {type(demo).__name__}")
+    if demo.n_dofs != model.n_dofs:
+        raise ValueError(f"demo {m}: expected {model.n_dofs} DoFs, found {demo.n_dofs}")
+    for kind, found, own in (
+        ("names", demo.names, model.names),
+        ("units", demo.units, model.units),
+    ):
+        if found is not None and list(found) != list(own):
+            raise ValueError(f"demo {m}: {kind} {found}, expected those of the model, {own}")
 
 
 def fan(

@@ -38,9 +38,10 @@ def spectrum(model: Model, *, figure: Figure | None = None) -> Figure:
     kept = model.n_styles
     axes = figure.subplots()
     axes.bar(number[:kept], share[:kept], color=BLUE, label=f"kept: J = {kept}")
-    axes.bar(number[kept:], share[kept:], color=GREY, label="left out")
+    if kept < len(share):
+        axes.bar(number[kept:], share[kept:], color=GREY, label="left out")
     axes.plot(number, share.cumsum(), "o-", color=ORANGE, markersize=4, label="sum so far")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set_xlim(0.4, len(share) + 0.6)
     axes.set_ylim(0, 105)
     left_out = f"{100 * model.left_out:.2g} % of the targets' RMS left out"
@@ -99,7 +100,7 @@ def styles(
                 points[chosen, other],
                 c=PALETTE[k % len(PALETTE)] if values is None else values,
                 cmap=None if values is None else gradient(),
-                marker=MARKERS[k % len(MARKERS)],
+                marker=MARKERS[(k + k // len(PALETTE)) % len(MARKERS)],
                 s=36,
                 label=group,
             )

@@ -85,7 +85,6 @@ impl Basis {
 
 /// Checks what every regressor is given.
 fn check(domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<()> {
-    check_positive("end", domain.extent())?;
     if u.is_empty() {
         return Err(Error::Arguments("u is empty: at least one sample is needed"));
     }
@@ -98,6 +97,7 @@ fn check(domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<()> {
     if u.windows(2).any(|pair| pair[1] < pair[0]) {
         return Err(Error::Arguments("u must not decrease"));
     }
+    check_positive("end", domain.extent())?;
     // Targets may exceed the bound on positions, of which they hold the derivative.
     match targets.indexed_iter().find(|(_, value)| !value.is_finite()) {
         Some(((row, column), &value)) => Err(Error::NotFiniteAt { name: "targets", row, column, value }),

@@ -67,21 +67,26 @@ struct Map {
 }
 
 impl Model {
-    /// Writes a model file. It appears whole or not at all, whatever interrupts the writing.
+    /// Writes a model file. It appears whole or not at all, whatever interrupts the writing; what a link leads to is
+    /// replaced, not the link, and a pipe or a device is written to.
     ///
     /// # Errors
     /// A path that cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let bytes = self.to_bytes()?;
         let io = |source| Error::Io { path: path.to_path_buf(), source };
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        if fs::metadata(&place).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            return fs::write(&place, &bytes).map_err(io);
+        }
+        let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // The error of a temporary file names that file; the kind of error is what matters.
         let draft = tempfile::Builder::new().prefix(".pdmp-").tempfile_in(folder);
         let mut file = draft.map_err(|error| io(error.kind().into()))?;
         file.write_all(&bytes).map_err(io)?;
         file.as_file().sync_all().map_err(io)?;
         readable(file.as_file()).map_err(io)?;
-        file.persist(path).map_err(|error| io(error.error))?;
+        file.persist(&place).map_err(|error| io(error.error))?;
         Ok(())
     }
 

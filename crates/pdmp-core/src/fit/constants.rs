@@ -30,6 +30,7 @@ impl Constants {
         };
         let (canonical, tau) = match kind {
             Kind::Discrete => {
+                given("mu", Some(options.mu).filter(|mu| *mu != FitOptions::new(kind).mu))?;
                 let tau = options.tau.unwrap_or(duration);
                 check_positive("tau", tau)?;
                 let u_end = duration / tau;

@@ -29,6 +29,14 @@ pub fn style_of(
         let (expected, found) = (n_dofs, demo.n_dofs());
         return Err(Error::Length { name: "demonstration", expected, found, per: "DoF" });
     }
+    for (told, own, otherwise) in [
+        (demo.names(), model.names(), "names differ from those of the model"),
+        (demo.units(), model.units(), "units differ from those of the model"),
+    ] {
+        if told.is_some_and(|told| told != own) {
+            return Err(Error::Arguments(otherwise));
+        }
+    }
     let alignment = Alignment {
         kind: model.kind(),
         dt,
