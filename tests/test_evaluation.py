@@ -320,6 +320,21 @@ def test_forecast_that_is_none_is_refused(forecast: Any, message: str) -> None:
         evaluated({"given": Given()})
 
 
+def test_progress_is_told_and_may_end_it() -> None:
+    """Every predictor is told by name, shares rise from 0, and what is raised comes out."""
+    told: list[tuple[str, float]] = []
+    evaluated({"known": Known()}, progress=lambda *at: told.append(at))
+    assert list(dict(told)) == ["mean demonstration", "known"]
+    shares = [share for _, share in told]
+    assert shares == sorted(shares) and shares[0] == 0 and shares[-1] < 1
+
+    def stop(name: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        evaluated({"known": Known()}, progress=stop)
+
+
 def test_reference_keeps_its_name() -> None:
     """No other predictor takes the place of what all are compared with."""
     with pytest.raises(ValueError, match="'mean demonstration' is always tried"):

@@ -11,6 +11,7 @@ from pathlib import Path
 from pdmp import demos
 from pdmp._files import replacing
 from pdmp.cli import _options
+from pdmp.cli._progress import progress
 
 MOST_STYLES = 8  # of the figure of E over J
 
@@ -36,7 +37,9 @@ def run(options: Namespace) -> None:
     recordings = demos.read(options.paths, context=options.context, **_options.reading(options))
     settings = _options.settings(options)
     tried = {"kind": options.kind, "period": options.period}
-    found = evaluate(recordings, predictors=baselines() | {"PDMP": PDMP(**settings)}, **tried)
+    with progress() as show:
+        predictors = baselines() | {"PDMP": PDMP(**settings)}
+        found = evaluate(recordings, predictors=predictors, **tried, progress=show)
     print(found)
     if not folder:
         return
@@ -44,7 +47,9 @@ def run(options: Namespace) -> None:
 
     most = min(MOST_STYLES, *(len(split.train) for split in found.splits))
     del settings["n_styles"]
-    curve = evaluate(recordings, predictors=over_styles(most, **settings), **tried)
+    with progress() as show:
+        predictors = over_styles(most, **settings)
+        curve = evaluate(recordings, predictors=predictors, **tried, progress=show)
     figures = {
         "held_out": plot.held_out(found, "PDMP", unit=options.unit),
         "prediction_error": plot.prediction_error(curve, unit=options.unit),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,7 @@ def evaluate(
     period: ArrayLike | None = None,
     n_samples: int = 101,
     max_folds: int = 12,
+    progress: Callable[[str, float], None] | None = None,
 ) -> Evaluation:
     """Learn from some demonstrations, and measure how well the others are foreseen.
 
@@ -105,6 +106,9 @@ def evaluate(
         C, the samples over each movement, linear between those recorded.
     max_folds : int
         The most folds that conditions are parted into.
+    progress : callable, optional
+        Told the predictor that is tried next, and the share of all folds of all of them that is
+        done; what it raises ends the evaluation.
 
     Returns
     -------
@@ -140,9 +144,14 @@ def evaluate(
         raise ValueError(f"predictors: '{REFERENCE}' is always tried: give yours another name")
     tried = {REFERENCE: MeanDemonstration()} | chosen
     forecasts, left_out = {}, {}
-    for name, predictor in tried.items():
+    for k, (name, predictor) in enumerate(tried.items()):
+
+        def tell(share: float, k: int = k, name: str = name) -> None:
+            if progress is not None:
+                progress(name, (k + share) / len(tried))
+
         try:
-            forecasts[name] = _foreseen(name, predictor, read, folds)
+            forecasts[name] = _foreseen(name, predictor, read, folds, tell)
         except ImportError as reason:
             left_out[name] = str(reason)
     scores = {name: score(read, folds, made) for name, made in forecasts.items()}
@@ -150,12 +159,17 @@ def evaluate(
 
 
 def _foreseen(
-    name: str, predictor: Predictor, read: Recordings, splits: Sequence[Split]
+    name: str,
+    predictor: Predictor,
+    read: Recordings,
+    splits: Sequence[Split],
+    tell: Callable[[float], None],
 ) -> list[list[Forecast]]:
     """Return what a predictor foresees, split by split; it learns once from the same rows."""
     learnt: dict[bytes, Foresee] = {}
     forecasts = []
-    for split in splits:
+    for k, split in enumerate(splits):
+        tell(k / len(splits))
         key = split.train.tobytes()
         if key not in learnt:
             learnt[key] = predictor.fit(read[split.train])
