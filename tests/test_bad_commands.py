@@ -62,7 +62,7 @@ RHYTHMIC: list[tuple[dict[str, Any], str]] = [
     ({"anchor": [1]}, "anchor has length 1, expected 2: one value per DoF"),
     ({"anchor": [NAN, 0]}, r"anchor\[0\] = NaN"),
     ({"goal": [0, 0]}, "goal does not apply to a rhythmic primitive: .*; set anchor"),
-    ({"amplitude": -1.0}, "amplitude = -1: must be finite and not negative"),
+    ({"amplitude": -1.0}, "amplitude = -1: must lie between 0, which is rest, and 1e150"),
     ({"amplitude": NAN}, "amplitude = NaN"),
     ({"context": [1]}, "the model knows no contexts: fit it with contexts="),
 ]

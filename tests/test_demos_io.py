@@ -275,6 +275,29 @@ def test_what_a_link_leads_to_is_replaced(tmp_path: Path) -> None:
         link.symlink_to(file)
         write(link)
         assert link.is_symlink() and len(file.read_bytes()) > 100
+        file.unlink()
+        write(link)
+        assert link.is_symlink() and len(file.read_bytes()) > 100
+
+
+@pytest.mark.parametrize("older", [None, 0o600, 0o664])
+def test_files_have_the_mode_of_others(tmp_path: Path, older: int | None) -> None:
+    """A new file is as readable as the process makes its files; one that is replaced stays so."""
+    model = pdmp.fit(reaches())
+    before = os.umask(0o027)
+    try:
+        for name, write in (
+            ("table", lambda path: demos.write_csv(path, model.rollout(), model.names)),
+            ("model", model.save),
+        ):
+            path = tmp_path / name
+            if older is not None:
+                path.touch()
+                path.chmod(older)
+            write(path)
+            assert path.stat().st_mode & 0o777 == (0o640 if older is None else older)
+    finally:
+        os.umask(before)
 
 
 def test_pipes_are_written_to(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     draft = place.with_name(f".{place.name}.{os.getpid()}.draft")
     try:
         yield draft
+        if place.exists():
+            shutil.copymode(place, draft)
         os.replace(draft, place)
     except OSError as error:
         if error.filename == str(draft):

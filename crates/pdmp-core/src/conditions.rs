@@ -155,6 +155,6 @@ pub(crate) fn check_amplitude(value: f64) -> Result<()> {
     if (0.0..=crate::LARGEST).contains(&value) {
         Ok(())
     } else {
-        Err(Error::Range { name: "amplitude", value, allowed: "must be finite and not negative" })
+        Err(Error::Range { name: "amplitude", value, allowed: "must lie between 0, which is rest, and 1e150" })
     }
 }

@@ -6,7 +6,7 @@ use ndarray::{Array3, Axis};
 
 use crate::conditions::{Complete, Conditions, refuse};
 use crate::demo::zeros;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::phase::Kind;
 use crate::responses::{Derivative, Responses};
@@ -41,8 +41,8 @@ impl Model {
     /// `derivative` asks for the same of ẏ or ÿ. `proceed` is told now and then the share that is done.
     ///
     /// # Errors
-    /// A variable of the other kind of primitive, conditions or times that do not fit the model, or whatever `proceed`
-    /// returns.
+    /// A variable of the other kind of primitive, a timing of several segments, conditions or times that do not fit the
+    /// model, or whatever `proceed` returns.
     pub fn jacobian(
         self: &Arc<Self>,
         variable: Variable,
@@ -53,6 +53,11 @@ impl Model {
     ) -> Result<Array3<f64>> {
         refuse(self.kind(), "goal", variable == Variable::Goal && self.kind() == Kind::Rhythmic)?;
         refuse(self.kind(), "anchor", variable == Variable::Anchor && self.kind() == Kind::Discrete)?;
+        if conditions.timing.as_ref().is_some_and(|timing| timing.len() > 1) {
+            return Err(Error::Arguments(
+                "a Jacobian is that of a movement in linear time: pass tau in place of timing",
+            ));
+        }
         let conditions = conditions.complete(self)?;
         let responses = self.responses(conditions.tau, timing, proceed)?;
         let still = if derivative == Derivative::Position { 1.0 } else { 0.0 };

@@ -155,7 +155,11 @@ impl Landscape {
 
     /// The forcing of all J·D outputs and its slope with respect to the clock.
     ///
-    /// Past the end of a discrete movement it fades with the phase, w(u) = w(u_end)·x(u)/x(u_end).
+    /// Past the end of a discrete movement it fades with the phase, w(u) = w(u_end)·x(u)/x(u_end). `value` and `slope`
+    /// take as many numbers as there are outputs, (J, D) by rows.
+    ///
+    /// # Panics
+    /// Slices that are longer.
     pub fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
         let place = self.place(u);
         let jet = |group: usize, j: usize| self.cubics(place.knot, group)[j].at(place.t);

@@ -28,6 +28,7 @@ pub(crate) trait Register: Real {
     /// Gives them back.
     fn store(self) -> Lanes;
 
+    #[inline(always)]
     fn splat(value: f64) -> Self {
         Self::load(&Lanes::splat(value))
     }

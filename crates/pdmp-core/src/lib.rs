@@ -93,7 +93,7 @@ mod spline;
 mod tabulate;
 mod targets;
 mod threads;
-mod units;
+mod unit_responses;
 
 pub use align::{Alignment, Template, TimeScaling, Warp};
 pub use attractor::Attractor;

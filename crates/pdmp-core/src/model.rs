@@ -187,7 +187,8 @@ impl Model {
         let extent = self.canonical().extent();
         let clock = self.canonical().clock_at(phase);
         // Long after the end x is zero, and the clock infinite.
-        if !(phase.is_finite() && clock >= 0.0) {
+        let beyond = self.kind() == Kind::Rhythmic && phase >= TAU;
+        if !(phase.is_finite() && clock >= 0.0) || beyond {
             let allowed = "must lie in [0, 1] where discrete, in [0, 2π) where rhythmic";
             return Err(Error::Range { name: "phase", value: phase, allowed });
         }

@@ -90,6 +90,9 @@ impl Cache {
 
     /// Keeps responses as long as no later ones need their place; those that are too large not at all.
     pub(crate) fn keep(&self, key: Key, responses: &Arc<Responses>) {
+        if responses.bytes() > MOST_BYTES {
+            return;
+        }
         self.with(|kept| {
             kept.retain(|(k, _)| *k != key);
             kept.push_back((key, Arc::clone(responses)));
@@ -144,6 +147,7 @@ mod tests {
         assert_eq!((0..20).filter(|&n| cache.find(key(n)).is_some()).collect::<Vec<_>>(), [18, 19]);
         cache.keep(key(50), &responses(MOST_BYTES));
         assert!(cache.find(key(50)).is_none(), "too large to be kept");
+        assert!(cache.find(key(18)).is_some() && cache.find(key(19)).is_some(), "others stay");
     }
 
     /// A key is the whole of what responses depend on; a copy of a cache is empty.

@@ -133,11 +133,14 @@ fn fits_are_reproducible() {
 /// The interruption that a caller asks for reaches it, from every stage.
 #[test]
 fn a_fit_can_be_interrupted() {
-    for stop in
-        [pdmp_core::Stage::Targets, pdmp_core::Stage::Factorise, pdmp_core::Stage::Regress, pdmp_core::Stage::Compile]
-    {
+    use pdmp_core::Stage;
+
+    for stop in [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile] {
         let mut proceed = |stage, _| if stage == stop { Err(Error::Interrupted) } else { Ok(()) };
-        let options = pdmp_core::FitOptions { basis: gp(), ..options(Kind::Discrete) };
+        let mut options = pdmp_core::FitOptions { basis: gp(), ..options(Kind::Discrete) };
+        if stop == Stage::Align {
+            options.alignment.time_scaling = pdmp_core::TimeScaling::Warp(pdmp_core::Warp::default());
+        }
         assert!(matches!(fit(&reaches(), &options, &mut proceed), Err(Error::Interrupted)));
     }
 }

@@ -6,7 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use common::*;
-use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
+use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status, Timing};
 use proptest::prelude::*;
 
 fn controller(model: &Arc<Model>, dt: f64) -> Controller {
@@ -291,6 +291,40 @@ fn finishes_at_the_goal_in_force() {
     while back.step().unwrap() == Status::Working {}
     run(&mut back, 20);
     assert!(distance(back.position(), &nominal) < 0.01, "{:?}", back.position());
+}
+
+/// Nor while a style is on its way that still pushes the movement off its goal.
+#[test]
+fn finishes_in_the_style_in_force() {
+    let nominal = REACH.demonstrated().goals.row(REACH.demonstrated().nominal).to_vec();
+    let range = REACH.ranges().iter().copied().fold(0.0, f64::max);
+    for size in [1.0, 30.0, 1000.0] {
+        let conditions =
+            Conditions { style: Some(vec![0.0; 2]), start: Some(nominal.clone()), ..Conditions::default() };
+        let mut late = Controller::new(Arc::clone(&REACH), 1e-3, &conditions, None).unwrap();
+        while late.time() < 1.001 * REACH.duration() {
+            late.step().unwrap();
+        }
+        late.set_style(&[size; 2]).unwrap();
+        while late.step().unwrap() == Status::Working {}
+        let mut farthest = 0.0f64;
+        for _ in 0..3000 {
+            late.step().unwrap();
+            farthest = farthest.max(distance(late.position(), &nominal));
+        }
+        assert!(farthest < 5e-3 * range, "{size}: {farthest:e} of {range}");
+    }
+}
+
+/// A tick of any length makes a controller, which refuses to take it.
+#[test]
+fn ticks_beyond_all_measure_are_refused() {
+    for dt in [1e100, 1e160, f64::MAX] {
+        let mut controller = controller(&REACH, dt);
+        assert!(matches!(controller.step(), Err(Error::Range { name: "dt", .. })));
+        let timing = Timing { dt, duration: Some(f64::MAX) };
+        let _ = REACH.rollout(&Conditions::default(), timing);
+    }
 }
 
 /// Everything at the edge of what is accepted, together, leaves the motion finite.

@@ -350,6 +350,20 @@ proptest! {
 }
 
 /// What cannot be a warp, events or a timing is refused with its numbers and the mend.
+/// A Jacobian is of linear time: one of another movement is not handed out.
+#[test]
+fn jacobian_of_a_timing_is_refused() {
+    let demos = [EVEN, UNEVEN].map(|slopes| warped(Kind::Discrete, 1.0, &slopes, 2.0));
+    let model = Arc::new(fit(&demos, &by_warp(Kind::Discrete), &mut |_, _| Ok(())).unwrap());
+    let conditions = Conditions { timing: Some(model.demonstrated().timings.row(1).to_vec()), ..Conditions::default() };
+    let timing = Timing { dt: 0.01, duration: None };
+    let found =
+        model.jacobian(pdmp_core::Variable::Style, pdmp_core::Derivative::Position, &conditions, timing, &mut |_| {
+            Ok(())
+        });
+    assert!(matches!(found, Err(Error::Arguments(_))));
+}
+
 #[test]
 fn bad_timings_are_refused() {
     let demos = reaches();

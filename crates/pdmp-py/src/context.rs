@@ -25,7 +25,7 @@ use crate::fit::map_of;
 ///     What was shown in each.
 /// map : {"auto", "linear", "polynomial", "gp"}
 ///     "auto" is the Gaussian process, unless another map is better at contexts left out by more than two standard
-///     errors.
+///     errors; linear for fewer than 4 different contexts, and for more than 1024.
 ///
 /// Raises
 /// ------

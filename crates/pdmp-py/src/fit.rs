@@ -39,7 +39,7 @@ use crate::warp::Warp;
 /// map : {"auto", "linear", "polynomial", "gp"}
 ///     What leads from contexts to movements: least squares as in the paper, ridge regression on polynomials of second
 ///     degree, or a Gaussian process. "auto" is the process, unless another is better at contexts left out by more
-///     than two standard errors; `model.map` tells.
+///     than two standard errors, and linear for fewer than 4 different contexts or more than 1024; `model.map` tells.
 /// n_styles : int or "auto", optional
 ///     Style dimension J; otherwise from `spectrum`. "auto" is by what contexts foresee: the fewest styles whose error at
 ///     contexts held out (cross-validation, at most ten folds) is above the least of all by no more than the standard

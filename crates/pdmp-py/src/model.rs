@@ -206,9 +206,10 @@ impl Model {
 
     /// Bounds within which a new movement of a condition lies, for each sample of `rollout(context=context, dt=dt)`.
     ///
-    /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, a = ∂y/∂(style, goal, start), the variance v that
-    /// the styles leave out of the demonstrations, and Student's quantile t for the degrees of freedom. Movements are
-    /// compared at equal phase: how their duration varies is in the prediction.
+    /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to what is
+    /// predicted, the variance v that the styles leave out of the demonstrations, and Student's quantile t for the
+    /// degrees of freedom. Movements are compared at equal shares of their durations: how these vary is in the
+    /// prediction.
     ///
     /// Parameters
     /// ----------
@@ -237,7 +238,8 @@ impl Model {
         dt: f64,
     ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
-        let [lower, upper] = self.0.band(&prediction, level, Timing { dt, duration: None }).map_err(raise)?;
+        let timing = Timing { dt, duration: None };
+        let [lower, upper] = py.detach(|| self.0.band(&prediction, level, timing)).map_err(raise)?;
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 

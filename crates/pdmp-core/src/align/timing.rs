@@ -90,7 +90,11 @@ impl WarpingFunction {
                 return [1.0 + (time - duration) * rate, rate, 0.0];
             }
             Kind::Discrete => (0.0, time),
-            Kind::Rhythmic => ((time / duration).floor(), time.rem_euclid(duration)),
+            Kind::Rhythmic => {
+                // Turns are counted by what is left: a quotient of its own may round to the next one.
+                let left = time.rem_euclid(duration);
+                (((time - left) / duration).round(), left)
+            }
         };
         let k = self.times.partition_point(|&t| t <= time).clamp(1, self.times.len() - 1) - 1;
         let piece = self.piece(k);
@@ -229,6 +233,24 @@ mod tests {
                 let time = f64::from(i) / 20.0;
                 let [phase, rate, bend] = warp.phase(time);
                 assert!((phase - time / 2.0).abs() < 1e-14 && (rate - 0.5).abs() < 1e-14 && bend.abs() < 1e-13);
+            }
+        }
+    }
+
+    /// Turns are counted once, also where a time is a whole number of them but for rounding.
+    #[test]
+    fn turns_are_counted_once() {
+        for hundredths in 20..300 {
+            let period = f64::from(hundredths) / 100.0;
+            let warp = WarpingFunction::new(Kind::Rhythmic, &[0.0, 0.5, 1.0], &[0.6 * period, 0.4 * period]);
+            for dt in [0.01, 0.001, period / 50.0] {
+                let mut before = -1e-12;
+                for k in 0..(10.0 * period / dt) as usize {
+                    let time = k as f64 * dt;
+                    let [phase, ..] = warp.phase(time);
+                    assert!(phase > before && (phase - time / period).abs() < 0.2, "{period} {time}: {phase}");
+                    before = phase;
+                }
             }
         }
     }

@@ -61,7 +61,8 @@ impl fmt::Display for MapKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MapChoice {
     /// The Gaussian process, unless another map has a smaller error at contexts left out, by a share of the two errors
-    /// that is above zero by more than two standard errors.
+    /// that is above zero by more than two standard errors; linear for fewer than 4 different contexts, and for more
+    /// than 1024.
     #[default]
     Auto,
     /// This one.

@@ -3,7 +3,7 @@
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use crate::demo::ContextValue;
+use crate::demo::{ContextValue, check_context};
 use crate::error::{Error, Result, check_finite};
 
 /// What one value of every context means.
@@ -65,10 +65,16 @@ fn unknown(column: usize, value: String, known: &[String]) -> Error {
 
 /// Contexts of demonstrations as numbers (M, Q), labels as their index, with what each column means.
 pub(crate) fn tabulate(contexts: &[&[ContextValue]]) -> Result<(Vec<ContextColumn>, Array2<f64>)> {
+    if contexts.is_empty() {
+        return Err(Error::Arguments("contexts is empty: pass one row per movement"));
+    }
     let width = contexts.iter().map(|context| context.len()).find(|&width| width > 0).unwrap_or(0);
     if let Some(m) = contexts.iter().position(|context| context.len() != width) {
         let (found, per) = (contexts[m].len(), "context value, as in the other demonstrations");
         return Err(Error::Length { name: "context", expected: width, found, per }.in_demo(m));
+    }
+    for (m, context) in contexts.iter().enumerate() {
+        check_context(context).map_err(|error| error.in_demo(m))?;
     }
     let columns = (0..width)
         .map(|q| ContextColumn::of(q, &contexts.iter().map(|context| &context[q]).collect::<Vec<_>>()))

@@ -27,6 +27,20 @@ fn linear_data_are_predicted_exactly() {
     }
 }
 
+/// What no map can be learnt from is refused with its place, whatever the map.
+#[test]
+fn contexts_that_are_none_are_refused() {
+    let bad = |contexts: &[Vec<ContextValue>], choice| {
+        let outputs = Array2::zeros((contexts.len(), 2));
+        ContextMap::fit(contexts, outputs.view(), choice).unwrap_err().to_string()
+    };
+    for choice in [MapKind::Linear, MapKind::Polynomial, MapKind::Gp].map(MapChoice::Given) {
+        assert!(bad(&[], choice).contains("contexts is empty"));
+        assert!(bad(&[vec![], vec![]], choice).contains("context is empty"));
+        assert!(bad(&contexts(&[0.0, f64::NAN, 1.0]), choice).contains("demo 1: context[0] = NaN"));
+    }
+}
+
 /// Slopes and covariance are those of the normal equations, solved here by Cramer's rule.
 #[test]
 fn regression_agrees_with_the_normal_equations() {

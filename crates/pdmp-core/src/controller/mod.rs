@@ -133,7 +133,7 @@ impl Controller {
             held: Held::new(model.ranges(), model.canonical().extent()),
             finest,
             glide: filter.glide(dt),
-            propagator: series.propagator::<Lanes>(1.0 / conditions.tau * dt),
+            propagator: series.propagator::<Lanes>(0.0),
             series,
             lead: 1.0,
             conditions,

@@ -286,17 +286,24 @@ impl Controller {
     }
 
     /// Whether a movement is over: how far a DoF may still go is at most about |y − g| + 2|z + w|/α_z + |w|/β_z, what is
-    /// left of its way, of its speed at critical damping, and of its forcing, and as far as the goal itself still goes.
+    /// left of its way, of its speed at critical damping, and of its forcing, be it of the style that is on its way, and
+    /// as far as the goal itself still goes.
     fn settled(&self) -> Status {
         let Some(Jet { value: fade, .. }) = self.model.landscape().fading(self.clock.value()) else {
             return Status::Working;
         };
         let Attractor { alpha_z, beta_z } = self.model.attractor();
+        let (landscape, target) = (self.model.landscape(), unpack(self.style.target(), self.model.n_styles()));
+        let place = landscape.place(self.clock.value());
         let over = (0..self.z.len()).all(|group| {
             let way = (self.position[group] - self.centre.target()[group]).abs();
             let forcing = self.forcing[group].shape * fade;
             let flow = (self.z[group] + forcing).abs() * (2.0 / alpha_z);
-            let left = way + flow + forcing.abs() * (1.0 / beta_z) + self.filter.left(&self.centre, group);
+            let mut push = forcing.abs();
+            if !self.style.settled() {
+                push = push.max((landscape.blend::<Lanes>(place, group, target).value * fade).abs());
+            }
+            let left = way + flow + push * (1.0 / beta_z) + self.filter.left(&self.centre, group);
             left.simd_le(self.tolerance[group]).all()
         });
         if over { Status::Finished } else { Status::Working }

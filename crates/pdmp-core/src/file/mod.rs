@@ -75,17 +75,22 @@ impl Model {
     pub fn save(&self, path: &Path) -> Result<()> {
         let bytes = self.to_bytes()?;
         let io = |source| Error::Io { path: path.to_path_buf(), source };
-        let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let place = fs::canonicalize(path)
+            // What a link leads to need not be there yet.
+            .or_else(|_| fs::read_link(path).map(|to| path.parent().unwrap_or(Path::new("")).join(to)))
+            .unwrap_or_else(|_| path.to_path_buf());
         if fs::metadata(&place).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
             return fs::write(&place, &bytes).map_err(io);
         }
         let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // The error of a temporary file names that file; the kind of error is what matters.
-        let draft = tempfile::Builder::new().prefix(".pdmp-").tempfile_in(folder);
+        let draft = drafts().prefix(".pdmp-").tempfile_in(folder);
         let mut file = draft.map_err(|error| io(error.kind().into()))?;
         file.write_all(&bytes).map_err(io)?;
         file.as_file().sync_all().map_err(io)?;
-        readable(file.as_file()).map_err(io)?;
+        if let Ok(older) = fs::metadata(&place) {
+            file.as_file().set_permissions(older.permissions()).map_err(io)?;
+        }
         file.persist(&place).map_err(|error| io(error.error))?;
         Ok(())
     }
@@ -135,14 +140,15 @@ fn checksum<'a>(constants: &Constants, arrays: impl Iterator<Item = (&'a str, &'
     Ok(hasher.finalize())
 }
 
-/// A temporary file is its owner's alone; a model is readable like any other file.
-#[cfg(unix)]
-fn readable(file: &fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn readable(_: &fs::File) -> std::io::Result<()> {
-    Ok(())
+/// Makes drafts that are readable like any other new file: by itself a temporary one is its owner's alone.
+fn drafts() -> tempfile::Builder<'static, 'static> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mut builder = tempfile::Builder::new();
+        builder.permissions(fs::Permissions::from_mode(0o666));
+        builder
+    }
+    #[cfg(not(unix))]
+    tempfile::Builder::new()
 }

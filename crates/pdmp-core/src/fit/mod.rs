@@ -9,7 +9,7 @@ use std::sync::Arc;
 use ndarray::{Array2, s};
 
 use crate::context::{ContextColumn, ContextMap, tabulate};
-use crate::demo::{ContextValue, Demonstration, check_context};
+use crate::demo::{ContextValue, Demonstration};
 use crate::error::{Error, Result};
 use crate::factor::{Factors, StyleCount};
 use crate::foresight::Foresight;
@@ -57,9 +57,11 @@ pub fn fit(
             let (columns, numbers) = contexts.as_ref().ok_or(Error::Arguments(
                 "n_styles = \"auto\" goes by contexts: pass contexts, a number, or None to go by the spectrum",
             ))?;
-            let all = Factors::of(targets.forcing.view(), StyleCount::Spectrum(1.0), &mut factorising)?;
+            let mut first = |share: f64| factorising(0.5 * share);
+            let all = Factors::of(targets.forcing.view(), StyleCount::Spectrum(1.0), &mut first)?;
             let foresight = Foresight::new(&aligned, &targets, &all, constants.attractor, constants.canonical)?;
-            let n_styles = foresight.styles(columns, numbers, options.map, &mut factorising)?;
+            let mut second = |share: f64| factorising(0.5 + 0.5 * share);
+            let n_styles = foresight.styles(columns, numbers, options.map, &mut second)?;
             all.leading(n_styles)
         }
     };
@@ -127,14 +129,11 @@ fn contexts_of(
     demos: &[Demonstration],
     given: Option<&[Vec<ContextValue>]>,
 ) -> Result<Option<(Vec<ContextColumn>, Array2<f64>)>> {
-    if let Some(contexts) = given {
-        if contexts.len() != demos.len() {
-            let (expected, found) = (demos.len(), contexts.len());
-            return Err(Error::Length { name: "contexts", expected, found, per: "demonstration" });
-        }
-        for (m, context) in contexts.iter().enumerate() {
-            check_context(context).map_err(|error| error.in_demo(m))?;
-        }
+    if let Some(contexts) = given
+        && contexts.len() != demos.len()
+    {
+        let (expected, found) = (demos.len(), contexts.len());
+        return Err(Error::Length { name: "contexts", expected, found, per: "demonstration" });
     }
     let contexts: Option<Vec<&[ContextValue]>> = match given {
         Some(contexts) => Some(contexts.iter().map(Vec::as_slice).collect()),
