@@ -109,6 +109,12 @@ public:
         return name ? name : "";
     }
 
+    /// A label that a value of the contexts may be, both counted from 0; empty past the last, and where it is a number.
+    std::string label(std::size_t value, std::size_t label) const {
+        const char *found = pdmp_model_label(get(), value, label);
+        return found ? found : "";
+    }
+
     /// Conditions that repeat a demonstration, counted from 0.
     Conditions demonstration(std::size_t demonstration) const {
         return conditions([&](pdmp_conditions *told, pdmp_buffer numbers, pdmp_text error) {

@@ -175,6 +175,9 @@ pub extern "C" fn pdmp_model_name(model: Option<&pdmp_model>, dof: usize) -> *co
 
 /// Conditions that repeat a demonstration, counted from 0: its style, goal and start or anchor, and tau.
 ///
+/// Of a model whose time was warped or has events, tau is that of the whole duration: within it the movement hurries and
+/// pauses as the nominal one does.
+///
 /// They are written to `numbers`, which has room for pdmp_info.n_conditions of them, and `conditions` points there.
 ///
 /// # Safety
@@ -219,7 +222,7 @@ pub extern "C" fn pdmp_model_label(model: Option<&pdmp_model>, value: usize, lab
 }
 
 /// Conditions of the movement predicted for a context (n_contexts), as in Section 4.1.2: style, goal and start or anchor,
-/// and tau. A label is given by its index, see pdmp_model_label.
+/// and tau, that of the whole duration. A label is given by its index, see pdmp_model_label.
 ///
 /// They are written to `numbers`, which has room for pdmp_info.n_conditions of them, and `conditions` points there.
 ///

@@ -34,6 +34,7 @@ int main(int, char **argv) try {
     auto model = pdmp::Model::from_bytes(bytes.data(), bytes.size());
     REQUIRE(model.info().n_dofs == 3 && model.info().kind == PDMP_DISCRETE);
     REQUIRE(model.name(0) == pdmp::Model::load(argv[1]).name(0) && model.name(3).empty());
+    REQUIRE(model.label(0, 0).empty());
     REQUIRE(thrown([&] { model.demonstration(5); }) == PDMP_RANGE);
     REQUIRE(thrown([&] { model.predict({}); }) == PDMP_NULL);
 
