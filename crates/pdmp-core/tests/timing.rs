@@ -371,7 +371,7 @@ fn bad_timings_are_refused() {
         |time_scaling| fit(&demos, &with(Kind::Discrete, time_scaling), &mut |_, _| Ok(())).unwrap_err().to_string();
     for (segments, slope, message) in [
         (0, 2.5, "segments = 0: must be at least 1, which is linear"),
-        (46, 2.5, "segments = 46: must lie between 1 and 45, half the fewest samples of a demonstration"),
+        (46, 2.5, "segments = 46: must lie between 1 and 45, half the fewest samples of a demonstration or 1000"),
         (8, 0.9, "slope = 0.9: must lie between 1, which is linear, and 10"),
         (8, f64::NAN, "slope = NaN: must lie between 1, which is linear, and 10"),
     ] {

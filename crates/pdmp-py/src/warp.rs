@@ -13,7 +13,7 @@ use crate::error::raise;
 /// Parameters
 /// ----------
 /// segments : int
-///     Number K of segments of equal phase; 1 is linear. At most half the samples of each demonstration.
+///     Number K of segments of equal phase; 1 is linear. At most half the samples of each demonstration, and 1000.
 /// slope : float
 ///     Bound of a segment's time, from 1 to 10: at most `slope` times that of linear scaling, at least 1 / `slope`.
 ///

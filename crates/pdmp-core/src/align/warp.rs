@@ -26,6 +26,8 @@ use crate::threads::Threads;
 
 /// Steps of the grid of time in a segment of linear time, and as many places at which a segment is compared.
 const STEPS: usize = 10;
+/// Segments whose search takes some 160 MB a thread: its memory grows with their square.
+const MOST_SEGMENTS: usize = 1000;
 /// Steepest slope that can be asked for: the grid knows no flatter one than its inverse.
 const STEEPEST: f64 = STEPS as f64;
 /// λ, what a warp costs.
@@ -106,7 +108,7 @@ impl Aligned<'_> {
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Template> {
         let fewest = self.demos.iter().map(|demo| demo.n_samples()).min().unwrap_or(0).min(self.n_samples);
-        warp.check(fewest / 2)?;
+        warp.check((fewest / 2).min(MOST_SEGMENTS))?;
         let (n_demos, n_dofs) = (self.n_demos(), self.demo(0).n_dofs());
         let unit = unit.map_or_else(|| ranges(self), <[f64]>::to_vec);
         let search = Search::new(warp.segments, warp.slope, n_dofs);

@@ -216,6 +216,15 @@ proptest! {
             let (profile, slope) = quietly(|progress| chain.slope(hyperparameters, progress)).unwrap();
             Score { value: profile.value(), gradient: profile.gradient(&slope) }
         };
+        let variances = |chain: &Chain<3>| {
+            let Form::Matern52(found) = quietly(|progress| chain.fit(hyperparameters, progress)).unwrap().form else {
+                panic!("another kernel");
+            };
+            (0..40).map(|k| found.variance(domain.extent() * (f64::from(k) + 0.37) / 40.0)).collect::<Vec<f64>>()
+        };
+        for (a, b) in variances(&even).into_iter().zip(variances(&uneven)) {
+            prop_assert!((a - b).abs() < 1e-9, "variance {a} is not {b}");
+        }
         let (even, uneven) = (score(&even), score(&uneven));
         let close = |a: f64, b: f64| (a - b).abs() < 1e-7 * (n_samples as f64 + a.abs());
         prop_assert!(close(even.value, uneven.value), "{} is not {}", even.value, uneven.value);
