@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pdmp._native import Demonstration
+from pdmp.demos._text import listed
 
 
 def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstration]]:
@@ -30,14 +31,13 @@ def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstra
     ValueError
         A shape that is not among the 30.
     """
-    if isinstance(shapes, str):
-        raise ValueError(f"shapes = '{shapes}': pass a list of names, ['{shapes}']")
     folder = _folder()
     known = sorted(file.stem for file in folder.glob("*.mat"))
-    for shape in shapes or []:
+    chosen = listed("shapes", shapes or known)
+    for shape in chosen:
         if shape not in known:
             raise ValueError(f"shapes: no '{shape}' among {', '.join(known)}")
-    return {shape: _demonstrations(folder / f"{shape}.mat") for shape in shapes or known}
+    return {shape: _demonstrations(folder / f"{shape}.mat") for shape in chosen}
 
 
 def _folder() -> Path:
