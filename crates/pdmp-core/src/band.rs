@@ -44,7 +44,7 @@ impl Model {
         let mut sum = Array2::zeros((n_samples, self.n_dofs()));
         let mut shown = Array2::zeros(sum.dim());
         for (m, outputs) in outputs.rows().into_iter().enumerate() {
-            aligned.sample(m, shown.as_slice_mut().unwrap_or_default())?;
+            aligned.sample(m, shown.as_slice_mut().unwrap_or_default());
             let made = sensitivity.positions(outputs);
             sum.zip_mut_with(&(&shown - &made.slice(ndarray::s![..n_samples, ..])), |sum, error| *sum += error * error);
         }
