@@ -137,19 +137,19 @@ pub(crate) fn pool(n: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Scores of K cut-offs, of each recording and DoF.
-struct Scores {
+pub(super) struct Scores {
     /// ln(n‖y − f‖²/tr(I − A)²), summed over the recordings (D, K).
-    logarithms: Array2<f64>,
+    pub(super) logarithms: Array2<f64>,
     /// ‖y − f‖² (D, K), of samples that are not thinned.
-    squares: Array2<f64>,
+    pub(super) squares: Array2<f64>,
     /// tr(I − A) (D, K).
-    traces: Array2<f64>,
+    pub(super) traces: Array2<f64>,
     /// Number of recordings in which a column moves (D,).
     moving: Array1<f64>,
 }
 
 impl Scores {
-    fn of(pool: &[Thinned], columns: &[usize], grid: &[f64], threads: Threads) -> Result<Self> {
+    pub(super) fn of(pool: &[Thinned], columns: &[usize], grid: &[f64], threads: Threads) -> Result<Self> {
         let shape = (columns.len(), grid.len());
         let mut parts: Vec<Self> = pool.iter().map(|_| Self::zeros(shape)).collect();
         threads.try_for_each(pool.iter().zip(&mut parts).collect(), |(thinned, part)| {
@@ -197,7 +197,7 @@ impl Scores {
 }
 
 /// A recording by the means of blocks of `block` samples.
-struct Thinned {
+pub(super) struct Thinned {
     time: Vec<f64>,
     period: Option<f64>,
     /// Means (n, D).
@@ -208,7 +208,7 @@ struct Thinned {
 
 impl Thinned {
     /// The means of the largest blocks that leave at least `least` samples.
-    fn of(samples: &Samples, least: usize) -> Self {
+    pub(super) fn of(samples: &Samples, least: usize) -> Self {
         let block = (samples.len() / least).max(1);
         let chunks = samples.time.chunks_exact(block);
         let time: Vec<f64> = chunks.map(|times| times.iter().sum::<f64>() / block as f64).collect();

@@ -94,23 +94,93 @@ fn dense(knots: &[f64], y: &[f64], lambda: f64) -> (DVector<f64>, f64) {
     (f, score)
 }
 
+/// Scores of one recording over a grid of cut-offs, with every sample.
+fn scores(samples: &Samples, grid: &[f64]) -> noise::Scores {
+    noise::Scores::of(&[noise::Thinned::of(samples, usize::MAX)], &[0], grid, Threads::ONE).unwrap()
+}
+
 #[test]
 fn values_and_scores_are_those_of_the_dense_formulas() {
-    let (knots, mut normal) = (irregular(40, 1.0), noise(1));
-    let y: Vec<f64> = knots.iter().map(|t| (t / 6.0).sin() + 0.1 * normal()).collect();
-    let roughness = Roughness::new(&knots);
-    let columns = [Column { d: 0, scale: 1.0, bend: roughness.bend(&y) }];
-    for lambda in [1e-3, 0.1, 10.0, 1e4] {
-        let (f, score) = dense(&knots, &y, lambda);
-        let residual = roughness.residual(&roughness.factor(lambda), &columns[0].bend);
+    let (time, mut normal) = (irregular(40, 0.01), noise(1));
+    let y = Array2::from_shape_fn((40, 1), |(i, _)| (time[i] / 0.06).sin() + 0.1 * normal());
+    let samples = Samples { time: &time, period: None, values: y.view() };
+    let knots: Vec<f64> = time.iter().map(|t| t / samples.interval()).collect();
+    let grid = [0.8, 3.0, 20.0, 60.0];
+    let found = scores(&samples, &grid);
+    let mut scale = None;
+    for (k, hz) in grid.into_iter().enumerate() {
+        let (f, score) = dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval()));
+        let smoothed = samples.smoothed(&[Some(hz)]);
         for i in 0..40 {
-            assert_abs_diff_eq!(y[i] - lambda * residual[i], f[i], epsilon = 1e-10);
+            assert_abs_diff_eq!(smoothed[[i, 0]], f[i], epsilon = 1e-10);
         }
-        assert_relative_eq!(roughness.scores(lambda, &columns)[0], score, max_relative = 1e-9);
+        // Scores are compared in a unit of their own.
+        let unit = found.logarithms[[0, k]] - score.ln();
+        assert_abs_diff_eq!(unit, *scale.get_or_insert(unit), epsilon = 1e-8);
+        let squares = (0..40).map(|i| (y[[i, 0]] - f[i]).powi(2)).sum::<f64>();
+        assert_relative_eq!(found.squares[[0, k]], squares, max_relative = 1e-8);
+        assert_relative_eq!(found.traces[[0, k]], (40.0 * squares / score).sqrt(), max_relative = 1e-8);
     }
-    let least = (-100..500).map(|k| dense(&knots, &y, 10f64.powf(k as f64 / 100.0)).1).fold(f64::MAX, f64::min);
-    let found = roughness.cross_validate(&columns, 1e6)[0];
-    assert_relative_eq!(dense(&knots, &y, found).1, least, max_relative = 1e-4);
+    let of = |hz: f64| dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval())).1;
+    let least = (0..400).map(|k| of(0.5 * 10f64.powf(k as f64 / 160.0))).fold(f64::MAX, f64::min);
+    let noise = Noise::of(Smoothing::Auto, &[samples], Threads::ONE).unwrap();
+    assert_relative_eq!(of(noise.cut_offs()[0].unwrap()), least, max_relative = 1e-2);
+}
+
+/// On a uniform circle the penalty is diagonal in Fourier components, of the eigenvalues that [`lambda`] inverts.
+#[test]
+fn scores_of_a_cycle_are_those_of_its_fourier_components() {
+    let (n, mut normal) = (48, noise(5));
+    let time = uniform(n, 0.02);
+    let y = Array2::from_shape_fn((n, 1), |(i, _)| (TAU * i as f64 / n as f64).cos() + 0.2 * normal());
+    let period = Some(n as f64 * 0.02);
+    let samples = Samples { time: &time, period, values: y.view() };
+    let grid = [4.0, 8.0, 15.0, 24.0];
+    let found = scores(&samples, &grid);
+    for (k, hz) in grid.into_iter().enumerate() {
+        let (mut squares, mut trace) = (0.0, 0.0);
+        for j in 0..n {
+            let angle = |i: usize| TAU * (j * i) as f64 / n as f64;
+            let (re, im) = (0..n)
+                .fold((0.0, 0.0), |(re, im), i| (re + y[[i, 0]] * angle(i).cos(), im + y[[i, 0]] * angle(i).sin()));
+            let sine = (PI * j as f64 / n as f64).sin().powi(2);
+            let penalty = lambda(hz * 0.02) * 16.0 * sine * sine / (1.0 - sine / 1.5);
+            let off = penalty / (1.0 + penalty);
+            squares += off * off * (re * re + im * im) / n as f64;
+            trace += off;
+        }
+        assert_relative_eq!(found.squares[[0, k]], squares, max_relative = 1e-6);
+        assert_relative_eq!(found.traces[[0, k]], trace, max_relative = 1e-6);
+    }
+}
+
+/// Recordings are few or many, dense or thin, and of one kind of movement or the other.
+#[test]
+fn the_size_of_white_noise_is_found() {
+    for (n, n_recordings) in [(101, 1), (101, 30), (1001, 10), (5001, 2)] {
+        for periodic in [false, true] {
+            let time = uniform(n, 1.0 / (n - 1) as f64);
+            let period = periodic.then_some(n as f64 / (n - 1) as f64);
+            let mut normal = noise(n as u64);
+            let recordings: Vec<Array2<f64>> = (0..n_recordings)
+                .map(|_| {
+                    Array2::from_shape_fn((n, 2), |(i, d)| {
+                        let s = time[i] / period.unwrap_or(1.0);
+                        let clean = if periodic { (TAU * s).sin() } else { minimum_jerk(s) };
+                        [clean + 0.01 * normal(), 50.0][d]
+                    })
+                })
+                .collect();
+            let samples: Vec<Samples> =
+                recordings.iter().map(|y| Samples { time: &time, period, values: y.view() }).collect();
+            let found = Noise::of(Smoothing::Auto, &samples, Threads::ONE).unwrap();
+            let case = format!("{n} samples, {n_recordings} recordings, periodic {periodic}: {found:?}");
+            let accuracy = 4.0 / ((n * n_recordings.min(10)) as f64).sqrt();
+            assert!((found.levels()[0] / 0.01 - 1.0).abs() < accuracy, "{case}");
+            assert!(found.cut_offs()[0].is_some_and(|hz| (1.0..15.0).contains(&hz)), "{case}");
+            assert_eq!((found.levels()[1], found.cut_offs()[1]), (0.0, None), "{case}");
+        }
+    }
 }
 
 #[test]
@@ -131,11 +201,15 @@ fn auto_takes_more_than_half_of_white_noise_off_whatever_its_seed() {
 }
 
 #[test]
-fn auto_leaves_clean_samples_alone() {
-    for n in [20, 100, 1000] {
+fn auto_leaves_clean_samples_alone_to_the_last_bit() {
+    for n in [20, 31, 100, 1000] {
         let time = uniform(n, 0.01);
-        let clean: Vec<f64> = time.iter().map(|t| minimum_jerk(t / time[n - 1])).collect();
-        assert!(distance(&smooth_column(Smoothing::Auto, &time, None, &clean), &clean) < 1e-10);
+        let share = |t: f64, steps: usize| t / (steps as f64 * 0.01);
+        let reach: Vec<f64> = time.iter().map(|&t| minimum_jerk(share(t, n - 1))).collect();
+        assert_eq!(smooth_column(Smoothing::Auto, &time, None, &reach), reach);
+        let wave = |t: &f64| (TAU * share(*t, n)).sin() + 0.3 * (3.0 * TAU * share(*t, n)).cos();
+        let cycle: Vec<f64> = time.iter().map(wave).collect();
+        assert_eq!(smooth_column(Smoothing::Auto, &time, Some(n as f64 * 0.01), &cycle), cycle);
     }
 }
 
