@@ -41,22 +41,27 @@ use crate::warp::Warp;
 ///     degree, or a Gaussian process. "auto" is the process, unless another is better at contexts left out by more
 ///     than two standard errors, and linear for fewer than 4 different contexts or more than 1024; `model.map` tells.
 /// n_styles : int or "auto", optional
-///     Style dimension J; otherwise from `spectrum`. "auto" is by what contexts foresee: the fewest styles whose error at
-///     contexts held out (cross-validation, at most ten folds) is above the least of all by no more than the standard
-///     error of the difference.
-/// spectrum : float
-///     Keep the fewest singular values whose sum exceeds this share of the sum of all.
+///     Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular
+///     values, at least five (or half of the demonstrations) and as many as the contexts explain (F-test), but none
+///     that measurement noise alone would give (parallel analysis). "auto" is cross-validation over contexts by the
+///     one-standard-error rule, in at most ten folds.
+/// spectrum : float, optional
+///     The paper's rule instead: the fewest singular values whose sum exceeds this share of the sum of all, such as 0.9.
 /// basis : {"gp", "ngnet"}, GP or NGnet
 ///     Function approximator of the landscape.
-/// smoothing : None, "auto" or float
-///     Interpolate, smooth by generalised cross-validation, or smooth with this cut-off in Hz.
+/// smoothing : "auto", float or None
+///     Smooth each degree of freedom by generalised cross-validation over all demonstrations, which leaves clean ones as
+///     they are; or with this cut-off in Hz; or interpolate every sample. `model.noise` and `model.cut_offs` hold what
+///     was found.
 /// nominal : int, optional
 ///     Index of the nominal demonstration; otherwise the one of median duration.
 /// n_samples : int, optional
 ///     Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
 ///     than 150.
-/// dof_scale : None, "range" or (D,) array_like
-///     Unit of each degree of freedom in the factorisation; if given as numbers, in a warp of time too.
+/// dof_scale : None, "unit", "range" or (D,) array_like
+///     Unit of each degree of freedom in the factorisation. By default as recorded ("unit") where all units are equal or
+///     unknown; otherwise the degrees of freedom of each unit are scaled together by the largest range among them.
+///     "range" scales each by its own range. If given as numbers, in a warp of time too.
 /// alignment : {"linear", "warp"} or Warp
 ///     How time is scaled to that of the nominal demonstration: linearly, or by the monotone warp that brings the
 ///     demonstrations closest to each other, where they pause or hurry in different places.

@@ -124,6 +124,12 @@ impl Model {
         to_numpy(py, &cut_offs)
     }
 
+    /// Unit of each degree of freedom in the factorisation (D,).
+    #[getter]
+    fn dof_scale<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        to_numpy(py, &self.0.learnt().dof_scale)
+    }
+
     /// Goals of the demonstrations (M, D).
     #[getter]
     fn goals<'py>(&self, py: Python<'py>) -> Matrix<'py> {
