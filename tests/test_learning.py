@@ -172,7 +172,8 @@ def _reach(*bends: float) -> np.ndarray:
     shapes = [np.sin(np.pi * (j + 1) * s) * (4 * s * (1 - s)) ** 2 for j in range(len(bends))]
     rise = s**3 * (10 - 15 * s + 6 * s**2) * [1.0, 0.6]
     return rise + sum(
-        bend * shape * [1.0, (-1.0) ** j] for j, (bend, shape) in enumerate(zip(bends, shapes))
+        bend * shape * [1.0, (-1.0) ** j]
+        for j, (bend, shape) in enumerate(zip(bends, shapes, strict=True))
     )
 
 
@@ -234,7 +235,7 @@ def test_clean_demonstrations_are_not_smoothed() -> None:
 
 
 def test_small_effects_of_a_context_are_kept() -> None:
-    """What a context explains counts among the styles, however small beside what varies at random."""
+    """A context counts among the styles, however small its effect beside random variation."""
     random = np.random.default_rng(1)
     heights = np.linspace(0, 0.02, 24)
     others = random.uniform(-1, 1, (24, 6))
@@ -245,7 +246,7 @@ def test_small_effects_of_a_context_are_kept() -> None:
 
 
 def test_degrees_of_freedom_in_different_units_weigh_alike() -> None:
-    """An effect in rad beside one in mm is kept; what hardly moves among those of its unit is not scaled up."""
+    """An effect in rad beside one in mm is kept; small ranges in the same unit stay small."""
     s = np.linspace(0, 1, 101)
     rise, bump = s**3 * (10 - 15 * s + 6 * s**2), (4 * s * (1 - s)) ** 3
     turns = np.linspace(-1, 1, 8)

@@ -64,8 +64,8 @@ def add_learning(parser: ArgumentParser) -> None:
         "--spectrum",
         type=float,
         metavar="SHARE",
-        help="without --styles: keep this share of the singular-value sum, such as the paper's 0.9; "
-        "default: the systematic styles, which exceed the measurement noise",
+        help="without --styles: keep this share of the singular-value sum, such as the paper's 0.9;"
+        " default: the systematic styles, which exceed the measurement noise",
     )
     parser.add_argument(
         "--basis",
