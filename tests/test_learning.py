@@ -199,6 +199,17 @@ def test_styles_end_at_the_noise(kind: Any, n_demos: int, noise: float) -> None:
     assert model.noise == pytest.approx(size, rel=0.15)
 
 
+@pytest.mark.parametrize("noise", [0.001, 0.005, 0.02])
+def test_styles_end_at_noise_that_was_resampled(noise: float) -> None:
+    """Recordings of half the rate, or less, brought to a higher one have the same J."""
+    random = np.random.default_rng(5)
+    clean = [_reach(*bends) for bends in random.uniform(-0.3, 0.3, (40, 3))]
+    recorded = [x + noise * np.ptp(clean[0]) * random.normal(size=x.shape) for x in clean]
+    for dt in (0.005, 0.002):
+        demos = [pdmp.demos.resample(pdmp.Demonstration(x, dt=0.01), dt) for x in recorded]
+        assert pdmp.fit(demos, basis="ngnet").n_styles == 4
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_repetitions_of_one_movement_are_one_style(seed: int) -> None:
     """A hundred noisy recordings of one reach have J = 1, and its peak of acceleration."""

@@ -5,8 +5,9 @@
 //! recordings, of the least geometric mean of their scores, leaves a fifth to a half of the error of acceleration that
 //! one each leaves at worst. At that cut-off, ‖y − f‖²/tr(I − A) is the variance of the noise.
 //!
-//! Recordings are searched in thinned form, by the means of blocks of samples: white noise stays white. Where the best
-//! cut-off is too high for that, they are searched again with more samples, at last with all.
+//! Recordings are searched in thinned form, by the means of blocks of samples: white noise stays white, and that of a
+//! recording that was resampled more densely becomes white again. Where the best cut-off is too high for that, they are
+//! searched again with more samples, at last with all.
 
 use ndarray::{Array1, Array2, Axis};
 
@@ -21,10 +22,10 @@ use crate::threads::Threads;
 const MAX_POOLED: usize = 24;
 
 /// Least samples of a thinned recording.
-const MIN_THINNED: usize = 128;
+const MIN_THINNED: usize = 64;
 
 /// Highest cut-off, in cycles per sample of thinned recordings, that is taken from them.
-const MAX_THINNED: f64 = 0.2;
+const MAX_THINNED: f64 = 0.25;
 
 /// Highest cut-off that is tried, in cycles per sample, which stands for interpolation: λ = 1e-3, where a sine at the
 /// Nyquist frequency keeps 95 % of its amplitude.
