@@ -15,7 +15,7 @@ from pdmp.pacing import Run
 
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
-_Map: TypeAlias = Literal["auto", "linear", "polynomial", "gp"]
+_Map: TypeAlias = Literal["auto", "stacked", "gp", "linear", "polynomial"]
 _Context: TypeAlias = ArrayLike | Sequence[float | str]
 _Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
 _Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
@@ -367,7 +367,7 @@ class ContextMap:
         map: _Map = "auto",
     ) -> ContextMap: ...
     @property
-    def kind(self) -> Literal["linear", "polynomial", "gp"]: ...
+    def kind(self) -> Literal["stacked", "gp", "linear", "polynomial"]: ...
     @property
     def errors(self) -> list[tuple[str, float]]: ...
     @property

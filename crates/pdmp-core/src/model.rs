@@ -60,6 +60,10 @@ pub struct Learnt {
     pub basis: String,
 }
 
+/// Most by which a predicted duration may leave the range of the demonstrations': far outside of their contexts its
+/// logarithm may be anything.
+const MAX_DURATION_RATIO: f64 = 3.0;
+
 /// A parametric dynamic movement primitive.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -166,7 +170,8 @@ impl Model {
         self.map.as_ref()
     }
 
-    /// The movement for a context (Q,), as in Section 4.1.2.
+    /// The movement for a context (Q,), as in Section 4.1.2. Its duration is at least a third of the shortest
+    /// demonstration's and at most three times the longest one's.
     ///
     /// # Errors
     /// A model without contexts, a context of another length, a label never shown, or a number that is not finite.
@@ -174,7 +179,11 @@ impl Model {
         let map = self.map.as_ref().ok_or(Error::Arguments(
             "the model knows no contexts: fit it with contexts=, or with demonstrations that carry one",
         ))?;
-        Prediction::of(map.predict(context)?, map.freedom(), self.kind(), self.n_styles(), self.n_dofs())
+        let demonstrated = self.demonstrated.durations.iter();
+        let [shortest, longest] =
+            [f64::min, f64::max].map(|of| demonstrated.clone().copied().reduce(of).unwrap_or(1.0));
+        let durations = shortest / MAX_DURATION_RATIO..=longest * MAX_DURATION_RATIO;
+        Prediction::of(map.predict(context)?, map.freedom(), self.kind(), self.n_styles(), self.n_dofs(), durations)
     }
 
     /// The time constant τ = dt/du in seconds at a phase, x or φ, of a movement with the given timing (K,).

@@ -36,10 +36,12 @@ use crate::warp::Warp;
 ///     Periods in s of time-stamped cycles.
 /// contexts : (M, Q) array_like, or M lists of Q numbers and labels, optional
 ///     The condition of each demonstration; otherwise those that they carry.
-/// map : {"auto", "linear", "polynomial", "gp"}
-///     What leads from contexts to movements: least squares as in the paper, ridge regression on polynomials of second
-///     degree, or a Gaussian process. "auto" is the process, unless another is better at contexts left out by more
-///     than two standard errors, and linear for fewer than 4 different contexts or more than 1024; `model.map` tells.
+/// map : {"auto", "stacked", "gp", "linear", "polynomial"}
+///     Map from contexts to movements: a Gaussian process and a penalised line, weighted by their errors at contexts
+///     left out, outside of the contexts of the demonstrations together with the mean ("stacked"); the process alone;
+///     least squares as in the paper; or ridge regression on polynomials of second degree. "auto" is "stacked", and
+///     "linear" for labels alone, which get the mean of their demonstrations each, for two different contexts and for
+///     more than 1024. The repr of `model.map` has the weights.
 /// n_styles : int or "auto", optional
 ///     Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular
 ///     values, at least five (or half of the demonstrations) and as many as the contexts explain (F-test), but none
@@ -230,7 +232,7 @@ pub(crate) fn map_of(map: &str) -> PyResult<MapChoice> {
         return Ok(MapChoice::Auto);
     }
     let found = MapKind::ALL.into_iter().find(|kind| kind.name() == map);
-    let wanted = "must be \"auto\", \"linear\", \"polynomial\" or \"gp\"";
+    let wanted = "must be \"auto\", \"stacked\", \"gp\", \"linear\" or \"polynomial\"";
     found.map(MapChoice::Given).ok_or_else(|| PyValueError::new_err(format!("map = {map:?}: {wanted}")))
 }
 

@@ -37,7 +37,7 @@ def add_learning(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--map",
-        choices=["auto", "linear", "polynomial", "gp"],
+        choices=["auto", "stacked", "gp", "linear", "polynomial"],
         default="auto",
         help="what leads from contexts to movements; default: auto",
     )

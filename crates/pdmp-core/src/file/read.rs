@@ -6,7 +6,7 @@ use safetensors::tensor::{Dtype, SafeTensors};
 use super::{Constants, KEY, Map, SCHEMA, Sealed, check_size, checksum};
 use crate::align::{Template, Warp};
 use crate::attractor::Attractor;
-use crate::context::{ContextMap, Kernel, Recipe};
+use crate::context::{ContextMap, Kernel, MapKind, Recipe, Stack};
 use crate::error::{Error, LARGEST, Result};
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
@@ -195,6 +195,7 @@ impl Reader<'_> {
         let ratios = self.array("map.ratios", &[outputs.ncols()])?;
         let sound = match map.kernel {
             None => ratios.iter().all(|ratio| *ratio == 0.0),
+            Some(Kernel::Linear) => false,
             Some(Kernel::Quadratic) => ratios.iter().all(|ratio| *ratio >= 0.0),
             Some(Kernel::Matern { length }) => length > 0.0 && ratios.iter().all(|ratio| *ratio >= 0.0),
         };
@@ -209,9 +210,25 @@ impl Reader<'_> {
         }
         let errors = map.errors.iter().map(|&(kind, error)| (kind, error.unwrap_or(f64::INFINITY))).collect();
         let directions = self.matrix("map.directions", (outputs.ncols(), outputs.ncols()))?;
-        let recipe = Recipe { kind: map.kind, kernel: map.kernel, directions, ratios, errors };
+        let trend = match map.kind {
+            MapKind::Stacked => Some(self.trend(outputs.ncols())?),
+            _ => None,
+        };
+        let recipe = Recipe { kind: map.kind, kernel: map.kernel, directions, ratios, trend, errors };
         ContextMap::restore(map.columns.clone(), contexts, outputs.view(), recipe)
             .map_err(|error| Error::File(error.to_string()))
+    }
+
+    /// The line of a stacked map: ratios (P,) and weights.
+    fn trend(&self, n_outputs: usize) -> Result<(Vec<f64>, Stack)> {
+        let slopes = self.array("map.slopes", &[n_outputs])?;
+        let weights = self.array("map.weights", &[2, 2])?;
+        let stack = Stack { inside: [weights[0], weights[1]], outside: [weights[2], weights[3]] };
+        let sound = |[g, l]: [f64; 2]| g >= 0.0 && l >= 0.0 && g + l <= 1.0 + 1e-9;
+        if slopes.iter().any(|ratio| *ratio < 0.0) || !sound(stack.inside) || !sound(stack.outside) {
+            return Err(Error::File("the map's line is out of range".to_string()));
+        }
+        Ok((slopes, stack))
     }
 
     /// Checks that the file holds the model's arrays and no others, unchanged.

@@ -6,7 +6,7 @@ use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
 use super::{Constants, KEY, Map, SCHEMA, Sealed, check_size, checksum};
-use crate::context::{ContextMap, Recipe};
+use crate::context::{ContextMap, Recipe, Stack};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::tabulate::Jets;
@@ -92,6 +92,10 @@ impl Model {
             let recipe = map.recipe();
             arrays.push(matrix("map.directions", &recipe.directions));
             arrays.push(vector("map.ratios", &recipe.ratios));
+            if let Some((slopes, Stack { inside, outside })) = &recipe.trend {
+                arrays.push(vector("map.slopes", slopes));
+                arrays.push(("map.weights", vec![2, 2], [*inside, *outside].concat()));
+            }
             arrays.extend(self.learnt.left_over.as_ref().map(|left_over| matrix("left_over", left_over)));
         }
         arrays
