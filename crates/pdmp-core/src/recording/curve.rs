@@ -9,9 +9,12 @@
 //!
 //! Clean samples are met by f alone. A spline through noisy ones would be smooth noise, which no later smoothing can
 //! separate from movement; carried by the samples it stays as white as it was recorded, as long as no more samples are
-//! drawn than there are. At the times of the recording, y is what was recorded.
+//! drawn than there are. Of several within a new interval it is the mean: then its power density stays, too. At the times
+//! of the recording, y is what was recorded.
 
-use ndarray::{Array2, ArrayView1};
+use std::ops::Range;
+
+use ndarray::Array2;
 
 use super::clock;
 use crate::demo::{Demonstration, zeros};
@@ -60,17 +63,25 @@ impl Curve {
     /// Positions (n, D) at n even times from `from` to `to`, both included, with the noise of the nearest samples.
     pub(super) fn sample(&self, from: f64, to: f64, n: usize) -> Result<Array2<f64>> {
         let mut position = self.smooth(from, to, n)?;
+        let half = 0.5 * (to - from) / (n - 1) as f64;
         for (mut row, t) in position.rows_mut().into_iter().zip(even(from, to, n)) {
-            row += &self.noise_near(t);
+            let near = self.near(t, half);
+            let share = 1.0 / near.len() as f64;
+            near.for_each(|c| row.scaled_add(share, &self.noise.row(c)));
         }
         Ok(position)
     }
 
-    /// The noise (D,) of the sample nearest to a time.
-    fn noise_near(&self, t: f64) -> ArrayView1<'_, f64> {
-        let after = self.time.partition_point(|&time| time < t).clamp(1, self.time.len() - 1);
+    /// The samples less than `half` an interval from a time, or the nearest one.
+    fn near(&self, t: f64, half: f64) -> Range<usize> {
+        let before = |limit: f64| self.time.partition_point(|&time| time < limit);
+        let within = before(t - half)..before(t + half);
+        if !within.is_empty() {
+            return within;
+        }
+        let after = before(t).clamp(1, self.time.len() - 1);
         let nearest = if t - self.time[after - 1] <= self.time[after] - t { after - 1 } else { after };
-        self.noise.row(nearest)
+        nearest..nearest + 1
     }
 }
 

@@ -122,7 +122,9 @@ pub(super) fn period_of(traits: ArrayView2<f64>, interval: f64) -> Result<f64> {
         peaks.iter().copied().filter(|&(lag, peak)| peak >= chance.least(lag).max(LEAST)).collect();
     let higher = |a: &(f64, f64), b: &(f64, f64)| a.1.total_cmp(&b.1);
     let Some(highest) = significant.iter().copied().max_by(higher) else {
-        let (lag, share) = peaks.into_iter().max_by(higher).unwrap_or_else(|| {
+        // That which is nearest to being one.
+        let short = |&(lag, peak): &(f64, f64)| peak - chance.least(lag).max(LEAST);
+        let (lag, share) = peaks.into_iter().max_by(|a, b| short(a).total_cmp(&short(b))).unwrap_or_else(|| {
             let k = best(fallen..agreement.len());
             (k as f64, agreement[k].min(LOBE))
         });

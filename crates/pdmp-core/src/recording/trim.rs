@@ -12,12 +12,21 @@ const MIN_DEVIATIONS: f64 = 11.0;
 /// The variance of a smoothing spline's slope at an end, over that in the middle.
 const END: f64 = 4.0;
 
+/// Largest share of the peak speed that noise may take movement for rest: a rest too many is kept rather than movement cut.
+const MAX_SHARE: f64 = 0.25;
+/// A recording jumps where it goes this many times as far within one interval as in all but [`MAX_JUMPS`] others.
+const MIN_JUMP: f64 = 10.0;
+/// Jumps that are recognised; a movement has more intervals than that.
+const MAX_JUMPS: usize = 3;
+/// Samples over which a spline rings beside a jump, down to a hundredth of its speed.
+const RINGING: usize = 4;
+
 /// The part of the recording in which there is movement: from the first to the last sample whose speed is at least the
 /// share `threshold` of the largest.
 ///
 /// The speed is that of the smoothed recording, all DoFs together, v² = Σ_d (ẏ_d / (max y_d − min y_d))². Where noise
-/// makes larger speeds than the threshold, a movement counts that surpasses noise somewhere, from where the threshold is
-/// passed.
+/// makes larger speeds than the threshold, a movement counts that surpasses noise or a quarter of the largest speed
+/// somewhere, from where the threshold is passed. The largest speed is that beside jumps from one sample to the next.
 ///
 /// # Errors
 /// A threshold outside (0, 1), a recording that stands still or moves for fewer than four samples, or without times.
@@ -28,7 +37,7 @@ pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
     }
     let (position, curve) = (demo.position(), Curve::of(demo)?);
     let slopes = curve.splines.slopes() * curve.interval();
-    let (mut speeds, mut noise) = (vec![0.0; slopes.nrows()], Vec::new());
+    let (mut speeds, mut steps, mut noise) = (vec![0.0; slopes.nrows()], vec![0.0; slopes.nrows() - 1], Vec::new());
     for (d, column) in position.columns().into_iter().enumerate() {
         let (low, high) = column.iter().fold((f64::MAX, f64::MIN), |(low, high), y| (y.min(low), y.max(high)));
         let range = high - low;
@@ -36,15 +45,19 @@ pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
             let slopes = &slopes.column(d) / range;
             speeds.iter_mut().zip(&slopes).for_each(|(speed, slope)| *speed += slope * slope);
             let (off, samples) = (&curve.noise.column(d) / range, &column / range);
+            let step = |pair: ArrayView1<f64>| (pair[1] - pair[0]).powi(2);
+            steps.iter_mut().zip(samples.windows(2)).for_each(|(sum, pair)| *sum += step(pair));
             noise.push(END * slope_variance(off.view(), (&samples - &off).view(), slopes.view()));
         }
     }
-    let peak = speeds.iter().fold(0.0, |m: f64, v| m.max(*v));
+    let jumps = jumps(&steps);
+    let calm = |c: &usize| jumps.iter().all(|jump| c.abs_diff(*jump) > RINGING);
+    let peak = (0..speeds.len()).filter(calm).map(|c| speeds[c]).fold(0.0, f64::max);
     let least = threshold * threshold * peak;
     let deviation = (2.0 * noise.iter().map(|x| x * x).sum::<f64>()).sqrt();
     let limit = noise.iter().sum::<f64>() + MIN_DEVIATIONS * deviation;
     let moves = |speed: &f64, least: f64| *speed > 0.0 && *speed >= least;
-    let surpasses = |speed: &f64| moves(speed, least.max(limit.min(peak)));
+    let surpasses = |speed: &f64| moves(speed, least.max(limit.min(MAX_SHARE * MAX_SHARE * peak)));
     let (Some(first), Some(last)) = (speeds.iter().position(surpasses), speeds.iter().rposition(surpasses)) else {
         return Err(Error::Arguments("the recording stands still: there is no movement to trim it to"));
     };
@@ -55,6 +68,14 @@ pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
         even => even.clone(),
     };
     demo.sampled(position.slice(s![first..=last, ..]).to_owned(), sampling)
+}
+
+/// Intervals whose squared steps stand out: beside the speed there all other movement would seem to rest.
+fn jumps(steps: &[f64]) -> Vec<usize> {
+    let mut sorted = steps.to_vec();
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    let most = MIN_JUMP * MIN_JUMP * sorted.get(MAX_JUMPS).copied().unwrap_or(f64::INFINITY);
+    (0..steps.len()).filter(|&c| most > 0.0 && steps[c] > most).collect()
 }
 
 /// The variance that noise leaves to the slopes of a smoothing spline in its middle, per sample².
