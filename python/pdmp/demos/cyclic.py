@@ -32,7 +32,7 @@ class Growth(NamedTuple):
     dof: int
     """Index of the degree of freedom."""
     gain: float
-    """Mean gain per cycle, in the unit of the degree of freedom."""
+    """Gain in a cycle, the median one by size, in the unit of the degree of freedom."""
     turns: int
     """Full turns of an angle per cycle; 0 of what is no angle."""
 

@@ -3,7 +3,7 @@
 use ndarray::{Array1, Array2, Axis, s};
 
 use super::cut::check_times;
-use super::growth::{Growth, surpasses, turns};
+use super::growth::{Growth, surpasses, turns, typical};
 use super::odd::{Reason, median, odd};
 use super::repetition::{period_of, traits};
 use super::track::Track;
@@ -151,20 +151,17 @@ impl Closed {
         Ok(Self { cycles, gains })
     }
 
-    /// Takes whole turns off each cycle and all that follow; the growth of those DoFs that turn or gain much.
+    /// Takes whole turns off each cycle and all that follow; returns the growth of DoFs that turn or gain much.
     fn turn_back(&mut self, recording: usize, units: Option<&[String]>) -> Vec<Growth> {
-        let n = self.cycles.len() as f64;
-        let Some(gain) = self.gains.iter().cloned().reduce(|sum, gain| sum + gain).map(|sum| sum / n) else {
-            return Vec::new();
-        };
         let mut growths = Vec::new();
-        for (dof, surpasses) in surpasses(&gain, &self.cycles).into_iter().enumerate() {
-            let gain = gain[dof];
-            let (turns, turn) = turns(gain, units.map_or("", |units| &units[dof]));
-            for (k, cycle) in self.cycles.iter_mut().enumerate() {
+        for dof in 0..self.gains.first().map_or(0, Array1::len) {
+            let mean = self.gains.iter().map(|gain| gain[dof]).sum::<f64>() / self.gains.len() as f64;
+            let (turns, turn) = turns(mean, units.map_or("", |units| &units[dof]));
+            for (k, cycle) in self.cycles.iter_mut().enumerate().filter(|_| turns != 0) {
                 cycle.column_mut(dof).mapv_inplace(|y| y - (k as f64 * f64::from(turns)) * turn);
             }
-            if surpasses || turns != 0 {
+            let gain = typical(&self.gains, dof);
+            if turns != 0 || surpasses(gain, &self.cycles, dof) {
                 growths.push(Growth { recording, dof, gain, turns });
             }
         }

@@ -20,7 +20,7 @@ pub struct Growth {
     pub recording: usize,
     /// Index of the degree of freedom.
     pub dof: usize,
-    /// Mean gain per cycle, in the unit of the degree of freedom.
+    /// Gain in a cycle, the median one by size, in the unit of the degree of freedom.
     pub gain: f64,
     /// Full turns per cycle that were taken off each cycle and all that follow; 0 of what is no angle.
     pub turns: i32,
@@ -39,13 +39,18 @@ pub(super) fn turns(gain: f64, unit: &str) -> (i32, f64) {
     (0, 0.0)
 }
 
-/// Whether a gain per cycle surpasses the movement within the cycles (C, D) of a recording.
-pub(super) fn surpasses(gain: &Array1<f64>, cycles: &[Array2<f64>]) -> Vec<bool> {
-    let range = |cycle: &Array2<f64>, dof: usize| {
-        let (low, high) =
-            cycle.column(dof).iter().fold((f64::MAX, f64::MIN), |(low, high), y| (y.min(low), y.max(high)));
-        high - low
+/// The gain of a degree of freedom in a cycle, the median one by size.
+pub(super) fn typical(gains: &[Array1<f64>], dof: usize) -> f64 {
+    let mut gains: Vec<f64> = gains.iter().map(|gain| gain[dof]).collect();
+    gains.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    gains.get(gains.len().saturating_sub(1) / 2).copied().unwrap_or(0.0)
+}
+
+/// Whether a gain surpasses all movement of a degree of freedom within closed cycles (C, D).
+pub(super) fn surpasses(gain: f64, cycles: &[Array2<f64>], dof: usize) -> bool {
+    let range = |cycle: &Array2<f64>| {
+        let column = cycle.column(dof);
+        column.iter().fold(f64::MIN, |m, y| m.max(*y)) - column.iter().fold(f64::MAX, |m, y| m.min(*y))
     };
-    let largest = |dof: usize| cycles.iter().map(|cycle| range(cycle, dof)).fold(0.0, f64::max);
-    gain.iter().enumerate().map(|(dof, gain)| gain.abs() > MIN_REPORTED * largest(dof)).collect()
+    gain.abs() > MIN_REPORTED * cycles.iter().map(range).fold(0.0, f64::max)
 }
