@@ -167,7 +167,7 @@ def cycles(
 
 
 def _gains(growths: list[Growth], demos: list[Demonstration]) -> str:
-    """Return a warning of degrees of freedom that closed cycles do not carry on, with their gains."""
+    """Return a warning of what grows from cycle to cycle, with its gains."""
     names, units = (demos[0].names, demos[0].units) if demos else (None, None)
     gains = []
     for dof in sorted({growth.dof for growth in growths}):
@@ -176,7 +176,7 @@ def _gains(growths: list[Growth], demos: list[Demonstration]) -> str:
         unit = f" {units[dof]}" if units and units[dof] else ""
         gains.append(f"'{name}' gains {largest.gain:.3g}{unit} in recording {largest.recording}")
     return (
-        f"more is gained per cycle than moved within one: {', '.join(gains)}; closed cycles lack the "
-        "gain, and a model of them stays in place: leave these degrees of freedom out, or make them "
-        "relative to what moves along"
+        f"more is gained per cycle than moved within one: {', '.join(gains)}; closed cycles lack "
+        "the gain, and a model of them stays in place: leave these degrees of freedom out, or make "
+        "them relative to what moves along"
     )
