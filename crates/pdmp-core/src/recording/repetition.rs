@@ -37,7 +37,6 @@ use crate::error::{Error, Result};
 use crate::recording::Curve;
 use crate::recording::odd::median;
 use crate::recording::significance::Chance;
-use crate::smooth::{Smoothing, smooth};
 use crate::spline::{Knots, Splines};
 
 pub(super) const STANDS_STILL: &str = "the recording stands still: it has no cycles";
@@ -68,16 +67,20 @@ pub fn period(demo: &Demonstration) -> Result<f64> {
 pub(super) fn traits(curve: &Curve) -> Result<Array2<f64>> {
     let n = curve.time.len();
     let time: Vec<f64> = (0..n).map(|c| c as f64).collect();
-    let mut position = curve.sample(curve.first(), curve.last(), n)?;
-    position.columns_mut().into_iter().for_each(standardise);
+    let (first, last) = (curve.first(), curve.last());
+    let mut position = curve.sample(first, last, n)?;
     // Noise would drown the velocities of a recording at a high rate.
-    let smoothed = smooth(Smoothing::Auto, &time, None, position.view())?;
-    let kept = smoothed.var_axis(Axis(0), 0.0);
+    let mut smoothed = curve.smooth(first, last, n)?;
+    let both = position.columns_mut().into_iter().zip(smoothed.columns_mut());
+    let weights: Vec<f64> = both
+        .map(|(position, smoothed)| [standardise(position), standardise(smoothed)])
+        .map(|[all, kept]| if all > 0.0 { (kept / all).min(1.0) } else { 0.0 })
+        .collect();
     let smoothed: Vec<f64> = smoothed.iter().copied().collect();
     let mut velocity = Splines::through(Knots::not_a_knot(time), &smoothed, position.ncols()).slopes();
-    for (mut column, kept) in velocity.columns_mut().into_iter().zip(&kept) {
+    for (mut column, weight) in velocity.columns_mut().into_iter().zip(weights) {
         standardise(column.view_mut());
-        column *= kept.sqrt();
+        column *= weight;
     }
     let traits = concatenate![Axis(1), position, velocity];
     if traits.iter().all(|x| *x == 0.0) {
@@ -86,12 +89,13 @@ pub(super) fn traits(curve: &Curve) -> Result<Array2<f64>> {
     Ok(traits)
 }
 
-/// Takes off the linear trend, by least squares, and makes the standard deviation 1; what is constant becomes 0.
-fn standardise(mut column: ArrayViewMut1<f64>) {
+/// Takes off the linear trend, by least squares, and makes the standard deviation 1; what is constant becomes 0. Returns
+/// what the deviation was.
+fn standardise(mut column: ArrayViewMut1<f64>) -> f64 {
     let n = column.len() as f64;
     let largest = column.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
     if largest == 0.0 {
-        return;
+        return 0.0;
     }
     column.mapv_inplace(|y| y / largest);
     let (mean, middle) = (column.sum() / n, (n - 1.0) / 2.0);
@@ -102,7 +106,9 @@ fn standardise(mut column: ArrayViewMut1<f64>) {
     column.iter_mut().enumerate().for_each(|(c, y)| *y -= mean + slope * (c as f64 - middle));
     let deviation = (column.iter().map(|y| y * y).sum::<f64>() / n).sqrt();
     // What is left of a constant, or of a straight line, is rounding.
-    column.mapv_inplace(|y| if deviation > 1e-9 { y / deviation } else { 0.0 });
+    let moves = deviation > 1e-9;
+    column.mapv_inplace(|y| if moves { y / deviation } else { 0.0 });
+    if moves { deviation * largest } else { 0.0 }
 }
 
 /// The period in samples of a recording with such traits (n, F), sampled each `interval` seconds.

@@ -30,12 +30,12 @@ const MAX_SAMPLES: usize = 4000;
 pub(super) struct Chance {
     /// Samples of the recording.
     n: usize,
-    /// Lags j > 0, how many each stands for, and the mean square correlation there.
+    /// Lags j > 0, how many each stands for, and the sum of squared correlations there.
     memory: Vec<(f64, f64, f64)>,
-    /// The same mean square without lag.
+    /// The same sum without lag.
     at_once: f64,
-    /// z² of the largest of all lags.
-    square: f64,
+    /// z²/F² of the largest of all lags.
+    scale: f64,
 }
 
 impl Chance {
@@ -47,29 +47,28 @@ impl Chance {
         let step = last.div_ceil(MAX_LAGS);
         let memory = (1..=last.div_ceil(step))
             .map(|k| (k * step).min(last))
-            .map(|j| (j as f64, step as f64, mean_square(traits, j)));
+            .map(|j| (j as f64, step as f64, squares(traits, j)));
         let independent = ((agreement.len() - fallen) as f64 / (2 * fallen.max(1)) as f64).max(1.0);
         let square = 2.0 * (independent / LEVEL).ln();
-        Self { n, memory: memory.collect(), at_once: mean_square(traits, 0), square }
+        let weights = traits.iter().map(|y| y * y).sum::<f64>() / n as f64;
+        Self { n, memory: memory.collect(), at_once: squares(traits, 0), scale: square / (weights * weights) }
     }
 
     /// The least correlation after a lag, in samples, that is not by chance.
     pub(super) fn least(&self, lag: f64) -> f64 {
         let m = self.n as f64 - lag;
         let later = self.memory.iter().map(|(j, step, square)| 2.0 * step * (1.0 - j / m).max(0.0) * square);
-        let pairs = m / (self.at_once + later.sum::<f64>());
-        (self.square / pairs).sqrt().tanh()
+        (self.scale * (self.at_once + later.sum::<f64>()) / m).sqrt().tanh()
     }
 }
 
-/// Mean over all pairs of traits (n, F) of the square of their correlation after `lag` samples, by their weights.
-fn mean_square(traits: ArrayView2<f64>, lag: usize) -> f64 {
+/// Sum over all pairs of traits (n, F) of the square of their correlation after `lag` samples, by their weights.
+fn squares(traits: ArrayView2<f64>, lag: usize) -> f64 {
     let n = traits.nrows();
     // Of a long recording a part in its middle stands for all.
     let used = (n - lag).min(MAX_SAMPLES);
     let from = (n - lag - used) / 2;
     let (now, later) = (traits.slice(s![from..from + used, ..]), traits.slice(s![from + lag..from + lag + used, ..]));
     let products = now.t().dot(&later) / used as f64;
-    let weights = traits.iter().map(|y| y * y).sum::<f64>() / n as f64;
-    products.iter().map(|r| r * r).sum::<f64>() / (weights * weights)
+    products.iter().map(|r| r * r).sum::<f64>()
 }
