@@ -18,7 +18,7 @@
 use ndarray::{ArrayView2, s};
 
 /// Probability of finding a period in noise.
-const LEVEL: f64 = 0.015;
+const LEVEL: f64 = 0.03;
 /// Memory of noise, over the lag at which its correlation is first zero.
 const MEMORY: f64 = 1.5;
 /// Lags within the memory at which correlations are computed; the sum between them is the trapezium's.
