@@ -11,7 +11,6 @@ use crate::error::{Error, Result};
 const MIN_DEVIATIONS: f64 = 11.0;
 /// The variance of a smoothing spline's slope at an end, over that in the middle.
 const END: f64 = 4.0;
-
 /// Largest share of the peak speed that noise may take movement for rest: a rest too many is kept rather than movement cut.
 const MAX_SHARE: f64 = 0.25;
 /// A recording jumps where it goes this many times as far within one interval as in all but [`MAX_JUMPS`] others.
