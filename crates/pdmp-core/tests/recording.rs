@@ -444,6 +444,9 @@ fn trimming_leaves_the_movement() {
     let expected = 1.5 * (1.0 - 2.0 * edge) / DT;
     assert_abs_diff_eq!(trimmed.n_samples() as f64, expected, epsilon = 2.0);
     assert!(recording::trim(&recorded(position), 1.0).unwrap_err().to_string().contains("threshold = 1"));
+    let step = Array2::from_shape_fn((30, 1), |(c, _)| f64::from(u8::from(c > 15)));
+    let message = recording::trim(&recorded(step), 0.9).unwrap_err().to_string();
+    assert!(message.contains("threshold = 0.9: leaves fewer than 4 samples"), "{message}");
     assert!(recording::trim(&recorded(Array2::zeros((9, 2))), 0.05).unwrap_err().to_string().contains("stands still"));
 }
 
