@@ -139,7 +139,14 @@ def cycles(
     recordings: Sequence[Demonstration],
     events: Sequence[ArrayLike] | None,  # one (K,) for each recording
     average: bool,
-) -> tuple[list[Demonstration], _Array, list[int], list[tuple[int, float, float, str]]]: ...
+) -> tuple[
+    list[Demonstration],
+    _Array,  # (K,)
+    list[list[float]],  # (K, D)
+    list[int],
+    list[tuple[int, float, float, str, bool]],
+    list[tuple[int, int, float, int]],
+]: ...
 
 @final
 class Model:

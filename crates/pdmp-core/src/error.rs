@@ -139,7 +139,7 @@ pub enum Error {
     },
     /// A recording that does not repeat itself.
     #[error(
-        "no period: the recording repeats itself best after {lag:.3} s, with a correlation of {share:.2}, below {least}; \
+        "no period: the recording repeats itself best after {lag:.3} s, with a correlation of {share:.2}, below {least:.2}; \
          keep the DoFs that repeat, or tell when each cycle begins with events="
     )]
     Aperiodic {

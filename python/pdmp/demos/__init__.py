@@ -31,12 +31,13 @@ from pdmp._native import cut, lowpass, period, resample, trim
 from pdmp.demos.angles import unwrap
 from pdmp.demos.archive import read_npz
 from pdmp.demos.bvh import read_bvh
-from pdmp.demos.cyclic import Cycles, Rejected, cycles
+from pdmp.demos.cyclic import Cycles, Growth, Rejected, cycles
 from pdmp.demos.folder import read, read_folder
 from pdmp.demos.table import read_csv, write_csv
 
 __all__ = [
     "Cycles",
+    "Growth",
     "Rejected",
     "cut",
     "cycles",
