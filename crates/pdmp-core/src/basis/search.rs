@@ -74,14 +74,16 @@ pub(super) fn maximise(axes: &[Axis; 2], objective: &mut impl Objective) -> Resu
     Ok(scan.place(best.map_or([0.0; 2], |(at, _)| at)))
 }
 
-/// Whether no neighbour of a cell is higher, nor as high and before it.
+/// Whether no neighbour of a cell is higher, nor as high and before it; what rounding makes of a plateau is as high.
 fn is_summit(values: &[f64], columns: usize, cell: usize) -> bool {
     let (row, column) = ((cell / columns) as isize, (cell % columns) as isize);
     let rows = (values.len() / columns) as isize;
     (-1..=1).flat_map(|i| (-1..=1).map(move |j| (row + i, column + j))).all(|(i, j)| {
         let inside = (0..rows).contains(&i) && (0..columns as isize).contains(&j);
         let other = (i * columns as isize + j) as usize;
-        !inside || other == cell || values[cell] > values[other] || (values[cell] == values[other] && cell < other)
+        // Nothing is gained between two places where nothing exists.
+        let gain = if inside && values[cell] != values[other] { values[cell] - values[other] } else { 0.0 };
+        !inside || other == cell || gain > GAIN || (gain >= -GAIN && cell < other)
     })
 }
 
