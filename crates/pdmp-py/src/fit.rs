@@ -82,6 +82,13 @@ use crate::warp::Warp;
 /// -------
 /// Model
 ///
+/// Warns
+/// -----
+/// UserWarning
+///     Samples that no movement makes, with their place: time stamps far closer than the others, dropouts written as
+///     zeros, padding, counters and time stamps among the columns, wrapped angles, angles of different demonstrations
+///     whole turns apart (taken off where units say that they are angles), and an `alpha_z` too high for the samples.
+///
 /// Raises
 /// ------
 /// ValueError
@@ -154,6 +161,7 @@ pub(crate) fn fit(
         None => Ok(()),
     };
     let model = detached(py, show, |proceed| pdmp_core::fit(&demos, &options, proceed))?;
+    crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
 }
 

@@ -2,6 +2,7 @@
 
 mod constants;
 mod options;
+mod stiffness;
 mod style;
 
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use crate::demo::{ContextValue, Demonstration};
 use crate::error::{Error, Result};
 use crate::factor::{Factors, StyleCount};
 use crate::foresight::Foresight;
+use crate::inspection::{inspect, unwound};
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
 use crate::targets::Targets;
@@ -36,6 +38,9 @@ pub fn fit(
     if let StyleChoice::Given(count) = options.styles {
         count.check(demos.len(), "demonstrations")?;
     }
+    let mut findings = inspect(demos, options.alignment.dt);
+    let whole = unwound(demos);
+    let demos = &*whole;
     let mut aligned = options.alignment.align(demos)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     let (names, units) = labels_of(demos)?;
@@ -95,12 +100,15 @@ pub fn fit(
         left_out,
         left_over: None,
         basis: regression.describe(),
+        findings: Vec::new(),
     };
     let Constants { attractor, tau, .. } = constants;
     let (cycle, responses) = Default::default();
     let map = None;
     let model = Model { attractor, landscape, tau, names, units, ranges, demonstrated, learnt, map, cycle, responses };
     let mut model = Arc::new(model.with_cycle());
+    findings.extend(stiffness::stiffness(&model, &aligned)?);
+    Arc::make_mut(&mut model).learnt.findings = findings;
     if let (Some(columns), Some(contexts)) = (columns, &model.demonstrated.contexts) {
         let (outputs, metric) = (model.outputs(), model.metric()?);
         let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
