@@ -195,7 +195,6 @@ impl Curvature {
         let b = old.unwrap_or(Self { first: scale, mixed: 0.0, second: scale });
         let lost = [b.first * moved[0] + b.mixed * moved[1], b.mixed * moved[0] + b.second * moved[1]];
         let share = dot(moved, lost);
-        let outer = |v: [f64; 2], size: f64| [v[0] * v[0] / size, v[0] * v[1] / size, v[1] * v[1] / size];
         let first = b.first - lost[0] * (lost[0] / share) + bent[0] * (bent[0] / fall);
         let second = b.second - lost[1] * (lost[1] / share) + bent[1] * (bent[1] / fall);
         let mixed = b.mixed - lost[0] * (lost[1] / share) + bent[0] * (bent[1] / fall);
