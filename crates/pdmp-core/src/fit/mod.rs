@@ -1,6 +1,7 @@
 //! Learning a primitive from demonstrations: the four steps of Section 3.2, composed.
 
 mod constants;
+mod cycle_phase;
 mod options;
 mod stiffness;
 mod style;
