@@ -3,6 +3,7 @@
 mod constants;
 mod cycle_phase;
 mod options;
+mod scaling;
 mod stiffness;
 mod style;
 
@@ -10,6 +11,7 @@ use std::sync::Arc;
 
 use ndarray::{Array2, s};
 
+use crate::align::{Aligned, TimeScaling};
 use crate::context::{ContextColumn, ContextMap, tabulate};
 use crate::demo::{ContextValue, Demonstration};
 use crate::error::{Error, Result};
@@ -49,7 +51,23 @@ pub fn fit(
     let threads = options.threads;
     let mut aligning = |share| proceed(Stage::Align, share);
     let unit = options.dof_scale.given(demos[0].n_dofs())?;
-    let template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut aligning)?;
+    let linear = aligned.clone();
+    let mut template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut aligning)?;
+    if let (TimeScaling::WarpIfBetter, Some((columns, numbers))) = (&options.alignment.time_scaling, &contexts) {
+        let n_styles = |aligned: &Aligned| {
+            let count = match options.styles {
+                StyleChoice::Given(count) => count,
+                StyleChoice::Auto => StyleCount::Spectrum(1.0),
+            };
+            let mut targets = Targets::of(aligned, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
+            targets.scale(&options.dof_scale.of(&targets.ranges()));
+            Ok(Factors::of(targets.forcing.view(), count, &mut |_| Ok(()))?.styles.ncols())
+        };
+        let contexts = scaling::Contexts { columns, numbers, map: options.map, n_styles: &n_styles };
+        if !contexts.favour(&aligned, &linear, options.alignment.kind, &mut aligning)? {
+            (aligned, template) = (linear, None);
+        }
+    }
     let mut targeting = |share| proceed(Stage::Targets, share);
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
