@@ -52,8 +52,10 @@ pub fn fit(
     let mut aligning = |share| proceed(Stage::Align, share);
     let unit = options.dof_scale.given(demos[0].n_dofs())?;
     let linear = aligned.clone();
-    let mut template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut aligning)?;
-    if let (TimeScaling::WarpIfBetter, Some((columns, numbers))) = (&options.alignment.time_scaling, &contexts) {
+    let compared = options.alignment.time_scaling == TimeScaling::WarpIfBetter && contexts.is_some();
+    let mut warping = |share| aligning(if compared { 0.5 * share } else { share });
+    let mut template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut warping)?;
+    if let (true, Some((columns, numbers))) = (compared, &contexts) {
         let n_styles = |aligned: &Aligned| {
             let count = match options.styles {
                 StyleChoice::Given(count) => count,
@@ -64,7 +66,8 @@ pub fn fit(
             Ok(Factors::of(targets.forcing.view(), count, &mut |_| Ok(()))?.styles.ncols())
         };
         let contexts = scaling::Contexts { columns, numbers, map: options.map, n_styles: &n_styles };
-        if !contexts.favour(&aligned, &linear, options.alignment.kind, &mut aligning)? {
+        let mut comparing = |share: f64| aligning(0.5 + 0.5 * share);
+        if !contexts.favour(&aligned, &linear, options.alignment.kind, &mut comparing)? {
             (aligned, template) = (linear, None);
         }
     }

@@ -86,7 +86,7 @@ pub fn style_of(
     let design = design(model);
     let mut target = targets.forcing.row(0).to_vec();
     if model.kind() == Kind::Rhythmic {
-        let samples = cycle_phase::lead(&design, &target, n_dofs);
+        let samples = cycle_phase::lead(&design, &target, model.demonstrated.styles.view(), n_dofs);
         target.rotate_left(samples * n_dofs);
         position.as_slice_mut().unwrap_or_default().rotate_left(samples * n_dofs);
     }
