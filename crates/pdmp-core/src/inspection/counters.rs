@@ -5,8 +5,8 @@ use crate::demo::Sampling;
 
 /// The columns that are a counter or a clock in every demonstration, where there are others beside them.
 pub(super) fn columns(surveys: &[Survey]) -> Vec<Finding> {
-    let n_dofs = surveys.first().map_or(0, |survey| survey.dofs.len());
-    let enough = surveys.iter().all(|survey| survey.n_samples() >= MIN_SAMPLES && survey.dofs.len() == n_dofs);
+    let n_dofs = surveys.first().map_or(0, |survey| survey.n_dofs);
+    let enough = surveys.iter().all(|survey| survey.n_samples() >= MIN_SAMPLES && survey.n_dofs == n_dofs);
     if n_dofs < 2 || !enough {
         return Vec::new();
     }
@@ -21,11 +21,8 @@ pub(super) fn columns(surveys: &[Survey]) -> Vec<Finding> {
 }
 
 fn counts(survey: &Survey, d: usize) -> bool {
-    let (column, extent) = (survey.column(d), survey.dofs[d]);
-    extent.step == 1.0
-        && extent.high - extent.low == (column.len() - 1) as f64
-        && column[column.len() - 1] == extent.high
-        && (1..column.len()).all(|c| column[c] - column[c - 1] == 1.0)
+    let column = survey.column(d);
+    (1..column.len()).all(|c| column[c] - column[c - 1] == 1.0)
 }
 
 /// Whether a column is the stamps themselves: a ramp may be a movement, but not the scatter of a clock.

@@ -23,13 +23,12 @@ struct Run {
 /// The runs of zeros of a demonstration; degrees of freedom that are lost together are reported together.
 pub(super) fn zeros(demo: usize, survey: &Survey) -> Vec<Finding> {
     let n = survey.n_samples();
-    if n < MIN_SAMPLES {
+    if n < MIN_SAMPLES || !survey.zero || survey.step == 0.0 {
         return Vec::new();
     }
-    let some = |d: &usize| survey.dofs[*d].zero && survey.dofs[*d].step > 0.0;
-    let mut runs: Vec<Run> = (0..survey.dofs.len()).filter(some).flat_map(|d| runs(d, survey.column(d))).collect();
+    let mut runs: Vec<Run> = (0..survey.n_dofs).flat_map(|d| runs(d, survey.column(d))).collect();
     // Rows of zeros at the end are padding.
-    let all = runs.iter().filter(|run| run.to == n - 1).count() == survey.dofs.len();
+    let all = runs.iter().filter(|run| run.to == n - 1).count() == survey.n_dofs;
     if all {
         runs.retain(|run| run.to != n - 1);
     }
@@ -48,20 +47,25 @@ pub(super) fn zeros(demo: usize, survey: &Survey) -> Vec<Finding> {
 /// Runs of zeros in a column with steps to and from them that are far larger than those elsewhere.
 fn runs(dof: usize, column: ArrayView1<f64>) -> Vec<Run> {
     let n = column.len();
-    let (mut largest, mut moving, mut steps) = (0.0f64, 0, 0);
     let mut found: Vec<Run> = Vec::new();
-    for c in 0..n {
-        if column[c] == 0.0 {
-            match found.last_mut() {
-                Some(run) if run.to + 1 == c => run.to = c,
-                _ => found.push(Run { dof, from: c, to: c, ratio: 0.0 }),
-            }
-        } else if c > 0 && column[c - 1] != 0.0 {
-            let step = (column[c] - column[c - 1]).abs();
-            largest = largest.max(step);
-            moving += usize::from(step > 0.0);
-            steps += 1;
+    for (c, _) in column.iter().enumerate().filter(|(_, y)| **y == 0.0) {
+        match found.last_mut() {
+            Some(run) if run.to + 1 == c => run.to = c,
+            _ => found.push(Run { dof, from: c, to: c, ratio: 0.0 }),
         }
+    }
+    // A movement may start or end with one sample at zero, or rest there.
+    let inside = |run: &Run| run.from > 0 && run.to + 1 < n;
+    found.retain(|run| inside(run) || (run.from < run.to && run.to - run.from + 1 < n));
+    if found.is_empty() {
+        return found;
+    }
+    let (mut largest, mut moving, mut steps) = (0.0f64, 0, 0);
+    for c in (1..n).filter(|&c| column[c] != 0.0 && column[c - 1] != 0.0) {
+        let step = (column[c] - column[c - 1]).abs();
+        largest = largest.max(step);
+        moving += usize::from(step > 0.0);
+        steps += 1;
     }
     if steps < MIN_SAMPLES / 2 || (moving as f64) < MIN_MOVING * steps as f64 {
         return Vec::new();
@@ -69,12 +73,7 @@ fn runs(dof: usize, column: ArrayView1<f64>) -> Vec<Run> {
     found.retain_mut(|run| {
         let before = (run.from > 0).then(|| column[run.from - 1].abs());
         let after = (run.to + 1 < n).then(|| column[run.to + 1].abs());
-        let jump = match (before, after) {
-            (Some(before), Some(after)) => before.min(after),
-            // A movement may start or end with one sample at zero.
-            (Some(jump), None) | (None, Some(jump)) if run.to > run.from => jump,
-            _ => 0.0,
-        };
+        let jump = before.into_iter().chain(after).fold(f64::INFINITY, f64::min);
         run.ratio = jump / largest;
         run.ratio > MAX_RATIO
     });

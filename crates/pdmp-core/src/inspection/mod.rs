@@ -8,7 +8,7 @@
 //! | `counters` | a column that counts samples, or repeats the time stamps |
 //! | `turns` | angles that jump by a full turn, or lie whole turns apart in different demonstrations |
 //!
-//! One pass over the samples collects the ranges and steps of each degree of freedom; what they exclude is not examined
+//! One pass over the samples finds the largest step and whether there are zeros; what these exclude is not examined
 //! further. A fit adds its own finding, gains whose transients the samples do not resolve, in `fit/stiffness.rs`.
 
 mod counters;
@@ -28,6 +28,9 @@ pub use turns::{turn_of, unwound};
 /// Fewest samples of which the usual step of a degree of freedom is known.
 const MIN_SAMPLES: usize = 10;
 
+/// Values that are examined side by side.
+const LANES: usize = 8;
+
 /// Returns what is implausible about the samples of demonstrations of one skill.
 ///
 /// `dt` in seconds is the sampling interval of those that carry none; without it places are given by sample alone.
@@ -45,11 +48,15 @@ pub fn inspect(demos: &[Demonstration], dt: Option<f64>) -> Vec<Finding> {
     findings
 }
 
-/// A demonstration with the ranges and steps of its degrees of freedom.
+/// A demonstration with what one pass over all samples tells.
 struct Survey<'a> {
     demo: &'a Demonstration,
     dt: Option<f64>,
-    dofs: Vec<Extent>,
+    n_dofs: usize,
+    /// Largest step of any degree of freedom from one sample to the next.
+    step: f64,
+    /// Whether any sample is exactly zero.
+    zero: bool,
 }
 
 /// The values of one degree of freedom.
@@ -59,28 +66,38 @@ struct Extent {
     high: f64,
     /// Largest step from one sample to the next.
     step: f64,
-    /// Whether a sample is exactly zero.
-    zero: bool,
 }
 
 impl<'a> Survey<'a> {
     fn new(demo: &'a Demonstration, dt: Option<f64>) -> Self {
+        let n_dofs = demo.n_dofs();
         let position = demo.position();
-        let first = position.row(0);
-        let start = |&y: &f64| Extent { low: y, high: y, step: 0.0, zero: y == 0.0 };
-        let mut dofs: Vec<Extent> = first.iter().map(start).collect();
-        let mut before = first;
-        for row in position.rows().into_iter().skip(1) {
-            for ((dof, &y), &last) in dofs.iter_mut().zip(row).zip(before) {
-                let step = (y - last).abs();
-                dof.low = if y < dof.low { y } else { dof.low };
-                dof.high = if y > dof.high { y } else { dof.high };
-                dof.step = if step > dof.step { step } else { dof.step };
-                dof.zero |= y == 0.0;
-            }
-            before = row;
+        let position = position.as_standard_layout();
+        let values = position.as_slice().unwrap_or_default();
+        let (mut steps, mut zero) = ([0.0f64; LANES], false);
+        let mut add = |lane: usize, value: f64, before: f64| {
+            let step = (value - before).abs();
+            steps[lane] = if step > steps[lane] { step } else { steps[lane] };
+            zero |= value == 0.0;
+        };
+        let (later, earlier) = (&values[n_dofs..], &values[..values.len() - n_dofs]);
+        let (whole, rest) = (later.chunks_exact(LANES), later.len() / LANES * LANES);
+        for (later, earlier) in whole.zip(earlier.chunks_exact(LANES)) {
+            (0..LANES).for_each(|lane| add(lane, later[lane], earlier[lane]));
         }
-        Self { demo, dt, dofs }
+        later[rest..].iter().zip(&earlier[rest..]).for_each(|(later, earlier)| add(0, *later, *earlier));
+        zero |= values[..n_dofs].contains(&0.0);
+        Self { demo, dt, n_dofs, step: steps.into_iter().fold(0.0, f64::max), zero }
+    }
+
+    fn extent(&self, d: usize) -> Extent {
+        let column = self.column(d);
+        let start = Extent { low: column[0], high: column[0], step: 0.0 };
+        (1..column.len()).fold(start, |Extent { low, high, step }, c| Extent {
+            low: low.min(column[c]),
+            high: high.max(column[c]),
+            step: step.max((column[c] - column[c - 1]).abs()),
+        })
     }
 
     fn n_samples(&self) -> usize {

@@ -52,7 +52,7 @@ fn ends_in_zeros(survey: &Survey, rows: usize) -> bool {
         return false;
     }
     let movement = n - rows;
-    (0..survey.dofs.len()).any(|d| {
+    (0..survey.n_dofs).any(|d| {
         let column = survey.column(d);
         let largest = (1..movement).fold(0.0f64, |most, c| most.max((column[c] - column[c - 1]).abs()));
         largest > 0.0 && column[movement - 1].abs() > MAX_RATIO * largest
@@ -62,9 +62,9 @@ fn ends_in_zeros(survey: &Survey, rows: usize) -> bool {
 /// Whether a degree of freedom still moves fast in its step to the sample `last`.
 fn stops_dead(survey: &Survey, last: usize) -> bool {
     last > 0
-        && (0..survey.dofs.len()).any(|d| {
+        && (0..survey.n_dofs).any(|d| {
             let column = survey.column(d);
             let step = (column[last] - column[last - 1]).abs();
-            step > 0.0 && step > DEAD * survey.dofs[d].step
+            step > 0.0 && step > DEAD * survey.extent(d).step
         })
 }

@@ -22,7 +22,7 @@ pub(super) fn close(demo: usize, survey: &Survey) -> Option<Finding> {
     let usual = *sorted.select_nth_unstable_by(intervals.len() / 2, f64::total_cmp).1;
     let mut worst: Option<Finding> = None;
     let mut most = MAX_RATIO;
-    for d in 0..survey.dofs.len() {
+    for d in 0..survey.n_dofs {
         let column = survey.column(d);
         let (mut usual_rate, mut close_rate, mut at) = (0.0f64, 0.0f64, 0);
         for (c, &interval) in intervals.iter().enumerate() {

@@ -46,8 +46,10 @@ fn unit(demo: &Demonstration, d: usize) -> Unit {
 /// The first jump by a full turn of each angle of a demonstration.
 pub(super) fn wraps(demo: usize, survey: &Survey) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for d in 0..survey.dofs.len() {
-        let (column, extent) = (survey.column(d), survey.dofs[d]);
+    // Smaller steps are none of a half turn.
+    let suspects = if survey.step > 0.5 * TAU { 0..survey.n_dofs } else { 0..0 };
+    for d in suspects.filter(|d| !matches!(unit(survey.demo, *d), Unit::Other)) {
+        let (column, extent) = (survey.column(d), survey.extent(d));
         let jumps = |turn: f64, least: f64, most: f64| {
             let jump = |c: usize| column[c] - column[c - 1];
             let found = (1..column.len()).find(|&c| (least..=most).contains(&(jump(c).abs() / turn)))?;
@@ -81,7 +83,7 @@ pub(super) fn apart(surveys: &[Survey]) -> Vec<Finding> {
     let demos: Vec<&Demonstration> = surveys.iter().map(|survey| survey.demo).collect();
     let Some(first) = surveys.first() else { return Vec::new() };
     let mut findings = Vec::new();
-    for d in 0..first.dofs.len() {
+    for d in 0..first.n_dofs {
         for (demo, turns, turn, mended) in turns(&demos, d) {
             findings.push(Finding::TurnsApart { demo, dof: surveys[demo].name(d), turns, turn, mended });
         }
