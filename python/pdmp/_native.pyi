@@ -115,6 +115,9 @@ def fit(
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model: ...
+def inspected(
+    demos: Sequence[Demonstration], *, dt: float | None = None
+) -> tuple[list[Demonstration], list[str]]: ...
 def factorise(
     targets: ArrayLike,  # (M, C*D)
     *,

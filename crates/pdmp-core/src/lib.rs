@@ -77,6 +77,7 @@ mod file;
 mod fit;
 mod follower;
 mod foresight;
+pub mod inspection;
 mod jacobian;
 mod landscape;
 mod lanes;

@@ -9,6 +9,7 @@ use crate::attractor::{Attractor, State};
 use crate::context::{ContextMap, Prediction};
 use crate::demo::ContextValue;
 use crate::error::{Error, Result, check_vector};
+use crate::inspection::Finding;
 use crate::landscape::Landscape;
 use crate::lanes::{Lanes, groups};
 use crate::phase::{Canonical, Kind};
@@ -58,6 +59,8 @@ pub struct Learnt {
     pub left_over: Option<Array2<f64>>,
     /// The basis functions, in one line.
     pub basis: String,
+    /// What was implausible about the demonstrations or the fit; empty in a model that was read from a file.
+    pub findings: Vec<Finding>,
 }
 
 /// Most by which a predicted duration may leave the range of the demonstrations': far outside of their contexts its

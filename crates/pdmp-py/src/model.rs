@@ -138,6 +138,7 @@ impl Model {
         events: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
         let events = optional("events", events)?;
+        crate::inspection::warn(py, &pdmp_core::inspection::inspect(std::slice::from_ref(&demonstration.0), dt))?;
         let style = py.detach(|| style_of(&self.0, &demonstration.0, dt, period, events.as_deref())).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }

@@ -171,7 +171,8 @@ pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
     py.detach(|| recording::period(&demo.0)).map_err(raise)
 }
 
-/// Positions (T, D) with NaN interpolated in gaps up to `max_gap` seconds; `turns` (D,) of angles, 0 of others.
+/// Positions (T, D) with NaN interpolated in gaps up to `max_gap` seconds; `turns` (D,) of angles, 0 of others, NaN where it is
+/// not known.
 #[pyfunction]
 pub(crate) fn fill<'py>(
     py: Python<'py>,

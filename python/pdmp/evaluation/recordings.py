@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -9,7 +10,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp._native import Demonstration
+from pdmp._native import Demonstration, inspected
 
 Array: TypeAlias = NDArray[Any]  # of float64
 Kind: TypeAlias = Literal["discrete", "rhythmic"]
@@ -109,6 +110,10 @@ def recordings(
     for m, demo in enumerate(given):
         if demo.n_dofs != given[0].n_dofs:
             raise ValueError(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
+    whole, findings = inspected(list(given), dt=dt)
+    for finding in findings:
+        warnings.warn(finding, UserWarning, stacklevel=3)
+    given = tuple(whole)
     if kind == "discrete" and period is not None:
         raise ValueError("period does not apply to discrete demonstrations: leave it out")
     periods = np.full(len(given), np.nan) if period is None else np.asarray(period, float)

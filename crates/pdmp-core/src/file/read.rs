@@ -162,6 +162,7 @@ impl Reader<'_> {
             singular_values,
             left_out: constants.left_out,
             left_over: None,
+            findings: Vec::new(),
             basis: constants.basis.clone(),
         };
         let (tau, names, units) = (constants.tau, constants.names.clone(), constants.units.clone());
