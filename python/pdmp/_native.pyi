@@ -104,6 +104,7 @@ def fit(
     smoothing: Literal["auto"] | float | None = None,
     nominal: int | None = None,
     n_samples: int | None = None,
+    transport: Literal["learnt", "immediate"] = "learnt",
     dof_scale: Literal["range"] | ArrayLike | None = None,  # (D,)
     alignment: Literal["linear", "warp"] | Warp = "linear",
     events: ArrayLike | None = None,  # (M, E)
@@ -285,6 +286,7 @@ class Model:
         events: ArrayLike | None = None,  # (E,)
     ) -> _Array: ...  # (J,)
     def landscape(self, u: ArrayLike) -> _Array: ...  # (len(u), J, D)
+    def transport(self, u: ArrayLike) -> _Array: ...  # (n,)
     def tau_at(self, phase: float, timing: ArrayLike) -> float: ...  # timing (K,)
     def predict(self, context: _Context) -> Prediction: ...
     def band(

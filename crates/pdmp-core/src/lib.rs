@@ -93,6 +93,7 @@ mod spline;
 mod tabulate;
 mod targets;
 mod threads;
+mod transport;
 mod unit_responses;
 
 pub use align::{Alignment, Template, TimeScaling, Warp};
@@ -114,3 +115,4 @@ pub use responses::Derivative;
 pub use rollout::Timing;
 pub use smooth::Smoothing;
 pub use threads::Threads;
+pub use transport::TransportChoice;

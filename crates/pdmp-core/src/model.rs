@@ -6,6 +6,7 @@ use ndarray::Array2;
 
 use crate::align::{Template, WarpingFunction};
 use crate::attractor::{Attractor, State};
+use crate::conditions::refuse;
 use crate::context::{ContextMap, Prediction};
 use crate::demo::ContextValue;
 use crate::error::{Error, Result, check_vector};
@@ -14,6 +15,7 @@ use crate::lanes::{Lanes, groups};
 use crate::phase::{Canonical, Kind};
 use crate::responses::Cache;
 use crate::smooth::Smoothing;
+use crate::transport::Transport;
 
 /// What was learnt from each demonstration, in absolute coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +67,7 @@ pub struct Learnt {
 pub struct Model {
     pub(crate) attractor: Attractor,
     pub(crate) landscape: Landscape,
+    pub(crate) transport: Transport,
     pub(crate) tau: f64,
     pub(crate) names: Vec<String>,
     pub(crate) units: Vec<String>,
@@ -215,6 +218,19 @@ impl Model {
             }
             None => Ok(()),
         }
+    }
+
+    /// Share m(u) of the way from start to goal that a discrete movement has covered at clock `u`: 1 throughout where
+    /// transport is immediate.
+    ///
+    /// # Errors
+    /// A rhythmic primitive, or a clock that is negative or not finite.
+    pub fn transport(&self, u: f64) -> Result<f64> {
+        refuse(self.kind(), "transport", self.kind() == Kind::Rhythmic)?;
+        if !(u.is_finite() && u >= 0.0) {
+            return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative" });
+        }
+        Ok(1.0 + self.transport.lag(u).value)
     }
 
     /// Basis functions b (J, D) by rows at clock `u`: the landscape without its gate.

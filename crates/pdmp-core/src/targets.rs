@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, Array3, Axis};
 
 use crate::align::Aligned;
 use crate::attractor::{Attractor, Inverse};
@@ -13,6 +13,7 @@ use crate::lanes::{Lanes, gather, groups, pack, scatter, unpack};
 use crate::phase::{Canonical, Kind};
 use crate::spline::Knots;
 use crate::threads::Threads;
+use crate::transport::Transport;
 
 /// What a fit takes from the demonstrations, one a row.
 #[derive(Debug)]
@@ -27,6 +28,8 @@ pub(crate) struct Targets {
     pub(crate) anchors: Array2<f64>,
     /// Peak-to-peak ranges (M, D).
     ranges: Array2<f64>,
+    /// Some samples (M, S, D) less the first, from which a transport profile is learnt; none where rhythmic.
+    moved: Array3<f64>,
 }
 
 /// The rows of one demonstration.
@@ -36,10 +39,11 @@ struct Rows<'a> {
     goal: &'a mut [f64],
     anchor: &'a mut [f64],
     range: &'a mut [f64],
+    moved: &'a mut [f64],
 }
 
 impl Targets {
-    /// The targets of all demonstrations; `proceed` is told the share that is done.
+    /// The targets of all demonstrations about their goals or anchors; `proceed` is told the share that is done.
     ///
     /// # Errors
     /// No memory, a bad smoothing, or whatever `proceed` returns.
@@ -51,12 +55,17 @@ impl Targets {
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
         let (n_demos, n_dofs) = (aligned.n_demos(), aligned.demo(0).n_dofs());
+        let kept = match canonical.kind() {
+            Kind::Discrete => Transport::samples(aligned.n_samples).len(),
+            Kind::Rhythmic => 0,
+        };
         let mut targets = Self {
             forcing: zeros("targets", (n_demos, aligned.n_samples * n_dofs))?,
             starts: Array2::zeros((n_demos, n_dofs)),
             goals: Array2::zeros((n_demos, n_dofs)),
             anchors: Array2::zeros((n_demos, n_dofs)),
             ranges: Array2::zeros((n_demos, n_dofs)),
+            moved: Array3::zeros((n_demos, kept, n_dofs)),
         };
         let work = Work::new(attractor, canonical, aligned.n_samples);
         let columns = || [0, 1].map(|_| vec![Lanes::ZERO; aligned.n_samples]);
@@ -72,6 +81,41 @@ impl Targets {
     /// Largest peak-to-peak range of each DoF within one demonstration (D,).
     pub(crate) fn ranges(&self) -> Vec<f64> {
         self.ranges.fold_axis(Axis(0), 0.0f64, |most, range| most.max(*range)).to_vec()
+    }
+
+    /// Learns the transport profile of the movements, whose DoFs are comparable in the given units (D,).
+    ///
+    /// # Errors
+    /// None for a canonical system of discrete movements.
+    pub(crate) fn transport(&mut self, canonical: Canonical, unit: &[f64]) -> Result<Transport> {
+        let mut moved = std::mem::take(&mut self.moved);
+        let mut ways = &self.goals - &self.starts;
+        moved.iter_mut().zip(unit.iter().cycle()).for_each(|(x, unit)| *x /= unit);
+        ways.iter_mut().zip(unit.iter().cycle()).for_each(|(x, unit)| *x /= unit);
+        Transport::learn(moved, ways, canonical)
+    }
+
+    /// Makes the targets those about the moving frame, f = y′ − c′ − z with z driven by y − c.
+    ///
+    /// A target is linear in its movement: that of (g − y₀)ℓ, read from the same spline, is taken away.
+    pub(crate) fn carry(&mut self, transport: &Transport, attractor: Attractor, canonical: Canonical) {
+        if transport.is_immediate() {
+            return;
+        }
+        let n_dofs = self.starts.ncols();
+        let work = Work::new(attractor, canonical, self.forcing.ncols() / n_dofs);
+        let mut lag: Vec<f64> = work.clock.iter().map(|&u| transport.lag(u).value).collect();
+        let mut slopes = vec![0.0; lag.len()];
+        work.knots.slopes(&lag, &mut slopes);
+        work.inverse.target(&mut lag, &slopes, 0.0, false);
+        let rows = self.forcing.rows_mut().into_iter().zip(self.goals.rows()).zip(self.starts.rows());
+        for ((mut row, goal), start) in rows {
+            let way = &goal - &start;
+            let samples = row.as_slice_mut().unwrap_or_default().chunks_exact_mut(n_dofs);
+            for (forcing, lag) in samples.zip(&lag) {
+                forcing.iter_mut().zip(&way).for_each(|(f, way)| *f -= way * lag);
+            }
+        }
     }
 
     /// Counts the targets in the given unit of each DoF.
@@ -90,19 +134,17 @@ impl Targets {
         let [starts, goals, anchors, ranges] = [&mut self.starts, &mut self.goals, &mut self.anchors, &mut self.ranges]
             .map(|matrix| chunks(matrix, n_dofs));
         let places = starts.zip(goals).zip(anchors).zip(ranges);
-        chunks(&mut self.forcing, n_values).zip(places).map(|(forcing, (((start, goal), anchor), range))| Rows {
-            forcing,
-            start,
-            goal,
-            anchor,
-            range,
-        })
+        let moved = self.moved.outer_iter_mut().map(|moved| moved.into_slice().unwrap_or_default());
+        chunks(&mut self.forcing, n_values).zip(places).zip(moved).map(
+            |((forcing, (((start, goal), anchor), range)), moved)| Rows { forcing, start, goal, anchor, range, moved },
+        )
     }
 }
 
 /// What all demonstrations have in common.
 struct Work {
     kind: Kind,
+    clock: Vec<f64>,
     inverse: Inverse,
     knots: Knots,
 }
@@ -113,10 +155,10 @@ impl Work {
         let inverse = attractor.inverse(clock[1]);
         let kind = canonical.kind();
         let knots = match kind {
-            Kind::Discrete => Knots::not_a_knot(clock),
-            Kind::Rhythmic => Knots::periodic(clock, TAU),
+            Kind::Discrete => Knots::not_a_knot(clock.clone()),
+            Kind::Rhythmic => Knots::periodic(clock.clone(), TAU),
         };
-        Self { kind, inverse, knots }
+        Self { kind, clock, inverse, knots }
     }
 
     /// Fills the rows of a demonstration whose positions stand in the place of its target.
@@ -125,9 +167,13 @@ impl Work {
     /// start at 0, and a DoF that does not move has a target of exactly zero, and its own position as its mean, to the
     /// last digit.
     fn learn(&self, rows: Rows, given: Option<&[f64]>, [column, slopes]: &mut [Vec<Lanes>; 2]) {
-        let Rows { forcing: position, start, goal, anchor, range } = rows;
+        let Rows { forcing: position, start, goal, anchor, range, moved } = rows;
         let n_dofs = start.len();
         start.copy_from_slice(&position[..n_dofs]);
+        for (moved, c) in moved.chunks_exact_mut(n_dofs).zip(Transport::samples(column.len())) {
+            let sample = &position[c * n_dofs..];
+            moved.iter_mut().zip(sample).zip(&*start).for_each(|((moved, y), start)| *moved = y - start);
+        }
         goal.copy_from_slice(given.unwrap_or(&position[position.len() - n_dofs..]));
         let n_samples = Lanes::splat(column.len() as f64);
         let goals = pack(goal);

@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayD, Axis, Ix2};
 use pdmp_core::basis::Basis;
 use pdmp_core::{
     Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Sampling, Smoothing, Stage, StyleChoice, StyleCount,
-    TimeScaling,
+    TimeScaling, TransportChoice,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -55,6 +55,9 @@ use crate::warp::Warp;
 /// n_samples : int, optional
 ///     Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
 ///     than 150.
+/// transport : {"learnt", "immediate"}
+///     How the way from start to goal is spread over a discrete movement: along the profile by which the demonstrations
+///     cover theirs (:meth:`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path.
 /// dof_scale : None, "range" or (D,) array_like
 ///     Unit of each degree of freedom in the factorisation; if given as numbers, in a warp of time too.
 /// alignment : {"linear", "warp"} or Warp
@@ -95,11 +98,11 @@ use crate::warp::Warp;
 #[pyfunction]
 #[pyo3(signature = (
     demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, spectrum=0.9, basis=None,
-    smoothing=None, nominal=None, n_samples=None, dof_scale=None, alignment=None, events=None, tau=None, alpha_z=25.0,
-    beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
+    smoothing=None, nominal=None, n_samples=None, transport="learnt", dof_scale=None, alignment=None, events=None,
+    tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
 ), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, spectrum=0.9, \
-    basis='gp', smoothing=None, nominal=None, n_samples=None, dof_scale=None, alignment='linear', events=None, \
-    tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
+    basis='gp', smoothing=None, nominal=None, n_samples=None, transport='learnt', dof_scale=None, \
+    alignment='linear', events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -115,6 +118,7 @@ pub(crate) fn fit(
     smoothing: Option<&Bound<'_, PyAny>>,
     nominal: Option<isize>,
     n_samples: Option<isize>,
+    transport: &str,
     dof_scale: Option<&Bound<'_, PyAny>>,
     alignment: Option<&Bound<'_, PyAny>>,
     events: Option<&Bound<'_, PyAny>>,
@@ -141,6 +145,7 @@ pub(crate) fn fit(
         map: map_of(map)?,
         styles: style_choice(n_styles, spectrum)?,
         basis: basis_of(basis)?,
+        transport: transport_of(transport)?,
         dof_scale: dof_scale_of(dof_scale)?,
         tau,
         alpha_z,
@@ -290,6 +295,14 @@ fn smoothing_of(smoothing: Option<&Bound<'_, PyAny>>) -> PyResult<Smoothing> {
             let wanted = "must be None, \"auto\" or a cut-off in Hz";
             Err(PyValueError::new_err(format!("smoothing = {}: {wanted}", smoothing.repr()?)))
         }
+    }
+}
+
+fn transport_of(transport: &str) -> PyResult<TransportChoice> {
+    match transport {
+        "learnt" => Ok(TransportChoice::Learnt),
+        "immediate" => Ok(TransportChoice::Immediate),
+        _ => Err(PyValueError::new_err(format!("transport = {transport:?}: must be \"learnt\" or \"immediate\""))),
     }
 }
 

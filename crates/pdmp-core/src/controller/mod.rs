@@ -25,8 +25,9 @@ use crate::follower::{Filter, Follower, Glide};
 use crate::lanes::{Lanes, copy, groups, repack, unpack};
 use crate::model::Model;
 use crate::perturbation::{Held, STILL, widest};
-use crate::phase::{CompensatedSum, Kind};
+use crate::phase::{Canonical, CompensatedSum, Kind};
 use crate::series::Series;
+use crate::transport::Lag;
 use tick::Forcing;
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
@@ -60,16 +61,24 @@ pub struct Controller {
     /// Amplitude r; 1 where discrete.
     r: f64,
     filter: Filter,
+    /// Seconds to 99 % of a changed command.
+    transition: f64,
     style: Follower,
     /// ρ = 1/τ.
     rate: Follower,
     /// Goal or anchor.
     centre: Follower,
+    /// How a commanded goal is followed: [`Controller::centre_filter`].
+    centre_filter: Filter,
     /// By groups of DoFs, as all that follows.
     forcing: Vec<Forcing>,
     /// Forcing at the start of the stretch at work, taken before anything moves: kept as numbers for the loop over the
     /// groups, it would not stay in registers.
     from: Vec<Jet<Lanes>>,
+    /// The way g − y₀ at the start, which the frame covers; zero where rhythmic.
+    way: Vec<Lanes>,
+    /// What is left of it at the clock.
+    lag: Lag,
     z: Vec<Lanes>,
     position: Vec<Lanes>,
     velocity: Vec<Lanes>,
@@ -83,6 +92,7 @@ pub struct Controller {
     finest: f64,
     /// Of the last tick, and good for the next if it is as long.
     glide: Glide,
+    centre_glide: Glide,
     propagator: Propagator,
     series: Series,
     /// Ticks from now for which the landscape is fetched.
@@ -119,11 +129,15 @@ impl Controller {
             clock: CompensatedSum::default(),
             r: 1.0,
             filter,
+            transition,
             style: Follower::new(&conditions.style),
             rate: Follower::new(&[1.0 / conditions.tau]),
             centre: Follower::new(&conditions.centre),
+            centre_filter: filter,
             forcing: vec![Forcing::default(); zeros.len()],
             from: vec![Jet::default(); zeros.len()],
+            way: zeros.clone(),
+            lag: Lag::default(),
             z: zeros.clone(),
             position: zeros.clone(),
             velocity: zeros.clone(),
@@ -133,6 +147,7 @@ impl Controller {
             held: Held::new(model.ranges(), model.canonical().extent()),
             finest,
             glide: filter.glide(dt),
+            centre_glide: filter.glide(dt),
             propagator: series.propagator::<Lanes>(0.0),
             series,
             lead: 1.0,
@@ -168,6 +183,11 @@ impl Controller {
         self.style.jump(&conditions.style);
         self.rate.jump(&[1.0 / conditions.tau]);
         self.centre.jump(&conditions.centre);
+        if let (Kind::Discrete, Some(start)) = (self.model.kind(), &conditions.start) {
+            repack(&mut self.way, start);
+            self.way.iter_mut().zip(self.centre.value()).for_each(|(way, goal)| *way = *goal - *way);
+        }
+        self.lag = self.model.transport.lag(0.0);
         self.read_forcing();
         self.place();
         self.set_tolerance();
@@ -193,6 +213,21 @@ impl Controller {
             for (z, forcing) in self.z.iter_mut().zip(&self.forcing) {
                 *z = *z * conditions.tau - forcing.shape * *r;
             }
+        }
+    }
+
+    /// The filter of a goal commanded now.
+    ///
+    /// Such a goal enters Eq. (1) alone, as in the paper, but over what remains of the movement: the filter takes so long,
+    /// less the time 1/β_z by which the output system lags behind, and never less than a transition. A goal at once is
+    /// what immediate transport has, an anchor, and any goal from shortly before the end on.
+    pub(super) fn centre_filter(&self) -> Filter {
+        match self.model.canonical() {
+            Canonical::Discrete { u_end, .. } if !self.model.transport.is_immediate() => {
+                let remaining = u_end - self.clock.value() - 1.0 / self.model.attractor().beta_z;
+                Filter::new(self.transition.max(remaining * self.conditions.tau))
+            }
+            _ => self.filter,
         }
     }
 

@@ -7,6 +7,7 @@ use crate::landscape::{Landscape, Place};
 use crate::lanes::{Lanes, Real, Register, flush, unpack};
 use crate::perturbation::Push;
 use crate::phase::{Canonical, CompensatedSum, amplitude};
+use crate::transport::Lag;
 
 /// Most pieces of a tick; a longer one is still stable, only less exact.
 const MOST_PIECES: f64 = 1000.0;
@@ -49,6 +50,8 @@ pub(super) struct Gate {
     rate: [f64; 2],
     /// 1/ρ.
     tau: f64,
+    /// m′ and m″ with respect to the output system's clock.
+    carry: [f64; 2],
 }
 
 impl Gate {
@@ -58,11 +61,12 @@ impl Gate {
         Jet { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
     }
 
-    /// ẏ = ρ(z + w) and ÿ = ρ²(z′ + w′) + ρ̇(z + w).
+    /// ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′, where c covers a `way`.
     #[inline(always)]
-    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: Jet<T>) -> [T; 2] {
-        let ([rate, change], flow) = (self.rate, state.z + w.value);
-        [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
+    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: Jet<T>, way: T) -> [T; 2] {
+        let ([rate, change], [carry, bend]) = (self.rate, self.carry);
+        let flow = state.z + w.value + way * carry;
+        [flow * rate, (attractor.z_slope(state) + w.slope + way * bend) * (rate * rate) + flow * change]
     }
 }
 
@@ -81,8 +85,11 @@ impl Controller {
     /// One tick of `dt` seconds, `h` on the clock.
     pub(super) fn tick(&mut self, dt: f64, h: f64) -> Status {
         self.started = true;
-        let moving = !(self.style.settled() && self.rate.settled() && self.centre.settled());
-        let parts = (h / self.finest).max(if moving { self.filter.parts(dt) } else { 0.0 });
+        let moving = !(self.style.settled() && self.rate.settled());
+        let mut parts = (h / self.finest).max(if moving { self.filter.parts(dt) } else { 0.0 });
+        if !self.centre.settled() {
+            parts = parts.max(self.centre_filter.parts(dt));
+        }
         if parts <= 1.0 {
             self.piece(dt, h);
         } else {
@@ -113,6 +120,7 @@ impl Controller {
     fn measure(&mut self, dt: f64) {
         if dt != self.glide.dt() {
             self.glide = self.filter.glide(dt);
+            self.centre_glide = self.centre_filter.glide(dt);
         }
     }
 
@@ -132,6 +140,7 @@ impl Controller {
             self.advance(before, h);
         }
         self.clock = CompensatedSum::at(u_end);
+        self.lag = self.model.transport.lag(u_end);
         self.read_forcing();
         let h = self.stretch(dt - before);
         self.advance(dt - before, h);
@@ -165,12 +174,14 @@ impl Controller {
         }
         self.style.advance::<T>(&self.glide);
         self.rate.advance::<T>(&self.glide);
-        let moving = self.centre.elapse(&self.glide);
+        let moving = self.centre.elapse(&self.centre_glide);
         self.clock.add(self.held.pace() * h);
         if let Canonical::Rhythmic { mu } = self.model.canonical() {
             self.clock.wrap();
             self.r = amplitude(mu, self.r, self.conditions.amplitude, h);
         }
+        let lags = [self.lag, self.model.transport.lag(self.clock.value())];
+        self.lag = lags[1];
         // A piece that reaches u_end has the slopes of the demonstrated side at both its ends.
         let after = if demonstrated { self.gate_within() } else { self.gate() };
 
@@ -188,23 +199,24 @@ impl Controller {
             forcing[group] = Forcing::read::<T>(landscape, place, group, style, swing);
             let to = after.jet(&forcing[group]);
 
-            let mut origin = T::load(&centre.value()[group]);
-            let state = State { e: T::load(&position[group]) - origin, z: T::load(&z[group]) };
+            let (goal, way) = (T::load(&centre.value()[group]), T::load(&self.way[group]));
+            let [start, mut origin] = lags.map(|lag| goal + way * lag.value);
+            let state = State { e: T::load(&position[group]) - start, z: T::load(&z[group]) };
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
-                let start = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * before.tau };
-                centre.advance_group::<T>(group, &self.glide);
+                let set_out = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * before.tau };
+                centre.advance_group::<T>(group, &self.centre_glide);
                 let arrived = T::load(&centre.value()[group]);
                 let slope = T::load(&centre.rate()[group]) * after.tau;
-                let moved = propagator.follow([start, Jet { value: arrived - origin, slope }]);
+                let moved = propagator.follow([set_out, Jet { value: arrived - goal, slope }]);
                 y = y + moved.e;
-                origin = arrived;
+                origin = arrived + way * lags[1].value;
                 next.z = next.z + moved.z;
             }
             let (y, z_next) = (flush(y, rest), flush(next.z, rest));
             (position[group], z[group]) = (y.store(), z_next.store());
-            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, to);
+            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, to, way);
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
         }
         landscape.prefetch(self.clock.value() + self.lead * self.held.pace() * h);
@@ -257,7 +269,8 @@ impl Controller {
             Canonical::Rhythmic { mu } => mu * (self.conditions.amplitude - r),
         };
         let tau = 1.0 / rate[0];
-        Gate { r, along: r * self.held.pace(), swing: r * tau, growth, rate, tau }
+        let (pace, Lag { slope, bend, .. }) = (self.held.pace(), self.lag);
+        Gate { r, along: r * pace, swing: r * tau, growth, rate, tau, carry: [pace * slope, pace * pace * bend] }
     }
 
     /// Reads the forcing at the clock.
@@ -273,9 +286,10 @@ impl Controller {
     pub(super) fn read_out(&mut self) {
         let (gate, attractor) = (self.gate(), self.model.attractor());
         for group in 0..self.z.len() {
-            let e = self.position[group] - self.centre.value()[group];
-            let w = gate.jet(&self.forcing[group]);
-            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, State { e, z: self.z[group] }, w);
+            let (w, way) = (gate.jet(&self.forcing[group]), self.way[group]);
+            let e = self.position[group] - (self.centre.value()[group] + way * self.lag.value);
+            let state = State { e, z: self.z[group] };
+            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, state, w, way);
         }
         if let Some(Push { velocity, acceleration }) = self.held.push() {
             for group in 0..self.z.len() {
@@ -303,7 +317,7 @@ impl Controller {
             if !self.style.settled() {
                 push = push.max((landscape.blend::<Lanes>(place, group, target).value * fade).abs());
             }
-            let left = way + flow + push * (1.0 / beta_z) + self.filter.left(&self.centre, group);
+            let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, group);
             left.simd_le(self.tolerance[group]).all()
         });
         if over { Status::Finished } else { Status::Working }

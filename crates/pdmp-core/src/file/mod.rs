@@ -19,7 +19,7 @@ use crate::phase::Canonical;
 use crate::smooth::Smoothing;
 
 /// Version of the file's layout.
-const SCHEMA: u32 = 4;
+const SCHEMA: u32 = 5;
 /// The metadata key.
 const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.

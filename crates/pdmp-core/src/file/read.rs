@@ -13,6 +13,7 @@ use crate::model::{Demonstrated, Learnt, Model};
 use crate::phase::Canonical;
 use crate::sensitivity::STEPS;
 use crate::tabulate::{Jets, MOST_CELLS};
+use crate::transport::Transport;
 
 impl Model {
     /// Reads a model from the bytes of a file.
@@ -119,6 +120,10 @@ impl Reader<'_> {
         let (values, slopes) = (knots("landscape.values")?, knots("landscape.slopes")?);
         let knots = Jets { n_outputs: n_styles * n_dofs, values, slopes };
         let landscape = Landscape::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
+        let [n_coefficients] = self.shape("transport")?;
+        let transport = self.array("transport", &[n_coefficients])?;
+        let transport = Transport::from_coefficients(transport, constants.canonical)
+            .map_err(|error| Error::File(error.to_string()))?;
         let breaks = self.array("breaks", &[n_segments + 1])?;
         if breaks[0] != 0.0 || breaks[n_segments] != 1.0 || breaks.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err(bad("breaks do not increase from 0 to 1"));
@@ -158,9 +163,21 @@ impl Reader<'_> {
         let (tau, names, units) = (constants.tau, constants.names.clone(), constants.units.clone());
         let (cycle, responses) = Default::default();
         let map = None;
-        let mut model =
-            Model { attractor, landscape, tau, names, units, ranges, demonstrated, learnt, map, cycle, responses }
-                .with_cycle();
+        let mut model = Model {
+            attractor,
+            landscape,
+            transport,
+            tau,
+            names,
+            units,
+            ranges,
+            demonstrated,
+            learnt,
+            map,
+            cycle,
+            responses,
+        }
+        .with_cycle();
         if let Some(map) = &constants.map {
             model.map = Some(self.map(map, &model)?);
             let left_over = self.matrix("left_over", (model.kind().samples(STEPS), n_dofs))?;

@@ -77,6 +77,7 @@ impl Model {
             vector("singular_values", &self.learnt.singular_values),
             vector("dof_scale", &self.learnt.dof_scale),
             vector("ranges", &self.ranges),
+            vector("transport", self.transport.coefficients()),
             ("landscape.values", knots.clone(), values),
             ("landscape.slopes", knots, slopes),
         ];

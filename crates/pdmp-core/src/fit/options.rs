@@ -9,6 +9,7 @@ use crate::factor::StyleCount;
 use crate::phase::Kind;
 use crate::smooth::Smoothing;
 use crate::threads::Threads;
+use crate::transport::TransportChoice;
 
 /// The unit of each degree of freedom in the factorisation.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,6 +59,8 @@ pub struct FitOptions {
     pub styles: StyleChoice,
     /// Function approximator of the landscape.
     pub basis: Basis,
+    /// How the way from start to goal is spread over a discrete movement.
+    pub transport: TransportChoice,
     /// Unit of each DoF in the factorisation.
     pub dof_scale: DofScale,
     /// Time constant τ in seconds, discrete; otherwise the nominal duration.
@@ -76,7 +79,7 @@ pub struct FitOptions {
 
 impl FitOptions {
     /// The defaults: as many styles as make up nine tenths of the singular values, a Gaussian process, no smoothing,
-    /// α_z = 25, μ = 1, as many threads as the system allows, and all else from the demonstrations.
+    /// a learnt transport, α_z = 25, μ = 1, as many threads as the system allows, and all else from the demonstrations.
     pub fn new(kind: Kind) -> Self {
         let smoothing = Smoothing::Interpolate;
         Self {
@@ -93,6 +96,7 @@ impl FitOptions {
             map: MapChoice::Auto,
             styles: StyleCount::Spectrum(0.9).into(),
             basis: Basis::Gp(Gp::default()),
+            transport: TransportChoice::Learnt,
             dof_scale: DofScale::Unit,
             tau: None,
             alpha_z: 25.0,

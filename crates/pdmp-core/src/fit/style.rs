@@ -60,6 +60,7 @@ pub fn style_of(
         (None, None) => {}
     }
     let mut target = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;
+    target.carry(&model.transport, model.attractor, model.canonical());
     let scale = &model.learnt.dof_scale;
     target.scale(scale);
     let target = target.forcing;
