@@ -75,7 +75,7 @@ impl Controller {
         }
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
-            self.centre_filter = self.centre_filter();
+            self.centre_filter = self.centre_filter(command.tau.unwrap_or(self.conditions.tau));
             self.centre_glide = self.centre_filter.glide(self.glide.dt());
             self.centre.follow(centre, &self.centre_filter);
             self.set_tolerance();

@@ -216,16 +216,16 @@ impl Controller {
         }
     }
 
-    /// The filter of a goal commanded now.
+    /// The filter of a goal commanded now, for a movement that goes on with `tau`.
     ///
     /// Such a goal enters Eq. (1) alone, as in the paper, but over what remains of the movement: the filter takes so long,
     /// less the time 1/β_z by which the output system lags behind, and never less than a transition. A goal at once is
     /// what immediate transport has, an anchor, and any goal from shortly before the end on.
-    pub(super) fn centre_filter(&self) -> Filter {
+    pub(super) fn centre_filter(&self, tau: f64) -> Filter {
         match self.model.canonical() {
             Canonical::Discrete { u_end, .. } if !self.model.transport.is_immediate() => {
                 let remaining = u_end - self.clock.value() - 1.0 / self.model.attractor().beta_z;
-                Filter::new(self.transition.max(remaining * self.conditions.tau))
+                Filter::new(self.transition.max(remaining * tau))
             }
             _ => self.filter,
         }
