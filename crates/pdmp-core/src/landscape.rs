@@ -17,6 +17,8 @@ pub struct Landscape {
     canonical: Canonical,
     n_styles: usize,
     n_dofs: usize,
+    /// Cubics at a knot, of all groups of DoFs and styles.
+    at_knot: usize,
     cells: usize,
     /// Width of a cell, and how many there are per unit of the clock.
     width: f64,
@@ -33,10 +35,10 @@ pub struct Landscape {
 #[repr(align(64))]
 struct Cubic([Lanes; 4]);
 
-/// A place on the clock: a knot, and how far beyond it.
+/// A place on the clock: the first cubic at a knot, and how far beyond it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
-    knot: usize,
+    first: usize,
     t: f64,
 }
 
@@ -108,7 +110,8 @@ impl Landscape {
                 }));
             }
         }
-        Self { canonical, n_styles, n_dofs, cells, width, per_clock: cells as f64 / extent, cubics, error }
+        let at_knot = groups(n_dofs) * n_styles;
+        Self { canonical, n_styles, n_dofs, at_knot, cells, width, per_clock: cells as f64 / extent, cubics, error }
     }
 
     /// The canonical system whose clock the table is read at.
@@ -133,13 +136,13 @@ impl Landscape {
 
     /// The forcing of a style at a knot, for one group of DoFs.
     pub(crate) fn knot(&self, k: usize, group: usize, j: usize) -> Jet<Lanes> {
-        self.cubics(k, group)[j].at(0.0)
+        self.cubics(k * self.at_knot, group)[j].at(0.0)
     }
 
-    /// The cubics of all styles from a knot on, for one group of DoFs.
+    /// The cubics of all styles for one group of DoFs, from a knot on whose first cubic is given.
     #[inline(always)]
-    fn cubics(&self, knot: usize, group: usize) -> &[Cubic] {
-        let start = (knot * groups(self.n_dofs) + group) * self.n_styles;
+    fn cubics(&self, first: usize, group: usize) -> &[Cubic] {
+        let start = first + group * self.n_styles;
         &self.cubics[start..start + self.n_styles]
     }
 
@@ -162,7 +165,7 @@ impl Landscape {
     /// Slices that are longer.
     pub fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
         let place = self.place(u);
-        let jet = |group: usize, j: usize| self.cubics(place.knot, group)[j].at(place.t);
+        let jet = |group: usize, j: usize| self.cubics(place.first, group)[j].at(place.t);
         match self.fading(u) {
             Some(Jet { value: fade, slope: fading }) => {
                 let faded = |Jet { value, .. }: Jet<Lanes>| Jet { value: value * fade, slope: value * fading };
@@ -202,9 +205,9 @@ impl Landscape {
         // A saturating cast: what lies below the table is read in its first cell.
         let cell = position as u32;
         if cell < self.cells as u32 {
-            Place { knot: cell as usize, t: (position - f64::from(cell)) * self.width }
+            Place { first: cell as usize * self.at_knot, t: (position - f64::from(cell)) * self.width }
         } else {
-            Place { knot: self.cells, t: 0.0 }
+            Place { first: self.cells * self.at_knot, t: 0.0 }
         }
     }
 
@@ -216,9 +219,8 @@ impl Landscape {
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
-            let stretch = groups(self.n_dofs) * self.n_styles;
-            let start = self.place(u).knot * stretch;
-            for Cubic([first, _, third, _]) in &self.cubics[start..start + stretch] {
+            let start = self.place(u).first;
+            for Cubic([first, _, third, _]) in &self.cubics[start..start + self.at_knot] {
                 // SAFETY: a hint; every x86-64 processor has it, and nothing is read.
                 unsafe {
                     _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(first).cast());
@@ -232,7 +234,7 @@ impl Landscape {
     #[inline(always)]
     pub(crate) fn blend<T: Register>(&self, place: Place, group: usize, style: &[f64]) -> Jet<T> {
         let mut sum = [T::default(); 4];
-        for (s, cubic) in style.iter().zip(self.cubics(place.knot, group)) {
+        for (s, cubic) in style.iter().zip(self.cubics(place.first, group)) {
             accumulate(&mut sum, cubic.load(), *s);
         }
         evaluate(sum, place.t)
@@ -242,7 +244,7 @@ impl Landscape {
     #[inline(always)]
     pub(crate) fn blend_both<T: Register>(&self, place: Place, group: usize, styles: [&[f64]; 2]) -> [Jet<T>; 2] {
         let mut sums = [[T::default(); 4]; 2];
-        for ((s, v), cubic) in styles[0].iter().zip(styles[1]).zip(self.cubics(place.knot, group)) {
+        for ((s, v), cubic) in styles[0].iter().zip(styles[1]).zip(self.cubics(place.first, group)) {
             let cubic = cubic.load();
             accumulate(&mut sums[0], cubic, *s);
             accumulate(&mut sums[1], cubic, *v);

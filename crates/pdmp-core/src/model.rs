@@ -6,7 +6,6 @@ use ndarray::Array2;
 
 use crate::align::{Template, WarpingFunction};
 use crate::attractor::{Attractor, State};
-use crate::conditions::refuse;
 use crate::context::{ContextMap, Prediction};
 use crate::demo::ContextValue;
 use crate::error::{Error, Result, check_vector};
@@ -226,7 +225,10 @@ impl Model {
     /// # Errors
     /// A rhythmic primitive, or a clock that is negative or not finite.
     pub fn transport(&self, u: f64) -> Result<f64> {
-        refuse(self.kind(), "transport", self.kind() == Kind::Rhythmic)?;
+        if self.kind() == Kind::Rhythmic {
+            let instead = ": it moves about an anchor, which no profile leads to";
+            return Err(Error::Kind { name: "transport", kind: self.kind(), instead });
+        }
         if !(u.is_finite() && u >= 0.0) {
             return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative" });
         }

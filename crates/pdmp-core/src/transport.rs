@@ -64,8 +64,17 @@ pub(crate) struct Transport {
     /// Width of a cell, and how many there are per unit of the clock.
     width: f64,
     per_clock: f64,
-    /// Cubics of ℓ from each knot on, over the clock; the last stands for what follows.
+    /// Cubics of ℓ in each cell, over the clock from its first knot on.
     cubics: Vec<[f64; 4]>,
+}
+
+/// A stretch of the clock on which ℓ is one cubic. Whoever reads ℓ at a clock that runs seeks a new one seldom.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stretch {
+    from: f64,
+    to: f64,
+    /// Coefficients over the clock from `from` on.
+    cubic: [f64; 4],
 }
 
 /// ℓ = m − 1 with its first and second derivative with respect to the clock.
@@ -79,7 +88,7 @@ pub(crate) struct Lag {
 impl Transport {
     /// m ≡ 1.
     pub(crate) fn immediate() -> Self {
-        Self { coefficients: Vec::new(), width: 1.0, per_clock: 1.0, cubics: vec![[0.0; 4]] }
+        Self { coefficients: Vec::new(), width: 1.0, per_clock: 1.0, cubics: Vec::new() }
     }
 
     /// The profile with these coefficients, if there are any, over a movement that ends at `u_end`.
@@ -112,8 +121,7 @@ impl Transport {
             let cube = (p[3] - p[0]) + 3.0 * (p[1] - p[2]);
             [value, 0.5 * (p[2] - p[0]) * scale, 0.5 * bend * scale * scale, cube / 6.0 * scale * scale * scale]
         };
-        let mut cubics: Vec<[f64; 4]> = coefficients.windows(DEGREE + 1).map(cubic).collect();
-        cubics.push([0.0; 4]);
+        let cubics = coefficients.windows(DEGREE + 1).map(cubic).collect();
         Ok(Self { coefficients, width, per_clock: cells as f64 / u_end, cubics })
     }
 
@@ -127,23 +135,20 @@ impl Transport {
         self.coefficients.is_empty()
     }
 
-    /// ℓ at clock `u`.
-    #[inline(always)]
-    pub(crate) fn lag(&self, u: f64) -> Lag {
-        let position = u * self.per_clock;
-        let last = self.cubics.len() - 1;
+    /// The stretch that clock `u` lies on.
+    pub(crate) fn stretch(&self, u: f64) -> Stretch {
         // A saturating cast: what lies before the start is read in the first cell.
-        let cell = position as u32;
-        if cell as usize >= last {
-            return Lag::default();
+        let cell = (u * self.per_clock) as usize;
+        let at = |knot: usize| self.width * knot as f64;
+        match self.cubics.get(cell) {
+            Some(&cubic) => Stretch { from: at(cell), to: at(cell + 1), cubic },
+            None => Stretch { from: at(self.cubics.len()), to: f64::INFINITY, cubic: [0.0; 4] },
         }
-        let [value, slope, square, cube] = self.cubics[cell as usize];
-        let t = (position - f64::from(cell)) * self.width;
-        Lag {
-            value: value + t * (slope + t * (square + t * cube)),
-            slope: slope + t * (2.0 * square + t * (3.0 * cube)),
-            bend: 2.0 * square + t * (6.0 * cube),
-        }
+    }
+
+    /// ℓ at clock `u`.
+    pub(crate) fn lag(&self, u: f64) -> Lag {
+        self.stretch(u).lag(u)
     }
 
     /// Learns the profile from movements less their starts, x (M, S, D) at equal steps of the clock from start to end, and
@@ -175,6 +180,24 @@ impl Transport {
     pub(crate) fn samples(n: usize) -> impl ExactSizeIterator<Item = usize> + Clone {
         let kept = n.min(MOST_SAMPLES);
         (0..kept).map(move |k| k * (n - 1) / (kept - 1))
+    }
+}
+
+impl Stretch {
+    /// Whether a clock that was on it and has run on to `u` is on it still.
+    #[inline(always)]
+    pub(crate) fn reaches(&self, u: f64) -> bool {
+        u < self.to
+    }
+
+    /// ℓ at clock `u`.
+    #[inline(always)]
+    pub(crate) fn lag(&self, u: f64) -> Lag {
+        let ([value, slope, square, cube], t) = (self.cubic, u - self.from);
+        let rest = cube * t;
+        let bend = square + rest;
+        let twice = bend + bend;
+        Lag { value: value + t * (slope + t * bend), slope: slope + t * (twice + rest), bend: twice + 4.0 * rest }
     }
 }
 

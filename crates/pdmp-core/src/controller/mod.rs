@@ -27,7 +27,7 @@ use crate::model::Model;
 use crate::perturbation::{Held, STILL, widest};
 use crate::phase::{Canonical, CompensatedSum, Kind};
 use crate::series::Series;
-use crate::transport::Lag;
+use crate::transport::Stretch;
 use tick::Forcing;
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
@@ -77,8 +77,10 @@ pub struct Controller {
     from: Vec<Jet<Lanes>>,
     /// The way g − y₀ at the start, which the frame covers; zero where rhythmic.
     way: Vec<Lanes>,
-    /// What is left of it at the clock.
-    lag: Lag,
+    /// The share m − 1 of it by which the frame is off the goal at the clock.
+    lag: f64,
+    /// Where it is read.
+    stretch: Stretch,
     z: Vec<Lanes>,
     position: Vec<Lanes>,
     velocity: Vec<Lanes>,
@@ -137,7 +139,8 @@ impl Controller {
             forcing: vec![Forcing::default(); zeros.len()],
             from: vec![Jet::default(); zeros.len()],
             way: zeros.clone(),
-            lag: Lag::default(),
+            lag: 0.0,
+            stretch: model.transport.stretch(0.0),
             z: zeros.clone(),
             position: zeros.clone(),
             velocity: zeros.clone(),
@@ -187,7 +190,7 @@ impl Controller {
             repack(&mut self.way, start);
             self.way.iter_mut().zip(self.centre.value()).for_each(|(way, goal)| *way = *goal - *way);
         }
-        self.lag = self.model.transport.lag(0.0);
+        self.read_frame();
         self.read_forcing();
         self.place();
         self.set_tolerance();

@@ -50,8 +50,6 @@ pub(super) struct Gate {
     rate: [f64; 2],
     /// 1/ρ.
     tau: f64,
-    /// m′ and m″ with respect to the output system's clock.
-    carry: [f64; 2],
 }
 
 impl Gate {
@@ -61,13 +59,18 @@ impl Gate {
         Jet { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
     }
 
-    /// ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′, where c covers a `way`.
+    /// ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w, where w has the motion c′ of the frame in it.
     #[inline(always)]
-    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: Jet<T>, way: T) -> [T; 2] {
-        let ([rate, change], [carry, bend]) = (self.rate, self.carry);
-        let flow = state.z + w.value + way * carry;
-        [flow * rate, (attractor.z_slope(state) + w.slope + way * bend) * (rate * rate) + flow * change]
+    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: Jet<T>) -> [T; 2] {
+        let ([rate, change], flow) = (self.rate, state.z + w.value);
+        [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
     }
+}
+
+/// Adds the motion of a frame that covers a `way` to the forcing, for m with respect to the output system's clock.
+#[inline(always)]
+fn carried<T: Real>(w: Jet<T>, way: T, [slope, bend]: [f64; 2]) -> Jet<T> {
+    Jet { value: w.value + way * slope, slope: w.slope + way * bend }
 }
 
 impl Controller {
@@ -140,7 +143,7 @@ impl Controller {
             self.advance(before, h);
         }
         self.clock = CompensatedSum::at(u_end);
-        self.lag = self.model.transport.lag(u_end);
+        self.read_frame();
         self.read_forcing();
         let h = self.stretch(dt - before);
         self.advance(dt - before, h);
@@ -180,8 +183,12 @@ impl Controller {
             self.clock.wrap();
             self.r = amplitude(mu, self.r, self.conditions.amplitude, h);
         }
-        let lags = [self.lag, self.model.transport.lag(self.clock.value())];
-        self.lag = lags[1];
+        if !self.stretch.reaches(self.clock.value()) {
+            self.stretch = self.model.transport.stretch(self.clock.value());
+        }
+        let Lag { value, slope, bend } = self.stretch.lag(self.clock.value());
+        let lags = [std::mem::replace(&mut self.lag, value), value];
+        let carry = self.carry(slope, bend);
         // A piece that reaches u_end has the slopes of the demonstrated side at both its ends.
         let after = if demonstrated { self.gate_within() } else { self.gate() };
 
@@ -192,15 +199,16 @@ impl Controller {
         let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
         let (n, rest) = (self.forcing.len(), T::splat(self.rest));
         let (forcing, centre) = (&mut self.forcing[..n], &mut self.centre);
+        let (starts, way) = (&self.from[..n], &self.way[..n]);
         let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
         let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
         for group in 0..n {
-            let from = Jet { value: T::load(&self.from[group].value), slope: T::load(&self.from[group].slope) };
+            let from = Jet { value: T::load(&starts[group].value), slope: T::load(&starts[group].slope) };
             forcing[group] = Forcing::read::<T>(landscape, place, group, style, swing);
             let to = after.jet(&forcing[group]);
 
-            let (goal, way) = (T::load(&centre.value()[group]), T::load(&self.way[group]));
-            let [start, mut origin] = lags.map(|lag| goal + way * lag.value);
+            let (goal, way) = (T::load(&centre.value()[group]), T::load(&way[group]));
+            let [start, mut origin] = lags.map(|lag| goal + way * lag);
             let state = State { e: T::load(&position[group]) - start, z: T::load(&z[group]) };
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
@@ -211,12 +219,12 @@ impl Controller {
                 let slope = T::load(&centre.rate()[group]) * after.tau;
                 let moved = propagator.follow([set_out, Jet { value: arrived - goal, slope }]);
                 y = y + moved.e;
-                origin = arrived + way * lags[1].value;
+                origin = arrived + way * lags[1];
                 next.z = next.z + moved.z;
             }
             let (y, z_next) = (flush(y, rest), flush(next.z, rest));
             (position[group], z[group]) = (y.store(), z_next.store());
-            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, to, way);
+            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, carried(to, way, carry));
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
         }
         landscape.prefetch(self.clock.value() + self.lead * self.held.pace() * h);
@@ -269,8 +277,20 @@ impl Controller {
             Canonical::Rhythmic { mu } => mu * (self.conditions.amplitude - r),
         };
         let tau = 1.0 / rate[0];
-        let (pace, Lag { slope, bend, .. }) = (self.held.pace(), self.lag);
-        Gate { r, along: r * pace, swing: r * tau, growth, rate, tau, carry: [pace * slope, pace * pace * bend] }
+        Gate { r, along: r * self.held.pace(), swing: r * tau, growth, rate, tau }
+    }
+
+    /// m′ and m″ with respect to the output system's clock, from those with respect to the phase's.
+    #[inline(always)]
+    fn carry(&self, slope: f64, bend: f64) -> [f64; 2] {
+        let pace = self.held.pace();
+        [slope * pace, bend * (pace * pace)]
+    }
+
+    /// Reads the frame at a clock that was set.
+    pub(super) fn read_frame(&mut self) {
+        self.stretch = self.model.transport.stretch(self.clock.value());
+        self.lag = self.stretch.lag(self.clock.value()).value;
     }
 
     /// Reads the forcing at the clock.
@@ -285,11 +305,14 @@ impl Controller {
     /// Velocity and acceleration of the present state.
     pub(super) fn read_out(&mut self) {
         let (gate, attractor) = (self.gate(), self.model.attractor());
+        let Lag { value, slope, bend } = self.model.transport.lag(self.clock.value());
+        let carry = self.carry(slope, bend);
         for group in 0..self.z.len() {
-            let (w, way) = (gate.jet(&self.forcing[group]), self.way[group]);
-            let e = self.position[group] - (self.centre.value()[group] + way * self.lag.value);
+            let way = self.way[group];
+            let w = carried(gate.jet(&self.forcing[group]), way, carry);
+            let e = self.position[group] - (self.centre.value()[group] + way * value);
             let state = State { e, z: self.z[group] };
-            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, state, w, way);
+            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, state, w);
         }
         if let Some(Push { velocity, acceleration }) = self.held.push() {
             for group in 0..self.z.len() {
