@@ -61,17 +61,19 @@ def filtered(model: pdmp.Model, spline: Any, centre: np.ndarray, u: np.ndarray) 
     return solution.y.T
 
 
-def test_singular_values_are_those_of_the_targets_of_reaches() -> None:
-    """Targets f = y' - z, made here by scipy from the resampled demonstrations, factorise alike."""
+@pytest.mark.parametrize("transport", ["learnt", "immediate"])
+def test_singular_values_are_those_of_the_targets_of_reaches(transport: Any) -> None:
+    """Targets f = e' - z about the frame, made here by scipy from the resampled demonstrations."""
     demos = reaches()
     n = 120
-    model = pdmp.fit(demos, n_styles=3, n_samples=n)
+    model = pdmp.fit(demos, n_styles=3, n_samples=n, transport=transport)
     targets = []
     for demo in demos:
         own = interpolate.CubicSpline(np.linspace(0, 1, demo.n_samples), demo.position)
         u = np.linspace(0, 1, n)
-        spline = interpolate.CubicSpline(u, own(u) - own(0))
-        targets.append((spline(u, 1) - filtered(model, spline, spline(1.0), u)).ravel())
+        frame = np.outer(model.transport(u), own(1) - own(0))
+        spline = interpolate.CubicSpline(u, own(u) - own(0) - frame)
+        targets.append((spline(u, 1) - filtered(model, spline, np.zeros(2), u)).ravel())
     left, sigma, _ = np.linalg.svd(targets, full_matrices=False)
     np.testing.assert_allclose(model.singular_values, sigma, rtol=1e-6, atol=1e-9 * sigma[0])
     np.testing.assert_allclose(np.abs(model.styles), np.abs(left[:, :3]), atol=1e-6)
@@ -167,10 +169,15 @@ def test_automatic_smoothing_comes_closer_to_what_was_meant() -> None:
 
 
 def test_automatic_smoothing_finds_the_rank() -> None:
-    """The two dimensions that noise hides come out by the spectrum rule."""
+    """The two dimensions that noise hides come out by the spectrum rule.
+
+    One of them is the way to the goal, which the frame carries where transport is learnt.
+    """
     _, recorded = noisy()
-    assert pdmp.fit(recorded, dt=0.01).n_styles > 2
-    assert pdmp.fit(recorded, dt=0.01, smoothing="auto").n_styles == 2
+    for transport, rank in (("immediate", 2), ("learnt", 1)):
+        options = {"dt": 0.01, "transport": transport}
+        assert pdmp.fit(recorded, **options).n_styles > rank
+        assert pdmp.fit(recorded, smoothing="auto", **options).n_styles == rank
 
 
 @pytest.mark.parametrize(("hz", "gain"), [(5.0, 1 / (1 + 4**4)), (20.0, 0.5), (80.0, 1.0)])

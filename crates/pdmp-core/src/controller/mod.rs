@@ -2,7 +2,8 @@
 //!
 //! Over a tick the forcing w, the goal and the clock are known at both ends with their slopes; a cubic between them is
 //! propagated exactly ([`crate::Attractor::propagator`]). Style, rate ρ = 1/τ and goal or anchor pass critically damped
-//! filters, so that position and velocity stay continuous: ẏ = ρ(z + w), ÿ = ρ²(z′ + w′) + ρ̇(z + w). A perturbation
+//! filters, so that position and velocity stay continuous: ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′. The frame c of a
+//! discrete movement is known exactly at both ends of a tick (`transport`), and outside what is propagated. A perturbation
 //! ([`Command::measured`], [`Command::coupling`]) slows the phase's clock against the output system's, and adds to ẏ and
 //! ÿ.
 //!
