@@ -18,7 +18,7 @@ def solve(
     style: np.ndarray,
     centre: np.ndarray,
     start: np.ndarray,
-    z: np.ndarray,
+    z_start: np.ndarray,
     tau: float,
     span: tuple[float, float],
     amplitude: tuple[float, float] = (1.0, 1.0),
@@ -29,18 +29,25 @@ def solve(
     positions as a function of time, and the state (2D,) at the end.
     """
     alpha, beta, n = model.alpha_z, model.beta_z, len(start)
+    u_end = model.durations[model.nominal] / model.tau
+    # Past the end a movement brakes; z there is that of a movement which began with z = 0.
+    braked = model.braking is not None and span[0] > 0
+    last = style @ model.landscape([u_end])[0] * np.exp(-(model.alpha_x or 0.0) * u_end)
 
     def flow(t: float, state: np.ndarray) -> np.ndarray:
         y, z, extra = state[:n], state[n : 2 * n], state[2 * n]
         discrete = model.kind == "discrete"
         gate = extra  # x, or r
         w = gate * (style @ model.landscape([t / tau])[0])
+        if braked:
+            late = t / tau - u_end
+            w = (z_start + last) * np.exp(-model.braking * late) - z_start * np.exp(-alpha * late)
         growth = -model.alpha_x * gate if discrete else model.mu * (amplitude[1] - gate)
         return np.concatenate([z + w, alpha * (beta * (centre - y) - z), [growth]]) / tau
 
     gate = np.exp(-model.alpha_x * span[0] / tau) if model.kind == "discrete" else amplitude[0]
     solution = integrate.solve_ivp(
-        flow, span, [*start, *z, gate], "DOP853", rtol=1e-10, atol=1e-12, dense_output=True
+        flow, span, [*start, *z_start, gate], "DOP853", rtol=1e-10, atol=1e-12, dense_output=True
     )
     return lambda t: solution.sol(t)[:n].T, solution.y[: 2 * n, -1]
 

@@ -161,6 +161,8 @@ class Model:
     @property
     def alpha_x(self) -> float | None: ...  # None if rhythmic
     @property
+    def braking(self) -> float | None: ...  # None if rhythmic or transport is immediate
+    @property
     def mu(self) -> float | None: ...  # None if discrete
     @property
     def names(self) -> list[str]: ...

@@ -15,6 +15,9 @@ use crate::spline::Knots;
 use crate::threads::Threads;
 use crate::transport::Transport;
 
+/// κ/α_z of a movement that ends all but at rest.
+const BRISK: f64 = 4.0;
+
 /// What a fit takes from the demonstrations, one a row.
 #[derive(Debug)]
 pub(crate) struct Targets {
@@ -28,6 +31,9 @@ pub(crate) struct Targets {
     pub(crate) anchors: Array2<f64>,
     /// Peak-to-peak ranges (M, D).
     ranges: Array2<f64>,
+    /// Largest |y″| and |y′| at the end (M, D), with respect to the clock.
+    bends: Array2<f64>,
+    ends: Array2<f64>,
     /// Some samples (M, S, D) less the first, from which a transport profile is learnt; none where rhythmic.
     moved: Array3<f64>,
 }
@@ -39,6 +45,8 @@ struct Rows<'a> {
     goal: &'a mut [f64],
     anchor: &'a mut [f64],
     range: &'a mut [f64],
+    bend: &'a mut [f64],
+    end: &'a mut [f64],
     moved: &'a mut [f64],
 }
 
@@ -65,6 +73,8 @@ impl Targets {
             goals: Array2::zeros((n_demos, n_dofs)),
             anchors: Array2::zeros((n_demos, n_dofs)),
             ranges: Array2::zeros((n_demos, n_dofs)),
+            bends: Array2::zeros((n_demos, n_dofs)),
+            ends: Array2::zeros((n_demos, n_dofs)),
             moved: Array3::zeros((n_demos, kept, n_dofs)),
         };
         let work = Work::new(attractor, canonical, aligned.n_samples);
@@ -93,6 +103,15 @@ impl Targets {
         moved.iter_mut().zip(unit.iter().cycle()).for_each(|(x, unit)| *x /= unit);
         ways.iter_mut().zip(unit.iter().cycle()).for_each(|(x, unit)| *x /= unit);
         Transport::learn(moved, ways, canonical)
+    }
+
+    /// The rate κ at which movements brake past their ends: y″ = −κy′ there is to be no harder than the hardest acceleration
+    /// demonstrated of the DoF, as long as κ is at least α_z, and four times that where nothing needs to brake.
+    pub(crate) fn braking(&self, attractor: Attractor) -> f64 {
+        let most = |matrix: &Array2<f64>| matrix.fold_axis(Axis(0), 0.0f64, |most, x| most.max(*x));
+        let ratio = |(bend, end): (f64, f64)| if end > 0.0 { bend / end } else { f64::INFINITY };
+        let hardest = most(&self.bends).into_iter().zip(most(&self.ends)).map(ratio).fold(f64::INFINITY, f64::min);
+        hardest.clamp(attractor.alpha_z, BRISK * attractor.alpha_z)
     }
 
     /// Makes the targets those about the moving frame, f = y′ − c′ − z with z driven by y − c.
@@ -133,10 +152,20 @@ impl Targets {
         }
         let [starts, goals, anchors, ranges] = [&mut self.starts, &mut self.goals, &mut self.anchors, &mut self.ranges]
             .map(|matrix| chunks(matrix, n_dofs));
-        let places = starts.zip(goals).zip(anchors).zip(ranges);
+        let [bends, ends] = [&mut self.bends, &mut self.ends].map(|matrix| chunks(matrix, n_dofs));
+        let places = starts.zip(goals).zip(anchors.zip(ranges)).zip(bends.zip(ends));
         let moved = self.moved.outer_iter_mut().map(|moved| moved.into_slice().unwrap_or_default());
         chunks(&mut self.forcing, n_values).zip(places).zip(moved).map(
-            |((forcing, (((start, goal), anchor), range)), moved)| Rows { forcing, start, goal, anchor, range, moved },
+            |((forcing, (((start, goal), (anchor, range)), (bend, end))), moved)| Rows {
+                forcing,
+                start,
+                goal,
+                anchor,
+                range,
+                bend,
+                end,
+                moved,
+            },
         )
     }
 }
@@ -167,7 +196,7 @@ impl Work {
     /// start at 0, and a DoF that does not move has a target of exactly zero, and its own position as its mean, to the
     /// last digit.
     fn learn(&self, rows: Rows, given: Option<&[f64]>, [column, slopes]: &mut [Vec<Lanes>; 2]) {
-        let Rows { forcing: position, start, goal, anchor, range, moved } = rows;
+        let Rows { forcing: position, start, goal, anchor, range, bend, end, moved } = rows;
         let n_dofs = start.len();
         start.copy_from_slice(&position[..n_dofs]);
         for (moved, c) in moved.chunks_exact_mut(n_dofs).zip(Transport::samples(column.len())) {
@@ -177,7 +206,8 @@ impl Work {
         goal.copy_from_slice(given.unwrap_or(&position[position.len() - n_dofs..]));
         let n_samples = Lanes::splat(column.len() as f64);
         let goals = pack(goal);
-        let [mut means, mut ranges] = [0, 1].map(|_| vec![Lanes::ZERO; goals.len()]);
+        let [mut means, mut ranges, mut bends, mut ends] = [(); 4].map(|()| vec![Lanes::ZERO; goals.len()]);
+        let per_step = 1.0 / self.clock[1];
         for group in 0..groups(n_dofs) {
             gather(position, n_dofs, group, column);
             let start = column[0];
@@ -189,10 +219,15 @@ impl Work {
             (means[group], ranges[group]) = (start + sum / n_samples, high - low);
             let centre = if self.kind == Kind::Discrete { goals[group] } else { means[group] };
             self.knots.slopes(column, slopes);
+            let bend = |pair: &[Lanes]| (pair[1] - pair[0]).abs() * per_step;
+            bends[group] = slopes.windows(2).fold(Lanes::ZERO, |most, pair| most.fast_max(bend(pair)));
+            ends[group] = slopes[slopes.len() - 1].abs();
             self.inverse.target(column, slopes, centre - start, self.kind == Kind::Rhythmic);
             scatter(column, n_dofs, group, position);
         }
         anchor.copy_from_slice(unpack(&means, n_dofs));
         range.copy_from_slice(unpack(&ranges, n_dofs));
+        bend.copy_from_slice(unpack(&bends, n_dofs));
+        end.copy_from_slice(unpack(&ends, n_dofs));
     }
 }

@@ -58,6 +58,7 @@ use crate::warp::Warp;
 /// transport : {"learnt", "immediate"}
 ///     How the way from start to goal is spread over a discrete movement: along the profile by which the demonstrations
 ///     cover theirs (:meth:`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path.
+///     Past its end a movement brakes (:attr:`Model.braking`), or its forcing fades with the phase as in the paper.
 /// dof_scale : None, "range" or (D,) array_like
 ///     Unit of each degree of freedom in the factorisation; if given as numbers, in a warp of time too.
 /// alignment : {"linear", "warp"} or Warp
@@ -71,9 +72,9 @@ use crate::warp::Warp;
 /// alpha_z, beta_z : float
 ///     Constants of the output system; `beta_z` is `alpha_z / 4` (critical damping) unless given.
 /// alpha_x : float, optional
-///     Constant of the discrete canonical system; otherwise x = 0.01 at the end. Past the end of the demonstrations
-///     the forcing fades with x: if a movement drifts off its goal there before it settles, `alpha_x = alpha_z` keeps
-///     it closest.
+///     Constant of the discrete canonical system; otherwise x = 0.01 at the end. Where transport is immediate the
+///     forcing fades with x past the end of the demonstrations: if a movement drifts off its goal there before it
+///     settles, `alpha_x = alpha_z` keeps it closest.
 /// mu : float
 ///     Constant of the rhythmic canonical system.
 /// threads : int, optional

@@ -3,7 +3,7 @@
 use super::{Controller, Status};
 use crate::attractor::{Attractor, Jet, State};
 use crate::error::{Error, Result};
-use crate::landscape::{Landscape, Place};
+use crate::landscape::{Fade, Landscape, Place};
 use crate::lanes::{Lanes, Real, Register, flush, unpack};
 use crate::perturbation::Push;
 use crate::phase::{Canonical, CompensatedSum, amplitude};
@@ -168,7 +168,7 @@ impl Controller {
         if h != self.propagator.step() {
             self.propagator = self.series.propagator::<T>(h);
         }
-        let demonstrated = self.model.landscape().fading(self.clock.value()).is_none();
+        let demonstrated = !self.model.landscape().is_past(self.clock.value());
         let levers = self.held.push().map(|_| self.levers());
         let before = self.gate();
         for (from, forcing) in self.from.iter_mut().zip(&self.forcing) {
@@ -193,8 +193,8 @@ impl Controller {
         let after = if demonstrated { self.gate_within() } else { self.gate() };
 
         let (model, propagator) = (&*self.model, &self.propagator);
-        let (landscape, attractor, place) =
-            (model.landscape(), model.attractor(), model.landscape().place(self.clock.value()));
+        let (landscape, attractor, clock) = (model.landscape(), model.attractor(), self.clock.value());
+        let place = if demonstrated { landscape.place_within(clock) } else { landscape.place(clock) };
         let style = unpack(self.style.value(), model.n_styles());
         let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
         let (n, rest) = (self.forcing.len(), T::splat(self.rest));
@@ -227,7 +227,10 @@ impl Controller {
             let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, carried(to, way, carry));
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
         }
-        landscape.prefetch(self.clock.value() + self.lead * self.held.pace() * h);
+        landscape.prefetch(clock + self.lead * self.held.pace() * h);
+        if demonstrated && landscape.is_past(clock) {
+            self.read_forcing();
+        }
         if let Some(before) = levers {
             self.add_perturbation(before);
             self.read_out();
@@ -262,8 +265,9 @@ impl Controller {
     pub(super) fn gate(&self) -> Gate {
         let within = self.gate_within();
         match self.model.landscape().fading(self.clock.value()) {
-            Some(Jet { value, slope }) => {
-                Gate { r: value, along: 0.0, swing: value * within.swing, growth: self.held.pace() * slope, ..within }
+            Some(Fade { value, growth, along, .. }) => {
+                let [along, growth] = [along, growth].map(|slope| self.held.pace() * slope);
+                Gate { r: value, along, swing: value * within.swing, growth, ..within }
             }
             None => within,
         }
@@ -326,7 +330,7 @@ impl Controller {
     /// left of its way, of its speed at critical damping, and of its forcing, be it of the style that is on its way, and
     /// as far as the goal itself still goes.
     fn settled(&self) -> Status {
-        let Some(Jet { value: fade, .. }) = self.model.landscape().fading(self.clock.value()) else {
+        let Some(fade) = self.model.landscape().fading(self.clock.value()) else {
             return Status::Working;
         };
         let Attractor { alpha_z, beta_z } = self.model.attractor();
@@ -334,11 +338,12 @@ impl Controller {
         let place = landscape.place(self.clock.value());
         let over = (0..self.z.len()).all(|group| {
             let way = (self.position[group] - self.centre.target()[group]).abs();
-            let forcing = self.forcing[group].shape * fade;
+            let Forcing { shape, slope, .. } = self.forcing[group];
+            let forcing = shape * fade.value;
             let flow = (self.z[group] + forcing).abs() * (2.0 / alpha_z);
-            let mut push = forcing.abs();
+            let mut push = fade.push(Jet { value: shape, slope });
             if !self.style.settled() {
-                push = push.max((landscape.blend::<Lanes>(place, group, target).value * fade).abs());
+                push = push.max(fade.push(landscape.blend(place, group, target)));
             }
             let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, group);
             left.simd_le(self.tolerance[group]).all()

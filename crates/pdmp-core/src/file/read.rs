@@ -124,6 +124,12 @@ impl Reader<'_> {
         let transport = self.array("transport", &[n_coefficients])?;
         let transport = Transport::from_coefficients(transport, constants.canonical)
             .map_err(|error| Error::File(error.to_string()))?;
+        let braking = constants.braking;
+        // Slower than z the two parts of the forcing past the end would part without bound.
+        let sound = braking.is_none_or(|braking| (constants.alpha_z..=1e12).contains(&braking));
+        if braking.is_none() != transport.is_immediate() || !sound {
+            return Err(bad("braking does not fit the rest"));
+        }
         let breaks = self.array("breaks", &[n_segments + 1])?;
         if breaks[0] != 0.0 || breaks[n_segments] != 1.0 || breaks.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err(bad("breaks do not increase from 0 to 1"));
@@ -167,6 +173,7 @@ impl Reader<'_> {
             attractor,
             landscape,
             transport,
+            braking,
             tau,
             names,
             units,

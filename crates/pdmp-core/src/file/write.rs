@@ -33,6 +33,7 @@ impl Model {
             tau: self.tau,
             alpha_z: self.attractor.alpha_z,
             beta_z: self.attractor.beta_z,
+            braking: self.braking,
             names: self.names.clone(),
             units: self.units.clone(),
             nominal: self.demonstrated.nominal,

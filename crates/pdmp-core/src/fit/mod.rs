@@ -54,6 +54,7 @@ pub fn fit(
         (TransportChoice::Learnt, Kind::Discrete) => targets.transport(constants.canonical, &dof_scale)?,
         _ => Transport::immediate(),
     };
+    let braking = (!transport.is_immediate()).then(|| targets.braking(constants.attractor));
     targets.carry(&transport, constants.attractor, constants.canonical);
     targets.scale(&dof_scale);
 
@@ -111,6 +112,7 @@ pub fn fit(
         attractor,
         landscape,
         transport,
+        braking,
         tau,
         names,
         units,
