@@ -243,6 +243,7 @@ impl Landscape {
     }
 
     /// How the forcing fades past the end of a discrete movement.
+    #[inline(always)]
     pub(crate) fn fading(&self, u: f64) -> Option<Fade> {
         match (self.canonical, self.ending) {
             (Canonical::Discrete { u_end, alpha_x }, ending) if u >= u_end => {

@@ -292,7 +292,8 @@ impl Model {
     ///     As in `rollout`; of a timing the loop takes the sum, and follows it where `tau_at` sets its pace.
     /// transition : float, optional
     ///     Time to 99 % in s of a changed style, goal, anchor or tau; 0 switches at once. A tenth of the nominal
-    ///     duration (discrete) or a quarter of the period (rhythmic) otherwise.
+    ///     duration (discrete) or a quarter of the period (rhythmic) otherwise. A goal takes what remains of the
+    ///     movement if that is longer, unless transport is immediate.
     ///
     /// Returns
     /// -------

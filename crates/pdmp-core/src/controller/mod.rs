@@ -107,7 +107,8 @@ impl Controller {
     ///
     /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal or anchor, both in
     /// seconds; 0 is the paper's immediate switch, and without it a tenth of the nominal duration (discrete) or a
-    /// quarter of the nominal period (rhythmic) serves.
+    /// quarter of the nominal period (rhythmic) serves. A goal takes what remains of the movement if that is longer,
+    /// unless transport is immediate.
     ///
     /// # Errors
     /// Conditions that do not fit the model, `dt` that is not positive, or a negative `transition`.

@@ -105,7 +105,8 @@ impl Controller {
         self.time.add(dt);
         // What has settled stays settled, unless it is pushed or commanded.
         if self.status == Status::Working || self.held.push().is_some() {
-            self.status = self.settled();
+            let past = self.model.landscape().is_past(self.clock.value());
+            self.status = if past { self.settled() } else { Status::Working };
         }
         self.status
     }
@@ -133,7 +134,8 @@ impl Controller {
             return self.advance(dt, h);
         };
         let (left, way) = (u_end - self.clock.value(), self.held.pace() * h);
-        if left <= 0.0 || left >= way {
+        // A tick that ends here but for rounding is one that does.
+        if left <= 0.0 || left > way * (1.0 + 1e-9) {
             return self.advance(dt, h);
         }
         let before = self.rate.time_to(left / self.held.pace(), dt, &self.filter);
@@ -170,7 +172,7 @@ impl Controller {
         }
         let demonstrated = !self.model.landscape().is_past(self.clock.value());
         let levers = self.held.push().map(|_| self.levers());
-        let before = self.gate();
+        let before = if demonstrated { self.gate_within() } else { self.gate() };
         for (from, forcing) in self.from.iter_mut().zip(&self.forcing) {
             let Jet { value, slope } = before.jet::<T>(forcing);
             *from = Jet { value: value.store(), slope: slope.store() };
@@ -228,9 +230,6 @@ impl Controller {
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
         }
         landscape.prefetch(clock + self.lead * self.held.pace() * h);
-        if demonstrated && landscape.is_past(clock) {
-            self.read_forcing();
-        }
         if let Some(before) = levers {
             self.add_perturbation(before);
             self.read_out();
@@ -262,6 +261,7 @@ impl Controller {
     }
 
     /// The gate at the clock, at u_end with the slope of what follows.
+    #[inline(always)]
     pub(super) fn gate(&self) -> Gate {
         let within = self.gate_within();
         match self.model.landscape().fading(self.clock.value()) {
@@ -274,6 +274,7 @@ impl Controller {
     }
 
     /// The gate of the demonstrated stretch.
+    #[inline(always)]
     fn gate_within(&self) -> Gate {
         let (r, rate) = (self.r, [self.rate.value(), self.rate.rate()].map(first));
         let growth = match self.model.canonical() {
