@@ -113,7 +113,7 @@ def labelled() -> pdmp.Model:
         for manner, lean in (("proud", 0.8), ("tired", -0.8))
         for height in (0.1, 0.3, 0.5, 0.7)
     ]
-    return pdmp.fit(demos, map="linear")
+    return pdmp.fit(demos, map="linear", spectrum=0.999)
 
 
 def test_labels_stand_beside_numbers() -> None:
@@ -261,7 +261,9 @@ def test_styles_are_as_many_as_contexts_foresee() -> None:
     few, many = [], []
     for _ in range(9):
         movements, heights = scattered(rng)
-        options = {"dt": 0.02, "contexts": heights}
+        # About a goal that acts at once the mean movement has a dimension of its own, apart from
+        # those of the heights.
+        options = {"dt": 0.02, "contexts": heights, "transport": "immediate"}
         few.append(pdmp.fit(movements, n_styles="auto", **options).n_styles)
         many.append(pdmp.fit(movements, spectrum=0.99, **options).n_styles)
     assert np.median(few) < np.median(many)

@@ -104,6 +104,7 @@ def fit(
     smoothing: Literal["auto"] | float | None = "auto",
     nominal: int | None = None,
     n_samples: int | None = None,
+    transport: Literal["learnt", "immediate"] = "learnt",
     dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
     alignment: Literal["linear", "warp"] | Warp = "linear",
     events: ArrayLike | None = None,  # (M, E)
@@ -169,6 +170,8 @@ class Model:
     def beta_z(self) -> float: ...
     @property
     def alpha_x(self) -> float | None: ...  # None if rhythmic
+    @property
+    def braking(self) -> float | None: ...  # None if rhythmic or transport is immediate
     @property
     def mu(self) -> float | None: ...  # None if discrete
     @property
@@ -301,6 +304,7 @@ class Model:
         events: ArrayLike | None = None,  # (E,)
     ) -> _Array: ...  # (J,)
     def landscape(self, u: ArrayLike) -> _Array: ...  # (len(u), J, D)
+    def transport(self, u: ArrayLike) -> _Array: ...  # (n,)
     def tau_at(self, phase: float, timing: ArrayLike) -> float: ...  # timing (K,)
     def predict(self, context: _Context) -> Prediction: ...
     def band(

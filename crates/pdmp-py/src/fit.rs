@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayD, Axis, Ix2};
 use pdmp_core::basis::Basis;
 use pdmp_core::{
     Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Sampling, Smoothing, Stage, StyleChoice, StyleCount,
-    TimeScaling,
+    TimeScaling, TransportChoice,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -60,6 +60,10 @@ use crate::warp::Warp;
 /// n_samples : int, optional
 ///     Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
 ///     than 150.
+/// transport : {"learnt", "immediate"}
+///     How the way from start to goal is spread over a discrete movement: along the profile by which the demonstrations
+///     cover theirs (:meth:`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path.
+///     Past its end a movement brakes (:attr:`Model.braking`), or its forcing fades with the phase as in the paper.
 /// dof_scale : None, "unit", "range" or (D,) array_like
 ///     Unit of each degree of freedom in the factorisation. By default as recorded ("unit") where all units are equal or
 ///     unknown; otherwise the degrees of freedom of each unit are scaled together by the largest range among them.
@@ -78,9 +82,9 @@ use crate::warp::Warp;
 /// alpha_z, beta_z : float
 ///     Constants of the output system; `beta_z` is `alpha_z / 4` (critical damping) unless given.
 /// alpha_x : float, optional
-///     Constant of the discrete canonical system; otherwise x = 0.01 at the end. Past the end of the demonstrations
-///     the forcing fades with x: if a movement drifts off its goal there before it settles, `alpha_x = alpha_z` keeps
-///     it closest.
+///     Constant of the discrete canonical system; otherwise x = 0.01 at the end. Where transport is immediate the
+///     forcing fades with x past the end of the demonstrations: if a movement drifts off its goal there before it
+///     settles, `alpha_x = alpha_z` keeps it closest.
 /// mu : float
 ///     Constant of the rhythmic canonical system.
 /// threads : int, optional
@@ -112,11 +116,11 @@ use crate::warp::Warp;
 #[pyfunction]
 #[pyo3(signature = (
     demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, spectrum=None, basis=None,
-    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, dof_scale=None, alignment=None, events=None, tau=None, alpha_z=25.0,
-    beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
+    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, transport="learnt", dof_scale=None,
+    alignment=None, events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
 ), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, spectrum=None, \
-    basis='gp', smoothing='auto', nominal=None, n_samples=None, dof_scale=None, alignment='linear', events=None, \
-    tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
+    basis='gp', smoothing='auto', nominal=None, n_samples=None, transport='learnt', dof_scale=None, \
+    alignment='linear', events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -132,6 +136,7 @@ pub(crate) fn fit(
     smoothing: SmoothingArgument,
     nominal: Option<isize>,
     n_samples: Option<isize>,
+    transport: &str,
     dof_scale: Option<&Bound<'_, PyAny>>,
     alignment: Option<&Bound<'_, PyAny>>,
     events: Option<&Bound<'_, PyAny>>,
@@ -158,6 +163,7 @@ pub(crate) fn fit(
         map: map_of(map)?,
         styles: style_choice(n_styles, spectrum)?,
         basis: basis_of(basis)?,
+        transport: transport_of(transport)?,
         dof_scale: dof_scale_of(dof_scale)?,
         tau,
         alpha_z,
@@ -322,6 +328,14 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
                 Err(PyValueError::new_err(format!("smoothing = {}: {wanted}", smoothing.repr()?)))
             }
         }
+    }
+}
+
+fn transport_of(transport: &str) -> PyResult<TransportChoice> {
+    match transport {
+        "learnt" => Ok(TransportChoice::Learnt),
+        "immediate" => Ok(TransportChoice::Immediate),
+        _ => Err(PyValueError::new_err(format!("transport = {transport:?}: must be \"learnt\" or \"immediate\""))),
     }
 }
 

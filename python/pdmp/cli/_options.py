@@ -80,6 +80,12 @@ def add_learning(parser: ArgumentParser) -> None:
         metavar="HZ",
         help="cut-off [Hz], auto (default: by cross-validation), or none",
     )
+    parser.add_argument(
+        "--transport",
+        choices=["learnt", "immediate"],
+        default="learnt",
+        help="how a moved start or goal is spread over the movement; default: learnt",
+    )
 
 
 def settings(options: Namespace) -> dict[str, Any]:
@@ -91,6 +97,7 @@ def settings(options: Namespace) -> dict[str, Any]:
         "spectrum": options.spectrum,
         "basis": options.basis,
         "smoothing": options.smoothing,
+        "transport": options.transport,
     }
 
 

@@ -14,6 +14,7 @@ use crate::phase::Canonical;
 use crate::sensitivity::STEPS;
 use crate::smooth::Noise;
 use crate::tabulate::{Jets, MOST_CELLS};
+use crate::transport::Transport;
 
 impl Model {
     /// Reads a model from the bytes of a file.
@@ -128,6 +129,16 @@ impl Reader<'_> {
         let (values, slopes) = (knots("landscape.values")?, knots("landscape.slopes")?);
         let knots = Jets { n_outputs: n_styles * n_dofs, values, slopes };
         let landscape = Landscape::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
+        let [n_coefficients] = self.shape("transport")?;
+        let transport = self.array("transport", &[n_coefficients])?;
+        let transport = Transport::from_coefficients(transport, constants.canonical)
+            .map_err(|error| Error::File(error.to_string()))?;
+        let braking = constants.braking;
+        // Slower than z the two parts of the forcing past the end would part without bound.
+        let sound = braking.is_none_or(|braking| (constants.alpha_z..=1e12).contains(&braking));
+        if braking.is_none() != transport.is_immediate() || !sound {
+            return Err(bad("braking does not fit the rest"));
+        }
         let breaks = self.array("breaks", &[n_segments + 1])?;
         if breaks[0] != 0.0 || breaks[n_segments] != 1.0 || breaks.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err(bad("breaks do not increase from 0 to 1"));
@@ -168,9 +179,22 @@ impl Reader<'_> {
         let (tau, names, units) = (constants.tau, constants.names.clone(), constants.units.clone());
         let (cycle, responses) = Default::default();
         let map = None;
-        let mut model =
-            Model { attractor, landscape, tau, names, units, ranges, demonstrated, learnt, map, cycle, responses }
-                .with_cycle();
+        let mut model = Model {
+            attractor,
+            landscape,
+            transport,
+            braking,
+            tau,
+            names,
+            units,
+            ranges,
+            demonstrated,
+            learnt,
+            map,
+            cycle,
+            responses,
+        }
+        .with_cycle();
         if let Some(map) = &constants.map {
             model.map = Some(self.map(map, &model)?);
             let left_over = self.matrix("left_over", (model.kind().samples(STEPS), n_dofs))?;

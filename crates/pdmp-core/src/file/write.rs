@@ -33,6 +33,7 @@ impl Model {
             tau: self.tau,
             alpha_z: self.attractor.alpha_z,
             beta_z: self.attractor.beta_z,
+            braking: self.braking,
             names: self.names.clone(),
             units: self.units.clone(),
             nominal: self.demonstrated.nominal,
@@ -80,6 +81,7 @@ impl Model {
             vector("ranges", &self.ranges),
             vector("noise.levels", self.learnt.noise.levels()),
             vector("noise.cut_offs", &cut_offs),
+            vector("transport", self.transport.coefficients()),
             ("landscape.values", knots.clone(), values),
             ("landscape.slopes", knots, slopes),
         ];

@@ -21,7 +21,9 @@ use crate::foresight::Foresight;
 use crate::inspection::{inspect, unwound};
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
+use crate::phase::Kind;
 use crate::targets::Targets;
+use crate::transport::{Transport, TransportChoice};
 
 use constants::Constants;
 pub use options::{DofScale, FitOptions, Stage, StyleChoice};
@@ -77,6 +79,12 @@ pub fn fit(
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
     let dof_scale = options.dof_scale.of(&ranges, &units);
+    let transport = match (options.transport, constants.canonical.kind()) {
+        (TransportChoice::Learnt, Kind::Discrete) => targets.transport(constants.canonical, &dof_scale)?,
+        _ => Transport::immediate(),
+    };
+    let braking = (!transport.is_immediate()).then(|| targets.braking(constants.attractor));
+    targets.carry(&transport, constants.attractor, constants.canonical);
     targets.scale(&dof_scale);
 
     let mut factorising = |share| proceed(Stage::Factorise, share);
@@ -93,7 +101,8 @@ pub fn fit(
             ))?;
             let mut first = |share: f64| factorising(0.5 * share);
             let all = Factors::of(targets.forcing.view(), StyleCount::Spectrum(1.0), &mut first)?;
-            let foresight = Foresight::new(&aligned, &targets, &all, constants.attractor, constants.canonical)?;
+            let foresight =
+                Foresight::new(&aligned, &targets, &all, &transport, constants.attractor, constants.canonical)?;
             let mut second = |share: f64| factorising(0.5 + 0.5 * share);
             let n_styles = foresight.styles(columns, numbers, options.map, &mut second)?;
             all.leading(n_styles)
@@ -134,7 +143,21 @@ pub fn fit(
     let Constants { attractor, tau, .. } = constants;
     let (cycle, responses) = Default::default();
     let map = None;
-    let model = Model { attractor, landscape, tau, names, units, ranges, demonstrated, learnt, map, cycle, responses };
+    let model = Model {
+        attractor,
+        landscape,
+        transport,
+        braking,
+        tau,
+        names,
+        units,
+        ranges,
+        demonstrated,
+        learnt,
+        map,
+        cycle,
+        responses,
+    };
     let mut model = Arc::new(model.with_cycle());
     findings.extend(stiffness::stiffness(&model, &aligned)?);
     Arc::make_mut(&mut model).learnt.findings = findings;

@@ -81,6 +81,7 @@ pub fn style_of(
         (None, None) => {}
     }
     let mut targets = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;
+    targets.carry(&model.transport, model.attractor, model.canonical());
     targets.scale(&model.learnt.dof_scale);
     let mut position = Array2::zeros((model.learnt.n_samples, n_dofs));
     aligned.sample(0, position.as_slice_mut().unwrap_or_default());
