@@ -33,7 +33,7 @@ pub fn resample(demo: &Demonstration, dt: f64) -> Result<Demonstration> {
     demo.sampled(if denser { curve.smooth(from, to, n) } else { curve.sample(from, to, n) }?, Sampling::Uniform { dt })
 }
 
-/// The movements between successive `times` [s] of the recording's clock, each with both ends.
+/// The movements between successive `times`, in seconds of the recording's clock, each with both ends.
 ///
 /// A part is sampled anew, evenly and as densely as the recording at most, so that it begins and ends at the very times
 /// that are given. Its samples carry the noise of the nearest recorded ones, which stays white.
