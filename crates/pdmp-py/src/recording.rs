@@ -14,7 +14,7 @@ use crate::error::raise;
 /// Samples at t₀, t₀ + dt, … as far as the recording goes; the clock of what is returned starts at 0. Of irregular time
 /// stamps it makes even ones. They are those of the cubic smoothing spline that generalised cross-validation chooses,
 /// which meets clean samples. No denser than the recording, they also carry what smoothing takes off the nearest recorded
-/// ones: noise stays white, and a fit can still smooth it. A denser grid is smooth. Frequencies above 1/(2 dt) are to be
+/// ones: noise stays white, and a fit can still smooth it. A denser grid is that of the spline through all samples. Frequencies above 1/(2 dt) are to be
 /// taken off first, by `lowpass`.
 ///
 /// Parameters

@@ -60,6 +60,15 @@ impl Curve {
         Ok(position)
     }
 
+    /// Positions (n, D) at n even times from `from` to `to`, both included, of the spline through all samples.
+    pub(super) fn interpolate(&self, from: f64, to: f64, n: usize) -> Result<Array2<f64>> {
+        let values: Vec<f64> = self.noise.iter().copied().collect();
+        let noise = Splines::through(Knots::not_a_knot(self.time.clone()), &values, self.splines.n_dofs());
+        let mut position = zeros("position", (n, self.splines.n_dofs()))?;
+        noise.sample(even(from, to, n), position.as_slice_mut().unwrap_or_default());
+        Ok(position + self.smooth(from, to, n)?)
+    }
+
     /// Positions (n, D) at n even times from `from` to `to`, both included, with the noise of the nearest samples.
     pub(super) fn sample(&self, from: f64, to: f64, n: usize) -> Result<Array2<f64>> {
         let mut position = self.smooth(from, to, n)?;

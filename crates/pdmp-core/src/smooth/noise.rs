@@ -111,20 +111,16 @@ impl Noise {
             let grid: Vec<f64> =
                 (0..(steps + 1).next_multiple_of(WIDTH)).map(|k| lowest * RATIO.powi(k as i32)).collect();
             let scores = Scores::of(&thinned, &open, &grid, threads)?;
-            open = open
-                .iter()
-                .enumerate()
-                .filter_map(|(column, &d)| {
-                    let (k, hz) = scores.best(column, &grid[..=steps]);
-                    if !whole && hz * interval > MAX_THINNED {
-                        return Some(d);
-                    }
-                    if scores.gain(column, k, steps) > MIN_GAIN {
-                        (self.cut_offs[d], self.levels[d]) = (Some(hz), scores.level(column, k));
-                    }
-                    None
-                })
-                .collect();
+            let mut left = Vec::new();
+            for (column, &d) in open.iter().enumerate() {
+                let (k, hz) = scores.best(column, &grid[..=steps]);
+                if scores.gain(column, k, steps) > MIN_GAIN && (whole || hz * interval <= MAX_THINNED) {
+                    (self.cut_offs[d], self.levels[d]) = (Some(hz), scores.level(column, k));
+                } else if !whole {
+                    left.push(d);
+                }
+            }
+            open = left;
             least *= 2;
         }
         Ok(())
