@@ -138,7 +138,7 @@ def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
 def test_warped_models_are_told_and_repeat_demonstrations(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With --alignment the fit is the library's, as with --styles auto; --tau overrides a timing."""
+    """With --alignment and --styles auto the fit is the library's; --tau overrides a timing."""
     path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"
     options = ("--context", "bend", "--alignment", "warp", "--styles", "auto")
     assert run("fit", folder, *options, "-o", path) == 0

@@ -1,7 +1,8 @@
-"""Samples that no movement makes are warned about, where a fit, a style or an evaluation meets them."""
+"""Samples that no movement makes are warned about by a fit, a style and an evaluation."""
 
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,7 +36,11 @@ def counted(position: np.ndarray) -> np.ndarray:
 
 
 KINDS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], slice, str]] = {
-    "lost": (lost, slice(2, 3), r'demo 2: "y0", "y1" are exactly 0 from sample 40 \(t = 0.4 s\) to'),
+    "lost": (
+        lost,
+        slice(2, 3),
+        r'demo 2: "y0", "y1" are exactly 0 from sample 40 \(t = 0.4 s\) to',
+    ),
     "padded": (padded, slice(1, 2), r"demo 1: ends in 21 rows exactly like the one before them"),
     "counted": (counted, slice(0, 5), r'"y0" grows by exactly 1 a sample in every demonstration'),
     "turned": (lambda y: y + 2 * np.pi, slice(3, 4), r'demo 3: "y0" lies 1 full turns of 6.283'),
@@ -77,7 +82,9 @@ def test_clean_and_noisy_movements_are_learnt_without_a_warning() -> None:
 def test_turns_between_recordings_of_an_angle_are_taken_off() -> None:
     """Goals of one joint are within a turn of each other, and an evaluation compares them so."""
     demos = [
-        Demonstration(reach(h) + [2 * np.pi * (k == 3), 0], dt=0.01, units=["rad", "m"], context=[h])
+        Demonstration(
+            reach(h) + [2 * np.pi * (k == 3), 0], dt=0.01, units=["rad", "m"], context=[h]
+        )
         for k, h in enumerate(HEIGHTS)
     ]
     with pytest.warns(UserWarning, match="they were taken off"):
@@ -88,8 +95,8 @@ def test_turns_between_recordings_of_an_angle_are_taken_off() -> None:
     assert found.scores["PDMP"].error.max() < 0.01
 
 
-def test_gaps_across_a_wrap_need_the_unit(tmp_path) -> None:
-    """Without a unit the way through the gap is not known; with it an angle goes the shorter one."""
+def test_gaps_across_a_wrap_need_the_unit(tmp_path: Path) -> None:
+    """Without a unit the way through the gap is not known; with it it is the shorter one."""
     angle = np.pi * (0.9 + 1.9 * S)
     wrapped = np.angle(np.exp(1j * angle))
     rows = np.column_stack([S, wrapped]).astype(object)
@@ -99,7 +106,9 @@ def test_gaps_across_a_wrap_need_the_unit(tmp_path) -> None:
         path = tmp_path / "angle.csv"
         path.write_text("\n".join([header, *(f"{t},{q}" for t, q in rows)]))
         if refused:
-            with pytest.raises(ValueError, match=r"column 'q': changes by -5.\d+ in the gap.*\[rad\]"):
+            with pytest.raises(
+                ValueError, match=r"column 'q': changes by -5.\d+ in the gap.*\[rad\]"
+            ):
                 pdmp.demos.read_csv(path, max_gap=0.5)
         else:
             whole = pdmp.demos.unwrap(pdmp.demos.read_csv(path, max_gap=0.5))

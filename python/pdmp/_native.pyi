@@ -44,6 +44,7 @@ __all__ = [
     "factorise",
     "fill",
     "fit",
+    "inspected",
     "load",
     "lowpass",
     "period",

@@ -114,7 +114,11 @@ impl Model {
         Ok(Trajectory::new(py, trajectory))
     }
 
-    /// The style (J,) of a new demonstration: least squares on its target.
+    /// The style (J,) of a new demonstration: the likeliest given its target.
+    ///
+    /// Minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with A the forcing of the styles, σ² what least squares leave of the target f
+    /// and v_j the largest square of the demonstrations' styles. A cycle that begins in another phase than those of the
+    /// model is turned to theirs first. The demonstration is inspected as in `fit`, with the same warnings.
     ///
     /// Parameters
     /// ----------
@@ -128,6 +132,13 @@ impl Model {
     /// Returns
     /// -------
     /// ndarray, (J,)
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Names or units other than those of the model; a demonstration that it does not describe, where the movement of
+    ///     the closest style deviates by more than half of the demonstration's own and its forcing by more than three times
+    ///     what is left out of those fitted, or where the style is more than ten times as large as any of theirs.
     #[pyo3(signature = (demonstration, *, dt=None, period=None, events=None))]
     fn style_of<'py>(
         &self,
