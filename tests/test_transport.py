@@ -148,3 +148,42 @@ def test_bad_transport_is_refused() -> None:
     assert model.transport([]).shape == (0,)
     with pytest.raises(ValueError, match="transport"):
         pdmp.fit(loops(), kind="rhythmic").transport([0.0])
+
+
+def after(model: pdmp.Model, m: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far a movement is from its goal past its end, and its accelerations there."""
+    duration = model.durations[m]
+    made = model.rollout(**pdmp.as_demonstrated(model, m), dt=0.001, duration=3 * duration)
+    late = made.time > duration + 1e-9
+    return np.abs(made.position[late] - model.goals[m]), np.abs(made.acceleration[late])
+
+
+def test_movement_that_ends_at_rest_stays_on_its_goal() -> None:
+    """And is finished with its time, where the paper's equations leave the goal again."""
+    demos = [np.column_stack([a * RISE, DETOUR + a * RISE**2]) for a in (0.8, 1.0, 1.2)]
+    model = pdmp.fit(demos, dt=0.01, n_styles=3)
+    assert after(model, 1)[0].max() < 2e-4
+    assert after(pdmp.fit(demos, dt=0.01, n_styles=3, transport="immediate"), 1)[0].max() > 2e-3
+    controller = model.controller(0.001)
+    while controller.step() != pdmp.Status.FINISHED:
+        assert controller.time < 1.05 * model.durations[1]
+
+
+def test_movement_that_ends_in_motion_brakes() -> None:
+    """As hard as the hardest acceleration demonstrated, if that is at least alpha_z y'."""
+    rate = 12 * np.pi
+    shakes = [(a * np.sin(rate * S + np.pi / 4))[:, None] for a in (0.8, 1.0, 1.2)]
+    slow = [(a * S**2)[:, None] for a in (0.8, 1.0, 1.2)]
+    for demos, braking in ((shakes, rate * np.sqrt(2)), (slow, 25.0)):
+        model = pdmp.fit(demos, dt=0.01, n_styles=2)
+        assert model.braking == pytest.approx(braking, rel=0.03)
+        away, hard = after(model, 1)
+        papers, _ = after(pdmp.fit(demos, dt=0.01, n_styles=2, transport="immediate"), 1)
+        assert away.max() < 0.5 * papers.max()
+        assert hard.max() <= 1.03 * max(rate**2 * (demos is shakes), 25.0 * 2.0)
+
+
+def test_braking_belongs_to_learnt_transport() -> None:
+    """The paper's forcing fades with the phase; a rhythmic one never ends."""
+    assert straight("immediate").braking is None
+    assert pdmp.fit(loops(), kind="rhythmic").braking is None
