@@ -51,7 +51,7 @@ def test_csv_columns_are_kept_in_the_order_asked_for(table: Path) -> None:
 
 def test_csv_time_may_have_another_name(table: Path) -> None:
     """The time column is the one that is named, and t becomes a degree of freedom."""
-    demo = demos.read_csv(table, time="y")
+    demo = demos.read_csv(table, time="y [s]")
     np.testing.assert_array_equal(demo.time, POSITION[:, 1])
     assert list(demo.names) == ["t", "x"]
 

@@ -6,7 +6,7 @@ use pdmp_core::MapChoice;
 use pyo3::prelude::*;
 
 use crate::convert::{Cube, Matrix, matrix};
-use crate::error::raise;
+use crate::error::{printable, raise};
 use crate::fit::map_of;
 
 /// A map from contexts to outputs, with the covariance of what it predicts.
@@ -87,6 +87,6 @@ impl ContextMap {
     }
 
     fn __repr__(&self) -> String {
-        format!("<pdmp.ContextMap: {}>", self.0)
+        printable(&format!("<pdmp.ContextMap: {}>", self.0))
     }
 }

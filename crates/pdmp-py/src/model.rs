@@ -111,7 +111,7 @@ impl Model {
         let conditions = arguments.in_context(&self.0, context)?;
         let trajectory =
             interruptible(py, |proceed| self.0.rollout_with(&conditions, Timing { dt, duration }, proceed))?;
-        Ok(Trajectory::new(py, trajectory))
+        Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
     }
 
     /// The style (J,) of a new demonstration: least squares on its target.
