@@ -4,6 +4,15 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from typing import Any
 
+from pdmp._shown import printable
+
+
+def path(text: str) -> str:
+    """Return the name of a file or folder, which must not stand for a stream."""
+    if text == "-":
+        raise ArgumentTypeError("- is no file: name one, or ./- where it is called so")
+    return text
+
 
 def add_reading(parser: ArgumentParser) -> None:
     """Add the options that tell how demonstrations are read."""
@@ -100,6 +109,6 @@ def _or_auto(read: Callable[[str], Any], wanted: str) -> Callable[[str], Any]:
         try:
             return text if text == "auto" else read(text)
         except ValueError:
-            raise ArgumentTypeError(f'"{text}" is neither a {wanted} nor auto') from None
+            raise ArgumentTypeError(f'"{printable(text)}" is neither a {wanted} nor auto') from None
 
     return value
