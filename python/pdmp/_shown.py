@@ -11,6 +11,4 @@ def printable(text: object, *, keep: str = "") -> str:
     text = str(text)
     if text.isprintable():
         return text
-    return "".join(
-        c if c in keep or category(c) not in HIDDEN else ascii(c)[1:-1] for c in text
-    )
+    return "".join(c if c in keep or category(c) not in HIDDEN else ascii(c)[1:-1] for c in text)

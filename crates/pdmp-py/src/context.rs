@@ -6,7 +6,7 @@ use pdmp_core::MapChoice;
 use pyo3::prelude::*;
 
 use crate::convert::{Cube, Matrix, matrix};
-use crate::error::{printable, raise};
+use crate::error::{ascii, raise};
 use crate::fit::map_of;
 
 /// A map from contexts to outputs, with the covariance of what it predicts.
@@ -87,6 +87,6 @@ impl ContextMap {
     }
 
     fn __repr__(&self) -> String {
-        printable(&format!("<pdmp.ContextMap: {}>", self.0))
+        ascii(&format!("<pdmp.ContextMap: {}>", self.0))
     }
 }

@@ -53,6 +53,12 @@ pub(crate) fn printable(text: &str) -> String {
     shown
 }
 
+/// A printable text that any console can write.
+pub(crate) fn ascii(text: &str) -> String {
+    let plain = printable(&text.replace('é', "e"));
+    plain.chars().flat_map(|c| if c.is_ascii() { vec![c] } else { c.escape_unicode().collect() }).collect()
+}
+
 /// Runs a long call without holding the interpreter. The call is handed a question whether to go on, which tells
 /// `progress` the share that is done, and whose answer is no after Ctrl-C or an exception of `progress`.
 pub(crate) fn detached<S, T: Send>(

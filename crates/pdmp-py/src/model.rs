@@ -13,7 +13,7 @@ use crate::conditions::Arguments;
 use crate::controller::Controller;
 use crate::convert::{Cube, Matrix, Reduced, Vector, optional, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
-use crate::error::{interruptible, raise};
+use crate::error::{ascii, interruptible, raise};
 use crate::prediction::Prediction;
 
 /// A parametric dynamic movement primitive: immutable, picklable, saved by `save`.
@@ -323,7 +323,7 @@ impl Model {
             model.n_dofs(),
             model.n_styles(),
             model.tau(),
-            model.learnt().basis
+            ascii(&model.learnt().basis)
         )
     }
 }

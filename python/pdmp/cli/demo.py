@@ -14,7 +14,12 @@ from pdmp.demo import run_demo
 def arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument(
-        "-o", "--output", type=path, default="demo", metavar="FOLDER", help="where to write; default: demo"
+        "-o",
+        "--output",
+        type=path,
+        default="demo",
+        metavar="FOLDER",
+        help="where to write; default: demo",
     )
 
 

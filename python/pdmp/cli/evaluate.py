@@ -19,9 +19,15 @@ MOST_STYLES = 8  # of the figure of E over J
 
 def arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("paths", nargs="+", type=_options.path, metavar="PATH", help="folder with an index.csv")
     parser.add_argument(
-        "-o", "--output", type=_options.path, metavar="FOLDER", help="where to write figures and tables"
+        "paths", nargs="+", type=_options.path, metavar="PATH", help="folder with an index.csv"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=_options.path,
+        metavar="FOLDER",
+        help="where to write figures and tables",
     )
     _options.add_reading(parser)
     _options.add_learning(parser)

@@ -22,7 +22,9 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="PATH",
         help="CSV or BVH file (one demonstration), NPZ file (several) or folder with an index.csv",
     )
-    parser.add_argument("-o", "--output", type=_options.path, required=True, metavar="FILE", help="model to write")
+    parser.add_argument(
+        "-o", "--output", type=_options.path, required=True, metavar="FILE", help="model to write"
+    )
     _options.add_reading(parser)
     _options.add_learning(parser)
 

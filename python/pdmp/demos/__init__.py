@@ -22,20 +22,29 @@ for what is known of it, beside `demos/<id>.csv` or `demos/<id>.bvh` files or a 
 order of the index. Without an index, all CSV and BVH files in the folder are read.
 
 What was read may be prepared: `unwrap` angles, take noise off by `lowpass`, `resample` evenly,
-`trim` to the movement or `cut` at given times. From cyclic recordings `cycles` makes what a
+`trim` to the movement or `cut` at given times; each of these takes one demonstration, a list or
+what a reader returned, and returns as many results. From cyclic recordings `cycles` makes what a
 rhythmic primitive is learnt from::
 
     cycles = pdmp.demos.cycles(pdmp.demos.read_csv("walk.csv"))
     model = pdmp.fit(cycles, kind="rhythmic")
 """
 
-from pdmp._native import cut, lowpass, period, resample, trim
-from pdmp.demos.angles import unwrap
+from pdmp import _native
+from pdmp.demos import angles
+from pdmp.demos._each import each
 from pdmp.demos.archive import read_npz
 from pdmp.demos.bvh import read_bvh
 from pdmp.demos.cyclic import Cycles, Rejected, cycles
 from pdmp.demos.folder import read, read_folder
 from pdmp.demos.table import read_csv, write_csv
+
+cut = each(_native.cut)
+lowpass = each(_native.lowpass)
+period = each(_native.period)
+resample = each(_native.resample)
+trim = each(_native.trim)
+unwrap = each(angles.unwrap)
 
 __all__ = [
     "Cycles",

@@ -48,7 +48,10 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
                 + remedy.replace("{unit}", " or ".join([*likely, "s"]))
             )
         scale = SECONDS[unit]
-        _warn(f"{source}: time stamps are read as {unit} since 1970: " + remedy.replace("{unit}", unit))
+        _warn(
+            f"{source}: time stamps are read as {unit} since 1970: "
+            + remedy.replace("{unit}", unit)
+        )
     elif not unit and step >= 1 and (time == np.floor(time)).all():
         _warn(
             f"{source}: time stamps are whole numbers that rise by {step:g}, and read as s: "
@@ -56,8 +59,8 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
         )
     if abs(first * scale) > MAX_STAMP or (scale < 1 and abs(first) * scale > EPOCH[0]):
         # Doubles since 1970 are whole in units of 0.2 µs.
-        return (time - time[0]) * scale
-    return time * scale
+        time = time - time[0]
+    return np.asarray(time * scale, float)
 
 
 def _since_1970(first: float, step: float, unit: str) -> bool:

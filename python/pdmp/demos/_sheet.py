@@ -154,7 +154,7 @@ def _header(
         if len(fields) == width and not units and _are_names(fields):
             named.append((line, fields))
         before = fields
-    timed = [row for row in named if time in (label(cell)[0] for cell in row[1])]
+    timed = [row for row in named if time in [label(cell)[0] for cell in row[1]]]
     if len(timed or named) > 1 and not timed:
         raise _text.refusal(
             f"{path}: lines {named[0][0]} and {named[1][0]} may both name the columns: delete what "

@@ -7,8 +7,24 @@ from pathlib import Path
 from pdmp._shown import printable
 
 GAPS = frozenset(
-    "na n/a #n/a #na <na> nan +nan -nan nan(ind) -nan(ind) 1.#qnan -1.#qnan 1.#ind -1.#ind null "
-    "none".split()
+    [
+        "na",
+        "n/a",
+        "#n/a",
+        "#na",
+        "<na>",
+        "nan",
+        "+nan",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "1.#qnan",
+        "-1.#qnan",
+        "1.#ind",
+        "-1.#ind",
+        "null",
+        "none",
+    ]
 )
 """Texts that mark a missing number, beside the empty one."""
 

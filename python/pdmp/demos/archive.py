@@ -13,7 +13,6 @@ from pdmp._native import Demonstration
 from pdmp.demos import _clock, _npz, _text
 from pdmp.demos._recording import demonstration
 
-
 LAYOUT = "store time (T,) and position (T, D), or each demonstration beside its time stamps NAME.t"
 
 

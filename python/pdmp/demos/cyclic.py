@@ -1,6 +1,6 @@
 """Cycles of rhythmic recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, cast, overload
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pdmp import _native
 from pdmp._native import Demonstration
+from pdmp.demos._text import refusal
 
 
 class Rejected(NamedTuple):
@@ -67,9 +68,9 @@ class Cycles(Sequence[Demonstration]):
 
 
 def cycles(
-    recordings: Demonstration | Sequence[Demonstration],
+    recordings: Demonstration | Sequence[Demonstration] | Mapping[str, Demonstration],
     *,
-    events: ArrayLike | Sequence[ArrayLike] | None = None,
+    events: ArrayLike | Sequence[ArrayLike] | Mapping[str, ArrayLike] | None = None,
     average: bool = False,
 ) -> Cycles:
     """Cut cyclic recordings into closed cycles that begin in the same phase.
@@ -91,11 +92,11 @@ def cycles(
 
     Parameters
     ----------
-    recordings : Demonstration or sequence of Demonstration
+    recordings : Demonstration, or sequence or mapping of Demonstration
         Recordings of at least one cycle and a half, with `dt` or `time`.
     events : (K,) array_like, or one for each recording, optional
         Times in s at which cycles begin, such as foot strikes, on the clock of the recording; the
-        last ends the last cycle.
+        last ends the last cycle. Of a mapping of recordings, they may be a mapping too.
     average : bool
         Make one mean cycle of each recording, instead of keeping each.
 
@@ -114,9 +115,13 @@ def cycles(
     ----------
     B. Iglewicz, D. C. Hoaglin, How to detect and handle outliers, ASQC Quality Press 1993
     """
+    if isinstance(recordings, Mapping) and isinstance(events, Mapping):
+        if odd := sorted(map(str, recordings.keys() ^ events.keys())):
+            raise refusal(f"events: '{odd[0]}' is among the recordings or the events alone")
+        events = [events[name] for name in recordings]
     begins = cast("Sequence[ArrayLike] | None", events)
     if isinstance(recordings, Demonstration):
         recordings = [recordings]
         begins = None if events is None else [cast(ArrayLike, events)]
-    demos, periods, sources, odd = _native.cycles(recordings, begins, average)
-    return Cycles(demos, periods, sources, [Rejected(*cycle) for cycle in odd])
+    demos, periods, sources, rejected = _native.cycles(recordings, begins, average)
+    return Cycles(demos, periods, sources, [Rejected(*cycle) for cycle in rejected])

@@ -63,7 +63,9 @@ def read(
         if path.is_dir():
             demos += read_folder(path, time=time, context=context, **options).values()
         elif context is not None:
-            raise _text.refusal(f"{path}: a context is read from the index.csv of a folder: pass one")
+            raise _text.refusal(
+                f"{path}: a context is read from the index.csv of a folder: pass one"
+            )
         elif path.suffix.lower() in SINGLE:
             demos.append(_read_single(path, time, **options))
         elif path.suffix.lower() == ".npz":
@@ -188,10 +190,14 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
     contexts: dict[str, list[float | str] | None] = {}
     for line, fields in lines:
         if fields[name] in contexts:
-            raise _text.refusal(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
+            raise _text.refusal(
+                f"{path}, line {line}: id '{fields[name]}' appears twice: rename one"
+            )
         for k in labels:
             if not fields[k]:
-                raise _text.refusal(f"{path}, line {line}, column '{header[k]}': no label: fill it in")
+                raise _text.refusal(
+                    f"{path}, line {line}, column '{header[k]}': no label: fill it in"
+                )
         values = [
             fields[k] if k in labels else _text.number(path, line, header[k], fields[k])
             for k in where

@@ -141,9 +141,7 @@ def _numbers(
     return positions, None if clock is None else np.array(stamps)
 
 
-def _row(
-    path: Path, line: int, cells: list[str], names: list[str], *, gaps: bool
-) -> list[float]:
+def _row(path: Path, line: int, cells: list[str], names: list[str], *, gaps: bool) -> list[float]:
     """Return the numbers of a row."""
     try:
         values = list(map(float, cells))

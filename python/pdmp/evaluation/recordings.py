@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp._native import Demonstration
+from pdmp._native import Demonstration, Trajectory
 
 Array: TypeAlias = NDArray[Any]  # of float64
+Demos: TypeAlias = (
+    Sequence[Demonstration | Trajectory | ArrayLike]
+    | Mapping[str, Demonstration | Trajectory | ArrayLike]
+    | ArrayLike
+)
 Kind: TypeAlias = Literal["discrete", "rhythmic"]
 
 
@@ -90,7 +95,7 @@ class Recordings:
 
 
 def recordings(
-    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
+    demos: Demos,
     contexts: ArrayLike | Sequence[Sequence[float | str]] | None,
     *,
     kind: Kind,
@@ -103,7 +108,10 @@ def recordings(
         raise ValueError(f'kind = "{kind}": must be "discrete" or "rhythmic"')
     if n_samples < 4:
         raise ValueError(f"n_samples = {n_samples}: must be at least 4")
-    given = tuple(_rated(demo, dt) for demo in list(demos))  # type: ignore[arg-type]
+    if isinstance(demos, (Demonstration, Trajectory)):
+        raise ValueError("demos is a single demonstration: put it into a list")
+    values = demos.values() if isinstance(demos, Mapping) else demos
+    given = tuple(_rated(demo, dt) for demo in values)  # type: ignore[union-attr]
     if not given:
         raise ValueError("demos is empty: pass at least two demonstrations")
     for m, demo in enumerate(given):
@@ -111,7 +119,9 @@ def recordings(
             raise ValueError(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
     if kind == "discrete" and period is not None:
         raise ValueError("period does not apply to discrete demonstrations: leave it out")
-    periods = np.full(len(given), np.nan) if period is None else np.asarray(period, float)
+    periods = np.full(len(given), np.nan) if period is None else np.asarray(period)
+    if periods.dtype.kind not in "iuf" or periods.ndim > 1:
+        raise ValueError("period must be a number of seconds, or one for each demonstration")
     if periods.ndim and len(periods) != len(given):
         raise ValueError(
             f"period has length {len(periods)}, expected {len(given)}: one value per demonstration"
@@ -124,8 +134,10 @@ def recordings(
     return Recordings(given, conditions, labels, kind, durations, sampled)
 
 
-def _rated(demo: Demonstration | ArrayLike, dt: float | None) -> Demonstration:
+def _rated(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> Demonstration:
     """Return a demonstration, with the rate that is given for those without."""
+    if isinstance(demo, Trajectory):
+        return Demonstration(demo)
     if not isinstance(demo, Demonstration):
         return Demonstration(demo, dt=dt)
     if demo.time is not None or dt is None:
@@ -169,8 +181,11 @@ def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
                     f"demo {m}: context has length {len(context)}, expected {len(values[0])}"
                 )
     # Beside a label, numpy would make labels of the numbers.
-    labelled = any(isinstance(value, str) for value in np.asarray(values, object).ravel())
-    array = np.asarray(values, object if labelled else float)
+    given = np.asarray(values, object)
+    kinds = {str if isinstance(value, str) else type(value) for value in given.ravel()}
+    if kinds & {bytes, bytearray, np.bytes_}:
+        raise ValueError("contexts hold bytes: decode them to labels, or pass numbers")
+    array = given if str in kinds else given.astype(float)
     if array.ndim != 2:
         raise ValueError(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
     if len(array) != len(demos):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pdmp._native import Demonstration
 from pdmp.evaluation.baselines import (
     Components,
     LinearWeights,
@@ -20,7 +19,7 @@ from pdmp.evaluation.baselines import (
     RadialWeights,
 )
 from pdmp.evaluation.predictors import PDMP, Forecast, Foresee, Predictor
-from pdmp.evaluation.recordings import Kind, Recordings, recordings
+from pdmp.evaluation.recordings import Demos, Kind, Recordings, recordings
 from pdmp.evaluation.result import REFERENCE, Evaluation, score
 from pdmp.evaluation.splits import Split, checked, held_out
 
@@ -57,7 +56,7 @@ def over_styles(most: int, **settings: Any) -> dict[str, Predictor]:
 
 
 def evaluate(
-    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
+    demos: Demos,
     *,
     contexts: ArrayLike | Sequence[Sequence[float | str]] | None = None,
     predictors: Mapping[str, Predictor] | None = None,
@@ -85,7 +84,7 @@ def evaluate(
 
     Parameters
     ----------
-    demos : sequence of Demonstration, sequence of array_like (T_m, D), or array_like (M, T, D)
+    demos : sequence or mapping of Demonstration or array_like (T_m, D), or array_like (M, T, D)
         The demonstrations, as for `pdmp.fit`.
     contexts : array_like (M, Q), or M lists of Q numbers and labels, optional
         The condition of each; those that the demonstrations hold by default.
