@@ -13,9 +13,12 @@ from pdmp._described import label
 from pdmp._shown import printable
 from pdmp.demos import _text
 
-SECONDS = {
-    "": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9
+SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+LONG = {
+    "μs": "us", "second": "s", "seconds": "s", "milliseconds": "ms", "msec": "ms",
+    "microseconds": "us", "usec": "us", "nanoseconds": "ns", "nsec": "ns",
 }  # fmt: skip
+"""Other ways to write them; the first one has the Greek letter."""
 MAX_STEP = 5.0  # s: no movement is sampled that rarely
 EPOCH = (6e8, 4.2e9)  # s since 1970, from 1989 to 2103
 MAX_STAMP = 1e11  # s, as for Demonstration
@@ -24,6 +27,7 @@ MAX_STAMP = 1e11  # s, as for Demonstration
 def unit_of(source: object, name: str, unit: str) -> str:
     """Return the unit of a time column, which may stand in parentheses too, or be missing."""
     unit = unit or label(re.sub(r"\((.*)\)$", r"[\1]", name))[1]
+    unit = LONG.get(unit.lower(), unit)
     if unit not in SECONDS:
         known = ", ".join(filter(None, SECONDS))
         raise _text.refusal(f"{source}, column '{name}': its unit is '{unit}': expected {known}")
@@ -43,9 +47,11 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
         unit = next((unit for unit in ("ms", "us", "ns") if _since_1970(first, step, unit)), "")
         if not unit:
             likely = [unit for unit in ("ms", "us", "ns") if 1e-4 < step * SECONDS[unit] < 1]
+            likely_unit = likely[0] if likely else "s"
             raise _text.refusal(
-                f"{source}: time stamps rise by {step:g}, which is long for seconds: "
-                + remedy.replace("{unit}", " or ".join([*likely, "s"]))
+                f"{source}: time stamps from {first:g} in steps of {step:g} are not in seconds: "
+                + remedy.replace("{unit}", likely_unit)
+                + f"; {step * SECONDS[likely_unit]:g} s would be between samples"
             )
         scale = SECONDS[unit]
         _warn(

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -62,17 +63,19 @@ class Sheet:
             yield line, fields
 
 
-def sheet(path: Path, time: str | None = None, *, index: bool = False) -> Sheet:
+def sheet(path: Path, times: Collection[str] = (), *, index: bool = False) -> Sheet:
     """Find separator, header and units of a CSV file.
 
     Comments, which begin with #, a line such as `sep=;` and other lines before the header are
     passed over. The header is the row with as many fields as the samples have that names the
-    columns; `time` is one of the names, if there is a choice. It may stand in a comment. Below it,
+    columns; if there is a choice, the one with a name among `times`. It may stand in a comment. Below it,
     a row of units is taken for one. The header of an index, whose rows may be words, is its first
     row.
     """
+    raw = path.read_bytes()
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        # Spreadsheets write UTF-16 with a mark, and call it Unicode.
+        text = raw.decode("utf-16" if raw[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8-sig")
     except UnicodeDecodeError:
         raise _text.refusal(f"{path}: not UTF-8 text: save it as UTF-8") from None
     separator = _separator(path, text)
@@ -85,7 +88,7 @@ def sheet(path: Path, time: str | None = None, *, index: bool = False) -> Sheet:
     width = _width([fields for _, fields in sample])
     line, fields = sample[0]
     if not index:
-        line, fields = _header(path, text, separator, sample, width, time)
+        line, fields = _header(path, text, separator, sample, width, times)
     below = next((row for row in sample if row[0] > line), None)
     units, first = None, line
     if not index and below is not None and len(below[1]) == width and _are_units(below[1]):
@@ -142,7 +145,7 @@ def _width(rows: list[list[str]]) -> int:
 
 
 def _header(
-    path: Path, text: str, separator: str, sample: list[Row], width: int, time: str | None
+    path: Path, text: str, separator: str, sample: list[Row], width: int, times: Collection[str]
 ) -> Row:
     """Return the row that names the columns; the first one if there is none."""
     named: list[Row] = []
@@ -154,7 +157,7 @@ def _header(
         if len(fields) == width and not units and _are_names(fields):
             named.append((line, fields))
         before = fields
-    timed = [row for row in named if time in [label(cell)[0] for cell in row[1]]]
+    timed = [row for row in named if any(label(cell)[0] in times for cell in row[1])]
     if len(timed or named) > 1 and not timed:
         raise _text.refusal(
             f"{path}: lines {named[0][0]} and {named[1][0]} may both name the columns: delete what "

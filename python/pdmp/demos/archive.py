@@ -75,7 +75,9 @@ def recordings(
         if columns is not None and names is not None:
             kept = _text.places(path, names, _text.listed("columns", columns))
         if dt is None and time is not None:
-            time = _clock.seconds(source, time, "", "if they are in {unit}, store them in s")
+            time = _clock.seconds(
+                source, time, "", "store them in s instead of {unit}, or pass dt="
+            )
         given = {
             kind: None if labels is None else [labels[k] for k in kept]
             for kind, labels in (("names", names), ("units", units))

@@ -19,6 +19,9 @@ from pdmp.demos import _clock, _text
 from pdmp.demos._recording import demonstration
 from pdmp.demos._sheet import Sheet, sheet
 
+CLOCKS = ("t", "time", "Time", "TIME")
+"""Names of a column of time stamps, if none is given; the first is the default."""
+
 
 def read_csv(
     path: str | PathLike[str],
@@ -43,8 +46,8 @@ def read_csv(
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all but `time` by default.
     time : str
-        Column of the time stamps, in s unless its header, or this name, has ms, µs or ns in
-        brackets. Stamps in ms, µs or ns since 1970 are recognised, with a warning, and count from
+        Column of the time stamps, by default `t` or `time`, in s unless its header, or this name,
+        has ms, µs or ns in brackets. Stamps in ms, µs or ns since 1970 are recognised, with a warning, and count from
         the first.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
@@ -65,29 +68,30 @@ def read_csv(
         A file that cannot be read.
     """
     path = Path(path)
-    found = sheet(path, label(time)[0] if dt is None else None)
+    times = CLOCKS if time == CLOCKS[0] else (time, label(time)[0])
+    found = sheet(path, times if dt is None else ())
     header, units = _labels(found)
     names = [name for name in header if name]
     _text.check_names(path, found.line, names)
-    unit = ""
-    if dt is None and time not in header:
-        time, unit = label(time)
-    if dt is None and time not in header:
+    stamped = next((name for name in times if name in header), None)
+    if dt is None and stamped is None:
         raise _text.refusal(
             f"{path}: no column '{time}' with the time among {', '.join(names)}: "
             "name it with time=, or pass dt="
         )
     if columns is None:
-        names = [name for name in names if name != time]
+        names = [name for name in names if name != stamped]
     else:
         names = _text.listed("columns", columns)
     where = _text.places(path, header, names)
-    clock = None if dt is not None else _text.places(path, header, [time])[0]
+    clock = header.index(stamped) if dt is None and stamped is not None else None
     position, stamps = _numbers(found, header, where, clock, gaps=max_gap > 0)
     if clock is not None and stamps is not None:
-        unit = _clock.unit_of(path, time, unit or units[clock])
-        remedy = f"give the unit by the header or by time='{time} [{{unit}}]'"
-        stamps = _clock.seconds(f"{path}, column '{time}'", stamps, unit, remedy)
+        name = header[clock]
+        given = units[clock] or ("" if name == time else label(time)[1])
+        remedy = f"write '{name} [{{unit}}]' in the header or as time="
+        unit = _clock.unit_of(path, name, given)
+        stamps = _clock.seconds(f"{path}, column '{name}'", stamps, unit, remedy)
     return demonstration(
         path,
         position,
@@ -115,6 +119,7 @@ def _numbers(
     path = found.path
     numbers: list[list[float]] = []
     stamps: list[float] = []
+    names = [header[k] for k in where]
     unnamed = [k for k, name in enumerate(header) if not name]
     decimal = {True: 0, False: 0}  # line where a number has a decimal comma, or a point
     for line, row in found.rows(blank=clock is None):
@@ -132,11 +137,11 @@ def _numbers(
                 f"{path}, line {line}: numbers have decimal commas and decimal points: write all "
                 "of them with one of the two, and no separators of thousands"
             )
-        numbers.append(_row(path, line, kept, [header[k] for k in where], gaps=gaps))
         if clock is not None:
             value = _text.number(path, line, header[clock], stamp)
-            # Whole ns since 1970 have more digits than a double.
-            stamps.append(int(stamp) if stamp.isdecimal() and len(stamp) < 19 + 1 else value)
+            # ns since 1970 have more digits than a double, and fewer than an integer.
+            stamps.append(int(stamp) if stamp.isdecimal() and value < 2**63 else value)
+        numbers.append(_row(path, line, kept, names, gaps=gaps))
     positions = np.array(numbers, float).reshape(len(numbers), len(where))
     return positions, None if clock is None else np.array(stamps)
 
