@@ -15,7 +15,7 @@ DERIVATIVES = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
 
 def label(field: str) -> tuple[str, str]:
     """Return name and unit of a header field such as `knee [rad]`; the unit is "" without one."""
-    found = re.fullmatch(r"(.*\S)\s*\[([^][]*)\]", field.strip())
+    found = re.fullmatch(r"(.*\S)\s*\[([^][]*)\]", field.strip(), re.DOTALL)
     return (found[1], found[2].strip()) if found else (field.strip(), "")
 
 

@@ -10,8 +10,13 @@ from pdmp._shown import printable
 
 
 def say(text: object, *, file: TextIO | None = None) -> None:
-    """Write a text of one line or several, with other control characters escaped."""
-    print(printable(text, keep="\n"), file=file)
+    """Write a line, with control characters escaped."""
+    print(printable(text), file=file)
+
+
+def report(text: str) -> None:
+    """Write several lines, with control characters escaped."""
+    print(printable(text, keep="\n"))
 
 
 @contextmanager

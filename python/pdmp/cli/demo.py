@@ -5,7 +5,7 @@ example: pdmp demo -o demo
 
 from argparse import ArgumentParser, Namespace
 
-from pdmp.cli._console import say
+from pdmp.cli._console import report
 from pdmp.cli._options import path
 from pdmp.cli._progress import progress
 from pdmp.demo import run_demo
@@ -26,5 +26,5 @@ def arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Run the demo and print its report."""
     with progress() as show:
-        report = run_demo(options.output, progress=show)
-    say(report)
+        text = run_demo(options.output, progress=show)
+    report(text)

@@ -11,7 +11,7 @@ from pathlib import Path
 from pdmp import demos
 from pdmp._files import replacing
 from pdmp.cli import _options
-from pdmp.cli._console import say
+from pdmp.cli._console import report, say
 from pdmp.cli._progress import progress
 
 MOST_STYLES = 8  # of the figure of E over J
@@ -47,7 +47,7 @@ def run(options: Namespace) -> None:
     with progress() as show:
         predictors = baselines() | {"PDMP": PDMP(**settings)}
         found = evaluate(recordings, predictors=predictors, **tried, progress=show)
-    say(found)
+    report(repr(found))
     if not folder:
         return
     from pdmp import plot

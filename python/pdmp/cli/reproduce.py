@@ -6,7 +6,7 @@ example: pdmp reproduce fig3 -o reproduction
 import sys
 from argparse import ArgumentParser, Namespace
 
-from pdmp.cli._console import say
+from pdmp.cli._console import report
 from pdmp.cli._options import path
 from pdmp.reproduction import FIGURES, reproduce
 from pdmp.reproduction.section import SEED
@@ -45,11 +45,11 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Make what was asked for, and print its tables."""
-    report = reproduce(
+    text = reproduce(
         options.figure,
         options.output,
         options.recordings,
         options.seed,
         progress=lambda name: print(f"making {name}", file=sys.stderr),
     )
-    say(report)
+    report(text)

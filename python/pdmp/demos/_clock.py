@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._described import label
-from pdmp._shown import printable
-from pdmp.demos import _text
+from pdmp._shown import printable, refusal
 
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 LONG = {
@@ -30,7 +29,7 @@ def unit_of(source: object, name: str, unit: str) -> str:
     unit = LONG.get(unit.lower(), unit)
     if unit not in SECONDS:
         known = ", ".join(filter(None, SECONDS))
-        raise _text.refusal(f"{source}, column '{name}': its unit is '{unit}': expected {known}")
+        raise refusal(f"{source}, column '{name}': its unit is '{unit}': expected {known}")
     return unit
 
 
@@ -48,7 +47,7 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
         if not unit:
             likely = [unit for unit in ("ms", "us", "ns") if 1e-4 < step * SECONDS[unit] < 1]
             likely_unit = likely[0] if likely else "s"
-            raise _text.refusal(
+            raise refusal(
                 f"{source}: time stamps from {first:g} in steps of {step:g} are not in seconds: "
                 + remedy.replace("{unit}", likely_unit)
                 + f"; {step * SECONDS[likely_unit]:g} s would be between samples"

@@ -5,7 +5,7 @@ from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 from pdmp._native import Demonstration
-from pdmp.demos._text import refusal
+from pdmp._shown import refusal
 
 P = ParamSpec("P")
 R = TypeVar("R")

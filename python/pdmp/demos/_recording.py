@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._native import Demonstration, fill
-from pdmp.demos._text import refusal
+from pdmp._shown import refusal
 
 TURNS = {"rad": tau, "deg": 360.0, "°": 360.0}
 

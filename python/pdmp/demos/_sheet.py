@@ -13,6 +13,7 @@ from itertools import islice
 from pathlib import Path
 
 from pdmp._described import label
+from pdmp._shown import refusal
 from pdmp.demos import _text
 
 SAMPLE = 200
@@ -50,7 +51,7 @@ class Sheet:
                 hint = ""
                 if len(fields) > len(self.fields) and self.separator == ",":
                     hint = "; where commas are decimal, separate fields by semicolons"
-                raise _text.refusal(
+                raise refusal(
                     f"{self.path}, line {line}: {len(fields)} fields, "
                     f"expected {len(self.fields)} as in the header{hint}"
                 )
@@ -68,23 +69,21 @@ def sheet(path: Path, times: Collection[str] = (), *, index: bool = False) -> Sh
 
     Comments, which begin with #, a line such as `sep=;` and other lines before the header are
     passed over. The header is the row with as many fields as the samples have that names the
-    columns; if there is a choice, the one with a name among `times`. It may stand in a comment. Below it,
-    a row of units is taken for one. The header of an index, whose rows may be words, is its first
-    row.
+    columns; if there is a choice, the one with a name among `times`. It may stand in a comment.
+    Below it, a row of units is taken for one. The header of an index, whose rows may be words, is
+    its first row.
     """
     raw = path.read_bytes()
     try:
         # Spreadsheets write UTF-16 with a mark, and call it Unicode.
         text = raw.decode("utf-16" if raw[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8-sig")
     except UnicodeDecodeError:
-        raise _text.refusal(f"{path}: not UTF-8 text: save it as UTF-8") from None
+        raise refusal(f"{path}: not UTF-8 text: save it as UTF-8") from None
     separator = _separator(path, text)
     sample = [row for row in islice(_parse(path, text, separator), SAMPLE) if any(row[1])]
     sample = [row for row in sample if not _separating(separator.join(row[1]))]
     if not sample:
-        raise _text.refusal(
-            f"{path}: empty: expected a header row with names, then one sample a row"
-        )
+        raise refusal(f"{path}: empty: expected a header row with names, then one sample a row")
     width = _width([fields for _, fields in sample])
     line, fields = sample[0]
     if not index:
@@ -107,7 +106,7 @@ def _parse(path: Path, text: str, separator: str) -> Iterator[Row]:
         for row in reader:
             yield reader.line_num, [cell.strip() for cell in row]
     except csv.Error as error:
-        raise _text.refusal(f"{path}, line {reader.line_num}: {error}") from None
+        raise refusal(f"{path}, line {reader.line_num}: {error}") from None
 
 
 def _separator(path: Path, text: str) -> str:
@@ -159,7 +158,7 @@ def _header(
         before = fields
     timed = [row for row in named if any(label(cell)[0] in times for cell in row[1])]
     if len(timed or named) > 1 and not timed:
-        raise _text.refusal(
+        raise refusal(
             f"{path}: lines {named[0][0]} and {named[1][0]} may both name the columns: delete what "
             "stands before the header"
         )

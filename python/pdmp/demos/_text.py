@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from pdmp._shown import printable
+from pdmp._shown import refusal
 
 GAPS = frozenset(
     [
@@ -27,11 +27,6 @@ GAPS = frozenset(
     ]
 )
 """Texts that mark a missing number, beside the empty one."""
-
-
-def refusal(message: str) -> ValueError:
-    """Return an error whose text, which may quote a file, has no control characters."""
-    return ValueError(printable(message))
 
 
 def listed(argument: str, names: Sequence[str]) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._native import Demonstration
+from pdmp._shown import refusal
 from pdmp.demos import _clock, _npz, _text
 from pdmp.demos._recording import demonstration
 
@@ -58,19 +59,17 @@ def recordings(
     arrays = _npz.arrays(path)
     names, units = _labels(path, arrays, "names"), _labels(path, arrays, "units")
     if columns is not None and names is None:
-        raise _text.refusal(
-            f"{path}: no array 'names' to tell which columns are {', '.join(columns)}"
-        )
+        raise refusal(f"{path}: no array 'names' to tell which columns are {', '.join(columns)}")
     for name, position, time in _parts(path, arrays):
         source = f"{path}, '{name}'"
         for labels in (names, units):
             expected = "D" if labels is None else len(labels)
             if position.ndim != 2 or expected not in (position.shape[1], "D"):
-                raise _text.refusal(
+                raise refusal(
                     f"{source}: shape {position.shape}, expected (T, {expected}): " + LAYOUT
                 )
         if dt is None and time is None:
-            raise _text.refusal(f"{source}: no time stamps: pass dt=")
+            raise refusal(f"{source}: no time stamps: pass dt=")
         kept = list(range(position.shape[1]))
         if columns is not None and names is not None:
             kept = _text.places(path, names, _text.listed("columns", columns))
@@ -91,8 +90,14 @@ def _labels(path: Path, arrays: dict[str, NDArray[Any]], kind: str) -> list[str]
         return None
     labels = np.atleast_1d(arrays.pop(kind))
     if labels.ndim != 1 or labels.dtype.kind not in "US":
-        raise _text.refusal(f"{path}: '{kind}' must be a vector of texts, one per DoF")
-    return [label.decode() if isinstance(label, bytes) else label for label in labels.tolist()]
+        raise refusal(f"{path}: '{kind}' must be a vector of texts, one per DoF")
+    try:
+        texts = [label.decode() if isinstance(label, bytes) else label for label in labels.tolist()]
+        "".join(texts).encode()
+    except (SystemError, ValueError):
+        # numpy checks no letters before it makes texts of them.
+        raise refusal(f"{path}: '{kind}' holds letters that there are none of") from None
+    return texts
 
 
 def _parts(
@@ -112,7 +117,7 @@ def _parts(
             if not name.endswith(".t"):
                 yield name, position, arrays.get(f"{name}.t")
             elif name.removesuffix(".t") not in arrays:
-                raise _text.refusal(f"{path}: '{name}' has time stamps of nothing")
+                raise refusal(f"{path}: '{name}' has time stamps of nothing")
 
 
 def _joined(
@@ -125,11 +130,12 @@ def _joined(
     start = given.tolist() if whole and (given == np.floor(given)).all() else []
     rises = all(before < after for before, after in pairwise(start))
     if len(start) < 2 or not rises or (start[0], start[-1]) != (0, n_samples):
-        raise _text.refusal(
+        raise refusal(
             f"{path}: 'start' must rise from 0 to {n_samples}, where the last demonstration "
-            f"ends, in whole numbers, got {np.array2string(given, threshold=9)}"
+            f"ends, in whole numbers, "
+            f"got {np.array2string(given, threshold=9) if whole else given.dtype}"
         )
     if time is not None and time.shape != (n_samples,):
-        raise _text.refusal(f"{path}: 't' has shape {time.shape}, expected ({n_samples},)")
+        raise refusal(f"{path}: 't' has shape {time.shape}, expected ({n_samples},)")
     for demo, (begin, end) in enumerate(pairwise(map(int, start))):
         yield str(demo), position[begin:end], None if time is None else time[begin:end]

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pdmp import _native
 from pdmp._native import Demonstration
-from pdmp.demos._text import refusal
+from pdmp._shown import refusal
 
 
 class Rejected(NamedTuple):

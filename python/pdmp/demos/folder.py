@@ -8,6 +8,7 @@ from typing import Any
 
 from pdmp._described import label
 from pdmp._native import Demonstration
+from pdmp._shown import refusal
 from pdmp.demos import _text
 from pdmp.demos._recording import demonstration
 from pdmp.demos._sheet import sheet
@@ -63,15 +64,13 @@ def read(
         if path.is_dir():
             demos += read_folder(path, time=time, context=context, **options).values()
         elif context is not None:
-            raise _text.refusal(
-                f"{path}: a context is read from the index.csv of a folder: pass one"
-            )
+            raise refusal(f"{path}: a context is read from the index.csv of a folder: pass one")
         elif path.suffix.lower() in SINGLE:
             demos.append(_read_single(path, time, **options))
         elif path.suffix.lower() == ".npz":
             demos += read_npz(path, **options).values()
         else:
-            raise _text.refusal(f"{path}: expected a .csv, .bvh or .npz file or a folder")
+            raise refusal(f"{path}: expected a .csv, .bvh or .npz file or a folder")
     return demos
 
 
@@ -127,7 +126,7 @@ def read_folder(
         }
     found = list(recordings(archive, columns, dt))
     if len(found) != len(contexts):
-        raise _text.refusal(
+        raise refusal(
             f"{archive}: holds {len(found)} demonstrations, but index.csv lists {len(contexts)}"
         )
     return {
@@ -149,7 +148,7 @@ def _read_unlisted(
         if files and context is None:
             files.sort(key=lambda file: _natural(file.name))
             return {file.stem: _read_single(file, time, **options) for file in files}
-    raise _text.refusal(f"{path}: no index.csv{'' if context else ', and no files'}: {FORMAT}")
+    raise refusal(f"{path}: no index.csv{'' if context else ', and no files'}: {FORMAT}")
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
@@ -160,7 +159,7 @@ def _natural(name: str) -> list[tuple[int, str]]:
 def _file(path: Path, name: str) -> Path:
     """Return the one file of that name, a CSV file where there is none."""
     if not name or re.search(r"[/\\:\x00-\x1f]", name) or name in (".", ".."):
-        raise _text.refusal(f"{path / 'index.csv'}: id '{name}' is no name of a file: {FORMAT}")
+        raise refusal(f"{path / 'index.csv'}: id '{name}' is no name of a file: {FORMAT}")
     folder = path / "demos"
     paths = [folder / f"{name}{suffix}" for suffix in SINGLE]
     if name.lower().endswith(SINGLE):
@@ -185,19 +184,15 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
     _text.check_names(path, found.line, header if header[0] else header[1:])
     name, *where = _text.places(path, header, ["id", *_text.listed("context", columns)])
     if not lines:
-        raise _text.refusal(f"{path}: lists no demonstrations: {FORMAT}")
+        raise refusal(f"{path}: lists no demonstrations: {FORMAT}")
     labels = {k for k in where if not any(_text.is_number(fields[k]) for _, fields in lines)}
     contexts: dict[str, list[float | str] | None] = {}
     for line, fields in lines:
         if fields[name] in contexts:
-            raise _text.refusal(
-                f"{path}, line {line}: id '{fields[name]}' appears twice: rename one"
-            )
+            raise refusal(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
         for k in labels:
             if not fields[k]:
-                raise _text.refusal(
-                    f"{path}, line {line}, column '{header[k]}': no label: fill it in"
-                )
+                raise refusal(f"{path}, line {line}, column '{header[k]}': no label: fill it in")
         values = [
             fields[k] if k in labels else _text.number(path, line, header[k], fields[k])
             for k in where

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pdmp._described import DERIVATIVES, label
 from pdmp._files import replacing
 from pdmp._native import Demonstration, Trajectory
+from pdmp._shown import refusal
 from pdmp.demos import _clock, _text
 from pdmp.demos._recording import demonstration
 from pdmp.demos._sheet import Sheet, sheet
@@ -47,8 +48,8 @@ def read_csv(
         Names of the degrees of freedom to keep, in this order; all but `time` by default.
     time : str
         Column of the time stamps, by default `t` or `time`, in s unless its header, or this name,
-        has ms, µs or ns in brackets. Stamps in ms, µs or ns since 1970 are recognised, with a warning, and count from
-        the first.
+        has ms, µs or ns in brackets. Stamps in ms, µs or ns since 1970 are recognised, with a
+        warning, and count from the first.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
     max_gap : float
@@ -75,7 +76,7 @@ def read_csv(
     _text.check_names(path, found.line, names)
     stamped = next((name for name in times if name in header), None)
     if dt is None and stamped is None:
-        raise _text.refusal(
+        raise refusal(
             f"{path}: no column '{time}' with the time among {', '.join(names)}: "
             "name it with time=, or pass dt="
         )
@@ -133,7 +134,7 @@ def _numbers(
         if "." in text:
             decimal[False] = line
         if found.separator != "," and all(decimal.values()):
-            raise _text.refusal(
+            raise refusal(
                 f"{path}, line {line}: numbers have decimal commas and decimal points: write all "
                 "of them with one of the two, and no separators of thousands"
             )
@@ -164,7 +165,7 @@ def _check_unnamed(path: Path, line: int, row: list[str], unnamed: list[int], sa
     """Check that what has no name is the index that pandas writes, or nothing."""
     for k in unnamed:
         if row[k] and not (k == 0 and row[k] == str(sample)):
-            raise _text.refusal(
+            raise refusal(
                 f"{path}, line {line}: '{row[k]}' stands in column {k + 1}, which has no name: "
                 "the first row must name the columns"
             )
@@ -217,7 +218,7 @@ def write_csv(
     ]
     for name, unit, field in zip(header, units, fields, strict=True):
         if label(field) != (name, unit):
-            raise _text.refusal(f"'{field}' would not be read back as '{name}' in '{unit}'")
+            raise refusal(f"{path}: '{field}' would not be read back as '{name}' in '{unit}'")
     columns = (trajectory.time, trajectory.position, trajectory.velocity, trajectory.acceleration)
     with replacing(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pdmp._shown import printable
+from pdmp._shown import printable, refusal
 from pdmp._tables import table
 from pdmp.evaluation.predictors import BAND, WIDTH, Forecast, Predictor
 from pdmp.evaluation.recordings import Array, Recordings
@@ -103,7 +103,7 @@ class Evaluation:
     def score(self, predictor: str) -> Scores:
         """Return the figures of one predictor, split by split."""
         if predictor not in self.scores:
-            raise ValueError(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
+            raise refusal(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
         return self.scores[predictor]
 
     def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
@@ -180,7 +180,7 @@ class Evaluation:
     def _rows(self, reach: Reach | None) -> list[int]:
         rows = [k for k, split in enumerate(self.splits) if reach in (None, split.reach)]
         if not rows:
-            raise ValueError(f'reach = "{reach}": no split is of this sort')
+            raise refusal(f'reach = "{reach}": no split is of this sort')
         return rows
 
 
