@@ -128,6 +128,36 @@ def test_npz_gives_demonstrations_stored_one_after_another(tmp_path: Path) -> No
     np.testing.assert_array_equal(found["1"].position, POSITION[:, 1:] + 1)
 
 
+def test_npz_gives_time_and_position(tmp_path: Path) -> None:
+    """What most would write first is read; a stack holds several demonstrations."""
+    path = tmp_path / "demos.npz"
+    np.savez(path, time=TIME, position=POSITION, velocity=POSITION, names=["x", "y"])
+    (demo,) = demos.read_npz(path).values()
+    np.testing.assert_array_equal(demo.position, POSITION)
+    np.testing.assert_array_equal(demo.time, TIME)
+    assert demo.names == ["x", "y"]
+    np.savez(path, position=POSITION[:, 0])
+    (demo,) = demos.read_npz(path, dt=0.5).values()
+    np.testing.assert_array_equal(demo.position, POSITION[:, :1])
+    for time in (TIME, np.array([TIME, 2 * TIME])):
+        np.savez(path, time=time, position=np.array([POSITION, -POSITION]))
+        found = demos.read_npz(path)
+        np.testing.assert_array_equal(found["1"].position, -POSITION)
+        np.testing.assert_array_equal(found["1"].time, time if time.ndim == 1 else time[1])
+
+
+def test_npz_stamps_are_seconds(tmp_path: Path) -> None:
+    """Stamps in ns since 1970 are recognised to the last digit; other long steps are refused."""
+    path, steps = tmp_path / "demos.npz", 10_000_000 * np.arange(4)
+    np.savez(path, time=1_700_000_000_000_000_000 + steps, position=POSITION)
+    with pytest.warns(UserWarning, match="read as ns since 1970"):
+        (demo,) = demos.read_npz(path).values()
+    np.testing.assert_allclose(demo.time, 0.01 * np.arange(4), atol=1e-15)
+    np.savez(path, time=steps, position=POSITION)
+    with pytest.raises(ValueError, match="store them in s instead of ns, or pass dt="):
+        demos.read_npz(path)
+
+
 @pytest.mark.parametrize(
     ("arrays", "message"),
     [
@@ -138,6 +168,14 @@ def test_npz_gives_demonstrations_stored_one_after_another(tmp_path: Path) -> No
         ({"y": POSITION, "t": TIME, "start": [0, 2]}, "'start' must rise from 0 to 4"),
         ({"y": POSITION, "t": TIME, "start": [0, 0.5, 4]}, "in whole numbers, got"),
         ({"y": POSITION, "t": TIME, "start": ["a", "b"]}, "in whole numbers, got"),
+        ({"y": POSITION, "t": TIME, "start": [0, np.inf]}, "in whole numbers, got"),
+        ({"y": POSITION, "t": TIME[:2], "start": [0, 4]}, r"'t' has shape \(2,\), expected \(4,\)"),
+        ({"position": POSITION, "time": TIME[:2]}, "time has length 2, expected 4"),
+        ({"position": np.array([POSITION] * 2), "time": [TIME[:2]] * 2}, "time has length 2"),
+        ({"position": POSITION, "time": np.array([TIME] * 2)}, "time"),
+        ({"position": POSITION.astype(str), "time": TIME}, "position has dtype"),
+        ({"position": POSITION, "time": TIME.astype(str)}, "time has dtype"),
+        ({"position": POSITION, "time": TIME, "names": [1, 2]}, "'names' must be a vector of"),
         ({"a.t": TIME}, "'a.t' has time stamps of nothing"),
         ({"a": np.array([[None]])}, "not an NPZ file of plain arrays"),
         ({"a": POSITION, "a.t": TIME[::-1]}, "'a': time"),
@@ -180,6 +218,53 @@ def test_npz_and_index_must_agree(folder: Path) -> None:
     np.savez(folder / "demos.npz", y=POSITION, t=TIME, start=[0, 4])
     with pytest.raises(ValueError, match=r"holds 1 demonstrations, but index\.csv lists 2"):
         demos.read_folder(folder)
+
+
+@pytest.mark.parametrize("place", [".", "demos"])
+def test_folder_without_an_index_is_read_by_its_files(tmp_path: Path, place: str) -> None:
+    """All files come by their names, numbers in their order; a context needs an index."""
+    (tmp_path / place).mkdir(exist_ok=True)
+    for name in ("take 10", "take 9", "b"):
+        (tmp_path / place / f"{name}.csv").write_text(TABLE)
+    assert list(demos.read_folder(tmp_path)) == ["b", "take 9", "take 10"]
+    assert len(demos.read(tmp_path)) == 3
+    with pytest.raises(ValueError, match=r"no index\.csv: expected an index\.csv with a row per"):
+        demos.read_folder(tmp_path, context=["height"])
+
+
+def test_folder_with_nothing_to_read_is_answered_with_the_format(tmp_path: Path) -> None:
+    """No index and no files, an index without rows, or no folder at all."""
+    with pytest.raises(ValueError, match=r"and no files: expected an index\.csv .*demos/<id>\.csv"):
+        demos.read_folder(tmp_path)
+    (tmp_path / "index.csv").write_text("id,height\n")
+    with pytest.raises(ValueError, match=r"lists no demonstrations: expected an index\.csv"):
+        demos.read_folder(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        demos.read_folder(tmp_path / "none")
+
+
+@pytest.mark.parametrize(
+    "name", ["../a", "/etc/passwd", "a/../a", "x/a", "..", ".", r"..\a", "C:a", "a\x00b", '""']
+)
+def test_id_names_a_file_in_the_folder(folder: Path, name: str) -> None:
+    """No id leads elsewhere; the error says what is expected."""
+    (folder / "a.csv").write_text(TABLE)
+    (folder / "index.csv").write_text(f"id,height\n{name},1\n")
+    with pytest.raises(ValueError, match=r"index\.csv.* is no name of a file: expected an index"):
+        demos.read_folder(folder)
+
+
+def test_id_may_be_the_name_of_the_file(folder: Path) -> None:
+    """With its suffix, there is only one file that it can be."""
+    (folder / "index.csv").write_text("id;height\na.csv;0,5\nb;1\n".replace(",", "."))
+    found = demos.read_folder(folder, context=["height"])
+    assert [demo.context.tolist() for demo in found.values()] == [[0.5], [1.0]]
+
+
+def test_index_of_pandas_is_read(folder: Path) -> None:
+    """A column without a name before the others is passed over."""
+    (folder / "index.csv").write_text(",id,height\n0,a,0.1\n1,b,0.2\n")
+    assert demos.read_folder(folder, context=["height"])["b"].context == [0.2]
 
 
 def test_context_may_be_labels(folder: Path) -> None:

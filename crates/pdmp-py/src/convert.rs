@@ -52,13 +52,7 @@ const MASKED: &str = "has masked values: fill them, or cut them out";
 /// The numpy array of a list, or of any object that knows how to become one.
 pub(crate) fn plain<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = value.py();
-    if is_masked(value)? {
-        return Err(PyValueError::new_err(format!("{name} {MASKED}")));
-    }
-    if value.is_instance_of::<PyByteArray>() {
-        // Its bytes would be numbers.
-        return Err(PyValueError::new_err(format!("{name} is a bytearray: expected real numbers")));
-    }
+    check_items(name, value, 0)?;
     let foreign = value.hasattr("__dlpack__")? && !value.hasattr("__array__")?;
     let made = py.import("numpy")?.call_method1(if foreign { "from_dlpack" } else { "asarray" }, (value,));
     Ok(made.map_err(|error| not_numbers(name, py, error))?.cast_into()?)
@@ -89,24 +83,36 @@ fn check_real(name: &str, item: &Bound<'_, PyAny>) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{name} {reason}")))
 }
 
-/// Whether a mask of numpy hides something: in an array, or in one of a list of arrays.
+/// Whether a mask of numpy hides something.
 fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
-    if let Ok(array) = value.cast::<PyUntypedArray>() {
-        let masked = || value.py().import("numpy.ma")?.getattr("MaskedArray");
-        return Ok(!array.is_exact_instance_of::<PyUntypedArray>()
-            && value.is_instance(&masked()?)?
-            && value.getattr("mask")?.call_method0("any")?.is_truthy()?);
-    }
-    if !value.is_instance_of::<PyList>() && !value.is_instance_of::<PyTuple>() {
+    if !value.is_instance_of::<PyUntypedArray>() || value.is_exact_instance_of::<PyUntypedArray>() {
         return Ok(false);
     }
-    for item in value.try_iter()? {
-        let item = item?;
-        if item.is_instance_of::<PyUntypedArray>() && is_masked(&item)? {
-            return Ok(true);
+    Ok(value.is_instance(&value.py().import("numpy.ma")?.getattr("MaskedArray")?)?
+        && value.getattr("mask")?.call_method0("any")?.is_truthy()?)
+}
+
+/// Deepest list that is searched: numpy has no more axes.
+const MAX_DEPTH: usize = 64;
+
+/// Refuses what numpy would take for numbers: in lists, values behind masks and bytes that can be written.
+fn check_items(name: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
+    let wrong = |reason: &str| Err(PyValueError::new_err(format!("{name} {reason}")));
+    if value.is_instance_of::<PyByteArray>() {
+        return wrong("holds a bytearray: expected real numbers");
+    }
+    if is_masked(value)? {
+        return wrong(MASKED);
+    }
+    if depth < MAX_DEPTH && (value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>()) {
+        for item in value.try_iter()? {
+            let item = item?;
+            if !item.is_exact_instance_of::<PyFloat>() {
+                check_items(name, &item, depth + 1)?;
+            }
         }
     }
-    Ok(false)
+    Ok(())
 }
 
 /// An array of any dimension.

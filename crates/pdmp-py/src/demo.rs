@@ -1,9 +1,7 @@
 //! Demonstrations and trajectories.
 
 use ndarray::{Array2, ArrayD};
-use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, ToPyArray,
-};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, ToPyArray};
 use pdmp_core::Sampling;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -62,7 +60,8 @@ impl Demonstration {
             (None, Some(time)) => Sampling::Stamped { time },
             (None, None) => Sampling::Unknown,
         };
-        let mut demo = pdmp_core::Demonstration::new(two_axes("position", source.position)?, sampling).map_err(raise)?;
+        let mut demo =
+            pdmp_core::Demonstration::new(two_axes("position", source.position)?, sampling).map_err(raise)?;
         if let Some(goal) = optional("goal", goal)? {
             demo = demo.with_goal(goal).map_err(raise)?;
         }

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._described import label
-from pdmp._shown import printable, refusal
+from pdmp._shown import refusal, warn
 
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 LONG = {
@@ -53,12 +52,12 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
                 + f"; {step * SECONDS[likely_unit]:g} s would be between samples"
             )
         scale = SECONDS[unit]
-        _warn(
+        warn(
             f"{source}: time stamps are read as {unit} since 1970: "
             + remedy.replace("{unit}", unit)
         )
     elif not unit and step >= 1 and (time == np.floor(time)).all():
-        _warn(
+        warn(
             f"{source}: time stamps are whole numbers that rise by {step:g}, and read as s: "
             + remedy.replace("{unit}", "s or ms")
         )
@@ -70,7 +69,3 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
 
 def _since_1970(first: float, step: float, unit: str) -> bool:
     return EPOCH[0] < first * SECONDS[unit] < EPOCH[1] and step * SECONDS[unit] < MAX_STEP
-
-
-def _warn(message: str) -> None:
-    warnings.warn(printable(message), UserWarning, stacklevel=4)

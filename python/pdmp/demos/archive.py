@@ -110,8 +110,10 @@ def _parts(
         time = arrays.get("time", arrays.get("t"))
         position = arrays["position"]
         position = position[:, None] if position.ndim == 1 else position
-        for m, each in enumerate(position if position.ndim == 3 else [position]):
-            yield str(m), each, time[m] if time is not None and time.ndim == 2 else time
+        stack = position if position.ndim == 3 else [position]
+        own = position.ndim == 3 and time is not None and time.shape[:-1] == position.shape[:1]
+        for m, each in enumerate(stack):
+            yield str(m), each, time[m] if own and time is not None else time
     else:
         for name, position in arrays.items():
             if not name.endswith(".t"):
