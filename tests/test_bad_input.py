@@ -105,6 +105,10 @@ LISTS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: [POSITION, POSITION[:, :1]],
         "demo 1: position has 1 DoFs, but demo 0 has 2: all must have the same",
     ),
+    "lists of them": (
+        lambda: {"C": reaches(), "S": reaches()},
+        "demo 0 is a list of demonstrations: put all of them into one list",
+    ),
     "one array": (
         lambda: POSITION,
         rf"demos has shape \[{N}, 2\], expected \(M, T, D\): put a single .* into a list",

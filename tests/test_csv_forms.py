@@ -158,6 +158,8 @@ def test_empty_rows_are_gaps_where_time_is_counted(tmp_path: Path) -> None:
         ([",x", *(f"{k / 10},{k}" for k in range(9))], "stands in column 1, which has no name"),
         (["t,,x", *(f"{k},{k},{k}" for k in range(9))], "stands in column 2, which has no name"),
         (["t,x", "0,inf", "1,2"], "inf is not finite"),
+        (["t,x", "0," + "1" * 100_000 + "x"], "'1{80}[.]{3}' is not a number"),
+        (["t,x", "1" * 100_000 + "x,m", "0,1"], "'1{80}[.]{3}' is not a number"),
     ],
 )
 def test_doubtful_tables_are_refused(tmp_path: Path, lines: list[str], message: str) -> None:

@@ -9,7 +9,7 @@ use pdmp_core::{
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyMapping};
+use pyo3::types::{PyBool, PyList, PyMapping};
 
 use crate::basis::{Gp, NGnet};
 use crate::convert::{count, matrix, numbers};
@@ -203,6 +203,12 @@ pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResu
             let item = item?;
             if let Ok(demo) = item.cast::<Demonstration>() {
                 return Ok(demo.get().0.clone());
+            }
+            if item.is_instance_of::<PyList>()
+                && item.get_item(0).is_ok_and(|one| one.is_instance_of::<Demonstration>())
+            {
+                let message = format!("demo {m} is a list of demonstrations: put all of them into one list");
+                return Err(PyValueError::new_err(message));
             }
             Source::of(&format!("demo {m}: position"), &item)?.demonstration(m)
         })

@@ -20,7 +20,11 @@ def add_reading(parser: ArgumentParser) -> None:
         "--columns", nargs="+", metavar="NAME", help="degrees of freedom to keep; default: all"
     )
     parser.add_argument(
-        "--time", default="t", metavar="NAME", help="CSV column of the time stamps; default: t"
+        "--time",
+        default="t",
+        metavar="NAME",
+        help="CSV column of the time stamps, with [ms], [us] or [ns] where it has no unit; "
+        "default: t or time",
     )
     parser.add_argument(
         "--dt", type=float, metavar="S", help="sampling interval [s], in place of time stamps"

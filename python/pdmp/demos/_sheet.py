@@ -18,6 +18,8 @@ from pdmp.demos import _text
 
 SAMPLE = 200
 """Rows from which the form of a file is found; a preamble must end among them."""
+MAX_UNIT = 40
+"""Characters of a unit; patterns take too long for texts of any length."""
 UNIT = re.compile(
     r"[munµμkMG]?(s|m|rad|N|Nm|g|V|A|Hz|W|J|Pa|T)|deg|°|°C|sec|min|h|cm|dm|deg|turns?|rev|px|%|1|"
     r"counts?|quat"
@@ -197,6 +199,8 @@ def _are_units(fields: list[str]) -> bool:
 
 
 def _is_unit(cell: str) -> bool:
+    if len(cell) > MAX_UNIT:
+        return False
     if re.fullmatch(r"-?|\[[^][]*\]|\([^()]*\)", cell):
         return True
     parts = re.split(r"[/*·⋅ ]", re.sub(r"(\^?[-+]?\d|[²³⁻¹])+$", "", cell))

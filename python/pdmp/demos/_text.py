@@ -6,6 +6,8 @@ from pathlib import Path
 
 from pdmp._shown import refusal
 
+MAX_SHOWN = 80
+"""Characters of a field that an error quotes."""
 GAPS = frozenset(
     [
         "na",
@@ -42,10 +44,13 @@ def check_names(path: Path, line: int, names: Sequence[str]) -> None:
     for name in names:
         if not is_name(name):
             raise refusal(
-                f"{path}, line {line}: '{name}' is not a name: the first row must name the columns"
+                f"{path}, line {line}: '{short(name)}' is not a name: the first row must name the "
+                "columns"
             )
         if name in seen:
-            raise refusal(f"{path}, line {line}: two columns are called '{name}': rename one")
+            raise refusal(
+                f"{path}, line {line}: two columns are called '{short(name)}': rename one"
+            )
         seen.add(name)
 
 
@@ -67,6 +72,7 @@ def places(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]
 def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) -> float:
     """Return the finite number in a field of the column called `name`, or NaN for a gap."""
     value = parsed(field)
+    field = short(field)
     place = f"{path}, line {line}, column '{name}'"
     if is_gap(field):
         if gaps:
@@ -81,6 +87,11 @@ def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) 
     if not math.isfinite(value):
         raise refusal(f"{place}: {field} is not finite: cut the row out")
     return value
+
+
+def short(field: str) -> str:
+    """Return a field, or its beginning where it is long."""
+    return field if len(field) <= MAX_SHOWN else field[:MAX_SHOWN] + "..."
 
 
 def is_gap(field: str) -> bool:
