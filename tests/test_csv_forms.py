@@ -104,6 +104,12 @@ def test_units_may_have_a_row(tmp_path: Path, units: str) -> None:
     assert demo.units == ["m", "rad"]
 
 
+def test_samples_of_ones_are_no_row_of_units(tmp_path: Path) -> None:
+    """Numbers are samples, also where they could be the unit of a ratio."""
+    lines = ["x,y", "1,1", "1,", *["1,1"] * 9]
+    np.testing.assert_array_equal(read(tmp_path, lines, dt=0.1, max_gap=0.5).position, 1)
+
+
 def test_units_in_a_row_scale_the_time(tmp_path: Path) -> None:
     """Time stamps below ms are ms; a unit in the header goes before one below."""
     lines = ["t,x [cm],y", "ms,m,m/s^2", *rows()]
@@ -148,11 +154,12 @@ def test_empty_rows_are_gaps_where_time_is_counted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
+        (["t;x", *(f"{k};{k + 1},000" for k in range(9))], "commas may be decimal or separate"),
         (["t;x;y", *rows(";", ","), "0,2;1.5;2"], "line 22: numbers have decimal commas and"),
         (["t;x", *(f"0,{k};1.000,5" for k in range(9))], "decimal commas and decimal points"),
         (["t,x", *(f"0,{k},1,{k}" for k in range(9))], "4 fields, expected 2 .* semicolons"),
         (["t,x", *(f"0.{k},1_000" for k in range(9))], "line 2, column 'x': '1_000' is not a"),
-        (["t,x", *(f'0.{k},"1,5"' for k in range(9))], "line 2, column 'x': '1,5' is not a"),
+        (["t,x", *(f'0.{k},"1,5"' for k in range(9))], "'1,5' is not a number: decimal commas are"),
         (["stamp,x", "clock,z", *rows()[:0], "0,1", "1,2"], "lines 1 and 2 may both name"),
         (["0.0,1", "0.1,2", "t,x", "0.2,3"], "line 1: '0.0' is not a name"),
         ([",x", *(f"{k / 10},{k}" for k in range(9))], "stands in column 1, which has no name"),

@@ -39,6 +39,8 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
     """
     if time.dtype.kind not in "iuf" or time.ndim != 1 or len(time) < 2:
         return time
+    if not np.isfinite(time).all():
+        return time
     step, first = float(np.median(np.abs(np.diff(time)))), float(time[0])
     scale = SECONDS[unit]
     if not unit and not (step < MAX_STEP and abs(first) < MAX_STAMP):
@@ -49,7 +51,7 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
             raise refusal(
                 f"{source}: time stamps from {first:g} in steps of {step:g} are not in seconds: "
                 + remedy.replace("{unit}", likely_unit)
-                + f"; {step * SECONDS[likely_unit]:g} s would be between samples"
+                + f" ({step * SECONDS[likely_unit]:g} s between samples), or [s] if they are"
             )
         scale = SECONDS[unit]
         warn(

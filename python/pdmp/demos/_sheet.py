@@ -100,7 +100,7 @@ def sheet(path: Path, times: Collection[str] = (), *, index: bool = False) -> Sh
 
 def _parse(path: Path, text: str, separator: str) -> Iterator[Row]:
     """Yield line number and fields of each row; comments are blank ones."""
-    lines = ("\n" if line.startswith("#") else line for line in io.StringIO(text, newline=""))
+    lines = ("\n" if _is_comment(line) else line for line in io.StringIO(text, newline=""))
     if separator == " ":
         lines = (line.strip() + "\n" for line in lines)
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
@@ -109,6 +109,10 @@ def _parse(path: Path, text: str, separator: str) -> Iterator[Row]:
             yield reader.line_num, [cell.strip() for cell in row]
     except csv.Error as error:
         raise refusal(f"{path}, line {reader.line_num}: {error}") from None
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip(" ").startswith("#")
 
 
 def _separator(path: Path, text: str) -> str:
@@ -170,8 +174,8 @@ def _header(
     for number, comment in enumerate(io.StringIO(text), 1):
         if number >= sample[0][0]:
             break
-        if comment.startswith("#"):
-            for _, fields in _parse(path, comment.lstrip("#%"), separator):
+        if _is_comment(comment):
+            for _, fields in _parse(path, comment.lstrip(" #%"), separator):
                 if len(fields) == width and _are_names(fields):
                     found = number, fields
     return found
@@ -195,7 +199,8 @@ def _are_numbers(fields: list[str]) -> bool:
 
 def _are_units(fields: list[str]) -> bool:
     """Return whether a row gives units: each in brackets, or one that is known."""
-    return any(cell.strip("-") for cell in fields) and all(map(_is_unit, fields))
+    said = [cell for cell in fields if cell.strip("-") and not _text.is_number(cell)]
+    return bool(said) and all(map(_is_unit, fields))
 
 
 def _is_unit(cell: str) -> bool:

@@ -83,7 +83,10 @@ def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) 
             "missing, or cut the row out"
         )
     if value is None:
-        raise refusal(f"{place}: '{field}' is not a number")
+        hint = ""
+        if parsed(field.replace(",", ".")) is not None:
+            hint = ": decimal commas are read where semicolons or tabs separate the fields"
+        raise refusal(f"{place}: '{field}' is not a number{hint}")
     if not math.isfinite(value):
         raise refusal(f"{place}: {field} is not finite: cut the row out")
     return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
@@ -20,6 +21,7 @@ from pdmp.demos import _clock, _text
 from pdmp.demos._recording import demonstration
 from pdmp.demos._sheet import Sheet, sheet
 
+THOUSANDS = re.compile(r"[^,]*|[-+]?[1-9]\d{0,2}(,\d{3})+")
 CLOCKS = ("t", "time", "Time", "TIME")
 """Names of a column of time stamps, if none is given; the first is the default."""
 
@@ -123,6 +125,7 @@ def _numbers(
     names = [header[k] for k in where]
     unnamed = [k for k, name in enumerate(header) if not name]
     decimal = {True: 0, False: 0}  # line where a number has a decimal comma, or a point
+    thousands = True  # whether the commas may separate thousands
     for line, row in found.rows(blank=clock is None):
         _check_unnamed(path, line, row, unnamed, len(numbers))
         kept = [row[k] for k in where]
@@ -130,6 +133,7 @@ def _numbers(
         text = "".join((*kept, stamp))
         if found.separator != "," and "," in text:
             decimal[True] = line
+            thousands = thousands and all(map(THOUSANDS.fullmatch, (*kept, stamp)))
             kept, stamp = [cell.replace(",", ".") for cell in kept], stamp.replace(",", ".")
         if "." in text:
             decimal[False] = line
@@ -143,6 +147,11 @@ def _numbers(
             # ns since 1970 have more digits than a double, and fewer than an integer.
             stamps.append(int(stamp) if stamp.isdecimal() and value < 2**63 else value)
         numbers.append(_row(path, line, kept, names, gaps=gaps))
+    if decimal[True] and thousands:
+        raise refusal(
+            f"{path}, line {decimal[True]}: commas may be decimal or separate thousands: write "
+            "decimal points"
+        )
     positions = np.array(numbers, float).reshape(len(numbers), len(where))
     return positions, None if clock is None else np.array(stamps)
 
