@@ -45,7 +45,7 @@ def assert_harmless(text: str) -> None:
 
 
 def test_reprs_are_harmless() -> None:
-    """Whatever is printed of an object is one line of printable characters, most of it ASCII."""
+    """An object prints as one line of printable characters, most of it ASCII."""
     model = pdmp.fit(hostile())
     context = [1.5, "left" + HOSTILE]
     objects = [model, model.map, model.predict(context), model.rollout(), model.controller()]

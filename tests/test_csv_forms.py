@@ -119,7 +119,7 @@ def test_units_in_a_row_scale_the_time(tmp_path: Path) -> None:
 
 
 def test_words_that_are_no_units_are_no_row_of_units(tmp_path: Path) -> None:
-    """A sample of words is refused with its place, whatever the header is."""
+    """A sample of words is refused with its place."""
     with pytest.raises(ValueError, match="line 2, column 't': 'zero' is not a number"):
         read(tmp_path, ["t,x,y", "zero,one,two", *rows()])
 

@@ -256,7 +256,7 @@ def test_id_names_a_file_in_the_folder(folder: Path, name: str) -> None:
 
 def test_id_may_be_the_name_of_the_file(folder: Path) -> None:
     """With its suffix, there is only one file that it can be."""
-    (folder / "index.csv").write_text("id;height\na.csv;0,5\nb;1\n".replace(",", "."))
+    (folder / "index.csv").write_text("id;height\na.csv;0,5\nb;1\n")
     found = demos.read_folder(folder, context=["height"])
     assert [demo.context.tolist() for demo in found.values()] == [[0.5], [1.0]]
 
@@ -282,7 +282,10 @@ def test_context_is_all_numbers_or_all_labels(folder: Path) -> None:
 
 
 def test_label_must_not_be_missing(folder: Path) -> None:
-    """An empty field is no label of its own."""
+    """An empty field is no label of its own, and a mark of a missing number is none."""
+    (folder / "index.csv").write_text("id,height\na,NA\nb,1\n")
+    with pytest.raises(ValueError, match=r"index\.csv, line 2, column 'height': no number"):
+        demos.read_folder(folder, context=["height"])
     (folder / "index.csv").write_text("id,hand [side]\na,left\nb,\n")
     with pytest.raises(ValueError, match=r"index\.csv, line 3, column 'hand': no label"):
         demos.read_folder(folder, context=["hand"])

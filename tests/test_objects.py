@@ -173,7 +173,7 @@ def test_frames_of_numbers_and_labels_are_contexts() -> None:
 
 
 def test_dates_are_times_from_the_first() -> None:
-    """Dates and durations of numpy count in seconds, whatever their unit is."""
+    """Dates and durations of numpy count in seconds, in any unit of theirs."""
     since = np.datetime64("2026-03-01T12:00", "ns") + np.round(1e9 * TIME).astype("m8[ns]")
     for time in (since, since - since[0], since.astype("M8[us]")):
         np.testing.assert_allclose(Demonstration(POSITION, time=time).time, TIME, atol=1e-12)

@@ -181,6 +181,8 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
     """
     found = sheet(path, index=True)
     header, lines = [label(field)[0] for field in found.fields], list(found.rows())
+    if found.separator != ",":
+        lines = [(line, list(map(_pointed, fields))) for line, fields in lines]
     _text.check_names(path, found.line, header if header[0] else header[1:])
     name, *where = _text.places(path, header, ["id", *_text.listed("context", columns)])
     if not lines:
@@ -190,12 +192,19 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
     for line, fields in lines:
         if fields[name] in contexts:
             raise refusal(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
-        for k in labels:
-            if not fields[k]:
-                raise refusal(f"{path}, line {line}, column '{header[k]}': no label: fill it in")
+        for k in where:
+            if not fields[k] or (k not in labels and _text.is_gap(fields[k])):
+                kind = "label" if k in labels else "number"
+                raise refusal(f"{path}, line {line}, column '{header[k]}': no {kind}: fill it in")
         values = [
             fields[k] if k in labels else _text.number(path, line, header[k], fields[k])
             for k in where
         ]
         contexts[fields[name]] = values or None
     return contexts
+
+
+def _pointed(field: str) -> str:
+    """Return a number with a decimal point, in place of a comma, and texts as they are."""
+    pointed = field.replace(",", ".")
+    return pointed if _text.is_number(pointed) else field
