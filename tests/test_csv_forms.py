@@ -67,6 +67,42 @@ def test_form_of_the_table_does_not_matter(tmp_path: Path, lines: list[str]) -> 
     assert_read(read(tmp_path, lines))
 
 
+def test_random_tables_are_read_or_refused(tmp_path: Path) -> None:
+    """No form of a table changes a number or a name; nearly all of them are read."""
+    random, refused = np.random.default_rng(0), 0
+    n_tables = 400
+    for _ in range(n_tables):
+        n_dofs, n_samples = random.integers(1, 6), random.integers(4, 12)
+        separator = str(random.choice([",", ";", "\t", " "]))
+        form = random.choice(["%.17g", "%.3f", "%.6e", "%.0f"])
+        scale = 10.0 ** random.integers(-3, 4)
+        timed = random.random() < 0.7
+        table = [[form % v for v in row] for row in scale * random.normal(size=(n_samples, n_dofs))]
+        expected = np.array(table, float)
+        names = [f"{'kmsxyN'[random.integers(6)]}_{d}" for d in range(n_dofs)]
+        heads, lines = ["t"] * timed + names, []
+        time = [f"{k / 8}" for k in range(n_samples)]
+        table = [[t] * timed + row for t, row in zip(time, table, strict=True)]
+        if separator != "," and random.random() < 0.4:
+            table = [[cell.replace(".", ",") for cell in row] for row in table]
+        if separator != " " and random.random() < 0.2:
+            heads, table = ["", *heads], [[str(k), *row] for k, row in enumerate(table)]
+        if random.random() < 0.2:
+            heads = [f'"{head}"' for head in heads]
+        if random.random() < 0.2:
+            lines.append("# recorded on 3 May, 2026; by hand")
+        lines += [separator.join(cells) for cells in (heads, *table)]
+        try:
+            demo = read(tmp_path, lines, **({} if timed else {"dt": 0.125}))
+        except ValueError:
+            refused += 1
+            continue
+        np.testing.assert_array_equal(demo.position, expected)
+        np.testing.assert_array_equal(demo.time, np.arange(n_samples) / 8)
+        assert demo.names == names
+    assert refused < 0.03 * n_tables
+
+
 def test_writers_of_others_are_read(tmp_path: Path) -> None:
     """What numpy and pandas write by default comes in to the last bit."""
     path = tmp_path / "table.csv"

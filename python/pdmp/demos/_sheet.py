@@ -123,17 +123,12 @@ def _separator(path: Path, text: str) -> str:
             return separator
         if line.strip():
             break
-    alike = {}
-    # Of spaces, there may be several, and words before the header have them too.
-    for candidates in (",;\t", " "):
-        for separator in candidates:
-            rows = [fields for _, fields in _parse(path, head, separator) if any(fields)]
-            counts = Counter(len(fields) for fields in rows if len(fields) > 1)
-            if counts:
-                alike[separator] = max(counts.values())
-        if alike and (separator != " " or alike[" "] > 1):
-            return max(alike, key=lambda separator: alike[separator])
-    return ","
+    alike = {",": 1}  # rows with as many fields; of equals, the first separator is taken
+    for separator in ",;\t ":
+        rows = [fields for _, fields in _parse(path, head, separator) if len(fields) > 1]
+        counts = Counter(len(fields) for fields in rows if any(fields))
+        alike[separator] = max(alike.get(separator, 0), *counts.values(), 0)
+    return max(alike, key=lambda separator: alike[separator])
 
 
 def _separating(line: str) -> str:
@@ -200,7 +195,9 @@ def _are_numbers(fields: list[str]) -> bool:
 def _are_units(fields: list[str]) -> bool:
     """Return whether a row gives units: each in brackets, or one that is known."""
     said = [cell for cell in fields if cell.strip("-") and not _text.is_number(cell)]
-    return bool(said) and all(map(_is_unit, fields))
+    # By itself, a word above the samples is rather a name.
+    lone = len(fields) == 1 and not fields[0].startswith(("[", "("))
+    return bool(said) and not lone and all(map(_is_unit, fields))
 
 
 def _is_unit(cell: str) -> bool:
@@ -208,6 +205,6 @@ def _is_unit(cell: str) -> bool:
         return False
     if re.fullmatch(r"-?|\[[^][]*\]|\([^()]*\)", cell):
         return True
-    parts = re.split(r"[/*·⋅ ]", re.sub(r"(\^?[-+]?\d|[²³⁻¹])+$", "", cell))
-    parts = [re.sub(r"(\^?[-+]?\d|[²³⁻¹])+$", "", part) for part in parts]
+    parts = re.split(r"[/*·⋅ ]", re.sub(r"(\^?[-+]?[1-4]|[²³⁴⁻¹])+$", "", cell))
+    parts = [re.sub(r"(\^?[-+]?[1-4]|[²³⁴⁻¹])+$", "", part) for part in parts]
     return all(map(UNIT.fullmatch, parts))
