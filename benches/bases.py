@@ -78,7 +78,9 @@ class Score:
 def score(group: Group, basis: Basis) -> Score:
     """Learn a group with a basis, and try it."""
     begin = perf_counter()
-    model = pdmp.fit(group.demos, kind=group.kind, n_styles=len(group.demos), basis=basis)
+    model = pdmp.fit(
+        group.demos, kind=group.kind, n_styles=len(group.demos), basis=basis, smoothing=None
+    )
     seconds = perf_counter() - begin
     return Score(reproduction(model, group), *foresight(group, basis), seconds)
 
@@ -138,7 +140,9 @@ def targets(group: Group) -> tuple[np.ndarray, np.ndarray, float]:
     back.
     """
     exact = pdmp.GP("matern32", noise=1e-10)
-    model = pdmp.fit(group.demos, kind=group.kind, n_styles=len(group.demos), basis=exact)
+    model = pdmp.fit(
+        group.demos, kind=group.kind, n_styles=len(group.demos), basis=exact, smoothing=None
+    )
     count = group.demos[model.nominal].n_samples
     if model.kind == "discrete":
         u = np.linspace(0, model.durations[model.nominal] / model.tau, count)

@@ -166,11 +166,111 @@ def test_automatic_smoothing_comes_closer_to_what_was_meant() -> None:
     assert error("auto") < 0.5 * error(None)
 
 
-def test_automatic_smoothing_finds_the_rank() -> None:
-    """The two dimensions that noise hides come out by the spectrum rule."""
-    _, recorded = noisy()
-    assert pdmp.fit(recorded, dt=0.01).n_styles > 2
-    assert pdmp.fit(recorded, dt=0.01, smoothing="auto").n_styles == 2
+def _reach(*bends: float) -> np.ndarray:
+    """Return a reach of 1 (101, 2) with bends of several shapes."""
+    s = np.linspace(0, 1, 101)[:, None]
+    shapes = [np.sin(np.pi * (j + 1) * s) * (4 * s * (1 - s)) ** 2 for j in range(len(bends))]
+    rise = s**3 * (10 - 15 * s + 6 * s**2) * [1.0, 0.6]
+    return rise + sum(
+        bend * shape * [1.0, (-1.0) ** j]
+        for j, (bend, shape) in enumerate(zip(bends, shapes, strict=True))
+    )
+
+
+def _cycle(*bends: float) -> np.ndarray:
+    """Return a wave (100, 2) with harmonics."""
+    phi = np.arange(100)[:, None] / 100 * 2 * np.pi
+    shapes = [np.cos((j + 2) * phi + [0.0, j]) / (j + 1) for j in range(len(bends))]
+    return np.sin(phi + [0.0, 1.0]) + sum(bend * x for bend, x in zip(bends, shapes, strict=True))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.001, 0.005, 0.02])
+@pytest.mark.parametrize("n_demos", [20, 60, 200])
+@pytest.mark.parametrize("kind", ["discrete", "rhythmic"])
+def test_styles_end_at_the_noise(kind: Any, n_demos: int, noise: float) -> None:
+    """A mean and three styles have J = 4, however many demonstrations and whatever the noise."""
+    random = np.random.default_rng(n_demos)
+    make = _reach if kind == "discrete" else _cycle
+    clean = [make(*bends) for bends in random.uniform(-0.3, 0.3, (n_demos, 3))]
+    size = noise * np.ptp(clean[0])
+    recorded = [x + size * random.normal(size=x.shape) for x in clean]
+    model = pdmp.fit(recorded, dt=0.01, kind=kind, basis="ngnet")
+    assert model.n_styles == 4
+    assert model.noise == pytest.approx(size, rel=0.15)
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.005, 0.02])
+def test_styles_end_at_noise_that_was_resampled(noise: float) -> None:
+    """Recordings of half the rate, or less, brought to a higher one have the same J."""
+    random = np.random.default_rng(5)
+    clean = [_reach(*bends) for bends in random.uniform(-0.3, 0.3, (40, 3))]
+    recorded = [x + noise * np.ptp(clean[0]) * random.normal(size=x.shape) for x in clean]
+    for dt in (0.005, 0.002):
+        demos = [pdmp.demos.resample(pdmp.Demonstration(x, dt=0.01), dt) for x in recorded]
+        assert pdmp.fit(demos, basis="ngnet").n_styles == 4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_repetitions_of_one_movement_are_one_style(seed: int) -> None:
+    """A hundred noisy recordings of one reach have J = 1, and its peak of acceleration."""
+    random = np.random.default_rng(seed)
+    clean = _reach()
+    recorded = [clean + 0.003 * random.normal(size=clean.shape) for _ in range(100)]
+    model = pdmp.fit(recorded, dt=0.01)
+    assert model.n_styles == 1
+    peak = np.abs(pdmp.fit([clean], dt=0.01).rollout().acceleration).max()
+    for m in range(0, 100, 20):
+        made = model.rollout(**pdmp.as_demonstrated(model, m))
+        assert np.abs(made.acceleration).max() < 1.3 * peak
+
+
+def test_noise_does_not_kick_a_joint_at_rest() -> None:
+    """Half a milliradian of it moves a joint at rest by less than 1 rad/s²."""
+    random = np.random.default_rng(0)
+    clean = _reach() * [1.0, 0.0]
+    recorded = [clean + 5e-4 * random.normal(size=clean.shape) for _ in range(5)]
+    model = pdmp.fit(recorded, dt=0.01)
+    for m in range(5):
+        made = model.rollout(**pdmp.as_demonstrated(model, m))
+        assert np.abs(made.acceleration[:, 1]).max() < 1.0
+    kicked = pdmp.fit(recorded, dt=0.01, smoothing=None)
+    assert np.abs(kicked.rollout(**pdmp.as_demonstrated(kicked, 0)).acceleration[:, 1]).max() > 10
+
+
+def test_clean_demonstrations_are_not_smoothed() -> None:
+    """Automatic smoothing leaves a clean model as it is, to the last bit."""
+    clean = [_reach(bend) for bend in (-0.2, 0.0, 0.1, 0.3)]
+    models = [pdmp.fit(clean, dt=0.01, smoothing=x, n_styles=2) for x in ("auto", None)]
+    assert models[0].to_bytes() == models[1].to_bytes()
+    assert np.all(np.isinf(models[0].cut_offs)) and not np.any(models[0].noise)
+
+
+def test_small_effects_of_a_context_are_kept() -> None:
+    """A context counts among the styles, however small its effect beside random variation."""
+    random = np.random.default_rng(1)
+    heights = np.linspace(0, 0.02, 24)
+    others = random.uniform(-1, 1, (24, 6))
+    demos = [_reach(*other, height) for height, other in zip(heights, others, strict=True)]
+    plain = pdmp.fit(demos, dt=0.01)
+    model = pdmp.fit(demos, dt=0.01, contexts=heights[:, None])
+    assert plain.n_styles < model.n_styles == 8
+
+
+def test_degrees_of_freedom_in_different_units_weigh_alike() -> None:
+    """An effect in rad beside one in mm is kept; small ranges in the same unit stay small."""
+    s = np.linspace(0, 1, 101)
+    rise, bump = s**3 * (10 - 15 * s + 6 * s**2), (4 * s * (1 - s)) ** 3
+    turns = np.linspace(-1, 1, 8)
+    demos = [
+        pdmp.Demonstration(
+            np.column_stack([400 * rise, 4 * bump, turn * bump]), dt=0.01, units=["mm", "mm", "rad"]
+        )
+        for turn in turns
+    ]
+    model = pdmp.fit(demos, spectrum=0.9)
+    assert model.dof_scale == pytest.approx([400, 400, np.ptp(demos[0].position[:, 2])], rel=1e-3)
+    made = model.rollout(**pdmp.as_demonstrated(model, 7))
+    assert made.position[:, 2].max() == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(("hz", "gain"), [(5.0, 1 / (1 + 4**4)), (20.0, 0.5), (80.0, 1.0)])

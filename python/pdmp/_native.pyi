@@ -101,12 +101,12 @@ def fit(
     contexts: _Contexts | None = None,  # (M, Q)
     map: _Map = "auto",
     n_styles: int | Literal["auto"] | None = None,
-    spectrum: float = 0.9,
+    spectrum: float | None = None,
     basis: Literal["gp", "ngnet"] | GP | NGnet = "gp",
-    smoothing: Literal["auto"] | float | None = None,
+    smoothing: Literal["auto"] | float | None = "auto",
     nominal: int | None = None,
     n_samples: int | None = None,
-    dof_scale: Literal["range"] | ArrayLike | None = None,  # (D,)
+    dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
     alignment: Literal["linear", "warp"] | Warp = "linear",
     events: ArrayLike | None = None,  # (M, E)
     tau: float | None = None,
@@ -175,6 +175,12 @@ class Model:
     def singular_values(self) -> _Array: ...  # decreasing: all, or of a large library the first J
     @property
     def left_out(self) -> float: ...  # share of the targets, by RMS, that J styles leave out
+    @property
+    def noise(self) -> _Array: ...  # (D,), standard deviation
+    @property
+    def cut_offs(self) -> _Array: ...  # (D,), Hz, inf where nothing is smoothed
+    @property
+    def dof_scale(self) -> _Array: ...  # (D,)
     @property
     def goals(self) -> _Array: ...  # (M, D)
     @property

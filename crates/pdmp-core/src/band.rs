@@ -34,7 +34,7 @@ impl Model {
         Ok(sensitivity.metric(self.outputs().view(), self.demonstrated.timings.view()))
     }
 
-    /// Variance (S, D) over the phase of what the styles leave out of the demonstrations.
+    /// Variance (S, D) over the phase of what the styles leave out of the demonstrations, measurement noise included.
     pub(crate) fn left_over(self: &Arc<Self>, aligned: Aligned) -> Result<Array2<f64>> {
         let (kind, outputs) = (self.kind(), self.outputs());
         let responses = self.phases()?;
@@ -44,11 +44,12 @@ impl Model {
         let mut sum = Array2::zeros((n_samples, self.n_dofs()));
         let mut shown = Array2::zeros(sum.dim());
         for (m, outputs) in outputs.rows().into_iter().enumerate() {
-            aligned.sample(m, shown.as_slice_mut().unwrap_or_default())?;
+            aligned.sample(m, shown.as_slice_mut().unwrap_or_default());
             let made = sensitivity.positions(outputs);
             sum.zip_mut_with(&(&shown - &made.slice(ndarray::s![..n_samples, ..])), |sum, error| *sum += error * error);
         }
-        Ok(sum / (outputs.nrows() - 1).max(1) as f64)
+        let noise = self.learnt.noise.levels().iter().map(|level| level * level).collect::<Array1<f64>>();
+        Ok(sum / (outputs.nrows() - 1).max(1) as f64 + noise)
     }
 
     /// Responses over the demonstrated duration, in as many steps as errors are averaged over.

@@ -53,7 +53,7 @@ impl<'a> Foresight<'a> {
         let sampled = aligned.clone().resampled(n_samples);
         let mut moved = Array3::zeros((shown.starts.nrows(), n_samples, shown.starts.ncols()));
         for (m, mut moved) in moved.outer_iter_mut().enumerate() {
-            sampled.sample(m, moved.as_slice_mut().unwrap_or_default())?;
+            sampled.sample(m, moved.as_slice_mut().unwrap_or_default());
         }
         let mut foresight = Self { kind, shown, factors, timings: aligned.timings.view(), start, moved };
         for m in 0..shown.starts.nrows() {

@@ -112,5 +112,5 @@ pub use model::{Demonstrated, Learnt, Model};
 pub use phase::{Canonical, Kind};
 pub use responses::Derivative;
 pub use rollout::Timing;
-pub use smooth::Smoothing;
+pub use smooth::{Noise, Smoothing};
 pub use threads::Threads;

@@ -13,7 +13,7 @@ use crate::landscape::Landscape;
 use crate::lanes::{Lanes, groups};
 use crate::phase::{Canonical, Kind};
 use crate::responses::Cache;
-use crate::smooth::Smoothing;
+use crate::smooth::Noise;
 
 /// What was learnt from each demonstration, in absolute coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,8 +43,8 @@ pub struct Demonstrated {
 pub struct Learnt {
     /// Samples C of the aligned demonstrations.
     pub n_samples: usize,
-    /// What was done about measurement noise.
-    pub smoothing: Smoothing,
+    /// Measurement noise of the demonstrations, and the cut-offs that take it off.
+    pub noise: Noise,
     /// What time was warped to, if it was.
     pub template: Option<Template>,
     /// Unit of each DoF in the factorisation (D,).

@@ -42,7 +42,7 @@ impl Targets {
     /// The targets of all demonstrations; `proceed` is told the share that is done.
     ///
     /// # Errors
-    /// No memory, a bad smoothing, or whatever `proceed` returns.
+    /// No memory, or whatever `proceed` returns.
     pub(crate) fn of(
         aligned: &Aligned,
         attractor: Attractor,
@@ -61,7 +61,7 @@ impl Targets {
         let work = Work::new(attractor, canonical, aligned.n_samples);
         let columns = || [0, 1].map(|_| vec![Lanes::ZERO; aligned.n_samples]);
         let learn = |columns: &mut [Vec<Lanes>; 2], (m, rows): (usize, Rows)| {
-            aligned.sample(m, rows.forcing)?;
+            aligned.sample(m, rows.forcing);
             work.learn(rows, aligned.demo(m).goal(), columns);
             Ok(())
         };

@@ -87,7 +87,7 @@ fn another_version_is_refused_by_number() {
     let mut bytes = BYTES.clone();
     bytes[place + schema.len()] = b'7';
     let message = Model::from_bytes(&bytes).unwrap_err().to_string();
-    assert!(message.contains("version 7") && message.contains("reads version 4"), "{message}");
+    assert!(message.contains("version 7") && message.contains("reads version 5"), "{message}");
 }
 
 /// What cannot be written or read is told with its path, and an older file survives.

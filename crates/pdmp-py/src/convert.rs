@@ -7,7 +7,7 @@ use numpy::{
 };
 use pdmp_core::{ContextValue, Threads};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::{PyException, PyMemoryError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
 
@@ -59,7 +59,7 @@ pub(crate) fn plain<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Boun
 }
 
 fn not_numbers(name: &str, py: Python<'_>, error: PyErr) -> PyErr {
-    if !error.is_instance_of::<PyException>(py) || error.is_instance_of::<PyMemoryError>(py) {
+    if !error.is_instance_of::<PyException>(py) {
         return error;
     }
     PyValueError::new_err(format!("{name} is not an array of numbers: {}", printable(&error.value(py).to_string())))

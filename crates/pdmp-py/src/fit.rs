@@ -41,22 +41,27 @@ use crate::warp::Warp;
 ///     degree, or a Gaussian process. "auto" is the process, unless another is better at contexts left out by more
 ///     than two standard errors, and linear for fewer than 4 different contexts or more than 1024; `model.map` tells.
 /// n_styles : int or "auto", optional
-///     Style dimension J; otherwise from `spectrum`. "auto" is by what contexts foresee: the fewest styles whose error at
-///     contexts held out (cross-validation, at most ten folds) is above the least of all by no more than the standard
-///     error of the difference.
-/// spectrum : float
-///     Keep the fewest singular values whose sum exceeds this share of the sum of all.
+///     Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular
+///     values, at least five (or half of the demonstrations) and as many as the contexts explain (F-test), but none
+///     that measurement noise alone would give (parallel analysis). "auto" is cross-validation over contexts by the
+///     one-standard-error rule, in at most ten folds.
+/// spectrum : float, optional
+///     The paper's rule instead: the fewest singular values whose sum exceeds this share of the sum of all, such as 0.9.
 /// basis : {"gp", "ngnet"}, GP or NGnet
 ///     Function approximator of the landscape.
-/// smoothing : None, "auto" or float
-///     Interpolate, smooth by generalised cross-validation, or smooth with this cut-off in Hz.
+/// smoothing : "auto", float or None
+///     Smooth each degree of freedom by generalised cross-validation over all demonstrations, which leaves clean ones as
+///     they are; or with this cut-off in Hz; or interpolate every sample. `model.noise` and `model.cut_offs` hold what
+///     was found.
 /// nominal : int, optional
 ///     Index of the nominal demonstration; otherwise the one of median duration.
 /// n_samples : int, optional
 ///     Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
 ///     than 150.
-/// dof_scale : None, "range" or (D,) array_like
-///     Unit of each degree of freedom in the factorisation; if given as numbers, in a warp of time too.
+/// dof_scale : None, "unit", "range" or (D,) array_like
+///     Unit of each degree of freedom in the factorisation. By default as recorded ("unit") where all units are equal or
+///     unknown; otherwise the degrees of freedom of each unit are scaled together by the largest range among them.
+///     "range" scales each by its own range. If given as numbers, in a warp of time too.
 /// alignment : {"linear", "warp"} or Warp
 ///     How time is scaled to that of the nominal demonstration: linearly, or by the monotone warp that brings the
 ///     demonstrations closest to each other, where they pause or hurry in different places.
@@ -94,11 +99,11 @@ use crate::warp::Warp;
 /// Matsubara, Hyon, Morimoto, Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
 #[pyfunction]
 #[pyo3(signature = (
-    demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, spectrum=0.9, basis=None,
-    smoothing=None, nominal=None, n_samples=None, dof_scale=None, alignment=None, events=None, tau=None, alpha_z=25.0,
+    demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, spectrum=None, basis=None,
+    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, dof_scale=None, alignment=None, events=None, tau=None, alpha_z=25.0,
     beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
-), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, spectrum=0.9, \
-    basis='gp', smoothing=None, nominal=None, n_samples=None, dof_scale=None, alignment='linear', events=None, \
+), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, spectrum=None, \
+    basis='gp', smoothing='auto', nominal=None, n_samples=None, dof_scale=None, alignment='linear', events=None, \
     tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
@@ -110,9 +115,9 @@ pub(crate) fn fit(
     contexts: Option<&Bound<'_, PyAny>>,
     map: &str,
     n_styles: Option<&Bound<'_, PyAny>>,
-    spectrum: f64,
+    spectrum: Option<f64>,
     basis: Option<&Bound<'_, PyAny>>,
-    smoothing: Option<&Bound<'_, PyAny>>,
+    smoothing: SmoothingArgument,
     nominal: Option<isize>,
     n_samples: Option<isize>,
     dof_scale: Option<&Bound<'_, PyAny>>,
@@ -132,7 +137,7 @@ pub(crate) fn fit(
             kind: kind_of(kind)?,
             dt,
             period: numbers("period", period)?,
-            smoothing: smoothing_of(smoothing)?,
+            smoothing: smoothing.0,
             nominal: nominal.map(|n| count("nominal", n)).transpose()?,
             n_samples: n_samples.map(|n| count("n_samples", n)).transpose()?,
             time_scaling: time_scaling_of(alignment, events)?,
@@ -157,8 +162,13 @@ pub(crate) fn fit(
     Ok(Model(Arc::new(model)))
 }
 
-fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, spectrum: f64) -> PyResult<StyleChoice> {
-    let Some(n_styles) = n_styles else { return style_count(None, spectrum).map(StyleChoice::Given) };
+fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, spectrum: Option<f64>) -> PyResult<StyleChoice> {
+    let Some(n_styles) = n_styles else {
+        return Ok(spectrum.map_or(StyleChoice::Systematic, |share| StyleCount::Spectrum(share).into()));
+    };
+    if spectrum.is_some() {
+        return Err(PyValueError::new_err("n_styles and spectrum: pass one of them"));
+    }
     if let Ok(name) = n_styles.extract::<String>() {
         let wanted = "must be a number, \"auto\" or None";
         return if name == "auto" {
@@ -167,7 +177,7 @@ fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, spectrum: f64) -> PyResult<
             Err(PyValueError::new_err(format!("n_styles = {name:?}: {wanted}")))
         };
     }
-    style_count(Some(n_styles.extract()?), spectrum).map(StyleChoice::Given)
+    count("n_styles", n_styles.extract()?).map(|n_styles| StyleCount::Given(n_styles).into())
 }
 
 /// J as given, or from a share of the spectrum.
@@ -276,30 +286,40 @@ fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
     }
 }
 
-fn smoothing_of(smoothing: Option<&Bound<'_, PyAny>>) -> PyResult<Smoothing> {
-    let Some(smoothing) = smoothing else { return Ok(Smoothing::Interpolate) };
-    // True would be a cut-off of 1 Hz.
-    if let Ok(hz) = smoothing.extract::<f64>()
-        && !smoothing.is_instance_of::<PyBool>()
-    {
-        return Ok(Smoothing::CutOff { hz });
-    }
-    match smoothing.extract::<String>().as_deref() {
-        Ok("auto") => Ok(Smoothing::Auto),
-        _ => {
-            let wanted = "must be None, \"auto\" or a cut-off in Hz";
-            Err(PyValueError::new_err(format!("smoothing = {}: {wanted}", smoothing.repr()?)))
+/// `smoothing=`: None, "auto" or a cut-off in Hz.
+pub(crate) struct SmoothingArgument(Smoothing);
+
+impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
+    type Error = PyErr;
+
+    fn extract(smoothing: pyo3::Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if smoothing.is_none() {
+            return Ok(Self(Smoothing::Interpolate));
+        }
+        // True would be a cut-off of 1 Hz.
+        if let Ok(hz) = smoothing.extract::<f64>()
+            && !smoothing.is_instance_of::<PyBool>()
+        {
+            return Ok(Self(Smoothing::CutOff { hz }));
+        }
+        match smoothing.extract::<String>().as_deref() {
+            Ok("auto") => Ok(Self(Smoothing::Auto)),
+            _ => {
+                let wanted = "must be None, \"auto\" or a cut-off in Hz";
+                Err(PyValueError::new_err(format!("smoothing = {}: {wanted}", smoothing.repr()?)))
+            }
         }
     }
 }
 
 fn dof_scale_of(scale: Option<&Bound<'_, PyAny>>) -> PyResult<DofScale> {
-    let Some(scale) = scale else { return Ok(DofScale::Unit) };
+    let Some(scale) = scale else { return Ok(DofScale::Auto) };
     match scale.extract::<String>().as_deref() {
         Ok("range") => Ok(DofScale::Range),
-        Ok(other) => {
-            Err(PyValueError::new_err(format!("dof_scale = {other:?}: must be None, \"range\" or one number per DoF")))
-        }
+        Ok("unit") => Ok(DofScale::Unit),
+        Ok(other) => Err(PyValueError::new_err(format!(
+            "dof_scale = {other:?}: must be None, \"unit\", \"range\" or one number per DoF"
+        ))),
         Err(_) => crate::convert::vector("dof_scale", scale).map(DofScale::Given),
     }
 }

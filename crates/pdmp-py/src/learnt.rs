@@ -109,6 +109,27 @@ impl Model {
         self.0.learnt().left_out
     }
 
+    /// Standard deviation of the measurement noise of each degree of freedom (D,), in its unit, by generalised
+    /// cross-validation: 0 where none was found, or none was looked for (`smoothing=None`).
+    #[getter]
+    fn noise<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        to_numpy(py, self.0.learnt().noise.levels())
+    }
+
+    /// Cut-offs of the smoothing (D,) in Hz, at which a sine keeps half of its amplitude; inf where every sample is met.
+    #[getter]
+    fn cut_offs<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        let cut_offs: Vec<f64> =
+            self.0.learnt().noise.cut_offs().iter().map(|hz| hz.unwrap_or(f64::INFINITY)).collect();
+        to_numpy(py, &cut_offs)
+    }
+
+    /// Unit of each degree of freedom in the factorisation (D,).
+    #[getter]
+    fn dof_scale<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        to_numpy(py, &self.0.learnt().dof_scale)
+    }
+
     /// Goals of the demonstrations (M, D).
     #[getter]
     fn goals<'py>(&self, py: Python<'py>) -> Matrix<'py> {

@@ -316,14 +316,30 @@ impl Model {
 
     fn __repr__(&self) -> String {
         let model = &self.0;
-        format!(
-            "<pdmp.Model: {}, {} demonstrations, {} DoFs, {} styles, tau {:.4} s; {}>",
+        ascii(&format!(
+            "<pdmp.Model: {}, {} demonstrations, {} DoFs, {} styles, tau {:.4} s{}; {}>",
             model.kind(),
             model.n_demos(),
             model.n_dofs(),
             model.n_styles(),
             model.tau(),
-            ascii(&model.learnt().basis)
-        )
+            noise(model),
+            model.learnt().basis
+        ))
     }
+}
+
+/// The noise of the degree of freedom that has most for its range, where any has.
+fn noise(model: &pdmp_core::Model) -> String {
+    let share = |d: usize| model.learnt().noise.levels()[d] / model.ranges()[d].max(f64::MIN_POSITIVE);
+    let noisiest = (0..model.n_dofs()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
+    noisiest.filter(|&d| share(d) > 0.0).map_or_else(String::new, |d| {
+        let (level, unit) = (model.learnt().noise.levels()[d], &model.units()[d]);
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        format!(
+            "; measurement noise {level:.2e}{unit}, {:.2} % of the range, in {}",
+            100.0 * share(d),
+            model.names()[d]
+        )
+    })
 }

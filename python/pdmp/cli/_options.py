@@ -76,9 +76,9 @@ def add_learning(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--spectrum",
         type=float,
-        default=0.9,
         metavar="SHARE",
-        help="without --styles: share of the singular-value sum to keep; default: 0.9",
+        help="without --styles: keep this share of the singular-value sum, such as the paper's 0.9;"
+        " default: the systematic styles, which exceed the measurement noise",
     )
     parser.add_argument(
         "--basis",
@@ -88,9 +88,10 @@ def add_learning(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--smoothing",
-        type=_or_auto(float, "frequency [Hz]"),
+        type=_smoothing,
+        default="auto",
         metavar="HZ",
-        help="cut-off [Hz], or auto; default: none",
+        help="cut-off [Hz], auto (default: by cross-validation), or none",
     )
 
 
@@ -104,6 +105,16 @@ def settings(options: Namespace) -> dict[str, Any]:
         "basis": options.basis,
         "smoothing": options.smoothing,
     }
+
+
+def _smoothing(text: str) -> float | str | None:
+    """Read a cut-off, auto or none."""
+    if text in ("auto", "none"):
+        return None if text == "none" else text
+    try:
+        return float(text)
+    except ValueError:
+        raise ArgumentTypeError(f'"{text}" is no frequency [Hz], auto or none') from None
 
 
 def _or_auto(read: Callable[[str], Any], wanted: str) -> Callable[[str], Any]:

@@ -36,6 +36,7 @@ def run(options: Namespace) -> None:
         "DoFs": f"{model.n_dofs}: {', '.join(_labels(model))}",
         "styles": f"{model.n_styles}, which leave out {model.left_out:.1%} of the targets' RMS",
         "singular values": _several(model.singular_values),
+        "noise": _noise(model),
         "basis": f"{model.basis}; table error {model.table_error:.1e}",
         "tau": f"{model.tau:g} s",
         "constants": constants,
@@ -56,6 +57,16 @@ def _labels(model: pdmp.Model) -> list[str]:
         f"{name} [{unit}]" if unit else name
         for name, unit in zip(model.names, model.units, strict=True)
     ]
+
+
+def _noise(model: pdmp.Model) -> str:
+    """Write the standard deviation of the measurement noise, and the cut-off that takes it off."""
+    labels = _labels(model)
+    noisy = zip(labels, model.noise, model.cut_offs, strict=True)
+    found = [
+        f"{label}: {level:.2g}, smoothed at {hz:.3g} Hz" for label, level, hz in noisy if level
+    ]
+    return "; ".join(found) or "none found"
 
 
 def _extent(values: Sequence[float | str]) -> str:

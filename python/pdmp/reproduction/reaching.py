@@ -23,7 +23,10 @@ HEIGHTS = (0.0, 0.15, 0.30, 0.45, 0.60)  # m: none to four boxes
 TRAINED = (0.0, 0.30, 0.45)  # m
 TRIALS = 3
 MOST_TRIALS = 100
-CONSTANTS: dict[str, Any] = {"alpha_z": 1.5, "beta_z": 1.5, "alpha_x": 0.5, "tau": 0.3}
+CONSTANTS: dict[str, Any] = {
+    **{"alpha_z": 1.5, "beta_z": 1.5, "alpha_x": 0.5, "tau": 0.3},
+    "smoothing": None,
+}
 """As printed; the damping ratio is √(α_z/β_z)/2 = 0.5."""
 NAMES = ["q1", "q2", "q3", "q4"]
 

@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-CONSTANTS: dict[str, Any] = {"alpha_z": 0.5, "beta_z": 0.5, "mu": 0.1}
+CONSTANTS: dict[str, Any] = {
+    **{"alpha_z": 0.5, "beta_z": 0.5, "mu": 0.1},
+    **{"spectrum": 0.9, "smoothing": None},
+}
 """The line that prints them lacks a comma, or means β_z = 1: it is read as α_z = 0.5, β_z = 0.5."""
 LASTING = 20.0  # s, between switches
 SETTLED = 5  # periods after which a new cycle should be reached

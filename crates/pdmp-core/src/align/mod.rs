@@ -15,7 +15,7 @@ use ndarray::{Array2, Axis};
 use crate::demo::{Demonstration, LEAST_SAMPLES};
 use crate::error::{Error, Result};
 use crate::phase::Kind;
-use crate::smooth::{Smoothing, smooth};
+use crate::smooth::{Noise, Samples, Smoothing, pool};
 use crate::spline::{Knots, Splines};
 use crate::threads::Threads;
 pub(crate) use clock::check_duration;
@@ -68,7 +68,8 @@ pub(crate) struct Aligned<'a> {
     demos: &'a [Demonstration],
     clocks: Vec<Clock<'a>>,
     kind: Kind,
-    smoothing: Smoothing,
+    /// Measurement noise, which is smoothed away.
+    pub(crate) noise: Noise,
     /// Where time is not linear.
     warps: Vec<Option<WarpingFunction>>,
     /// Phases (K+1,) that divide the movement into segments.
@@ -82,12 +83,12 @@ pub(crate) struct Aligned<'a> {
 }
 
 impl Alignment {
-    /// Reads the clocks of all demonstrations, whose time is linear until it is warped.
+    /// Reads the clocks of all demonstrations, whose time is linear until it is warped, and estimates their noise.
     ///
     /// # Errors
-    /// No demonstration, different DoFs, a missing rate or period, a bad nominal index or number of samples, events out of
-    /// order.
-    pub(crate) fn align<'a>(&self, demos: &'a [Demonstration]) -> Result<Aligned<'a>> {
+    /// No demonstration, different DoFs, a missing rate or period, a bad nominal index or number of samples, a bad
+    /// cut-off.
+    pub(crate) fn align<'a>(&self, demos: &'a [Demonstration], threads: Threads) -> Result<Aligned<'a>> {
         let n_dofs = demos.first().ok_or(Error::NoDemonstrations)?.n_dofs();
         if !(self.period.len() <= 1 || self.period.len() == demos.len()) {
             let (expected, found) = (demos.len(), self.period.len());
@@ -113,10 +114,24 @@ impl Alignment {
             let value = n_samples as f64;
             return Err(Error::Range { name: "n_samples", value, allowed: "must lie between 4 and 1e6" });
         }
-        let Self { kind, smoothing, .. } = *self;
+        let (kind, noise) = (self.kind, Noise::none(n_dofs));
         let (warps, breaks) = (vec![None; demos.len()], vec![0.0, 1.0]);
         let timings = ndarray::Array1::from_vec(durations).insert_axis(Axis(1));
-        Ok(Aligned { demos, clocks, kind, smoothing, warps, breaks, timings, nominal, n_samples })
+        let mut aligned = Aligned { demos, clocks, kind, noise, warps, breaks, timings, nominal, n_samples };
+        aligned.noise = self.noise(&aligned, threads)?;
+        Ok(aligned)
+    }
+
+    /// Estimates the measurement noise of demonstrations, in a pool of them.
+    fn noise(&self, aligned: &Aligned, threads: Threads) -> Result<Noise> {
+        if let Smoothing::CutOff { .. } = self.smoothing {
+            for m in 0..aligned.n_demos() {
+                self.smoothing.check(&aligned.samples(m, &aligned.seconds(m))).map_err(|error| error.in_demo(m))?;
+            }
+        }
+        let pool: Vec<(usize, Vec<f64>)> = pool(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
+        let samples: Vec<Samples> = pool.iter().map(|(m, time)| aligned.samples(*m, time)).collect();
+        Noise::of(self.smoothing, &samples, threads)
     }
 
     /// The demonstration of median duration: the lower one of two, the earlier one of equals.
@@ -142,7 +157,7 @@ impl TimeScaling {
     /// What the demonstrations were warped to is returned, so that others can be.
     ///
     /// # Errors
-    /// Settings out of range, events out of order, no memory, a bad smoothing, or whatever `proceed` returns.
+    /// Settings out of range, events out of order, no memory, or whatever `proceed` returns.
     pub(crate) fn apply(
         &self,
         aligned: &mut Aligned,
@@ -183,10 +198,7 @@ impl Aligned<'_> {
     ///
     /// Time scaling by Tⁿ/Tᵐ puts sample c at the share c/(C−1) of the duration, or c/C of the period; what is warped is
     /// read where its warping function is at that phase.
-    ///
-    /// # Errors
-    /// A bad smoothing.
-    pub(crate) fn sample(&self, m: usize, position: &mut [f64]) -> Result<()> {
+    pub(crate) fn sample(&self, m: usize, position: &mut [f64]) {
         let Clock { ticks, extent, .. } = self.clocks[m];
         let steps = self.kind.steps(self.n_samples) as f64;
         let phases = (0..self.n_samples).map(|c| c as f64);
@@ -196,35 +208,43 @@ impl Aligned<'_> {
                 && self.demos[m].n_samples() == self.n_samples
                 && extent == steps =>
             {
-                position.copy_from_slice(&self.smoothed(m)?);
-                Ok(())
+                position.copy_from_slice(&self.smoothed(m));
             }
             None => self.read(m, phases.map(|c| c * extent / steps), position),
         }
     }
 
     /// Writes the positions of demonstration `m` at times in its ticks, which do not decrease.
-    fn read(&self, m: usize, times: impl Iterator<Item = f64> + Clone, position: &mut [f64]) -> Result<()> {
+    fn read(&self, m: usize, times: impl Iterator<Item = f64> + Clone, position: &mut [f64]) {
         let Clock { ticks, extent, .. } = self.clocks[m];
-        let values = self.smoothed(m)?;
+        let values = self.smoothed(m);
         let own = (0..self.demos[m].n_samples()).map(|c| ticks.at(c)).collect();
         let knots = match self.kind {
             Kind::Discrete => Knots::not_a_knot(own),
             Kind::Rhythmic => Knots::periodic(own, extent),
         };
         Splines::through(knots, &values, self.demos[m].n_dofs()).sample(times, position);
-        Ok(())
     }
 
-    /// The samples of demonstration `m` (n·D), without its noise if that is to be taken out.
-    fn smoothed(&self, m: usize) -> Result<Cow<'_, [f64]>> {
-        let (own, Clock { ticks, duration, .. }) = (self.demos[m].position(), self.clocks[m]);
-        if self.smoothing == Smoothing::Interpolate {
-            return Ok(own.to_slice().map_or_else(|| Cow::Owned(own.iter().copied().collect()), Cow::Borrowed));
+    /// Samples of demonstration `m`, at the times of [`Aligned::seconds`].
+    fn samples<'a>(&'a self, m: usize, time: &'a [f64]) -> Samples<'a> {
+        let period = (self.kind == Kind::Rhythmic).then_some(self.clocks[m].duration);
+        Samples { time, period, values: self.demos[m].position() }
+    }
+
+    /// Times of the samples of demonstration `m` (n,), in seconds from the first.
+    fn seconds(&self, m: usize) -> Vec<f64> {
+        let ticks = self.clocks[m].ticks;
+        (0..self.demos[m].n_samples()).map(|c| ticks.at(c) * ticks.unit()).collect()
+    }
+
+    /// The samples of demonstration `m` (n·D), smoothed where they are noisy.
+    fn smoothed(&self, m: usize) -> Cow<'_, [f64]> {
+        let own = self.demos[m].position();
+        if self.noise.cut_offs().iter().all(Option::is_none) {
+            return own.to_slice().map_or_else(|| Cow::Owned(own.iter().copied().collect()), Cow::Borrowed);
         }
-        let seconds: Vec<f64> = (0..own.nrows()).map(|c| ticks.at(c) * ticks.unit()).collect();
-        let period = (self.kind == Kind::Rhythmic).then_some(duration);
-        let smoothed = smooth(self.smoothing, &seconds, period, own).map_err(|error| error.in_demo(m))?;
-        Ok(Cow::Owned(smoothed.iter().copied().collect()))
+        let smoothed = self.samples(m, &self.seconds(m)).smoothed(self.noise.cut_offs());
+        Cow::Owned(smoothed.into_raw_vec_and_offset().0)
     }
 }

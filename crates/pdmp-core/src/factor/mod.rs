@@ -63,25 +63,49 @@ pub enum StyleCount {
     Given(usize),
     /// The fewest whose singular values make up more than this share of the sum of all.
     Spectrum(f64),
+    /// The same share of the singular values that exceed `noise`, and at least five of these, or as many as half of the
+    /// demonstrations.
+    AboveNoise {
+        /// Largest singular value of the measurement noise in the targets.
+        noise: f64,
+        /// Share of the sum, in (0, 1].
+        share: f64,
+    },
 }
+
+/// Styles that are kept as far as they exceed the noise, even where fewer make up the share: so few cost nothing, and a
+/// mean with three styles has four, of which the largest two or three often make up nine tenths. Fewer than ten
+/// demonstrations do not support so many: predictions from contexts then became worse.
+const MIN_STYLES: usize = 5;
+
+/// Smallest singular value, in shares of the largest, that is no rounding error of the targets or of the decomposition.
+const MIN_RATIO: f64 = 1e-6;
 
 impl StyleCount {
     /// Checks the count against the number of things that limit it.
     pub(crate) fn check(self, most: usize, of: &'static str) -> Result<()> {
         match self {
             StyleCount::Given(n_styles) if n_styles < 1 || n_styles > most => Err(Error::Styles { n_styles, most, of }),
-            StyleCount::Spectrum(value) if !(value > 0.0 && value <= 1.0) => {
+            StyleCount::Spectrum(value) | StyleCount::AboveNoise { share: value, .. }
+                if !(value > 0.0 && value <= 1.0) =>
+            {
                 Err(Error::Range { name: "spectrum", value, allowed: "must lie in (0, 1]" })
             }
             _ => Ok(()),
         }
     }
 
-    /// J for these singular values.
-    fn among(self, singular_values: &[f64]) -> usize {
+    /// J for these singular values of so many demonstrations.
+    pub(crate) fn among(self, singular_values: &[f64], n_demos: usize) -> usize {
         match self {
             StyleCount::Given(n_styles) => n_styles,
             StyleCount::Spectrum(share) => leading(singular_values, share),
+            StyleCount::AboveNoise { noise, share } => {
+                let least = MIN_STYLES.min(n_demos / 2);
+                let floor = noise.max(MIN_RATIO * singular_values.first().copied().unwrap_or(0.0));
+                let above = singular_values.iter().take_while(|&&sigma| sigma > floor).count().max(1);
+                leading(&singular_values[..above], share).max(least).min(above)
+            }
         }
     }
 }
@@ -146,7 +170,7 @@ impl Factors {
     /// The factors of targets that are zero throughout.
     fn still((rows, columns): (usize, usize), styles: StyleCount) -> Self {
         let singular_values = vec![0.0; rows.min(columns)];
-        let n_styles = styles.among(&singular_values);
+        let n_styles = styles.among(&singular_values, rows);
         let styles = Array2::from_shape_fn((rows, n_styles), |(i, j)| if i == j { 1.0 } else { 0.0 });
         Self { styles, basis: Array2::zeros((n_styles, columns)), singular_values, error: 0.0 }
     }
@@ -214,7 +238,7 @@ impl<'a> Library<'a> {
             }
         }
         if let Some(gram) = gram::Gram::of(wide, &mut |share| proceed((1.0 + share) / 3.0))? {
-            let n_styles = styles.among(&gram.values);
+            let n_styles = styles.among(&gram.values, self.targets.nrows());
             // Of few demonstrations all factors cost little, and give all singular values their digits.
             let kept = if k <= 64 { k } else { n_styles };
             if let Some(vectors) = gram.leading(n_styles, kept) {
@@ -243,7 +267,7 @@ impl<'a> Library<'a> {
     /// needed; X is a `frame` of orthonormal columns, or one.
     fn of_triangle(&self, styles: StyleCount, triangle: MatRef<f64>, frame: Option<MatRef<f64>>) -> Result<Factors> {
         let small::Svd { sigma: values, v, .. } = small::Svd::of(triangle);
-        let n_styles = styles.among(&values);
+        let n_styles = styles.among(&values, self.targets.nrows());
         let v = v.subcols(0, n_styles);
         let vectors = frame.map_or_else(|| v.to_owned(), |frame| product(frame, v));
         let projection = self.project(vectors, n_styles, |_| ())?;

@@ -16,10 +16,9 @@ use crate::context::{ContextColumn, Kernel, MapKind};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::phase::Canonical;
-use crate::smooth::Smoothing;
 
 /// Version of the file's layout.
-const SCHEMA: u32 = 4;
+const SCHEMA: u32 = 5;
 /// The metadata key.
 const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.
@@ -47,7 +46,6 @@ struct Constants {
     units: Vec<String>,
     nominal: usize,
     n_samples: usize,
-    smoothing: Smoothing,
     /// Bound of the slopes, where time was warped.
     slope: Option<f64>,
     left_out: f64,

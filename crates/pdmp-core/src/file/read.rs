@@ -12,6 +12,7 @@ use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
 use crate::phase::Canonical;
 use crate::sensitivity::STEPS;
+use crate::smooth::Noise;
 use crate::tabulate::{Jets, MOST_CELLS};
 
 impl Model {
@@ -81,6 +82,14 @@ impl Reader<'_> {
         }
     }
 
+    fn noise(&self, n_dofs: usize) -> Result<Noise> {
+        let [levels, cut_offs] = [self.array("noise.levels", &[n_dofs])?, self.array("noise.cut_offs", &[n_dofs])?];
+        if levels.iter().chain(&cut_offs).any(|x| *x < 0.0) {
+            return Err(Error::File("a noise or cut-off is negative".to_string()));
+        }
+        Ok(Noise { levels, cut_offs: cut_offs.into_iter().map(|hz| Some(hz).filter(|hz| *hz > 0.0)).collect() })
+    }
+
     fn shape<const N: usize>(&self, name: &str) -> Result<[usize; N]> {
         let tensor = self.tensors.tensor(name).map_err(|_| Error::File(format!("no array {name}")))?;
         tensor.shape().try_into().map_err(|_| Error::File(format!("{name} has {} axes", tensor.shape().len())))
@@ -147,7 +156,7 @@ impl Reader<'_> {
         let attractor = Attractor { alpha_z: constants.alpha_z, beta_z: constants.beta_z };
         let learnt = Learnt {
             n_samples: constants.n_samples,
-            smoothing: constants.smoothing,
+            noise: self.noise(n_dofs)?,
             template: self.template(&constants, n_segments, n_dofs)?,
             dof_scale,
             singular_values,

@@ -37,7 +37,6 @@ impl Model {
             units: self.units.clone(),
             nominal: self.demonstrated.nominal,
             n_samples: self.learnt.n_samples,
-            smoothing: self.learnt.smoothing,
             slope: self.learnt.template.as_ref().map(|template| template.slope),
             left_out: self.learnt.left_out,
             basis: self.learnt.basis.clone(),
@@ -67,6 +66,8 @@ impl Model {
         let demonstrated = &self.demonstrated;
         let Jets { values, slopes, .. } = self.landscape.knots();
         let knots = vec![self.landscape.cells() + 1, self.n_styles(), self.n_dofs()];
+        // 0 where every sample is met.
+        let cut_offs: Vec<f64> = self.learnt.noise.cut_offs().iter().map(|hz| hz.unwrap_or(0.0)).collect();
         let mut arrays = vec![
             matrix("styles", &demonstrated.styles),
             matrix("goals", &demonstrated.goals),
@@ -77,6 +78,8 @@ impl Model {
             vector("singular_values", &self.learnt.singular_values),
             vector("dof_scale", &self.learnt.dof_scale),
             vector("ranges", &self.ranges),
+            vector("noise.levels", self.learnt.noise.levels()),
+            vector("noise.cut_offs", &cut_offs),
             ("landscape.values", knots.clone(), values),
             ("landscape.slopes", knots, slopes),
         ];

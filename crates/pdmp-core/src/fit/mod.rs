@@ -2,6 +2,7 @@
 
 mod constants;
 mod options;
+mod selection;
 mod style;
 
 use std::sync::Arc;
@@ -36,22 +37,27 @@ pub fn fit(
     if let StyleChoice::Given(count) = options.styles {
         count.check(demos.len(), "demonstrations")?;
     }
-    let mut aligned = options.alignment.align(demos)?;
+    let threads = options.threads;
+    let mut aligned = options.alignment.align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
-    let threads = options.threads;
     let mut aligning = |share| proceed(Stage::Align, share);
     let unit = options.dof_scale.given(demos[0].n_dofs())?;
     let template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut aligning)?;
     let mut targeting = |share| proceed(Stage::Targets, share);
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
-    let dof_scale = options.dof_scale.of(&ranges);
+    let dof_scale = options.dof_scale.of(&ranges, &units);
     targets.scale(&dof_scale);
 
     let mut factorising = |share| proceed(Stage::Factorise, share);
     let factors = match options.styles {
+        StyleChoice::Systematic => {
+            let noise = selection::noise_limit(&aligned, &constants, &dof_scale, threads)?;
+            let tables = contexts.as_ref().map(|(columns, numbers)| (columns.as_slice(), numbers));
+            selection::systematic(targets.forcing.view(), noise, tables, &mut factorising)?
+        }
         StyleChoice::Given(count) => Factors::of(targets.forcing.view(), count, &mut factorising)?,
         StyleChoice::Auto => {
             let (columns, numbers) = contexts.as_ref().ok_or(Error::Arguments(
@@ -88,7 +94,7 @@ pub fn fit(
     let demonstrated = Demonstrated { styles, goals, starts, anchors, breaks, timings, durations, contexts, nominal };
     let learnt = Learnt {
         n_samples,
-        smoothing: options.alignment.smoothing,
+        noise: aligned.noise.clone(),
         template,
         dof_scale,
         singular_values,

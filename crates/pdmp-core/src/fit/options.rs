@@ -11,9 +11,13 @@ use crate::smooth::Smoothing;
 use crate::threads::Threads;
 
 /// The unit of each degree of freedom in the factorisation.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum DofScale {
-    /// As recorded: right where all DoFs have one unit.
+    /// As recorded where all DoFs have one unit, or none is known. Of DoFs in different units, those in one unit are
+    /// scaled together, by the largest range among them: what hardly moves, or not at all, stays small.
+    #[default]
+    Auto,
+    /// As recorded.
     Unit,
     /// The range of each DoF, so that all weigh alike.
     Range,
@@ -34,12 +38,20 @@ impl DofScale {
         }
     }
 
-    /// The units (D,) of DoFs with such ranges.
-    pub(super) fn of(&self, ranges: &[f64]) -> Vec<f64> {
+    /// The scales (D,) of DoFs with these ranges and units.
+    pub(super) fn of(&self, ranges: &[f64], units: &[String]) -> Vec<f64> {
+        // A DoF at rest has no range; it has no target to be scaled either.
+        let moving = |range: f64| if range > 0.0 { range } else { 1.0 };
         match self {
-            Self::Unit => vec![1.0; ranges.len()],
-            // A DoF at rest has no range; it has no target to be scaled either.
-            Self::Range => ranges.iter().map(|&range| if range > 0.0 { range } else { 1.0 }).collect(),
+            Self::Auto if units.iter().any(|unit| *unit != units[0]) => {
+                let largest = |unit: &String| {
+                    let alike = ranges.iter().zip(units).filter(|(_, other)| *other == unit);
+                    alike.fold(0.0f64, |most, (range, _)| most.max(*range))
+                };
+                units.iter().map(|unit| moving(largest(unit))).collect()
+            }
+            Self::Auto | Self::Unit => vec![1.0; ranges.len()],
+            Self::Range => ranges.iter().map(|&range| moving(range)).collect(),
             Self::Given(scale) => scale.clone(),
         }
     }
@@ -75,25 +87,24 @@ pub struct FitOptions {
 }
 
 impl FitOptions {
-    /// The defaults: as many styles as make up nine tenths of the singular values, a Gaussian process, no smoothing,
-    /// α_z = 25, μ = 1, as many threads as the system allows, and all else from the demonstrations.
+    /// The defaults: smoothing by cross-validation, the systematic styles, a Gaussian process, α_z = 25, μ = 1, as many
+    /// threads as the system allows, and all else from the demonstrations.
     pub fn new(kind: Kind) -> Self {
-        let smoothing = Smoothing::Interpolate;
         Self {
             alignment: Alignment {
                 kind,
                 dt: None,
                 period: Vec::new(),
-                smoothing,
+                smoothing: Smoothing::Auto,
                 nominal: None,
                 n_samples: None,
                 time_scaling: TimeScaling::Linear,
             },
             contexts: None,
             map: MapChoice::Auto,
-            styles: StyleCount::Spectrum(0.9).into(),
+            styles: StyleChoice::Systematic,
             basis: Basis::Gp(Gp::default()),
-            dof_scale: DofScale::Unit,
+            dof_scale: DofScale::Auto,
             tau: None,
             alpha_z: 25.0,
             beta_z: None,
@@ -104,9 +115,13 @@ impl FitOptions {
     }
 }
 
-/// How the number of styles J is chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The choice of the style dimension J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum StyleChoice {
+    /// As many as carry nine tenths of the sum of the singular values, at least five, and at least as many as the
+    /// contexts explain; never more than exceed the measurement noise.
+    #[default]
+    Systematic,
     /// By number, or by the spectrum.
     Given(StyleCount),
     /// The fewest that foresee movements, in contexts held out, with an error above the least that any number has by no

@@ -7,6 +7,7 @@ use crate::align::{Alignment, TimeScaling};
 use crate::demo::Demonstration;
 use crate::error::{Error, Result};
 use crate::model::Model;
+use crate::smooth::Smoothing;
 use crate::targets::Targets;
 use crate::threads::Threads;
 
@@ -41,12 +42,13 @@ pub fn style_of(
         kind: model.kind(),
         dt,
         period: period.into_iter().collect(),
-        smoothing: model.learnt.smoothing,
+        smoothing: Smoothing::Interpolate,
         nominal: None,
         n_samples: Some(model.learnt.n_samples),
         time_scaling: TimeScaling::Linear,
     };
-    let mut aligned = alignment.align(std::slice::from_ref(demo))?;
+    let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
+    aligned.noise = model.learnt.noise.clone();
     let by_events = model.learnt.template.is_none() && model.demonstrated.timings.ncols() > 1;
     match (&model.learnt.template, events) {
         (None, Some(events)) if by_events => aligned.register_to(&model.demonstrated.breaks, events)?,
