@@ -138,12 +138,16 @@ def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
 def test_warped_models_are_told_and_repeat_demonstrations(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With --alignment and --styles auto the fit is the library's; --tau overrides a timing."""
+    """With --alignment the fit is the library's, as with --styles auto; --tau overrides a timing."""
     path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"
     options = ("--context", "bend", "--alignment", "warp", "--styles", "auto")
     assert run("fit", folder, *options, "-o", path) == 0
     recordings = demos.read([folder], context=["bend"])
     expected = pdmp.fit(recordings, alignment="warp", n_styles="auto")
+    np.testing.assert_array_equal(pdmp.load(path).styles, expected.styles)
+    # Without contexts nothing speaks against a warp.
+    assert run("fit", folder, "--alignment", "warp", "-o", path) == 0
+    expected = pdmp.fit(demos.read([folder]), alignment="warp")
     model = pdmp.load(path)
     np.testing.assert_array_equal(model.styles, expected.styles)
     assert run("info", path) == 0

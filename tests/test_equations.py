@@ -18,7 +18,7 @@ def solve(
     style: np.ndarray,
     centre: np.ndarray,
     start: np.ndarray,
-    z: np.ndarray,
+    z_start: np.ndarray,
     tau: float,
     span: tuple[float, float],
     amplitude: tuple[float, float] = (1.0, 1.0),
@@ -29,18 +29,25 @@ def solve(
     positions as a function of time, and the state (2D,) at the end.
     """
     alpha, beta, n = model.alpha_z, model.beta_z, len(start)
+    u_end = model.durations[model.nominal] / model.tau
+    # Past the end a movement brakes; z there is that of a movement which began with z = 0.
+    braked = model.braking is not None and span[0] > 0
+    last = style @ model.landscape([u_end])[0] * np.exp(-(model.alpha_x or 0.0) * u_end)
 
     def flow(t: float, state: np.ndarray) -> np.ndarray:
         y, z, extra = state[:n], state[n : 2 * n], state[2 * n]
         discrete = model.kind == "discrete"
         gate = extra  # x, or r
         w = gate * (style @ model.landscape([t / tau])[0])
+        if braked:
+            late = t / tau - u_end
+            w = (z_start + last) * np.exp(-model.braking * late) - z_start * np.exp(-alpha * late)
         growth = -model.alpha_x * gate if discrete else model.mu * (amplitude[1] - gate)
         return np.concatenate([z + w, alpha * (beta * (centre - y) - z), [growth]]) / tau
 
     gate = np.exp(-model.alpha_x * span[0] / tau) if model.kind == "discrete" else amplitude[0]
     solution = integrate.solve_ivp(
-        flow, span, [*start, *z, gate], "DOP853", rtol=1e-10, atol=1e-12, dense_output=True
+        flow, span, [*start, *z_start, gate], "DOP853", rtol=1e-10, atol=1e-12, dense_output=True
     )
     return lambda t: solution.sol(t)[:n].T, solution.y[: 2 * n, -1]
 
@@ -48,32 +55,50 @@ def solve(
 STYLE, START = np.array([0.5, -0.3]), np.array([0.1, -0.2])
 
 
+def frame(model: pdmp.Model, goal: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return the frame at a clock (n,), less the goal (n, 2), on the way from START."""
+    return np.outer(model.transport(u) - 1, goal - START)
+
+
 @pytest.mark.parametrize(
-    "options", [{}, {"alpha_z": 10.0, "beta_z": 10.0}, {"beta_z": 2.0}], ids=str
+    "options",
+    [
+        {},
+        {"alpha_z": 10.0, "beta_z": 10.0},
+        {"beta_z": 2.0},
+        {"beta_z": 2.0, "transport": "immediate"},
+    ],
+    ids=str,
 )
 @pytest.mark.parametrize("basis", ["gp", "ngnet"])
 def test_reaching_solves_the_equations(options: dict[str, Any], basis: Any) -> None:
-    """Critical, under- and overdamped movements agree with an integration from z(0) = 0."""
+    """Critical, under- and overdamped movements agree with an integration from z(0) = 0.
+
+    Seen from the frame c(u) = y0 + (g - y0) m(u) they solve the paper's equations with g = 0.
+    """
     model = pdmp.fit(reaches(), n_styles=2, basis=basis, **options)
     goal, tau = np.array([1.2, 0.3]), 0.8 * model.tau
     made = model.rollout(STYLE, goal=goal, start=START, tau=tau, dt=0.01, duration=2 * tau)
+    moved = made.position - frame(model, goal, made.time / tau)
     end = model.durations[model.nominal] * tau / model.tau
-    path, last = solve(model, STYLE, goal, START, np.zeros(2), tau, (0.0, end))
+    path, last = solve(model, STYLE, goal, moved[0], np.zeros(2), tau, (0.0, end))
     # Past the end the landscape has a kink, over which no integrator should step.
     later, _ = solve(model, STYLE, goal, last[:2], last[2:], tau, (end, 2 * tau))
     before = made.time <= end
-    np.testing.assert_allclose(made.position[before], path(made.time[before]), atol=1e-6)
-    np.testing.assert_allclose(made.position[~before], later(made.time[~before]), atol=1e-6)
+    np.testing.assert_allclose(moved[before], path(made.time[before]), atol=1e-6)
+    np.testing.assert_allclose(moved[~before], later(made.time[~before]), atol=1e-6)
 
 
-def test_start_velocity_sets_the_auxiliary_state() -> None:
+@pytest.mark.parametrize("transport", ["learnt", "immediate"])
+def test_start_velocity_sets_the_auxiliary_state(transport: Any) -> None:
     """z(0) = tau v - w(0) leads to the same movement as `velocity`."""
-    model = pdmp.fit(reaches(), n_styles=2)
+    model = pdmp.fit(reaches(), n_styles=2, transport=transport)
     velocity, goal = np.array([0.3, -0.4]), model.goals[2]
     made = model.rollout(STYLE, start=START, velocity=velocity, dt=0.01)
+    moved = made.position - frame(model, goal, made.time / model.tau)
     z = model.tau * velocity - STYLE @ model.landscape([0.0])[0]
-    path, _ = solve(model, STYLE, goal, START, z, model.tau, (0.0, made.time[-1]))
-    np.testing.assert_allclose(made.position, path(made.time), atol=1e-6)
+    path, _ = solve(model, STYLE, goal, moved[0], z, model.tau, (0.0, made.time[-1]))
+    np.testing.assert_allclose(moved, path(made.time), atol=1e-6)
     np.testing.assert_allclose(made.velocity[0], velocity, atol=1e-12)
 
 

@@ -361,7 +361,7 @@ def mannered() -> tuple[list[np.ndarray], list[list[float | str]]]:
 def test_labels_are_conditions_too() -> None:
     """A label tells of a condition beside numbers, to primitives and all others alike."""
     movements, contexts = mannered()
-    predictors = baselines() | {"PDMP": PDMP(map="linear")}
+    predictors = baselines() | {"PDMP": PDMP(map="linear", spectrum=0.999)}
     found = pdmp.evaluate(movements, contexts=contexts, dt=0.01, predictors=predictors)
     assert {split.reach for split in found.splits} == {"interpolation", "extrapolation"}
     assert sum(len(split.test) for split in found.splits) == len(movements)

@@ -167,27 +167,41 @@ def test_matern_processes_are_those_of_tinygp(kernel: str, seed: int) -> None:
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(("noise", "most"), [(None, 0.05), (1e-8, 1e-3), (1e-2, 1e-3)])
+@pytest.mark.parametrize(
+    ("noise", "true", "most"),
+    [(None, 1e-7, 0.05), (None, 1e-2, 0.05), (1e-8, 1e-8, 1e-3), (1e-2, 1e-2, 1e-3)],
+)
 @pytest.mark.parametrize("kernel", THEIRS)
 def test_scikit_learn_finds_nothing_likelier(
-    kernel: Any, noise: float | None, most: float, seed: int
+    kernel: Any, noise: float | None, true: float, most: float, seed: int
 ) -> None:
     """Its optimum in the same box gains at most 1e-3 in length, 0.05 in length and noise."""
     random = np.random.default_rng(seed)
     u = np.append(0.0, np.sort(random.uniform(0, 1, 39)))[:, None]
     truth = THEIRS[kernel](10 ** random.uniform(-1.3, 0))(u)
-    spread = np.linalg.cholesky(truth + (noise or 1e-7) * np.eye(40))
+    spread = np.linalg.cholesky(truth + true * np.eye(40))
     f = 10 ** random.uniform(-2, 2) * spread @ random.normal(size=(40, 3))
     ours = pdmp.GP(kernel, noise=noise).regress(u[:, 0], f)
 
     extent, unit = u[-1, 0], np.var(f)
     shape = THEIRS[kernel](0.3 * extent, length_scale_bounds=(extent / 40, 2 * extent))
-    white = kernels.WhiteKernel(noise or 1e-8, "fixed" if noise else (1e-10, 1e-6))
+    white = kernels.WhiteKernel(true, "fixed" if noise else (1e-10, 1e4))
     signal = kernels.ConstantKernel(unit, (1e-12 * unit, 1e12 * unit))
     theirs = process.GaussianProcessRegressor(
         signal * (shape + white), alpha=0.0, n_restarts_optimizer=2, random_state=seed
     ).fit(u, f)
     assert theirs.log_marginal_likelihood_value_ <= ours.log_likelihood + most
+
+
+@pytest.mark.parametrize("deviation", [1e-3, 0.05, 0.5])
+def test_noise_is_found_where_a_regression_is_used_by_itself(deviation: float) -> None:
+    """Two waves with white noise: its deviation is found within a tenth, the waves within it."""
+    u = np.linspace(0, 1, 500)
+    waves = np.column_stack([np.sin(7 * u), np.cos(4 * u)])
+    noise = deviation * np.random.default_rng(1).normal(size=waves.shape)
+    found = pdmp.GP().regress(u, waves + noise)
+    assert np.sqrt(found.noise * found.signal_variance) == pytest.approx(deviation, rel=0.1)
+    assert np.abs(found.predict(u)[0] - waves).max() < deviation
 
 
 def test_signal_variance_is_in_the_squared_unit_of_the_outputs() -> None:

@@ -61,17 +61,19 @@ def filtered(model: pdmp.Model, spline: Any, centre: np.ndarray, u: np.ndarray) 
     return solution.y.T
 
 
-def test_singular_values_are_those_of_the_targets_of_reaches() -> None:
-    """Targets f = y' - z, made here by scipy from the resampled demonstrations, factorise alike."""
+@pytest.mark.parametrize("transport", ["learnt", "immediate"])
+def test_singular_values_are_those_of_the_targets_of_reaches(transport: Any) -> None:
+    """Targets f = e' - z about the frame, made here by scipy from the resampled demonstrations."""
     demos = reaches()
     n = 120
-    model = pdmp.fit(demos, n_styles=3, n_samples=n)
+    model = pdmp.fit(demos, n_styles=3, n_samples=n, transport=transport)
     targets = []
     for demo in demos:
         own = interpolate.CubicSpline(np.linspace(0, 1, demo.n_samples), demo.position)
         u = np.linspace(0, 1, n)
-        spline = interpolate.CubicSpline(u, own(u) - own(0))
-        targets.append((spline(u, 1) - filtered(model, spline, spline(1.0), u)).ravel())
+        frame = np.outer(model.transport(u), own(1) - own(0))
+        spline = interpolate.CubicSpline(u, own(u) - own(0) - frame)
+        targets.append((spline(u, 1) - filtered(model, spline, np.zeros(2), u)).ravel())
     left, sigma, _ = np.linalg.svd(targets, full_matrices=False)
     np.testing.assert_allclose(model.singular_values, sigma, rtol=1e-6, atol=1e-9 * sigma[0])
     np.testing.assert_allclose(np.abs(model.styles), np.abs(left[:, :3]), atol=1e-6)

@@ -77,7 +77,7 @@ def test_events_are_met_at_one_phase() -> None:
 
 def test_timing_is_foreseen_from_the_context() -> None:
     """Where hurry goes with the context, a context never shown has its own, and a band about it."""
-    model = pdmp.fit(demos(list(np.linspace(-0.4, 0.4, 9))), nominal=4, alignment="warp")
+    model = pdmp.fit(demos(list(np.linspace(-0.4, 0.4, 9))), nominal=4, alignment=Warp())
     found = model.predict([0.15])
     assert found.timing.shape == (8,) and found.duration == pytest.approx(1, abs=1e-6)
     size = model.n_styles + 2 * model.n_dofs + 8
@@ -88,6 +88,26 @@ def test_timing_is_foreseen_from_the_context() -> None:
     np.testing.assert_allclose((lower + upper) / 2, made, atol=1e-12)
 
 
+def test_warp_by_name_foresees_no_worse_than_linear_scaling() -> None:
+    """Hurry that no context tells is left alone; without contexts, and asked for, it is warped."""
+    rng = np.random.default_rng(3)
+    heights = np.linspace(0.2, 0.4, 12)
+    shown = demos(list(rng.uniform(-0.5, 0.5, 12)), list(heights))
+    contexts = heights[:, None]
+    assert pdmp.fit(shown, contexts=contexts, alignment="warp").timings.shape == (12, 1)
+    assert pdmp.fit(shown, contexts=contexts, alignment=Warp()).timings.shape == (12, 8)
+    bare = [demo.position for demo in shown]
+    assert pdmp.fit(bare, dt=1 / (N - 1), alignment="warp").timings.shape == (12, 8)
+
+
+def test_warp_by_name_takes_fewer_segments_on_short_recordings() -> None:
+    """Eight segments need 16 samples of each; asked for by number, they are refused with that."""
+    short = [demo.position[::20] for demo in demos([0.0, 0.4, -0.4])]  # 11 samples
+    assert pdmp.fit(short, dt=0.1, alignment="warp").timings.shape == (3, 5)
+    with pytest.raises(ValueError, match="segments = 8: must lie between 1 and 5"):
+        pdmp.fit(short, dt=0.1, alignment=Warp())
+
+
 def test_a_band_knows_that_timing_is_uncertain() -> None:
     """Hurry that the context does not tell is in the band: nine tenths of new movements are too."""
     rng = np.random.default_rng(5)
@@ -96,7 +116,7 @@ def test_a_band_knows_that_timing_is_uncertain() -> None:
         bends = list(rng.uniform(-0.5, 0.5, 14))
         shown = demos(bends, list(np.linspace(0.2, 0.4, 14)))
         heights = np.linspace(0.2, 0.4, 14)[:, None]
-        model = pdmp.fit(shown, contexts=heights, alignment="warp")
+        model = pdmp.fit(shown, contexts=heights, alignment=Warp())
         lower, upper = model.band([0.3], dt=1 / (N - 1))
         for bend in rng.uniform(-0.5, 0.5, 10):
             new = reach(hurried(bend))

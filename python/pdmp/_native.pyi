@@ -15,7 +15,7 @@ from pdmp.pacing import Run
 
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
-_Map: TypeAlias = Literal["auto", "linear", "polynomial", "gp"]
+_Map: TypeAlias = Literal["auto", "stacked", "gp", "linear", "polynomial"]
 _Context: TypeAlias = ArrayLike | Sequence[float | str]
 _Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
 _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
@@ -106,6 +106,7 @@ def fit(
     smoothing: Literal["auto"] | float | None = "auto",
     nominal: int | None = None,
     n_samples: int | None = None,
+    transport: Literal["learnt", "immediate"] = "learnt",
     dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
     alignment: Literal["linear", "warp"] | Warp = "linear",
     events: ArrayLike | None = None,  # (M, E)
@@ -117,6 +118,9 @@ def fit(
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model: ...
+def inspected(
+    demos: Sequence[Demonstration], *, dt: float | None = None
+) -> tuple[list[Demonstration], list[str]]: ...
 def factorise(
     targets: ArrayLike,  # (M, C*D)
     *,
@@ -141,7 +145,14 @@ def cycles(
     recordings: _Demos,
     events: Sequence[ArrayLike] | None,  # one (K,) for each recording
     average: bool,
-) -> tuple[list[Demonstration], _Array, list[int], list[tuple[int, float, float, str]]]: ...
+) -> tuple[
+    list[Demonstration],
+    _Array,  # (K,)
+    list[list[float]],  # (K, D)
+    list[int],
+    list[tuple[int, float, float, str, bool]],
+    list[tuple[int, int, float, int]],
+]: ...
 
 @final
 class Model:
@@ -161,6 +172,8 @@ class Model:
     def beta_z(self) -> float: ...
     @property
     def alpha_x(self) -> float | None: ...  # None if rhythmic
+    @property
+    def braking(self) -> float | None: ...  # None if rhythmic or transport is immediate
     @property
     def mu(self) -> float | None: ...  # None if discrete
     @property
@@ -293,6 +306,7 @@ class Model:
         events: ArrayLike | None = None,  # (E,)
     ) -> _Array: ...  # (J,)
     def landscape(self, u: ArrayLike) -> _Array: ...  # (len(u), J, D)
+    def transport(self, u: ArrayLike) -> _Array: ...  # (n,)
     def tau_at(self, phase: float, timing: ArrayLike) -> float: ...  # timing (K,)
     def predict(self, context: _Context) -> Prediction: ...
     def band(
@@ -369,7 +383,7 @@ class ContextMap:
         map: _Map = "auto",
     ) -> ContextMap: ...
     @property
-    def kind(self) -> Literal["linear", "polynomial", "gp"]: ...
+    def kind(self) -> Literal["stacked", "gp", "linear", "polynomial"]: ...
     @property
     def errors(self) -> list[tuple[str, float]]: ...
     @property

@@ -132,7 +132,8 @@ typedef struct {
     /// Length of a tick, in seconds.
     double dt;
     /// Time to 99 % of a changed style, tau, goal or anchor, in seconds; 0 is the paper's immediate switch, and without
-    /// it a tenth of the nominal duration (discrete) or a quarter of the nominal period (rhythmic) serves.
+    /// it a tenth of the nominal duration (discrete) or a quarter of the nominal period (rhythmic) serves. A goal takes
+    /// what remains of the movement if that is longer, unless transport is immediate.
     const double *transition;
     /// Where the controller is put, pdmp_controller_size bytes aligned to pdmp_controller_alignment; its vectors, whose
     /// lengths are the model's, are allocated even so.

@@ -29,7 +29,8 @@ pub struct pdmp_settings {
     /// Length of a tick, in seconds.
     pub dt: f64,
     /// Time to 99 % of a changed style, tau, goal or anchor, in seconds; 0 is the paper's immediate switch, and without
-    /// it a tenth of the nominal duration (discrete) or a quarter of the nominal period (rhythmic) serves.
+    /// it a tenth of the nominal duration (discrete) or a quarter of the nominal period (rhythmic) serves. A goal takes
+    /// what remains of the movement if that is longer, unless transport is immediate.
     pub transition: *const f64,
     /// Where the controller is put, pdmp_controller_size bytes aligned to pdmp_controller_alignment; its vectors, whose
     /// lengths are the model's, are allocated even so.

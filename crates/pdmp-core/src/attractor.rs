@@ -6,9 +6,9 @@
 //! d/du [e; z] = A [e; z] + [w(u); α_zβ_z γ(u)],     A = [0, 1; −α_zβ_z, −α_z]
 //! ```
 //!
-//! where γ = g − g₀ is how far the goal has moved since the start of the step. For cubic w and γ the solution over a
-//! step h is a combination of φ-functions of Ah (Hochbruck and Ostermann, Acta Numerica 19, 2010), so that a step is
-//! stable and exact for every h. The inverse drives z alone by a given y, which is the same problem in one dimension.
+//! where γ = g − g₀ is how far the goal has moved since the start of the step. About a moving frame (`transport`) it is the
+//! same system, with e seen from the frame. For cubic w and γ the solution over a step h is a combination of φ-functions of
+//! Ah (Hochbruck and Ostermann, Acta Numerica 19, 2010), so that a step is stable and exact for every h. The inverse drives z alone by a given y, which is the same problem in one dimension.
 
 use crate::lanes::Real;
 

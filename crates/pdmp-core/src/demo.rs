@@ -155,6 +155,14 @@ impl Demonstration {
         Ok(Self { goal: None, ..self.sampled(position, sampling)? })
     }
 
+    /// Moves a degree of freedom, goal included, as when whole turns are taken off an angle.
+    pub(crate) fn shift(&mut self, dof: usize, by: f64) {
+        self.position.column_mut(dof).iter_mut().for_each(|y| *y += by);
+        if let Some(goal) = &mut self.goal {
+            goal[dof] += by;
+        }
+    }
+
     /// Positions (T, D).
     pub fn position(&self) -> ArrayView2<'_, f64> {
         self.position.view()

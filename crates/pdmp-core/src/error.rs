@@ -137,9 +137,24 @@ pub enum Error {
         /// The longest gap that is interpolated, in seconds.
         max_gap: f64,
     },
+    /// A gap through which a column of unknown unit changes as a wrapped angle does.
+    #[error(
+        "column '{column}': changes by {change:.3} in the gap between t = {from} s and t = {to} s, about a full turn: give its \
+         unit, as in \"{column} [rad]\" or units=, so that an angle goes the shorter way round, or unwrap it first"
+    )]
+    WrapInGap {
+        /// Name of the column.
+        column: String,
+        /// Time of the last sample before the gap, in seconds.
+        from: f64,
+        /// Time of the first sample after it, in seconds.
+        to: f64,
+        /// The change between them.
+        change: f64,
+    },
     /// A recording that does not repeat itself.
     #[error(
-        "no period: the recording repeats itself best after {lag:.3} s, with a correlation of {share:.2}, below {least}; \
+        "no period: the recording repeats itself best after {lag:.3} s, with a correlation of {share:.2}, below {least:.2}; \
          keep the DoFs that repeat, or tell when each cycle begins with events="
     )]
     Aperiodic {
@@ -240,6 +255,29 @@ pub enum Error {
         /// What to use, as the end of the sentence.
         instead: &'static str,
     },
+    /// A demonstration that no style of a model describes.
+    #[error(
+        "the model does not describe this demonstration: the movement of the closest style deviates by {:.0} % of the \
+         demonstration's own, and the forcing it leaves out is {} that left out of the model's demonstrations; check its \
+         DoFs, units and phase, or fit a model with it",
+        100.0 * off,
+        Times(*times)
+    )]
+    Undescribed {
+        /// Deviation of the movement over its own from the mean, by root mean square.
+        off: f64,
+        /// Size of the forcing that is left out, over that which is left out of the demonstrations.
+        times: f64,
+    },
+    /// A demonstration whose style is far larger than those demonstrated.
+    #[error(
+        "the model does not describe this demonstration: its style is {ratio:.1} times as large as the largest of the \
+         demonstrations'; check its units"
+    )]
+    StyleSize {
+        /// Its size over the largest of the demonstrations'.
+        ratio: f64,
+    },
     /// Arguments that are missing or exclude each other.
     #[error("{0}")]
     Arguments(&'static str),
@@ -260,6 +298,15 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+}
+
+/// How many times as much.
+struct Times(f64);
+
+impl fmt::Display for Times {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.0 < 1e4 { write!(f, "{:.1} times", self.0) } else { f.write_str("over 10 000 times") }
+    }
 }
 
 /// Where samples are missing, and what can be done about it.

@@ -15,6 +15,7 @@ use crate::phase::{Canonical, Kind};
 use crate::responses::Curves;
 use crate::sensitivity::{STEPS, Sensitivity};
 use crate::targets::Targets;
+use crate::transport::Transport;
 
 /// Most folds that contexts are dealt to, and the fewest different ones.
 const FOLDS: usize = 10;
@@ -38,6 +39,7 @@ impl<'a> Foresight<'a> {
         aligned: &'a Aligned,
         shown: &'a Targets,
         factors: &'a Factors,
+        transport: &Transport,
         attractor: Attractor,
         canonical: Canonical,
     ) -> Result<Self> {
@@ -47,7 +49,12 @@ impl<'a> Foresight<'a> {
         let back = |State { e, z }| State { e: step[0][0] * e + step[0][1] * z, z: step[1][0] * e + step[1][1] * z };
         let way = std::iter::successors(Some(State { e: 1.0, z: 0.0 }), |state| Some(back(*state)));
         let start: Array1<f64> = match kind {
-            Kind::Discrete => way.take(n_samples).map(|state| state.e).collect(),
+            Kind::Discrete => {
+                // What the frame does not carry comes back as the paper has it.
+                let free = 1.0 + transport.lag(0.0).value;
+                let clock = canonical.clock(n_samples).into_iter();
+                way.zip(clock).map(|(state, u)| free * state.e - transport.lag(u).value).collect()
+            }
             Kind::Rhythmic => Array1::zeros(n_samples),
         };
         let sampled = aligned.clone().resampled(n_samples);

@@ -22,6 +22,7 @@
 //! | – | `u`, `clock` | | – | u̇ = 1/τ: x = exp(−α_x u), φ = u mod 2π |
 //! | s, S | `style`, `styles` | (J,), (M, J) | – | style parameter |
 //! | b(x; W), w | `basis`, `landscape` | (J, D) | DoF unit | attractor landscape per style, and the same times its gate |
+//! | m(u) | `transport` | | | share of the way from start to goal that the frame has covered |
 //! | U: h ↦ s | `ContextMap` | | | from a condition to style, goal, start or anchor, and timing |
 //!
 //! Time is axis 0 of every array that has a time axis.
@@ -77,6 +78,7 @@ mod file;
 mod fit;
 mod follower;
 mod foresight;
+pub mod inspection;
 mod jacobian;
 mod landscape;
 mod lanes;
@@ -93,6 +95,7 @@ mod spline;
 mod tabulate;
 mod targets;
 mod threads;
+mod transport;
 mod unit_responses;
 
 pub use align::{Alignment, Template, TimeScaling, Warp};
@@ -114,3 +117,4 @@ pub use responses::Derivative;
 pub use rollout::Timing;
 pub use smooth::{Noise, Smoothing};
 pub use threads::Threads;
+pub use transport::TransportChoice;

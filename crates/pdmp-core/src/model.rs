@@ -9,11 +9,13 @@ use crate::attractor::{Attractor, State};
 use crate::context::{ContextMap, Prediction};
 use crate::demo::ContextValue;
 use crate::error::{Error, Result, check_vector};
+use crate::inspection::Finding;
 use crate::landscape::Landscape;
 use crate::lanes::{Lanes, groups};
 use crate::phase::{Canonical, Kind};
 use crate::responses::Cache;
 use crate::smooth::Noise;
+use crate::transport::Transport;
 
 /// What was learnt from each demonstration, in absolute coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,13 +60,22 @@ pub struct Learnt {
     pub left_over: Option<Array2<f64>>,
     /// The basis functions, in one line.
     pub basis: String,
+    /// What was implausible about the demonstrations or the fit; empty in a model that was read from a file.
+    pub findings: Vec<Finding>,
 }
+
+/// Most by which a predicted duration may leave the range of the demonstrations': far outside of their contexts its
+/// logarithm may be anything.
+const MAX_DURATION_RATIO: f64 = 3.0;
 
 /// A parametric dynamic movement primitive.
 #[derive(Clone, Debug)]
 pub struct Model {
     pub(crate) attractor: Attractor,
     pub(crate) landscape: Landscape,
+    pub(crate) transport: Transport,
+    /// κ, per unit of the clock, at which a movement brakes past its end; none where transport is immediate, and rhythmic.
+    pub(crate) braking: Option<f64>,
     pub(crate) tau: f64,
     pub(crate) names: Vec<String>,
     pub(crate) units: Vec<String>,
@@ -84,7 +95,14 @@ impl Model {
     pub(crate) fn with_cycle(mut self) -> Self {
         let shape = (self.n_dofs(), self.n_styles());
         self.cycle = match self.kind() {
-            Kind::Discrete => vec![State::default(); groups(shape.0) * shape.1],
+            Kind::Discrete => {
+                if let Some(braking) = self.braking {
+                    let end = from_rest(self.attractor, &self.landscape, shape);
+                    let z: Vec<Lanes> = end.iter().map(|state| state.z).collect();
+                    self.landscape = self.landscape.braked(self.attractor.alpha_z, braking, &z);
+                }
+                vec![State::default(); groups(shape.0) * shape.1]
+            }
             Kind::Rhythmic => steady_cycle(self.attractor, &self.landscape, shape),
         };
         self
@@ -166,7 +184,8 @@ impl Model {
         self.map.as_ref()
     }
 
-    /// The movement for a context (Q,), as in Section 4.1.2.
+    /// The movement for a context (Q,), as in Section 4.1.2. Its duration is at least a third of the shortest
+    /// demonstration's and at most three times the longest one's.
     ///
     /// # Errors
     /// A model without contexts, a context of another length, a label never shown, or a number that is not finite.
@@ -174,7 +193,11 @@ impl Model {
         let map = self.map.as_ref().ok_or(Error::Arguments(
             "the model knows no contexts: fit it with contexts=, or with demonstrations that carry one",
         ))?;
-        Prediction::of(map.predict(context)?, map.freedom(), self.kind(), self.n_styles(), self.n_dofs())
+        let demonstrated = self.demonstrated.durations.iter();
+        let [shortest, longest] =
+            [f64::min, f64::max].map(|of| demonstrated.clone().copied().reduce(of).unwrap_or(1.0));
+        let durations = shortest / MAX_DURATION_RATIO..=longest * MAX_DURATION_RATIO;
+        Prediction::of(map.predict(context)?, map.freedom(), self.kind(), self.n_styles(), self.n_dofs(), durations)
     }
 
     /// The time constant τ = dt/du in seconds at a phase, x or φ, of a movement with the given timing (K,).
@@ -217,6 +240,28 @@ impl Model {
         }
     }
 
+    /// Share m(u) of the way from start to goal that a discrete movement has covered at clock `u`: 1 throughout where
+    /// transport is immediate.
+    ///
+    /// # Errors
+    /// A rhythmic primitive, or a clock that is negative or not finite.
+    pub fn transport(&self, u: f64) -> Result<f64> {
+        if self.kind() == Kind::Rhythmic {
+            let instead = ": it moves about an anchor, which no profile leads to";
+            return Err(Error::Kind { name: "transport", kind: self.kind(), instead });
+        }
+        if !(u.is_finite() && u >= 0.0) {
+            return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative" });
+        }
+        Ok(1.0 + self.transport.lag(u).value)
+    }
+
+    /// Rate κ, per unit of the clock, at which a discrete movement brakes past its end; none where its forcing fades with
+    /// the phase, as it does where transport is immediate.
+    pub fn braking(&self) -> Option<f64> {
+        self.braking
+    }
+
     /// Basis functions b (J, D) by rows at clock `u`: the landscape without its gate.
     ///
     /// # Errors
@@ -238,20 +283,26 @@ impl Model {
     }
 }
 
-/// The state from which one turn leads back to itself, (I − exp(2πA))⁻¹ times the response of a turn from rest.
-fn steady_cycle(attractor: Attractor, landscape: &Landscape, (n_dofs, n_styles): (usize, usize)) -> Vec<State<Lanes>> {
+/// The states to which the demonstrated stretch leads from rest, of unit styles, by groups of DoFs and styles.
+fn from_rest(attractor: Attractor, landscape: &Landscape, (n_dofs, n_styles): (usize, usize)) -> Vec<State<Lanes>> {
     let cells = landscape.cells();
-    let cell = attractor.propagator(TAU / cells as f64);
+    let cell = attractor.propagator(landscape.canonical().extent() / cells as f64);
+    let mut states = Vec::with_capacity(groups(n_dofs) * n_styles);
+    for group in 0..groups(n_dofs) {
+        states.extend((0..n_styles).map(|j| {
+            let jet = |k: usize| landscape.knot(k, group, j);
+            (0..cells).fold(State::default(), |state, k| cell.advance(state, [jet(k), jet(k + 1)]))
+        }));
+    }
+    states
+}
+
+/// The states from which one turn leads back to itself, (I − exp(2πA))⁻¹ times the response of a turn from rest.
+fn steady_cycle(attractor: Attractor, landscape: &Landscape, shape: (usize, usize)) -> Vec<State<Lanes>> {
     let [[a, b], [c, d]] = attractor.propagator(TAU).transition();
     // A stable system never returns to where it was unforced: the determinant is positive.
     let scale = 1.0 / ((1.0 - a) * (1.0 - d) - b * c);
-    let mut cycle = Vec::with_capacity(groups(n_dofs) * n_styles);
-    for group in 0..groups(n_dofs) {
-        for j in 0..n_styles {
-            let jet = |k: usize| landscape.knot(k, group, j);
-            let State { e, z } = (0..cells).fold(State::default(), |s, k| cell.advance(s, [jet(k), jet(k + 1)]));
-            cycle.push(State { e: (e * (1.0 - d) + z * b) * scale, z: (e * c + z * (1.0 - a)) * scale });
-        }
-    }
-    cycle
+    let closed =
+        |State { e, z }: State<Lanes>| State { e: (e * (1.0 - d) + z * b) * scale, z: (e * c + z * (1.0 - a)) * scale };
+    from_rest(attractor, landscape, shape).into_iter().map(closed).collect()
 }

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! where Rⱼ is the movement of the j-th unit style about zero, from zero (discrete) or on its cycle (rhythmic), E the way
-//! back from a start of one, and V what a start velocity of one adds. Where no start velocity is given the last term
+//! from a start of one to a goal of zero, 1 − m(u) where a transport was learnt, and V what a start velocity of one adds. Where no start velocity is given the last term
 //! is missing, and the one before it where a rhythmic movement is given no start. Velocities and accelerations are
 //! made of the curves' derivatives in the same way. All curves are rollouts, so that they repeat the control loop.
 

@@ -4,6 +4,7 @@
 mod common;
 
 use common::*;
+use ndarray::Array2;
 use pdmp_core::{Canonical, DofScale, Error, Kind, Sampling, StyleCount, Timing, fit, style_of};
 
 /// Targets followed by generation give every demonstration back, at its own duration, J = M.
@@ -110,6 +111,53 @@ fn style_of_finds_demonstrations_again() {
             assert!((s - model.demonstrated().styles[[m, j]]).abs() < 2e-3, "{m} {j} {s}");
         }
     }
+}
+
+/// A cycle that begins elsewhere is turned to the phase of the model: it has the style that it has from there.
+#[test]
+fn style_of_finds_a_cycle_in_any_phase() {
+    let demos = cycles();
+    let model =
+        learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(2).into(), ..options(Kind::Rhythmic) });
+    for (m, demo) in demos.iter().enumerate() {
+        let expected = style_of(&model, demo, None, None, None).unwrap();
+        let n = demo.n_samples();
+        for lead in [n / 7, n / 2, n - 3] {
+            let turned = Array2::from_shape_fn(demo.position().dim(), |(c, d)| demo.position()[[(c + lead) % n, d]]);
+            let turned = pdmp_core::Demonstration::new(turned, demo.sampling().clone()).unwrap();
+            let style = style_of(&model, &turned, None, None, None).unwrap();
+            for (found, expected) in style.iter().zip(&expected) {
+                assert!((found - expected).abs() < 5e-3, "{m}, {lead}: {found} is not {expected}");
+            }
+        }
+    }
+}
+
+/// What no style describes is refused with the size of the deviation: other movements, other units. Styles without
+/// effect, of equal demonstrations, come out as they were, not as quotients of rounding.
+#[test]
+fn style_of_refuses_what_the_model_does_not_describe() {
+    let demos = reaches();
+    let model =
+        learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(2).into(), ..options(Kind::Discrete) });
+    let changed = |change: &dyn Fn(usize, f64) -> f64| {
+        let position =
+            Array2::from_shape_fn(demos[1].position().dim(), |(c, d)| change(c, demos[1].position()[[c, d]]));
+        let demo = pdmp_core::Demonstration::new(position, demos[1].sampling().clone()).unwrap();
+        style_of(&model, &demo, None, None, None)
+    };
+    assert!(changed(&|_, y| y).is_ok());
+    assert!(matches!(changed(&|_, y| 57.3 * y), Err(Error::StyleSize { ratio }) if ratio > 10.0));
+    let other = changed(&|c, y| y + (0.5 * c as f64).sin());
+    assert!(matches!(other, Err(Error::Undescribed { off, times }) if off > 0.5 && times > 3.0), "{other:?}");
+
+    let equal = vec![demos[1].clone(); 4];
+    let model =
+        learn(&equal, &pdmp_core::FitOptions { styles: StyleCount::Given(3).into(), ..options(Kind::Discrete) });
+    let style = style_of(&model, &equal[0], None, None, None).unwrap();
+    assert!(style.iter().all(|s| s.abs() <= 1.0), "{style:?}");
+    let style = style_of(&model, &demos[2], None, None, None);
+    assert!(style.is_err() || style.unwrap().iter().all(|s| s.abs() < 10.0));
 }
 
 /// Without noise, a goal given for a demonstration takes the place of its last sample.

@@ -30,7 +30,20 @@ fn apart(model: &Model, a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).zip(model.ranges()).map(|((a, b), range)| (a - b).abs() / range).fold(0.0, f64::max)
 }
 
-/// State of the equations written down again: positions, z and the phase's clock.
+/// Where a frame about a goal lies from it: (g − y₀)(m − 1).
+fn frame(model: &Model, d: usize, u: f64) -> f64 {
+    let demonstrated = model.demonstrated();
+    match model.kind() {
+        Kind::Discrete => {
+            let [goal, start] =
+                [&demonstrated.goals, &demonstrated.starts].map(|places| places[[demonstrated.nominal, d]]);
+            (goal - start) * (model.transport(u).unwrap() - 1.0)
+        }
+        Kind::Rhythmic => 0.0,
+    }
+}
+
+/// State of the equations written down again: positions in the frame, z and the phase's clock.
 type Plain = (Vec<f64>, Vec<f64>, f64);
 
 /// What τẏ, τż and τu̇ are under a velocity c_v, an acceleration c_a and a pace κ.
@@ -75,7 +88,7 @@ fn perturbed_movement_solves_the_stated_equations() {
         let mut controller = controller(model);
         controller.set_compliance(stopping, tracking).unwrap();
         // From rest where the cycle would start on its cycle: z is then not seen from outside.
-        let start = controller.position().to_vec();
+        let start: Vec<f64> = (0..n).map(|d| controller.position()[d] - frame(model, d, 0.0)).collect();
         let rest = controller.velocity().iter().map(|v| v * model.tau());
         let at_start = slopes(model, &(start.clone(), vec![0.0; n], 0.0), &vec![0.0; n], &vec![0.0; n], 1.0).0;
         let z = rest.zip(&at_start).map(|(flow, w)| flow - w * model.tau()).collect();
@@ -95,10 +108,12 @@ fn perturbed_movement_solves_the_stated_equations() {
             for _ in 0..4 {
                 plain = rk4(model, &plain, dt / 4.0, &pushed, &acceleration[..n], pace);
             }
-            assert!(apart(model, controller.position(), &plain.0) < 1e-7);
+            let position: Vec<f64> = (0..n).map(|d| plain.0[d] + frame(model, d, plain.2)).collect();
+            assert!(apart(model, controller.position(), &position) < 1e-7);
         }
         let slope = slopes(model, &plain, &pushed, &acceleration[..n], pace);
-        assert!((0..n).all(|d| (slope.0[d] - controller.velocity()[d]).abs() < 1e-6));
+        let rise = |d: usize| (frame(model, d, plain.2 + 1e-6) - frame(model, d, plain.2 - 1e-6)) / 2e-6 * slope.2;
+        assert!((0..n).all(|d| (slope.0[d] + rise(d) - controller.velocity()[d]).abs() < 1e-6));
         assert!((controller.phase() - model.canonical().phase(plain.2)).abs() < 1e-9);
     }
 }
@@ -183,7 +198,7 @@ fn held_and_let_go_it_continues() {
             pdmp_core::Canonical::Discrete { alpha_x, u_end } => (phase / held.phase()).ln() / alpha_x / u_end,
             pdmp_core::Canonical::Rhythmic { .. } => (held.phase() - phase) / std::f64::consts::TAU,
         };
-        assert!((0.0..0.1).contains(&gone), "{gone}");
+        assert!((0.0..0.12).contains(&gone), "{gone}");
         let before = held.position().to_vec();
         let mut ticks = 0;
         loop {

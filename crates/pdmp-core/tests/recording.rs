@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use ndarray::{Array1, Array2, Axis, concatenate, s};
 use pdmp_core::recording::{self, Cycles, Keep, Reason};
-use pdmp_core::{Demonstration, FitOptions, Kind, Result, Sampling};
+use pdmp_core::{Demonstration, FitOptions, Kind, Result, Sampling, Smoothing};
 use proptest::prelude::*;
 
 const DT: f64 = 0.01;
@@ -16,6 +16,35 @@ fn noise(mut state: u64) -> impl FnMut() -> f64 {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
+}
+
+/// Standard normal numbers: Box and Muller's from those.
+fn normal(seed: u64) -> impl FnMut() -> f64 {
+    let mut even = noise(seed);
+    move || (-2.0 * (0.5 - 0.5 * even()).ln()).sqrt() * (PI * even()).cos()
+}
+
+/// `position` with white noise of so many times the range of each DoF.
+fn noisy(mut position: Array2<f64>, share: f64, seed: u64) -> Array2<f64> {
+    let mut normal = normal(seed);
+    for mut column in position.columns_mut() {
+        let range = column.iter().fold(f64::MIN, |m, y| m.max(*y)) - column.iter().fold(f64::MAX, |m, y| m.min(*y));
+        column.mapv_inplace(|y| y + share * range * normal());
+    }
+    position
+}
+
+/// Correlation of the second differences of a column with themselves one sample later: −2/3 of white noise.
+fn roughness(column: &[f64]) -> f64 {
+    let bends: Vec<f64> = column.windows(3).map(|y| y[0] - 2.0 * y[1] + y[2]).collect();
+    bends.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / bends.iter().map(|b| b * b).sum::<f64>()
+}
+
+/// Styles that a smoothed fit finds.
+fn n_styles(kind: Kind, demos: &[Demonstration]) -> usize {
+    let mut options = FitOptions::new(kind);
+    options.alignment.smoothing = Smoothing::Auto;
+    pdmp_core::fit(demos, &options, &mut |_, _| Ok(())).unwrap().n_styles()
 }
 
 /// Both hips, a knee and the pelvis' height at a phase of a walk, in rad and m.
@@ -90,10 +119,47 @@ fn what_has_no_period_is_refused_with_the_figure() {
     let noisy = Array2::from_shape_fn((200, 3), |_| random());
     for position in [reaching, noisy] {
         let message = one(recorded(position)).unwrap_err().to_string();
-        assert!(message.starts_with("demo 0: no period") && message.contains("below 0.5"), "{message}");
+        assert!(message.starts_with("demo 0: no period") && message.contains(", below 0."), "{message}");
     }
     let message = recording::period(&recorded(Array2::ones((50, 2)))).unwrap_err().to_string();
     assert!(message.contains("stands still"), "{message}");
+}
+
+/// Noise repeats itself by chance alone, whatever it remembers: at most two of fifty recordings have a period.
+#[test]
+fn noise_has_no_period() {
+    // A first-order filter of this share, twice, and then summed so many times.
+    for (keep, n_sums) in [(0.0, 0), (0.5, 0), (0.8, 0), (0.9, 0), (0.97, 0), (0.0, 1), (0.0, 2)] {
+        let found = (0..50).filter(|&seed| {
+            let (mut normal, n, n_dofs) =
+                (normal(seed + 1), [60, 100, 200, 400][seed as usize % 4], 1 + seed as usize % 3);
+            let mut position = Array2::from_shape_fn((n, n_dofs), |_| normal());
+            for mut column in position.columns_mut() {
+                for share in [keep, keep, 1.0, 1.0].into_iter().take(2).chain(vec![1.0; n_sums]) {
+                    let mut last = 0.0;
+                    column.mapv_inplace(|y| {
+                        last = share * last + y;
+                        last
+                    });
+                }
+            }
+            recording::period(&recorded(position)).is_ok()
+        });
+        let found = found.count();
+        assert!(found <= 2, "filter {keep}, {n_sums} sums: {found} of 50");
+    }
+}
+
+/// A movement that repeats itself is found in two periods, through noise, and in many periods through much noise.
+#[test]
+fn short_and_noisy_recordings_have_their_period() {
+    for (n, share) in [(200, 0.0), (200, 0.02), (200, 0.05), (250, 0.1), (300, 0.2), (3000, 0.4)] {
+        for seed in 1..6 {
+            let position = noisy(walk(&even(n), |t| TAU * t + seed as f64), share, seed);
+            let period = recording::period(&recorded(position)).unwrap();
+            assert_relative_eq!(period, 1.0, max_relative = 0.05);
+        }
+    }
 }
 
 /// Strides whose cadence swings by 7 % are cut where they end, to 2 % of a stride; even ones would miss by a fifth.
@@ -150,6 +216,91 @@ fn cycles_of_all_recordings_begin_in_one_phase() {
     for cycle in &found.kept {
         for (d, y) in pose(0.4).into_iter().enumerate() {
             assert_abs_diff_eq!(cycle.demo.position()[[0, d]], y, epsilon = 0.02);
+        }
+    }
+}
+
+/// Cycles of noisy strides are learnt as the one stride that they are: their noise is as white as it was recorded.
+#[test]
+fn noise_of_cycles_stays_white_and_is_no_style() {
+    for (period, share) in [(1.035, 0.002), (1.0037, 0.005), (2.002, 0.01)] {
+        let n = (20.5 * period / DT) as usize;
+        let position = noisy(walk(&even(n), |t| TAU * t / period), share, 7);
+        let as_recorded = roughness(&position.column(0).to_vec());
+        let demos: Vec<_> = one(recorded(position)).unwrap().kept.into_iter().map(|cycle| cycle.demo).collect();
+        let mean = demos.iter().map(|demo| roughness(&demo.position().column(0).to_vec())).sum::<f64>() / 20.0;
+        assert_abs_diff_eq!(mean, as_recorded, epsilon = 0.1);
+        assert_eq!(n_styles(Kind::Rhythmic, &demos), 1);
+    }
+}
+
+/// Each recording is cut at the rate at which it was recorded, not at that of the first.
+#[test]
+fn cycles_are_no_denser_than_their_recording() {
+    let fast = recorded(walk(&even(450), |t| TAU * t));
+    let time: Vec<f64> = (0..150).map(|c| f64::from(c) * 0.03).collect();
+    let slow = Demonstration::new(walk(&time, |t| TAU * t), Sampling::Uniform { dt: 0.03 }).unwrap();
+    let found = recording::cycles(&[fast, slow], None, Keep::Each).unwrap();
+    for cycle in &found.kept {
+        assert_eq!(cycle.demo.n_samples(), [100, 33][cycle.recording]);
+    }
+    assert!(found.kept.iter().any(|cycle| cycle.recording == 1));
+}
+
+/// A reach and a rest among walks are rejected as wholes; alone, they are errors.
+#[test]
+fn recordings_without_a_period_are_rejected_among_others() {
+    let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+    let reaching = recorded(Array2::from_shape_fn((200, 4), |(c, d)| reach(c as f64 / 199.0) * (d as f64 - 1.5)));
+    let still = recorded(Array2::ones((80, 4)));
+    let walking = recorded(walk(&even(500), |t| TAU * t));
+    let found = recording::cycles(&[reaching.clone(), walking, still.clone()], None, Keep::Each).unwrap();
+    assert!(found.kept.len() >= 4 && found.kept.iter().all(|cycle| cycle.recording == 1));
+    let [first, second] = &found.rejected[..] else { panic!("{:?}", found.rejected) };
+    assert!(matches!(first.reason, Reason::Aperiodic { .. }) && first.reason.to_string().contains("no period"));
+    assert_eq!((first.recording, first.start, first.period), (0, 0.0, 1.99));
+    assert_eq!((second.recording, second.reason), (2, Reason::Still));
+    assert!(recording::cycles(&[still, reaching], None, Keep::Each).unwrap_err().to_string().contains("stands still"));
+}
+
+/// A crank turns on by a turn per cycle: all its closed cycles are about one mean, and the turns are reported.
+#[test]
+fn turns_are_taken_off_from_cycle_to_cycle() {
+    for (unit, turn) in [("rad", TAU), ("deg", -360.0), ("", TAU), ("rad", -2.0 * TAU)] {
+        let crank = |t: f64| turn * (t + 0.02 * (TAU * t).sin());
+        let position = concatenate![
+            Axis(1),
+            walk(&even(620), |t| TAU * t),
+            Array1::from_iter(even(620).into_iter().map(crank)).insert_axis(Axis(1))
+        ];
+        let units = ["rad", "rad", "rad", "m", unit].map(String::from).to_vec();
+        let found = one(recorded(position).with_units(units).unwrap()).unwrap();
+        assert_eq!(found.kept.len(), 6);
+        let [growth] = &found.growths[..] else { panic!("{:?}", found.growths) };
+        let turns = if unit == "deg" { turn / 360.0 } else { turn / TAU };
+        assert_eq!((growth.dof, f64::from(growth.turns)), (4, turns));
+        for cycle in &found.kept {
+            assert_relative_eq!(cycle.gain[4], turn, max_relative = 1e-2);
+            let away = &cycle.demo.position().column(4) - 0.5 * turn;
+            assert!(away.iter().all(|y| y.abs() < 0.05 * turn.abs()), "{unit}: {away}");
+            assert!(seam(&cycle.demo) < 1.1);
+        }
+    }
+}
+
+/// What gains more in each cycle than it moves is reported with the gain, unless it is little.
+#[test]
+fn gains_that_surpass_the_movement_are_reported() {
+    for (gain, reported) in [(0.5, false), (1.4, true), (5.0, true)] {
+        let mut position = walk(&even(500), |t| TAU * t);
+        position.column_mut(0).iter_mut().zip(even(500)).for_each(|(y, t)| *y += gain * t);
+        // A column at rest gains nothing but rounding.
+        position = concatenate![Axis(1), position, Array2::from_elem((500, 1), 0.1 + gain)];
+        let found = one(recorded(position)).unwrap();
+        assert_eq!(found.growths.len(), usize::from(reported), "{gain}: {:?}", found.growths);
+        for growth in found.growths {
+            assert_relative_eq!(growth.gain, gain, max_relative = 0.02);
+            assert_eq!((growth.recording, growth.dof, growth.turns), (0, 0, 0));
         }
     }
 }
@@ -228,6 +379,45 @@ fn resampling_is_exact_for_cubics_at_irregular_stamps() {
     }
 }
 
+/// Noisy reaches at twice the rate, at half of it and cut between samples need the one style that the clean ones do.
+#[test]
+fn reaches_sampled_anew_are_learnt_as_easily_as_recorded() {
+    let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+    for share in [0.0, 0.001, 0.003] {
+        let demos: Vec<_> = (0..40)
+            .map(|seed| {
+                let path = |(c, d): (usize, usize)| reach(c as f64 / 100.0) * [1.0, -0.4][d];
+                recorded(noisy(Array2::from_shape_fn((101, 2), path), share, seed + 1))
+            })
+            .collect();
+        let anew = |f: &dyn Fn(&Demonstration) -> Demonstration| demos.iter().map(f).collect::<Vec<_>>();
+        for demos in [
+            anew(&|demo| recording::resample(demo, 0.5 * DT).unwrap()),
+            anew(&|demo| recording::resample(demo, 0.3 * DT).unwrap()),
+            anew(&|demo| recording::resample(demo, 2.0 * DT).unwrap()),
+            anew(&|demo| recording::cut(demo, &[0.0037, 0.9962]).unwrap().remove(0)),
+        ] {
+            assert_eq!(n_styles(Kind::Discrete, &demos), 1, "noise {share}, {} samples", demos[0].n_samples());
+        }
+    }
+}
+
+/// At the times of the recording nothing changes, noise or not; between them clean samples are met to 1e-6.
+#[test]
+fn resampling_keeps_what_was_recorded() {
+    let clean = walk(&even(301), |t| TAU * t / 1.3);
+    let rough = noisy(clean.clone(), 0.02, 3);
+    let same = recording::resample(&recorded(rough.clone()), DT).unwrap();
+    let every = recording::resample(&recorded(clean), 0.5 * DT).unwrap();
+    let finer: Vec<f64> = (0..601).map(|c| 0.5 * DT * f64::from(c)).collect();
+    for (made, meant, tolerance) in [(same, rough, 1e-12), (every, walk(&finer, |t| TAU * t / 1.3), 1e-6)] {
+        assert_eq!(made.n_samples(), meant.nrows());
+        for (a, b) in made.position().iter().zip(&meant) {
+            assert_abs_diff_eq!(a, b, epsilon = tolerance);
+        }
+    }
+}
+
 /// Parts begin and end at the times given, and meet there.
 #[test]
 fn parts_meet_at_the_times_that_cut_them() {
@@ -254,7 +444,34 @@ fn trimming_leaves_the_movement() {
     let expected = 1.5 * (1.0 - 2.0 * edge) / DT;
     assert_abs_diff_eq!(trimmed.n_samples() as f64, expected, epsilon = 2.0);
     assert!(recording::trim(&recorded(position), 1.0).unwrap_err().to_string().contains("threshold = 1"));
+    let step = Array2::from_shape_fn((30, 1), |(c, _)| f64::from(u8::from(c > 15)));
+    let message = recording::trim(&recorded(step), 0.9).unwrap_err().to_string();
+    assert!(message.contains("threshold = 0.9: leaves fewer than 4 samples"), "{message}");
     assert!(recording::trim(&recorded(Array2::zeros((9, 2))), 0.05).unwrap_err().to_string().contains("stands still"));
+}
+
+/// Noise of up to 2 % of the range takes no rest for movement and no movement for rest, nor does a jump.
+#[test]
+fn trimming_is_not_misled_by_noise_or_a_jump() {
+    let share = |t: f64| ((t - 0.8) / 1.0).clamp(0.0, 1.0);
+    let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+    let clean = Array2::from_shape_fn((261, 2), |(c, d)| [1.0, -0.4][d] * reach(share(c as f64 * DT)));
+    let stamped = |position| Demonstration::new(position, Sampling::Stamped { time: even(261) }).unwrap();
+    let ends = |position: Array2<f64>| {
+        let trimmed = recording::trim(&stamped(position), 0.05).unwrap();
+        let Sampling::Stamped { time } = trimmed.sampling() else { panic!("no stamps") };
+        [time[0], time[time.len() - 1]]
+    };
+    let [first, last] = ends(clean.clone());
+    for (noise, slack) in [(0.001, 0.04), (0.003, 0.05), (0.01, 0.09), (0.02, 0.12)] {
+        for seed in 1..11 {
+            let found = ends(noisy(clean.clone(), noise, seed));
+            assert_abs_diff_eq!(&found[..], &[first, last][..], epsilon = slack);
+        }
+    }
+    let mut jumping = clean;
+    jumping.slice_mut(s![130.., ..]).mapv_inplace(|y| y + 0.5);
+    assert_abs_diff_eq!(&ends(jumping)[..], &[first, last][..], epsilon = 0.02);
 }
 
 /// A sine at the cut-off keeps half its amplitude, where it was: without lag.

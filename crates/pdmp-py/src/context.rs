@@ -12,10 +12,13 @@ use crate::fit::map_of;
 /// A map from contexts to outputs, with the covariance of what it predicts.
 ///
 /// What `fit` learns from contexts to style, goal, start and duration (Section 4.1.2 of the paper), for any outputs:
-/// y = φ(h)ᵀβ + f(h) + ε for each principal component. "linear" is least squares, φ = (1, h) and no f; "polynomial" and "gp" have a constant and a
-/// Gaussian process f, with the kernel of the polynomials of second degree or Matérn-5/2. The ratio of f to the noise is
-/// found by restricted maximum likelihood, for each component; the length, by the error at contexts left out. Numbers are compared by their spread,
-/// labels by whether they are the same; repetitions of one context are averaged and count once.
+/// y = φ(h)ᵀβ + f(h) + ε for each principal component. "linear" is least squares, φ = (1, h) and no f; "polynomial" and
+/// "gp" have a constant and a Gaussian process f, with the kernel of the polynomials of second degree or Matérn-5/2. The
+/// ratio of f to the noise is found by restricted maximum likelihood, for each component; the length, by the error at
+/// contexts left out. "stacked" combines the deviations g of "gp" and l of a line with penalised slopes from the mean,
+/// w_g·g + w_l·l, with the weights of least error at contexts left out: w_g + w_l = 1 inside of the contexts given,
+/// w_g + w_l ≤ 1 from a tenth of their range outside on. Numbers are compared by their spread, labels by whether they are
+/// the same; repetitions of one context are averaged and count once.
 ///
 /// Parameters
 /// ----------
@@ -23,9 +26,8 @@ use crate::fit::map_of;
 ///     Conditions.
 /// outputs : (M, P) array_like
 ///     What was shown in each.
-/// map : {"auto", "linear", "polynomial", "gp"}
-///     "auto" is the Gaussian process, unless another map is better at contexts left out by more than two standard
-///     errors; linear for fewer than 4 different contexts, and for more than 1024.
+/// map : {"auto", "stacked", "gp", "linear", "polynomial"}
+///     As for `fit`.
 ///
 /// Raises
 /// ------

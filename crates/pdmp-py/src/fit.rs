@@ -6,6 +6,7 @@ use ndarray::Array2;
 use pdmp_core::basis::Basis;
 use pdmp_core::{
     Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Smoothing, Stage, StyleChoice, StyleCount, TimeScaling,
+    TransportChoice,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -36,10 +37,12 @@ use crate::warp::Warp;
 ///     Periods in s of time-stamped cycles.
 /// contexts : (M, Q) array_like, or M lists of Q numbers and labels, optional
 ///     The condition of each demonstration; otherwise those that they carry.
-/// map : {"auto", "linear", "polynomial", "gp"}
-///     What leads from contexts to movements: least squares as in the paper, ridge regression on polynomials of second
-///     degree, or a Gaussian process. "auto" is the process, unless another is better at contexts left out by more
-///     than two standard errors, and linear for fewer than 4 different contexts or more than 1024; `model.map` tells.
+/// map : {"auto", "stacked", "gp", "linear", "polynomial"}
+///     Map from contexts to movements: a Gaussian process and a penalised line, weighted by their errors at contexts
+///     left out, outside of the contexts of the demonstrations together with the mean ("stacked"); the process alone;
+///     least squares as in the paper; or ridge regression on polynomials of second degree. "auto" is "stacked", and
+///     "linear" for labels alone, which get the mean of their demonstrations each, for two different contexts and for
+///     more than 1024. The repr of `model.map` has the weights.
 /// n_styles : int or "auto", optional
 ///     Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular
 ///     values, at least five (or half of the demonstrations) and as many as the contexts explain (F-test), but none
@@ -58,13 +61,20 @@ use crate::warp::Warp;
 /// n_samples : int, optional
 ///     Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
 ///     than 150.
+/// transport : {"learnt", "immediate"}
+///     How the way from start to goal is spread over a discrete movement: along the profile by which the demonstrations
+///     cover theirs (:meth:`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path.
+///     Past its end a movement brakes (:attr:`Model.braking`), or its forcing fades with the phase as in the paper.
 /// dof_scale : None, "unit", "range" or (D,) array_like
 ///     Unit of each degree of freedom in the factorisation. By default as recorded ("unit") where all units are equal or
 ///     unknown; otherwise the degrees of freedom of each unit are scaled together by the largest range among them.
 ///     "range" scales each by its own range. If given as numbers, in a warp of time too.
 /// alignment : {"linear", "warp"} or Warp
 ///     How time is scaled to that of the nominal demonstration: linearly, or by the monotone warp that brings the
-///     demonstrations closest to each other, where they pause or hurry in different places.
+///     demonstrations closest to each other, where they pause or hurry in different places. A `Warp` is applied as given;
+///     "warp" has eight segments, fewer where a demonstration has fewer than 16 samples, and with at least three
+///     different contexts is applied only if it lowers the error at contexts held out by more than its standard error;
+///     `model.timings` has one column where it is not.
 /// events : (M, E) array_like, optional
 ///     Times in s of E landmarks in each demonstration, from its first sample or of its time stamps, in place of a
 ///     warp: all are aligned to those of the nominal demonstration.
@@ -73,9 +83,9 @@ use crate::warp::Warp;
 /// alpha_z, beta_z : float
 ///     Constants of the output system; `beta_z` is `alpha_z / 4` (critical damping) unless given.
 /// alpha_x : float, optional
-///     Constant of the discrete canonical system; otherwise x = 0.01 at the end. Past the end of the demonstrations
-///     the forcing fades with x: if a movement drifts off its goal there before it settles, `alpha_x = alpha_z` keeps
-///     it closest.
+///     Constant of the discrete canonical system; otherwise x = 0.01 at the end. Where transport is immediate the
+///     forcing fades with x past the end of the demonstrations: if a movement drifts off its goal there before it
+///     settles, `alpha_x = alpha_z` keeps it closest.
 /// mu : float
 ///     Constant of the rhythmic canonical system.
 /// threads : int, optional
@@ -86,6 +96,13 @@ use crate::warp::Warp;
 /// Returns
 /// -------
 /// Model
+///
+/// Warns
+/// -----
+/// UserWarning
+///     Samples that no movement makes, with their place: time stamps far closer than the others, dropouts written as
+///     zeros, padding, counters and time stamps among the columns, wrapped angles, angles of different demonstrations
+///     whole turns apart (taken off where units say that they are angles), and an `alpha_z` too high for the samples.
 ///
 /// Raises
 /// ------
@@ -100,11 +117,11 @@ use crate::warp::Warp;
 #[pyfunction]
 #[pyo3(signature = (
     demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, spectrum=None, basis=None,
-    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, dof_scale=None, alignment=None, events=None, tau=None, alpha_z=25.0,
-    beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
+    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, transport="learnt", dof_scale=None,
+    alignment=None, events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
 ), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, spectrum=None, \
-    basis='gp', smoothing='auto', nominal=None, n_samples=None, dof_scale=None, alignment='linear', events=None, \
-    tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
+    basis='gp', smoothing='auto', nominal=None, n_samples=None, transport='learnt', dof_scale=None, \
+    alignment='linear', events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -120,6 +137,7 @@ pub(crate) fn fit(
     smoothing: SmoothingArgument,
     nominal: Option<isize>,
     n_samples: Option<isize>,
+    transport: &str,
     dof_scale: Option<&Bound<'_, PyAny>>,
     alignment: Option<&Bound<'_, PyAny>>,
     events: Option<&Bound<'_, PyAny>>,
@@ -146,6 +164,7 @@ pub(crate) fn fit(
         map: map_of(map)?,
         styles: style_choice(n_styles, spectrum)?,
         basis: basis_of(basis)?,
+        transport: transport_of(transport)?,
         dof_scale: dof_scale_of(dof_scale)?,
         tau,
         alpha_z,
@@ -159,6 +178,7 @@ pub(crate) fn fit(
         None => Ok(()),
     };
     let model = detached(py, show, |proceed| pdmp_core::fit(&demos, &options, proceed))?;
+    crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
 }
 
@@ -230,7 +250,7 @@ pub(crate) fn map_of(map: &str) -> PyResult<MapChoice> {
         return Ok(MapChoice::Auto);
     }
     let found = MapKind::ALL.into_iter().find(|kind| kind.name() == map);
-    let wanted = "must be \"auto\", \"linear\", \"polynomial\" or \"gp\"";
+    let wanted = "must be \"auto\", \"stacked\", \"gp\", \"linear\" or \"polynomial\"";
     found.map(MapChoice::Given).ok_or_else(|| PyValueError::new_err(format!("map = {map:?}: {wanted}")))
 }
 
@@ -278,7 +298,7 @@ fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
     }
     match alignment.extract::<String>().as_deref() {
         Ok("linear") => Ok(TimeScaling::Linear),
-        Ok("warp") => Ok(TimeScaling::Warp(Default::default())),
+        Ok("warp") => Ok(TimeScaling::WarpIfBetter),
         _ => {
             let wanted = "must be \"linear\", \"warp\" or pdmp.Warp(...)";
             Err(PyValueError::new_err(format!("alignment = {}: {wanted}", alignment.repr()?)))
@@ -309,6 +329,14 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
                 Err(PyValueError::new_err(format!("smoothing = {}: {wanted}", smoothing.repr()?)))
             }
         }
+    }
+}
+
+fn transport_of(transport: &str) -> PyResult<TransportChoice> {
+    match transport {
+        "learnt" => Ok(TransportChoice::Learnt),
+        "immediate" => Ok(TransportChoice::Immediate),
+        _ => Err(PyValueError::new_err(format!("transport = {transport:?}: must be \"learnt\" or \"immediate\""))),
     }
 }
 

@@ -54,6 +54,13 @@ impl Model {
         self.0.attractor().beta_z
     }
 
+    /// Rate per unit of the clock at which a discrete movement brakes past its end; None if rhythmic, or if transport
+    /// is immediate, where the forcing fades with the phase.
+    #[getter]
+    fn braking(&self) -> Option<f64> {
+        self.0.braking()
+    }
+
     /// Rate of the discrete canonical system; None if rhythmic.
     #[getter]
     fn alpha_x(&self) -> Option<f64> {

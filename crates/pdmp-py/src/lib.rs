@@ -10,6 +10,7 @@ mod demo;
 mod error;
 mod factor;
 mod fit;
+mod inspection;
 mod jacobian;
 mod learnt;
 mod model;
@@ -43,6 +44,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<controller::Controller>()?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
     module.add_function(wrap_pyfunction!(factor::factorise, module)?)?;
+    module.add_function(wrap_pyfunction!(inspection::inspected, module)?)?;
     module.add_function(wrap_pyfunction!(model::load, module)?)?;
     module.add_function(wrap_pyfunction!(recording::resample, module)?)?;
     module.add_function(wrap_pyfunction!(recording::trim, module)?)?;

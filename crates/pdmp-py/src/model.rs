@@ -138,6 +138,7 @@ impl Model {
         events: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
         let events = optional("events", events)?;
+        crate::inspection::warn(py, &pdmp_core::inspection::inspect(std::slice::from_ref(&demonstration.0), dt))?;
         let style = py.detach(|| style_of(&self.0, &demonstration.0, dt, period, events.as_deref())).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
@@ -162,6 +163,30 @@ impl Model {
             }
         }
         Ok(landscape.into_pyarray(py))
+    }
+
+    /// Share m(u) of the way from start to goal that a discrete movement has covered, from 0 at the start to 1 from
+    /// the end on.
+    ///
+    /// The output system moves about the frame c(u) = y₀ + (g − y₀)·m(u); m ≡ 1 where the model was fitted with
+    /// ``transport="immediate"``.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, (n,)
+    ///     Clock: t / tau.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, (n,)
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A rhythmic primitive, or a clock that is negative or not finite.
+    fn transport<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<Vector<'py>> {
+        let share: PyResult<Vec<f64>> = vector("u", u)?.iter().map(|&u| self.0.transport(u).map_err(raise)).collect();
+        Ok(share?.into_pyarray(py))
     }
 
     /// The time constant in s at a phase of a movement with the given timing.
@@ -268,7 +293,8 @@ impl Model {
     ///     As in `rollout`; of a timing the loop takes the sum, and follows it where `tau_at` sets its pace.
     /// transition : float, optional
     ///     Time to 99 % in s of a changed style, goal, anchor or tau; 0 switches at once. A tenth of the nominal
-    ///     duration (discrete) or a quarter of the period (rhythmic) otherwise.
+    ///     duration (discrete) or a quarter of the period (rhythmic) otherwise. A goal takes what remains of the
+    ///     movement if that is longer, unless transport is immediate.
     ///
     /// Returns
     /// -------

@@ -2,7 +2,7 @@
 
 use numpy::IntoPyArray;
 use pdmp_core::recording;
-use pdmp_core::recording::Keep;
+use pdmp_core::recording::{Keep, Reason};
 use pyo3::prelude::*;
 
 use crate::convert::{Matrix, Vector, matrix, to_numpy, vector};
@@ -12,9 +12,11 @@ use crate::fit::demonstrations;
 
 /// Sample a recording anew, at even intervals.
 ///
-/// The cubic spline through the samples at t₀, t₀ + dt, … as far as the recording goes; the clock of what is returned
-/// starts at 0. Of irregular time stamps it makes even ones. Frequencies above 1/(2 dt) are to be taken off first, by
-/// `lowpass`.
+/// Samples at t₀, t₀ + dt, … as far as the recording goes; the clock of what is returned starts at 0. Of irregular time
+/// stamps it makes even ones. They are those of the cubic smoothing spline that generalised cross-validation chooses,
+/// which meets clean samples. No denser than the recording, they also carry what smoothing takes off the nearest recorded
+/// ones: noise stays white, and a fit can still smooth it. A denser grid is smooth. Frequencies above 1/(2 dt) are to be
+/// taken off first, by `lowpass`.
 ///
 /// Parameters
 /// ----------
@@ -40,7 +42,9 @@ pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: f64) -> PyResul
 /// Keep the part of a recording in which there is movement.
 ///
 /// That is from the first to the last sample whose speed is at least the share `threshold` of the largest, with the
-/// speed of all degrees of freedom together, v² = Σ_d (ẏ_d / (max y_d − min y_d))².
+/// speed of all degrees of freedom together, v² = Σ_d (ẏ_d / (max y_d − min y_d))², of the recording as generalised
+/// cross-validation smooths it. Where noise is faster than the threshold, a movement counts that surpasses noise
+/// somewhere, from where the threshold is passed. The samples stay as they were recorded.
 ///
 /// Parameters
 /// ----------
@@ -67,8 +71,8 @@ pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: f64) -> PyRe
 
 /// Cut a recording at given times into one movement from each to the next.
 ///
-/// Each is the cubic spline through the recording, sampled evenly and about as densely as that, with both ends: it
-/// begins and ends at the very times that are given.
+/// Each is sampled evenly, as densely as the recording at most, with both ends: it begins and ends at the very times that
+/// are given. As with `resample`, noise stays white.
 ///
 /// Parameters
 /// ----------
@@ -142,7 +146,8 @@ pub(crate) fn residuals<'py>(
 /// Positions and velocities of all degrees of freedom, each less its linear trend, are correlated with themselves k
 /// samples later; A(k) is the mean of these correlations. The period is the first peak of A that is as high as the
 /// highest, but for what varies from cycle to cycle; half a cycle, and the period of a harmonic, make lower ones, and
-/// an odd cycle is no matter. A parabola finds it to a part of a sample.
+/// an odd cycle is no matter. A parabola finds it to a part of a sample. Peaks that noise of the same memory makes by
+/// chance are none: the fewer independent samples overlap, the higher a peak must be.
 ///
 /// Parameters
 /// ----------
@@ -157,7 +162,7 @@ pub(crate) fn residuals<'py>(
 /// Raises
 /// ------
 /// ValueError
-///     A recording whose highest peak is below 0.5, that stands still, or has no times.
+///     A recording whose peaks are all below 0.35 or by chance, that stands still, or has no times.
 ///
 /// References
 /// ----------
@@ -167,7 +172,8 @@ pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
     py.detach(|| recording::period(&demo.0)).map_err(raise)
 }
 
-/// Positions (T, D) with NaN interpolated in gaps up to `max_gap` seconds; `turns` (D,) of angles, 0 of others.
+/// Positions (T, D) with NaN interpolated in gaps up to `max_gap` seconds; `turns` (D,) of angles, 0 of others, NaN where it is
+/// not known.
 #[pyfunction]
 pub(crate) fn fill<'py>(
     py: Python<'py>,
@@ -182,10 +188,13 @@ pub(crate) fn fill<'py>(
     Ok(filled.into_pyarray(py))
 }
 
-/// A cycle that was left out: index of its recording, start and period in s, and the reason.
-type Rejected = (usize, f64, f64, String);
-/// Cycles, their periods (K,) in s, the indices of their recordings, and the rejected.
-type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<usize>, Vec<Rejected>);
+/// A cycle or a recording that was left out: index of the recording, start and period in s, the reason, and whether it is
+/// the whole recording.
+type Rejected = (usize, f64, f64, String, bool);
+/// Index of a recording and of a degree of freedom, its gain per cycle, and how many of its turns were taken off.
+type Growth = (usize, usize, f64, i32);
+/// Cycles, their periods (K,) in s, their gains (K, D), the indices of their recordings, the rejected, and what grows.
+type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, Vec<Rejected>, Vec<Growth>);
 
 /// Cuts recordings into cycles: what `pdmp.demos.cycles` calls.
 #[pyfunction]
@@ -202,9 +211,14 @@ pub(crate) fn cycles<'py>(
     let found = py.detach(|| recording::cycles(&recordings, events.as_deref(), keep)).map_err(raise)?;
     let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
     let of = found.kept.iter().map(|cycle| cycle.recording).collect();
-    let rejected =
-        found.rejected.iter().map(|cycle| (cycle.recording, cycle.start, cycle.period, cycle.reason.to_string()));
+    let rejected = found.rejected.iter().map(|cycle| {
+        let whole = matches!(cycle.reason, Reason::Aperiodic { .. } | Reason::Still);
+        (cycle.recording, cycle.start, cycle.period, cycle.reason.to_string(), whole)
+    });
     let rejected = rejected.collect();
+    let growths =
+        found.growths.iter().map(|growth| (growth.recording, growth.dof, growth.gain, growth.turns)).collect();
+    let gains = found.kept.iter().map(|cycle| cycle.gain.clone()).collect();
     let demos = found.kept.into_iter().map(|cycle| Demonstration(cycle.demo)).collect();
-    Ok((demos, to_numpy(py, &periods), of, rejected))
+    Ok((demos, to_numpy(py, &periods), gains, of, rejected, growths))
 }

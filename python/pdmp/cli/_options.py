@@ -50,7 +50,7 @@ def add_learning(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--map",
-        choices=["auto", "linear", "polynomial", "gp"],
+        choices=["auto", "stacked", "gp", "linear", "polynomial"],
         default="auto",
         help="what leads from contexts to movements; default: auto",
     )
@@ -93,6 +93,12 @@ def add_learning(parser: ArgumentParser) -> None:
         metavar="HZ",
         help="cut-off [Hz], auto (default: by cross-validation), or none",
     )
+    parser.add_argument(
+        "--transport",
+        choices=["learnt", "immediate"],
+        default="learnt",
+        help="how a moved start or goal is spread over the movement; default: learnt",
+    )
 
 
 def settings(options: Namespace) -> dict[str, Any]:
@@ -104,6 +110,7 @@ def settings(options: Namespace) -> dict[str, Any]:
         "spectrum": options.spectrum,
         "basis": options.basis,
         "smoothing": options.smoothing,
+        "transport": options.transport,
     }
 
 

@@ -19,8 +19,6 @@ SHAPES = ("CShape", "GShape", "NShape", "Sshape", "WShape")
 BLENDED = ("CShape", "Sshape")
 RUN, RESTYLED = "NShape", "WShape"
 GOAL_SHIFT = np.array([10.0, 15.0])  # mm
-# Writing stops abruptly: with the forcing fading as fast as z, the pen hardly moves after it.
-ALPHA = 25.0
 
 
 def run_demo(
@@ -55,11 +53,9 @@ def run_demo(
     demos = [demo for shape in SHAPES for demo in recordings[shape]]
     labels = [shape for shape in SHAPES for _ in recordings[shape]]
     with timed(times, "learn, J by the spectrum"):
-        model = pdmp.fit(demos, alpha_z=ALPHA, alpha_x=ALPHA, progress=progress)
+        model = pdmp.fit(demos, progress=progress)
     with timed(times, "learn, J = M"):
-        whole = pdmp.fit(
-            demos, alpha_z=ALPHA, alpha_x=ALPHA, n_styles=len(demos), progress=progress
-        )
+        whole = pdmp.fit(demos, n_styles=len(demos), progress=progress)
     with timed(times, "save and load"):
         model.save(folder / "model.safetensors")
         model = pdmp.load(folder / "model.safetensors")

@@ -35,7 +35,7 @@ from pdmp.demos import angles
 from pdmp.demos._each import each
 from pdmp.demos.archive import read_npz
 from pdmp.demos.bvh import read_bvh
-from pdmp.demos.cyclic import Cycles, Rejected, cycles
+from pdmp.demos.cyclic import Cycles, Growth, Rejected, cycles
 from pdmp.demos.folder import read, read_folder
 from pdmp.demos.table import read_csv, write_csv
 
@@ -48,6 +48,7 @@ unwrap = each(angles.unwrap)
 
 __all__ = [
     "Cycles",
+    "Growth",
     "Rejected",
     "cut",
     "cycles",

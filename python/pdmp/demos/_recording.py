@@ -28,7 +28,7 @@ def demonstration(
     """Return a demonstration with its gaps filled, and `source` before the text of its errors."""
     n_samples, n_dofs = position.shape
     columns = [f"y{d}" for d in range(n_dofs)] if names is None else names
-    turns = [TURNS.get(unit, 0.0) for unit in units or [""] * n_dofs]
+    turns = [TURNS.get(unit, 0.0) if unit else np.nan for unit in units or [""] * n_dofs]
     clock = np.arange(n_samples) * (dt or 1.0) if time is None else time
     try:
         whole = fill(position, clock, columns, turns, max_gap)

@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from pdmp import _native
 from pdmp._native import Demonstration
-from pdmp._shown import refusal
+from pdmp._shown import refusal, warn
 
 
 class Rejected(NamedTuple):
-    """A cycle that was left out."""
+    """A cycle, or a whole recording, that was left out."""
 
     recording: int
     """Index of the recording."""
@@ -22,6 +22,19 @@ class Rejected(NamedTuple):
     """How long it lasts, in s."""
     reason: str
     """What is odd about it."""
+
+
+class Growth(NamedTuple):
+    """What a degree of freedom gains in each cycle of a recording, which closed cycles lack."""
+
+    recording: int
+    """Index of the recording."""
+    dof: int
+    """Index of the degree of freedom."""
+    gain: float
+    """Gain in a cycle, the median one by size, in the unit of the degree of freedom."""
+    turns: int
+    """Full turns of an angle per cycle; 0 of what is no angle."""
 
 
 class Cycles(Sequence[Demonstration]):
@@ -34,7 +47,12 @@ class Cycles(Sequence[Demonstration]):
     recordings : list of int
         Index of the recording that each is from.
     rejected : list of Rejected
-        Cycles that were left out, and why.
+        Cycles that were left out, and recordings that do not repeat themselves, and why.
+    gains : (K, D) array
+        What each degree of freedom gained from the beginning of a cycle to its end, before that
+        was distributed.
+    growths : list of Growth
+        Degrees of freedom that turn, or gain more per cycle than they move within it.
     """
 
     def __init__(
@@ -43,11 +61,15 @@ class Cycles(Sequence[Demonstration]):
         periods: NDArray[np.float64],
         recordings: list[int],
         rejected: list[Rejected],
+        gains: NDArray[np.float64],
+        growths: list[Growth],
     ) -> None:
         self._demos = demos
         self.periods = periods
         self.recordings = recordings
         self.rejected = rejected
+        self.gains = gains
+        self.growths = growths
 
     def __len__(self) -> int:
         """Return the number of cycles K."""
@@ -79,16 +101,23 @@ def cycles(
     when each cycle begins: in the phase of the first recording's first sample, to which the others
     are turned by circular cross-correlation with its mean cycle.
 
-    A cycle is C samples of the cubic spline through the recording, as many as the first recording
-    has in a period. Its drift from y(0) to y(T) is distributed over it, so that it joins itself
-    without a jump and keeps its mean::
+    A cycle is C samples, as many as its recording has in a period, of the cubic smoothing spline
+    that generalised cross-validation chooses, with what that takes off the nearest recorded
+    samples: noise stays white, and a fit can still smooth it. The gain from f(0) to f(T) of the
+    spline f is distributed over the cycle, so that it joins itself without a jump and keeps its
+    mean::
 
-        y_c = y(c T / C) - (c / C - 1/2) (y(T) - y(0))
+        y_c = y(c T / C) - (c / C - 1/2) (f(T) - f(0))
+
+    The angle of a wheel or a crank gains full turns per cycle; they are taken off each cycle and
+    all that follow. Units of angle tell what turns; without units, a gain of one turn in radians
+    or degrees to a hundredth does. Of anything else that gains more per cycle than it moves within
+    it, such as the way walked, a warning gives the gain: a model of closed cycles stays in place.
 
     A cycle is rejected if its period differs from the median of its recording by more than 3.5
     robust standard deviations and 10 %, or its shape from the median cycle by 3.5 robust standard
     deviations more than usual, twice what is usual, and a quarter of the movement's standard
-    deviation.
+    deviation. A recording among several that does not repeat itself is rejected with a warning.
 
     Parameters
     ----------
@@ -108,20 +137,50 @@ def cycles(
     Raises
     ------
     ValueError
-        A recording without a period, whose correlation with itself is told, without times, or with
-        other degrees of freedom than the first; events that do not increase or lie outside.
+        No recording with a period, with the correlation of the first with itself; a recording
+        without times, or with other degrees of freedom than the first; events that do not increase
+        or lie outside.
+
+    Warns
+    -----
+    UserWarning
+        A recording that does not repeat itself; degrees of freedom that gain more per cycle than
+        they move within it and are no angles of full turns.
 
     References
     ----------
     B. Iglewicz, D. C. Hoaglin, How to detect and handle outliers, ASQC Quality Press 1993
     """
     if isinstance(recordings, Mapping) and isinstance(events, Mapping):
-        if odd := sorted(map(str, recordings.keys() ^ events.keys())):
-            raise refusal(f"events: '{odd[0]}' is among the recordings or the events alone")
+        if lone := sorted(map(str, recordings.keys() ^ events.keys())):
+            raise refusal(f"events: '{lone[0]}' is among the recordings or the events alone")
         events = [events[name] for name in recordings]
     begins = cast("Sequence[ArrayLike] | None", events)
     if isinstance(recordings, Demonstration):
         recordings = [recordings]
         begins = None if events is None else [cast(ArrayLike, events)]
-    demos, periods, sources, rejected = _native.cycles(recordings, begins, average)
-    return Cycles(demos, periods, sources, [Rejected(*cycle) for cycle in rejected])
+    demos, periods, gains, sources, odd, grown = _native.cycles(recordings, begins, average)
+    for recording, _, _, reason, whole in odd:
+        if whole:
+            warn(f"recording {recording} is left out: {reason}")
+    growths = [Growth(*growth) for growth in grown]
+    if gaining := [growth for growth in growths if not growth.turns]:
+        warn(_gains(gaining, demos))
+    rejected = [Rejected(*cycle[:4]) for cycle in odd]
+    return Cycles(demos, periods, sources, rejected, np.array(gains), growths)
+
+
+def _gains(growths: list[Growth], demos: list[Demonstration]) -> str:
+    """Return a warning of what grows from cycle to cycle, with its gains."""
+    names, units = (demos[0].names, demos[0].units) if demos else (None, None)
+    gains = []
+    for dof in sorted({growth.dof for growth in growths}):
+        largest = max((g for g in growths if g.dof == dof), key=lambda growth: abs(growth.gain))
+        name = names[dof] if names else f"y{dof}"
+        unit = f" {units[dof]}" if units and units[dof] else ""
+        gains.append(f"'{name}' gains {largest.gain:.3g}{unit} in recording {largest.recording}")
+    return (
+        f"more is gained per cycle than moved within one: {', '.join(gains)}; closed cycles lack "
+        "the gain, and a model of them stays in place: leave these degrees of freedom out, or make "
+        "them relative to what moves along"
+    )

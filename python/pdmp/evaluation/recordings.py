@@ -9,8 +9,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp._native import Demonstration, Trajectory
-from pdmp._shown import refusal
+from pdmp._native import Demonstration, Trajectory, inspected
+from pdmp._shown import refusal, warn
 
 Array: TypeAlias = NDArray[Any]  # of float64
 Demos: TypeAlias = (
@@ -118,6 +118,10 @@ def recordings(
     for m, demo in enumerate(given):
         if demo.n_dofs != given[0].n_dofs:
             raise refusal(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
+    whole, findings = inspected(list(given), dt=dt)
+    for finding in findings:
+        warn(finding)
+    given = tuple(whole)
     if kind == "discrete" and period is not None:
         raise ValueError("period does not apply to discrete demonstrations: leave it out")
     periods = np.full(len(given), np.nan) if period is None else np.asarray(period)

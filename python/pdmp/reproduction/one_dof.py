@@ -56,7 +56,7 @@ def discrete(noise: Generator) -> Example:
     shapes = np.column_stack([straight, detour, detour * (1 - 2 * s) * 2])
     weights = noise.normal([1.0, 0.0, 0.0], [0.15, 0.35, 0.45], (N_DEMOS, 3))
     demos = _demos(weights @ shapes.T, noise.uniform(0.8, 1.2, N_DEMOS) / (N_SAMPLES - 1))
-    model = pdmp.fit(demos, n_styles=N_STYLES, smoothing=None)
+    model = pdmp.fit(demos, n_styles=N_STYLES, smoothing=None, transport="immediate")
     return Example("discrete", model, demos, lambda a: {**a, "goal": np.asarray(a["goal"]) + 0.4})
 
 

@@ -26,6 +26,7 @@ MOST_TRIALS = 100
 CONSTANTS: dict[str, Any] = {
     **{"alpha_z": 1.5, "beta_z": 1.5, "alpha_x": 0.5, "tau": 0.3},
     "smoothing": None,
+    "transport": "immediate",
 }
 """As printed; the damping ratio is √(α_z/β_z)/2 = 0.5."""
 NAMES = ["q1", "q2", "q3", "q4"]

@@ -57,6 +57,10 @@ pub enum TimeScaling {
     Linear,
     /// By the monotone warp that brings the demonstrations closest to each other.
     Warp(Warp),
+    /// By the default warp, in fewer segments where a demonstration has fewer than 16 samples; in a fit with at least three
+    /// different contexts only if movements at contexts held out are foreseen better so, by more than the standard error,
+    /// and linearly otherwise.
+    WarpIfBetter,
     /// So that landmarks fall on those of the nominal demonstration: their times (M, E) in seconds, from the first sample
     /// or of the time stamps.
     Events(Array2<f64>),
@@ -168,6 +172,11 @@ impl TimeScaling {
         match self {
             Self::Linear => Ok(None),
             Self::Warp(warp) => aligned.warp(warp, unit, threads, proceed).map(Some),
+            Self::WarpIfBetter => {
+                let warp = Warp::default();
+                let segments = warp.segments.min(aligned.most_segments());
+                aligned.warp(&Warp { segments, ..warp }, unit, threads, proceed).map(Some)
+            }
             Self::Events(events) => aligned.register(events.view()).map(|()| None),
         }
     }

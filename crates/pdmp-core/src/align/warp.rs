@@ -107,8 +107,7 @@ impl Aligned<'_> {
         threads: Threads,
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Template> {
-        let fewest = self.demos.iter().map(|demo| demo.n_samples()).min().unwrap_or(0).min(self.n_samples);
-        warp.check((fewest / 2).min(MOST_SEGMENTS))?;
+        warp.check(self.most_segments())?;
         let (n_demos, n_dofs) = (self.n_demos(), self.demo(0).n_dofs());
         let unit = unit.map_or_else(|| ranges(self), <[f64]>::to_vec);
         let search = Search::new(warp.segments, warp.slope, n_dofs);
@@ -150,6 +149,12 @@ impl Aligned<'_> {
         }
         let shape = Array2::from_shape_vec((search.cells(), n_dofs), template).unwrap_or_default();
         Ok(Template { slope: warp.slope, unit, shape })
+    }
+
+    /// The most segments that the samples carry: half of them.
+    pub(super) fn most_segments(&self) -> usize {
+        let fewest = self.demos.iter().map(|demo| demo.n_samples()).min().unwrap_or(0).min(self.n_samples);
+        (fewest / 2).min(MOST_SEGMENTS)
     }
 
     /// Warps the one demonstration to a template.

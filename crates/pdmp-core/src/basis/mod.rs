@@ -9,7 +9,7 @@ use std::fmt;
 
 use ndarray::ArrayView2;
 
-pub use self::gp::{Gp, GpPosterior, Kernel};
+pub use self::gp::{Gp, GpPosterior, Kernel, NoiseBound};
 pub use self::ngnet::{NGnet, NGnetRegression};
 use crate::error::{Error, Result, check_positive};
 
@@ -63,7 +63,8 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// Regresses `targets` (C, outputs) on the clock `u` (C,).
+    /// Regresses the landscape's `targets` (C, outputs) on the clock `u` (C,): a Gaussian process within
+    /// [`NoiseBound::LANDSCAPE`].
     ///
     /// `proceed` is asked now and then whether to go on, with the share done in [0, 1].
     ///
@@ -77,7 +78,7 @@ impl Basis {
         proceed: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Box<dyn Regression>> {
         Ok(match self {
-            Basis::Gp(gp) => Box::new(gp.regress(domain, u, targets, proceed)?),
+            Basis::Gp(gp) => Box::new(gp.regress_within(NoiseBound::LANDSCAPE, domain, u, targets, proceed)?),
             Basis::NGnet(ngnet) => Box::new(ngnet.regress(domain, u, targets)?),
         })
     }

@@ -74,14 +74,16 @@ pub(super) fn maximise(axes: &[Axis; 2], objective: &mut impl Objective) -> Resu
     Ok(scan.place(best.map_or([0.0; 2], |(at, _)| at)))
 }
 
-/// Whether no neighbour of a cell is higher, nor as high and before it.
+/// Whether no neighbour of a cell is higher, nor as high and before it; what rounding makes of a plateau is as high.
 fn is_summit(values: &[f64], columns: usize, cell: usize) -> bool {
     let (row, column) = ((cell / columns) as isize, (cell % columns) as isize);
     let rows = (values.len() / columns) as isize;
     (-1..=1).flat_map(|i| (-1..=1).map(move |j| (row + i, column + j))).all(|(i, j)| {
         let inside = (0..rows).contains(&i) && (0..columns as isize).contains(&j);
         let other = (i * columns as isize + j) as usize;
-        !inside || other == cell || values[cell] > values[other] || (values[cell] == values[other] && cell < other)
+        // Nothing is gained between two places where nothing exists.
+        let gain = if inside && values[cell] != values[other] { values[cell] - values[other] } else { 0.0 };
+        !inside || other == cell || gain > GAIN || (gain >= -GAIN && cell < other)
     })
 }
 
@@ -178,6 +180,10 @@ impl Curvature {
 
     /// Learns that the gradient fell by `bent` over a step. Where it rose, the function is not yet a hill, and nothing
     /// is learnt.
+    ///
+    /// Not inlined, and entry by entry: inlined, the optimiser of Rust 1.95 was seen to square bent₁ in place of bent₀·bent₁,
+    /// and the ascent ended where the estimate was no longer positive definite.
+    #[inline(never)]
     fn updated(old: Option<Self>, moved: [f64; 2], bent: [f64; 2]) -> Option<Self> {
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
         let fall = dot(moved, bent);
@@ -189,8 +195,10 @@ impl Curvature {
         let b = old.unwrap_or(Self { first: scale, mixed: 0.0, second: scale });
         let lost = [b.first * moved[0] + b.mixed * moved[1], b.mixed * moved[0] + b.second * moved[1]];
         let share = dot(moved, lost);
-        let entry = |b: f64, i: usize, j: usize| b - lost[i] * lost[j] / share + bent[i] * bent[j] / fall;
-        Some(Self { first: entry(b.first, 0, 0), mixed: entry(b.mixed, 0, 1), second: entry(b.second, 1, 1) })
+        let first = b.first - lost[0] * (lost[0] / share) + bent[0] * (bent[0] / fall);
+        let second = b.second - lost[1] * (lost[1] / share) + bent[1] * (bent[1] / fall);
+        let mixed = b.mixed - lost[0] * (lost[1] / share) + bent[0] * (bent[1] / fall);
+        Some(Self { first, mixed, second })
     }
 }
 
@@ -209,6 +217,20 @@ mod tests {
 
         fn score(&mut self, at: [f64; 2]) -> Result<Score> {
             (self.0)(at)
+        }
+    }
+
+    #[test]
+    fn curvature_explains_the_last_step() {
+        let mut curvature = None;
+        for (moved, bent) in
+            [([0.5, 0.28], [17.0, 27.6]), ([-0.15, -0.21], [-10.7, -19.1]), ([0.13, -0.05], [3.3, -0.9])]
+        {
+            curvature = Curvature::updated(curvature, moved, bent);
+            let Curvature { first, mixed, second } = curvature.unwrap();
+            assert_abs_diff_eq!(first * moved[0] + mixed * moved[1], bent[0], epsilon = 1e-9);
+            assert_abs_diff_eq!(mixed * moved[0] + second * moved[1], bent[1], epsilon = 1e-9);
+            assert!(first > 0.0 && first * second > mixed * mixed);
         }
     }
 

@@ -1,4 +1,4 @@
-//! How a map is chosen: the ratios by evidence, length and kind of map by the error at contexts left out.
+//! The choice of a map: ratios by evidence, length and weights by the errors at contexts left out.
 
 use std::fmt;
 
@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kernel::Kernel;
 use super::kriging::{Kriging, Values};
+use super::stack::Stack;
 use crate::error::Result;
 
 /// Lengths that are tried, in units of the contexts' spread.
@@ -14,10 +15,8 @@ const LENGTHS: [f64; 9] = [8.0, 5.2, 3.4, 2.2, 1.4, 0.92, 0.59, 0.39, 0.25];
 /// Grid of ln(ρ·mean λ), and how far the search goes on from its best.
 const GRID: (f64, f64, f64) = (-7.0, 16.0, 0.5);
 const HALVINGS: usize = 12;
-/// Standard errors that tell for sure that another map is better than the process.
-const CLEARLY: f64 = 2.0;
-/// Fewest contexts between which a choice is made.
-const FEWEST: usize = 4;
+/// Fewest different contexts of a Gaussian process: through two there is a line.
+const MIN_CONTEXTS: usize = 3;
 /// Most contexts of a map whose cost grows with their cube.
 pub(crate) const MOST: usize = 1024;
 
@@ -31,11 +30,14 @@ pub enum MapKind {
     Polynomial,
     /// A Gaussian process (Matérn-5/2), the noise of each output by its evidence, the length by the error left out.
     Gp,
+    /// The Gaussian process and a line whose slopes are held small by the evidence, weighted by their errors at contexts
+    /// left out: inside of the contexts of the demonstrations the two alone, outside with the mean.
+    Stacked,
 }
 
 impl MapKind {
-    /// All, the one first that returns to the mean outside of what was shown.
-    pub const ALL: [Self; 3] = [Self::Gp, Self::Polynomial, Self::Linear];
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Stacked, Self::Gp, Self::Polynomial, Self::Linear];
 
     /// The name used in files and in Python.
     pub fn name(self) -> &'static str {
@@ -43,6 +45,7 @@ impl MapKind {
             Self::Linear => "linear",
             Self::Polynomial => "polynomial",
             Self::Gp => "gp",
+            Self::Stacked => "stacked",
         }
     }
 }
@@ -53,6 +56,7 @@ impl fmt::Display for MapKind {
             Self::Linear => "linear",
             Self::Polynomial => "polynomial",
             Self::Gp => "Gaussian process",
+            Self::Stacked => "Gaussian process and line",
         })
     }
 }
@@ -60,9 +64,8 @@ impl fmt::Display for MapKind {
 /// How the map from contexts is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MapChoice {
-    /// The Gaussian process, unless another map has a smaller error at contexts left out, by a share of the two errors
-    /// that is above zero by more than two standard errors; linear for fewer than 4 different contexts, and for more
-    /// than 1024.
+    /// Stacked. Labels alone, two different contexts, or more than 1024: least squares, which gives each label the mean
+    /// of its demonstrations.
     #[default]
     Auto,
     /// This one.
@@ -92,7 +95,7 @@ impl Candidate {
         match kind {
             MapKind::Linear => Self::with(kind, None, shown, |_, _| vec![0.0; shown.outputs.ncols()]),
             MapKind::Polynomial => Self::with(kind, Some(Kernel::Quadratic), shown, ratios),
-            MapKind::Gp => {
+            MapKind::Gp | MapKind::Stacked => {
                 let of_length = |length| {
                     let candidate = Self::with(kind, Some(Kernel::Matern { length }), shown, ratios)?;
                     Ok((candidate.errors().sum(), candidate))
@@ -133,33 +136,47 @@ impl Candidate {
     }
 }
 
-/// The map of a choice, and the error of each that was tried at contexts left out.
-pub(super) fn choose(choice: MapChoice, shown: &Shown) -> Result<(Candidate, Vec<(MapKind, f64)>)> {
-    let n = shown.inputs.nrows();
-    let kinds = match choice {
-        MapChoice::Given(kind) => vec![kind],
-        MapChoice::Auto if (FEWEST..=MOST).contains(&n) => MapKind::ALL.to_vec(),
-        MapChoice::Auto => vec![MapKind::Linear],
+/// The line of a stacked map, and its weight.
+#[derive(Clone, Debug)]
+pub(super) struct Trend {
+    pub(super) line: Candidate,
+    pub(super) stack: Stack,
+}
+
+/// Returns the map of a choice, its trend if it has one, and the error of each that was tried at contexts left out.
+pub(super) fn choose(
+    choice: MapChoice,
+    labels_alone: bool,
+    shown: &Shown,
+) -> Result<(Candidate, Option<Trend>, Vec<(MapKind, f64)>)> {
+    let kind = match choice {
+        MapChoice::Given(kind) => kind,
+        MapChoice::Auto if labels_alone || !(MIN_CONTEXTS..=MOST).contains(&shown.inputs.nrows()) => MapKind::Linear,
+        MapChoice::Auto => MapKind::Stacked,
     };
-    let mut candidates = Vec::with_capacity(kinds.len());
-    for kind in kinds {
-        let candidate = Candidate::of(kind, shown)?;
-        let errors = candidate.errors();
-        candidates.push((candidate, errors));
-    }
-    let tried: Vec<_> = candidates.iter().map(|(candidate, errors)| (candidate.kind, mean(errors))).collect();
-    let reference = candidates[0].1.clone();
-    let better = |errors: &Array1<f64>| {
-        // In shares, each context has its say: the ends, where errors are largest, would drown the others.
-        let gain = (&reference - errors) / (&reference + errors).mapv(|sum| sum.max(f64::MIN_POSITIVE));
-        let spread = (&gain - mean(&gain)).mapv(|x| x * x).sum() / (n * (n - 1).max(1)) as f64;
-        mean(errors) < mean(&reference) && mean(&gain) > CLEARLY * spread.sqrt()
+    let candidate = Candidate::of(kind, shown)?;
+    let mut tried = vec![(kind, mean(&candidate.errors()))];
+    let trend = match kind {
+        MapKind::Stacked => {
+            let line = Candidate::with(MapKind::Linear, Some(Kernel::Linear), shown, ratios)?;
+            let deviations = &shown.outputs - &shown.outputs.mean_axis(Axis(0)).unwrap_or_default();
+            let missed = |of: &Candidate| of.kriging.left_out(&of.values, &of.ratios);
+            let (process, straight) = (missed(&candidate), missed(&line));
+            let stack = Stack::find(&deviations, &process, &straight);
+            let [g, l] = stack.inside;
+            let errors = (process * g + straight * l).map_axis(Axis(1), |row| row.dot(&row));
+            tried = vec![(kind, mean(&errors)), (MapKind::Gp, tried[0].1), (MapKind::Linear, mean(&line.errors()))];
+            Some(Trend { line, stack })
+        }
+        _ => None,
     };
-    let best = (1..candidates.len())
-        .filter(|&k| better(&candidates[k].1))
-        .min_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1))
-        .unwrap_or(0);
-    Ok((candidates.swap_remove(best).0, tried))
+    Ok((candidate, trend, tried))
+}
+
+/// The trend of a stacked map with known constants.
+pub(super) fn trend(shown: &Shown, ratios: Vec<f64>, stack: Stack) -> Result<Trend> {
+    let line = Candidate::with(MapKind::Linear, Some(Kernel::Linear), shown, |_, _| ratios)?;
+    Ok(Trend { line, stack })
 }
 
 fn mean(values: &Array1<f64>) -> f64 {

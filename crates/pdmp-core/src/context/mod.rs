@@ -11,12 +11,13 @@ mod kernel;
 mod kriging;
 mod prediction;
 mod space;
+mod stack;
 #[cfg(test)]
 mod tests;
 
 use std::collections::HashMap;
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array1, Array2, ArrayView2, Axis};
 
 pub use choice::{MapChoice, MapKind};
 pub(crate) use kernel::Kernel;
@@ -26,9 +27,10 @@ pub use space::ContextColumn;
 pub(crate) use space::tabulate;
 
 use axes::Axes;
-use choice::{Candidate, MOST, Shown, choose};
-use kriging::{Kriging, Place};
+use choice::{Candidate, MOST, Shown, Trend, choose};
+use kriging::Kriging;
 use space::{Scale, numbers};
+pub(crate) use stack::Stack;
 
 use crate::demo::{ContextValue, check_matrix};
 use crate::error::{Error, Result};
@@ -43,11 +45,14 @@ pub struct ContextMap {
     axes: Axes,
     /// The ratio of signal to noise of each component (P,), as all that follows is of components.
     ratios: Vec<f64>,
+    /// The same of the line (P,), if there is one.
+    slopes: Vec<f64>,
     errors: Vec<(MapKind, f64)>,
-    kriging: Kriging,
-    /// Coefficients (q, P) and (r, P) of a place's two kinds of coordinates.
-    flat: Array2<f64>,
-    rest: Array2<f64>,
+    process: Part,
+    /// The line beside the process, and their weights.
+    trend: Option<(Part, Stack)>,
+    /// Mean of the components over the contexts (P,).
+    centre: Array1<f64>,
     /// Covariance (P, P) of the contexts' noise, where more contexts than coefficients leave any.
     noise: Option<Array2<f64>>,
     /// Covariance (P, P) that a new movement adds to it: that within a context, as far as it is not averaged away.
@@ -55,13 +60,36 @@ pub struct ContextMap {
     freedom: usize,
 }
 
-/// What a map is determined by, besides the data: enough to have it again.
+/// One prediction of the components: coefficients (q, P) and (r, P) of the two kinds of coordinates of a place.
+#[derive(Clone, Debug, PartialEq)]
+struct Part {
+    kriging: Kriging,
+    flat: Array2<f64>,
+    rest: Array2<f64>,
+}
+
+impl Part {
+    fn of(candidate: Candidate) -> Self {
+        let Candidate { kriging, values, ratios, .. } = candidate;
+        let rest = kriging.coefficients(&values, &ratios);
+        Self { kriging, flat: values.flat, rest }
+    }
+
+    /// Components (P,) for features (F,).
+    fn mean(&self, features: &[f64]) -> Array1<f64> {
+        let place = self.kriging.place(features);
+        place.flat.dot(&self.flat) + place.rest.dot(&self.rest)
+    }
+}
+
+/// Constants of a map, which determine it together with the data.
 #[derive(Clone, Debug)]
 pub(crate) struct Recipe {
     pub(crate) kind: MapKind,
     pub(crate) kernel: Option<Kernel>,
     pub(crate) directions: Array2<f64>,
     pub(crate) ratios: Vec<f64>,
+    pub(crate) trend: Option<(Vec<f64>, Stack)>,
     pub(crate) errors: Vec<(MapKind, f64)>,
 }
 
@@ -102,15 +130,16 @@ impl ContextMap {
         choice: MapChoice,
     ) -> Result<Self> {
         let data = Data::of(columns, contexts, outputs)?;
-        if data.inputs.nrows() > MOST && matches!(choice, MapChoice::Given(MapKind::Gp | MapKind::Polynomial)) {
+        if data.inputs.nrows() > MOST && matches!(choice, MapChoice::Given(kind) if kind != MapKind::Linear) {
             let (name, value) = ("contexts", data.inputs.nrows() as f64);
             let allowed = "different contexts: at most 1024 for this map; round them, or take map=\"linear\"";
             return Err(Error::Range { name, value, allowed });
         }
         let axes = Axes::principal(data.means.view(), metric)?;
         let data = data.along(&axes);
-        let (candidate, errors) = choose(choice, &data.shown())?;
-        Ok(data.map(axes, candidate, errors))
+        let labels_alone = data.columns.iter().all(|column| matches!(column, ContextColumn::Label(_)));
+        let (candidate, trend, errors) = choose(choice, labels_alone, &data.shown())?;
+        Ok(data.map(axes, candidate, trend, errors))
     }
 
     /// The same map again, from the data that it was learnt from.
@@ -120,16 +149,23 @@ impl ContextMap {
         outputs: ArrayView2<f64>,
         recipe: Recipe,
     ) -> Result<Self> {
-        let Recipe { kind, kernel, directions, ratios, errors } = recipe;
+        let Recipe { kind, kernel, directions, ratios, trend, errors } = recipe;
         let axes = Axes::new(directions)?;
         let data = Data::of(columns, contexts, outputs)?.along(&axes);
         let candidate = Candidate::with(kind, kernel, &data.shown(), |_, _| ratios)?;
-        Ok(data.map(axes, candidate, errors))
+        let trend = trend.map(|(ratios, stack)| choice::trend(&data.shown(), ratios, stack)).transpose()?;
+        Ok(data.map(axes, candidate, trend, errors))
     }
 
     pub(crate) fn recipe(&self) -> Recipe {
-        let (directions, ratios, errors) = (self.axes.directions.clone(), self.ratios.clone(), self.errors.clone());
-        Recipe { kind: self.kind, kernel: self.kernel, directions, ratios, errors }
+        Recipe {
+            kind: self.kind,
+            kernel: self.kernel,
+            directions: self.axes.directions.clone(),
+            ratios: self.ratios.clone(),
+            trend: self.trend.as_ref().map(|(_, stack)| (self.slopes.clone(), *stack)),
+            errors: self.errors.clone(),
+        }
     }
 
     /// What each value of a context means.
@@ -174,32 +210,55 @@ impl ContextMap {
     pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<Expected> {
         let context: Vec<ContextValue> = context.iter().cloned().map(Into::into).collect();
         let context = numbers(&self.columns, &context)?;
-        let place = self.kriging.place(&self.scale.features(&context));
-        let mean = self.mean(&place);
+        let features = self.scale.features(&context);
+        let outside = self.scale.outside(&context);
+        let (components, dispersion) = self.components(&features, &outside);
+        let mean = components.dot(&self.axes.directions).to_vec();
         let covariance = self.noise.as_ref().map(|noise| {
+            let kriging = &self.process.kriging;
+            let place = kriging.place(&features);
             let spread: Vec<f64> =
-                self.ratios.iter().map(|&ratio| (1.0 + self.kriging.variance(&place, ratio)).sqrt()).collect();
-            let grown = Array2::from_shape_fn(noise.dim(), |(i, j)| noise[[i, j]] * spread[i] * spread[j]);
+                self.ratios.iter().map(|&ratio| (1.0 + kriging.variance(&place, ratio)).sqrt()).collect();
+            let mut grown = Array2::from_shape_fn(noise.dim(), |(i, j)| noise[[i, j]] * spread[i] * spread[j]);
+            for (weight, deviation) in dispersion {
+                let column = deviation.view().insert_axis(Axis(1));
+                grown.scaled_add(weight, &column.dot(&column.t()));
+            }
             self.axes.covariance(&match &self.within {
                 Some(within) => grown + within,
                 None => grown,
             })
         });
         if mean.iter().chain(covariance.iter().flatten()).any(|x| !x.is_finite()) {
-            return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
+            return Err(Error::Fit(format!(
+                "context {context:?} is so far from those of the demonstrations that the prediction overflows"
+            )));
         }
-        Ok(Expected { mean, covariance, outside: self.scale.outside(&context) })
+        Ok(Expected { mean, covariance, outside })
     }
 }
 
 impl ContextMap {
     /// The outputs (P,) for a context as numbers (Q,), labels as their index.
     pub(crate) fn expect(&self, numbers: &[f64]) -> Vec<f64> {
-        self.mean(&self.kriging.place(&self.scale.features(numbers)))
+        let (components, _) = self.components(&self.scale.features(numbers), &self.scale.outside(numbers));
+        components.dot(&self.axes.directions).to_vec()
     }
 
-    fn mean(&self, place: &Place) -> Vec<f64> {
-        (place.flat.dot(&self.flat) + place.rest.dot(&self.rest)).dot(&self.axes.directions).to_vec()
+    /// Components (P,) for features (F,), and the deviations from them of the predictions that they combine, with the
+    /// share in which each may be right: the variance of a mixture.
+    fn components(&self, features: &[f64], outside: &[f64]) -> (Array1<f64>, Vec<(f64, Array1<f64>)>) {
+        let process = self.process.mean(features);
+        let Some((line, stack)) = &self.trend else { return (process, Vec::new()) };
+        let weights = stack.at(outside.iter().fold(0.0, |most, share| share.max(most)));
+        let members = [process, line.mean(features), self.centre.clone()];
+        let combined =
+            members.iter().zip(weights).fold(Array1::zeros(self.centre.len()), |mut sum, (mean, (weight, _))| {
+                sum.scaled_add(weight, mean);
+                sum
+            });
+        let dispersion = members.into_iter().zip(weights).map(|(mean, (_, share))| (share, mean - &combined)).collect();
+        (combined, dispersion)
     }
 }
 
@@ -223,11 +282,16 @@ impl std::fmt::Display for ContextMap {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         write!(f, "{}", self.kind)?;
         if let Some(Kernel::Matern { length }) = self.kernel {
-            write!(f, " of length {length:.2}")?;
+            write!(f, ", length {length:.2} of the contexts' spread")?;
+        }
+        if let Some((_, Stack { inside, outside })) = &self.trend {
+            write!(f, "; weights {:.2} and {:.2} inside the contexts of the demonstrations", inside[0], inside[1])?;
+            let mean = (1.0 - outside[0] - outside[1]).max(0.0);
+            write!(f, ", {:.2}, {:.2} and {mean:.2} for the mean outside", outside[0], outside[1])?;
         }
         for (k, (kind, error)) in self.errors.iter().filter(|(_, error)| error.is_finite()).enumerate() {
-            let before = if k == 0 { "; left-out error of" } else { "," };
-            write!(f, "{before} {} {error:.3e}", kind.name())?;
+            let before = if k == 0 { "; leave-one-out error" } else { "," };
+            write!(f, "{before} {error:.3e} ({})", kind.name())?;
         }
         Ok(())
     }
@@ -280,20 +344,38 @@ impl Data {
         Shown { inputs: self.inputs.view(), n_inputs: self.scale.n_inputs(), outputs: self.means.view() }
     }
 
-    fn map(self, axes: Axes, candidate: Candidate, errors: Vec<(MapKind, f64)>) -> ContextMap {
-        let Candidate { kind, kernel, kriging, values, ratios } = candidate;
-        let (noise, freedom) = match (kriging.freedom(), &self.within) {
+    fn map(self, axes: Axes, candidate: Candidate, trend: Option<Trend>, errors: Vec<(MapKind, f64)>) -> ContextMap {
+        let (kind, kernel, ratios) = (candidate.kind, candidate.kernel, candidate.ratios.clone());
+        let (noise, freedom) = match (candidate.kriging.freedom(), &self.within) {
             // As many coefficients as contexts: what is left is the noise of the averages.
             (0, None) => (None, 0),
             (0, Some((within, freedom))) => (Some(within * self.kept), *freedom),
             (freedom, _) => {
-                let innovations = kriging.innovations(&values, &ratios);
+                let innovations = candidate.kriging.innovations(&candidate.values, &ratios);
                 (Some(innovations.t().dot(&innovations) / freedom as f64), freedom)
             }
         };
         let within = self.within.map(|(within, _)| within * (1.0 - self.kept));
-        let rest = kriging.coefficients(&values, &ratios);
-        let (columns, scale, flat) = (self.columns, self.scale, values.flat);
-        ContextMap { columns, scale, kind, kernel, axes, ratios, errors, kriging, flat, rest, noise, within, freedom }
+        let (columns, scale) = (self.columns, self.scale);
+        let centre = self.means.mean_axis(Axis(0)).unwrap_or_default();
+        let slopes = trend.as_ref().map(|trend| trend.line.ratios.clone()).unwrap_or_default();
+        let trend = trend.map(|trend| (Part::of(trend.line), trend.stack));
+        let process = Part::of(candidate);
+        ContextMap {
+            columns,
+            scale,
+            kind,
+            kernel,
+            axes,
+            ratios,
+            slopes,
+            errors,
+            process,
+            trend,
+            centre,
+            noise,
+            within,
+            freedom,
+        }
     }
 }

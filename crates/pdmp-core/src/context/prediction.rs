@@ -1,5 +1,7 @@
 //! The movement that a map predicts.
 
+use std::ops::RangeInclusive;
+
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
 use super::Expected;
@@ -62,14 +64,21 @@ pub(crate) fn relative_changes(timing: &[f64]) -> Array2<f64> {
 }
 
 impl Prediction {
-    /// The movement whose outputs are expected.
+    /// The movement whose outputs are expected, its duration within a range.
     ///
     /// # Errors
     /// Times that overflow.
-    pub(crate) fn of(expected: Expected, freedom: usize, kind: Kind, n_styles: usize, n_dofs: usize) -> Result<Self> {
+    pub(crate) fn of(
+        expected: Expected,
+        freedom: usize,
+        kind: Kind,
+        n_styles: usize,
+        n_dofs: usize,
+        durations: RangeInclusive<f64>,
+    ) -> Result<Self> {
         let Expected { mean, mut covariance, outside } = expected;
         let first = n_styles + n_dofs * if kind == Kind::Discrete { 2 } else { 1 };
-        let duration = mean[first].exp();
+        let duration = mean[first].exp().clamp(*durations.start(), *durations.end());
         let weights: Vec<f64> = mean[first + 1..].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
         let whole: f64 = weights.iter().sum();
         let timing: Vec<f64> = weights.iter().map(|weight| duration * weight / whole).collect();

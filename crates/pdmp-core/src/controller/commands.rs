@@ -75,7 +75,9 @@ impl Controller {
         }
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
-            self.centre.follow(centre, &filter);
+            self.centre_filter = self.centre_filter(command.tau.unwrap_or(self.conditions.tau));
+            self.centre_glide = self.centre_filter.glide(self.glide.dt());
+            self.centre.follow(centre, &self.centre_filter);
             self.set_tolerance();
             news = true;
         }

@@ -2,7 +2,8 @@
 //!
 //! Over a tick the forcing w, the goal and the clock are known at both ends with their slopes; a cubic between them is
 //! propagated exactly ([`crate::Attractor::propagator`]). Style, rate ρ = 1/τ and goal or anchor pass critically damped
-//! filters, so that position and velocity stay continuous: ẏ = ρ(z + w), ÿ = ρ²(z′ + w′) + ρ̇(z + w). A perturbation
+//! filters, so that position and velocity stay continuous: ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′. The frame c of a
+//! discrete movement is known exactly at both ends of a tick (`transport`), and outside what is propagated. A perturbation
 //! ([`Command::measured`], [`Command::coupling`]) slows the phase's clock against the output system's, and adds to ẏ and
 //! ÿ.
 //!
@@ -25,8 +26,9 @@ use crate::follower::{Filter, Follower, Glide};
 use crate::lanes::{Lanes, copy, groups, repack, unpack};
 use crate::model::Model;
 use crate::perturbation::{Held, STILL, widest};
-use crate::phase::{CompensatedSum, Kind};
+use crate::phase::{Canonical, CompensatedSum, Kind};
 use crate::series::Series;
+use crate::transport::Stretch;
 use tick::Forcing;
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
@@ -60,16 +62,26 @@ pub struct Controller {
     /// Amplitude r; 1 where discrete.
     r: f64,
     filter: Filter,
+    /// Seconds to 99 % of a changed command.
+    transition: f64,
     style: Follower,
     /// ρ = 1/τ.
     rate: Follower,
     /// Goal or anchor.
     centre: Follower,
+    /// How a commanded goal is followed: [`Controller::centre_filter`].
+    centre_filter: Filter,
     /// By groups of DoFs, as all that follows.
     forcing: Vec<Forcing>,
     /// Forcing at the start of the stretch at work, taken before anything moves: kept as numbers for the loop over the
     /// groups, it would not stay in registers.
     from: Vec<Jet<Lanes>>,
+    /// The way g − y₀ at the start, which the frame covers; zero where rhythmic.
+    way: Vec<Lanes>,
+    /// The share m − 1 of it by which the frame is off the goal at the clock.
+    lag: f64,
+    /// Where it is read.
+    stretch: Stretch,
     z: Vec<Lanes>,
     position: Vec<Lanes>,
     velocity: Vec<Lanes>,
@@ -83,6 +95,7 @@ pub struct Controller {
     finest: f64,
     /// Of the last tick, and good for the next if it is as long.
     glide: Glide,
+    centre_glide: Glide,
     propagator: Propagator,
     series: Series,
     /// Ticks from now for which the landscape is fetched.
@@ -94,7 +107,8 @@ impl Controller {
     ///
     /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal or anchor, both in
     /// seconds; 0 is the paper's immediate switch, and without it a tenth of the nominal duration (discrete) or a
-    /// quarter of the nominal period (rhythmic) serves.
+    /// quarter of the nominal period (rhythmic) serves. A goal takes what remains of the movement if that is longer,
+    /// unless transport is immediate.
     ///
     /// # Errors
     /// Conditions that do not fit the model, `dt` that is not positive, or a negative `transition`.
@@ -119,11 +133,16 @@ impl Controller {
             clock: CompensatedSum::default(),
             r: 1.0,
             filter,
+            transition,
             style: Follower::new(&conditions.style),
             rate: Follower::new(&[1.0 / conditions.tau]),
             centre: Follower::new(&conditions.centre),
+            centre_filter: filter,
             forcing: vec![Forcing::default(); zeros.len()],
             from: vec![Jet::default(); zeros.len()],
+            way: zeros.clone(),
+            lag: 0.0,
+            stretch: model.transport.stretch(0.0),
             z: zeros.clone(),
             position: zeros.clone(),
             velocity: zeros.clone(),
@@ -133,6 +152,7 @@ impl Controller {
             held: Held::new(model.ranges(), model.canonical().extent()),
             finest,
             glide: filter.glide(dt),
+            centre_glide: filter.glide(dt),
             propagator: series.propagator::<Lanes>(0.0),
             series,
             lead: 1.0,
@@ -168,6 +188,11 @@ impl Controller {
         self.style.jump(&conditions.style);
         self.rate.jump(&[1.0 / conditions.tau]);
         self.centre.jump(&conditions.centre);
+        if let (Kind::Discrete, Some(start)) = (self.model.kind(), &conditions.start) {
+            repack(&mut self.way, start);
+            self.way.iter_mut().zip(self.centre.value()).for_each(|(way, goal)| *way = *goal - *way);
+        }
+        self.read_frame();
         self.read_forcing();
         self.place();
         self.set_tolerance();
@@ -193,6 +218,21 @@ impl Controller {
             for (z, forcing) in self.z.iter_mut().zip(&self.forcing) {
                 *z = *z * conditions.tau - forcing.shape * *r;
             }
+        }
+    }
+
+    /// The filter of a goal commanded now, for a movement that goes on with `tau`.
+    ///
+    /// Such a goal enters Eq. (1) alone, as in the paper, but over what remains of the movement: the filter takes so long,
+    /// less the time 1/β_z by which the output system lags behind, and never less than a transition. A goal at once is
+    /// what immediate transport has, an anchor, and any goal from shortly before the end on.
+    pub(super) fn centre_filter(&self, tau: f64) -> Filter {
+        match self.model.canonical() {
+            Canonical::Discrete { u_end, .. } if !self.model.transport.is_immediate() => {
+                let remaining = u_end - self.clock.value() - 1.0 / self.model.attractor().beta_z;
+                Filter::new(self.transition.max(remaining * tau))
+            }
+            _ => self.filter,
         }
     }
 

@@ -3,10 +3,11 @@
 use super::{Controller, Status};
 use crate::attractor::{Attractor, Jet, State};
 use crate::error::{Error, Result};
-use crate::landscape::{Landscape, Place};
+use crate::landscape::{Fade, Landscape, Place};
 use crate::lanes::{Lanes, Real, Register, flush, unpack};
 use crate::perturbation::Push;
 use crate::phase::{Canonical, CompensatedSum, amplitude};
+use crate::transport::Lag;
 
 /// Most pieces of a tick; a longer one is still stable, only less exact.
 const MOST_PIECES: f64 = 1000.0;
@@ -58,12 +59,18 @@ impl Gate {
         Jet { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
     }
 
-    /// ẏ = ρ(z + w) and ÿ = ρ²(z′ + w′) + ρ̇(z + w).
+    /// ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w, where w has the motion c′ of the frame in it.
     #[inline(always)]
     fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: Jet<T>) -> [T; 2] {
         let ([rate, change], flow) = (self.rate, state.z + w.value);
         [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
     }
+}
+
+/// Adds the motion of a frame that covers a `way` to the forcing, for m with respect to the output system's clock.
+#[inline(always)]
+fn carried<T: Real>(w: Jet<T>, way: T, [slope, bend]: [f64; 2]) -> Jet<T> {
+    Jet { value: w.value + way * slope, slope: w.slope + way * bend }
 }
 
 impl Controller {
@@ -81,8 +88,11 @@ impl Controller {
     /// One tick of `dt` seconds, `h` on the clock.
     pub(super) fn tick(&mut self, dt: f64, h: f64) -> Status {
         self.started = true;
-        let moving = !(self.style.settled() && self.rate.settled() && self.centre.settled());
-        let parts = (h / self.finest).max(if moving { self.filter.parts(dt) } else { 0.0 });
+        let moving = !(self.style.settled() && self.rate.settled());
+        let mut parts = (h / self.finest).max(if moving { self.filter.parts(dt) } else { 0.0 });
+        if !self.centre.settled() {
+            parts = parts.max(self.centre_filter.parts(dt));
+        }
         if parts <= 1.0 {
             self.piece(dt, h);
         } else {
@@ -95,7 +105,8 @@ impl Controller {
         self.time.add(dt);
         // What has settled stays settled, unless it is pushed or commanded.
         if self.status == Status::Working || self.held.push().is_some() {
-            self.status = self.settled();
+            let past = self.model.landscape().is_past(self.clock.value());
+            self.status = if past { self.settled() } else { Status::Working };
         }
         self.status
     }
@@ -113,6 +124,7 @@ impl Controller {
     fn measure(&mut self, dt: f64) {
         if dt != self.glide.dt() {
             self.glide = self.filter.glide(dt);
+            self.centre_glide = self.centre_filter.glide(dt);
         }
     }
 
@@ -122,7 +134,8 @@ impl Controller {
             return self.advance(dt, h);
         };
         let (left, way) = (u_end - self.clock.value(), self.held.pace() * h);
-        if left <= 0.0 || left >= way {
+        // A tick that ends here but for rounding is one that does.
+        if left <= 0.0 || left > way * (1.0 + 1e-9) {
             return self.advance(dt, h);
         }
         let before = self.rate.time_to(left / self.held.pace(), dt, &self.filter);
@@ -132,6 +145,7 @@ impl Controller {
             self.advance(before, h);
         }
         self.clock = CompensatedSum::at(u_end);
+        self.read_frame();
         self.read_forcing();
         let h = self.stretch(dt - before);
         self.advance(dt - before, h);
@@ -156,58 +170,66 @@ impl Controller {
         if h != self.propagator.step() {
             self.propagator = self.series.propagator::<T>(h);
         }
-        let demonstrated = self.model.landscape().fading(self.clock.value()).is_none();
+        let demonstrated = !self.model.landscape().is_past(self.clock.value());
         let levers = self.held.push().map(|_| self.levers());
-        let before = self.gate();
+        let before = if demonstrated { self.gate_within() } else { self.gate() };
         for (from, forcing) in self.from.iter_mut().zip(&self.forcing) {
             let Jet { value, slope } = before.jet::<T>(forcing);
             *from = Jet { value: value.store(), slope: slope.store() };
         }
         self.style.advance::<T>(&self.glide);
         self.rate.advance::<T>(&self.glide);
-        let moving = self.centre.elapse(&self.glide);
+        let moving = self.centre.elapse(&self.centre_glide);
         self.clock.add(self.held.pace() * h);
         if let Canonical::Rhythmic { mu } = self.model.canonical() {
             self.clock.wrap();
             self.r = amplitude(mu, self.r, self.conditions.amplitude, h);
         }
+        if !self.stretch.reaches(self.clock.value()) {
+            self.stretch = self.model.transport.stretch(self.clock.value());
+        }
+        let Lag { value, slope, bend } = self.stretch.lag(self.clock.value());
+        let lags = [std::mem::replace(&mut self.lag, value), value];
+        let carry = self.carry(slope, bend);
         // A piece that reaches u_end has the slopes of the demonstrated side at both its ends.
         let after = if demonstrated { self.gate_within() } else { self.gate() };
 
         let (model, propagator) = (&*self.model, &self.propagator);
-        let (landscape, attractor, place) =
-            (model.landscape(), model.attractor(), model.landscape().place(self.clock.value()));
+        let (landscape, attractor, clock) = (model.landscape(), model.attractor(), self.clock.value());
+        let place = if demonstrated { landscape.place_within(clock) } else { landscape.place(clock) };
         let style = unpack(self.style.value(), model.n_styles());
         let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
         let (n, rest) = (self.forcing.len(), T::splat(self.rest));
         let (forcing, centre) = (&mut self.forcing[..n], &mut self.centre);
+        let (starts, way) = (&self.from[..n], &self.way[..n]);
         let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
         let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
         for group in 0..n {
-            let from = Jet { value: T::load(&self.from[group].value), slope: T::load(&self.from[group].slope) };
+            let from = Jet { value: T::load(&starts[group].value), slope: T::load(&starts[group].slope) };
             forcing[group] = Forcing::read::<T>(landscape, place, group, style, swing);
             let to = after.jet(&forcing[group]);
 
-            let mut origin = T::load(&centre.value()[group]);
-            let state = State { e: T::load(&position[group]) - origin, z: T::load(&z[group]) };
+            let (goal, way) = (T::load(&centre.value()[group]), T::load(&way[group]));
+            let [start, mut origin] = lags.map(|lag| goal + way * lag);
+            let state = State { e: T::load(&position[group]) - start, z: T::load(&z[group]) };
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
-                let start = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * before.tau };
-                centre.advance_group::<T>(group, &self.glide);
+                let set_out = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * before.tau };
+                centre.advance_group::<T>(group, &self.centre_glide);
                 let arrived = T::load(&centre.value()[group]);
                 let slope = T::load(&centre.rate()[group]) * after.tau;
-                let moved = propagator.follow([start, Jet { value: arrived - origin, slope }]);
+                let moved = propagator.follow([set_out, Jet { value: arrived - goal, slope }]);
                 y = y + moved.e;
-                origin = arrived;
+                origin = arrived + way * lags[1];
                 next.z = next.z + moved.z;
             }
             let (y, z_next) = (flush(y, rest), flush(next.z, rest));
             (position[group], z[group]) = (y.store(), z_next.store());
-            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, to);
+            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, carried(to, way, carry));
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
         }
-        landscape.prefetch(self.clock.value() + self.lead * self.held.pace() * h);
+        landscape.prefetch(clock + self.lead * self.held.pace() * h);
         if let Some(before) = levers {
             self.add_perturbation(before);
             self.read_out();
@@ -239,17 +261,20 @@ impl Controller {
     }
 
     /// The gate at the clock, at u_end with the slope of what follows.
+    #[inline(always)]
     pub(super) fn gate(&self) -> Gate {
         let within = self.gate_within();
         match self.model.landscape().fading(self.clock.value()) {
-            Some(Jet { value, slope }) => {
-                Gate { r: value, along: 0.0, swing: value * within.swing, growth: self.held.pace() * slope, ..within }
+            Some(Fade { value, growth, along, .. }) => {
+                let [along, growth] = [along, growth].map(|slope| self.held.pace() * slope);
+                Gate { r: value, along, swing: value * within.swing, growth, ..within }
             }
             None => within,
         }
     }
 
     /// The gate of the demonstrated stretch.
+    #[inline(always)]
     fn gate_within(&self) -> Gate {
         let (r, rate) = (self.r, [self.rate.value(), self.rate.rate()].map(first));
         let growth = match self.model.canonical() {
@@ -258,6 +283,19 @@ impl Controller {
         };
         let tau = 1.0 / rate[0];
         Gate { r, along: r * self.held.pace(), swing: r * tau, growth, rate, tau }
+    }
+
+    /// m′ and m″ with respect to the output system's clock, from those with respect to the phase's.
+    #[inline(always)]
+    fn carry(&self, slope: f64, bend: f64) -> [f64; 2] {
+        let pace = self.held.pace();
+        [slope * pace, bend * (pace * pace)]
+    }
+
+    /// Reads the frame at a clock that was set.
+    pub(super) fn read_frame(&mut self) {
+        self.stretch = self.model.transport.stretch(self.clock.value());
+        self.lag = self.stretch.lag(self.clock.value()).value;
     }
 
     /// Reads the forcing at the clock.
@@ -272,10 +310,14 @@ impl Controller {
     /// Velocity and acceleration of the present state.
     pub(super) fn read_out(&mut self) {
         let (gate, attractor) = (self.gate(), self.model.attractor());
+        let Lag { value, slope, bend } = self.model.transport.lag(self.clock.value());
+        let carry = self.carry(slope, bend);
         for group in 0..self.z.len() {
-            let e = self.position[group] - self.centre.value()[group];
-            let w = gate.jet(&self.forcing[group]);
-            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, State { e, z: self.z[group] }, w);
+            let way = self.way[group];
+            let w = carried(gate.jet(&self.forcing[group]), way, carry);
+            let e = self.position[group] - (self.centre.value()[group] + way * value);
+            let state = State { e, z: self.z[group] };
+            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, state, w);
         }
         if let Some(Push { velocity, acceleration }) = self.held.push() {
             for group in 0..self.z.len() {
@@ -289,7 +331,7 @@ impl Controller {
     /// left of its way, of its speed at critical damping, and of its forcing, be it of the style that is on its way, and
     /// as far as the goal itself still goes.
     fn settled(&self) -> Status {
-        let Some(Jet { value: fade, .. }) = self.model.landscape().fading(self.clock.value()) else {
+        let Some(fade) = self.model.landscape().fading(self.clock.value()) else {
             return Status::Working;
         };
         let Attractor { alpha_z, beta_z } = self.model.attractor();
@@ -297,13 +339,14 @@ impl Controller {
         let place = landscape.place(self.clock.value());
         let over = (0..self.z.len()).all(|group| {
             let way = (self.position[group] - self.centre.target()[group]).abs();
-            let forcing = self.forcing[group].shape * fade;
+            let Forcing { shape, slope, .. } = self.forcing[group];
+            let forcing = shape * fade.value;
             let flow = (self.z[group] + forcing).abs() * (2.0 / alpha_z);
-            let mut push = forcing.abs();
+            let mut push = fade.push(Jet { value: shape, slope });
             if !self.style.settled() {
-                push = push.max((landscape.blend::<Lanes>(place, group, target).value * fade).abs());
+                push = push.max(fade.push(landscape.blend(place, group, target)));
             }
-            let left = way + flow + push * (1.0 / beta_z) + self.filter.left(&self.centre, group);
+            let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, group);
             left.simd_le(self.tolerance[group]).all()
         });
         if over { Status::Finished } else { Status::Working }

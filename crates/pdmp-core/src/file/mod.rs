@@ -42,6 +42,8 @@ struct Constants {
     tau: f64,
     alpha_z: f64,
     beta_z: f64,
+    /// κ past the end, where transport is learnt.
+    braking: Option<f64>,
     names: Vec<String>,
     units: Vec<String>,
     nominal: usize,

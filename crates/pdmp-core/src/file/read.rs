@@ -6,7 +6,7 @@ use safetensors::tensor::{Dtype, SafeTensors};
 use super::{Constants, KEY, Map, SCHEMA, Sealed, check_size, checksum};
 use crate::align::{Template, Warp};
 use crate::attractor::Attractor;
-use crate::context::{ContextMap, Kernel, Recipe};
+use crate::context::{ContextMap, Kernel, MapKind, Recipe, Stack};
 use crate::error::{Error, LARGEST, Result};
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
@@ -14,6 +14,7 @@ use crate::phase::Canonical;
 use crate::sensitivity::STEPS;
 use crate::smooth::Noise;
 use crate::tabulate::{Jets, MOST_CELLS};
+use crate::transport::Transport;
 
 impl Model {
     /// Reads a model from the bytes of a file.
@@ -128,6 +129,16 @@ impl Reader<'_> {
         let (values, slopes) = (knots("landscape.values")?, knots("landscape.slopes")?);
         let knots = Jets { n_outputs: n_styles * n_dofs, values, slopes };
         let landscape = Landscape::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
+        let [n_coefficients] = self.shape("transport")?;
+        let transport = self.array("transport", &[n_coefficients])?;
+        let transport = Transport::from_coefficients(transport, constants.canonical)
+            .map_err(|error| Error::File(error.to_string()))?;
+        let braking = constants.braking;
+        // Slower than z the two parts of the forcing past the end would part without bound.
+        let sound = braking.is_none_or(|braking| (constants.alpha_z..=1e12).contains(&braking));
+        if braking.is_none() != transport.is_immediate() || !sound {
+            return Err(bad("braking does not fit the rest"));
+        }
         let breaks = self.array("breaks", &[n_segments + 1])?;
         if breaks[0] != 0.0 || breaks[n_segments] != 1.0 || breaks.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err(bad("breaks do not increase from 0 to 1"));
@@ -162,14 +173,28 @@ impl Reader<'_> {
             singular_values,
             left_out: constants.left_out,
             left_over: None,
+            findings: Vec::new(),
             basis: constants.basis.clone(),
         };
         let (tau, names, units) = (constants.tau, constants.names.clone(), constants.units.clone());
         let (cycle, responses) = Default::default();
         let map = None;
-        let mut model =
-            Model { attractor, landscape, tau, names, units, ranges, demonstrated, learnt, map, cycle, responses }
-                .with_cycle();
+        let mut model = Model {
+            attractor,
+            landscape,
+            transport,
+            braking,
+            tau,
+            names,
+            units,
+            ranges,
+            demonstrated,
+            learnt,
+            map,
+            cycle,
+            responses,
+        }
+        .with_cycle();
         if let Some(map) = &constants.map {
             model.map = Some(self.map(map, &model)?);
             let left_over = self.matrix("left_over", (model.kind().samples(STEPS), n_dofs))?;
@@ -195,6 +220,7 @@ impl Reader<'_> {
         let ratios = self.array("map.ratios", &[outputs.ncols()])?;
         let sound = match map.kernel {
             None => ratios.iter().all(|ratio| *ratio == 0.0),
+            Some(Kernel::Linear) => false,
             Some(Kernel::Quadratic) => ratios.iter().all(|ratio| *ratio >= 0.0),
             Some(Kernel::Matern { length }) => length > 0.0 && ratios.iter().all(|ratio| *ratio >= 0.0),
         };
@@ -209,9 +235,25 @@ impl Reader<'_> {
         }
         let errors = map.errors.iter().map(|&(kind, error)| (kind, error.unwrap_or(f64::INFINITY))).collect();
         let directions = self.matrix("map.directions", (outputs.ncols(), outputs.ncols()))?;
-        let recipe = Recipe { kind: map.kind, kernel: map.kernel, directions, ratios, errors };
+        let trend = match map.kind {
+            MapKind::Stacked => Some(self.trend(outputs.ncols())?),
+            _ => None,
+        };
+        let recipe = Recipe { kind: map.kind, kernel: map.kernel, directions, ratios, trend, errors };
         ContextMap::restore(map.columns.clone(), contexts, outputs.view(), recipe)
             .map_err(|error| Error::File(error.to_string()))
+    }
+
+    /// The line of a stacked map: ratios (P,) and weights.
+    fn trend(&self, n_outputs: usize) -> Result<(Vec<f64>, Stack)> {
+        let slopes = self.array("map.slopes", &[n_outputs])?;
+        let weights = self.array("map.weights", &[2, 2])?;
+        let stack = Stack { inside: [weights[0], weights[1]], outside: [weights[2], weights[3]] };
+        let sound = |[g, l]: [f64; 2]| g >= 0.0 && l >= 0.0 && g + l <= 1.0 + 1e-9;
+        if slopes.iter().any(|ratio| *ratio < 0.0) || !sound(stack.inside) || !sound(stack.outside) {
+            return Err(Error::File("the map's line is out of range".to_string()));
+        }
+        Ok((slopes, stack))
     }
 
     /// Checks that the file holds the model's arrays and no others, unchanged.

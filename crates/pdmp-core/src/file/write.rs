@@ -6,7 +6,7 @@ use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
 use super::{Constants, KEY, Map, SCHEMA, Sealed, check_size, checksum};
-use crate::context::{ContextMap, Recipe};
+use crate::context::{ContextMap, Recipe, Stack};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::tabulate::Jets;
@@ -33,6 +33,7 @@ impl Model {
             tau: self.tau,
             alpha_z: self.attractor.alpha_z,
             beta_z: self.attractor.beta_z,
+            braking: self.braking,
             names: self.names.clone(),
             units: self.units.clone(),
             nominal: self.demonstrated.nominal,
@@ -80,6 +81,7 @@ impl Model {
             vector("ranges", &self.ranges),
             vector("noise.levels", self.learnt.noise.levels()),
             vector("noise.cut_offs", &cut_offs),
+            vector("transport", self.transport.coefficients()),
             ("landscape.values", knots.clone(), values),
             ("landscape.slopes", knots, slopes),
         ];
@@ -92,6 +94,10 @@ impl Model {
             let recipe = map.recipe();
             arrays.push(matrix("map.directions", &recipe.directions));
             arrays.push(vector("map.ratios", &recipe.ratios));
+            if let Some((slopes, Stack { inside, outside })) = &recipe.trend {
+                arrays.push(vector("map.slopes", slopes));
+                arrays.push(("map.weights", vec![2, 2], [*inside, *outside].concat()));
+            }
             arrays.extend(self.learnt.left_over.as_ref().map(|left_over| matrix("left_over", left_over)));
         }
         arrays

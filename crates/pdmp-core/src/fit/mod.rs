@@ -1,22 +1,29 @@
 //! Learning a primitive from demonstrations: the four steps of Section 3.2, composed.
 
 mod constants;
+mod cycle_phase;
 mod options;
+mod scaling;
 mod selection;
+mod stiffness;
 mod style;
 
 use std::sync::Arc;
 
 use ndarray::{Array2, s};
 
+use crate::align::{Aligned, TimeScaling};
 use crate::context::{ContextColumn, ContextMap, tabulate};
 use crate::demo::{ContextValue, Demonstration};
 use crate::error::{Error, Result};
 use crate::factor::{Factors, StyleCount};
 use crate::foresight::Foresight;
+use crate::inspection::{inspect, unwound};
 use crate::landscape::Landscape;
 use crate::model::{Demonstrated, Learnt, Model};
+use crate::phase::Kind;
 use crate::targets::Targets;
+use crate::transport::{Transport, TransportChoice};
 
 use constants::Constants;
 pub use options::{DofScale, FitOptions, Stage, StyleChoice};
@@ -38,17 +45,46 @@ pub fn fit(
         count.check(demos.len(), "demonstrations")?;
     }
     let threads = options.threads;
+    let mut findings = inspect(demos, options.alignment.dt);
+    let whole = unwound(demos);
+    let demos = &*whole;
     let mut aligned = options.alignment.align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
     let mut aligning = |share| proceed(Stage::Align, share);
     let unit = options.dof_scale.given(demos[0].n_dofs())?;
-    let template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut aligning)?;
+    let linear = aligned.clone();
+    let compared = options.alignment.time_scaling == TimeScaling::WarpIfBetter && contexts.is_some();
+    let mut warping = |share| aligning(if compared { 0.5 * share } else { share });
+    let mut template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut warping)?;
+    if let (true, Some((columns, numbers))) = (compared, &contexts) {
+        let n_styles = |aligned: &Aligned| {
+            let count = match options.styles {
+                StyleChoice::Given(count) => count,
+                StyleChoice::Systematic => StyleCount::Spectrum(0.9),
+                StyleChoice::Auto => StyleCount::Spectrum(1.0),
+            };
+            let mut targets = Targets::of(aligned, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
+            targets.scale(&options.dof_scale.of(&targets.ranges(), &units));
+            Ok(Factors::of(targets.forcing.view(), count, &mut |_| Ok(()))?.styles.ncols())
+        };
+        let contexts = scaling::Contexts { columns, numbers, map: options.map, n_styles: &n_styles };
+        let mut comparing = |share: f64| aligning(0.5 + 0.5 * share);
+        if !contexts.favour(&aligned, &linear, options.alignment.kind, &mut comparing)? {
+            (aligned, template) = (linear, None);
+        }
+    }
     let mut targeting = |share| proceed(Stage::Targets, share);
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
     let dof_scale = options.dof_scale.of(&ranges, &units);
+    let transport = match (options.transport, constants.canonical.kind()) {
+        (TransportChoice::Learnt, Kind::Discrete) => targets.transport(constants.canonical, &dof_scale)?,
+        _ => Transport::immediate(),
+    };
+    let braking = (!transport.is_immediate()).then(|| targets.braking(constants.attractor));
+    targets.carry(&transport, constants.attractor, constants.canonical);
     targets.scale(&dof_scale);
 
     let mut factorising = |share| proceed(Stage::Factorise, share);
@@ -65,7 +101,8 @@ pub fn fit(
             ))?;
             let mut first = |share: f64| factorising(0.5 * share);
             let all = Factors::of(targets.forcing.view(), StyleCount::Spectrum(1.0), &mut first)?;
-            let foresight = Foresight::new(&aligned, &targets, &all, constants.attractor, constants.canonical)?;
+            let foresight =
+                Foresight::new(&aligned, &targets, &all, &transport, constants.attractor, constants.canonical)?;
             let mut second = |share: f64| factorising(0.5 + 0.5 * share);
             let n_styles = foresight.styles(columns, numbers, options.map, &mut second)?;
             all.leading(n_styles)
@@ -101,12 +138,29 @@ pub fn fit(
         left_out,
         left_over: None,
         basis: regression.describe(),
+        findings: Vec::new(),
     };
     let Constants { attractor, tau, .. } = constants;
     let (cycle, responses) = Default::default();
     let map = None;
-    let model = Model { attractor, landscape, tau, names, units, ranges, demonstrated, learnt, map, cycle, responses };
+    let model = Model {
+        attractor,
+        landscape,
+        transport,
+        braking,
+        tau,
+        names,
+        units,
+        ranges,
+        demonstrated,
+        learnt,
+        map,
+        cycle,
+        responses,
+    };
     let mut model = Arc::new(model.with_cycle());
+    findings.extend(stiffness::stiffness(&model, &aligned)?);
+    Arc::make_mut(&mut model).learnt.findings = findings;
     if let (Some(columns), Some(contexts)) = (columns, &model.demonstrated.contexts) {
         let (outputs, metric) = (model.outputs(), model.metric()?);
         let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;

@@ -9,6 +9,7 @@ use crate::factor::StyleCount;
 use crate::phase::Kind;
 use crate::smooth::Smoothing;
 use crate::threads::Threads;
+use crate::transport::TransportChoice;
 
 /// The unit of each degree of freedom in the factorisation.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,6 +71,8 @@ pub struct FitOptions {
     pub styles: StyleChoice,
     /// Function approximator of the landscape.
     pub basis: Basis,
+    /// How the way from start to goal is spread over a discrete movement.
+    pub transport: TransportChoice,
     /// Unit of each DoF in the factorisation.
     pub dof_scale: DofScale,
     /// Time constant τ in seconds, discrete; otherwise the nominal duration.
@@ -87,8 +90,8 @@ pub struct FitOptions {
 }
 
 impl FitOptions {
-    /// The defaults: smoothing by cross-validation, the systematic styles, a Gaussian process, α_z = 25, μ = 1, as many
-    /// threads as the system allows, and all else from the demonstrations.
+    /// The defaults: smoothing by cross-validation, the systematic styles, a Gaussian process, a learnt transport, α_z = 25,
+    /// μ = 1, as many threads as the system allows, and all else from the demonstrations.
     pub fn new(kind: Kind) -> Self {
         Self {
             alignment: Alignment {
@@ -104,6 +107,7 @@ impl FitOptions {
             map: MapChoice::Auto,
             styles: StyleChoice::Systematic,
             basis: Basis::Gp(Gp::default()),
+            transport: TransportChoice::Learnt,
             dof_scale: DofScale::Auto,
             tau: None,
             alpha_z: 25.0,

@@ -1,5 +1,7 @@
 //! Samples that are missing.
 
+use std::f64::consts::TAU;
+
 use ndarray::Array2;
 
 use crate::demo::{LEAST_SAMPLES, check_time};
@@ -10,11 +12,11 @@ use crate::spline::Knots;
 /// same column.
 ///
 /// A gap lasts from the sample before it to the one after it. `time` (T,) is in seconds, and `turns` (D,) tells what a
-/// full turn is where a column is an angle, 0 where it is none: an angle goes the shorter way round through a gap.
-/// `names` (D,) are those that errors tell.
+/// full turn is where a column is an angle, 0 where it is none and NaN where that is not known: an angle goes the shorter
+/// way round through a gap. `names` (D,) are those that errors tell.
 ///
 /// # Errors
-/// A gap longer than `max_gap` seconds, or at either end; a column with fewer than four samples; times that do not
+/// A change by about a full turn through a gap of a column that may be an angle. A gap longer than `max_gap` seconds, or at either end; a column with fewer than four samples; times that do not
 /// increase.
 pub fn fill(
     mut position: Array2<f64>,
@@ -45,6 +47,11 @@ pub fn fill(
         let mut values: Vec<f64> = present.iter().map(|&c| column[c]).collect();
         if turn > 0.0 {
             unwrap(&mut values, turn);
+        } else if turn.is_nan()
+            && let Some(k) = wrap(&values, &present)
+        {
+            let (column, [from, to]) = (name.clone(), [k, k + 1].map(|k| time[present[k]]));
+            return Err(Error::WrapInGap { column, from, to, change: values[k + 1] - values[k] });
         }
         let knots = Knots::not_a_knot(present.iter().map(|&c| time[c]).collect());
         let mut slopes = vec![0.0; values.len()];
@@ -76,6 +83,27 @@ fn check(present: &[usize], time: &[f64], name: &str, max_gap: f64) -> Result<()
         None if present.len() < LEAST_SAMPLES => Err(Error::Samples { found: present.len(), least: LEAST_SAMPLES }),
         None => Ok(()),
     }
+}
+
+/// Ranges that look like those of a wrapped angle, in turns.
+const WRAPPED: [f64; 2] = [0.9, 1.02];
+/// Least change through a gap that looks like a wrap, in turns, and over what the fastest change between neighbours makes of
+/// the length of the gap.
+const MIN_WRAP: f64 = 0.5;
+const MIN_RATIO: f64 = 3.0;
+
+/// The present sample before the first gap through which the values change as a wrapped angle does.
+fn wrap(values: &[f64], present: &[usize]) -> Option<usize> {
+    let [low, high] = values.iter().fold([f64::MAX, f64::MIN], |[low, high], &y| [low.min(y), high.max(y)]);
+    let range = |turn: f64| (WRAPPED[0] * turn..=WRAPPED[1] * turn).contains(&(high - low));
+    let turn = [TAU, 360.0].into_iter().find(|turn| range(*turn))?;
+    let change = |k: usize| (values[k + 1] - values[k]).abs();
+    let samples = |k: usize| present[k + 1] - present[k];
+    // Wraps between neighbours are none of the changes to compare with.
+    let usual = (0..values.len() - 1).filter(|&k| samples(k) == 1 && change(k) < MIN_WRAP * turn);
+    let fastest = usual.map(change).fold(0.0, f64::max);
+    (0..values.len() - 1)
+        .find(|&k| samples(k) > 1 && change(k) > MIN_WRAP * turn && change(k) > MIN_RATIO * fastest * samples(k) as f64)
 }
 
 /// Takes off the full turns between one angle and the next.

@@ -10,6 +10,9 @@ use std::fmt;
 
 use ndarray::{Array2, Axis};
 
+use super::repetition::STANDS_STILL;
+use crate::error::Error;
+
 /// Largest modified z-score.
 const LARGEST_SCORE: f64 = 3.5;
 /// The median absolute deviation of a normal distribution, over its standard deviation.
@@ -38,16 +41,40 @@ pub enum Reason {
     },
     /// The recording ends before a whole cycle that begins in the phase of the first recording's.
     Phase,
+    /// The recording does not repeat itself.
+    Aperiodic {
+        /// Where it resembles itself most, in seconds.
+        lag: f64,
+        /// The mean correlation of all DoFs there.
+        share: f64,
+        /// The least correlation that chance does not explain.
+        least: f64,
+    },
+    /// The recording stands still.
+    Still,
+}
+
+impl Reason {
+    /// The reason for which a whole recording is left out, from what the search for its period says.
+    pub(super) fn of(error: &Error) -> Option<Self> {
+        match *error {
+            Error::Aperiodic { lag, share, least } => Some(Self::Aperiodic { lag, share, least }),
+            Error::Arguments(STANDS_STILL) => Some(Self::Still),
+            _ => None,
+        }
+    }
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
+        match *self {
             Reason::Period { median } => write!(f, "the median period is {median:.3} s"),
             Reason::Shape { distance, median } => {
                 write!(f, "{distance:.2} standard deviations from the median cycle, the others {median:.2}")
             }
             Reason::Phase => write!(f, "the recording holds no whole cycle from the phase in which the first begins"),
+            Reason::Aperiodic { lag, share, least } => Error::Aperiodic { lag, share, least }.fmt(f),
+            Reason::Still => write!(f, "{STANDS_STILL}"),
         }
     }
 }

@@ -9,7 +9,8 @@
 //! ρ_f(k) = cov(y_f[0 … n−k), y_f[k … n)) / (σ(y_f[0 … n−k)) σ(y_f[k … n)))
 //! ```
 //!
-//! and A(k) is its mean over all traits. The sums of products for all lags are one autocorrelation, which is a Fourier
+//! and A(k) is its mean over all traits, velocities weighted by the share of the variance of their positions that
+//! smoothing keeps: those of mere noise, smoothed, are few slow waves that agree with anything. The sums of products for all lags are one autocorrelation, which is a Fourier
 //! transform of the power spectrum (Wiener–Khinchin).
 //!
 //! One cycle, two cycles and so on each make a peak of A, the highest lag of a lobe; half a cycle, or the period of a
@@ -20,7 +21,8 @@
 //! median over c of 1/(2F) Σ_f (y_f(c + k) − y_f(c))²
 //! ```
 //!
-//! which is 1 − A for what is evenly distributed, but does not mind an odd cycle, and tells a harmonic.
+//! which is 1 − A for what is evenly distributed, but does not mind an odd cycle, and tells a harmonic. Peaks that chance
+//! explains are none (see `significance`).
 //!
 //! P. McLeod, G. Wyvill, A smarter way to find pitch, ICMC 2005 (lobes, and the first of almost the highest peaks).
 
@@ -34,13 +36,14 @@ use crate::demo::Demonstration;
 use crate::error::{Error, Result};
 use crate::recording::Curve;
 use crate::recording::odd::median;
-use crate::smooth::{Smoothing, smooth};
+use crate::recording::significance::Chance;
 use crate::spline::{Knots, Splines};
 
+pub(super) const STANDS_STILL: &str = "the recording stands still: it has no cycles";
 /// Longest period, as a share of the recording: it must hold one cycle and a half.
 const LONGEST: f64 = 2.0 / 3.0;
-/// Least correlation of a recording with itself a period later.
-const LEAST: f64 = 0.5;
+/// Least correlation of a recording with itself a period later: noise that a filter has cut off sharply rings with less.
+const LEAST: f64 = 0.35;
 /// Correlation above which there is a lobe.
 const LOBE: f64 = 0.25;
 /// A peak is as high as the highest if it keeps this share of its height,
@@ -59,30 +62,40 @@ pub fn period(demo: &Demonstration) -> Result<f64> {
     Ok(period_of(traits(&curve)?.view(), curve.interval())? * curve.interval())
 }
 
-/// Traits (n, 2D) of a recording at n even times: positions, then velocities. Those that are constant are zero.
+/// Traits (n, 2D) of a recording at n even times: positions of unit variance, then velocities whose variance is their
+/// weight. Those that are constant are zero.
 pub(super) fn traits(curve: &Curve) -> Result<Array2<f64>> {
     let n = curve.time.len();
     let time: Vec<f64> = (0..n).map(|c| c as f64).collect();
-    let mut position = curve.sample(curve.first(), curve.last(), n)?;
-    position.columns_mut().into_iter().for_each(standardise);
+    let (first, last) = (curve.first(), curve.last());
+    let mut position = curve.sample(first, last, n)?;
     // Noise would drown the velocities of a recording at a high rate.
-    let smoothed = smooth(Smoothing::Auto, &time, None, position.view())?;
+    let mut smoothed = curve.smooth(first, last, n)?;
+    let both = position.columns_mut().into_iter().zip(smoothed.columns_mut());
+    let weights: Vec<f64> = both
+        .map(|(position, smoothed)| [standardise(position), standardise(smoothed)])
+        .map(|[all, kept]| if all > 0.0 { (kept / all).min(1.0) } else { 0.0 })
+        .collect();
     let smoothed: Vec<f64> = smoothed.iter().copied().collect();
     let mut velocity = Splines::through(Knots::not_a_knot(time), &smoothed, position.ncols()).slopes();
-    velocity.columns_mut().into_iter().for_each(standardise);
+    for (mut column, weight) in velocity.columns_mut().into_iter().zip(weights) {
+        standardise(column.view_mut());
+        column *= weight;
+    }
     let traits = concatenate![Axis(1), position, velocity];
     if traits.iter().all(|x| *x == 0.0) {
-        return Err(Error::Arguments("the recording stands still: it has no cycles"));
+        return Err(Error::Arguments(STANDS_STILL));
     }
     Ok(traits)
 }
 
-/// Takes off the linear trend, by least squares, and makes the standard deviation 1; what is constant becomes 0.
-fn standardise(mut column: ArrayViewMut1<f64>) {
+/// Takes off the linear trend, by least squares, and makes the standard deviation 1; what is constant becomes 0. Returns
+/// what the deviation was.
+fn standardise(mut column: ArrayViewMut1<f64>) -> f64 {
     let n = column.len() as f64;
     let largest = column.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
     if largest == 0.0 {
-        return;
+        return 0.0;
     }
     column.mapv_inplace(|y| y / largest);
     let (mean, middle) = (column.sum() / n, (n - 1.0) / 2.0);
@@ -93,7 +106,9 @@ fn standardise(mut column: ArrayViewMut1<f64>) {
     column.iter_mut().enumerate().for_each(|(c, y)| *y -= mean + slope * (c as f64 - middle));
     let deviation = (column.iter().map(|y| y * y).sum::<f64>() / n).sqrt();
     // What is left of a constant, or of a straight line, is rounding.
-    column.mapv_inplace(|y| if deviation > 1e-9 { y / deviation } else { 0.0 });
+    let moves = deviation > 1e-9;
+    column.mapv_inplace(|y| if moves { y / deviation } else { 0.0 });
+    if moves { deviation * largest } else { 0.0 }
 }
 
 /// The period in samples of a recording with such traits (n, F), sampled each `interval` seconds.
@@ -108,16 +123,22 @@ pub(super) fn period_of(traits: ArrayView2<f64>, interval: f64) -> Result<f64> {
         .filter(|&k| k + 1 < agreement.len())
         .map(|k| vertex(k, [agreement[k - 1], agreement[k], agreement[k + 1]]))
         .collect();
-    let highest = peaks.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_else(|| {
-        let k = best(fallen..agreement.len());
-        (k as f64, agreement[k].min(LOBE))
-    });
-    if highest.1 < LEAST {
-        return Err(Error::Aperiodic { lag: highest.0 * interval, share: highest.1, least: LEAST });
-    }
+    let chance = Chance::of(traits, &agreement, fallen);
+    let significant: Vec<(f64, f64)> =
+        peaks.iter().copied().filter(|&(lag, peak)| peak >= chance.least(lag).max(LEAST)).collect();
+    let higher = |a: &(f64, f64), b: &(f64, f64)| a.1.total_cmp(&b.1);
+    let Some(highest) = significant.iter().copied().max_by(higher) else {
+        // That which is nearest to being one.
+        let short = |&(lag, peak): &(f64, f64)| peak - chance.least(lag).max(LEAST);
+        let (lag, share) = peaks.into_iter().max_by(|a, b| short(a).total_cmp(&short(b))).unwrap_or_else(|| {
+            let k = best(fallen..agreement.len());
+            (k as f64, agreement[k].min(LOBE))
+        });
+        return Err(Error::Aperiodic { lag: lag * interval, share, least: chance.least(lag).max(LEAST) });
+    };
     let most = LACK * lack(traits, highest.0) + SLACK;
     let as_high = |&(lag, peak): &(f64, f64)| peak >= SHARE * highest.1 && lack(traits, lag) <= most;
-    Ok(peaks.into_iter().find(as_high).unwrap_or(highest).0)
+    Ok(significant.into_iter().find(as_high).unwrap_or(highest).0)
 }
 
 /// Runs of lags, from `first` on, at which the agreement makes a lobe.
@@ -132,19 +153,19 @@ fn lobes(agreement: &[f64], first: usize) -> Vec<Range<usize>> {
     lobes
 }
 
-/// Whether a trait is not constant.
-fn moves(column: &ArrayView1<f64>) -> bool {
-    column.iter().any(|y| *y != 0.0)
+/// The weight of a trait; 0 of one that is constant.
+fn mean_square(column: &ArrayView1<f64>) -> f64 {
+    column.dot(column) / column.len() as f64
 }
 
 /// What the agreement of traits (n, F) after a lag lacks half of the time.
 fn lack(traits: ArrayView2<f64>, lag: f64) -> f64 {
     let (whole, share) = (lag as usize, lag.fract());
-    let n_moving = traits.columns().into_iter().filter(moves).count() as f64;
+    let weight = traits.columns().into_iter().map(|column| mean_square(&column)).sum::<f64>();
     let distance = |c: usize| {
         let later = traits.row(c + whole).into_iter().zip(traits.row(c + whole + 1));
         let off = |((a, b), y): ((&f64, &f64), &f64)| (a * (1.0 - share) + b * share - y).powi(2);
-        later.zip(traits.row(c)).map(off).sum::<f64>() / (2.0 * n_moving)
+        later.zip(traits.row(c)).map(off).sum::<f64>() / (2.0 * weight)
     };
     median(&(0..traits.nrows() - whole - 1).map(distance).collect::<Vec<_>>())
 }
@@ -160,8 +181,12 @@ pub(super) fn vertex(k: usize, [before, at, after]: [f64; 3]) -> (f64, f64) {
 fn agreement(traits: ArrayView2<f64>) -> Vec<f64> {
     let n = traits.nrows();
     let mut sum = vec![0.0; (LONGEST * n as f64) as usize + 1];
-    let mut n_moving = 0.0;
-    for column in traits.columns().into_iter().filter(moves) {
+    let mut weights = 0.0;
+    for column in traits.columns() {
+        let weight = mean_square(&column);
+        if weight == 0.0 {
+            continue;
+        }
         let products = products(column);
         // Sums of the first c samples, and of their squares.
         let mut sums = vec![[0.0; 2]; n + 1];
@@ -174,13 +199,13 @@ fn agreement(traits: ArrayView2<f64>) -> Vec<f64> {
             let [behind, behind_square] = [total - left, square - left_square];
             let variances = (ahead_square / m - (ahead / m).powi(2)) * (behind_square / m - (behind / m).powi(2));
             // A part at rest agrees with nothing.
-            if variances > 1e-18 {
-                *sum += (products[k] / m - ahead * behind / (m * m)) / variances.sqrt();
+            if variances > 1e-18 * weight * weight {
+                *sum += weight * (products[k] / m - ahead * behind / (m * m)) / variances.sqrt();
             }
         }
-        n_moving += 1.0;
+        weights += weight;
     }
-    sum.iter().map(|sum| sum / n_moving).collect()
+    sum.iter().map(|sum| sum / weights).collect()
 }
 
 /// Σ_c y_c y_{c+k} for each lag k.

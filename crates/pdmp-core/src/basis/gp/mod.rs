@@ -26,15 +26,9 @@ use crate::error::{Error, Result, check_positive};
 
 /// Smallest ratio of noise to signal variance: below, rounding makes the covariance matrix indefinite.
 const LEAST_NOISE: f64 = 1e-10;
-/// Largest ratio that the search considers, and largest share of the targets' mean square that it leaves to noise: a
-/// thousandth of the signal's deviation, and of the targets.
-///
-/// What the landscape takes for noise, no style brings back, and noise on the demonstrations is what smoothing is for.
-/// With ratios up to 1 the likelihood took the impact in recorded walking forces for noise, and with it half of the
-/// signal: reproductions were off by 23 % of the range, against 6 % with three styles and 3 % with all below 1e-4.
-/// Handwriting is met to 1e-4 at worst below 1e-6. The ratio alone is no bound: long lengths have signal variances far
-/// beyond the targets' mean square, and with 1e-6 of it recorded robot paths were reproduced worse than by a network.
-const MOST_NOISE: f64 = 1e-6;
+/// Largest ratio that the search considers: the signal is a hundredth of the noise, in deviations, and what more there is
+/// of noise no longer changes the likelihood.
+const MOST_NOISE: f64 = 1e4;
 /// Weight, in halves of the number of values, of the square by which the logarithm of the noise exceeds its bound. The
 /// likelihood pulls by no more than half of that number: it is exceeded by a twentieth at most.
 const BARRIER: f64 = 20.0;
@@ -52,8 +46,8 @@ const PORTION: usize = 4096;
 /// The P outputs are independent Gaussian processes of mean zero over the clock with one covariance σ²K,
 /// K = k(u, u′; ℓ) + νI. The signal variance has the maximum-likelihood value σ̂² = Σ fᵀK⁻¹f/(CP). Length ℓ and noise
 /// ratio ν, where not given, maximise the log marginal likelihood with that value put in, −CP/2·ln σ̂² − P/2·ln|K|,
-/// over ν from 1e-10 to 1e-6 and ℓ from the distance of the samples to twice the extent of the clock, with a noise
-/// νσ̂² of at most a millionth of the targets' mean square.
+/// over ν from 1e-10 to 1e4 and ℓ from the distance of the samples to twice the extent of the clock. Noise in the
+/// landscape of a primitive is bounded further, by [`NoiseBound::LANDSCAPE`].
 ///
 /// The variance is shared because basis targets share their noise: S has orthonormal columns, so equal noise on the
 /// demonstrations is equal noise on every row of ΣVᵀ, strong or weak. With a variance each, the weak factors of real
@@ -78,6 +72,32 @@ pub struct Gp {
     pub noise: Option<f64>,
 }
 
+/// How much of the targets a search may take for noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseBound {
+    /// Largest ratio ν of noise to signal variance.
+    ratio: f64,
+    /// Largest noise νσ̂² as a share of the targets' mean square, where it is bounded.
+    share: Option<f64>,
+    /// Ratios that the scan looks at.
+    points: usize,
+}
+
+impl NoiseBound {
+    /// As much as is likeliest, up to a ratio of 1e4.
+    pub const NONE: Self = Self { ratio: MOST_NOISE, share: None, points: 15 };
+
+    /// The bound in the landscape of a primitive: a thousandth of the signal's deviation, and of the targets.
+    ///
+    /// What the landscape takes for noise, no style brings back, and noise on the demonstrations is what smoothing is
+    /// for. With ratios up to 1 the likelihood took the impact in recorded walking forces for noise, and with it half of
+    /// the signal: reproductions were off by 23 % of the range, against 6 % with three styles and 3 % with all below
+    /// 1e-4. Handwriting is met to 1e-4 at worst below 1e-6. The ratio alone is no bound: long lengths have signal
+    /// variances far beyond the targets' mean square, and with 1e-6 of it recorded robot paths were reproduced worse
+    /// than by a network.
+    pub const LANDSCAPE: Self = Self { ratio: 1e-6, share: Some(1e-6), points: 3 };
+}
+
 impl Gp {
     /// A process with the given kernel, and hyperparameters where they are not to be found.
     ///
@@ -89,7 +109,22 @@ impl Gp {
         Ok(Self { kernel, length, noise })
     }
 
-    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease.
+    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease, with the likeliest noise.
+    ///
+    /// # Errors
+    /// As for [`Gp::regress_within`].
+    pub fn regress(
+        &self,
+        domain: Domain,
+        u: &[f64],
+        targets: ArrayView2<f64>,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<GpPosterior> {
+        self.regress_within(NoiseBound::NONE, domain, u, targets, proceed)
+    }
+
+    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease, with the likeliest noise within
+    /// a bound. A noise that is given is used as it is.
     ///
     /// `proceed` is asked before each evaluation of the likelihood, and now and then in a long one, with the share done
     /// in [0, 1].
@@ -99,8 +134,9 @@ impl Gp {
     /// # Errors
     /// Hyperparameters out of range, arrays that do not match, numbers that are not finite; more samples than a dense
     /// matrix can have; a covariance matrix that stays indefinite; whatever `proceed` returns.
-    pub fn regress(
+    pub fn regress_within(
         &self,
+        bound: NoiseBound,
         domain: Domain,
         u: &[f64],
         targets: ArrayView2<f64>,
@@ -110,25 +146,26 @@ impl Gp {
         self.check(domain)?;
         let progress = &mut Progress { proceed, share: 0.0 };
         match self.kernel {
-            Kernel::Matern32 => self.learn::<Chain<2>>(domain, u, targets, progress),
-            Kernel::Matern52 => self.learn::<Chain<3>>(domain, u, targets, progress),
+            Kernel::Matern32 => self.learn::<Chain<2>>(bound, domain, u, targets, progress),
+            Kernel::Matern52 => self.learn::<Chain<3>>(bound, domain, u, targets, progress),
             Kernel::SquaredExponential if u.len() > MOST_SAMPLES => {
                 let allowed = "a squared exponential takes at most 10000; pass a smaller n_samples, or a Matérn kernel";
                 Err(Error::Range { name: "samples", value: u.len() as f64, allowed })
             }
-            Kernel::SquaredExponential => self.learn::<Dense>(domain, u, targets, progress),
+            Kernel::SquaredExponential => self.learn::<Dense>(bound, domain, u, targets, progress),
         }
     }
 
     fn learn<P: Process>(
         &self,
+        bound: NoiseBound,
         domain: Domain,
         u: &[f64],
         targets: ArrayView2<f64>,
         progress: &mut Progress,
     ) -> Result<GpPosterior> {
         let samples = Samples::new(u, targets);
-        let mut at = self.hyperparameters::<P>(domain, &samples, progress)?;
+        let mut at = self.hyperparameters::<P>(bound, domain, &samples, progress)?;
         let process = P::new(domain, &samples);
         progress.reach(0.9)?;
         let fitted = loop {
@@ -168,6 +205,7 @@ impl Gp {
     /// Length and noise: what is given, and for the rest what makes the targets most likely.
     fn hyperparameters<P: Process>(
         &self,
+        within: NoiseBound,
         domain: Domain,
         samples: &Samples,
         progress: &mut Progress,
@@ -185,20 +223,17 @@ impl Gp {
         let axis = |given: Option<f64>, (low, high): (f64, f64), points| {
             given.map_or(Axis { low: low.ln(), high: high.ln(), points }, |given| Axis::given(given.ln()))
         };
-        let axes = [axis(self.length, lengths, 12), axis(self.noise, (LEAST_NOISE, MOST_NOISE), 3)];
-        let bound = match self.noise {
-            Some(_) => None,
-            None => {
-                Some(MOST_NOISE * samples.targets.iter().map(|f| f * f).sum::<f64>() / samples.targets.len() as f64)
-            }
-        };
+        let noises = (LEAST_NOISE, within.ratio);
+        let axes = [axis(self.length, lengths, 12), axis(self.noise, noises, within.points)];
+        let mean_square = || samples.targets.iter().map(|f| f * f).sum::<f64>() / samples.targets.len() as f64;
+        let bound = within.share.filter(|_| self.noise.is_none()).map(|share| share * mean_square());
         let process = |most: usize| P::new(domain, &samples.thinned(most));
         let mut likelihood = Likelihood { scanned: process(SCANNED), searched: process(P::SEARCHED), bound, progress };
         let [length, noise] = maximise(&axes, &mut likelihood)?;
         // What is given comes out as it was.
         Ok(Hyperparameters {
             length: self.length.unwrap_or(length.exp()),
-            noise: self.noise.unwrap_or(noise.exp().clamp(LEAST_NOISE, MOST_NOISE)),
+            noise: self.noise.unwrap_or(noise.exp().clamp(noises.0, noises.1)),
         })
     }
 }

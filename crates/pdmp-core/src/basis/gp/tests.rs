@@ -306,23 +306,51 @@ fn no_hyperparameters_are_likelier_than_those_found() {
     let u = grid(INTERVAL, 60);
     for noise in [0.0, 1e-3, 0.3, 10.0] {
         let targets = waves(INTERVAL, &u) + noise * normal(60, 2);
-        let bound = MOST_NOISE * targets.iter().map(|f| f * f).sum::<f64>() / 120.0;
         for kernel in Kernel::ALL {
-            let found = fit(&Gp { kernel, ..Gp::default() }, INTERVAL, &u, &targets);
-            assert!(found.noise() * found.signal_variance() < 1.06 * bound);
-            for i in 0..30 {
-                for j in 0..21 {
-                    let ratio = (MOST_NOISE * 10f64.powf(-0.2 * j as f64)).max(LEAST_NOISE);
-                    let length = 0.017 * 1.17_f64.powi(i);
-                    let other = Gp { kernel, length: Some(length), noise: Some(ratio) };
-                    let other = fit(&other, INTERVAL, &u, &targets);
-                    let gain = other.log_likelihood() - found.log_likelihood();
-                    assert!(
-                        gain < 0.1 || other.noise() * other.signal_variance() > bound,
-                        "{kernel}, noise {noise}: {length}, {ratio:e} gains {gain}"
-                    );
+            let gp = Gp { kernel, ..Gp::default() };
+            for within in [NoiseBound::NONE, NoiseBound::LANDSCAPE] {
+                let found = gp.regress_within(within, INTERVAL, &u, targets.view(), &mut |_| Ok(())).unwrap();
+                let mean_square = targets.iter().map(|f| f * f).sum::<f64>() / 120.0;
+                let most = within.share.map_or(f64::INFINITY, |share| share * mean_square);
+                assert!(found.noise() * found.signal_variance() < 1.06 * most);
+                assert!((LEAST_NOISE..=within.ratio).contains(&found.noise()));
+                for i in 0..30 {
+                    for j in 0..21 {
+                        let ratio = within.ratio * (LEAST_NOISE / within.ratio).powf(f64::from(j) / 20.0);
+                        let length = 0.017 * 1.17_f64.powi(i);
+                        let other = Gp { kernel, length: Some(length), noise: Some(ratio.max(LEAST_NOISE)) };
+                        let other = fit(&other, INTERVAL, &u, &targets);
+                        let gain = other.log_likelihood() - found.log_likelihood();
+                        assert!(
+                            gain < 0.1 || other.noise() * other.signal_variance() > most,
+                            "{kernel}, noise {noise}, {within:?}: {length}, {ratio:e} gains {gain}"
+                        );
+                    }
                 }
             }
+        }
+    }
+}
+
+/// By itself a regression finds the noise of its targets; in the landscape of a primitive they are followed.
+#[test]
+fn noise_is_found_as_it_is_and_bounded_in_a_landscape() {
+    for domain in [INTERVAL, Domain::Circle] {
+        let u = grid(domain, 400);
+        for deviation in [1e-3, 0.03, 0.3] {
+            let targets = waves(domain, &u) + deviation * normal(400, 2);
+            for kernel in Kernel::ALL {
+                let gp = Gp { kernel, ..Gp::default() };
+                let found = fit(&gp, domain, &u, &targets);
+                let noise = (found.noise() * found.signal_variance()).sqrt();
+                assert_relative_eq!(noise, deviation, max_relative = 0.15);
+                let worst =
+                    (0..400).map(|i| (at(&found, u[i]).0[0] - waves(domain, &u)[[i, 0]]).abs()).fold(0.0, f64::max);
+                assert!(worst < 2.0 * deviation, "{kernel}: off by {worst}, noise {deviation}");
+            }
+            let targets = targets.view();
+            let landscape = Gp::default().regress_within(NoiseBound::LANDSCAPE, domain, &u, targets, &mut |_| Ok(()));
+            assert!(landscape.unwrap().noise() <= 1e-6);
         }
     }
 }

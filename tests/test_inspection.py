@@ -1,0 +1,106 @@
+"""Samples that no movement makes are warned about, where a fit, a style or an evaluation meets them."""
+
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import pdmp
+from pdmp import Demonstration
+
+S = np.linspace(0, 1, 101)
+RISE = S**3 * (10 - 15 * S + 6 * S**2)
+HEIGHTS = [0.0, 0.15, 0.3, 0.45, 0.6]
+
+
+def reach(height: float) -> np.ndarray:
+    """Return a reach over an obstacle, away from zero."""
+    return np.column_stack([0.5 + RISE, 0.2 + 64 * height * (S - S**2) ** 3])
+
+
+def lost(position: np.ndarray) -> np.ndarray:
+    """Return the positions with a marker lost for 60 ms."""
+    return np.where((S >= 0.4)[:, None] & (S < 0.455)[:, None], 0.0, position)
+
+
+def padded(position: np.ndarray) -> np.ndarray:
+    """Return a movement of 80 samples with its last row repeated."""
+    return position[np.minimum(np.arange(101) * 100 // 79, 100)]
+
+
+def counted(position: np.ndarray) -> np.ndarray:
+    """Return the positions beside a counter of frames."""
+    return np.column_stack([np.arange(1, 102), position])
+
+
+KINDS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], slice, str]] = {
+    "lost": (lost, slice(2, 3), r'demo 2: "y0", "y1" are exactly 0 from sample 40 \(t = 0.4 s\) to'),
+    "padded": (padded, slice(1, 2), r"demo 1: ends in 21 rows exactly like the one before them"),
+    "counted": (counted, slice(0, 5), r'"y0" grows by exactly 1 a sample in every demonstration'),
+    "turned": (lambda y: y + 2 * np.pi, slice(3, 4), r'demo 3: "y0" lies 1 full turns of 6.283'),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_fit_style_and_evaluation_warn_of_the_place(kind: str) -> None:
+    """Each names demonstration, degree of freedom and place, at the line of the caller."""
+    change, which, text = KINDS[kind]
+    demos = [reach(height) for height in HEIGHTS]
+    demos[which] = [change(demo) for demo in demos[which]]
+    contexts = [[height] for height in HEIGHTS]
+    with pytest.warns(UserWarning, match=text) as caught:
+        pdmp.fit(demos, dt=0.01, contexts=contexts)
+    assert caught[0].filename == __file__
+    with pytest.warns(UserWarning, match=text) as caught:
+        pdmp.evaluate(demos, contexts=contexts, dt=0.01, predictors={})
+    assert caught[0].filename == __file__
+
+
+def test_style_of_warns_of_lost_samples() -> None:
+    """A recording that a model is asked about is inspected like those it was fitted to."""
+    model = pdmp.fit([reach(height) for height in HEIGHTS], dt=0.01, n_styles=2)
+    with pytest.warns(UserWarning, match=r'"y0", "y1" are exactly 0'), pytest.raises(ValueError):
+        model.style_of(Demonstration(lost(reach(0.3)), dt=0.01))
+
+
+def test_clean_and_noisy_movements_are_learnt_without_a_warning() -> None:
+    """Zero, rest and noise of a tenth of the range are no reason to warn."""
+    rng = np.random.default_rng(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for noise in (0.0, 1e-3, 0.1):
+            demos = [reach(h) - [0.5, 0.2] + noise * rng.normal(size=(101, 2)) for h in HEIGHTS]
+            pdmp.fit(demos, dt=0.01)
+
+
+def test_turns_between_recordings_of_an_angle_are_taken_off() -> None:
+    """Goals of one joint are within a turn of each other, and an evaluation compares them so."""
+    demos = [
+        Demonstration(reach(h) + [2 * np.pi * (k == 3), 0], dt=0.01, units=["rad", "m"], context=[h])
+        for k, h in enumerate(HEIGHTS)
+    ]
+    with pytest.warns(UserWarning, match="they were taken off"):
+        model = pdmp.fit(demos)
+    np.testing.assert_allclose(model.goals[:, 0], 1.5, atol=1e-9)
+    with pytest.warns(UserWarning):
+        found = pdmp.evaluate(demos, predictors={"PDMP": pdmp.evaluation.PDMP()})
+    assert found.scores["PDMP"].error.max() < 0.01
+
+
+def test_gaps_across_a_wrap_need_the_unit(tmp_path) -> None:
+    """Without a unit the way through the gap is not known; with it an angle goes the shorter one."""
+    angle = np.pi * (0.9 + 1.9 * S)
+    wrapped = np.angle(np.exp(1j * angle))
+    rows = np.column_stack([S, wrapped]).astype(object)
+    missing = (np.abs(angle - np.pi) < 0.15) & (S > 0)
+    rows[missing, 1] = ""
+    for header, refused in (("t,q", True), ("t,q [rad]", False)):
+        path = tmp_path / "angle.csv"
+        path.write_text("\n".join([header, *(f"{t},{q}" for t, q in rows)]))
+        if refused:
+            with pytest.raises(ValueError, match=r"column 'q': changes by -5.\d+ in the gap.*\[rad\]"):
+                pdmp.demos.read_csv(path, max_gap=0.5)
+        else:
+            whole = pdmp.demos.unwrap(pdmp.demos.read_csv(path, max_gap=0.5))
+            np.testing.assert_allclose(whole.position[:, 0], angle, atol=1e-6)

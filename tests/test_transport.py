@@ -1,0 +1,150 @@
+"""A start and a goal are carried along the profile by which the demonstrations cover their way."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+from synthetic import loops, reaches
+
+S = np.linspace(0, 1, 101)
+RISE = S**3 * (10 - 15 * S + 6 * S**2)
+# Quick at first and slow at last: no minimum jerk.
+EARLY = 1 - (1 - S**2) ** 3
+DETOUR = (4 * S * (1 - S)) ** 3
+
+
+def straight(transport: Any = "learnt") -> pdmp.Model:
+    """Return a model of straight reaches of about the same length."""
+    return pdmp.fit([(a * RISE)[:, None] for a in (0.9, 1.0, 1.1)], dt=0.01, transport=transport)
+
+
+def test_nearer_goal_is_gone_to_without_swinging_back() -> None:
+    """Half as far, the path stays between start and goal; with the paper's it swings back first."""
+    made = straight().rollout(goal=[0.5], start=[0.0]).position
+    assert made.min() > -0.01
+    assert made.max() < 0.51
+    assert straight("immediate").rollout(goal=[0.5], start=[0.0]).position.min() < -0.2
+
+
+def test_one_demonstration_suffices() -> None:
+    """Its progress along the arc is the profile."""
+    model = pdmp.fit([RISE[:, None]], dt=0.01)
+    np.testing.assert_allclose(model.transport(S * model.durations[0] / model.tau), RISE, atol=5e-3)
+    made = model.rollout(goal=[0.5], start=[0.0], dt=0.01).position[:, 0]
+    np.testing.assert_allclose(made, 0.5 * RISE, atol=5e-3)
+
+
+def test_start_and_goal_of_another_lead_to_its_path() -> None:
+    """Where movements differ by start and goal alone, each is made from any other."""
+    random = np.random.default_rng(0)
+    starts, goals = random.normal(size=(2, 6, 2))
+    paths = [
+        start * (1 - EARLY[:, None]) + goal * EARLY[:, None] + DETOUR[:, None] * [0.6, -0.3]
+        for start, goal in zip(starts, goals, strict=True)
+    ]
+    model = pdmp.fit(paths, dt=0.01)
+    for m in range(6):
+        made = model.rollout(model.styles[0], start=starts[m], goal=goals[m], dt=0.01).position
+        np.testing.assert_allclose(made, paths[m], atol=0.02 * np.ptp(paths[m]))
+
+
+def test_movements_are_moved_by_the_profile() -> None:
+    """Start and goal weigh 1 - m and m, and nothing else follows from them."""
+    model = pdmp.fit(reaches())
+    m = model.transport(np.linspace(0, 1, 51))
+    assert m[0] == 0 and m[-1] == 1 and np.all(np.diff(m) >= 0)
+    made = model.rollout(dt=model.tau / 50)
+    moved = model.rollout(start=model.starts[2] - 0.3, goal=model.goals[2] + 2.0, dt=model.tau / 50)
+    np.testing.assert_allclose(
+        moved.position - made.position, (2.0 * m - 0.3 * (1 - m))[:, None] + [0, 0], atol=1e-12
+    )
+
+
+def test_far_goal_does_not_kick() -> None:
+    """Ten ranges away, the acceleration at first is what the profile asks for."""
+    model = straight()
+    clock = np.linspace(0, 1, 2001)
+    bend = np.gradient(np.gradient(model.transport(clock), clock), clock)
+    made = model.rollout(goal=[11.0], start=[0.0], dt=model.tau / 2000).acceleration[:, 0]
+    assert abs(made[0]) < 0.05 * np.abs(made).max()
+    assert np.abs(made).max() < 12 * np.abs(bend).max() / model.tau**2
+
+
+def loop(model: pdmp.Model, at: float, goal: float, transition: float) -> np.ndarray:
+    """Return position, velocity, acceleration (T, 3) of a loop whose goal is moved at a share."""
+    controller = model.controller(0.001, style=model.styles[1], transition=transition)
+    motion = []
+    for k in range(3000):
+        if k == round(1000 * at):
+            controller.goal = [goal]
+        controller.step()
+        values = controller.position, controller.velocity, controller.acceleration
+        motion.append(np.concatenate(values))
+    return np.array(motion)
+
+
+@pytest.mark.parametrize("transition", [0.0, 0.1])
+@pytest.mark.parametrize("at", [0.05, 0.2, 0.4, 0.6, 0.8, 0.9, 0.99, 1.2])
+def test_goal_moved_on_the_way_accelerates_no_more_than_the_papers(
+    at: float, transition: float
+) -> None:
+    """At any phase; position and velocity stay continuous, and the goal is reached."""
+    moved, plain, paper, papers_own = (
+        loop(model, at, goal, transition)
+        for model in (straight(), straight("immediate"))
+        for goal in (1.5, 1.0)
+    )
+    by_goal = moved - plain
+    assert np.abs(by_goal[:, 2]).max() <= 1.0001 * np.abs((paper - papers_own)[:, 2]).max()
+    assert np.abs(np.diff(by_goal[:, 0])).max() <= 1.1e-3 * np.abs(by_goal[:, 1]).max()
+    assert np.abs(np.diff(by_goal[:, 1])).max() <= 1.1e-3 * np.abs(by_goal[:, 2]).max()
+    assert by_goal[-1, 0] == pytest.approx(0.5, abs=1e-4)
+
+
+@pytest.mark.parametrize("at", [0.01, 0.1, 0.2, 0.4])
+def test_goal_moved_early_is_reached_in_time(at: float) -> None:
+    """What remains of the movement is enough."""
+    by_goal = loop(straight(), at, 1.5, 0.1) - loop(straight(), at, 1.0, 0.1)
+    assert by_goal[1000, 0] == pytest.approx(0.5, abs=0.02)
+
+
+def test_profile_is_saved(tmp_path: Path) -> None:
+    """Moved goals lead to the same paths from a file; an immediate transport stays so."""
+    for transport in ("learnt", "immediate"):
+        model = pdmp.fit(reaches(), transport=transport)
+        model.save(tmp_path / "model.safetensors")
+        again = pdmp.load(tmp_path / "model.safetensors")
+        np.testing.assert_array_equal(again.transport(S), model.transport(S))
+        goal = [2.0, -1.0]
+        made, same = (each.rollout(goal=goal).position for each in (model, again))
+        np.testing.assert_array_equal(made, same)
+
+
+def test_profile_does_not_depend_on_the_unit() -> None:
+    """Neither of all degrees of freedom, nor, with ranges as units, of one."""
+    demos = [demo.position for demo in reaches()]
+    profile = pdmp.fit(demos, dt=0.02).transport(S)
+    for scale in (1e-140, 1e-3, 1e140):
+        same = pdmp.fit([scale * demo for demo in demos], dt=0.02).transport(S)
+        np.testing.assert_allclose(same, profile, atol=1e-12)
+    ranged, same = (
+        pdmp.fit([demo * [1.0, unit] for demo in demos], dt=0.02, dof_scale="range").transport(S)
+        for unit in (1.0, 1e3)
+    )
+    np.testing.assert_allclose(same, ranged, atol=1e-12)
+
+
+def test_bad_transport_is_refused() -> None:
+    """A name that is none, a clock before the start, a rhythmic primitive."""
+    with pytest.raises(ValueError, match='transport = "late": must be "learnt" or "immediate"'):
+        pdmp.fit(reaches(), transport="late")  # type: ignore[arg-type]
+    model = straight()
+    for u in (-0.1, np.nan, np.inf):
+        with pytest.raises(ValueError, match="u"):
+            model.transport([u])
+    assert model.transport([]).shape == (0,)
+    with pytest.raises(ValueError, match="transport"):
+        pdmp.fit(loops(), kind="rhythmic").transport([0.0])
