@@ -46,6 +46,7 @@ __all__ = [
     "factorise",
     "fill",
     "fit",
+    "inspected",
     "load",
     "lowpass",
     "period",
