@@ -39,7 +39,19 @@ POSITIONS = {
         np.ma.masked_greater(POSITION, 0.5),
         "position has masked values: fill them, or cut",
     ),
-    "words": ([["left", "right"]] * 5, "position is not an array of numbers"),
+    "words": ([["left", "right"]] * 5, "position has dtype"),
+    "numbers as text": ([["1.5", "2"]] * 5, "position has dtype"),
+    "text among numbers": ([[1.5, "2"]] * 5, "position has dtype"),
+    "text among objects": (
+        np.array([[1.5, "2"]] * 5, object),
+        "position holds '2': expected real numbers",
+    ),
+    "arrays of text": ([[1.5, np.array("2")]] * 5, "position has dtype"),
+    "bytes": ([[b"1", b"2"]] * 5, "position has dtype"),
+    "list of masked": (
+        [np.ma.array([1.0, 2.0], mask=[False, True])] * 5,
+        "position has masked values: fill them, or cut",
+    ),
     "strings": (POSITION.astype(str), "position has dtype"),
     "dates": (np.zeros((5, 2), "M8[s]"), "position has dtype"),
 }
@@ -92,6 +104,10 @@ LISTS: dict[str, tuple[Callable[[], Any], str]] = {
     "different DoFs": (
         lambda: [POSITION, POSITION[:, :1]],
         "demo 1: position has 1 DoFs, but demo 0 has 2: all must have the same",
+    ),
+    "lists of them": (
+        lambda: {"C": reaches(), "S": reaches()},
+        "demo 0 is a list of demonstrations: put all of them into one list",
     ),
     "one array": (
         lambda: POSITION,

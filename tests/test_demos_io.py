@@ -51,7 +51,7 @@ def test_csv_columns_are_kept_in_the_order_asked_for(table: Path) -> None:
 
 def test_csv_time_may_have_another_name(table: Path) -> None:
     """The time column is the one that is named, and t becomes a degree of freedom."""
-    demo = demos.read_csv(table, time="y")
+    demo = demos.read_csv(table, time="y [s]")
     np.testing.assert_array_equal(demo.time, POSITION[:, 1])
     assert list(demo.names) == ["t", "x"]
 
@@ -81,7 +81,6 @@ def test_csv_bears_what_spreadsheets_write(tmp_path: Path) -> None:
         (TABLE.replace("30", ""), "line 4, column 'y': empty: pass max_gap="),
         (TABLE.replace("40", "nan"), "line 5, column 'y': nan is not finite: pass max_gap="),
         (TABLE + "0.5,5\n", "line 6: 2 fields, expected 3"),
-        (TABLE.replace(",", ";"), "line 1: 't;x;y' is one field: separate fields by commas"),
         (TABLE.replace("t,", "t [h],"), "its unit is 'h': expected s, sec, ms"),
         ("t,x\n0,1\n0.1,2\n", "2 samples"),
         (TABLE.replace("0.2", "0.1"), "time"),
@@ -129,6 +128,36 @@ def test_npz_gives_demonstrations_stored_one_after_another(tmp_path: Path) -> No
     np.testing.assert_array_equal(found["1"].position, POSITION[:, 1:] + 1)
 
 
+def test_npz_gives_time_and_position(tmp_path: Path) -> None:
+    """What most would write first is read; a stack holds several demonstrations."""
+    path = tmp_path / "demos.npz"
+    np.savez(path, time=TIME, position=POSITION, velocity=POSITION, names=["x", "y"])
+    (demo,) = demos.read_npz(path).values()
+    np.testing.assert_array_equal(demo.position, POSITION)
+    np.testing.assert_array_equal(demo.time, TIME)
+    assert demo.names == ["x", "y"]
+    np.savez(path, position=POSITION[:, 0])
+    (demo,) = demos.read_npz(path, dt=0.5).values()
+    np.testing.assert_array_equal(demo.position, POSITION[:, :1])
+    for time in (TIME, np.array([TIME, 2 * TIME])):
+        np.savez(path, time=time, position=np.array([POSITION, -POSITION]))
+        found = demos.read_npz(path)
+        np.testing.assert_array_equal(found["1"].position, -POSITION)
+        np.testing.assert_array_equal(found["1"].time, time if time.ndim == 1 else time[1])
+
+
+def test_npz_stamps_are_seconds(tmp_path: Path) -> None:
+    """Stamps in ns since 1970 are recognised to the last digit; other long steps are refused."""
+    path, steps = tmp_path / "demos.npz", 10_000_000 * np.arange(4)
+    np.savez(path, time=1_700_000_000_000_000_000 + steps, position=POSITION)
+    with pytest.warns(UserWarning, match="read as ns since 1970"):
+        (demo,) = demos.read_npz(path).values()
+    np.testing.assert_allclose(demo.time, 0.01 * np.arange(4), atol=1e-15)
+    np.savez(path, time=steps, position=POSITION)
+    with pytest.raises(ValueError, match="store them in s instead of ns, or pass dt="):
+        demos.read_npz(path)
+
+
 @pytest.mark.parametrize(
     ("arrays", "message"),
     [
@@ -139,6 +168,14 @@ def test_npz_gives_demonstrations_stored_one_after_another(tmp_path: Path) -> No
         ({"y": POSITION, "t": TIME, "start": [0, 2]}, "'start' must rise from 0 to 4"),
         ({"y": POSITION, "t": TIME, "start": [0, 0.5, 4]}, "in whole numbers, got"),
         ({"y": POSITION, "t": TIME, "start": ["a", "b"]}, "in whole numbers, got"),
+        ({"y": POSITION, "t": TIME, "start": [0, np.inf]}, "in whole numbers, got"),
+        ({"y": POSITION, "t": TIME[:2], "start": [0, 4]}, r"'t' has shape \(2,\), expected \(4,\)"),
+        ({"position": POSITION, "time": TIME[:2]}, "time has length 2, expected 4"),
+        ({"position": np.array([POSITION] * 2), "time": [TIME[:2]] * 2}, "time has length 2"),
+        ({"position": POSITION, "time": np.array([TIME] * 2)}, "time"),
+        ({"position": POSITION.astype(str), "time": TIME}, "position has dtype"),
+        ({"position": POSITION, "time": TIME.astype(str)}, "time has dtype"),
+        ({"position": POSITION, "time": TIME, "names": [1, 2]}, "'names' must be a vector of"),
         ({"a.t": TIME}, "'a.t' has time stamps of nothing"),
         ({"a": np.array([[None]])}, "not an NPZ file of plain arrays"),
         ({"a": POSITION, "a.t": TIME[::-1]}, "'a': time"),
@@ -183,6 +220,53 @@ def test_npz_and_index_must_agree(folder: Path) -> None:
         demos.read_folder(folder)
 
 
+@pytest.mark.parametrize("place", [".", "demos"])
+def test_folder_without_an_index_is_read_by_its_files(tmp_path: Path, place: str) -> None:
+    """All files come by their names, numbers in their order; a context needs an index."""
+    (tmp_path / place).mkdir(exist_ok=True)
+    for name in ("take 10", "take 9", "b"):
+        (tmp_path / place / f"{name}.csv").write_text(TABLE)
+    assert list(demos.read_folder(tmp_path)) == ["b", "take 9", "take 10"]
+    assert len(demos.read(tmp_path)) == 3
+    with pytest.raises(ValueError, match=r"no index\.csv: expected an index\.csv with a row per"):
+        demos.read_folder(tmp_path, context=["height"])
+
+
+def test_folder_with_nothing_to_read_is_answered_with_the_format(tmp_path: Path) -> None:
+    """No index and no files, an index without rows, or no folder at all."""
+    with pytest.raises(ValueError, match=r"and no files: expected an index\.csv .*demos/<id>\.csv"):
+        demos.read_folder(tmp_path)
+    (tmp_path / "index.csv").write_text("id,height\n")
+    with pytest.raises(ValueError, match=r"lists no demonstrations: expected an index\.csv"):
+        demos.read_folder(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        demos.read_folder(tmp_path / "none")
+
+
+@pytest.mark.parametrize(
+    "name", ["../a", "/etc/passwd", "a/../a", "x/a", "..", ".", r"..\a", "C:a", "a\x00b", '""']
+)
+def test_id_names_a_file_in_the_folder(folder: Path, name: str) -> None:
+    """No id leads elsewhere; the error says what is expected."""
+    (folder / "a.csv").write_text(TABLE)
+    (folder / "index.csv").write_text(f"id,height\n{name},1\n")
+    with pytest.raises(ValueError, match=r"index\.csv.* is no name of a file: expected an index"):
+        demos.read_folder(folder)
+
+
+def test_id_may_be_the_name_of_the_file(folder: Path) -> None:
+    """With its suffix, there is only one file that it can be."""
+    (folder / "index.csv").write_text("id;height\na.csv;0,5\nb;1\n")
+    found = demos.read_folder(folder, context=["height"])
+    assert [demo.context.tolist() for demo in found.values()] == [[0.5], [1.0]]
+
+
+def test_index_of_pandas_is_read(folder: Path) -> None:
+    """A column without a name before the others is passed over."""
+    (folder / "index.csv").write_text(",id,height\n0,a,0.1\n1,b,0.2\n")
+    assert demos.read_folder(folder, context=["height"])["b"].context == [0.2]
+
+
 def test_context_may_be_labels(folder: Path) -> None:
     """A column of words makes labels."""
     found = demos.read_folder(folder, context=["shape", "height"])
@@ -198,7 +282,10 @@ def test_context_is_all_numbers_or_all_labels(folder: Path) -> None:
 
 
 def test_label_must_not_be_missing(folder: Path) -> None:
-    """An empty field is no label of its own."""
+    """An empty field is no label of its own, and a mark of a missing number is none."""
+    (folder / "index.csv").write_text("id,height\na,NA\nb,1\n")
+    with pytest.raises(ValueError, match=r"index\.csv, line 2, column 'height': no number"):
+        demos.read_folder(folder, context=["height"])
     (folder / "index.csv").write_text("id,hand [side]\na,left\nb,\n")
     with pytest.raises(ValueError, match=r"index\.csv, line 3, column 'hand': no label"):
         demos.read_folder(folder, context=["hand"])

@@ -227,6 +227,6 @@ def test_a_process_says_what_was_used(kernel: Any) -> None:
     """Kernel, length and noise are properties, and in the text."""
     regression = pdmp.GP(kernel, 0.25, 1e-3).regress([0.0, 1.0], [[0.0], [1.0]])
     assert (regression.kernel, regression.length, regression.noise) == (kernel, 0.25, 1e-3)
-    name = {"matern32": "Matérn-3/2", "matern52": "Matérn-5/2"}.get(kernel, "squared exponential")
+    name = {"matern32": "Matern-3/2", "matern52": "Matern-5/2"}.get(kernel, "squared exponential")
     text = f"<pdmp.GPRegression: Gaussian process, {name}, length 0.25, noise 1e-3>"
     assert repr(regression) == text

@@ -4,7 +4,7 @@
 # B trajectories, C samples of a regression with P outputs. Times are in s, positions in the unit of
 # each degree of freedom. Whatever numpy can turn into float64 is accepted; float64 comes back.
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import Any, ClassVar, Literal, TypeAlias, final
 
@@ -18,6 +18,8 @@ _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Map: TypeAlias = Literal["auto", "stacked", "gp", "linear", "polynomial"]
 _Context: TypeAlias = ArrayLike | Sequence[float | str]
 _Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
+_Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
+_Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
 _Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
 
 __all__ = [
@@ -62,7 +64,7 @@ class ModelFileError(PdmpError): ...
 class Demonstration:
     def __new__(
         cls,
-        position: ArrayLike,  # (T, D)
+        position: ArrayLike | Trajectory,  # (T, D)
         *,
         dt: float | None = None,
         time: ArrayLike | None = None,  # (T,)
@@ -92,7 +94,7 @@ class Demonstration:
     def n_dofs(self) -> int: ...
 
 def fit(
-    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,  # M of them, or (M, T, D)
+    demos: _Demos,  # M of them, or (M, T, D)
     *,
     kind: _Kind = "discrete",
     dt: float | None = None,
@@ -141,7 +143,7 @@ def fill(
     max_gap: float,
 ) -> _Array: ...  # (T, D)
 def cycles(
-    recordings: Sequence[Demonstration],
+    recordings: _Demos,
     events: Sequence[ArrayLike] | None,  # one (K,) for each recording
     average: bool,
 ) -> tuple[
@@ -399,6 +401,14 @@ class Trajectory:
     def velocity(self) -> _Array: ...  # (T, D)
     @property
     def acceleration(self) -> _Array: ...  # (T, D)
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def units(self) -> list[str]: ...  # "" where unknown
+    def to_dict(self) -> dict[str, Any]: ...
+    def to_dataframe(self) -> Any: ...  # pandas.DataFrame
+    def to_csv(self, path: str | PathLike[str]) -> None: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
 class Status:

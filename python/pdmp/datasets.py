@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pdmp._native import Demonstration
+from pdmp._shown import refusal
 from pdmp.demos._text import listed
 
 
@@ -36,7 +37,7 @@ def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstra
     chosen = listed("shapes", shapes or known)
     for shape in chosen:
         if shape not in known:
-            raise ValueError(f"shapes: no '{shape}' among {', '.join(known)}")
+            raise refusal(f"shapes: no '{shape}' among {', '.join(known)}")
     return {shape: _demonstrations(folder / f"{shape}.mat") for shape in chosen}
 
 

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::convert::{Matrix, count, matrix, vector};
-use crate::error::raise;
+use crate::error::{ascii, raise};
 
 /// Gaussian process regression, the paper's choice of basis functions.
 ///
@@ -151,7 +151,7 @@ impl GpRegression {
     }
 
     fn __repr__(&self) -> String {
-        format!("<pdmp.GPRegression: {}>", self.0.describe())
+        ascii(&format!("<pdmp.GPRegression: {}>", self.0.describe()))
     }
 }
 

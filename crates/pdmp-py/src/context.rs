@@ -6,7 +6,7 @@ use pdmp_core::MapChoice;
 use pyo3::prelude::*;
 
 use crate::convert::{Cube, Matrix, matrix};
-use crate::error::raise;
+use crate::error::{ascii, raise};
 use crate::fit::map_of;
 
 /// A map from contexts to outputs, with the covariance of what it predicts.
@@ -89,6 +89,6 @@ impl ContextMap {
     }
 
     fn __repr__(&self) -> String {
-        format!("<pdmp.ContextMap: {}>", self.0)
+        ascii(&format!("<pdmp.ContextMap: {}>", self.0))
     }
 }

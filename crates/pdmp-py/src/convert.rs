@@ -7,11 +7,11 @@ use numpy::{
 };
 use pdmp_core::{ContextValue, Threads};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyString, PyTuple};
+use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
 
-use crate::error::raise;
+use crate::error::{printable, raise};
 
 /// A numpy vector, (n,).
 pub(crate) type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -25,28 +25,94 @@ pub(crate) type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyTuple>);
 
 /// An array of any dimension, without a copy where it comes as doubles.
 fn doubles<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDyn<'py, f64, AllowTypeChange>> {
-    // numpy would drop imaginary parts, and read text and dates as numbers.
-    if let Ok(untyped) = value.cast::<PyUntypedArray>()
-        && !matches!(untyped.dtype().kind(), b'f' | b'i' | b'u' | b'b' | b'O')
-    {
-        let dtype = untyped.dtype();
-        return Err(PyValueError::new_err(format!("{name} has dtype {dtype}: expected real numbers")));
+    let Ok(array) = value.cast::<PyUntypedArray>() else { return doubles(name, plain(name, value)?.as_any()) };
+    let wrong = |reason: &str| Err(PyValueError::new_err(format!("{name} {reason}")));
+    match array.dtype().kind() {
+        b'f' | b'i' | b'u' | b'b' => {}
+        b'O' => {
+            for item in value.call_method0("ravel")?.try_iter()? {
+                check_real(name, &item?)?;
+            }
+        }
+        // numpy would drop imaginary parts, and read text and dates as numbers.
+        _ => return wrong(&format!("has dtype {}: expected real numbers", array.dtype())),
     }
-    // What a mask hides is no number.
-    if let Ok(mask) = value.getattr("mask")
-        && mask.call_method0("any")?.is_truthy()?
-    {
-        return Err(PyValueError::new_err(format!("{name} has masked values: fill them, or cut them out")));
+    if is_masked(value)? {
+        return wrong(MASKED);
     }
     // Fields of packed records: a view in Rust steps by whole numbers.
-    if let Ok(untyped) = value.cast::<PyUntypedArray>()
-        && !untyped.is_aligned()
-    {
+    if !array.is_aligned() {
         return doubles(name, &value.call_method0("copy")?);
     }
-    value.extract().map_err(|error: PyErr| {
-        PyValueError::new_err(format!("{name} is not an array of numbers: {}", error.value(value.py())))
-    })
+    value.extract().map_err(|error: PyErr| not_numbers(name, value.py(), error))
+}
+
+const MASKED: &str = "has masked values: fill them, or cut them out";
+
+/// The numpy array of a list, or of any object that knows how to become one.
+pub(crate) fn plain<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let py = value.py();
+    check_items(name, value, 0)?;
+    let foreign = value.hasattr("__dlpack__")? && !value.hasattr("__array__")?;
+    let made = py.import("numpy")?.call_method1(if foreign { "from_dlpack" } else { "asarray" }, (value,));
+    Ok(made.map_err(|error| not_numbers(name, py, error))?.cast_into()?)
+}
+
+fn not_numbers(name: &str, py: Python<'_>, error: PyErr) -> PyErr {
+    if !error.is_instance_of::<PyException>(py) {
+        return error;
+    }
+    PyValueError::new_err(format!("{name} is not an array of numbers: {}", printable(&error.value(py).to_string())))
+}
+
+/// Checks that `float` finds a real number, and does not read one out of a text.
+fn check_real(name: &str, item: &Bound<'_, PyAny>) -> PyResult<()> {
+    if item.is_instance_of::<PyFloat>() || item.is_instance_of::<PyInt>() || item.is_none() {
+        return Ok(());
+    }
+    let kind = item.getattr("dtype").and_then(|dtype| dtype.getattr("kind")).and_then(|kind| kind.extract::<char>());
+    let text = item.is_instance_of::<PyString>()
+        || item.is_instance_of::<PyBytes>()
+        || item.is_instance_of::<PyByteArray>()
+        || kind.is_ok_and(|kind| !"fiub".contains(kind));
+    let reason = match item.get_type().name() {
+        _ if text => format!("holds {}: expected real numbers", printable(&item.repr()?.to_string())),
+        Ok(kind) if kind == "NAType" => "has missing values: fill them, or cut them out".to_string(),
+        _ => return Ok(()),
+    };
+    Err(PyValueError::new_err(format!("{name} {reason}")))
+}
+
+/// Whether a mask of numpy hides something.
+fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    if !value.is_instance_of::<PyUntypedArray>() || value.is_exact_instance_of::<PyUntypedArray>() {
+        return Ok(false);
+    }
+    Ok(value.is_instance(&value.py().import("numpy.ma")?.getattr("MaskedArray")?)?
+        && value.getattr("mask")?.call_method0("any")?.is_truthy()?)
+}
+
+/// Deepest list that is searched: numpy has no more axes.
+const MAX_DEPTH: usize = 64;
+
+/// Refuses what numpy would take for numbers: in lists, values behind masks and bytes that can be written.
+fn check_items(name: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
+    let wrong = |reason: &str| Err(PyValueError::new_err(format!("{name} {reason}")));
+    if value.is_instance_of::<PyByteArray>() {
+        return wrong("holds a bytearray: expected real numbers");
+    }
+    if is_masked(value)? {
+        return wrong(MASKED);
+    }
+    if depth < MAX_DEPTH && (value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>()) {
+        for item in value.try_iter()? {
+            let item = item?;
+            if !item.is_exact_instance_of::<PyFloat>() {
+                check_items(name, &item, depth + 1)?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// An array of any dimension.
@@ -54,8 +120,22 @@ pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64
     Ok(doubles(name, value)?.as_array().to_owned())
 }
 
+/// Positions, whose axes are time and degree of freedom.
+pub(crate) fn two_axes(name: &str, array: ArrayD<f64>) -> PyResult<Array2<f64>> {
+    let shape = array.shape().to_vec();
+    array
+        .into_dimensionality()
+        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes (T, D)")))
+}
+
 /// A vector, (n,).
 pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    // Commands of a loop, mostly.
+    if let Ok(list) = value.cast_exact::<PyList>()
+        && list.iter().all(|item| item.is_exact_instance_of::<PyFloat>())
+    {
+        return list.extract();
+    }
     let array = array(name, value)?;
     let shape = array.shape().to_vec();
     let vector = array
@@ -86,25 +166,39 @@ pub(crate) fn optional(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult
 
 /// A context (Q,) of numbers and labels.
 pub(crate) fn context(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<ContextValue>> {
-    let Ok(items) = value.try_iter() else { return Ok(vec![context_value(name, value)?]) };
-    if value.is_instance_of::<PyString>() {
+    if value.is_instance_of::<PyString>() || value.is_instance_of::<PyBytes>() {
         return Err(PyTypeError::new_err(format!("{name} is a single text: put it into a list, one value per column")));
     }
+    let value = &rows_of(name, value)?;
+    let Ok(items) = value.try_iter() else { return Ok(vec![context_value(name, value)?]) };
     items.enumerate().map(|(q, item)| context_value(&format!("{name}[{q}]"), &item?)).collect()
+}
+
+/// An array in place of a data frame, which would go through its columns; lists and arrays as they are.
+fn rows_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    if is_masked(value)? {
+        return Err(PyValueError::new_err(format!("{name} {MASKED}")));
+    }
+    if value.is_instance_of::<PyUntypedArray>() || !(value.hasattr("__array__")? || value.hasattr("__dlpack__")?) {
+        return Ok(value.clone());
+    }
+    Ok(plain(name, value)?.into_any())
 }
 
 fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue> {
     if let Ok(label) = value.extract::<String>() {
         return Ok(ContextValue::Label(label));
     }
+    check_real(name, value)?;
     value.extract().map(ContextValue::Number).map_err(|_| {
-        let shown = value.repr().map_or_else(|_| "it".to_string(), |repr| repr.to_string());
+        let shown = value.repr().map_or_else(|_| "it".to_string(), |repr| printable(&repr.to_string()));
         PyTypeError::new_err(format!("{name} = {shown}: expected a number or a text"))
     })
 }
 
 /// Contexts (M, Q) of numbers and labels.
 pub(crate) fn contexts(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
+    let value = &rows_of("contexts", value)?;
     let shape: Option<Vec<usize>> = value.getattr("shape").and_then(|shape| shape.extract()).ok();
     if shape.as_ref().is_some_and(|shape| shape.len() != 2) {
         let shape = shape.unwrap_or_default();
@@ -117,7 +211,7 @@ pub(crate) fn contexts(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValu
         .map(|(m, row)| {
             let row = row?;
             if row.is_instance_of::<PyString>() || row.try_iter().is_err() {
-                let shown = row.repr()?;
+                let shown = printable(&row.repr()?.to_string());
                 return Err(PyValueError::new_err(format!(
                     "contexts[{m}] = {shown}: expected two axes (M, Q): put the values of each demonstration into a list"
                 )));

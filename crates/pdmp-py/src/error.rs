@@ -19,9 +19,10 @@ pub(crate) fn raise(error: Error) -> PyErr {
     while let Error::Demo { source, .. } = kind {
         kind = source;
     }
+    let text = printable(&error.to_string());
     match kind {
-        Error::Fit(_) => FitError::new_err(error.to_string()),
-        Error::File(_) => ModelFileError::new_err(error.to_string()),
+        Error::Fit(_) => FitError::new_err(text),
+        Error::File(_) => ModelFileError::new_err(text),
         Error::Interrupted => PyKeyboardInterrupt::new_err(()),
         Error::Io { path, source } => {
             let (reason, path) = (source.to_string(), path.display().to_string());
@@ -30,12 +31,32 @@ pub(crate) fn raise(error: Error) -> PyErr {
                 (Some(errno), _) => PyOSError::new_err((errno, reason, path)),
                 (None, ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, "No such file or directory", path)),
                 (None, ErrorKind::PermissionDenied) => PyPermissionError::new_err((13, "Permission denied", path)),
-                (None, _) => PyOSError::new_err(error.to_string()),
+                (None, _) => PyOSError::new_err(text),
             }
         }
-        Error::Memory { .. } => PyMemoryError::new_err(error.to_string()),
-        _ => PyValueError::new_err(error.to_string()),
+        Error::Memory { .. } => PyMemoryError::new_err(text),
+        _ => PyValueError::new_err(text),
     }
+}
+
+/// A text whose control characters are escaped, line breaks and reversed directions of writing among them: names and
+/// labels come from files, and texts end up on terminals.
+pub(crate) fn printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            ' '..='~' => shown.push(c),
+            // After a letter, combining accents stay as they are.
+            _ => shown.extend(format!("a{c}").escape_debug().skip(1)),
+        }
+    }
+    shown
+}
+
+/// A printable text that any console can write.
+pub(crate) fn ascii(text: &str) -> String {
+    let plain = printable(&text.replace('é', "e"));
+    plain.chars().flat_map(|c| if c.is_ascii() { vec![c] } else { c.escape_unicode().collect() }).collect()
 }
 
 /// Runs a long call without holding the interpreter. The call is handed a question whether to go on, which tells

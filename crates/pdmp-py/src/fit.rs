@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use ndarray::{Array2, ArrayD, Axis, Ix2};
+use ndarray::Array2;
 use pdmp_core::basis::Basis;
 use pdmp_core::{
-    Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Sampling, Smoothing, Stage, StyleChoice, StyleCount,
-    TimeScaling, TransportChoice,
+    Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Smoothing, Stage, StyleChoice, StyleCount, TimeScaling,
+    TransportChoice,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyBool;
+use pyo3::types::{PyBool, PyList, PyMapping};
 
 use crate::basis::{Gp, NGnet};
-use crate::convert::{array, count, matrix, numbers};
-use crate::demo::Demonstration;
-use crate::error::{detached, raise};
+use crate::convert::{count, matrix, numbers};
+use crate::demo::{Demonstration, Source, Trajectory};
+use crate::error::detached;
 use crate::model::Model;
 use crate::warp::Warp;
 
@@ -26,8 +26,9 @@ use crate::warp::Warp;
 ///
 /// Parameters
 /// ----------
-/// demos : sequence of Demonstration, sequence of (T, D) array_like, or (M, T, D) array_like
-///     Demonstrations of one skill; if rhythmic, each is one cycle without its end point.
+/// demos : sequence or mapping of Demonstration, of Trajectory or of (T, D) array_like, or (M, T, D) array_like
+///     Demonstrations of one skill; if rhythmic, each is one cycle without its end point. Of a mapping, such as the
+///     readers return, the values count. Data frames name their degrees of freedom by their columns.
 /// kind : {"discrete", "rhythmic"}
 ///     From a start to a goal, or around an anchor.
 /// dt : float, optional
@@ -148,7 +149,7 @@ pub(crate) fn fit(
     threads: Option<isize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
-    let demos = demonstrations(demos)?;
+    let demos = demonstrations("demos", demos)?;
     let options = FitOptions {
         alignment: Alignment {
             kind: kind_of(kind)?,
@@ -207,41 +208,41 @@ pub(crate) fn style_count(n_styles: Option<isize>, spectrum: f64) -> PyResult<St
     }
 }
 
-fn demonstrations(demos: &Bound<'_, PyAny>) -> PyResult<Vec<pdmp_core::Demonstration>> {
-    if demos.is_instance_of::<Demonstration>() {
-        return Err(PyValueError::new_err("demos is a single demonstration: put it into a list"));
+/// Demonstrations from a list of them or of arrays, a mapping of names to them, or a stack of arrays.
+pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResult<Vec<pdmp_core::Demonstration>> {
+    if demos.is_instance_of::<Demonstration>() || demos.is_instance_of::<Trajectory>() {
+        return Err(PyValueError::new_err(format!("{argument} is a single demonstration: put it into a list")));
     }
+    let demos = &if demos.is_instance_of::<PyMapping>() { demos.call_method0("values")? } else { demos.clone() };
     if demos.hasattr("ndim")? {
-        let stack = array("demos", demos)?;
-        if stack.ndim() != 3 {
-            let shape = stack.shape();
+        let shape: Vec<usize> = demos.getattr("shape")?.extract()?;
+        if shape.len() != 3 {
             let wanted = "expected (M, T, D): put a single (T, D) array into a list";
-            return Err(PyValueError::new_err(format!("demos has shape {shape:?}, {wanted}")));
+            return Err(PyValueError::new_err(format!("{argument} has shape {shape:?}, {wanted}")));
         }
-        return stack.axis_iter(Axis(0)).enumerate().map(|(m, demo)| unrated(m, demo.to_owned())).collect();
     }
     let items = demos.try_iter().map_err(|_| {
-        PyTypeError::new_err("demos must be a list of demonstrations or arrays, or an array of shape (M, T, D)")
+        PyTypeError::new_err(format!(
+            "{argument} must be a list of demonstrations or arrays, a mapping of names to them, or an array of shape \
+             (M, T, D)"
+        ))
     })?;
     items
         .enumerate()
         .map(|(m, item)| {
             let item = item?;
-            match item.cast::<Demonstration>() {
-                Ok(demo) => Ok(demo.get().0.clone()),
-                Err(_) => unrated(m, array(&format!("demo {m}: position"), &item)?),
+            if let Ok(demo) = item.cast::<Demonstration>() {
+                return Ok(demo.get().0.clone());
             }
+            if item.is_instance_of::<PyList>()
+                && item.get_item(0).is_ok_and(|one| one.is_instance_of::<Demonstration>())
+            {
+                let message = format!("demo {m} is a list of demonstrations: put all of them into one list");
+                return Err(PyValueError::new_err(message));
+            }
+            Source::of(&format!("demo {m}: position"), &item)?.demonstration(m)
         })
         .collect()
-}
-
-/// A demonstration from a bare array (T, D), whose rate the fit is told.
-fn unrated(m: usize, position: ArrayD<f64>) -> PyResult<pdmp_core::Demonstration> {
-    let shape = position.shape().to_vec();
-    let position = position.into_dimensionality::<Ix2>().map_err(|_| {
-        PyValueError::new_err(format!("demo {m}: position has shape {shape:?}, expected two axes (T, D)"))
-    })?;
-    pdmp_core::Demonstration::new(position, Sampling::Unknown).map_err(|error| raise(error.in_demo(m)))
 }
 
 pub(crate) fn map_of(map: &str) -> PyResult<MapChoice> {

@@ -13,7 +13,7 @@ use crate::conditions::Arguments;
 use crate::controller::Controller;
 use crate::convert::{Cube, Matrix, Reduced, Vector, optional, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
-use crate::error::{interruptible, raise};
+use crate::error::{ascii, interruptible, raise};
 use crate::prediction::Prediction;
 
 /// A parametric dynamic movement primitive: immutable, picklable, saved by `save`.
@@ -111,7 +111,7 @@ impl Model {
         let conditions = arguments.in_context(&self.0, context)?;
         let trajectory =
             interruptible(py, |proceed| self.0.rollout_with(&conditions, Timing { dt, duration }, proceed))?;
-        Ok(Trajectory::new(py, trajectory))
+        Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
     }
 
     /// The style (J,) of a new demonstration: the likeliest given its target.
@@ -353,7 +353,7 @@ impl Model {
 
     fn __repr__(&self) -> String {
         let model = &self.0;
-        format!(
+        ascii(&format!(
             "<pdmp.Model: {}, {} demonstrations, {} DoFs, {} styles, tau {:.4} s{}; {}>",
             model.kind(),
             model.n_demos(),
@@ -362,7 +362,7 @@ impl Model {
             model.tau(),
             noise(model),
             model.learnt().basis
-        )
+        ))
     }
 }
 

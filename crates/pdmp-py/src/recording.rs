@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use crate::convert::{Matrix, Vector, matrix, to_numpy, vector};
 use crate::demo::Demonstration;
 use crate::error::raise;
+use crate::fit::demonstrations;
 
 /// Sample a recording anew, at even intervals.
 ///
@@ -199,11 +200,11 @@ type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, V
 #[pyfunction]
 pub(crate) fn cycles<'py>(
     py: Python<'py>,
-    recordings: Vec<Demonstration>,
+    recordings: &Bound<'py, PyAny>,
     events: Option<Vec<Bound<'py, PyAny>>>,
     average: bool,
 ) -> PyResult<Found<'py>> {
-    let recordings: Vec<_> = recordings.into_iter().map(|demo| demo.0).collect();
+    let recordings = demonstrations("recordings", recordings)?;
     let vectors = |events: Vec<Bound<'py, PyAny>>| events.iter().map(|times| vector("events", times)).collect();
     let events: Option<Vec<Vec<f64>>> = events.map(vectors).transpose()?;
     let keep = if average { Keep::Mean } else { Keep::Each };

@@ -4,6 +4,15 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from typing import Any
 
+from pdmp._shown import printable
+
+
+def path(text: str) -> str:
+    """Return the name of a file or folder, which must not stand for a stream."""
+    if text == "-":
+        raise ArgumentTypeError("- is no file: name one, or ./- where it is called so")
+    return text
+
 
 def add_reading(parser: ArgumentParser) -> None:
     """Add the options that tell how demonstrations are read."""
@@ -11,7 +20,11 @@ def add_reading(parser: ArgumentParser) -> None:
         "--columns", nargs="+", metavar="NAME", help="degrees of freedom to keep; default: all"
     )
     parser.add_argument(
-        "--time", default="t", metavar="NAME", help="CSV column of the time stamps; default: t"
+        "--time",
+        default="t",
+        metavar="NAME",
+        help="CSV column of the time stamps, with [ms], [us] or [ns] where it has no unit; "
+        "default: t or time",
     )
     parser.add_argument(
         "--dt", type=float, metavar="S", help="sampling interval [s], in place of time stamps"
@@ -118,6 +131,6 @@ def _or_auto(read: Callable[[str], Any], wanted: str) -> Callable[[str], Any]:
         try:
             return text if text == "auto" else read(text)
         except ValueError:
-            raise ArgumentTypeError(f'"{text}" is neither a {wanted} nor auto') from None
+            raise ArgumentTypeError(f'"{printable(text)}" is neither a {wanted} nor auto') from None
 
     return value

@@ -11,6 +11,7 @@ from pathlib import Path
 from pdmp import demos
 from pdmp._files import replacing
 from pdmp.cli import _options
+from pdmp.cli._console import report, say
 from pdmp.cli._progress import progress
 
 MOST_STYLES = 8  # of the figure of E over J
@@ -18,9 +19,15 @@ MOST_STYLES = 8  # of the figure of E over J
 
 def arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("paths", nargs="+", metavar="PATH", help="folder with an index.csv")
     parser.add_argument(
-        "-o", "--output", metavar="FOLDER", help="where to write figures and tables"
+        "paths", nargs="+", type=_options.path, metavar="PATH", help="folder with an index.csv"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=_options.path,
+        metavar="FOLDER",
+        help="where to write figures and tables",
     )
     _options.add_reading(parser)
     _options.add_learning(parser)
@@ -40,7 +47,7 @@ def run(options: Namespace) -> None:
     with progress() as show:
         predictors = baselines() | {"PDMP": PDMP(**settings)}
         found = evaluate(recordings, predictors=predictors, **tried, progress=show)
-    print(found)
+    report(repr(found))
     if not folder:
         return
     from pdmp import plot
@@ -57,8 +64,8 @@ def run(options: Namespace) -> None:
     table = folder / "evaluation.md"
     with replacing(table) as draft:
         draft.write_text(found.markdown(), encoding="utf-8")
-    print(table)
+    say(table)
     for name, figure in figures.items():
         path = folder / f"{name}.png"
         plot.save(figure, path)
-        print(path)
+        say(path)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pdmp
 from pdmp import demos
 from pdmp.cli import _options
+from pdmp.cli._console import say
 from pdmp.cli._progress import progress
 
 
@@ -16,11 +17,14 @@ def arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument(
         "paths",
+        type=_options.path,
         nargs="+",
         metavar="PATH",
         help="CSV or BVH file (one demonstration), NPZ file (several) or folder with an index.csv",
     )
-    parser.add_argument("-o", "--output", required=True, metavar="FILE", help="model to write")
+    parser.add_argument(
+        "-o", "--output", type=_options.path, required=True, metavar="FILE", help="model to write"
+    )
     _options.add_reading(parser)
     _options.add_learning(parser)
 
@@ -42,4 +46,4 @@ def run(options: Namespace) -> None:
             progress=show,
         )
     model.save(options.output)
-    print(f"{options.output}: {model!r}")
+    say(f"{options.output}: {model!r}")

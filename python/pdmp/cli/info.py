@@ -9,14 +9,16 @@ from collections.abc import Sequence
 import numpy as np
 
 import pdmp
-from pdmp.plot._canvas import dof_labels
+from pdmp._shown import printable
+from pdmp.cli._console import say
+from pdmp.cli._options import path
 
 MOST = 40  # singular values that are printed
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("model", metavar="MODEL", help="model file")
+    parser.add_argument("model", type=path, metavar="MODEL", help="model file")
 
 
 def run(options: Namespace) -> None:
@@ -31,7 +33,7 @@ def run(options: Namespace) -> None:
         "kind": model.kind,
         "demonstrations": f"{model.n_demos}, nominal {model.nominal}",
         "durations": f"{model.durations.min():g} to {model.durations.max():g} s",
-        "DoFs": f"{model.n_dofs}: {', '.join(dof_labels(model.names, model.units))}",
+        "DoFs": f"{model.n_dofs}: {', '.join(_labels(model))}",
         "styles": f"{model.n_styles}, which leave out {model.left_out:.1%} of the targets' RMS",
         "singular values": _several(model.singular_values),
         "noise": _noise(model),
@@ -46,12 +48,20 @@ def run(options: Namespace) -> None:
         lines["contexts"] = ", ".join(_extent(column) for column in columns)
         lines["map"] = str(model.map)
     for name, text in lines.items():
-        print(f"{name:<16}{text}")
+        say(f"{name:<16}{printable(text)}")
+
+
+def _labels(model: pdmp.Model) -> list[str]:
+    """Return the names of the degrees of freedom, with the unit where it is known."""
+    return [
+        f"{name} [{unit}]" if unit else name
+        for name, unit in zip(model.names, model.units, strict=True)
+    ]
 
 
 def _noise(model: pdmp.Model) -> str:
     """Write the standard deviation of the measurement noise, and the cut-off that takes it off."""
-    labels = dof_labels(model.names, model.units)
+    labels = _labels(model)
     noisy = zip(labels, model.noise, model.cut_offs, strict=True)
     found = [
         f"{label}: {level:.2g}, smoothed at {hz:.3g} Hz" for label, level, hz in noisy if level

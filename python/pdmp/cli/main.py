@@ -3,11 +3,13 @@
 import os
 import re
 import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
 from pdmp._native import PdmpError, __version__
+from pdmp._shown import printable
 from pdmp.cli import demo, evaluate, fit, info, plot, reproduce, rollout
+from pdmp.cli._console import console
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 _OPTIONS = {
@@ -47,7 +49,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     SystemExit
         With code 2 for wrong usage, with code 0 after `--help` and `--version`.
     """
-    options = _parser().parse_args(argv)
+    with console():
+        return _run(_parser().parse_args(argv))
+
+
+def _run(options: Namespace) -> int:
+    """Run a command and return the exit code."""
     try:
         options.run(options)
         sys.stdout.flush()
@@ -86,6 +93,6 @@ def _parser() -> ArgumentParser:
 def _in_one_line(error: Exception) -> str:
     """Return what an error says, with options in place of the arguments that they are in Python."""
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
-    text = " ".join(str(error).split())
+        return printable(f"{error.filename}: {error.strerror}")
+    text = printable(" ".join(str(error).split()))
     return re.sub(rf"\b({'|'.join(_OPTIONS)})=", lambda found: _OPTIONS[found[1]], text)

@@ -11,13 +11,27 @@ from pathlib import Path
 import pdmp
 from pdmp import demos, plot
 from pdmp.cli import _options
+from pdmp.cli._console import say
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("model", metavar="MODEL", help="model file")
-    parser.add_argument("paths", nargs="*", metavar="PATH", help="its demonstrations, as for fit")
-    parser.add_argument("-o", "--output", required=True, metavar="FOLDER", help="where to write")
+    parser.add_argument("model", type=_options.path, metavar="MODEL", help="model file")
+    parser.add_argument(
+        "paths",
+        nargs="*",
+        type=_options.path,
+        metavar="PATH",
+        help="its demonstrations, as for fit",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=_options.path,
+        required=True,
+        metavar="FOLDER",
+        help="where to write",
+    )
     _options.add_reading(parser)
 
 
@@ -43,4 +57,4 @@ def run(options: Namespace) -> None:
     for name, figure in figures.items():
         path = Path(options.output, f"{name}.png")
         plot.save(figure, path)
-        print(path)
+        say(path)

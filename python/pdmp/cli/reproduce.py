@@ -6,6 +6,8 @@ example: pdmp reproduce fig3 -o reproduction
 import sys
 from argparse import ArgumentParser, Namespace
 
+from pdmp.cli._console import report
+from pdmp.cli._options import path
 from pdmp.reproduction import FIGURES, reproduce
 from pdmp.reproduction.section import SEED
 
@@ -21,6 +23,7 @@ def arguments(parser: ArgumentParser) -> None:
         "-o",
         "--output",
         default="reproduction",
+        type=path,
         metavar="FOLDER",
         help="where pictures and tables go; default: reproduction",
     )
@@ -33,6 +36,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--recordings",
+        type=path,
         metavar="FOLDER",
         help="for fig5, CSV files of people walking: t [s]; r_sh1, r_sh2, r_sh3, r_elb, l_sh1, … "
         "[rad]",
@@ -41,11 +45,11 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Make what was asked for, and print its tables."""
-    report = reproduce(
+    text = reproduce(
         options.figure,
         options.output,
         options.recordings,
         options.seed,
         progress=lambda name: print(f"making {name}", file=sys.stderr),
     )
-    print(report)
+    report(text)

@@ -9,13 +9,16 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 import pdmp
-from pdmp import demos
+from pdmp.cli._console import say
+from pdmp.cli._options import path
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("model", metavar="MODEL", help="model file")
-    parser.add_argument("-o", "--output", required=True, metavar="FILE", help="CSV to write")
+    parser.add_argument("model", type=path, metavar="MODEL", help="model file")
+    parser.add_argument(
+        "-o", "--output", type=path, required=True, metavar="FILE", help="CSV to write"
+    )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--style", nargs="+", type=float, metavar="S", help="style parameters")
     which.add_argument("--context", nargs="+", type=_value, metavar="C", help="context to meet")
@@ -46,8 +49,8 @@ def run(options: Namespace) -> None:
     trajectory = model.rollout(**given)
     if options.context is not None and model.predict(options.context).outside.any():
         print("pdmp: the context lies outside of those demonstrated", file=sys.stderr)
-    demos.write_csv(options.output, trajectory, model.names, model.units)
-    print(f"{options.output}: {len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
+    trajectory.to_csv(options.output)
+    say(f"{options.output}: {len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
 
 
 def _value(text: str) -> float | str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._native import Demonstration, fill
+from pdmp._shown import refusal
 
 TURNS = {"rad": tau, "deg": 360.0, "°": 360.0}
 
@@ -33,4 +34,4 @@ def demonstration(
         whole = fill(position, clock, columns, turns, max_gap)
         return Demonstration(whole, dt=dt, time=time, context=context, names=names, units=units)
     except ValueError as error:
-        raise ValueError(f"{source}: {error}") from None
+        raise refusal(f"{source}: {error}") from None

@@ -1,102 +1,116 @@
-"""Rows, names and numbers of a CSV file, with the place of whatever is wrong in them."""
+"""Names and numbers of a CSV file, with the place of whatever is wrong in them."""
 
-import csv
 import math
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
+from pdmp._shown import refusal
 
-def rows(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield line number and fields of each row that is not blank, the checked header first."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.reader(file)
-        header: list[str] = []
-        try:
-            for row in reader:
-                fields = [field.strip() for field in row]
-                if not any(fields):
-                    continue
-                if not header:
-                    header = fields
-                    if len(header) == 1 and re.search("[;\t]", header[0]):
-                        raise ValueError(
-                            f"{path}, line {reader.line_num}: '{header[0]}' is one field: "
-                            "separate fields by commas"
-                        )
-                    check_names(path, reader.line_num, header)
-                elif len(fields) != len(header):
-                    raise ValueError(
-                        f"{path}, line {reader.line_num}: {len(fields)} fields, "
-                        f"expected {len(header)} as in the header"
-                    )
-                yield reader.line_num, fields
-        except UnicodeDecodeError:
-            raise ValueError(f"{path}: not UTF-8 text: save it as UTF-8") from None
-        except csv.Error as error:
-            raise ValueError(f"{path}, line {reader.line_num}: {error}") from None
-    if not header:
-        raise ValueError(f"{path}: empty: expected a header row with names, then one sample a row")
-
-
-def label(field: str) -> tuple[str, str]:
-    """Return name and unit of a header field such as `knee [rad]`; the unit is "" without one."""
-    found = re.fullmatch(r"(.*\S)\s*\[([^][]*)\]", field)
-    return (found[1], found[2].strip()) if found else (field, "")
+MAX_SHOWN = 80
+"""Characters of a field that an error quotes."""
+GAPS = frozenset(
+    [
+        "na",
+        "n/a",
+        "#n/a",
+        "#na",
+        "<na>",
+        "nan",
+        "+nan",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "1.#qnan",
+        "-1.#qnan",
+        "1.#ind",
+        "-1.#ind",
+        "null",
+        "none",
+    ]
+)
+"""Texts that mark a missing number, beside the empty one."""
 
 
 def listed(argument: str, names: Sequence[str]) -> list[str]:
     """Return several names as a list; a text would be taken apart letter by letter."""
     if isinstance(names, str):
-        raise ValueError(f"{argument} = '{names}': pass a list of names, ['{names}']")
+        raise refusal(f"{argument} = '{names}': pass a list of names, ['{names}']")
     return list(names)
 
 
 def check_names(path: Path, line: int, names: Sequence[str]) -> None:
     """Check that the first row names the columns, each by a name of its own."""
+    seen: set[str] = set()
     for name in names:
-        if not name.strip() or _parsed(name) is not None:
-            raise ValueError(
-                f"{path}, line {line}: '{name}' is not a name: the first row must name the columns"
+        if not is_name(name):
+            raise refusal(
+                f"{path}, line {line}: '{short(name)}' is not a name: the first row must name the "
+                "columns"
             )
-        if names.count(name) > 1:
-            raise ValueError(f"{path}, line {line}: two columns are called '{name}': rename one")
+        if name in seen:
+            raise refusal(
+                f"{path}, line {line}: two columns are called '{short(name)}': rename one"
+            )
+        seen.add(name)
 
 
-def column(path: Path, header: Sequence[str], name: str) -> int:
-    """Return the index of the column called `name`."""
-    if name not in header:
-        raise ValueError(f"{path}: no column '{name}' among {', '.join(header)}")
-    return header.index(name)
+def is_name(field: str) -> bool:
+    """Return whether a field may head a column."""
+    return bool(field.strip()) and parsed(field.replace(",", ".", 1)) is None
+
+
+def places(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]:
+    """Return the index of the column of each name."""
+    where = {name: k for k, name in enumerate(header)}
+    for name in names:
+        if name not in where:
+            known = ", ".join(header) if len(header) <= 40 else f"{len(header)} columns"
+            raise refusal(f"{path}: no column '{name}' among {known}")
+    return [where[name] for name in names]
 
 
 def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) -> float:
     """Return the finite number in a field of the column called `name`, or NaN for a gap."""
-    value = _parsed(field)
-    if gaps and (not field or (value is not None and math.isnan(value))):
-        return math.nan
-    if not field:
-        raise ValueError(
-            f"{path}, line {line}, column '{name}': empty: pass max_gap= to interpolate what is "
+    value = parsed(field)
+    field = short(field)
+    place = f"{path}, line {line}, column '{name}'"
+    if is_gap(field):
+        if gaps:
+            return math.nan
+        found = f"{field} is not finite" if value is not None else f"'{field}' marks a gap"
+        raise refusal(
+            f"{place}: {found if field else 'empty'}: pass max_gap= to interpolate what is "
             "missing, or cut the row out"
         )
     if value is None:
-        raise ValueError(f"{path}, line {line}, column '{name}': '{field}' is not a number")
+        hint = ""
+        if parsed(field.replace(",", ".")) is not None:
+            hint = ": decimal commas are read where semicolons or tabs separate the fields"
+        raise refusal(f"{place}: '{field}' is not a number{hint}")
     if not math.isfinite(value):
-        raise ValueError(
-            f"{path}, line {line}, column '{name}': {field} is not finite: "
-            "pass max_gap= to interpolate what is NaN, or cut the row out"
-        )
+        raise refusal(f"{place}: {field} is not finite: cut the row out")
     return value
 
 
+def short(field: str) -> str:
+    """Return a field, or its beginning where it is long."""
+    return field if len(field) <= MAX_SHOWN else field[:MAX_SHOWN] + "..."
+
+
+def is_gap(field: str) -> bool:
+    """Return whether a field marks a missing number."""
+    return not field or field.lower() in GAPS
+
+
 def is_number(field: str) -> bool:
-    """Say whether a field holds a number, finite or not."""
-    return _parsed(field) is not None
+    """Return whether a field holds a number, finite or not."""
+    return parsed(field) is not None
 
 
-def _parsed(field: str) -> float | None:
+def parsed(field: str) -> float | None:
+    """Return the number in a field, if it is one."""
     try:
-        return float(field)
+        # Python takes 1_000 for a thousand.
+        return None if "_" in field else float(field)
     except ValueError:
         return None

@@ -5,14 +5,16 @@ from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._native import Demonstration
-from pdmp.demos import _text
+from pdmp._shown import refusal
+from pdmp.demos import _clock, _npz, _text
 from pdmp.demos._recording import demonstration
+
+LAYOUT = "store time (T,) and position (T, D), or each demonstration beside its time stamps NAME.t"
 
 
 def read_npz(
@@ -27,7 +29,7 @@ def read_npz(
     Parameters
     ----------
     path : path
-        An NPZ file in one of the two layouts that `pdmp.demos` describes.
+        An NPZ file in one of the layouts that `pdmp.demos` describes.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
     dt : float, optional
@@ -54,21 +56,27 @@ def recordings(
     path: Path, columns: Sequence[str] | None, dt: float | None
 ) -> Iterator[tuple[str, NDArray[Any], dict[str, Any]]]:
     """Yield name, positions (T, D) and the other arguments of each demonstration in the file."""
-    arrays = _arrays(path)
-    names, units = _labels(arrays, "names"), _labels(arrays, "units")
+    arrays = _npz.arrays(path)
+    names, units = _labels(path, arrays, "names"), _labels(path, arrays, "units")
     if columns is not None and names is None:
-        raise ValueError(f"{path}: no array 'names' to tell which columns are {', '.join(columns)}")
+        raise refusal(f"{path}: no array 'names' to tell which columns are {', '.join(columns)}")
     for name, position, time in _parts(path, arrays):
+        source = f"{path}, '{name}'"
         for labels in (names, units):
             expected = "D" if labels is None else len(labels)
             if position.ndim != 2 or expected not in (position.shape[1], "D"):
-                shape = position.shape
-                raise ValueError(f"{path}, '{name}': shape {shape}, expected (T, {expected})")
+                raise refusal(
+                    f"{source}: shape {position.shape}, expected (T, {expected}): " + LAYOUT
+                )
         if dt is None and time is None:
-            raise ValueError(f"{path}, '{name}': no time stamps: pass dt=")
+            raise refusal(f"{source}: no time stamps: pass dt=")
         kept = list(range(position.shape[1]))
         if columns is not None and names is not None:
-            kept = [_text.column(path, names, name) for name in _text.listed("columns", columns)]
+            kept = _text.places(path, names, _text.listed("columns", columns))
+        if dt is None and time is not None:
+            time = _clock.seconds(
+                source, time, "", "store them in s instead of {unit}, or pass dt="
+            )
         given = {
             kind: None if labels is None else [labels[k] for k in kept]
             for kind, labels in (("names", names), ("units", units))
@@ -76,45 +84,60 @@ def recordings(
         yield name, position[:, kept], {"dt": dt, "time": time if dt is None else None, **given}
 
 
-def _labels(arrays: dict[str, NDArray[Any]], kind: str) -> list[str] | None:
+def _labels(path: Path, arrays: dict[str, NDArray[Any]], kind: str) -> list[str] | None:
     """Take the names or units of the degrees of freedom out of the arrays."""
     if kind not in arrays:
         return None
-    labels = np.atleast_1d(arrays.pop(kind)).tolist()
-    return [label.decode() if isinstance(label, bytes) else str(label) for label in labels]
-
-
-def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    labels = np.atleast_1d(arrays.pop(kind))
+    if labels.ndim != 1 or labels.dtype.kind not in "US":
+        raise refusal(f"{path}: '{kind}' must be a vector of texts, one per DoF")
     try:
-        archive = np.load(path, allow_pickle=False)
-        if isinstance(archive, np.ndarray):
-            raise ValueError("it is a single array; use numpy.savez")
-        with archive:
-            return dict(archive)
-    except (BadZipFile, EOFError, ValueError) as error:
-        raise ValueError(f"{path}: not an NPZ file of plain arrays: {error}") from None
+        texts = [label.decode() if isinstance(label, bytes) else label for label in labels.tolist()]
+        "".join(texts).encode()
+    except (SystemError, ValueError):
+        # numpy checks no letters before it makes texts of them.
+        raise refusal(f"{path}: '{kind}' holds letters that there are none of") from None
+    return texts
 
 
 def _parts(
     path: Path, arrays: dict[str, NDArray[Any]]
 ) -> Iterator[tuple[str, NDArray[Any], NDArray[Any] | None]]:
-    """Yield name, positions and time stamps of each demonstration, in either layout."""
-    if "y" not in arrays or "start" not in arrays:
+    """Yield name, positions and time stamps of each demonstration, in any layout."""
+    if "y" in arrays and "start" in arrays:
+        yield from _joined(path, arrays["y"], arrays.get("t"), arrays["start"])
+    elif "position" in arrays and "position.t" not in arrays:
+        time = arrays.get("time", arrays.get("t"))
+        position = arrays["position"]
+        position = position[:, None] if position.ndim == 1 else position
+        stack = position if position.ndim == 3 else [position]
+        own = position.ndim == 3 and time is not None and time.shape[:-1] == position.shape[:1]
+        for m, each in enumerate(stack):
+            yield str(m), each, time[m] if own and time is not None else time
+    else:
         for name, position in arrays.items():
             if not name.endswith(".t"):
                 yield name, position, arrays.get(f"{name}.t")
             elif name.removesuffix(".t") not in arrays:
-                raise ValueError(f"{path}: '{name}' has time stamps of nothing")
-        return
-    position, time = arrays["y"], arrays.get("t")
-    given = np.atleast_1d(arrays["start"])
-    whole = given.dtype.kind in "iuf" and given.ndim == 1 and (given == np.floor(given)).all()
-    start = given.astype(int).tolist() if whole else []
+                raise refusal(f"{path}: '{name}' has time stamps of nothing")
+
+
+def _joined(
+    path: Path, position: NDArray[Any], time: NDArray[Any] | None, given: NDArray[Any]
+) -> Iterator[tuple[str, NDArray[Any], NDArray[Any] | None]]:
+    """Yield the demonstrations that lie one after another."""
+    n_samples = len(position) if position.ndim else 0
+    given = np.atleast_1d(given)
+    whole = given.dtype.kind in "iuf" and given.ndim == 1 and np.isfinite(given).all()
+    start = given.tolist() if whole and (given == np.floor(given)).all() else []
     rises = all(before < after for before, after in pairwise(start))
-    if len(start) < 2 or not rises or (start[0], start[-1]) != (0, len(position)):
-        raise ValueError(
-            f"{path}: 'start' must rise from 0 to {len(position)}, where the last demonstration "
-            f"ends, in whole numbers, got {given.tolist()}"
+    if len(start) < 2 or not rises or (start[0], start[-1]) != (0, n_samples):
+        raise refusal(
+            f"{path}: 'start' must rise from 0 to {n_samples}, where the last demonstration "
+            f"ends, in whole numbers, "
+            f"got {np.array2string(given, threshold=9) if whole else given.dtype}"
         )
-    for demo, (begin, end) in enumerate(pairwise(start)):
+    if time is not None and time.shape != (n_samples,):
+        raise refusal(f"{path}: 't' has shape {time.shape}, expected ({n_samples},)")
+    for demo, (begin, end) in enumerate(pairwise(map(int, start))):
         yield str(demo), position[begin:end], None if time is None else time[begin:end]

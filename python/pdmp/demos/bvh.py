@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pdmp._native import Demonstration
+from pdmp._shown import refusal
 from pdmp.demos import _text
 from pdmp.demos._recording import demonstration
 
@@ -63,14 +64,15 @@ def read_bvh(
             for channel in joint["CHANNELS"][1:]
         ]
         n_frames, interval = motion.nframes, motion.frame_time
-    except (LookupError, StopIteration, TypeError, ValueError):
-        raise ValueError(f"{path}: not a whole BVH file: joints, channels or frames lack") from None
+    except Exception:
+        # The parser has no errors of its own.
+        raise refusal(f"{path}: not a whole BVH file: joints, channels or frames lack") from None
     if len(motion.frames) != n_frames:
-        raise ValueError(
+        raise refusal(
             f"{path}: holds {len(motion.frames)} frames, but announces {n_frames}: export it anew"
         )
     names = found if columns is None else _text.listed("columns", columns)
-    where = [_text.column(path, found, name) for name in names]
+    where = _text.places(path, found, names)
     position = np.array([_frame(path, k, row, found) for k, row in enumerate(motion.frames)])
     position = position.reshape(n_frames, len(found))[:, where]
     turning = [name.endswith("rotation") for name in names]
@@ -95,23 +97,21 @@ def _parsed(path: Path) -> Bvh:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
-        raise ValueError(f"{path}: not UTF-8 text: save it as UTF-8") from None
+        raise refusal(f"{path}: not UTF-8 text: save it as UTF-8") from None
     try:
         # The parser takes a blank line for a joint, and the last line only with its end.
         return Bvh("\n".join(line for line in lines if line.strip()) + "\n")
-    except (AttributeError, LookupError):
-        raise ValueError(f"{path}: not a BVH file: its braces do not match") from None
+    except Exception:
+        raise refusal(f"{path}: not a BVH file: its braces do not match") from None
 
 
 def _frame(path: Path, frame: int, row: Sequence[str], names: Sequence[str]) -> list[float]:
     if len(row) != len(names):
-        raise ValueError(f"{path}, frame {frame}: {len(row)} numbers, expected {len(names)}")
+        raise refusal(f"{path}, frame {frame}: {len(row)} numbers, expected {len(names)}")
     numbers = []
     for name, field in zip(names, row, strict=True):
         try:
             numbers.append(float(field))
         except ValueError:
-            raise ValueError(
-                f"{path}, frame {frame}, '{name}': '{field}' is not a number"
-            ) from None
+            raise refusal(f"{path}, frame {frame}, '{name}': '{field}' is not a number") from None
     return numbers

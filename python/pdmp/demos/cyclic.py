@@ -1,7 +1,6 @@
 """Cycles of rhythmic recordings."""
 
-import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, cast, overload
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pdmp import _native
 from pdmp._native import Demonstration
+from pdmp._shown import refusal, warn
 
 
 class Rejected(NamedTuple):
@@ -90,9 +90,9 @@ class Cycles(Sequence[Demonstration]):
 
 
 def cycles(
-    recordings: Demonstration | Sequence[Demonstration],
+    recordings: Demonstration | Sequence[Demonstration] | Mapping[str, Demonstration],
     *,
-    events: ArrayLike | Sequence[ArrayLike] | None = None,
+    events: ArrayLike | Sequence[ArrayLike] | Mapping[str, ArrayLike] | None = None,
     average: bool = False,
 ) -> Cycles:
     """Cut cyclic recordings into closed cycles that begin in the same phase.
@@ -121,11 +121,11 @@ def cycles(
 
     Parameters
     ----------
-    recordings : Demonstration or sequence of Demonstration
+    recordings : Demonstration, or sequence or mapping of Demonstration
         Recordings of at least one cycle and a half, with `dt` or `time`.
     events : (K,) array_like, or one for each recording, optional
         Times in s at which cycles begin, such as foot strikes, on the clock of the recording; the
-        last ends the last cycle.
+        last ends the last cycle. Of a mapping of recordings, they may be a mapping too.
     average : bool
         Make one mean cycle of each recording, instead of keeping each.
 
@@ -151,6 +151,10 @@ def cycles(
     ----------
     B. Iglewicz, D. C. Hoaglin, How to detect and handle outliers, ASQC Quality Press 1993
     """
+    if isinstance(recordings, Mapping) and isinstance(events, Mapping):
+        if lone := sorted(map(str, recordings.keys() ^ events.keys())):
+            raise refusal(f"events: '{lone[0]}' is among the recordings or the events alone")
+        events = [events[name] for name in recordings]
     begins = cast("Sequence[ArrayLike] | None", events)
     if isinstance(recordings, Demonstration):
         recordings = [recordings]
@@ -158,10 +162,10 @@ def cycles(
     demos, periods, gains, sources, odd, grown = _native.cycles(recordings, begins, average)
     for recording, _, _, reason, whole in odd:
         if whole:
-            warnings.warn(f"recording {recording} is left out: {reason}", stacklevel=2)
+            warn(f"recording {recording} is left out: {reason}")
     growths = [Growth(*growth) for growth in grown]
     if gaining := [growth for growth in growths if not growth.turns]:
-        warnings.warn(_gains(gaining, demos), stacklevel=2)
+        warn(_gains(gaining, demos))
     rejected = [Rejected(*cycle[:4]) for cycle in odd]
     return Cycles(demos, periods, sources, rejected, np.array(gains), growths)
 

@@ -1,19 +1,27 @@
 """Folders with an index, and several files and folders at once."""
 
+import re
 from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pdmp._described import label
 from pdmp._native import Demonstration
+from pdmp._shown import refusal
 from pdmp.demos import _text
 from pdmp.demos._recording import demonstration
+from pdmp.demos._sheet import sheet
 from pdmp.demos.archive import read_npz, recordings
 from pdmp.demos.bvh import read_bvh
 from pdmp.demos.table import read_csv
 
 SINGLE = (".csv", ".bvh")
 """Formats with one demonstration a file."""
+FORMAT = (
+    "expected an index.csv with a row per demonstration, its name under 'id', beside "
+    "demos/<id>.csv or demos/<id>.bvh files or a demos.npz"
+)
 
 
 def read(
@@ -56,13 +64,13 @@ def read(
         if path.is_dir():
             demos += read_folder(path, time=time, context=context, **options).values()
         elif context is not None:
-            raise ValueError(f"{path}: a context is read from the index.csv of a folder: pass one")
+            raise refusal(f"{path}: a context is read from the index.csv of a folder: pass one")
         elif path.suffix.lower() in SINGLE:
             demos.append(_read_single(path, time, **options))
         elif path.suffix.lower() == ".npz":
             demos += read_npz(path, **options).values()
         else:
-            raise ValueError(f"{path}: expected a .csv, .bvh or .npz file or a folder")
+            raise refusal(f"{path}: expected a .csv, .bvh or .npz file or a folder")
     return demos
 
 
@@ -76,6 +84,9 @@ def read_folder(
     context: Sequence[str] | None = None,
 ) -> dict[str, Demonstration]:
     """Read the demonstrations that a folder's `index.csv` lists, by their ids.
+
+    Of a folder without an index, all CSV and BVH files are read, or all in its folder `demos`, or
+    its `demos.npz`, by their names in natural order; they have no context.
 
     Parameters
     ----------
@@ -95,23 +106,27 @@ def read_folder(
     Raises
     ------
     ValueError
-        An index without `id`, or with one twice, a context that is not a finite number, or what
-        `read_csv`, `read_bvh` and `read_npz` refuse.
+        A folder with nothing to read, an index without `id`, or with one twice, an id that is no
+        name of a file, a context that is not a finite number, or what `read_csv`, `read_bvh` and
+        `read_npz` refuse.
     OSError
         A file that cannot be read.
     """
     path = Path(path)
-    contexts = _contexts(path / "index.csv", context or [])
-    archive = path / "demos.npz"
+    options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
+    index, archive = path / "index.csv", path / "demos.npz"
+    if path.is_dir() and not index.exists():
+        return _read_unlisted(path, time, context, **options)
+    contexts = _contexts(index, context or [])
     if not archive.exists():
-        options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
+        files = {name: _file(path, name) for name in contexts}
         return {
-            name: _read_single(_file(path / "demos", name), time, context=values, **options)
-            for name, values in contexts.items()
+            name: _read_single(file, time, context=contexts[name], **options)
+            for name, file in files.items()
         }
     found = list(recordings(archive, columns, dt))
     if len(found) != len(contexts):
-        raise ValueError(
+        raise refusal(
             f"{archive}: holds {len(found)} demonstrations, but index.csv lists {len(contexts)}"
         )
     return {
@@ -122,9 +137,33 @@ def read_folder(
     }
 
 
-def _file(folder: Path, name: str) -> Path:
+def _read_unlisted(
+    path: Path, time: str, context: Sequence[str] | None, **options: Any
+) -> dict[str, Demonstration]:
+    """Read all files of a folder without an index."""
+    if context is None and (path / "demos.npz").exists():
+        return read_npz(path / "demos.npz", **options)
+    for folder in (path, path / "demos"):
+        files = [file for suffix in SINGLE for file in folder.glob(f"*{suffix}")]
+        if files and context is None:
+            files.sort(key=lambda file: _natural(file.name))
+            return {file.stem: _read_single(file, time, **options) for file in files}
+    raise refusal(f"{path}: no index.csv{'' if context else ', and no files'}: {FORMAT}")
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Return what sorts "2" before "10"."""
+    return [(int(part) if part.isdecimal() else -1, part) for part in re.split(r"(\d+)", name)]
+
+
+def _file(path: Path, name: str) -> Path:
     """Return the one file of that name, a CSV file where there is none."""
+    if not name or re.search(r"[/\\:\x00-\x1f]", name) or name in (".", ".."):
+        raise refusal(f"{path / 'index.csv'}: id '{name}' is no name of a file: {FORMAT}")
+    folder = path / "demos"
     paths = [folder / f"{name}{suffix}" for suffix in SINGLE]
+    if name.lower().endswith(SINGLE):
+        paths.append(folder / name)
     return next((path for path in paths if path.exists()), paths[0])
 
 
@@ -140,21 +179,32 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
 
     A column without any number holds labels.
     """
-    (_, fields), *lines = _text.rows(path)
-    header = [_text.label(field)[0] for field in fields]
-    name = _text.column(path, header, "id")
-    where = [_text.column(path, header, column) for column in _text.listed("context", columns)]
+    found = sheet(path, index=True)
+    header, lines = [label(field)[0] for field in found.fields], list(found.rows())
+    if found.separator != ",":
+        lines = [(line, list(map(_pointed, fields))) for line, fields in lines]
+    _text.check_names(path, found.line, header if header[0] else header[1:])
+    name, *where = _text.places(path, header, ["id", *_text.listed("context", columns)])
+    if not lines:
+        raise refusal(f"{path}: lists no demonstrations: {FORMAT}")
     labels = {k for k in where if not any(_text.is_number(fields[k]) for _, fields in lines)}
     contexts: dict[str, list[float | str] | None] = {}
     for line, fields in lines:
         if fields[name] in contexts:
-            raise ValueError(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
-        for k in labels:
-            if not fields[k]:
-                raise ValueError(f"{path}, line {line}, column '{header[k]}': no label: fill it in")
+            raise refusal(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
+        for k in where:
+            if not fields[k] or (k not in labels and _text.is_gap(fields[k])):
+                kind = "label" if k in labels else "number"
+                raise refusal(f"{path}, line {line}, column '{header[k]}': no {kind}: fill it in")
         values = [
             fields[k] if k in labels else _text.number(path, line, header[k], fields[k])
             for k in where
         ]
         contexts[fields[name]] = values or None
     return contexts
+
+
+def _pointed(field: str) -> str:
+    """Return a number with a decimal point, in place of a comma, and texts as they are."""
+    pointed = field.replace(",", ".")
+    return pointed if _text.is_number(pointed) else field

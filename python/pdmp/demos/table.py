@@ -1,18 +1,29 @@
 """CSV files: one demonstration in, one trajectory out."""
 
+from __future__ import annotations
+
 import csv
+import math
+import re
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pdmp._described import DERIVATIVES, label
 from pdmp._files import replacing
 from pdmp._native import Demonstration, Trajectory
-from pdmp.demos import _text
+from pdmp._shown import refusal
+from pdmp.demos import _clock, _text
 from pdmp.demos._recording import demonstration
+from pdmp.demos._sheet import Sheet, sheet
 
-SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+THOUSANDS = re.compile(r"[^,]*|[-+]?[1-9]\d{0,2}(,\d{3})+")
+CLOCKS = ("t", "time", "Time", "TIME")
+"""Names of a column of time stamps, if none is given; the first is the default."""
 
 
 def read_csv(
@@ -26,21 +37,27 @@ def read_csv(
 ) -> Demonstration:
     """Read one demonstration from a CSV file.
 
-    A column headed `knee [rad]` is called `knee`, and its unit is rad.
+    A column headed `knee [rad]` is called `knee`, and its unit is rad; units may stand in a row of
+    their own below the header too. Fields are separated by commas, semicolons, tabs or spaces;
+    where not by commas, these may be decimal. Lines before the header, comments, which begin with
+    #, and the unnamed index column that pandas writes are passed over.
 
     Parameters
     ----------
     path : path
-        UTF-8 text, fields separated by commas, names in the first row.
+        UTF-8 text with a row of names, then one sample a row.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all but `time` by default.
     time : str
-        Column of the time stamps, in s unless its header tells ms, µs or ns.
+        Column of the time stamps, by default `t` or `time`, in s unless its header, or this name,
+        has ms, µs or ns in brackets. Stamps in ms, µs or ns since 1970 are recognised, with a
+        warning, and count from the first.
     dt : float, optional
         Sampling interval [s], in place of time stamps.
     max_gap : float
         Longest gap [s] that is interpolated, from the sample before to the one after; by default
-        none is. A gap is an empty field or NaN; rows that are missing altogether are none.
+        none is. A gap is an empty field, NaN, NA or null; rows that are missing altogether are
+        none.
     context : sequence of float or str, optional
         Context (Q,) of the demonstration.
 
@@ -48,39 +65,41 @@ def read_csv(
     ------
     ValueError
         A field that is not a finite number, a gap that is longer than `max_gap` or at an end, a
-        column that is missing, or what `Demonstration` refuses; names file, column, and line or
-        time.
+        column that is missing, time stamps in an unknown unit, or what `Demonstration` refuses;
+        names file, column, and line or time.
     OSError
         A file that cannot be read.
     """
     path = Path(path)
-    lines = _text.rows(path)
-    first, fields = next(lines)
-    header, units = zip(*map(_text.label, fields), strict=True)
-    _text.check_names(path, first, header)
-    if dt is None and time not in header:
-        raise ValueError(
-            f"{path}: no column '{time}' with the time among {', '.join(header)}: "
+    times = CLOCKS if time == CLOCKS[0] else (time, label(time)[0])
+    found = sheet(path, times if dt is None else ())
+    header, units = _labels(found)
+    names = [name for name in header if name]
+    _text.check_names(path, found.line, names)
+    stamped = next((name for name in times if name in header), None)
+    if dt is None and stamped is None:
+        raise refusal(
+            f"{path}: no column '{time}' with the time among {', '.join(names)}: "
             "name it with time=, or pass dt="
         )
-    names = [name for name in header if name != time]
-    if columns is not None:
+    if columns is None:
+        names = [name for name in names if name != stamped]
+    else:
         names = _text.listed("columns", columns)
-    where = [_text.column(path, header, name) for name in names]
-    clock = None if dt is not None else _text.column(path, header, time)
-    numbers: list[list[float]] = []
-    stamps: list[float] = []
-    for line, row in lines:
-        numbers.append(
-            [_text.number(path, line, header[k], row[k], gaps=max_gap > 0) for k in where]
-        )
-        if clock is not None:
-            stamps.append(_text.number(path, line, time, row[clock]))
+    where = _text.places(path, header, names)
+    clock = header.index(stamped) if dt is None and stamped is not None else None
+    position, stamps = _numbers(found, header, where, clock, gaps=max_gap > 0)
+    if clock is not None and stamps is not None:
+        name = header[clock]
+        given = units[clock] or ("" if name == time else label(time)[1])
+        remedy = f"write '{name} [{{unit}}]' in the header or as time="
+        unit = _clock.unit_of(path, name, given)
+        stamps = _clock.seconds(f"{path}, column '{name}'", stamps, unit, remedy)
     return demonstration(
         path,
-        np.array(numbers).reshape(len(numbers), len(names)),
+        position,
         dt=dt,
-        time=None if clock is None else np.array(stamps) * _second(path, time, units[clock]),
+        time=stamps,
         names=names,
         units=[units[k] for k in where] if any(units[k] for k in where) else None,
         max_gap=max_gap,
@@ -88,19 +107,83 @@ def read_csv(
     )
 
 
-def _second(path: Path, name: str, unit: str) -> float:
-    """Return how many seconds the unit of a time column is, which may stand in parentheses too."""
-    unit = unit or _text.label(name.replace("(", "[").replace(")", "]"))[1]
-    if unit not in SECONDS:
-        known = ", ".join(filter(None, SECONDS))
-        raise ValueError(f"{path}, column '{name}': its unit is '{unit}': expected {known}")
-    return SECONDS[unit]
+def _labels(found: Sheet) -> tuple[list[str], list[str]]:
+    """Return names and units of the columns; those of the header go before those below it."""
+    header, units = map(list, zip(*map(label, found.fields), strict=True))
+    if found.units is not None:
+        units = [unit or below for unit, below in zip(units, found.units, strict=True)]
+    return header, units
+
+
+def _numbers(
+    found: Sheet, header: list[str], where: list[int], clock: int | None, *, gaps: bool
+) -> tuple[NDArray[Any], NDArray[Any] | None]:
+    """Return positions (T, D), NaN in gaps, and time stamps (T,) as they are written."""
+    path = found.path
+    numbers: list[list[float]] = []
+    stamps: list[float] = []
+    names = [header[k] for k in where]
+    unnamed = [k for k, name in enumerate(header) if not name]
+    decimal = {True: 0, False: 0}  # line where a number has a decimal comma, or a point
+    thousands = True  # whether the commas may separate thousands
+    for line, row in found.rows(blank=clock is None):
+        _check_unnamed(path, line, row, unnamed, len(numbers))
+        kept = [row[k] for k in where]
+        stamp = "0" if clock is None else row[clock]
+        text = "".join((*kept, stamp))
+        if found.separator != "," and "," in text:
+            decimal[True] = line
+            thousands = thousands and all(map(THOUSANDS.fullmatch, (*kept, stamp)))
+            kept, stamp = [cell.replace(",", ".") for cell in kept], stamp.replace(",", ".")
+        if "." in text:
+            decimal[False] = line
+        if found.separator != "," and all(decimal.values()):
+            raise refusal(
+                f"{path}, line {line}: numbers have decimal commas and decimal points: write all "
+                "of them with one of the two, and no separators of thousands"
+            )
+        if clock is not None:
+            value = _text.number(path, line, header[clock], stamp)
+            # ns since 1970 have more digits than a double, and fewer than an integer.
+            stamps.append(int(stamp) if stamp.isdecimal() and value < 2**63 else value)
+        numbers.append(_row(path, line, kept, names, gaps=gaps))
+    if decimal[True] and thousands:
+        raise refusal(
+            f"{path}, line {decimal[True]}: commas may be decimal or separate thousands: write "
+            "decimal points"
+        )
+    positions = np.array(numbers, float).reshape(len(numbers), len(where))
+    return positions, None if clock is None else np.array(stamps)
+
+
+def _row(path: Path, line: int, cells: list[str], names: list[str], *, gaps: bool) -> list[float]:
+    """Return the numbers of a row."""
+    try:
+        values = list(map(float, cells))
+        if all(map(math.isfinite, values)) and "_" not in "".join(cells):
+            return values
+    except ValueError:
+        pass
+    return [
+        _text.number(path, line, name, cell, gaps=gaps)
+        for name, cell in zip(names, cells, strict=True)
+    ]
+
+
+def _check_unnamed(path: Path, line: int, row: list[str], unnamed: list[int], sample: int) -> None:
+    """Check that what has no name is the index that pandas writes, or nothing."""
+    for k in unnamed:
+        if row[k] and not (k == 0 and row[k] == str(sample)):
+            raise refusal(
+                f"{path}, line {line}: '{row[k]}' stands in column {k + 1}, which has no name: "
+                "the first row must name the columns"
+            )
 
 
 def write_csv(
     path: str | PathLike[str],
     trajectory: Trajectory,
-    names: Sequence[str],
+    names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
 ) -> None:
     """Write a trajectory as CSV; `read_csv` with `columns=names` reads its positions back.
@@ -114,11 +197,11 @@ def write_csv(
     path : path
         Where to write.
     trajectory : Trajectory
-        What a rollout returned.
-    names : sequence of str
-        Names of the D degrees of freedom, such as `Model.names`.
+        A rollout.
+    names : sequence of str, optional
+        Names of the D degrees of freedom, in place of the trajectory's.
     units : sequence of str, optional
-        Their units, such as `Model.units`; "" where one is not known.
+        Their units, in place of the trajectory's; "" where one is not known.
 
     Raises
     ------
@@ -127,25 +210,26 @@ def write_csv(
     OSError
         A file that cannot be written.
     """
-    path, names = Path(path), _text.listed("names", names)
+    path = Path(path)
+    names = trajectory.names if names is None else _text.listed("names", names)
+    units = trajectory.units if units is None else _text.listed("units", units)
     n_dofs = trajectory.position.shape[1]
-    units = [""] * n_dofs if units is None else units
     for kind, given in (("name", names), ("unit", units)):
         if len(given) != n_dofs:
             raise ValueError(
                 f"{kind}s has length {len(given)}, expected {n_dofs}: one {kind} per DoF"
             )
-    suffixes = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
-    _text.check_names(
-        path, 1, ["t", *(f"{name}{suffix}" for suffix, _ in suffixes for name in names)]
-    )
-    header = [
-        f"{name}{suffix} [{unit}{per}]" if unit else f"{name}{suffix}"
-        for suffix, per in suffixes
-        for name, unit in zip(names, units, strict=True)
+    header = [f"{name}{suffix}" for suffix, _ in DERIVATIVES for name in names]
+    _text.check_names(path, 1, ["t", *header])
+    units = [unit and f"{unit}{per}" for _, per in DERIVATIVES for unit in units]
+    fields = [
+        f"{name} [{unit}]" if unit else name for name, unit in zip(header, units, strict=True)
     ]
+    for name, unit, field in zip(header, units, fields, strict=True):
+        if label(field) != (name, unit):
+            raise refusal(f"{path}: '{field}' would not be read back as '{name}' in '{unit}'")
     columns = (trajectory.time, trajectory.position, trajectory.velocity, trajectory.acceleration)
     with replacing(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["t", *header])
+        writer.writerow(["t", *fields])
         writer.writerows(np.column_stack(columns).tolist())

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp._native import Demonstration, inspected
+from pdmp._native import Demonstration, Trajectory, inspected
+from pdmp._shown import refusal, warn
 
 Array: TypeAlias = NDArray[Any]  # of float64
+Demos: TypeAlias = (
+    Sequence[Demonstration | Trajectory | ArrayLike]
+    | Mapping[str, Demonstration | Trajectory | ArrayLike]
+    | ArrayLike
+)
 Kind: TypeAlias = Literal["discrete", "rhythmic"]
 
 
@@ -91,7 +96,7 @@ class Recordings:
 
 
 def recordings(
-    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
+    demos: Demos,
     contexts: ArrayLike | Sequence[Sequence[float | str]] | None,
     *,
     kind: Kind,
@@ -101,24 +106,29 @@ def recordings(
 ) -> Recordings:
     """Check demonstrations and contexts, and read each demonstration over its own duration."""
     if kind not in ("discrete", "rhythmic"):
-        raise ValueError(f'kind = "{kind}": must be "discrete" or "rhythmic"')
+        raise refusal(f'kind = "{kind}": must be "discrete" or "rhythmic"')
     if n_samples < 4:
-        raise ValueError(f"n_samples = {n_samples}: must be at least 4")
-    given = tuple(_rated(demo, dt) for demo in list(demos))  # type: ignore[arg-type]
+        raise refusal(f"n_samples = {n_samples}: must be at least 4")
+    if isinstance(demos, (Demonstration, Trajectory)):
+        raise ValueError("demos is a single demonstration: put it into a list")
+    values = demos.values() if isinstance(demos, Mapping) else demos
+    given = tuple(_rated(demo, dt) for demo in values)  # type: ignore[union-attr]
     if not given:
         raise ValueError("demos is empty: pass at least two demonstrations")
     for m, demo in enumerate(given):
         if demo.n_dofs != given[0].n_dofs:
-            raise ValueError(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
+            raise refusal(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
     whole, findings = inspected(list(given), dt=dt)
     for finding in findings:
-        warnings.warn(finding, UserWarning, stacklevel=3)
+        warn(finding)
     given = tuple(whole)
     if kind == "discrete" and period is not None:
         raise ValueError("period does not apply to discrete demonstrations: leave it out")
-    periods = np.full(len(given), np.nan) if period is None else np.asarray(period, float)
+    periods = np.full(len(given), np.nan) if period is None else np.asarray(period)
+    if periods.dtype.kind not in "iuf" or periods.ndim > 1:
+        raise ValueError("period must be a number of seconds, or one for each demonstration")
     if periods.ndim and len(periods) != len(given):
-        raise ValueError(
+        raise refusal(
             f"period has length {len(periods)}, expected {len(given)}: one value per demonstration"
         )
     periods = np.broadcast_to(periods, len(given))
@@ -129,8 +139,10 @@ def recordings(
     return Recordings(given, conditions, labels, kind, durations, sampled)
 
 
-def _rated(demo: Demonstration | ArrayLike, dt: float | None) -> Demonstration:
+def _rated(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> Demonstration:
     """Return a demonstration, with the rate that is given for those without."""
+    if isinstance(demo, Trajectory):
+        return Demonstration(demo)
     if not isinstance(demo, Demonstration):
         return Demonstration(demo, dt=dt)
     if demo.time is not None or dt is None:
@@ -144,15 +156,15 @@ def _read(
 ) -> tuple[float, Array]:
     """Return the duration [s] and the positions (C, D), linear between the samples."""
     if demo.time is None:
-        raise ValueError(f"demo {m}: no sampling interval: pass dt= in seconds")
+        raise refusal(f"demo {m}: no sampling interval: pass dt= in seconds")
     time = demo.time - demo.time[0]
     duration, wrap = float(time[-1]), None
     if kind == "rhythmic":
         if np.isnan(period) and demo.dt is None:
-            raise ValueError(f"demo {m}: a time-stamped cycle: pass period= in seconds")
+            raise refusal(f"demo {m}: a time-stamped cycle: pass period= in seconds")
         wrap = float((demo.dt or 0) * demo.n_samples if np.isnan(period) else period)
         if wrap <= duration:
-            raise ValueError(
+            raise refusal(
                 f"demo {m}: period = {wrap:g}: must exceed the last time stamp, {duration:g} s"
             )
         duration = wrap
@@ -168,23 +180,26 @@ def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
         values = [demo.context for demo in demos]
         for m, context in enumerate(values):
             if context is None:
-                raise ValueError(f"demo {m} has no context: pass contexts=")
+                raise refusal(f"demo {m} has no context: pass contexts=")
             if len(context) != len(values[0]):
-                raise ValueError(
+                raise refusal(
                     f"demo {m}: context has length {len(context)}, expected {len(values[0])}"
                 )
     # Beside a label, numpy would make labels of the numbers.
-    labelled = any(isinstance(value, str) for value in np.asarray(values, object).ravel())
-    array = np.asarray(values, object if labelled else float)
+    given = np.asarray(values, object)
+    kinds = {str if isinstance(value, str) else type(value) for value in given.ravel()}
+    if kinds & {bytes, bytearray, np.bytes_}:
+        raise ValueError("contexts hold bytes: decode them to labels, or pass numbers")
+    array = given if str in kinds else given.astype(float)
     if array.ndim != 2:
-        raise ValueError(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
+        raise refusal(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
     if len(array) != len(demos):
-        raise ValueError(
+        raise refusal(
             f"contexts has length {len(array)}, expected {len(demos)}: one value per demonstration"
         )
     finite = [[isinstance(value, str) or np.isfinite(value) for value in row] for row in array]
     for m, q in np.argwhere(~np.array(finite))[:1]:
-        raise ValueError(f"contexts[{m}, {q}] = {array[m, q]}: must be finite: leave the demo out")
+        raise refusal(f"contexts[{m}, {q}] = {array[m, q]}: must be finite: leave the demo out")
     return array
 
 
@@ -194,7 +209,7 @@ def _labels(q: int, values: Array) -> list[str] | None:
     if not labels:
         return None
     if numbers := sum(not isinstance(value, str) for value in values):
-        raise ValueError(
+        raise refusal(
             f"contexts[:, {q}] holds {len(values) - numbers} labels and {numbers} numbers: "
             "write all of them as labels, or all as numbers"
         )

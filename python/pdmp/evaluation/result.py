@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pdmp._shown import printable, refusal
 from pdmp._tables import table
 from pdmp.evaluation.predictors import BAND, WIDTH, Forecast, Predictor
 from pdmp.evaluation.recordings import Array, Recordings
@@ -102,7 +103,7 @@ class Evaluation:
     def score(self, predictor: str) -> Scores:
         """Return the figures of one predictor, split by split."""
         if predictor not in self.scores:
-            raise ValueError(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
+            raise refusal(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
         return self.scores[predictor]
 
     def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
@@ -142,7 +143,7 @@ class Evaluation:
             found = self.summary(name, reach)
             figures = (found.error, found.deviation, found.relative, found.relative_error)
             shares = (found.coverage, found.duration)
-            rows.append([name, *map(_number, figures), *map(_percent, shares)])
+            rows.append([printable(name), *map(_number, figures), *map(_percent, shares)])
         return rows
 
     def markdown(self) -> str:
@@ -156,7 +157,7 @@ class Evaluation:
         """Return the tables as text."""
         lines = []
         for reach in self.reaches():
-            cells = [HEADER, *self.table(reach)]
+            cells = [list(map(_plain, row)) for row in (HEADER, *self.table(reach))]
             widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
             lines.append(self._title(reach))
             for first, *others in cells:
@@ -171,12 +172,15 @@ class Evaluation:
         return f"{reach}: {len(rows)} folds, {held} demonstrations"
 
     def _notes(self) -> list[str]:
-        return [f"left out: {name}: {reason}" for name, reason in self.left_out.items()]
+        return [
+            f"left out: {printable(name)}: {printable(reason)}"
+            for name, reason in self.left_out.items()
+        ]
 
     def _rows(self, reach: Reach | None) -> list[int]:
         rows = [k for k, split in enumerate(self.splits) if reach in (None, split.reach)]
         if not rows:
-            raise ValueError(f'reach = "{reach}": no split is of this sort')
+            raise refusal(f'reach = "{reach}": no split is of this sort')
         return rows
 
 
@@ -204,6 +208,11 @@ def _deviation(values: Array) -> float:
 
 def _standard_error(values: Array) -> float:
     return _deviation(values) / sqrt(len(values))
+
+
+def _plain(cell: str) -> str:
+    """Return a cell without what not every console has."""
+    return cell.replace("±", "+-").replace("–", "-")
 
 
 def _number(value: float) -> str:

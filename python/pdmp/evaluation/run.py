@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pdmp._native import Demonstration
+from pdmp._shown import refusal
 from pdmp.evaluation.baselines import (
     Components,
     LinearWeights,
@@ -20,7 +20,7 @@ from pdmp.evaluation.baselines import (
     RadialWeights,
 )
 from pdmp.evaluation.predictors import PDMP, Forecast, Foresee, Predictor
-from pdmp.evaluation.recordings import Kind, Recordings, recordings
+from pdmp.evaluation.recordings import Demos, Kind, Recordings, recordings
 from pdmp.evaluation.result import REFERENCE, Evaluation, score
 from pdmp.evaluation.splits import Split, checked, held_out
 
@@ -57,7 +57,7 @@ def over_styles(most: int, **settings: Any) -> dict[str, Predictor]:
 
 
 def evaluate(
-    demos: Sequence[Demonstration] | Sequence[ArrayLike] | ArrayLike,
+    demos: Demos,
     *,
     contexts: ArrayLike | Sequence[Sequence[float | str]] | None = None,
     predictors: Mapping[str, Predictor] | None = None,
@@ -85,7 +85,7 @@ def evaluate(
 
     Parameters
     ----------
-    demos : sequence of Demonstration, sequence of array_like (T_m, D), or array_like (M, T, D)
+    demos : sequence or mapping of Demonstration or array_like (T_m, D), or array_like (M, T, D)
         The demonstrations, as for `pdmp.fit`.
     contexts : array_like (M, Q), or M lists of Q numbers and labels, optional
         The condition of each; those that the demonstrations hold by default.
@@ -141,7 +141,7 @@ def evaluate(
     _check_labels(read, folds)
     chosen = baselines() | {"PDMP": PDMP()} if predictors is None else dict(predictors)
     if not isinstance(chosen.get(REFERENCE, MeanDemonstration()), MeanDemonstration):
-        raise ValueError(f"predictors: '{REFERENCE}' is always tried: give yours another name")
+        raise refusal(f"predictors: '{REFERENCE}' is always tried: give yours another name")
     tried = {REFERENCE: MeanDemonstration()} | chosen
     forecasts, left_out = {}, {}
     for k, (name, predictor) in enumerate(tried.items()):
@@ -181,7 +181,7 @@ def _foreseen(
 
 def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> None:
     if not isinstance(forecast, Forecast):
-        raise ValueError(
+        raise refusal(
             f"predictors: '{name}' foresees a {type(forecast).__name__}, expected an "
             "evaluation.Forecast"
         )
@@ -190,12 +190,12 @@ def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> No
         if kind == "variance" and values is None:
             continue
         if np.shape(values) != shape:
-            raise ValueError(
+            raise refusal(
                 f"predictors: '{name}' foresees {kind}s of shape {np.shape(values)}, "
                 f"expected (C, D) = {shape}"
             )
         if not np.isfinite(values).all():
-            raise ValueError(f"predictors: '{name}' foresees a {kind} that is not finite")
+            raise refusal(f"predictors: '{name}' foresees a {kind} that is not finite")
 
 
 def _check_labels(read: Recordings, splits: Sequence[Split]) -> None:
@@ -204,7 +204,7 @@ def _check_labels(read: Recordings, splits: Sequence[Split]) -> None:
         for split in splits:
             column = read.contexts[:, q]
             if unseen := sorted(set(column[split.test]) - set(column[split.train])):
-                raise ValueError(
+                raise refusal(
                     f'contexts[:, {q}]: "{unseen[0]}" is held out altogether, and nothing tells of '
                     "it: show it in several conditions, or pass splits= that leave some of it"
                 )

@@ -20,7 +20,7 @@ SAMPLES = 500
 
 def demonstrations(
     model: Model,
-    demos: Sequence[Demonstration],
+    demos: Sequence[Demonstration] | Mapping[str, Demonstration],
     *,
     labels: Sequence[str] | None = None,
     figure: Figure | None = None,
@@ -33,7 +33,7 @@ def demonstrations(
     ----------
     model : Model
         The primitive learnt from `demos`.
-    demos : sequence of Demonstration
+    demos : sequence or mapping of Demonstration
         The M demonstrations, in the order of the fit.
     labels : sequence of str, optional
         What each of the M demonstrations shows.
@@ -48,6 +48,7 @@ def demonstrations(
     ImportError
         matplotlib is not installed.
     """
+    demos = list(demos.values()) if isinstance(demos, Mapping) else demos
     labels = [""] * len(demos) if labels is None else labels
     for name, length in (("demos", len(demos)), ("labels", len(labels))):
         if length != model.n_demos:

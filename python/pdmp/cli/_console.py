@@ -1,0 +1,44 @@
+"""What commands write to the terminal."""
+
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+from pdmp._shown import printable
+
+
+def say(text: object, *, file: TextIO | None = None) -> None:
+    """Write a line, with control characters escaped."""
+    print(printable(text), file=file)
+
+
+def report(text: str) -> None:
+    """Write several lines, with control characters escaped."""
+    print(printable(text, keep="\n"))
+
+
+@contextmanager
+def console() -> Iterator[None]:
+    """Write warnings in one line, and ? in place of characters that the console does not have."""
+    with warnings.catch_warnings():
+        warnings.showwarning = _warning
+        changed = []
+        for stream in (sys.stdout, sys.stderr):
+            errors, reconfigure = (
+                getattr(stream, "errors", None),
+                getattr(stream, "reconfigure", None),
+            )
+            if errors in ("strict", "surrogateescape") and reconfigure is not None:
+                reconfigure(errors="replace")
+                changed.append((reconfigure, errors))
+        try:
+            yield
+        finally:
+            for reconfigure, errors in changed:
+                reconfigure(errors=errors)
+
+
+def _warning(message: Warning | str, *_: object, **__: object) -> None:
+    print(f"pdmp: warning: {printable(' '.join(str(message).split()))}", file=sys.stderr)
