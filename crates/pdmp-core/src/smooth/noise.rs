@@ -27,6 +27,10 @@ const MIN_THINNED: usize = 64;
 /// Highest cut-off, in cycles per sample of thinned recordings, that is taken from them.
 const MAX_THINNED: f64 = 0.25;
 
+/// Largest step from one sample of a thinned recording to the next, by root mean square in shares of the deviation from
+/// the mean: that of a sine with twelve samples a period. A recording of many periods that has fewer would pass for noise.
+const MAX_STEP: f64 = 0.5;
+
 /// Highest cut-off that is tried, in cycles per sample, which stands for interpolation: λ = 1e-3, where a sine at the
 /// Nyquist frequency keeps 95 % of its amplitude.
 const INTERPOLATING: f64 = 1.07;
@@ -114,7 +118,8 @@ impl Noise {
             let mut left = Vec::new();
             for (column, &d) in open.iter().enumerate() {
                 let (k, hz) = scores.best(column, &grid[..=steps]);
-                if scores.gain(column, k, steps) > MIN_GAIN && (whole || hz * interval <= MAX_THINNED) {
+                let resolved = whole || hz * interval <= MAX_THINNED && scores.is_resolved(column);
+                if resolved && scores.gain(column, k, steps) > MIN_GAIN {
                     (self.cut_offs[d], self.levels[d]) = (Some(hz), scores.level(column, k));
                 } else if !whole {
                     left.push(d);
@@ -143,6 +148,8 @@ pub(super) struct Scores {
     pub(super) traces: Array2<f64>,
     /// Number of recordings in which a column moves (D,).
     moving: Array1<f64>,
+    /// Mean squares of steps from sample to sample, and of deviations from the mean (2, D).
+    variation: Array2<f64>,
 }
 
 impl Scores {
@@ -159,13 +166,15 @@ impl Scores {
             sum.squares += &part.squares;
             sum.traces += &part.traces;
             sum.moving += &part.moving;
+            sum.variation += &part.variation;
         }
         Ok(sum)
     }
 
     fn zeros(shape: (usize, usize)) -> Self {
         let [logarithms, squares, traces] = [(); 3].map(|()| Array2::zeros(shape));
-        Self { logarithms, squares, traces, moving: Array1::zeros(shape.0) }
+        let (moving, variation) = (Array1::zeros(shape.0), Array2::zeros((2, shape.0)));
+        Self { logarithms, squares, traces, moving, variation }
     }
 
     /// Index and cut-off of the least score: that of the parabola through the lowest of the grid and its neighbours.
@@ -184,6 +193,11 @@ impl Scores {
     fn gain(&self, column: usize, to: usize, from: usize) -> f64 {
         let scores = self.logarithms.row(column);
         (scores[from] - scores[to]) / self.moving[column].max(1.0)
+    }
+
+    /// Returns whether the samples follow the movement of a column closely.
+    fn is_resolved(&self, column: usize) -> bool {
+        self.variation[[0, column]] <= MAX_STEP * MAX_STEP * self.variation[[1, column]]
     }
 
     /// Standard deviation of the noise of a column at a cut-off of the grid.
@@ -225,6 +239,14 @@ impl Thinned {
     fn score(&self, columns: &[usize], grid: &[f64], scores: &mut Scores) {
         let (samples, n) = (self.samples(), self.time.len());
         let shares: Vec<Option<(f64, Vec<Lanes>)>> = columns.iter().map(|&d| shares(&samples, d)).collect();
+        for (column, shares) in shares.iter().enumerate() {
+            let Some((_, shares)) = shares else { continue };
+            let y: Vec<f64> = shares.iter().map(|share| share.to_array()[0]).collect();
+            let mean = y.iter().sum::<f64>() / n as f64;
+            scores.moving[column] = 1.0;
+            scores.variation[[0, column]] = y.windows(2).map(|y| (y[1] - y[0]).powi(2)).sum::<f64>() / (n - 1) as f64;
+            scores.variation[[1, column]] = y.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / n as f64;
+        }
         for (group, hz) in grid.chunks_exact(WIDTH).enumerate() {
             let pad = samples.pad(hz[0]);
             let roughness = Roughness::new(&samples.knots(pad));
@@ -237,7 +259,6 @@ impl Thinned {
                 let Some((scale, shares)) = shares else { continue };
                 let mut bend = shares.clone();
                 copy_cycle(&mut bend, pad);
-                scores.moving[column] = 1.0;
                 roughness.bend(&mut bend);
                 factor.solve(&mut bend);
                 roughness.residual(&mut bend);
