@@ -15,7 +15,7 @@ use ndarray::{Array2, Axis};
 use crate::demo::{Demonstration, LEAST_SAMPLES};
 use crate::error::{Error, Result};
 use crate::phase::Kind;
-use crate::smooth::{Noise, Samples, Smoothing, pool};
+use crate::smooth::{MIN_THINNED, Noise, Samples, Smoothing, pool};
 use crate::spline::{Knots, Splines};
 use crate::threads::Threads;
 pub(crate) use clock::check_duration;
@@ -135,7 +135,7 @@ impl Alignment {
         }
         let pool: Vec<(usize, Vec<f64>)> = pool(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
         let samples: Vec<Samples> = pool.iter().map(|(m, time)| aligned.samples(*m, time)).collect();
-        Noise::of(self.smoothing, &samples, threads)
+        Noise::of(self.smoothing, &samples, MIN_THINNED, threads)
     }
 
     /// The demonstration of median duration: the lower one of two, the earlier one of equals.

@@ -30,7 +30,7 @@ use crate::error::{Error, Result, check_positive};
 use crate::lanes::{Lanes, WIDTH};
 use crate::threads::Threads;
 pub use noise::Noise;
-pub(crate) use noise::pool;
+pub(crate) use noise::{MIN_THINNED, pool};
 use roughness::Roughness;
 
 /// Treatment of measurement noise before demonstrations are differentiated.
@@ -158,7 +158,8 @@ fn copy_cycle(cycle: &mut Vec<Lanes>, pad: usize) {
     }
 }
 
-/// The smoothed values (n, D) of one recording, each column for itself.
+/// The smoothed values (n, D) of one recording, each column for itself. Noise is searched in all samples: a jump, which
+/// blocks spread, does not pass for it.
 ///
 /// # Errors
 /// A cut-off that is not positive and finite, above the Nyquist frequency, below [`MIN_PER_SAMPLE`] or below one per
@@ -171,7 +172,7 @@ pub(crate) fn smooth(
 ) -> Result<Array2<f64>> {
     let samples = Samples { time, period, values };
     smoothing.check(&samples)?;
-    Ok(samples.smoothed(Noise::of(smoothing, &[samples], Threads::ONE)?.cut_offs()))
+    Ok(samples.smoothed(Noise::of(smoothing, &[samples], usize::MAX, Threads::ONE)?.cut_offs()))
 }
 
 impl Smoothing {

@@ -22,7 +22,7 @@ use crate::threads::Threads;
 const MAX_POOLED: usize = 24;
 
 /// Least samples of a thinned recording.
-const MIN_THINNED: usize = 64;
+pub(crate) const MIN_THINNED: usize = 64;
 
 /// Highest cut-off, in cycles per sample of thinned recordings, that is taken from them.
 const MAX_THINNED: f64 = 0.25;
@@ -77,11 +77,12 @@ impl Noise {
         &self.cut_offs
     }
 
-    /// The noise of the recordings in a [`pool`] (at least one), all of which a given cut-off suits.
+    /// The noise of the recordings in a [`pool`] (at least one), all of which a given cut-off suits, searched in means of
+    /// blocks that leave at least `least` samples.
     ///
     /// # Errors
     /// None but those of threads that cannot be had.
-    pub(crate) fn of(smoothing: Smoothing, pool: &[Samples], threads: Threads) -> Result<Self> {
+    pub(crate) fn of(smoothing: Smoothing, pool: &[Samples], least: usize, threads: Threads) -> Result<Self> {
         let n_dofs = pool[0].values.ncols();
         let mut noise = Self::none(n_dofs);
         match smoothing {
@@ -93,23 +94,22 @@ impl Noise {
                 let scores = Scores::of(&thinned, &columns, &[hz; WIDTH], threads)?;
                 noise.levels = columns.iter().map(|&d| scores.level(d, 0)).collect();
             }
-            Smoothing::Auto => noise.search(pool, threads)?,
+            Smoothing::Auto => noise.search(pool, least, threads)?,
         }
         Ok(noise)
     }
 
     /// Searches the cut-off of every DoF.
-    fn search(&mut self, pool: &[Samples], threads: Threads) -> Result<()> {
+    fn search(&mut self, pool: &[Samples], mut least: usize, threads: Threads) -> Result<()> {
         let mut open = noisy(pool);
         let longest = pool.iter().map(Samples::len).max().unwrap_or(0);
         // At least one cycle per period, or half a cycle in the whole of the longest recording.
         let cycles = if pool[0].period.is_some() { 1.0 } else { 0.5 };
         let extreme = if pool[0].period.is_some() { f64::min } else { f64::max };
         let lowest = cycles / pool.iter().map(Samples::duration).reduce(extreme).unwrap_or(1.0);
-        let mut least = MIN_THINNED;
         while !open.is_empty() {
             let thinned: Vec<Thinned> = pool.iter().map(|samples| Thinned::of(samples, least)).collect();
-            let whole = 2 * least > longest;
+            let whole = least > longest / 2;
             let interval = median(thinned.iter().map(|thinned| thinned.interval));
             let steps = ((INTERPOLATING / interval / lowest).ln() / RATIO.ln()).ceil().max(2.0) as usize;
             let grid: Vec<f64> =
@@ -126,7 +126,7 @@ impl Noise {
                 }
             }
             open = left;
-            least *= 2;
+            least = least.saturating_mul(2);
         }
         Ok(())
     }

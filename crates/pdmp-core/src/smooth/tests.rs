@@ -123,7 +123,7 @@ fn values_and_scores_are_those_of_the_dense_formulas() {
     }
     let of = |hz: f64| dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval())).1;
     let least = (0..400).map(|k| of(0.5 * 10f64.powf(k as f64 / 160.0))).fold(f64::MAX, f64::min);
-    let noise = Noise::of(Smoothing::Auto, &[samples], Threads::ONE).unwrap();
+    let noise = Noise::of(Smoothing::Auto, &[samples], MIN_THINNED, Threads::ONE).unwrap();
     assert_relative_eq!(of(noise.cut_offs()[0].unwrap()), least, max_relative = 1e-2);
 }
 
@@ -173,7 +173,7 @@ fn the_size_of_white_noise_is_found() {
                 .collect();
             let samples: Vec<Samples> =
                 recordings.iter().map(|y| Samples { time: &time, period, values: y.view() }).collect();
-            let found = Noise::of(Smoothing::Auto, &samples, Threads::ONE).unwrap();
+            let found = Noise::of(Smoothing::Auto, &samples, MIN_THINNED, Threads::ONE).unwrap();
             let case = format!("{n} samples, {n_recordings} recordings, periodic {periodic}: {found:?}");
             // Four standard errors, from the 64 samples that thinned recordings have at least.
             let accuracy = 4.0 / (2.0 * (n.min(64) * n_recordings.min(24)) as f64).sqrt();
