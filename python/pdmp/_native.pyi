@@ -395,6 +395,7 @@ class Controller:
         measured: ArrayLike | None = None,  # (D,)
         coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
     ) -> Status: ...
+    def release(self) -> None: ...
     def run(
         self,
         rate_hz: float | None = None,

@@ -39,8 +39,8 @@ pub struct pdmp_coupling {
 
 /// All that one tick is told; what is not told stays as it was.
 ///
-/// Style, goal, anchor, tau and amplitude stay in force until they are commanded again; dt, measured and coupling hold
-/// for this tick alone.
+/// Style, goal, anchor, tau and amplitude stay in force until they are commanded again, measured until it is measured
+/// again or pdmp_controller_release; dt and coupling hold for this tick alone.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_command {
@@ -56,7 +56,7 @@ pub struct pdmp_command {
     pub amplitude: *const f64,
     /// Length of this tick, in seconds, if it differs from the controller's.
     pub dt: *const f64,
-    /// Position (n_dofs) at which the robot is now, in the unit of each DoF.
+    /// Position (n_dofs) at which the robot is now, in the unit of each DoF; NULL if it was not measured anew.
     pub measured: pdmp_vector,
     /// The user's own terms.
     pub coupling: pdmp_coupling,

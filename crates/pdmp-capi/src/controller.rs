@@ -229,6 +229,15 @@ pub extern "C" fn pdmp_controller_set_compliance(
     on(controller, |controller| Ok(controller.inner.set_compliance(stopping, tracking).map(|()| PDMP_OK)?))
 }
 
+/// Forgets the measured position: no robot follows any more, until the next one is measured.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_release(controller: Option<&mut pdmp_controller>) -> pdmp_status {
+    on(controller, |controller| {
+        controller.inner.release();
+        Ok(PDMP_OK)
+    })
+}
+
 /// One tick with nothing new commanded. Answers whether the movement goes on.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_step(controller: Option<&mut pdmp_controller>) -> pdmp_status {
@@ -241,11 +250,13 @@ pub extern "C" fn pdmp_controller_step(controller: Option<&mut pdmp_controller>)
 /// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is
 /// held over the tick:
 ///
-///     tau y' = z + w(u) + k_t (m - y) + tau c_v
+///     tau y' = z + w(u) + k_t d + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
-///     tau u' = 1 / (1 + k_s |(m - y) / range|^2)
+///     tau u' = k = 1 / (1 + k_s |d / range|^2)
+///     tau o' = 5 k (e - o) / extent
 ///
-/// with the measured position m and the coupling terms c_v and c_a.
+/// with the coupling terms c_v and c_a, and d, what of the error e = m - y at the measured position m lies beyond the
+/// error o that is expected by now. The last e stays in force until the next measurement or pdmp_controller_release.
 ///
 /// # Safety
 /// What `command` and `motion` point to is valid.

@@ -115,20 +115,25 @@ impl Controller {
 impl Controller {
     /// One tick, perturbed if the robot is measured or terms of one's own are given:
     ///
-    ///     tau y' = z + w(u) + k_t (m - y) + tau c_v
+    ///     tau y' = z + w(u) + k_t d + tau c_v
     ///     tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
-    ///     tau u' = 1 / (1 + k_s |(m - y) / range|**2)
+    ///     tau u' = k = 1 / (1 + k_s |d / range|**2)
+    ///     tau o' = 5 k (e - o) / extent
     ///
-    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. All is evaluated at the
-    /// start of the tick and held over it; however long it is, y is pulled no further than m. A robot that is held
-    /// fast so holds the movement, all but stops its phase, and, let go, continues from there.
+    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. Of the error e = m - y
+    /// counts d, what lies beyond the error o that is expected by now; extent is T / tau or 2 pi. All is evaluated at
+    /// the start of the tick and held over it; however long it is, y is pulled no further than m. A robot that is held
+    /// fast so holds the movement, all but stops its phase, and, let go, continues from there; one that always lags or
+    /// sags by the same comes no further from the goal than that, and finishes.
     ///
     /// Parameters
     /// ----------
     /// dt : float, optional
     ///     Length of this tick in s, if it differs from the controller's.
     /// measured : array_like (D,), optional
-    ///     Position m at which the robot is, in the unit of each DoF.
+    ///     Position m at which the robot is, in the unit of each DoF; the error of an angle (rad, deg, °) is taken the
+    ///     short way round. None is no new measurement: the last distance m - y stays in force until the next one or
+    ///     `release`, so that a sensor may be slower than the loop.
     /// coupling : tuple of two array_like (D,), optional
     ///     Terms (c_v, c_a), per s and per s²: the velocity gains c_v, and jumps where it does; the acceleration c_a.
     ///
@@ -375,6 +380,12 @@ impl Controller {
     fn set_compliance(&mut self, compliance: (f64, f64)) -> PyResult<()> {
         let (stopping, tracking) = compliance;
         self.inner.set_compliance(stopping, tracking).map_err(raise)
+    }
+
+    /// Forget the measured position: no robot follows any more, until the next one is measured.
+    fn release(&mut self, py: Python<'_>) {
+        self.inner.release();
+        self.publish(py);
     }
 
     fn __repr__(&self) -> String {

@@ -56,6 +56,12 @@ impl Controller {
         self.held.set_compliance(stopping, tracking)
     }
 
+    /// Forgets the measured position: no robot follows any more, until the next one is measured.
+    pub fn release(&mut self) {
+        self.held.release();
+        self.read_out();
+    }
+
     fn set(&mut self, command: &Command) -> Result<()> {
         command.check(&self.model)?;
         self.apply(command);

@@ -130,7 +130,7 @@ impl Controller {
             acceleration: zeros.clone(),
             tolerance: zeros,
             rest: REST * widest(model.ranges()),
-            held: Held::new(model.ranges(), model.canonical().extent()),
+            held: Held::new(model.ranges(), model.units(), model.canonical().extent()),
             finest,
             glide: filter.glide(dt),
             propagator: series.propagator::<Lanes>(0.0),
@@ -217,8 +217,12 @@ impl Controller {
     /// A tick longer than 1000 τ; the state then stays as it was.
     pub fn step(&mut self) -> Result<Status> {
         self.check_length(self.dt, None)?;
-        self.held.release();
         let h = self.stretch(self.dt);
+        if self.held.followed() {
+            self.held.take(&Command::default(), &self.position, self.dt, h);
+        } else {
+            self.held.rest();
+        }
         Ok(self.tick(self.dt, h))
     }
 
@@ -228,14 +232,19 @@ impl Controller {
     /// held over the tick:
     ///
     /// ```text
-    /// τẏ = z + w(u) + k_t(ỹ − y) + τc_v
+    /// τẏ = z + w(u) + k_t d + τc_v
     /// τż = α_z(β_z(g − y) − z) + τ²c_a
-    /// τu̇ = κ = 1/(1 + k_s‖(ỹ − y)/range‖²)
+    /// τu̇ = κ = 1/(1 + k_s‖d/range‖²)
+    /// τȯ = λκ(e − o)
     /// ```
     ///
     /// `measured` ỹ stops the phase as the robot falls behind and pulls the movement towards it, with the gains of
-    /// [`Controller::set_compliance`]; `coupling` adds c_v to the velocity and c_a to the acceleration. Over the tick the
-    /// pull is the velocity (1 − exp(−k_t h))/dt of the error at its start, h being the tick on the clock: however long
+    /// [`Controller::set_compliance`]. Of the error e = ỹ − y counts d, what lies beyond the error o that is expected by
+    /// now: e − o where o is of the sign of e and smaller, 0 where it is larger, e where it is of the other sign. A robot
+    /// that always lags or sags by the same so neither holds the movement up nor keeps it from its goal. The error of a
+    /// DoF whose unit is rad, deg or ° is taken the short way round. A measurement stays in force, as the distance e, until
+    /// the next one or [`Controller::release`], so that a sensor may be slower than the loop. `coupling` adds c_v to the velocity and c_a to the acceleration. Over the tick the
+    /// pull is the velocity (1 − exp(−k_t h))/dt of d at its start, h being the tick on the clock: however long
     /// the tick, it pulls no further than ỹ.
     ///
     /// Phase stopping and the pull: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
