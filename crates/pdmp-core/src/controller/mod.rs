@@ -1,8 +1,8 @@
 //! The real-time loop: one tick of the primitive per call, with every command open to change.
 //!
 //! Over a tick the forcing w, the goal and the clock are known at both ends with their slopes; a cubic between them is
-//! propagated exactly ([`crate::Attractor::propagator`]). Style, rate ρ = 1/τ and goal or anchor pass critically damped
-//! filters, so that position and velocity stay continuous: ẏ = ρ(z + w), ÿ = ρ²(z′ + w′) + ρ̇(z + w). A perturbation
+//! propagated exactly ([`crate::Attractor::propagator`]). Style, goal or anchor and amplitude pass critically damped
+//! filters on the clock, the rate ρ = 1/τ one in seconds, so that position and velocity stay continuous: ẏ = ρ(z + w), ÿ = ρ²(z′ + w′) + ρ̇(z + w). A perturbation
 //! ([`Command::measured`], [`Command::coupling`]) slows the phase's clock against the output system's, and adds to ẏ and
 //! ÿ.
 //!
@@ -65,6 +65,10 @@ pub struct Controller {
     rate: Follower,
     /// Goal or anchor.
     centre: Follower,
+    /// r₀.
+    amplitude: Follower,
+    /// Share of the rate 1/τ at which the path is followed.
+    speed: f64,
     /// By groups of DoFs, as all that follows.
     forcing: Vec<Forcing>,
     /// Forcing at the start of the stretch at work, taken before anything moves: kept as numbers for the loop over the
@@ -83,6 +87,8 @@ pub struct Controller {
     finest: f64,
     /// Of the last tick, and good for the next if it is as long.
     glide: Glide,
+    /// The same of the filters on the clock.
+    course: Glide,
     propagator: Propagator,
     series: Series,
     /// Ticks from now for which the landscape is fetched.
@@ -92,8 +98,9 @@ pub struct Controller {
 impl Controller {
     /// Starts a movement.
     ///
-    /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal or anchor, both in
-    /// seconds; 0 is the paper's immediate switch, and without it a tenth of the nominal duration (discrete) or a
+    /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal, anchor or amplitude, both
+    /// in seconds. The rate 1/τ changes in so many seconds; the others on the clock, in so many seconds at the model's own
+    /// τ, so that the path does not depend on how fast it is followed. 0 is the paper's immediate switch, and without it a tenth of the nominal duration (discrete) or a
     /// quarter of the nominal period (rhythmic) serves.
     ///
     /// # Errors
@@ -122,6 +129,8 @@ impl Controller {
             style: Follower::new(&conditions.style),
             rate: Follower::new(&[1.0 / conditions.tau]),
             centre: Follower::new(&conditions.centre),
+            amplitude: Follower::new(&[conditions.amplitude]),
+            speed: 1.0,
             forcing: vec![Forcing::default(); zeros.len()],
             from: vec![Jet::default(); zeros.len()],
             z: zeros.clone(),
@@ -133,6 +142,7 @@ impl Controller {
             held: Held::new(model.ranges(), model.units(), model.canonical().extent()),
             finest,
             glide: filter.glide(dt),
+            course: filter.pass(0.0),
             propagator: series.propagator::<Lanes>(0.0),
             series,
             lead: 1.0,
@@ -166,7 +176,8 @@ impl Controller {
         let conditions = &self.conditions;
         self.r = conditions.amplitude;
         self.style.jump(&conditions.style);
-        self.rate.jump(&[1.0 / conditions.tau]);
+        self.rate.jump(&[self.speed / conditions.tau]);
+        self.amplitude.jump(&[conditions.amplitude]);
         self.centre.jump(&conditions.centre);
         self.read_forcing();
         self.place();
@@ -336,6 +347,11 @@ impl Controller {
     /// Time constant commanded, in seconds.
     pub fn tau(&self) -> f64 {
         self.conditions.tau
+    }
+
+    /// Speed commanded: share of the rate 1/τ at which the path is followed.
+    pub fn speed(&self) -> f64 {
+        self.speed
     }
 
     /// Gains k_s and k_t of a measured position.
