@@ -25,6 +25,8 @@ pub struct pdmp_conditions {
     pub amplitude: *const f64,
     /// Time constant tau, in seconds.
     pub tau: *const f64,
+    /// Phase phi at which a rhythmic movement starts, in rad, on its limit cycle; otherwise 0.
+    pub phase: *const f64,
 }
 
 /// Terms of the user's own, constant over a tick: both or none.
@@ -96,6 +98,8 @@ impl pdmp_conditions {
             // SAFETY: NULL or valid.
             tau: unsafe { self.tau.as_ref() }.copied(),
             timing: None,
+            // SAFETY: NULL or valid.
+            phase: unsafe { self.phase.as_ref() }.copied(),
         })
     }
 
@@ -122,6 +126,7 @@ impl pdmp_conditions {
             velocity: told(&conditions.velocity),
             amplitude: ptr::null(),
             tau: conditions.tau.map_or(ptr::null(), |tau| lay(&[tau]).data),
+            phase: ptr::null(),
         }
     }
 }

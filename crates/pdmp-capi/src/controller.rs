@@ -102,6 +102,37 @@ fn place_in(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> 
     }
 }
 
+/// Makes a controller that goes on bit for bit as another would, to look ahead from where that is; it is made like the
+/// other in memory of the caller's, or allocated. The copy is NULL if it is refused.
+///
+/// # Safety
+/// `memory` is used by nothing else, and `error` has the room that it tells.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pdmp_controller_clone(
+    controller: Option<&pdmp_controller>,
+    memory: pdmp_memory,
+    copy: Option<&mut MaybeUninit<*mut pdmp_controller>>,
+    error: pdmp_text,
+) -> pdmp_status {
+    let call = || {
+        let place = copy.ok_or(Fault::Null("copy"))?.write(ptr::null_mut());
+        let inner = controller.ok_or(Fault::Null("controller"))?.inner.clone();
+        let given = place_in(memory)?;
+        let made = pdmp_controller { inner, fault: None, owned: given.is_none() };
+        *place = match given {
+            // SAFETY: large enough, aligned, and used by nothing else.
+            Some(memory) => unsafe {
+                memory.write(made);
+                memory
+            },
+            None => Box::into_raw(Box::new(made)),
+        };
+        Ok(PDMP_OK)
+    };
+    // SAFETY: the caller's promise is the same.
+    unsafe { answer_in(error, call) }
+}
+
 /// Frees a controller. Memory of the caller's is the caller's again. With NULL it does nothing.
 ///
 /// # Safety
@@ -214,6 +245,13 @@ pub extern "C" fn pdmp_controller_set_amplitude(
     amplitude: f64,
 ) -> pdmp_status {
     on(controller, |controller| Ok(controller.inner.set_amplitude(amplitude).map(|()| PDMP_OK)?))
+}
+
+/// Sets the speed, the share of the rate 1/tau at which the path is followed: 0 pauses on the path, 1 goes on. A change
+/// passes the filter of tau, and stays in force over pdmp_controller_reset.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_set_speed(controller: Option<&mut pdmp_controller>, speed: f64) -> pdmp_status {
+    on(controller, |controller| Ok(controller.inner.set_speed(speed).map(|()| PDMP_OK)?))
 }
 
 /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.

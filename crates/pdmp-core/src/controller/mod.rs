@@ -196,6 +196,15 @@ impl Controller {
             *position = self.centre.value()[group] + on_cycle.e;
             *z = on_cycle.z;
         }
+        let phase = conditions.phase;
+        if phase > 0.0 {
+            // The limit cycle is followed to where the movement starts, no phase of it being closer to a closed form.
+            let parts = (phase / self.finest).ceil();
+            (0..parts as u32).for_each(|_| self.advance(self.dt, phase / parts));
+            self.clock = CompensatedSum::at(phase);
+            self.read_forcing();
+        }
+        let Self { conditions, r, .. } = self;
         if let Some(start) = &conditions.start {
             repack(&mut self.position, start);
         }

@@ -152,7 +152,7 @@ impl Controller {
     }
 
     /// Moves on by `dt` seconds, `h` on the clock.
-    fn advance(&mut self, dt: f64, h: f64) {
+    pub(super) fn advance(&mut self, dt: f64, h: f64) {
         if h <= 0.0 {
             // A pause: nothing moves but the rate.
             self.measure(dt);
