@@ -267,6 +267,7 @@ def test_a_movement_waits_for_a_late_tick(clock: Clock) -> None:
 
 
 def test_a_controller_runs_in_one_loop_at_a_time(clock: Clock) -> None:
+    """A second loop is refused while the first runs, and no longer."""
     controller = REACH.controller()
     first = iter(controller.run(duration=0.1))
     next(first)
@@ -277,6 +278,7 @@ def test_a_controller_runs_in_one_loop_at_a_time(clock: Clock) -> None:
     assert sum(1 for _ in controller.run(duration=0.1)) == 100
 
     async def twice() -> None:
+        """Leave one loop and begin the next at once."""
         for _ in range(2):
             async for _ in controller.run(rate_hz=500, duration=60):
                 break
@@ -290,6 +292,7 @@ def test_a_controller_runs_in_one_loop_at_a_time(clock: Clock) -> None:
 
 
 def test_status_is_true_while_the_movement_goes_on() -> None:
+    """`while controller.step()` runs to the end; the numbers are those of C."""
     controller = REACH.controller()
     ticks = 0
     while controller.step():
@@ -301,6 +304,7 @@ def test_status_is_true_while_the_movement_goes_on() -> None:
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
 def test_a_copy_goes_on_bit_for_bit_and_apart(model: pdmp.Model, copied: Any) -> None:
+    """A copy moves like the original would, which it does not disturb."""
     controller, alone = model.controller(), model.controller()
     for each in (controller, alone):
         for _ in range(100):
@@ -320,6 +324,7 @@ def test_a_copy_goes_on_bit_for_bit_and_apart(model: pdmp.Model, copied: Any) ->
 
 
 def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
+    """A pause ends at a place of the path, keeps it, and goes on from there."""
     free, paused = model.controller(), model.controller()
     for _ in range(200):
         free.step()
@@ -332,7 +337,6 @@ def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
     np.testing.assert_array_equal(paused.position, place)
     np.testing.assert_array_equal(paused.velocity, 0 * place)
     paused.speed = 1
-    last = free.position.copy()
     while abs(free.phase - phase) > 1e-12:
         ahead = copy.copy(free)
         ahead.step()
@@ -347,9 +351,7 @@ def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
             free = ahead
             break
         free.step()
-        last = free.position
     np.testing.assert_allclose(free.position, place, atol=1e-8)
-    assert last is not None
     for _ in range(500):
         paused.step()
     assert abs(paused.phase - phase) > 1e-3
@@ -359,6 +361,7 @@ def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
 
 
 def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase() -> None:
+    """Nothing dies away after a start at a phase."""
     s = np.arange(100) / 100 * 2 * np.pi
     cycles = [np.column_stack([a * np.sin(s), 0.3 * a * np.cos(2 * s)]) for a in (1, 1.2, 1.5)]
     model = pdmp.fit(cycles, dt=0.01, kind="rhythmic")
@@ -372,7 +375,9 @@ def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase() -> None:
         start.step()
         start.reset(phase=phase, amplitude=0.5)
         np.testing.assert_allclose(
-            start.position - model.anchors[0], 0.5 * (whole.position[share] - model.anchors[0]), atol=0.5
+            start.position - model.anchors[0],
+            0.5 * (whole.position[share] - model.anchors[0]),
+            atol=0.5,
         )
         turn = model.rollout(phase=phase, dt=1 / 1000, duration=1)
         np.testing.assert_allclose(turn.position[0], turn.position[-1], atol=1e-8)
@@ -383,10 +388,12 @@ def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase() -> None:
 
 
 def test_an_amplitude_changes_as_smoothly_as_tau() -> None:
+    """Halving the amplitude jumps no harder in acceleration than halving tau."""
     s = np.arange(100) / 100 * 2 * np.pi
     model = pdmp.fit([a * np.sin(s)[:, None] for a in (1, 1.5)], dt=0.01, kind="rhythmic")
 
     def jump(**command: float) -> float:
+        """Return the largest jump of the acceleration after a command."""
         controller = model.controller()
         for _ in range(1300):
             controller.step()

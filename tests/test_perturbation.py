@@ -46,6 +46,7 @@ def test_held_robot_waits_and_then_arrives() -> None:
 
 
 def test_robot_that_sags_is_as_far_from_the_goal_as_it_sags() -> None:
+    """A constant error keeps the movement neither from its goal nor from its end."""
     controller = MODELS[0].controller()
     sag = np.array([0.0, 0.02])
     while controller.step(measured=controller.position - sag) == pdmp.Status.WORKING:
