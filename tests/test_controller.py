@@ -254,7 +254,7 @@ def test_late_ticks_keep_the_time_of_the_clock(clock: Clock) -> None:
 
 
 def test_a_movement_waits_for_a_late_tick(clock: Clock) -> None:
-    """By default every tick moves by one period, and the deadlines to come are later by what was missed."""
+    """By default every tick moves by one period, and the deadlines to come are later."""
     controller, alone = REACH.controller(), REACH.controller()
     run = controller.run(rate_hz=1000, duration=0.5)
     for k, tick in enumerate(run):

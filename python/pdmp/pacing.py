@@ -42,8 +42,8 @@ class Run:
 
     Each iteration begins anew, at the time it begins. Its deadlines are start + k / rate_hz for
     k = 1, 2, …, so that no delay adds up; where the movement waits, whole periods that were missed
-    are added to start. A controller runs in one loop at a time: a second one is refused. Before each the loop sleeps, without holding the
-    interpreter; then it steps, and hands out the tick.
+    are added to start. Before each the loop sleeps, without holding the interpreter; then it steps,
+    and hands out the tick. A controller runs in one loop at a time: a second one is refused.
 
     Attributes
     ----------
@@ -145,8 +145,8 @@ def _alone(controller: Controller) -> Iterator[None]:
     with _lock:
         if key in _running:
             raise RuntimeError(
-                "this controller runs in another loop already: end that one first (an iterator that "
-                "was left by break ends with close()), or give each loop a controller of its own"
+                "this controller runs in another loop already: end that one first (close() an "
+                "iterator that was left by break), or give each loop a controller of its own"
             )
         _running.add(key)
     try:
