@@ -77,9 +77,10 @@ impl Filter {
         if follower.settled() {
             return target + (q - target) * decay;
         }
-        // q − target = (q₀ − target)e^(−mt) + m∫(d + (v + ωd)s)e^(−ωs)e^(−m(t−s))ds, with x = (m − ω)t.
-        let x = (m - self.omega) * dt;
-        let filtered = (-self.omega * dt).exp();
+        // q − target = (q₀ − target)e^(−mt) + m∫(d + (v + ωd)s)e^(−ωs)e^(−m(t−s))ds, with x = (m − ω)t. A
+        // filter is over after a few of its own times.
+        let s = (self.omega * dt).min(1e4);
+        let (x, filtered) = (m * dt - s, (-s).exp());
         let [even, linear] = if x.abs() > 0.1 {
             [(filtered - decay) / x, (filtered * (x - 1.0) + decay) / (x * x)]
         } else {
@@ -92,7 +93,7 @@ impl Filter {
             }
             sums.map(|sum| sum * decay)
         };
-        target + (q - target) * decay + m * dt * (d * even + (v + self.omega * d) * dt * linear)
+        target + (q - target) * decay + m * dt * (d * even + (v * dt + s * d) * linear)
     }
 
     /// The solution over `dt` seconds.
