@@ -34,6 +34,7 @@ const NO_CONDITIONS: pdmp_conditions = pdmp_conditions {
     velocity: NOTHING,
     amplitude: ptr::null(),
     tau: ptr::null(),
+    phase: std::ptr::null(),
 };
 const SETTINGS: pdmp_settings =
     pdmp_settings { dt: 1e-3, transition: ptr::null(), memory: pdmp_memory { data: ptr::null_mut(), size: 0 } };
