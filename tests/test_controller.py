@@ -1,6 +1,7 @@
 """The control loop in Python: its memory, its threads and its clock."""
 
 import asyncio
+import copy
 import gc
 import sys
 import threading
@@ -237,7 +238,7 @@ def test_a_given_duration_outlasts_the_movement(clock: Clock) -> None:
 def test_late_ticks_keep_the_time_of_the_clock(clock: Clock) -> None:
     """Missed deadlines are told, made good in one step, and do not move the later ones."""
     controller = REACH.controller()
-    run = controller.run(rate_hz=1000, duration=0.5)
+    run = controller.run(rate_hz=1000, duration=0.5, late="catch up")
     missed, late = [], []
     for k, tick in enumerate(run):
         assert controller.time == pytest.approx(tick.time)
@@ -252,9 +253,164 @@ def test_late_ticks_keep_the_time_of_the_clock(clock: Clock) -> None:
     assert run.ticks + run.missed == 500
 
 
+def test_a_movement_waits_for_a_late_tick(clock: Clock) -> None:
+    """By default every tick moves by one period, and the deadlines to come are later."""
+    controller, alone = REACH.controller(), REACH.controller()
+    run = controller.run(rate_hz=1000, duration=0.5)
+    for k, tick in enumerate(run):
+        alone.step()
+        np.testing.assert_array_equal(controller.position, alone.position)
+        assert tick.missed == (41 if k == 201 else 0)
+        clock.work(42.25e-3 if k == 200 else 0.1e-3)
+    assert (run.ticks, run.missed) == (500, 41)
+    assert clock.now - 1000 == pytest.approx(0.541, abs=1e-3)
+
+
+def test_a_controller_runs_in_one_loop_at_a_time(clock: Clock) -> None:
+    """A second loop is refused while the first runs, and no longer."""
+    controller = REACH.controller()
+    first = iter(controller.run(duration=0.1))
+    next(first)
+    with pytest.raises(RuntimeError, match="runs in another loop"):
+        next(iter(controller.run(duration=0.1)))
+    next(iter(REACH.controller().run(duration=0.1)))
+    first.close()  # type: ignore[attr-defined]
+    assert sum(1 for _ in controller.run(duration=0.1)) == 100
+
+    async def twice() -> None:
+        """Leave one loop and begin the next at once."""
+        for _ in range(2):
+            async for _ in controller.run(rate_hz=500, duration=60):
+                break
+
+    monkeypatched = pacing.perf_counter
+    pacing.perf_counter = time.perf_counter
+    try:
+        asyncio.run(twice())
+    finally:
+        pacing.perf_counter = monkeypatched
+
+
+def test_status_is_true_while_the_movement_goes_on() -> None:
+    """`while controller.step()` runs to the end; the numbers are those of C."""
+    controller = REACH.controller()
+    ticks = 0
+    while controller.step():
+        ticks += 1
+    assert controller.status is pdmp.Status.FINISHED
+    assert ticks > 100
+    assert (int(pdmp.Status.WORKING), int(pdmp.Status.FINISHED)) == (1, 2)
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_goes_on_bit_for_bit_and_apart(model: pdmp.Model, copied: Any) -> None:
+    """A copy moves like the original would, which it does not disturb."""
+    controller, alone = model.controller(), model.controller()
+    for each in (controller, alone):
+        for _ in range(100):
+            each.step(measured=each.position - 0.01)
+        each.tau = 0.7 * each.tau
+        each.style = 0.5 * each.style
+        each.step()
+    ahead = copied(controller)
+    before = controller.position.copy()
+    for _ in range(300):
+        alone.step()
+        ahead.step()
+        np.testing.assert_array_equal(ahead.position, alone.position)
+        np.testing.assert_array_equal(ahead.acceleration, alone.acceleration)
+    np.testing.assert_array_equal(controller.position, before)
+    assert (ahead.phase, ahead.time) == (alone.phase, alone.time)
+
+
+def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
+    """A pause ends at a place of the path, keeps it, and goes on from there."""
+    free, paused = model.controller(), model.controller()
+    for _ in range(200):
+        free.step()
+        paused.step()
+    paused.speed = 0
+    for _ in range(20_000):
+        paused.step()
+    place, phase = paused.position.copy(), paused.phase
+    paused.step(coupling=(np.ones_like(place), np.ones_like(place)))
+    np.testing.assert_array_equal(paused.position, place)
+    np.testing.assert_array_equal(paused.velocity, 0 * place)
+    paused.speed = 1
+    while abs(free.phase - phase) > 1e-12:
+        ahead = copy.copy(free)
+        ahead.step()
+        if (ahead.phase - phase) * np.sign(free.phase - phase) < 0 or ahead.phase == phase:
+            low, high = 0.0, 0.001
+            for _ in range(60):
+                middle = (low + high) / 2
+                ahead = copy.copy(free)
+                ahead.step(middle)
+                past = (ahead.phase - phase) * np.sign(free.phase - phase) < 0
+                low, high = (low, middle) if past else (middle, high)
+            free = ahead
+            break
+        free.step()
+    np.testing.assert_allclose(free.position, place, atol=1e-8)
+    for _ in range(500):
+        paused.step()
+    assert abs(paused.phase - phase) > 1e-3
+    for bad in (-0.1, np.nan, np.inf):
+        with pytest.raises(ValueError, match="speed"):
+            paused.speed = bad
+
+
+def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase() -> None:
+    """Nothing dies away after a start at a phase."""
+    s = np.arange(100) / 100 * 2 * np.pi
+    cycles = [np.column_stack([a * np.sin(s), 0.3 * a * np.cos(2 * s)]) for a in (1, 1.2, 1.5)]
+    model = pdmp.fit(cycles, dt=0.01, kind="rhythmic")
+    whole = model.rollout(dt=1 / 1000, duration=1)
+    for share in (250, 600, 999):
+        phase = share / 1000 * 2 * np.pi
+        for start in (model.controller(phase=phase), model.controller(phase=phase - 2 * np.pi)):
+            assert start.phase == pytest.approx(phase)
+            np.testing.assert_allclose(start.position, whole.position[share], atol=1e-8)
+            np.testing.assert_allclose(start.velocity, whole.velocity[share], atol=1e-6)
+        start.step()
+        start.reset(phase=phase, amplitude=0.5)
+        np.testing.assert_allclose(
+            start.position - model.anchors[0],
+            0.5 * (whole.position[share] - model.anchors[0]),
+            atol=0.5,
+        )
+        turn = model.rollout(phase=phase, dt=1 / 1000, duration=1)
+        np.testing.assert_allclose(turn.position[0], turn.position[-1], atol=1e-8)
+    with pytest.raises(ValueError, match="phase"):
+        REACH.controller(phase=1.0)
+    with pytest.raises(ValueError, match="phase"):
+        model.controller(phase=np.nan)
+
+
+def test_an_amplitude_changes_as_smoothly_as_tau() -> None:
+    """Halving the amplitude jumps no harder in acceleration than halving tau."""
+    s = np.arange(100) / 100 * 2 * np.pi
+    model = pdmp.fit([a * np.sin(s)[:, None] for a in (1, 1.5)], dt=0.01, kind="rhythmic")
+
+    def jump(**command: float) -> float:
+        """Return the largest jump of the acceleration after a command."""
+        controller = model.controller()
+        for _ in range(1300):
+            controller.step()
+        for name, value in command.items():
+            setattr(controller, name, value)
+        samples = []
+        for _ in range(200):
+            samples.append(controller.acceleration.copy())
+            controller.step()
+        return float(np.abs(np.diff(samples, axis=0)).max())
+
+    assert jump(amplitude=0.5) < 2 * jump(tau=model.tau / 2)
+
+
 def test_a_body_that_is_always_late_misses_and_does_not_burst(clock: Clock) -> None:
     """At 2.5 periods a tick the loop makes as many ticks as there is time for."""
-    run = REACH.controller().run(rate_hz=1000, duration=1)
+    run = REACH.controller().run(rate_hz=1000, duration=1, late="catch up")
     for _ in run:
         clock.work(2.5e-3)
     assert run.ticks == pytest.approx(400, abs=20)
@@ -320,7 +476,7 @@ def test_paced_loops_keep_real_time() -> None:
     """On the system's clock no tick comes early, and all of the time is moved through."""
     controller = REACH.controller()
     begin = time.perf_counter()
-    run = controller.run(rate_hz=1000, duration=0.2)
+    run = controller.run(rate_hz=1000, duration=0.2, late="catch up")
     for tick in run:
         assert time.perf_counter() - begin >= tick.time
     assert run.ticks + run.missed >= 200
@@ -363,9 +519,9 @@ def test_tasks_run_beside_an_asynchronous_loop() -> None:
         task = asyncio.create_task(serve())
         run = controller.run(rate_hz=200, duration=0.2)
         ticks = 0
-        async for tick in run:
+        async for _ in run:
             ticks += 1
-            alone.step((1 + tick.missed) / 200)
+            alone.step(1 / 200)
             assert served >= ticks
             np.testing.assert_array_equal(controller.position, alone.position)
         task.cancel()

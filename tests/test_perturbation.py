@@ -38,8 +38,18 @@ def test_held_robot_waits_and_then_arrives() -> None:
     place = controller.position.copy()
     for _ in range(2000):
         assert controller.step(measured=place) == pdmp.Status.WORKING
-    assert abs(controller.position[0] - place[0]) < 0.2
+    assert abs(controller.position[0] - place[0]) < 0.3
+    controller.release()
     while controller.step() == pdmp.Status.WORKING:
+        assert controller.time < 6
+    np.testing.assert_allclose(controller.position, controller.goal, atol=2e-3)
+
+
+def test_robot_that_sags_is_as_far_from_the_goal_as_it_sags() -> None:
+    """A constant error keeps the movement neither from its goal nor from its end."""
+    controller = MODELS[0].controller()
+    sag = np.array([0.0, 0.02])
+    while controller.step(measured=controller.position - sag) == pdmp.Status.WORKING:
         assert controller.time < 6
     np.testing.assert_allclose(controller.position, controller.goal, atol=2e-3)
 

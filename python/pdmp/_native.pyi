@@ -229,6 +229,7 @@ class Model:
         dt: float = 0.01,
         duration: float | None = None,
         context: _Context | None = None,  # (Q,)
+        phase: float | None = None,  # rhythmic
     ) -> Trajectory: ...
     def rollouts(
         self,
@@ -332,6 +333,7 @@ class Model:
         amplitude: float = 1.0,
         timing: ArrayLike | None = None,  # (K,)
         context: _Context | None = None,
+        phase: float | None = None,
     ) -> Controller: ...
     def to_bytes(self) -> bytes: ...
     @staticmethod
@@ -416,9 +418,13 @@ class Status:
     FINISHED: ClassVar[Status]
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+    def __bool__(self) -> bool: ...
+    def __int__(self) -> int: ...
 
 @final
 class Controller:
+    def __copy__(self) -> Controller: ...
+    def __deepcopy__(self, _memo: Any, /) -> Controller: ...
     def step(
         self,
         dt: float | None = None,
@@ -426,6 +432,7 @@ class Controller:
         measured: ArrayLike | None = None,  # (D,)
         coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
     ) -> Status: ...
+    def release(self) -> None: ...
     def run(
         self,
         rate_hz: float | None = None,
@@ -433,6 +440,7 @@ class Controller:
         duration: float | None = None,
         measured: Callable[[], ArrayLike | None] | None = None,  # (D,)
         coupling: Callable[[], tuple[ArrayLike, ArrayLike] | None] | None = None,  # both (D,)
+        late: Literal["wait", "catch up"] = "wait",
     ) -> Run: ...
     def reset(
         self,
@@ -446,6 +454,7 @@ class Controller:
         tau: float | None = None,
         timing: ArrayLike | None = None,  # (K,)
         context: _Context | None = None,
+        phase: float | None = None,
     ) -> None: ...
     @property
     def position(self) -> _Array: ...  # (D,), a read-only view that each step updates
@@ -479,6 +488,10 @@ class Controller:
     def amplitude(self) -> float: ...
     @amplitude.setter
     def amplitude(self, amplitude: float, /) -> None: ...
+    @property
+    def speed(self) -> float: ...
+    @speed.setter
+    def speed(self, speed: float, /) -> None: ...
     @property
     def compliance(self) -> tuple[float, float]: ...  # stopping k_s, tracking k_t
     @compliance.setter

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import contextmanager
 from numbers import Real
+from threading import Lock
 from time import perf_counter, sleep
 from typing import NamedTuple, TypeAlias, TypeVar
 
@@ -22,12 +24,12 @@ class Tick(NamedTuple):
     Attributes
     ----------
     time : float
-        Time of the movement since the loop began in s: whole periods, which is when the tick was
-        due, or the last of its deadlines if it missed some.
+        Time of the movement since the loop began in s: whole periods.
     late : float
         How long after its deadline it began in s, the first of them if it missed some.
     missed : int
-        How many deadlines it missed; it then moved by as many periods more.
+        How many deadlines it missed; where it catches up it moved by as many periods more, where it
+        waits the deadlines to come are later by as many.
     """
 
     time: float
@@ -39,8 +41,9 @@ class Run:
     """A paced loop, made by `Controller.run`: iterable with `for` and with `async for`.
 
     Each iteration begins anew, at the time it begins. Its deadlines are start + k / rate_hz for
-    k = 1, 2, …, so that no delay adds up. Before each the loop sleeps, without holding the
-    interpreter; then it steps, and hands out the tick.
+    k = 1, 2, …, so that no delay adds up; where the movement waits, whole periods that were missed
+    are added to start. Before each the loop sleeps, without holding the interpreter; then it steps,
+    and hands out the tick. A controller runs in one loop at a time: a second one is refused.
 
     Attributes
     ----------
@@ -59,31 +62,40 @@ class Run:
         duration: float | None,
         measured: _Measured,
         coupling: _Coupling,
+        late: str = "wait",
     ) -> None:
         self._controller = controller
         self._rate = _countable("rate_hz", rate_hz)
         self._last = None if duration is None else _periods(duration, self._rate)
         self._measured = _function("measured", measured)
         self._coupling = _function("coupling", coupling)
+        if late not in ("wait", "catch up"):
+            raise ValueError(f'late = {late!r}: must be "wait" or "catch up"')
+        self._catches_up = late == "catch up"
         self._begin()
 
     def __iter__(self) -> Iterator[Tick]:
         """Begin a loop that sleeps between its ticks."""
-        self._begin()
-        while not self._over():
-            sleep(self._wait())
-            yield self._tick()
+        with _alone(self._controller):
+            self._begin()
+            while not self._over():
+                sleep(self._wait())
+                yield self._tick()
 
     async def __aiter__(self) -> AsyncIterator[Tick]:
         """Begin a loop that lets others run between its ticks."""
         from asyncio import sleep
 
-        self._begin()
-        while not self._over():
-            await sleep(self._wait())
-            while (early := self._wait()) > 0:  # as event loops may wake
-                await sleep(early)
-            yield self._tick()
+        for _ in range(3):  # a loop that was left is closed by the event loop
+            if id(self._controller) in _running:
+                await sleep(0)
+        with _alone(self._controller):
+            self._begin()
+            while not self._over():
+                await sleep(self._wait())
+                while (early := self._wait()) > 0:  # as event loops may wake
+                    await sleep(early)
+                yield self._tick()
 
     def _begin(self) -> None:
         self.ticks = self.missed = 0
@@ -107,16 +119,41 @@ class Run:
     def _tick(self) -> Tick:
         late = max(0.0, perf_counter() - self._due())
         missed = int(late * self._rate)
-        if self._last is not None:
+        if self._catches_up and self._last is not None:
             missed = min(missed, self._last - self._periods - 1)
+        periods = 1 + missed if self._catches_up else 1
         self._controller.step(
-            (1 + missed) / self._rate, measured=self._measured(), coupling=self._coupling()
+            periods / self._rate, measured=self._measured(), coupling=self._coupling()
         )
-        self._periods += 1 + missed
+        if not self._catches_up:
+            self._start += missed / self._rate
+        self._periods += periods
         self.ticks += 1
         self.missed += missed
         self.worst = max(self.worst, late)
         return Tick(self._periods / self._rate, late, missed)
+
+
+_running: set[int] = set()  # controllers in a loop, by their identity
+_lock = Lock()
+
+
+@contextmanager
+def _alone(controller: Controller) -> Iterator[None]:
+    """Keep a controller to one loop, which ends with its iterator."""
+    key = id(controller)
+    with _lock:
+        if key in _running:
+            raise RuntimeError(
+                "this controller runs in another loop already: end that one first (close() an "
+                "iterator that was left by break), or give each loop a controller of its own"
+            )
+        _running.add(key)
+    try:
+        yield
+    finally:
+        with _lock:
+            _running.discard(key)
 
 
 def _countable(name: str, value: float) -> float:

@@ -187,6 +187,9 @@ public:
         return pdmp_controller_set_compliance(get(), stopping, tracking);
     }
 
+    pdmp_status set_speed(double speed) noexcept { return pdmp_controller_set_speed(get(), speed); }
+    pdmp_status release() noexcept { return pdmp_controller_release(get()); }
+
     /// One tick with nothing new commanded.
     pdmp_status step() noexcept { return pdmp_controller_step(get()); }
 

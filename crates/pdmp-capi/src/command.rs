@@ -25,6 +25,8 @@ pub struct pdmp_conditions {
     pub amplitude: *const f64,
     /// Time constant tau, in seconds.
     pub tau: *const f64,
+    /// Phase phi at which a rhythmic movement starts, in rad, on its limit cycle; otherwise 0.
+    pub phase: *const f64,
 }
 
 /// Terms of the user's own, constant over a tick: both or none.
@@ -39,8 +41,8 @@ pub struct pdmp_coupling {
 
 /// All that one tick is told; what is not told stays as it was.
 ///
-/// Style, goal, anchor, tau and amplitude stay in force until they are commanded again; dt, measured and coupling hold
-/// for this tick alone.
+/// Style, goal, anchor, tau and amplitude stay in force until they are commanded again, measured until it is measured
+/// again or pdmp_controller_release; dt and coupling hold for this tick alone.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_command {
@@ -56,7 +58,7 @@ pub struct pdmp_command {
     pub amplitude: *const f64,
     /// Length of this tick, in seconds, if it differs from the controller's.
     pub dt: *const f64,
-    /// Position (n_dofs) at which the robot is now, in the unit of each DoF.
+    /// Position (n_dofs) at which the robot is now, in the unit of each DoF; NULL if it was not measured anew.
     pub measured: pdmp_vector,
     /// The user's own terms.
     pub coupling: pdmp_coupling,
@@ -96,6 +98,8 @@ impl pdmp_conditions {
             // SAFETY: NULL or valid.
             tau: unsafe { self.tau.as_ref() }.copied(),
             timing: None,
+            // SAFETY: NULL or valid.
+            phase: unsafe { self.phase.as_ref() }.copied(),
         })
     }
 
@@ -122,6 +126,7 @@ impl pdmp_conditions {
             velocity: told(&conditions.velocity),
             amplitude: ptr::null(),
             tau: conditions.tau.map_or(ptr::null(), |tau| lay(&[tau]).data),
+            phase: ptr::null(),
         }
     }
 }

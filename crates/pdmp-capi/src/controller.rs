@@ -103,6 +103,37 @@ fn place_in(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> 
     }
 }
 
+/// Makes a controller that goes on bit for bit as another would, to look ahead from where that is; it is made like the
+/// other in memory of the caller's, or allocated. The copy is NULL if it is refused.
+///
+/// # Safety
+/// `memory` is used by nothing else, and `error` has the room that it tells.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pdmp_controller_clone(
+    controller: Option<&pdmp_controller>,
+    memory: pdmp_memory,
+    copy: Option<&mut MaybeUninit<*mut pdmp_controller>>,
+    error: pdmp_text,
+) -> pdmp_status {
+    let call = || {
+        let place = copy.ok_or(Fault::Null("copy"))?.write(ptr::null_mut());
+        let inner = controller.ok_or(Fault::Null("controller"))?.inner.clone();
+        let given = place_in(memory)?;
+        let made = pdmp_controller { inner, fault: None, owned: given.is_none() };
+        *place = match given {
+            // SAFETY: large enough, aligned, and used by nothing else.
+            Some(memory) => unsafe {
+                memory.write(made);
+                memory
+            },
+            None => Box::into_raw(Box::new(made)),
+        };
+        Ok(PDMP_OK)
+    };
+    // SAFETY: the caller's promise is the same.
+    unsafe { answer_in(error, call) }
+}
+
 /// Frees a controller. Memory of the caller's is the caller's again. With NULL it does nothing.
 ///
 /// # Safety
@@ -217,6 +248,13 @@ pub extern "C" fn pdmp_controller_set_amplitude(
     on(controller, |controller| Ok(controller.inner.set_amplitude(amplitude).map(|()| PDMP_OK)?))
 }
 
+/// Sets the speed, the share of the rate 1/tau at which the path is followed: 0 pauses on the path, 1 goes on. A change
+/// passes the filter of tau, and stays in force over pdmp_controller_reset.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_set_speed(controller: Option<&mut pdmp_controller>, speed: f64) -> pdmp_status {
+    on(controller, |controller| Ok(controller.inner.set_speed(speed).map(|()| PDMP_OK)?))
+}
+
 /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
 ///
 /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 over the
@@ -228,6 +266,15 @@ pub extern "C" fn pdmp_controller_set_compliance(
     tracking: f64,
 ) -> pdmp_status {
     on(controller, |controller| Ok(controller.inner.set_compliance(stopping, tracking).map(|()| PDMP_OK)?))
+}
+
+/// Forgets the measured position: no robot follows any more, until the next one is measured.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_release(controller: Option<&mut pdmp_controller>) -> pdmp_status {
+    on(controller, |controller| {
+        controller.inner.release();
+        Ok(PDMP_OK)
+    })
 }
 
 /// One tick with nothing new commanded. Answers whether the movement goes on.
@@ -242,11 +289,13 @@ pub extern "C" fn pdmp_controller_step(controller: Option<&mut pdmp_controller>)
 /// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is
 /// held over the tick:
 ///
-///     tau y' = z + w(u) + k_t (m - y) + tau c_v
+///     tau y' = z + w(u) + k_t d + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
-///     tau u' = 1 / (1 + k_s |(m - y) / range|^2)
+///     tau u' = k = 1 / (1 + k_s |d / range|^2)
+///     tau o' = 5 k (e - o) / extent
 ///
-/// with the measured position m and the coupling terms c_v and c_a.
+/// with the coupling terms c_v and c_a, and d, what of the error e = m - y at the measured position m lies beyond the
+/// error o that is expected by now. The last e stays in force until the next measurement or pdmp_controller_release.
 ///
 /// # Safety
 /// What `command` and `motion` point to is valid.

@@ -34,6 +34,7 @@ const NO_CONDITIONS: pdmp_conditions = pdmp_conditions {
     velocity: NOTHING,
     amplitude: ptr::null(),
     tau: ptr::null(),
+    phase: std::ptr::null(),
 };
 const SETTINGS: pdmp_settings =
     pdmp_settings { dt: 1e-3, transition: ptr::null(), memory: pdmp_memory { data: ptr::null_mut(), size: 0 } };
@@ -386,6 +387,8 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
             // SAFETY: as above.
             tau: unsafe { told.tau.as_ref() }.copied(),
             timing: None,
+            // SAFETY: as above.
+            phase: unsafe { told.phase.as_ref() }.copied(),
         };
         // In C a movement has one time constant.
         let by_tau = |conditions: pdmp_core::Conditions| {

@@ -8,7 +8,8 @@ use crate::phase::Kind;
 /// All that one tick is told; what is `None` stays as it was.
 ///
 /// Style, goal, anchor, τ and amplitude stay in force until they are commanded again, so that the same command can be
-/// given at every tick; `dt`, `measured` and `coupling` hold for this tick alone.
+/// given at every tick; `measured` until the next one or [`crate::Controller::release`]; `dt` and `coupling` hold for this
+/// tick alone.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Command<'a> {
     /// Length of this tick, in seconds, if it differs from the controller's.
@@ -23,7 +24,7 @@ pub struct Command<'a> {
     pub tau: Option<f64>,
     /// Amplitude r₀ to go to, rhythmic.
     pub amplitude: Option<f64>,
-    /// Position ỹ (D,) at which the robot is now, in the unit of each DoF.
+    /// Position ỹ (D,) at which the robot is now, in the unit of each DoF; `None` if it was not measured anew.
     pub measured: Option<&'a [f64]>,
     /// The user's own terms.
     pub coupling: Option<Coupling<'a>>,

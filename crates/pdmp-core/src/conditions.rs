@@ -5,7 +5,7 @@ use ndarray::Array2;
 use crate::context::Prediction;
 use crate::error::{Error, Result, check_positive, check_vector};
 use crate::model::Model;
-use crate::phase::Kind;
+use crate::phase::{Kind, turn};
 
 /// What a movement starts with; what is `None` is that of the nominal demonstration.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,6 +27,8 @@ pub struct Conditions {
     /// Time in each segment of the movement (K,), in seconds, in place of τ. A rollout follows it; a controller, whose τ
     /// can be set at any tick, takes its sum: see [`Model::tau_at`].
     pub timing: Option<Vec<f64>>,
+    /// Phase φ at which a rhythmic movement starts, in rad: on its limit cycle, with nothing to die away; otherwise 0.
+    pub phase: Option<f64>,
 }
 
 impl Model {
@@ -83,7 +85,12 @@ impl Conditions {
             Some(style) => check_style(style, model.n_styles()).map(|()| style.clone())?,
             None => demonstrated.styles.row(nominal).to_vec(),
         };
-        Ok(Complete { style, centre, start, velocity: self.velocity.clone(), amplitude, tau })
+        refuse(kind, "phase", kind == Kind::Discrete && self.phase.is_some())?;
+        let phase = self.phase.unwrap_or(0.0);
+        if !phase.is_finite() {
+            return Err(Error::Range { name: "phase", value: phase, allowed: "must be a finite angle in rad" });
+        }
+        Ok(Complete { style, centre, start, velocity: self.velocity.clone(), amplitude, tau, phase: turn(phase) })
     }
 
     /// τ in seconds: as given, that of a movement as long as the timing, or the nominal demonstration's.
@@ -115,12 +122,15 @@ pub(crate) struct Complete {
     pub(crate) velocity: Option<Vec<f64>>,
     pub(crate) amplitude: f64,
     pub(crate) tau: f64,
+    /// φ in [0, 2π); 0 where discrete.
+    pub(crate) phase: f64,
 }
 
 /// Refuses an argument that this kind of primitive does not have.
 pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> {
     let instead = match (kind, name) {
         (Kind::Discrete, "anchor") => ": it moves to a goal; set goal",
+        (Kind::Discrete, "phase") => ": what it does later depends on where it started; it starts at its start",
         (Kind::Rhythmic, "goal") => ": it moves about an anchor; set anchor",
         _ => "",
     };

@@ -1,5 +1,8 @@
 //! Critically damped second-order filters: how commands change without a jump in position or velocity.
 //!
+//! The rate 1/τ passes its filter in seconds. Style, goal, anchor and amplitude pass theirs on the clock, in seconds at the
+//! nominal rate, so that the path does not depend on how fast it is followed.
+//!
 //! ẍ = −2ωẋ − ω²(x − target), solved in closed form over a tick. Its impulse response is positive, so that a filtered
 //! positive command stays positive, whatever the order and time of its changes.
 
@@ -56,6 +59,41 @@ impl Filter {
     pub(crate) fn left(&self, follower: &Follower, group: usize) -> Lanes {
         let Follower { value, rate, target, .. } = follower;
         (value[group] - target[group]).abs() + rate[group].abs() * (1.0 / self.omega)
+    }
+
+    /// The solution over `dt` seconds without its integral, which only the rate needs.
+    pub(crate) fn pass(&self, dt: f64) -> Glide {
+        let s = (self.omega * dt).min(1e4);
+        let decay = (-s).exp();
+        let (value, rate) = ([(1.0 + s) * decay, dt * decay], [-self.omega * (s * decay), (1.0 - s) * decay]);
+        Glide { dt, value, rate, integral: [0.0; 2] }
+    }
+
+    /// What follows a filtered command x by q̇ = m(x − q), after `dt` seconds: the amplitude r of Eq. (4), or a target of
+    /// its own that is at rest where the filter is immediate.
+    pub(crate) fn lag(&self, follower: &Follower, q: f64, m: f64, dt: f64) -> f64 {
+        let [x, v, target] = [&follower.value, &follower.rate, &follower.target].map(|lanes| lanes[0].as_array()[0]);
+        let (d, decay) = (x - target, (-m * dt).exp());
+        if follower.settled() {
+            return target + (q - target) * decay;
+        }
+        // q − target = (q₀ − target)e^(−mt) + m∫(d + (v + ωd)s)e^(−ωs)e^(−m(t−s))ds, with x = (m − ω)t. A
+        // filter is over after a few of its own times.
+        let s = (self.omega * dt).min(1e4);
+        let (x, filtered) = (m * dt - s, (-s).exp());
+        let [even, linear] = if x.abs() > 0.1 {
+            [(filtered - decay) / x, (filtered * (x - 1.0) + decay) / (x * x)]
+        } else {
+            // (e^x − 1)/x and (e^x(x − 1) + 1)/x² by their series: Σ x^k/(k + 1)! and Σ x^k/(k!(k + 2)).
+            let (mut power, mut sums) = (1.0, [0.0; 2]);
+            for k in 0..12 {
+                sums[0] += power / f64::from(k + 1);
+                sums[1] += power / f64::from(k + 2);
+                power *= x / f64::from(k + 1);
+            }
+            sums.map(|sum| sum * decay)
+        };
+        target + (q - target) * decay + m * dt * (d * even + (v * dt + s * d) * linear)
     }
 
     /// The solution over `dt` seconds.
@@ -257,6 +295,31 @@ mod tests {
             (0..n).map(|k| f64::from(k) * h).map(|t| h / 6.0 * (at(t) + 4.0 * at(t + h / 2.0) + at(t + h))).sum();
         assert_relative_eq!(follower.integral(&filter.glide(0.1)), simpson, max_relative = 1e-11);
         assert_relative_eq!(follower.time_to(simpson, 1.0, &filter), 0.1, max_relative = 1e-9);
+    }
+
+    /// What follows a filtered command solves its equation, by RK4, faster and slower than the filter and alike.
+    #[test]
+    fn lag_solves_its_equation() {
+        let (start, filter) = command();
+        for m in [0.3, filter.omega * (1.0 - 1e-9), filter.omega * 1.01, 500.0] {
+            let (mut q, n) = (1.0, 2000);
+            let h = 0.1 / f64::from(n);
+            let x = |t: f64| {
+                let mut follower = start.clone();
+                follower.advance::<Lanes>(&filter.pass(t));
+                first(follower.value())
+            };
+            for k in 0..n {
+                let t = f64::from(k) * h;
+                let f = |t: f64, q: f64| m * (x(t) - q);
+                let a = f(t, q);
+                let b = f(t + h / 2.0, q + h / 2.0 * a);
+                let c = f(t + h / 2.0, q + h / 2.0 * b);
+                let d = f(t + h, q + h * c);
+                q += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+            }
+            assert_relative_eq!(filter.lag(&start, 1.0, m, 0.1), q, max_relative = 1e-9);
+        }
     }
 
     proptest! {

@@ -73,6 +73,11 @@ impl Model {
     ) -> Result<Trajectory> {
         let steps = timing.steps(self, conditions.time_constant(self)?)?;
         let mut clock = Clock::of(self, conditions)?;
+        if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
+            return Err(Error::Arguments(
+                "pass phase or a timing of several segments, not both: a timing starts at phase 0",
+            ));
+        }
         let conditions = clock.conditions(conditions);
         let mut controller = Controller::new(Arc::clone(self), timing.dt, &conditions, Some(0.0))?.looking_ahead(LEAD);
         let shape = (steps + 1, self.n_dofs());

@@ -412,3 +412,65 @@ fn rollouts_can_be_interrupted() {
     assert!(matches!(stopped, Err(Error::Interrupted)));
     assert!(asked > 10);
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    /// The path does not depend on how fast it is followed: any speeds, pauses included, lead through the same places.
+    #[test]
+    fn path_does_not_depend_on_the_rate(speeds in prop::collection::vec((0..4u8, 0.2..1.5f64), 6)) {
+        for model in [&*REACH, &*CYCLE] {
+            let dt = 2e-4;
+            let make = || Controller::new(Arc::clone(model), dt, &Conditions::default(), None).unwrap();
+            let clock = |controller: &Controller| match model.canonical() {
+                pdmp_core::Canonical::Discrete { alpha_x, .. } => -controller.phase().ln() / alpha_x,
+                pdmp_core::Canonical::Rhythmic { .. } => controller.phase(),
+            };
+            // Goes on to a place on the clock, the last tick as long as is left.
+            let go = |controller: &mut Controller, to: f64, speeds: &[(u8, f64)]| {
+                for k in 0..100_000 {
+                    if k % 400 == 0 && !speeds.is_empty() {
+                        let (pause, speed) = speeds[k / 400 % speeds.len()];
+                        controller.set_speed(if pause == 0 { 0.0 } else { speed }).unwrap();
+                    }
+                    let mut ahead = controller.clone();
+                    ahead.step().unwrap();
+                    if clock(&ahead) < to {
+                        *controller = ahead;
+                        continue;
+                    }
+                    let (mut low, mut high) = (0.0, dt);
+                    for _ in 0..60 {
+                        let middle = 0.5 * (low + high);
+                        let mut ahead = controller.clone();
+                        tick(&mut ahead, &Command { dt: Some(middle), ..Command::default() }).unwrap();
+                        if clock(&ahead) < to { low = middle } else { high = middle }
+                    }
+                    tick(controller, &Command { dt: Some(high), ..Command::default() }).unwrap();
+                    return true;
+                }
+                false
+            };
+            let extent = model.canonical().extent();
+            let (mut plain, mut varied) = (make(), make());
+            for (k, share) in [0.2, 0.3, 0.45, 0.7, 0.9].into_iter().enumerate() {
+                let mut arrived = go(&mut plain, share * extent, &[]);
+                arrived &= go(&mut varied, share * extent, &speeds);
+                prop_assume!(arrived);
+                for ((a, b), range) in plain.position().iter().zip(varied.position()).zip(model.ranges()) {
+                    prop_assert!((a - b).abs() < 1e-9 * range, "{share}: {a} {b}");
+                }
+                let centre: Vec<f64> = plain.centre().iter().map(|c| c + 0.3).collect();
+                for controller in [&mut plain, &mut varied] {
+                    match (k, model.kind()) {
+                        (0, _) => controller.set_style(&[0.6, -0.2]).unwrap(),
+                        (1, Kind::Discrete) => controller.set_goal(&centre).unwrap(),
+                        (1, Kind::Rhythmic) => controller.set_anchor(&centre).unwrap(),
+                        (2, Kind::Rhythmic) => controller.set_amplitude(0.4).unwrap(),
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+}

@@ -93,18 +93,23 @@ fn perturbed_movement_solves_the_stated_equations() {
         let at_start = slopes(model, &(start.clone(), vec![0.0; n], 0.0), &vec![0.0; n], &vec![0.0; n], 1.0).0;
         let z = rest.zip(&at_start).map(|(flow, w)| flow - w * model.tau()).collect();
         let mut plain: Plain = (start, z, 0.0);
-        let strain: f64 = behind[..n].iter().zip(model.ranges()).map(|(e, range)| (e / range).powi(2)).sum();
-        let (pace, pull) = match phase {
-            true => (1.0 / (1.0 + stopping * strain), (1.0 - (-tracking * dt / model.tau()).exp()) / dt),
-            false => (1.0, 0.0),
-        };
-        let pushed: Vec<f64> = velocity[..n].iter().zip(behind).map(|(v, e)| v + pull * e).collect();
+        let pull = if phase { (1.0 - (-tracking * dt / model.tau()).exp()) / dt } else { 0.0 };
+        let (mut pushed, mut pace, mut expected) = (velocity[..n].to_vec(), 1.0, 0.0);
         // Past the demonstrated end, which is a tick's end in the unslowed reach.
         for _ in 0..1500 {
             let robot: Vec<f64> = controller.position().iter().zip(behind).map(|(y, e)| y + e).collect();
             let terms = coupling(&velocity[..n], &acceleration[..n]);
             let terms = if phase { Command { measured: Some(&robot), ..terms } } else { terms };
             tick(&mut controller, &Command { dt: Some(dt), ..terms }).unwrap();
+            // The expected error is a share of the constant one, the same for every DoF.
+            let beyond: Vec<f64> = behind[..n].iter().map(|e| e * (1.0 - expected)).collect();
+            if phase {
+                let strain: f64 = beyond.iter().zip(model.ranges()).map(|(d, range)| (d / range).powi(2)).sum();
+                pace = 1.0 / (1.0 + stopping * strain);
+                expected +=
+                    (1.0 - expected) * (1.0 - (-5.0 / model.canonical().extent() * pace * dt / model.tau()).exp());
+            }
+            pushed = velocity.iter().zip(&beyond).map(|(v, d)| v + pull * d).collect();
             for _ in 0..4 {
                 plain = rk4(model, &plain, dt / 4.0, &pushed, &acceleration[..n], pace);
             }
@@ -190,7 +195,7 @@ fn held_and_let_go_it_continues() {
         let (place, phase) = (held.position().to_vec(), held.phase());
         for _ in 0..1000 {
             assert_eq!(tick(&mut held, &measured(&place)).unwrap(), Status::Working);
-            assert!(apart(model, held.position(), &place) < 0.16);
+            assert!(apart(model, held.position(), &place) < 0.2);
             assert!(largest(held.velocity()) < peak);
         }
         // Free, the phase would have gone through the whole movement.
@@ -199,6 +204,7 @@ fn held_and_let_go_it_continues() {
             pdmp_core::Canonical::Rhythmic { .. } => (held.phase() - phase) / std::f64::consts::TAU,
         };
         assert!((0.0..0.12).contains(&gone), "{gone}");
+        held.release();
         let before = held.position().to_vec();
         let mut ticks = 0;
         loop {
@@ -227,6 +233,69 @@ fn held_and_let_go_it_continues() {
     }
 }
 
+/// A robot that always lags by the same holds nothing up: the movement arrives on its own goal.
+#[test]
+fn constant_error_neither_moves_the_goal_nor_stops_the_phase() {
+    let goal = REACH.demonstrated().goals.row(REACH.demonstrated().nominal).to_vec();
+    for (share, every, longest) in [(0.002, 1, 1.6), (0.05, 1, 1.9), (0.05, 10, 1.9), (0.1, 1, 3.0)] {
+        let mut controller = controller(&REACH);
+        let mut free = controller.clone();
+        let alone = 1 + (0..).take_while(|_| free.step().unwrap() == Status::Working).count();
+        let ticks = (0..20_000).position(|k| {
+            let robot: Vec<f64> =
+                controller.position().iter().zip(REACH.ranges()).map(|(y, range)| y - share * range).collect();
+            let command = if k % every == 0 { measured(&robot) } else { Command::default() };
+            tick(&mut controller, &command).unwrap() == Status::Finished
+        });
+        assert!(apart(&REACH, controller.position(), &goal) < 1.5e-3);
+        assert!(ticks.is_some_and(|ticks| (ticks as f64) < longest * alone as f64), "{share}: {ticks:?} of {alone}");
+    }
+}
+
+/// A robot that follows is not held back by a sensor slower than the loop; one that is held fast holds the movement.
+#[test]
+fn last_distance_stays_in_force_between_measurements() {
+    let (mut free, mut followed) = (controller(&REACH), controller(&REACH));
+    for k in 0..1500 {
+        free.step().unwrap();
+        let robot = followed.position().to_vec();
+        if k % 10 == 0 { tick(&mut followed, &measured(&robot)) } else { followed.step() }.unwrap();
+        assert_eq!(free.position(), followed.position());
+    }
+    let away = [1, 10, 40].map(|every| {
+        let mut held = controller(&REACH);
+        (0..300).for_each(|_| _ = held.step().unwrap());
+        let place = held.position().to_vec();
+        for k in 0..1000 {
+            if k % every == 0 { tick(&mut held, &measured(&place)) } else { held.step() }.unwrap();
+        }
+        apart(&REACH, held.position(), &place)
+    });
+    assert!(away[1] < 1.1 * away[0] && away[2] < 1.5 * away[0], "{away:?}");
+}
+
+/// An encoder that starts anew at ±π or ±180° is no error.
+#[test]
+fn angles_take_the_error_the_short_way_round() {
+    for (unit, turn) in [("rad", std::f64::consts::TAU), ("deg", 360.0), ("°", 360.0)] {
+        let demos = [0.9, 1.0, 1.1].map(|a| {
+            let rise = |s: f64| turn * (0.4 + 0.16 * a * s * s * (3.0 - 2.0 * s));
+            let position = ndarray::Array2::from_shape_fn((101, 1), |(c, _)| rise(c as f64 / 100.0));
+            let demo = pdmp_core::Demonstration::new(position, pdmp_core::Sampling::Uniform { dt: 0.01 }).unwrap();
+            demo.with_units(vec![unit.to_owned()]).unwrap()
+        });
+        let model = learn(&demos, &options(Kind::Discrete));
+        let (mut free, mut followed) = (controller(&model), controller(&model));
+        for _ in 0..1200 {
+            let wrapped = (followed.position()[0] + turn / 2.0).rem_euclid(turn) - turn / 2.0;
+            free.step().unwrap();
+            tick(&mut followed, &measured(&[wrapped])).unwrap();
+            assert!(apart(&model, free.position(), followed.position()) < 1e-9);
+        }
+        assert!(followed.position()[0] > turn / 2.0);
+    }
+}
+
 /// A movement whose phase is stopped does not finish, be it on its goal.
 #[test]
 fn stopped_phase_does_not_finish() {
@@ -248,16 +317,17 @@ fn still_dof_does_not_stop_the_phase() {
         pdmp_core::Demonstration::new(position, pdmp_core::Sampling::Uniform { dt: 0.01 }).unwrap()
     });
     let model = learn(&still.collect::<Vec<_>>(), &options(Kind::Discrete));
-    let (mut free, mut pulled) = (controller(&model), controller(&model));
+    let (mut free, mut pulled, mut most) = (controller(&model), controller(&model), 0.0f64);
     for _ in 0..500 {
         let mut robot = pulled.position().to_vec();
         robot[2] += 0.1;
         free.step().unwrap();
         tick(&mut pulled, &measured(&robot)).unwrap();
+        most = most.max(pulled.position()[2] - free.position()[2]);
     }
     assert_eq!(free.phase(), pulled.phase());
     assert_eq!(free.position()[..2], pulled.position()[..2]);
-    assert!(pulled.position()[2] > free.position()[2] + 0.05);
+    assert!(most > 0.03, "{most}");
 }
 
 /// What is refused changes nothing.

@@ -17,6 +17,7 @@ pub(crate) struct Arguments<'a, 'py> {
     pub(crate) amplitude: f64,
     pub(crate) tau: Option<f64>,
     pub(crate) timing: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) phase: Option<f64>,
 }
 
 impl Arguments<'_, '_> {
@@ -30,6 +31,7 @@ impl Arguments<'_, '_> {
             amplitude: Some(self.amplitude),
             tau: self.tau,
             timing: optional("timing", self.timing)?,
+            phase: self.phase,
         })
     }
 
@@ -56,6 +58,7 @@ impl Arguments<'_, '_> {
             // A tau that is given takes the place of the predicted timing.
             timing: given.timing.or(predicted.timing.filter(|_| given.tau.is_none())),
             tau: given.tau,
+            phase: given.phase,
         })
     }
 }

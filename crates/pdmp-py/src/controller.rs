@@ -10,18 +10,23 @@ use crate::conditions::Arguments;
 use crate::convert::{Reduced, Vector, refill, to_numpy};
 use crate::error::raise;
 
-/// Whether a movement goes on (`WORKING`) or has settled on its goal (`FINISHED`).
+/// Whether a movement goes on (`WORKING`, 1) or has settled on its goal (`FINISHED`, 2, and false).
 #[pyclass(frozen, eq, hash, module = "pdmp")]
 #[derive(PartialEq, Eq, Hash)]
 pub(crate) enum Status {
     #[pyo3(name = "WORKING")]
-    Working,
+    Working = 1,
     #[pyo3(name = "FINISHED")]
-    Finished,
+    Finished = 2,
 }
 
 #[pymethods]
 impl Status {
+    /// A loop runs `while controller.step()`.
+    fn __bool__(&self) -> bool {
+        *self == Self::Working
+    }
+
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         let name = match self {
             Self::Working => "WORKING",
@@ -115,20 +120,25 @@ impl Controller {
 impl Controller {
     /// One tick, perturbed if the robot is measured or terms of one's own are given:
     ///
-    ///     tau y' = z + w(u) + k_t (m - y) + tau c_v
+    ///     tau y' = z + w(u) + k_t d + tau c_v
     ///     tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
-    ///     tau u' = 1 / (1 + k_s |(m - y) / range|**2)
+    ///     tau u' = k = 1 / (1 + k_s |d / range|**2)
+    ///     tau o' = 5 k (e - o) / extent
     ///
-    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. All is evaluated at the
-    /// start of the tick and held over it; however long it is, y is pulled no further than m. A robot that is held
-    /// fast so holds the movement, all but stops its phase, and, let go, continues from there.
+    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. Of the error e = m - y
+    /// counts d, what lies beyond the error o that is expected by now; extent is T / tau or 2 pi. All is evaluated at
+    /// the start of the tick and held over it; however long it is, y is pulled no further than m. A robot that is held
+    /// fast so holds the movement, all but stops its phase, and, let go, continues from there; one that always lags or
+    /// sags by the same comes no further from the goal than that, and finishes.
     ///
     /// Parameters
     /// ----------
     /// dt : float, optional
     ///     Length of this tick in s, if it differs from the controller's.
     /// measured : array_like (D,), optional
-    ///     Position m at which the robot is, in the unit of each DoF.
+    ///     Position m at which the robot is, in the unit of each DoF; the error of an angle (rad, deg, °) is taken the
+    ///     short way round. None is no new measurement: the last distance m - y stays in force until the next one or
+    ///     `release`, so that a sensor may be slower than the loop.
     /// coupling : tuple of two array_like (D,), optional
     ///     Terms (c_v, c_a), per s and per s²: the velocity gains c_v, and jumps where it does; the acceleration c_a.
     ///
@@ -184,10 +194,10 @@ impl Controller {
     /// The first tick comes one period after the loop begins; what the body commands acts on the next. Nothing runs
     /// beside the body: a `break` or an exception, Ctrl-C too, ends the loop between two ticks.
     ///
-    /// A movement keeps to the clock on the wall. The deadlines start + k / rate_hz stay where they are however late a
-    /// tick comes; one that comes n whole periods late has missed n deadlines, and makes good for them in one step of
-    /// n + 1 periods. After a long stall the position so jumps ahead: leave the loop where the robot cannot follow, or
-    /// let it tell its position, which stops the phase.
+    /// Deadlines are start + k / rate_hz; a tick that comes n whole periods late has missed n of them. By default the
+    /// movement then waits: the tick is one period long like any other, and the deadlines to come are n periods later, so
+    /// that the position never jumps ahead. With `late="catch up"` the movement keeps to the clock on the wall: one step of
+    /// n + 1 periods makes good for them, and the position jumps as far. One controller runs in one loop at a time.
     ///
     /// In between, the loop sleeps and other threads run. `async for` waits for the other tasks instead; event loops
     /// wake only to the millisecond, so that deadlines closer than some 5 ms are for threads.
@@ -201,6 +211,8 @@ impl Controller {
     ///     the body has commanded nothing more, and a rhythmic one when the loop is left; with it, both last as long.
     /// measured, coupling : callable, optional
     ///     Asked without arguments before each tick for what `step` takes under this name, or None.
+    /// late : {"wait", "catch up"}
+    ///     What a late tick does.
     ///
     /// Returns
     /// -------
@@ -211,28 +223,31 @@ impl Controller {
     /// ------
     /// ValueError
     ///     A rate or duration that is no number between 1e-9 and 1e9; a duration below one period; `measured` or
-    ///     `coupling` that cannot be called.
-    #[pyo3(signature = (rate_hz=None, *, duration=None, measured=None, coupling=None))]
+    ///     `coupling` that cannot be called; `late` of another name.
+    /// RuntimeError
+    ///     On the first tick: the controller runs in another loop already.
+    #[pyo3(signature = (rate_hz=None, *, duration=None, measured=None, coupling=None, late="wait"))]
     fn run<'py>(
         slf: &Bound<'py, Self>,
         rate_hz: Option<Bound<'py, PyAny>>,
         duration: Option<Bound<'py, PyAny>>,
         measured: Option<Bound<'py, PyAny>>,
         coupling: Option<Bound<'py, PyAny>>,
+        late: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
         let rate_hz = match rate_hz {
             Some(rate_hz) => rate_hz,
             None => PyFloat::new(py, 1.0 / slf.try_borrow()?.inner.dt()).into_any(),
         };
-        py.import("pdmp.pacing")?.call_method1("Run", (slf, rate_hz, duration, measured, coupling))
+        py.import("pdmp.pacing")?.call_method1("Run", (slf, rate_hz, duration, measured, coupling, late))
     }
 
     /// Start again.
     ///
     /// Parameters
     /// ----------
-    /// style, goal, start, velocity, anchor, amplitude, tau, timing, context
+    /// style, goal, start, velocity, anchor, amplitude, tau, timing, context, phase
     ///     As in `Model.controller`: what is not given is that of the nominal demonstration, not what was commanded before.
     ///
     /// Raises
@@ -241,7 +256,7 @@ impl Controller {
     ///     What `Model.rollout` refuses; the movement then goes on as it was.
     #[pyo3(signature = (
         *, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, timing=None,
-        context=None
+        context=None, phase=None
     ))]
     #[allow(clippy::too_many_arguments)]
     fn reset(
@@ -256,8 +271,9 @@ impl Controller {
         tau: Option<f64>,
         timing: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
+        phase: Option<f64>,
     ) -> PyResult<()> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
         let conditions = arguments.in_context(self.inner.model(), context)?;
         let result = self.inner.reset(&conditions);
         self.command(py, result)
@@ -365,6 +381,19 @@ impl Controller {
         self.command(py, result)
     }
 
+    /// Speed: the share of the rate 1 / tau at which the path is followed. 0 pauses on the path, 1 goes on; a change
+    /// passes the filter of tau, and stays in force over `reset`.
+    #[getter]
+    fn speed(&self) -> f64 {
+        self.inner.speed()
+    }
+
+    #[setter]
+    fn set_speed(&mut self, py: Python<'_>, speed: f64) -> PyResult<()> {
+        let result = self.inner.set_speed(speed);
+        self.command(py, result)
+    }
+
     /// Gains (k_s, k_t) of a measured position: how much it stops the phase, and pulls per unit of u. 0 is without.
     #[getter]
     fn compliance(&self) -> (f64, f64) {
@@ -375,6 +404,21 @@ impl Controller {
     fn set_compliance(&mut self, compliance: (f64, f64)) -> PyResult<()> {
         let (stopping, tracking) = compliance;
         self.inner.set_compliance(stopping, tracking).map_err(raise)
+    }
+
+    /// A controller of its own that goes on bit for bit as this one would; the model is shared.
+    fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
+        Self::new(py, self.inner.clone())
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> PyResult<Self> {
+        self.__copy__(py)
+    }
+
+    /// Forget the measured position: no robot follows any more, until the next one is measured.
+    fn release(&mut self, py: Python<'_>) {
+        self.inner.release();
+        self.publish(py);
     }
 
     fn __repr__(&self) -> String {

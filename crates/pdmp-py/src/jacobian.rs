@@ -43,8 +43,17 @@ impl Model {
         tau: Option<f64>,
         duration: Option<f64>,
     ) -> PyResult<Cube<'py>> {
-        let arguments =
-            Arguments { style: None, goal: None, start, velocity, anchor: None, amplitude, tau, timing: None };
+        let arguments = Arguments {
+            style: None,
+            goal: None,
+            start,
+            velocity,
+            anchor: None,
+            amplitude,
+            tau,
+            timing: None,
+            phase: None,
+        };
         self.jacobian(py, Variable::Style, derivative, arguments, Timing { dt, duration })
     }
 
@@ -145,5 +154,15 @@ impl Model {
 
 /// Arguments of which only start and time constant matter.
 fn from<'a, 'py>(start: Option<&'a Bound<'py, PyAny>>, tau: Option<f64>) -> Arguments<'a, 'py> {
-    Arguments { style: None, goal: None, start, velocity: None, anchor: None, amplitude: 1.0, tau, timing: None }
+    Arguments {
+        style: None,
+        goal: None,
+        start,
+        velocity: None,
+        anchor: None,
+        amplitude: 1.0,
+        tau,
+        timing: None,
+        phase: None,
+    }
 }

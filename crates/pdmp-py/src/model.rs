@@ -77,6 +77,8 @@ impl Model {
     ///     rhythmic.
     /// context : array_like, (Q,), optional
     ///     Predicts style, goal, start or anchor, and timing, where they are not given.
+    /// phase : float, optional
+    ///     Phase φ in rad at which a rhythmic movement starts, on its limit cycle; 0 otherwise.
     ///
     /// Returns
     /// -------
@@ -89,7 +91,7 @@ impl Model {
     ///     A wrong length, a number that is not finite, or an argument of the other kind of primitive.
     #[pyo3(signature = (
         style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, timing=None,
-        dt=0.01, duration=None, context=None
+        dt=0.01, duration=None, context=None, phase=None
     ))]
     #[allow(clippy::too_many_arguments)]
     fn rollout(
@@ -106,8 +108,9 @@ impl Model {
         dt: f64,
         duration: Option<f64>,
         context: Option<&Bound<'_, PyAny>>,
+        phase: Option<f64>,
     ) -> PyResult<Trajectory> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
         let conditions = arguments.in_context(&self.0, context)?;
         let trajectory =
             interruptible(py, |proceed| self.0.rollout_with(&conditions, Timing { dt, duration }, proceed))?;
@@ -300,19 +303,19 @@ impl Model {
     /// ----------
     /// dt : float
     ///     Length of a tick in s.
-    /// style, goal, start, velocity, tau, timing, anchor, amplitude, context
+    /// style, goal, start, velocity, tau, timing, anchor, amplitude, context, phase
     ///     As in `rollout`; of a timing the loop takes the sum, and follows it where `tau_at` sets its pace.
     /// transition : float, optional
-    ///     Time to 99 % in s of a changed style, goal, anchor or tau; 0 switches at once. A tenth of the nominal
-    ///     duration (discrete) or a quarter of the period (rhythmic) otherwise. A goal takes what remains of the
-    ///     movement if that is longer, unless transport is immediate.
+    ///     Time to 99 % in s, at the model's own tau, of a changed style, goal, anchor or amplitude, and of a changed tau
+    ///     or speed; 0 switches at once. A tenth of the nominal duration (discrete) or a quarter of the period (rhythmic)
+    ///     otherwise. A goal takes what remains of the movement if that is longer, unless transport is immediate.
     ///
     /// Returns
     /// -------
     /// Controller
     #[pyo3(signature = (
         dt=0.001, style=None, goal=None, start=None, velocity=None, tau=None, transition=None, *, anchor=None,
-        amplitude=1.0, timing=None, context=None
+        amplitude=1.0, timing=None, context=None, phase=None
     ))]
     #[allow(clippy::too_many_arguments)]
     fn controller(
@@ -329,8 +332,9 @@ impl Model {
         amplitude: f64,
         timing: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
+        phase: Option<f64>,
     ) -> PyResult<Controller> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
         let conditions = arguments.in_context(&self.0, context)?;
         let controller = pdmp_core::Controller::new(Arc::clone(&self.0), dt, &conditions, transition).map_err(raise)?;
         Controller::new(py, controller)

@@ -2,7 +2,7 @@
 
 use super::{Controller, Status};
 use crate::command::Command;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 impl Controller {
     /// Sets the style s (J,) to go to.
@@ -37,12 +37,32 @@ impl Controller {
         self.set(&Command { tau: Some(tau), ..Command::default() })
     }
 
-    /// Sets the amplitude r₀ of a rhythmic movement; r follows by Eq. (4).
+    /// Sets the amplitude r₀ of a rhythmic movement; r follows by Eq. (4), r₀ a filter.
     ///
     /// # Errors
     /// A discrete primitive, a negative number or one that is not finite; r₀ then stays as it was.
     pub fn set_amplitude(&mut self, amplitude: f64) -> Result<()> {
         self.set(&Command { amplitude: Some(amplitude), ..Command::default() })
+    }
+
+    /// Sets the speed: the share of the rate 1/τ at which the path is followed, 1 at the start. 0 pauses on the path; the
+    /// change passes the filter of τ. A speed stays in force over [`Controller::reset`].
+    ///
+    /// # Errors
+    /// A speed outside [0, 1e6]; it then stays as it was.
+    pub fn set_speed(&mut self, speed: f64) -> Result<()> {
+        if !(0.0..=1e6).contains(&speed) {
+            return Err(Error::Range { name: "speed", value: speed, allowed: "must lie between 0, a pause, and 1e6" });
+        }
+        self.speed = speed;
+        let rate = [speed / self.conditions.tau];
+        if self.started {
+            self.rate.follow(&rate, &self.filter);
+        } else {
+            self.rate.jump(&rate);
+        }
+        self.read_out();
+        Ok(())
     }
 
     /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
@@ -54,6 +74,12 @@ impl Controller {
     /// A gain that is negative, not finite or above 1e100; both then stay as they were.
     pub fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
         self.held.set_compliance(stopping, tracking)
+    }
+
+    /// Forgets the measured position: no robot follows any more, until the next one is measured.
+    pub fn release(&mut self) {
+        self.held.release();
+        self.read_out();
     }
 
     fn set(&mut self, command: &Command) -> Result<()> {
@@ -75,19 +101,20 @@ impl Controller {
         }
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
-            self.centre_filter = self.centre_filter(command.tau.unwrap_or(self.conditions.tau));
-            self.centre_glide = self.centre_filter.glide(self.glide.dt());
+            self.centre_filter = self.centre_filter();
+            self.centre_course = self.centre_filter.pass(self.course.dt());
             self.centre.follow(centre, &self.centre_filter);
             self.set_tolerance();
             news = true;
         }
         if let Some(tau) = command.tau.filter(|tau| *tau != self.conditions.tau) {
             self.conditions.tau = tau;
-            self.rate.follow(&[1.0 / tau], &filter);
+            self.rate.follow(&[self.speed / tau], &filter);
             news = true;
         }
         if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != self.conditions.amplitude) {
             self.conditions.amplitude = amplitude;
+            self.amplitude.follow(&[amplitude], &filter);
             news = true;
         }
         if !news {

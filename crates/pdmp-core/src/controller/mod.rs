@@ -1,9 +1,10 @@
 //! The real-time loop: one tick of the primitive per call, with every command open to change.
 //!
 //! Over a tick the forcing w, the goal and the clock are known at both ends with their slopes; a cubic between them is
-//! propagated exactly ([`crate::Attractor::propagator`]). Style, rate ρ = 1/τ and goal or anchor pass critically damped
-//! filters, so that position and velocity stay continuous: ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′. The frame c of a
-//! discrete movement is known exactly at both ends of a tick (`transport`), and outside what is propagated. A perturbation
+//! propagated exactly ([`crate::Attractor::propagator`]). Style, goal or anchor and amplitude pass critically damped
+//! filters on the clock, the rate ρ = 1/τ one in seconds, so that position and velocity stay continuous: ẏ = ρy′ and
+//! ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′. The frame c of a discrete movement is known exactly at both ends of a tick
+//! (`transport`), and outside what is propagated. A perturbation
 //! ([`Command::measured`], [`Command::coupling`]) slows the phase's clock against the output system's, and adds to ẏ and
 //! ÿ.
 //!
@@ -71,6 +72,10 @@ pub struct Controller {
     centre: Follower,
     /// How a commanded goal is followed: [`Controller::centre_filter`].
     centre_filter: Filter,
+    /// r₀.
+    amplitude: Follower,
+    /// Share of the rate 1/τ at which the path is followed.
+    speed: f64,
     /// By groups of DoFs, as all that follows.
     forcing: Vec<Forcing>,
     /// Forcing at the start of the stretch at work, taken before anything moves: kept as numbers for the loop over the
@@ -95,7 +100,9 @@ pub struct Controller {
     finest: f64,
     /// Of the last tick, and good for the next if it is as long.
     glide: Glide,
-    centre_glide: Glide,
+    /// The same of the filters on the clock.
+    course: Glide,
+    centre_course: Glide,
     propagator: Propagator,
     series: Series,
     /// Ticks from now for which the landscape is fetched.
@@ -105,10 +112,11 @@ pub struct Controller {
 impl Controller {
     /// Starts a movement.
     ///
-    /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal or anchor, both in
-    /// seconds; 0 is the paper's immediate switch, and without it a tenth of the nominal duration (discrete) or a
-    /// quarter of the nominal period (rhythmic) serves. A goal takes what remains of the movement if that is longer,
-    /// unless transport is immediate.
+    /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal, anchor or amplitude,
+    /// both in seconds. The rate 1/τ changes in so many seconds; the others on the clock, in so many seconds at the
+    /// model's own τ, so that the path does not depend on how fast it is followed. 0 is the paper's immediate switch, and
+    /// without it a tenth of the nominal duration (discrete) or a quarter of the nominal period (rhythmic) serves. A goal
+    /// takes what remains of the movement if that is longer, unless transport is immediate.
     ///
     /// # Errors
     /// Conditions that do not fit the model, `dt` that is not positive, or a negative `transition`.
@@ -138,6 +146,8 @@ impl Controller {
             rate: Follower::new(&[1.0 / conditions.tau]),
             centre: Follower::new(&conditions.centre),
             centre_filter: filter,
+            amplitude: Follower::new(&[conditions.amplitude]),
+            speed: 1.0,
             forcing: vec![Forcing::default(); zeros.len()],
             from: vec![Jet::default(); zeros.len()],
             way: zeros.clone(),
@@ -149,10 +159,11 @@ impl Controller {
             acceleration: zeros.clone(),
             tolerance: zeros,
             rest: REST * widest(model.ranges()),
-            held: Held::new(model.ranges(), model.canonical().extent()),
+            held: Held::new(model.ranges(), model.units(), model.canonical().extent()),
             finest,
             glide: filter.glide(dt),
-            centre_glide: filter.glide(dt),
+            course: filter.pass(0.0),
+            centre_course: filter.pass(0.0),
             propagator: series.propagator::<Lanes>(0.0),
             series,
             lead: 1.0,
@@ -186,7 +197,8 @@ impl Controller {
         let conditions = &self.conditions;
         self.r = conditions.amplitude;
         self.style.jump(&conditions.style);
-        self.rate.jump(&[1.0 / conditions.tau]);
+        self.rate.jump(&[self.speed / conditions.tau]);
+        self.amplitude.jump(&[conditions.amplitude]);
         self.centre.jump(&conditions.centre);
         if let (Kind::Discrete, Some(start)) = (self.model.kind(), &conditions.start) {
             repack(&mut self.way, start);
@@ -210,6 +222,15 @@ impl Controller {
             *position = self.centre.value()[group] + on_cycle.e;
             *z = on_cycle.z;
         }
+        let phase = conditions.phase;
+        if phase > 0.0 {
+            // The limit cycle is followed to where the movement starts, no phase of it being closer to a closed form.
+            let parts = (phase / self.finest).ceil();
+            (0..parts as u32).for_each(|_| self.advance(self.dt, phase / parts));
+            self.clock = CompensatedSum::at(phase);
+            self.read_forcing();
+        }
+        let Self { conditions, r, .. } = self;
         if let Some(start) = &conditions.start {
             repack(&mut self.position, start);
         }
@@ -221,16 +242,16 @@ impl Controller {
         }
     }
 
-    /// The filter of a goal commanded now, for a movement that goes on with `tau`.
+    /// The filter of a goal commanded now, on the clock.
     ///
     /// Such a goal enters Eq. (1) alone, as in the paper, but over what remains of the movement: the filter takes so long,
     /// less the time 1/β_z by which the output system lags behind, and never less than a transition. A goal at once is
     /// what immediate transport has, an anchor, and any goal from shortly before the end on.
-    pub(super) fn centre_filter(&self, tau: f64) -> Filter {
+    pub(super) fn centre_filter(&self) -> Filter {
         match self.model.canonical() {
             Canonical::Discrete { u_end, .. } if !self.model.transport.is_immediate() => {
                 let remaining = u_end - self.clock.value() - 1.0 / self.model.attractor().beta_z;
-                Filter::new(self.transition.max(remaining * tau))
+                Filter::new(self.transition.max(remaining * self.model.tau()))
             }
             _ => self.filter,
         }
@@ -257,8 +278,12 @@ impl Controller {
     /// A tick longer than 1000 τ; the state then stays as it was.
     pub fn step(&mut self) -> Result<Status> {
         self.check_length(self.dt, None)?;
-        self.held.release();
         let h = self.stretch(self.dt);
+        if self.held.followed() {
+            self.held.take(&Command::default(), &self.position, self.dt, h);
+        } else {
+            self.held.rest();
+        }
         Ok(self.tick(self.dt, h))
     }
 
@@ -268,14 +293,19 @@ impl Controller {
     /// held over the tick:
     ///
     /// ```text
-    /// τẏ = z + w(u) + k_t(ỹ − y) + τc_v
+    /// τẏ = z + w(u) + k_t d + τc_v
     /// τż = α_z(β_z(g − y) − z) + τ²c_a
-    /// τu̇ = κ = 1/(1 + k_s‖(ỹ − y)/range‖²)
+    /// τu̇ = κ = 1/(1 + k_s‖d/range‖²)
+    /// τȯ = λκ(e − o)
     /// ```
     ///
     /// `measured` ỹ stops the phase as the robot falls behind and pulls the movement towards it, with the gains of
-    /// [`Controller::set_compliance`]; `coupling` adds c_v to the velocity and c_a to the acceleration. Over the tick the
-    /// pull is the velocity (1 − exp(−k_t h))/dt of the error at its start, h being the tick on the clock: however long
+    /// [`Controller::set_compliance`]. Of the error e = ỹ − y counts d, what lies beyond the error o that is expected by
+    /// now: e − o where o is of the sign of e and smaller, 0 where it is larger, e where it is of the other sign. A robot
+    /// that always lags or sags by the same so neither holds the movement up nor keeps it from its goal. The error of a
+    /// DoF whose unit is rad, deg or ° is taken the short way round. A measurement stays in force, as the distance e, until
+    /// the next one or [`Controller::release`], so that a sensor may be slower than the loop. `coupling` adds c_v to the velocity and c_a to the acceleration. Over the tick the
+    /// pull is the velocity (1 − exp(−k_t h))/dt of d at its start, h being the tick on the clock: however long
     /// the tick, it pulls no further than ỹ.
     ///
     /// Phase stopping and the pull: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
@@ -367,6 +397,11 @@ impl Controller {
     /// Time constant commanded, in seconds.
     pub fn tau(&self) -> f64 {
         self.conditions.tau
+    }
+
+    /// Speed commanded: share of the rate 1/τ at which the path is followed.
+    pub fn speed(&self) -> f64 {
+        self.speed
     }
 
     /// Gains k_s and k_t of a measured position.

@@ -6,11 +6,13 @@ use crate::error::{Error, Result};
 use crate::landscape::{Fade, Landscape, Place};
 use crate::lanes::{Lanes, Real, Register, flush, unpack};
 use crate::perturbation::Push;
-use crate::phase::{Canonical, CompensatedSum, amplitude};
+use crate::phase::{Canonical, CompensatedSum, amplitude, faded};
 use crate::transport::Lag;
 
 /// Most pieces of a tick; a longer one is still stable, only less exact.
 const MOST_PIECES: f64 = 1000.0;
+/// Lowest rate, relative to the nominal one, at which terms of the user's own act in full.
+const LEAST_RATE: f64 = 1e-6;
 /// Longest tick, in units of τ.
 const LONGEST_TICK: f64 = 1000.0;
 
@@ -21,7 +23,7 @@ pub(super) struct Forcing {
     pub(super) shape: Lanes,
     /// Its derivative with respect to the phase's clock.
     slope: Lanes,
-    /// ṡᵀb, per second.
+    /// ṡᵀb, per second at the nominal rate.
     swing: Lanes,
 }
 
@@ -37,7 +39,7 @@ impl Forcing {
     }
 }
 
-/// What turns a [`Forcing`] into w = r·sᵀb and its slope along the motion, w′ = rκ·sᵀb′ + r/ρ·ṡᵀb + r′·sᵀb. Past the
+/// What turns a [`Forcing`] into w = r·sᵀb and its slope along the motion, w′ = rκ·sᵀb′ + rτ_n·ṡᵀb + r′·sᵀb. Past the
 /// end of a discrete movement r stands for the fading phase, and b for what is faded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gate {
@@ -48,8 +50,6 @@ pub(super) struct Gate {
     growth: f64,
     /// ρ and ρ̇.
     rate: [f64; 2],
-    /// 1/ρ.
-    tau: f64,
 }
 
 impl Gate {
@@ -76,7 +76,7 @@ fn carried<T: Real>(w: Jet<T>, way: T, [slope, bend]: [f64; 2]) -> Jet<T> {
 impl Controller {
     /// Checks that a tick is not too long for the rates at which it starts and to which it goes.
     pub(super) fn check_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
-        let commanded = tau.map_or(first(self.rate.target()), |tau| 1.0 / tau);
+        let commanded = tau.map_or(first(self.rate.target()), |tau| self.speed / tau);
         let at_once = !self.started || self.filter.immediate();
         let fastest = if at_once { commanded } else { commanded.max(first(self.rate.value())) };
         if dt * fastest > LONGEST_TICK {
@@ -88,10 +88,15 @@ impl Controller {
     /// One tick of `dt` seconds, `h` on the clock.
     pub(super) fn tick(&mut self, dt: f64, h: f64) -> Status {
         self.started = true;
-        let moving = !(self.style.settled() && self.rate.settled());
-        let mut parts = (h / self.finest).max(if moving { self.filter.parts(dt) } else { 0.0 });
+        let mut parts = h / self.finest;
+        if !(self.style.settled() && self.amplitude.settled()) {
+            parts = parts.max(self.filter.parts(h * self.model.tau()));
+        }
         if !self.centre.settled() {
-            parts = parts.max(self.centre_filter.parts(dt));
+            parts = parts.max(self.centre_filter.parts(h * self.model.tau()));
+        }
+        if !self.rate.settled() {
+            parts = parts.max(self.filter.parts(dt));
         }
         if parts <= 1.0 {
             self.piece(dt, h);
@@ -120,11 +125,19 @@ impl Controller {
         self.rate.integral(&self.glide)
     }
 
-    /// Gets the filters ready for `dt` seconds.
+    /// Gets the filter of the rate ready for `dt` seconds.
     fn measure(&mut self, dt: f64) {
         if dt != self.glide.dt() {
             self.glide = self.filter.glide(dt);
-            self.centre_glide = self.centre_filter.glide(dt);
+        }
+    }
+
+    /// Gets the filters on the clock ready for a stretch `h` of it.
+    #[inline(always)]
+    fn measure_clock(&mut self, h: f64) {
+        let seconds = h * self.model.tau();
+        if seconds != self.course.dt() && !(self.style.settled() && self.centre.settled() && self.amplitude.settled()) {
+            (self.course, self.centre_course) = (self.filter.pass(seconds), self.centre_filter.pass(seconds));
         }
     }
 
@@ -152,8 +165,12 @@ impl Controller {
     }
 
     /// Moves on by `dt` seconds, `h` on the clock.
-    fn advance(&mut self, dt: f64, h: f64) {
+    pub(super) fn advance(&mut self, dt: f64, h: f64) {
         if h <= 0.0 {
+            // A pause: nothing moves but the rate.
+            self.measure(dt);
+            self.rate.advance::<Lanes>(&self.glide);
+            self.held.rest();
             return self.read_out();
         }
         #[cfg(target_arch = "x86_64")]
@@ -167,6 +184,7 @@ impl Controller {
     #[inline(always)]
     pub(super) fn advance_in<T: Register>(&mut self, dt: f64, h: f64) {
         self.measure(dt);
+        self.measure_clock(h);
         if h != self.propagator.step() {
             self.propagator = self.series.propagator::<T>(h);
         }
@@ -177,13 +195,20 @@ impl Controller {
             let Jet { value, slope } = before.jet::<T>(forcing);
             *from = Jet { value: value.store(), slope: slope.store() };
         }
-        self.style.advance::<T>(&self.glide);
+        self.style.advance::<T>(&self.course);
         self.rate.advance::<T>(&self.glide);
-        let moving = self.centre.elapse(&self.centre_glide);
+        let moving = self.centre.elapse(&self.centre_course);
         self.clock.add(self.held.pace() * h);
         if let Canonical::Rhythmic { mu } = self.model.canonical() {
             self.clock.wrap();
-            self.r = amplitude(mu, self.r, self.conditions.amplitude, h);
+            self.r = if self.amplitude.settled() {
+                amplitude(mu, self.r, self.conditions.amplitude, h)
+            } else {
+                let (tau, dt) = (self.model.tau(), self.course.dt());
+                let r = faded(self.filter.lag(&self.amplitude, self.r, mu / tau, dt));
+                self.amplitude.advance::<T>(&self.course);
+                r
+            };
         }
         if !self.stretch.reaches(self.clock.value()) {
             self.stretch = self.model.transport.stretch(self.clock.value());
@@ -199,7 +224,7 @@ impl Controller {
         let place = if demonstrated { landscape.place_within(clock) } else { landscape.place(clock) };
         let style = unpack(self.style.value(), model.n_styles());
         let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
-        let (n, rest) = (self.forcing.len(), T::splat(self.rest));
+        let (n, rest, nominal) = (self.forcing.len(), T::splat(self.rest), model.tau());
         let (forcing, centre) = (&mut self.forcing[..n], &mut self.centre);
         let (starts, way) = (&self.from[..n], &self.way[..n]);
         let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
@@ -215,10 +240,10 @@ impl Controller {
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
-                let set_out = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * before.tau };
-                centre.advance_group::<T>(group, &self.centre_glide);
+                let set_out = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * nominal };
+                centre.advance_group::<T>(group, &self.centre_course);
                 let arrived = T::load(&centre.value()[group]);
-                let slope = T::load(&centre.rate()[group]) * after.tau;
+                let slope = T::load(&centre.rate()[group]) * nominal;
                 let moved = propagator.follow([set_out, Jet { value: arrived - goal, slope }]);
                 y = y + moved.e;
                 origin = arrived + way * lags[1];
@@ -253,9 +278,12 @@ impl Controller {
     /// centre must move to add τ² to the row of Eq. (1).
     fn levers(&self) -> [Jet; 2] {
         let Attractor { alpha_z, beta_z } = self.model.attractor();
-        let (tau, rate) = (1.0 / first(self.rate.value()), first(self.rate.rate()));
+        // On the way into a pause the terms fade with it once τ lies beyond all that can be commanded.
+        let least = LEAST_RATE / self.model.tau();
+        let (rate, change) = (first(self.rate.value()), first(self.rate.rate()));
+        let tau = 1.0 / rate.max(least);
         // dτ/du = τ·dτ/dt.
-        let slope = -rate * tau.powi(3);
+        let slope = if rate < least { 0.0 } else { -change * tau.powi(3) };
         let centre = tau / (alpha_z * beta_z);
         [Jet { value: tau, slope }, Jet { value: tau * centre, slope: 2.0 * slope * centre }]
     }
@@ -279,10 +307,9 @@ impl Controller {
         let (r, rate) = (self.r, [self.rate.value(), self.rate.rate()].map(first));
         let growth = match self.model.canonical() {
             Canonical::Discrete { .. } => 0.0,
-            Canonical::Rhythmic { mu } => mu * (self.conditions.amplitude - r),
+            Canonical::Rhythmic { mu } => mu * (first(self.amplitude.value()) - r),
         };
-        let tau = 1.0 / rate[0];
-        Gate { r, along: r * self.held.pace(), swing: r * tau, growth, rate, tau }
+        Gate { r, along: r * self.held.pace(), swing: r * self.model.tau(), growth, rate }
     }
 
     /// m′ and m″ with respect to the output system's clock, from those with respect to the phase's.
