@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::{Matrix, Reduced, Vector, matrix, optional, shown_context, to_numpy};
+use crate::convert::{Matrix, Reduced, Vector, matrix, optional, shown_context, texts, to_numpy};
 use crate::error::raise;
 
 /// One recorded movement.
@@ -47,8 +47,8 @@ impl Demonstration {
         time: Option<&Bound<'_, PyAny>>,
         goal: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
-        names: Option<Vec<String>>,
-        units: Option<Vec<String>>,
+        names: Option<&Bound<'_, PyAny>>,
+        units: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let sampling = match (dt, optional("time", time)?) {
             (Some(_), Some(_)) => return Err(PyValueError::new_err("pass dt or time, not both")),
@@ -65,10 +65,10 @@ impl Demonstration {
             demo = demo.with_context(crate::convert::context("context", values)?).map_err(raise)?;
         }
         if let Some(names) = names {
-            demo = demo.with_names(names).map_err(raise)?;
+            demo = demo.with_names(texts("names", names)?).map_err(raise)?;
         }
         if let Some(units) = units {
-            demo = demo.with_units(units).map_err(raise)?;
+            demo = demo.with_units(texts("units", units)?).map_err(raise)?;
         }
         Ok(Self(demo))
     }

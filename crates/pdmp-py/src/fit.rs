@@ -1,5 +1,6 @@
 //! Learning, called from Python.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use ndarray::{Array2, ArrayD, Axis, Ix2};
@@ -13,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
 use crate::basis::{Gp, NGnet};
-use crate::convert::{array, count, matrix, numbers};
+use crate::convert::{array, count, items, matrix, numbers};
 use crate::demo::Demonstration;
 use crate::error::{detached, raise};
 use crate::model::Model;
@@ -191,19 +192,15 @@ fn demonstrations(demos: &Bound<'_, PyAny>) -> PyResult<Vec<pdmp_core::Demonstra
         }
         return stack.axis_iter(Axis(0)).enumerate().map(|(m, demo)| unrated(m, demo.to_owned())).collect();
     }
-    let items = demos.try_iter().map_err(|_| {
-        PyTypeError::new_err("demos must be a list of demonstrations or arrays, or an array of shape (M, T, D)")
-    })?;
-    items
-        .enumerate()
-        .map(|(m, item)| {
-            let item = item?;
-            match item.cast::<Demonstration>() {
-                Ok(demo) => Ok(demo.get().0.clone()),
-                Err(_) => unrated(m, array(&format!("demo {m}: position"), &item)?),
-            }
-        })
-        .collect()
+    if demos.try_iter().is_err() {
+        let wanted = "demos must be a list of demonstrations or arrays, or an array of shape (M, T, D)";
+        return Err(PyTypeError::new_err(wanted));
+    }
+    let m = Cell::new(0);
+    items("demos", demos, |_, item| match (item.cast::<Demonstration>(), m.replace(m.get() + 1)) {
+        (Ok(demo), _) => Ok(demo.get().0.clone()),
+        (Err(_), m) => unrated(m, array(&format!("demo {m}: position"), item)?),
+    })
 }
 
 /// A demonstration from a bare array (T, D), whose rate the fit is told.

@@ -3,9 +3,10 @@
 use numpy::IntoPyArray;
 use pdmp_core::recording;
 use pdmp_core::recording::Keep;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::convert::{Matrix, Vector, matrix, to_numpy, vector};
+use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
 use crate::demo::Demonstration;
 use crate::error::raise;
 
@@ -172,11 +173,12 @@ pub(crate) fn fill<'py>(
     py: Python<'py>,
     position: &Bound<'py, PyAny>,
     time: &Bound<'py, PyAny>,
-    names: Vec<String>,
-    turns: Vec<f64>,
+    names: &Bound<'py, PyAny>,
+    turns: &Bound<'py, PyAny>,
     max_gap: f64,
 ) -> PyResult<Matrix<'py>> {
     let (position, time) = (matrix("position", "(T, D)", position)?, vector("time", time)?);
+    let (names, turns) = (texts("names", names)?, vector("turns", turns)?);
     let filled = recording::fill(position, &time, &names, &turns, max_gap).map_err(raise)?;
     Ok(filled.into_pyarray(py))
 }
@@ -190,13 +192,15 @@ type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<usize>, Vec<Rejected>);
 #[pyfunction]
 pub(crate) fn cycles<'py>(
     py: Python<'py>,
-    recordings: Vec<Demonstration>,
-    events: Option<Vec<Bound<'py, PyAny>>>,
+    recordings: &Bound<'py, PyAny>,
+    events: Option<&Bound<'py, PyAny>>,
     average: bool,
 ) -> PyResult<Found<'py>> {
-    let recordings: Vec<_> = recordings.into_iter().map(|demo| demo.0).collect();
-    let vectors = |events: Vec<Bound<'py, PyAny>>| events.iter().map(|times| vector("events", times)).collect();
-    let events: Option<Vec<Vec<f64>>> = events.map(vectors).transpose()?;
+    let recordings = items("recordings", recordings, |name, item| match item.cast::<Demonstration>() {
+        Ok(demo) => Ok(demo.get().0.clone()),
+        Err(_) => Err(PyTypeError::new_err(format!("{name} is not a Demonstration"))),
+    })?;
+    let events = events.map(|events| items("events", events, vector)).transpose()?;
     let keep = if average { Keep::Mean } else { Keep::Each };
     let found = py.detach(|| recording::cycles(&recordings, events.as_deref(), keep)).map_err(raise)?;
     let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
