@@ -126,6 +126,11 @@ impl Reader<'_> {
         if timings.iter().any(|seconds| *seconds <= 0.0) {
             return Err(bad("a time is not positive"));
         }
+        // What a fit makes so: movements of default length and rate then have the number of samples that dt promises.
+        let share = timings.row(constants.nominal).sum() / (constants.tau * constants.canonical.extent());
+        if !((1.0 - 1e-6)..=(1.0 + 1e-6)).contains(&share) {
+            return Err(bad("tau does not agree with the nominal duration"));
+        }
         let demonstrated = Demonstrated {
             styles: self.matrix("styles", (n_demos, n_styles))?,
             goals: self.matrix("goals", (n_demos, n_dofs))?,
