@@ -1,4 +1,4 @@
-"""Lengths that lie, arrays of many holders, recursion without end, files that cost more than they promise."""
+"""Lengths that lie, arrays of many holders, endless recursion, costly files."""
 
 import errno
 import json
@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pdmp._native import Model
 
 import pdmp
+from pdmp._native import Model
 
 S = np.linspace(0, 1, 51)
 REACHES = [np.column_stack([S**2 * (3 - 2 * S), h * S * (1 - S)]) for h in (0.0, 0.3, 0.6)]
