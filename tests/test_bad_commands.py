@@ -178,7 +178,7 @@ def test_bad_command_leaves_the_loop_as_it_was(
         assert np.isfinite(disturbed.position).all()
 
 
-@pytest.mark.parametrize("dt", [0.0, -0.01, NAN, INF, 1e9])
+@pytest.mark.parametrize("dt", [-0.01, NAN, INF, 1e9])
 def test_bad_tick_leaves_the_state_as_it_was(discrete: pdmp.Model, dt: float) -> None:
     """A tick that is refused moves nothing."""
     controller = discrete.controller(0.01)

@@ -3,6 +3,7 @@
 import errno
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,7 +24,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield path
         return
     place = path.resolve()
-    draft = place.with_name(f".{place.name}.{os.getpid()}.draft")
+    # No two threads share a draft, and a long name stays short enough for the file system.
+    draft = place.with_name(f".pdmp-{os.getpid()}-{threading.get_ident()}.draft")
     try:
         yield draft
         if place.exists():

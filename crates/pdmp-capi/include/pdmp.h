@@ -111,11 +111,11 @@ typedef struct {
     const double *tau;
 } pdmp_conditions;
 
-/// Room for numbers; `{NULL, 0}` if they are not wanted.
+/// Room for numbers; `{NULL, 0}` if they are not wanted. More room than needed is left as it is.
 typedef struct {
     /// Where the first number goes.
     double *data;
-    /// How many there is room for.
+    /// How many there is room for, at least as many as are written.
     size_t length;
 } pdmp_buffer;
 

@@ -18,13 +18,13 @@ pub struct pdmp_vector {
     pub length: usize,
 }
 
-/// Room for numbers; `{NULL, 0}` if they are not wanted.
+/// Room for numbers; `{NULL, 0}` if they are not wanted. More room than needed is left as it is.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_buffer {
     /// Where the first number goes.
     pub data: *mut f64,
-    /// How many there is room for.
+    /// How many there is room for, at least as many as are written.
     pub length: usize,
 }
 
@@ -48,20 +48,12 @@ pub struct pdmp_memory {
     pub size: usize,
 }
 
-/// Whether a pair is given, with the length it must have. Checked before anything is read or written: a wrong length
-/// reaches memory that is not the caller's.
-fn given<T>(
-    data: *const T,
-    found: usize,
-    name: &'static str,
-    expected: usize,
-    per: &'static str,
-) -> Result<bool, Fault> {
-    match (data.is_null(), found) {
-        (true, 0) => Ok(false),
+/// Whether a pair is given: `Some` length, or none for `{NULL, 0}`.
+fn given<T>(data: *const T, length: usize, name: &'static str) -> Result<Option<usize>, Fault> {
+    match (data.is_null(), length) {
+        (true, 0) => Ok(None),
         (true, _) => Err(Fault::Null(name)),
-        (false, _) if found != expected => Err(Error::Length { name, expected, found, per }.into()),
-        (false, _) => Ok(true),
+        (false, found) => Ok(Some(found)),
     }
 }
 
@@ -78,9 +70,13 @@ impl pdmp_vector {
         expected: usize,
         per: &'static str,
     ) -> Result<Option<&'a [f64]>, Fault> {
-        let given = given(self.data, self.length, name, expected, per)?;
-        // SAFETY: it is not NULL, and the caller promises the rest.
-        Ok(given.then(|| unsafe { std::slice::from_raw_parts(self.data, self.length) }))
+        // Checked before anything is read: a wrong length reaches memory that is not the caller's.
+        match given(self.data, self.length, name)? {
+            None => Ok(None),
+            Some(found) if found != expected => Err(Error::Length { name, expected, found, per }.into()),
+            // SAFETY: it is not NULL, and the caller promises the rest.
+            Some(length) => Ok(Some(unsafe { std::slice::from_raw_parts(self.data, length) })),
+        }
     }
 
     /// The numbers, which must be told.
@@ -101,7 +97,10 @@ impl pdmp_vector {
 impl pdmp_buffer {
     /// Checks that there is room for one number per `per`, if they are wanted.
     pub(crate) fn check(self, name: &'static str, expected: usize, per: &'static str) -> Result<(), Fault> {
-        given(self.data, self.length, name, expected, per).map(drop)
+        match given(self.data, self.length, name)? {
+            Some(found) if found < expected => Err(Error::Length { name, expected, found, per }.into()),
+            _ => Ok(()),
+        }
     }
 
     /// Writes the numbers, if they are wanted.

@@ -26,12 +26,25 @@ fn run(process: &mut Process) -> Output {
     process.output().unwrap_or_else(|error| panic!("{:?} is needed for this test: {error}", process.get_program()))
 }
 
+/// The version of the interface: before 1.0 every minor version has its own.
+fn interface() -> String {
+    match env!("CARGO_PKG_VERSION_MAJOR") {
+        "0" => format!("0.{}", env!("CARGO_PKG_VERSION_MINOR")),
+        major => major.to_string(),
+    }
+}
+
 /// Builds a program with either library, runs both in `folder`, and returns what they print.
 fn prints(compiler: [&str; 2], source: &Path, folder: &Path, arguments: &[&str]) -> [String; 2] {
     // Cargo puts the libraries beside the tests that it builds.
     let libraries = std::env::current_exe().unwrap().parent().unwrap().to_path_buf();
+    // A program asks for the library by the version of its interface.
+    let link = folder.join(format!("libpdmp.so.{}", interface()));
+    if !link.exists() {
+        std::os::unix::fs::symlink(libraries.join("libpdmp.so"), &link).unwrap();
+    }
     let search = format!("-L{}", libraries.display());
-    let found_at_run_time = format!("-Wl,-rpath,{}", libraries.display());
+    let found_at_run_time = format!("-Wl,-rpath,{}", folder.canonicalize().unwrap().display());
     let archive = libraries.join("libpdmp.a").display().to_string();
     let links: [&[&str]; 2] = [&[&archive, "-lpthread", "-ldl", "-lm"], &[&search, "-lpdmp", &found_at_run_time]];
     links.map(|link| {

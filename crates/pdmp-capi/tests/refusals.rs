@@ -222,7 +222,7 @@ fn a_refused_command_changes_nothing_and_says_why() {
     assert_eq!(pdmp_controller_step(running.handle()), PDMP_WORKING);
     let before = running.state(3);
     let (three, two, nan) = ([0.5; 3], [0.5; 2], [0.5, f64::NAN, 0.5]);
-    let (huge, zero) = (usize::MAX, 0.0);
+    let (huge, before_now) = (usize::MAX, -1e-3);
     let none = NO_COMMAND;
     let half = pdmp_coupling { velocity: vector(&three), acceleration: NOTHING };
     for (command, status, text) in [
@@ -238,7 +238,7 @@ fn a_refused_command_changes_nothing_and_says_why() {
             &format!("style has length 9, expected {}: one value per style dimension", info(&model).n_styles),
         ),
         (pdmp_command { goal: vector(&nan), ..none }, PDMP_RANGE, "goal[1] = NaN: every number must be finite"),
-        (pdmp_command { dt: &zero, ..none }, PDMP_RANGE, "dt = 0: must be positive and finite"),
+        (pdmp_command { dt: &before_now, ..none }, PDMP_RANGE, "dt = -0.001: must be finite and not negative"),
         (
             pdmp_command { anchor: vector(&three), ..none },
             PDMP_ABSENT,
@@ -409,6 +409,12 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
         unsafe {
             let place = Some(&mut told);
             assert_eq!(pdmp_model_demonstration(Some(&model), demos.len(), place, room, UNWANTED), PDMP_RANGE);
+            let mut more = vec![f64::NAN; room.length + 3];
+            assert_eq!(
+                pdmp_model_demonstration(Some(&model), 0, Some(&mut told), buffer(&mut more), UNWANTED),
+                PDMP_OK
+            );
+            assert!(more[room.length..].iter().all(|number| number.is_nan()));
             let short = pdmp_buffer { length: room.length - 1, ..room };
             assert_eq!(pdmp_model_demonstration(Some(&model), 0, Some(&mut told), short, UNWANTED), PDMP_LENGTH);
             let predicted = pdmp_model_predict(Some(&model), vector(&[0.2]), Some(&mut told), room, UNWANTED);

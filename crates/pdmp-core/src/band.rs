@@ -121,7 +121,11 @@ impl Model {
             .map_err(|_| Error::Arguments("no degree of freedom is left"))?;
         let quantile = student.inverse_cdf(0.5 * (1.0 + level));
         let width = width.mapv(|variance| quantile * variance.sqrt());
-        Ok([&centre - &width, &centre + &width])
+        let bounds = [&centre - &width, &centre + &width];
+        if bounds.iter().flatten().any(|bound| !bound.is_finite()) {
+            return Err(Error::Arguments("the prediction varies so much that its band overflows"));
+        }
+        Ok(bounds)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the caller owns of a tick: what is commanded, and where the motion is written.
 
 use crate::conditions::{check_amplitude, check_style, check_tau, refuse};
-use crate::error::{Error, Result, check_positive, check_vector};
+use crate::error::{Error, Result, check_vector};
 use crate::model::Model;
 use crate::phase::Kind;
 
@@ -12,7 +12,8 @@ use crate::phase::Kind;
 /// tick alone.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Command<'a> {
-    /// Length of this tick, in seconds, if it differs from the controller's.
+    /// Length of this tick, in seconds, if it differs from the controller's. In a tick of length zero commands take effect
+    /// as between ticks, and nothing moves.
     pub dt: Option<f64>,
     /// Style s (J,) to go to.
     pub style: Option<&'a [f64]>,
@@ -59,7 +60,9 @@ impl Command<'_> {
             None => Ok(()),
         };
         if let Some(dt) = self.dt {
-            check_positive("dt", dt)?;
+            if !(0.0..f64::INFINITY).contains(&dt) {
+                return Err(Error::Range { name: "dt", value: dt, allowed: "must be finite and not negative" });
+            }
         }
         if let Some(style) = self.style {
             check_style(style, model.n_styles())?;

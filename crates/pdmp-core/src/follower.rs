@@ -14,6 +14,8 @@ const SETTLING: f64 = 6.638_352_067_993_813;
 const FINEST: f64 = 0.07;
 /// Most parts of a tick for a transition's sake.
 const MOST_PARTS: f64 = 32.0;
+/// Shortest transition, in seconds, that is filtered: a shorter one, whose ω² leaves the range of numbers, is immediate.
+const MIN_TRANSITION: f64 = 1e-15;
 /// After so long, times ω, what is left of a step lies far below rounding.
 const FORGOTTEN: f64 = 45.0;
 
@@ -41,6 +43,7 @@ pub(crate) struct Glide {
 impl Filter {
     /// `transition` is the time to 99 % in seconds, 0 for an immediate switch.
     pub(crate) fn new(transition: f64) -> Self {
+        let transition = if transition < MIN_TRANSITION { 0.0 } else { transition };
         Self { omega: SETTLING / transition, forgets: FORGOTTEN / SETTLING * transition }
     }
 

@@ -17,6 +17,11 @@ use crate::responses::Cache;
 use crate::smooth::Noise;
 use crate::transport::Transport;
 
+/// Largest rate α_z, β_z, α_x or μ, and the inverse of the smallest: products of several stay finite.
+pub(crate) const MAX_RATE: f64 = 1e6;
+/// Largest time constant, in seconds, and the inverse of the smallest: rates and their squares stay finite.
+pub(crate) const MAX_TAU: f64 = 1e12;
+
 /// What was learnt from each demonstration, in absolute coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Demonstrated {

@@ -98,6 +98,7 @@ proptest! {
                     amplitude: conditions.amplitude,
                     tau,
                     timing: None,
+                    phase: None,
                 };
                 let mut controller = Controller::new(Arc::clone(model), dt, &one, Some(0.0)).unwrap();
                 let mut stepped = [(); 3].map(|()| Array2::zeros((made[0].len_of(Axis(1)), n)));
@@ -215,6 +216,7 @@ fn jacobians_are_differences_of_rollouts() {
                 amplitude: Some(if discrete { 1.0 } else { 0.7 }),
                 tau: Some(1.4 * model.tau()),
                 timing: None,
+                phase: None,
             };
             let rollout = |conditions: &Conditions| model.rollout(conditions, timing(0.01, 1.5)).unwrap();
             let centre = if discrete { Variable::Goal } else { Variable::Anchor };

@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::convert::{Cube, array, count, matrix, threads, writable};
+use crate::convert::{Cube, array, count, items, matrix, threads, writable};
 use crate::error::{interruptible, raise};
 use crate::model::Model;
 
@@ -73,14 +73,14 @@ impl Model {
         dt: f64,
         duration: Option<f64>,
         derivatives: isize,
-        out: Option<Vec<Bound<'py, PyAny>>>,
+        out: Option<&Bound<'py, PyAny>>,
         threads: Option<isize>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let arguments = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
         let work = Work::new(py, self, arguments, Timing { dt, duration }, derivatives, threads)?;
         let movements = 0..work.batch.shape().0;
         let out = match out {
-            Some(out) => work.check(&movements, &out)?,
+            Some(out) => work.check(&movements, &items("out", out, |_, array| Ok(array.clone()))?)?,
             None => work.allocate(py, &movements)?,
         };
         work.write(py, movements, out)

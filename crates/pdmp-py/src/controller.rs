@@ -1,13 +1,17 @@
 //! The real-time loop in Python.
 
-use numpy::{PyArray1, PyArrayMethods};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use ndarray::ArrayView1;
+use numpy::PyArray1;
+use numpy::npyffi::{_PyArray_GET_ITEM_DATA, NPY_ARRAY_WRITEABLE};
 use pdmp_core::{Command, Coupling, Kind};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyFloat;
 
 use crate::conditions::Arguments;
-use crate::convert::{Reduced, Vector, refill, to_numpy};
+use crate::convert::{Reduced, Vector, read_only, refill};
 use crate::error::raise;
 
 /// Whether a movement goes on (`WORKING`, 1) or has settled on its goal (`FINISHED`, 2, and false).
@@ -36,26 +40,37 @@ impl Status {
     }
 }
 
-/// A vector that the loop writes and the user reads without a copy: a read-only array over memory that numpy does not
-/// own, so that it can neither be made writable nor resized.
-struct Output(Py<PyArray1<f64>>);
+/// The bits of numbers that the loop writes while arrays over them are read.
+#[pyclass(frozen, module = "pdmp._native")]
+struct Memory(Box<[AtomicU64]>);
+
+/// A vector that the loop writes and the user reads without a copy: each access gives a read-only array of its own, so
+/// that who reshapes it changes it for nobody else, over memory that numpy does not own, so that it can neither be made
+/// writable nor resized.
+struct Output(Py<Memory>);
 
 impl Output {
     fn new(py: Python<'_>, length: usize) -> PyResult<Self> {
-        let array = PyArray1::from_vec(py, vec![0.0; length]);
-        array.call_method("setflags", (false,), None)?;
-        Ok(Self(array.unbind()))
+        Py::new(py, Memory((0..length).map(|_| AtomicU64::new(0)).collect())).map(Self)
+    }
+
+    fn write(&self, values: &[f64]) {
+        for (place, value) in self.0.get().0.iter().zip(values) {
+            place.store(value.to_bits(), Relaxed);
+        }
     }
 
     #[allow(unsafe_code)]
-    fn write(&self, py: Python<'_>, values: &[f64]) {
-        let data = self.0.bind(py).data();
-        // SAFETY: `new` made the array contiguous and as long as the movement has DoFs; no Rust reference to it exists.
-        unsafe { data.copy_from_nonoverlapping(values.as_ptr(), values.len()) }
-    }
-
-    fn view(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
-        self.0.clone_ref(py)
+    fn view<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        let memory = &self.0.get().0;
+        // SAFETY: the memory has this length, is never moved, and lives as long as the array, whose base it is. Atomic
+        // integers have the layout of doubles. The array is new, so that nobody has written through it.
+        unsafe {
+            let numbers = ArrayView1::from_shape_ptr(memory.len(), memory.as_ptr().cast::<f64>());
+            let array = PyArray1::borrow_from_array(&numbers, self.0.bind(py).clone().into_any());
+            (*_PyArray_GET_ITEM_DATA(array.as_ptr().cast())).flags &= !NPY_ARRAY_WRITEABLE;
+            array
+        }
     }
 }
 
@@ -99,19 +114,19 @@ impl Controller {
             given: Given::default(),
             inner,
         };
-        controller.publish(py);
+        controller.publish();
         Ok(controller)
     }
 
-    fn publish(&self, py: Python<'_>) {
-        self.position.write(py, self.inner.position());
-        self.velocity.write(py, self.inner.velocity());
-        self.acceleration.write(py, self.inner.acceleration());
+    fn publish(&self) {
+        self.position.write(self.inner.position());
+        self.velocity.write(self.inner.velocity());
+        self.acceleration.write(self.inner.acceleration());
     }
 
     /// A command may hold from the start, and then changes what is shown.
-    fn command(&mut self, py: Python<'_>, result: pdmp_core::Result<()>) -> PyResult<()> {
-        self.publish(py);
+    fn command(&mut self, result: pdmp_core::Result<()>) -> PyResult<()> {
+        self.publish();
         result.map_err(raise)
     }
 }
@@ -134,7 +149,7 @@ impl Controller {
     /// Parameters
     /// ----------
     /// dt : float, optional
-    ///     Length of this tick in s, if it differs from the controller's.
+    ///     Length of this tick in s, if it differs from the controller's. A tick of length zero changes nothing.
     /// measured : array_like (D,), optional
     ///     Position m at which the robot is, in the unit of each DoF; the error of an angle (rad, deg, °) is taken the
     ///     short way round. None is no new measurement: the last distance m - y stays in force until the next one or
@@ -150,7 +165,7 @@ impl Controller {
     /// Raises
     /// ------
     /// ValueError
-    ///     A tick that is not positive or longer than 1000 tau, a wrong length, or a number that is not finite; the
+    ///     A tick that is negative or longer than 1000 tau, a wrong length, or a number that is not finite; the
     ///     state then stays as it was.
     ///
     /// References
@@ -182,7 +197,7 @@ impl Controller {
             ..Command::default()
         };
         inner.step_with(&command).map_err(raise)?;
-        self.publish(py);
+        self.publish();
         Ok(self.status(py))
     }
 
@@ -261,7 +276,6 @@ impl Controller {
     #[allow(clippy::too_many_arguments)]
     fn reset(
         &mut self,
-        py: Python<'_>,
         style: Option<&Bound<'_, PyAny>>,
         goal: Option<&Bound<'_, PyAny>>,
         start: Option<&Bound<'_, PyAny>>,
@@ -276,24 +290,24 @@ impl Controller {
         let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
         let conditions = arguments.in_context(self.inner.model(), context)?;
         let result = self.inner.reset(&conditions);
-        self.command(py, result)
+        self.command(result)
     }
 
     /// Position y (D,): a read-only view.
     #[getter]
-    fn position(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+    fn position<'py>(&self, py: Python<'py>) -> Vector<'py> {
         self.position.view(py)
     }
 
     /// Velocity (D,) per s: a read-only view.
     #[getter]
-    fn velocity(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+    fn velocity<'py>(&self, py: Python<'py>) -> Vector<'py> {
         self.velocity.view(py)
     }
 
     /// Acceleration (D,) per s²: a read-only view.
     #[getter]
-    fn acceleration(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+    fn acceleration<'py>(&self, py: Python<'py>) -> Vector<'py> {
         self.acceleration.view(py)
     }
 
@@ -318,43 +332,43 @@ impl Controller {
         self.inner.time()
     }
 
-    /// Goal g (D,), discrete.
+    /// Goal g (D,), discrete: a read-only copy, to be set as a whole.
     #[getter]
     fn goal<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
         self.centre(py, Kind::Discrete, "a rhythmic primitive has no goal; it has an anchor")
     }
 
     #[setter]
-    fn set_goal(&mut self, py: Python<'_>, goal: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_goal(&mut self, goal: &Bound<'_, PyAny>) -> PyResult<()> {
         refill("goal", goal, &mut self.given.command)?;
         let result = self.inner.set_goal(&self.given.command);
-        self.command(py, result)
+        self.command(result)
     }
 
-    /// Style s (J,).
+    /// Style s (J,): a read-only copy, to be set as a whole.
     #[getter]
-    fn style<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        to_numpy(py, self.inner.style())
+    fn style<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
+        read_only(py, self.inner.style())
     }
 
     #[setter]
-    fn set_style(&mut self, py: Python<'_>, style: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_style(&mut self, style: &Bound<'_, PyAny>) -> PyResult<()> {
         refill("style", style, &mut self.given.command)?;
         let result = self.inner.set_style(&self.given.command);
-        self.command(py, result)
+        self.command(result)
     }
 
-    /// Anchor y_a (D,), rhythmic.
+    /// Anchor y_a (D,), rhythmic: a read-only copy, to be set as a whole.
     #[getter]
     fn anchor<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
         self.centre(py, Kind::Rhythmic, "a discrete primitive has no anchor; it has a goal")
     }
 
     #[setter]
-    fn set_anchor(&mut self, py: Python<'_>, anchor: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_anchor(&mut self, anchor: &Bound<'_, PyAny>) -> PyResult<()> {
         refill("anchor", anchor, &mut self.given.command)?;
         let result = self.inner.set_anchor(&self.given.command);
-        self.command(py, result)
+        self.command(result)
     }
 
     /// Time constant in s.
@@ -364,9 +378,9 @@ impl Controller {
     }
 
     #[setter]
-    fn set_tau(&mut self, py: Python<'_>, tau: f64) -> PyResult<()> {
+    fn set_tau(&mut self, tau: f64) -> PyResult<()> {
         let result = self.inner.set_tau(tau);
-        self.command(py, result)
+        self.command(result)
     }
 
     /// Amplitude r₀, rhythmic; 1 where discrete.
@@ -376,9 +390,9 @@ impl Controller {
     }
 
     #[setter]
-    fn set_amplitude(&mut self, py: Python<'_>, amplitude: f64) -> PyResult<()> {
+    fn set_amplitude(&mut self, amplitude: f64) -> PyResult<()> {
         let result = self.inner.set_amplitude(amplitude);
-        self.command(py, result)
+        self.command(result)
     }
 
     /// Speed: the share of the rate 1 / tau at which the path is followed. 0 pauses on the path, 1 goes on; a change
@@ -391,7 +405,7 @@ impl Controller {
     #[setter]
     fn set_speed(&mut self, py: Python<'_>, speed: f64) -> PyResult<()> {
         let result = self.inner.set_speed(speed);
-        self.command(py, result)
+        self.command(result)
     }
 
     /// Gains (k_s, k_t) of a measured position: how much it stops the phase, and pulls per unit of u. 0 is without.
@@ -418,7 +432,7 @@ impl Controller {
     /// Forget the measured position: no robot follows any more, until the next one is measured.
     fn release(&mut self, py: Python<'_>) {
         self.inner.release();
-        self.publish(py);
+        self.publish();
     }
 
     fn __repr__(&self) -> String {
@@ -432,6 +446,6 @@ impl Controller {
         if self.inner.model().kind() != kind {
             return Err(PyValueError::new_err(other));
         }
-        Ok(to_numpy(py, self.inner.centre()))
+        read_only(py, self.inner.centre())
     }
 }

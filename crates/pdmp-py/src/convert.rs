@@ -1,17 +1,21 @@
 //! Arrays across the border: anything numpy can turn into float64 comes in, float64 goes out.
 
-use ndarray::{Array1, Array2, ArrayD, ArrayView2, Ix1, Ix2};
+use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
 use numpy::{
-    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayLikeDyn, PyArrayMethods,
-    PyUntypedArray, PyUntypedArrayMethods,
+    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayLikeDyn,
+    PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pdmp_core::{ContextValue, Threads};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
+use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
 
-use crate::error::{printable, raise};
+use crate::error::{nested, printable, raise};
+
+/// Most items of a list of demonstrations, contexts or names. Lists without an end are refused before memory is.
+const MAX_ITEMS: usize = 1 << 20;
 
 /// A numpy vector, (n,).
 pub(crate) type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -23,9 +27,50 @@ pub(crate) type Cube<'py> = Bound<'py, PyArray3<f64>>;
 /// What `__reduce__` returns: a callable, and its arguments.
 pub(crate) type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyTuple>);
 
+/// The items of a list or any other iterable, each converted as it comes: a length that the iterable reports is not
+/// relied on.
+pub(crate) fn items<'py, T>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    convert: impl Fn(&str, &Bound<'py, PyAny>) -> PyResult<T>,
+) -> PyResult<Vec<T>> {
+    let expected = || PyTypeError::new_err(format!("{name} must be a list"));
+    if value.is_instance_of::<PyString>() {
+        return Err(expected());
+    }
+    let mut converted = Vec::new();
+    for item in value.try_iter().map_err(|_| expected())? {
+        if converted.len() == MAX_ITEMS {
+            return Err(PyValueError::new_err(format!("{name} has more than {MAX_ITEMS} items")));
+        }
+        converted.push(convert(&format!("{name}[{}]", converted.len()), &item?)?);
+    }
+    Ok(converted)
+}
+
+/// A list of texts.
+pub(crate) fn texts(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+    items(name, value, |name, item| {
+        item.extract().map_err(|_| PyTypeError::new_err(format!("{name} = {}: expected a text", shown(item))))
+    })
+}
+
+/// A value as Python writes it.
+fn shown(value: &Bound<'_, PyAny>) -> String {
+    value.repr().map_or_else(|_| "it".to_string(), |repr| printable(&repr.to_string()))
+}
+
 /// An array of any dimension, without a copy where it comes as doubles.
 fn doubles<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDyn<'py, f64, AllowTypeChange>> {
-    let Ok(array) = value.cast::<PyUntypedArray>() else { return doubles(name, plain(name, value)?.as_any()) };
+    // What comes as doubles is read without a call to Python.
+    if value.is_exact_instance_of::<PyArrayDyn<f64>>() {
+        return converted(name, value);
+    }
+    nested(|| converted(name, value))
+}
+
+fn converted<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDyn<'py, f64, AllowTypeChange>> {
+    let Ok(array) = value.cast::<PyUntypedArray>() else { return converted(name, plain(name, value)?.as_any()) };
     let wrong = |reason: &str| Err(PyValueError::new_err(format!("{name} {reason}")));
     match array.dtype().kind() {
         b'f' | b'i' | b'u' | b'b' => {}
@@ -42,7 +87,7 @@ fn doubles<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDy
     }
     // Fields of packed records: a view in Rust steps by whole numbers.
     if !array.is_aligned() {
-        return doubles(name, &value.call_method0("copy")?);
+        return converted(name, &value.call_method0("copy")?);
     }
     value.extract().map_err(|error: PyErr| not_numbers(name, value.py(), error))
 }
@@ -170,8 +215,10 @@ pub(crate) fn context(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Cont
         return Err(PyTypeError::new_err(format!("{name} is a single text: put it into a list, one value per column")));
     }
     let value = &rows_of(name, value)?;
-    let Ok(items) = value.try_iter() else { return Ok(vec![context_value(name, value)?]) };
-    items.enumerate().map(|(q, item)| context_value(&format!("{name}[{q}]"), &item?)).collect()
+    if value.try_iter().is_err() {
+        return Ok(vec![context_value(name, value)?]);
+    }
+    items(name, value, context_value)
 }
 
 /// An array in place of a data frame, which would go through its columns; lists and arrays as they are.
@@ -191,7 +238,7 @@ fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue>
     }
     check_real(name, value)?;
     value.extract().map(ContextValue::Number).map_err(|_| {
-        let shown = value.repr().map_or_else(|_| "it".to_string(), |repr| printable(&repr.to_string()));
+        let shown = shown(value);
         PyTypeError::new_err(format!("{name} = {shown}: expected a number or a text"))
     })
 }
@@ -199,26 +246,26 @@ fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue>
 /// Contexts (M, Q) of numbers and labels.
 pub(crate) fn contexts(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
     let value = &rows_of("contexts", value)?;
-    let shape: Option<Vec<usize>> = value.getattr("shape").and_then(|shape| shape.extract()).ok();
-    if shape.as_ref().is_some_and(|shape| shape.len() != 2) {
-        let shape = shape.unwrap_or_default();
-        return Err(PyValueError::new_err(format!("contexts has shape {shape:?}, expected two axes (M, Q)")));
+    if let Ok(shape) = value.getattr("shape")
+        && let Ok(shape) = shape.cast::<PyTuple>()
+        && shape.len() != 2
+    {
+        let shape: Vec<String> = shape.iter().map(|length| length.to_string()).collect();
+        let shape = format!("[{}]", shape.join(", "));
+        return Err(PyValueError::new_err(format!("contexts has shape {shape}, expected two axes (M, Q)")));
     }
-    let rows = value
-        .try_iter()
-        .map_err(|_| PyTypeError::new_err("contexts must be an array of shape (M, Q), or a list of M lists"))?;
-    rows.enumerate()
-        .map(|(m, row)| {
-            let row = row?;
-            if row.is_instance_of::<PyString>() || row.try_iter().is_err() {
-                let shown = printable(&row.repr()?.to_string());
-                return Err(PyValueError::new_err(format!(
-                    "contexts[{m}] = {shown}: expected two axes (M, Q): put the values of each demonstration into a list"
-                )));
-            }
-            context(&format!("contexts[{m}]"), &row)
-        })
-        .collect()
+    if value.try_iter().is_err() {
+        return Err(PyTypeError::new_err("contexts must be an array of shape (M, Q), or a list of M lists"));
+    }
+    items("contexts", value, |name, row| {
+        if row.is_instance_of::<PyString>() || row.try_iter().is_err() {
+            let shown = shown(row);
+            return Err(PyValueError::new_err(format!(
+                "{name} = {shown}: expected two axes (M, Q): put the values of each demonstration into a list"
+            )));
+        }
+        context(name, row)
+    })
 }
 
 /// A context as numpy has it where all are numbers, or as a list with its labels.
@@ -250,22 +297,12 @@ pub(crate) fn numbers(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<
 
 /// A matrix with the named axes.
 pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
-    with_matrix(name, axes, value, |matrix| Ok(matrix.to_owned()))
-}
-
-/// Calls with a matrix of the named axes, which is not copied where it comes as doubles.
-pub(crate) fn with_matrix<T>(
-    name: &str,
-    axes: &str,
-    value: &Bound<'_, PyAny>,
-    call: impl FnOnce(ArrayView2<f64>) -> PyResult<T>,
-) -> PyResult<T> {
-    let array = doubles(name, value)?;
-    let view = array.as_array().into_dimensionality::<Ix2>().map_err(|_| {
-        let shape = array.shape();
-        PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}"))
-    })?;
-    call(view)
+    // Copied: other threads may write to the caller's memory while a long call reads.
+    let array = array(name, value)?;
+    let shape = array.shape().to_vec();
+    array
+        .into_dimensionality::<Ix2>()
+        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
 }
 
 /// A float64 array of this shape that can be written.
@@ -278,8 +315,38 @@ pub(crate) fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResul
     if !array.is_aligned() {
         return Err(wrong("not aligned in memory".into()));
     }
+    if overlaps(array.shape(), array.strides()) {
+        return Err(wrong("elements that share memory".into()));
+    }
     array.try_readwrite().map_err(|error| wrong(error.to_string()))?;
     Ok(array.clone())
+}
+
+/// Whether elements of an array may share memory: sorted by stride, each axis must step over the whole of the last.
+fn overlaps(shape: &[usize], strides: &[isize]) -> bool {
+    if shape.contains(&0) {
+        return false;
+    }
+    let mut axes: Vec<(usize, usize)> = strides
+        .iter()
+        .map(|stride| stride.unsigned_abs())
+        .zip(shape.iter().copied())
+        .filter(|axis| axis.1 > 1)
+        .collect();
+    axes.sort_unstable();
+    let mut reach = size_of::<f64>();
+    axes.into_iter().any(|(stride, length)| {
+        let over = stride < reach;
+        reach = stride.saturating_mul(length);
+        over
+    })
+}
+
+/// A new numpy vector that cannot be written to: assigning to an element would change nothing else.
+pub(crate) fn read_only<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Vector<'py>> {
+    let vector = to_numpy(py, values);
+    vector.call_method(intern!(py, "setflags"), (false,), None)?;
+    Ok(vector)
 }
 
 /// A new numpy vector.

@@ -7,7 +7,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::convert::{Matrix, Reduced, Vector, array, optional, plain, shown_context, to_numpy, two_axes, vector};
+use crate::convert::{
+    Matrix, Reduced, Vector, array, optional, plain, shown_context, texts, to_numpy, two_axes, vector,
+};
 use crate::error::{printable, raise};
 
 /// One recorded movement.
@@ -48,8 +50,8 @@ impl Demonstration {
         time: Option<&Bound<'_, PyAny>>,
         goal: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
-        names: Option<Vec<String>>,
-        units: Option<Vec<String>>,
+        names: Option<&Bound<'_, PyAny>>,
+        units: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let stamps = time.map(clock).transpose()?;
         let source = Source::of("position", position)?;
@@ -68,10 +70,11 @@ impl Demonstration {
         if let Some(values) = context {
             demo = demo.with_context(crate::convert::context("context", values)?).map_err(raise)?;
         }
-        if let Some(names) = names.or(source.names) {
+        let given = |name, value: Option<&Bound<'_, PyAny>>| value.map(|value| texts(name, value)).transpose();
+        if let Some(names) = given("names", names)?.or(source.names) {
             demo = demo.with_names(names).map_err(raise)?;
         }
-        if let Some(units) = units.or(source.units) {
+        if let Some(units) = given("units", units)?.or(source.units) {
             demo = demo.with_units(units).map_err(raise)?;
         }
         Ok(Self(demo))

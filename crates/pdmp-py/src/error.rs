@@ -1,11 +1,13 @@
 //! How errors of the core appear in Python.
 
+use std::cell::Cell;
 use std::io::ErrorKind;
 
 use pdmp_core::Error;
 use pyo3::create_exception;
 use pyo3::exceptions::{
-    PyException, PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyPermissionError, PyValueError,
+    PyException, PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyPermissionError,
+    PyRecursionError, PyValueError,
 };
 use pyo3::prelude::*;
 
@@ -31,7 +33,8 @@ pub(crate) fn raise(error: Error) -> PyErr {
                 (Some(errno), _) => PyOSError::new_err((errno, reason, path)),
                 (None, ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, "No such file or directory", path)),
                 (None, ErrorKind::PermissionDenied) => PyPermissionError::new_err((13, "Permission denied", path)),
-                (None, _) => PyOSError::new_err(text),
+                // A path that never reached the system: EINVAL.
+                (None, _) => PyOSError::new_err((22, reason, path)),
             }
         }
         Error::Memory { .. } => PyMemoryError::new_err(text),
@@ -59,6 +62,27 @@ pub(crate) fn ascii(text: &str) -> String {
     plain.chars().flat_map(|c| if c.is_ascii() { vec![c] } else { c.escape_unicode().collect() }).collect()
 }
 
+/// Most calls within calls: each takes stack of its own, of which Python's limit of recursion knows nothing.
+const MAX_NESTED: usize = 16;
+
+/// Runs a call that may call back into Python, and from there into this library again.
+pub(crate) fn nested<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    thread_local!(static DEPTH: Cell<usize> = const { Cell::new(0) });
+    struct Level;
+    impl Drop for Level {
+        fn drop(&mut self) {
+            DEPTH.set(DEPTH.get() - 1);
+        }
+    }
+    if DEPTH.get() >= MAX_NESTED {
+        let message = "a callback, or the __array__ of an argument, calls the function that called it, again and again";
+        return Err(PyRecursionError::new_err(message));
+    }
+    DEPTH.set(DEPTH.get() + 1);
+    let _level = Level;
+    call()
+}
+
 /// Runs a long call without holding the interpreter. The call is handed a question whether to go on, which tells
 /// `progress` the share that is done, and whose answer is no after Ctrl-C or an exception of `progress`.
 pub(crate) fn detached<S, T: Send>(
@@ -66,16 +90,18 @@ pub(crate) fn detached<S, T: Send>(
     progress: impl Fn(Python<'_>, S, f64) -> PyResult<()> + Sync,
     call: impl FnOnce(&mut dyn FnMut(S, f64) -> Result<(), Error>) -> Result<T, Error> + Send,
 ) -> PyResult<T> {
-    let mut raised = None;
-    let result = py.detach(|| {
-        call(&mut |stage, share| {
-            Python::attach(|py| py.check_signals().and_then(|()| progress(py, stage, share))).map_err(|error| {
-                raised = Some(error);
-                Error::Interrupted
+    nested(|| {
+        let mut raised = None;
+        let result = py.detach(|| {
+            call(&mut |stage, share| {
+                Python::attach(|py| py.check_signals().and_then(|()| progress(py, stage, share))).map_err(|error| {
+                    raised = Some(error);
+                    Error::Interrupted
+                })
             })
-        })
-    });
-    result.map_err(|error| raised.unwrap_or_else(|| raise(error)))
+        });
+        result.map_err(|error| raised.unwrap_or_else(|| raise(error)))
+    })
 }
 
 /// [`detached`] for a call whose progress nobody follows.

@@ -3,7 +3,7 @@
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::{to_numpy, with_matrix};
+use crate::convert::{matrix, to_numpy};
 use crate::error::interruptible;
 use crate::fit::style_count;
 
@@ -66,9 +66,8 @@ pub(crate) fn factorise(
     spectrum: f64,
 ) -> PyResult<Factors> {
     let styles = style_count(n_styles, spectrum)?;
-    let factors = with_matrix("targets", "(M, C·D)", targets, |targets| {
-        interruptible(py, |proceed| pdmp_core::Factors::of(targets, styles, proceed))
-    })?;
+    let targets = matrix("targets", "(M, C·D)", targets)?;
+    let factors = interruptible(py, |proceed| pdmp_core::Factors::of(targets.view(), styles, proceed))?;
     let left_out = factors.left_out();
     Ok(Factors {
         styles: factors.styles.into_pyarray(py).unbind(),

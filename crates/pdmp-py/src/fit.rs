@@ -1,5 +1,6 @@
 //! Learning, called from Python.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use ndarray::Array2;
@@ -13,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyList, PyMapping};
 
 use crate::basis::{Gp, NGnet};
-use crate::convert::{count, matrix, numbers};
+use crate::convert::{count, items, matrix, numbers};
 use crate::demo::{Demonstration, Source, Trajectory};
 use crate::error::detached;
 use crate::model::Model;
@@ -221,28 +222,24 @@ pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResu
             return Err(PyValueError::new_err(format!("{argument} has shape {shape:?}, {wanted}")));
         }
     }
-    let items = demos.try_iter().map_err(|_| {
-        PyTypeError::new_err(format!(
+    if demos.try_iter().is_err() {
+        return Err(PyTypeError::new_err(format!(
             "{argument} must be a list of demonstrations or arrays, a mapping of names to them, or an array of shape \
              (M, T, D)"
-        ))
-    })?;
-    items
-        .enumerate()
-        .map(|(m, item)| {
-            let item = item?;
-            if let Ok(demo) = item.cast::<Demonstration>() {
-                return Ok(demo.get().0.clone());
-            }
-            if item.is_instance_of::<PyList>()
-                && item.get_item(0).is_ok_and(|one| one.is_instance_of::<Demonstration>())
-            {
-                let message = format!("demo {m} is a list of demonstrations: put all of them into one list");
-                return Err(PyValueError::new_err(message));
-            }
-            Source::of(&format!("demo {m}: position"), &item)?.demonstration(m)
-        })
-        .collect()
+        )));
+    }
+    let next = Cell::new(0);
+    items(argument, demos, |_, item| {
+        let m = next.replace(next.get() + 1);
+        if let Ok(demo) = item.cast::<Demonstration>() {
+            return Ok(demo.get().0.clone());
+        }
+        if item.is_instance_of::<PyList>() && item.get_item(0).is_ok_and(|one| one.is_instance_of::<Demonstration>()) {
+            let message = format!("demo {m} is a list of demonstrations: put all of them into one list");
+            return Err(PyValueError::new_err(message));
+        }
+        Source::of(&format!("demo {m}: position"), item)?.demonstration(m)
+    })
 }
 
 pub(crate) fn map_of(map: &str) -> PyResult<MapChoice> {

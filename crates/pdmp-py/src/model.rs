@@ -27,7 +27,9 @@ pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
 /// Parameters
 /// ----------
 /// path : path-like
-///     A `.safetensors` file written by `Model.save`.
+///     A `.safetensors` file written by `Model.save`. A file from elsewhere is data: it runs no code and names no other
+///     file, takes memory and time in proportion to its size, and moves in finite numbers or not at all. Its checksum
+///     finds damage, not intent: the movement itself, and all texts in it, are whatever its author wrote.
 ///
 /// Returns
 /// -------
@@ -282,7 +284,8 @@ impl Model {
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 
-    /// Write a model file. It appears whole or not at all, whatever interrupts the writing.
+    /// Write a model file. It appears whole or not at all, whatever interrupts the writing; a process that is killed
+    /// meanwhile leaves a draft `.pdmp-*.draft` beside it.
     ///
     /// Parameters
     /// ----------
@@ -342,13 +345,13 @@ impl Model {
 
     /// The bytes of a model file.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &self.0.to_bytes().map_err(raise)?))
+        Ok(PyBytes::new(py, &py.detach(|| self.0.to_bytes()).map_err(raise)?))
     }
 
     /// A model from the bytes of a model file.
     #[staticmethod]
-    fn from_bytes(data: &[u8]) -> PyResult<Self> {
-        pdmp_core::Model::from_bytes(data).map(|model| Self(Arc::new(model))).map_err(raise)
+    fn from_bytes(py: Python<'_>, data: &[u8]) -> PyResult<Self> {
+        py.detach(|| pdmp_core::Model::from_bytes(data)).map(|model| Self(Arc::new(model))).map_err(raise)
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {

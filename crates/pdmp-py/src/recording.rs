@@ -5,7 +5,7 @@ use pdmp_core::recording;
 use pdmp_core::recording::{Keep, Reason};
 use pyo3::prelude::*;
 
-use crate::convert::{Matrix, Vector, matrix, to_numpy, vector};
+use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
 use crate::demo::Demonstration;
 use crate::error::raise;
 use crate::fit::demonstrations;
@@ -179,11 +179,12 @@ pub(crate) fn fill<'py>(
     py: Python<'py>,
     position: &Bound<'py, PyAny>,
     time: &Bound<'py, PyAny>,
-    names: Vec<String>,
-    turns: Vec<f64>,
+    names: &Bound<'py, PyAny>,
+    turns: &Bound<'py, PyAny>,
     max_gap: f64,
 ) -> PyResult<Matrix<'py>> {
     let (position, time) = (matrix("position", "(T, D)", position)?, vector("time", time)?);
+    let (names, turns) = (texts("names", names)?, vector("turns", turns)?);
     let filled = recording::fill(position, &time, &names, &turns, max_gap).map_err(raise)?;
     Ok(filled.into_pyarray(py))
 }
@@ -201,12 +202,11 @@ type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, V
 pub(crate) fn cycles<'py>(
     py: Python<'py>,
     recordings: &Bound<'py, PyAny>,
-    events: Option<Vec<Bound<'py, PyAny>>>,
+    events: Option<&Bound<'py, PyAny>>,
     average: bool,
 ) -> PyResult<Found<'py>> {
     let recordings = demonstrations("recordings", recordings)?;
-    let vectors = |events: Vec<Bound<'py, PyAny>>| events.iter().map(|times| vector("events", times)).collect();
-    let events: Option<Vec<Vec<f64>>> = events.map(vectors).transpose()?;
+    let events = events.map(|events| items("events", events, vector)).transpose()?;
     let keep = if average { Keep::Mean } else { Keep::Each };
     let found = py.detach(|| recording::cycles(&recordings, events.as_deref(), keep)).map_err(raise)?;
     let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();

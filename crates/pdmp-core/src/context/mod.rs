@@ -35,6 +35,9 @@ pub(crate) use stack::Stack;
 use crate::demo::{ContextValue, check_matrix};
 use crate::error::{Error, Result};
 
+/// Most multiplications n·f² that a linear map of n contexts with f inputs may take: a second or two.
+const MAX_WORK: f64 = 4e9;
+
 /// A map from contexts of Q values to P outputs, with the covariance of what it predicts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContextMap {
@@ -130,11 +133,7 @@ impl ContextMap {
         choice: MapChoice,
     ) -> Result<Self> {
         let data = Data::of(columns, contexts, outputs)?;
-        if data.inputs.nrows() > MOST && matches!(choice, MapChoice::Given(kind) if kind != MapKind::Linear) {
-            let (name, value) = ("contexts", data.inputs.nrows() as f64);
-            let allowed = "different contexts: at most 1024 for this map; round them, or take map=\"linear\"";
-            return Err(Error::Range { name, value, allowed });
-        }
+        data.check_count(matches!(choice, MapChoice::Given(kind) if kind != MapKind::Linear))?;
         let axes = Axes::principal(data.means.view(), metric)?;
         let data = data.along(&axes);
         let labels_alone = data.columns.iter().all(|column| matches!(column, ContextColumn::Label(_)));
@@ -151,7 +150,9 @@ impl ContextMap {
     ) -> Result<Self> {
         let Recipe { kind, kernel, directions, ratios, trend, errors } = recipe;
         let axes = Axes::new(directions)?;
-        let data = Data::of(columns, contexts, outputs)?.along(&axes);
+        let data = Data::of(columns, contexts, outputs)?;
+        data.check_count(kernel.is_some() || kind != MapKind::Linear)?;
+        let data = data.along(&axes);
         let candidate = Candidate::with(kind, kernel, &data.shown(), |_, _| ratios)?;
         let trend = trend.map(|(ratios, stack)| choice::trend(&data.shown(), ratios, stack)).transpose()?;
         Ok(data.map(axes, candidate, trend, errors))
@@ -312,6 +313,13 @@ struct Data {
 impl Data {
     fn of(columns: Vec<ContextColumn>, contexts: &Array2<f64>, outputs: ArrayView2<f64>) -> Result<Self> {
         let groups = alike(contexts);
+        // Each label is an input of its own.
+        let n_inputs: usize = columns.iter().map(ContextColumn::n_features).sum();
+        let work = groups.len() as f64 * (n_inputs as f64).powi(2);
+        if work > MAX_WORK {
+            let allowed = "labels and numbers of a context: too many for so many contexts; merge labels";
+            return Err(Error::Range { name: "contexts", value: n_inputs as f64, allowed });
+        }
         let firsts: Vec<usize> = groups.iter().map(|group| group[0]).collect();
         let distinct = contexts.select(Axis(0), &firsts);
         let scale = Scale::of(&columns, &distinct)?;
@@ -332,6 +340,16 @@ impl Data {
         let within = (freedom > 0).then(|| (scatter / freedom as f64, freedom));
         let kept = groups.iter().map(|group| 1.0 / group.len() as f64).sum::<f64>() / groups.len() as f64;
         Ok(Self { columns, scale, inputs, means, within, kept })
+    }
+
+    /// Checks the number of contexts of a map whose cost grows with its cube.
+    fn check_count(&self, cubic: bool) -> Result<()> {
+        if cubic && self.inputs.nrows() > MOST {
+            let (name, value) = ("contexts", self.inputs.nrows() as f64);
+            let allowed = "different contexts: at most 1024 for this map; round them, or take map=\"linear\"";
+            return Err(Error::Range { name, value, allowed });
+        }
+        Ok(())
     }
 
     /// The same, of components along axes.

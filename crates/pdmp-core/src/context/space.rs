@@ -47,6 +47,14 @@ impl ContextColumn {
         }
     }
 
+    /// Number of features that it gives: one, or one per label.
+    pub(crate) fn n_features(&self) -> usize {
+        match self {
+            Self::Number => 1,
+            Self::Label(labels) => labels.len(),
+        }
+    }
+
     /// The value that a number stands for.
     pub(crate) fn value(&self, column: usize, number: f64) -> Result<ContextValue> {
         match self {

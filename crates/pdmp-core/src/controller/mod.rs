@@ -314,7 +314,7 @@ impl Controller {
     ///
     /// # Errors
     /// A vector of a wrong length, a number that is not finite, τ, amplitude or goal that a setter refuses, or a tick
-    /// that is not positive or longer than 1000 τ.
+    /// that is negative or longer than 1000 τ.
     pub fn update(&mut self, command: &Command, motion: &mut Motion) -> Result<Status> {
         motion.check(self.model.n_dofs())?;
         let status = self.step_with(command)?;
@@ -339,6 +339,10 @@ impl Controller {
         let dt = command.dt.unwrap_or(self.dt);
         self.check_length(dt, command.tau)?;
         self.apply(command);
+        // Two readings of a coarse clock may be equal.
+        if dt == 0.0 {
+            return Ok(self.status);
+        }
         let h = self.stretch(dt);
         self.held.take(command, &self.position, dt, h);
         Ok(self.tick(dt, h))

@@ -1,8 +1,15 @@
 //! The model file: safetensors, with the constants as JSON beside the arrays.
 //!
 //! One metadata key holds the JSON, as several would be written in random order. A checksum over the constants and
-//! all arrays finds damage that leaves every shape intact.
+//! all arrays finds damage that leaves every shape intact. It is no signature: anyone can write a file that passes.
+//!
+//! A file from elsewhere is data. It holds no code and names no other file, and a loaded model moves in finite numbers
+//! or refuses to. Reading takes memory and time in proportion to the file: header, number of arrays, contexts of a map
+//! and size of every number have the bounds of the interface and of [`crate::fit`]. What a file can do is
+//! describe a harmful movement, under any names, labels and units: limits of the robot are to be kept by its driver.
 
+mod draft;
+mod header;
 mod read;
 mod write;
 
@@ -11,6 +18,8 @@ use std::io::{Read, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+
+use draft::Draft;
 
 use crate::context::{ContextColumn, Kernel, MapKind};
 use crate::error::{Error, Result};
@@ -23,8 +32,8 @@ const SCHEMA: u32 = 5;
 const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.
 const LARGEST_FILE: u64 = 1 << 32;
-/// Largest header that is read, in bytes.
-const LARGEST_HEADER: u64 = 1 << 26;
+/// Largest header that is read, in bytes: nearly all of it labels.
+const MAX_HEADER: u64 = 1 << 26;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -68,7 +77,8 @@ struct Map {
 
 impl Model {
     /// Writes a model file. It appears whole or not at all, whatever interrupts the writing; what a link leads to is
-    /// replaced, not the link, and a pipe or a device is written to.
+    /// replaced, not the link, and a pipe or a device is written to. It is written beside its place as `.pdmp-*.draft`
+    /// and then renamed: a process that is killed meanwhile leaves the draft, which can be deleted.
     ///
     /// # Errors
     /// A path that cannot be written.
@@ -83,16 +93,13 @@ impl Model {
             return fs::write(&place, &bytes).map_err(io);
         }
         let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        // The error of a temporary file names that file; the kind of error is what matters.
-        let draft = drafts().prefix(".pdmp-").tempfile_in(folder);
-        let mut file = draft.map_err(|error| io(error.kind().into()))?;
+        let (draft, mut file) = Draft::create(folder).map_err(io)?;
         file.write_all(&bytes).map_err(io)?;
-        file.as_file().sync_all().map_err(io)?;
+        file.sync_all().map_err(io)?;
         if let Ok(older) = fs::metadata(&place) {
-            file.as_file().set_permissions(older.permissions()).map_err(io)?;
+            file.set_permissions(older.permissions()).map_err(io)?;
         }
-        file.persist(&place).map_err(|error| io(error.error))?;
-        Ok(())
+        draft.persist(&place).map_err(io)
     }
 
     /// Reads a model file.
@@ -122,7 +129,7 @@ fn check_size(bytes: &[u8]) -> Result<()> {
         _ if bytes.len() as u64 > LARGEST_FILE => Err(bad("larger than any model")),
         None => Err(bad("shorter than a header")),
         Some(0) => Err(bad("not a safetensors file")),
-        Some(length) if length > LARGEST_HEADER => {
+        Some(length) if length > MAX_HEADER => {
             Err(bad("not a safetensors file, or damaged: it announces a header larger than any model has"))
         }
         Some(_) => Ok(()),
@@ -138,17 +145,4 @@ fn checksum<'a>(constants: &Constants, arrays: impl Iterator<Item = (&'a str, &'
         hasher.update(bytes);
     }
     Ok(hasher.finalize())
-}
-
-/// Makes drafts that are readable like any other new file: by itself a temporary one is its owner's alone.
-fn drafts() -> tempfile::Builder<'static, 'static> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        let mut builder = tempfile::Builder::new();
-        builder.permissions(fs::Permissions::from_mode(0o666));
-        builder
-    }
-    #[cfg(not(unix))]
-    tempfile::Builder::new()
 }

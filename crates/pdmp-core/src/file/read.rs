@@ -2,14 +2,16 @@
 
 use ndarray::{Array2, Axis};
 use safetensors::tensor::{Dtype, SafeTensors};
+use serde::Deserialize;
 
-use super::{Constants, KEY, Map, SCHEMA, Sealed, check_size, checksum};
+use super::{Constants, Map, SCHEMA, Sealed, checksum, header};
 use crate::align::{Template, Warp};
 use crate::attractor::Attractor;
+use crate::conditions::LARGEST_STYLE;
 use crate::context::{ContextMap, Kernel, MapKind, Recipe, Stack};
 use crate::error::{Error, LARGEST, Result};
 use crate::landscape::Landscape;
-use crate::model::{Demonstrated, Learnt, Model};
+use crate::model::{Demonstrated, Learnt, MAX_RATE, MAX_TAU, Model};
 use crate::phase::Canonical;
 use crate::sensitivity::STEPS;
 use crate::smooth::Noise;
@@ -23,28 +25,30 @@ impl Model {
     /// Bytes that are not whole, not a model, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let bad = |reason: &str| Error::File(reason.to_string());
-        check_size(bytes)?;
-        let broken = |error: safetensors::SafeTensorError| Error::File(error.to_string());
-        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(broken)?;
-        let tensors = SafeTensors::deserialize(bytes).map_err(broken)?;
-        let entries = metadata.metadata().as_ref().ok_or(bad("no metadata"))?;
-        let json = entries.get(KEY).filter(|_| entries.len() == 1).ok_or(bad("no pdmp metadata"))?;
+        let json = header::constants(bytes)?;
         // The version is read alone first: another one may hold anything else.
-        let version: serde_json::Value = serde_json::from_str(json).map_err(|error| Error::File(error.to_string()))?;
-        match version.get("schema").and_then(serde_json::Value::as_u64) {
+        let version: Version = serde_json::from_str(&json).map_err(|error| Error::File(error.to_string()))?;
+        match version.schema {
             Some(found) if found == u64::from(SCHEMA) => {}
             Some(found) => {
                 return Err(Error::File(format!("version {found}, while this library reads version {SCHEMA}")));
             }
             None => return Err(bad("no schema version")),
         }
-        let sealed: Sealed = serde_json::from_str(json).map_err(|error| Error::File(error.to_string()))?;
+        let tensors = SafeTensors::deserialize(bytes).map_err(|error| Error::File(error.to_string()))?;
+        let sealed: Sealed = serde_json::from_str(&json).map_err(|error| Error::File(error.to_string()))?;
         // One text alone is written for these constants: a flipped bit may leave another that means the same.
         if serde_json::to_string(&sealed).ok().as_deref() != Some(json.as_str()) {
             return Err(bad("damaged: its constants are not written as they were"));
         }
         Reader { tensors }.model(sealed.model, sealed.crc32)
     }
+}
+
+/// The version of a file, whatever else it holds.
+#[derive(Deserialize)]
+struct Version {
+    schema: Option<u64>,
 }
 
 /// Takes arrays out of a file, checking dimensions and numbers.
@@ -64,8 +68,9 @@ impl Reader<'_> {
             .chunks_exact(8)
             .map(|chunk| f64::from_le_bytes(chunk.try_into().unwrap_or_default()))
             .collect();
-        match data.iter().position(|x| x.is_nan() || x.abs() > LARGEST * LARGEST) {
-            Some(index) => Err(Error::File(format!("{name} holds {} at {index}", data[index]))),
+        let limit = limit(name);
+        match data.iter().position(|x| x.is_nan() || x.abs() > limit) {
+            Some(index) => Err(Error::File(format!("{name} holds {:e} at {index}", data[index]))),
             None => Ok(data),
         }
     }
@@ -119,13 +124,7 @@ impl Reader<'_> {
             Some(map) => Some(self.matrix("contexts", (n_demos, map.columns.len()))?),
             None => None,
         };
-        let knots = |name| {
-            let data = self.array(name, &[n_knots, n_styles, n_dofs])?;
-            if let Some(value) = data.iter().find(|x| x.abs() > LARGEST) {
-                return Err(Error::File(format!("{name} holds {value:e}")));
-            }
-            Ok(data)
-        };
+        let knots = |name| self.array(name, &[n_knots, n_styles, n_dofs]);
         let (values, slopes) = (knots("landscape.values")?, knots("landscape.slopes")?);
         let knots = Jets { n_outputs: n_styles * n_dofs, values, slopes };
         let landscape = Landscape::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
@@ -146,6 +145,11 @@ impl Reader<'_> {
         let timings = self.matrix("timings", (n_demos, n_segments))?;
         if timings.iter().any(|seconds| *seconds <= 0.0) {
             return Err(bad("a time is not positive"));
+        }
+        // What a fit makes so: movements of default length and rate then have the number of samples that dt promises.
+        let share = timings.row(constants.nominal).sum() / (constants.tau * constants.canonical.extent());
+        if !((1.0 - 1e-6)..=(1.0 + 1e-6)).contains(&share) {
+            return Err(bad("tau does not agree with the nominal duration"));
         }
         let demonstrated = Demonstrated {
             styles: self.matrix("styles", (n_demos, n_styles))?,
@@ -268,6 +272,15 @@ impl Reader<'_> {
     }
 }
 
+/// Largest magnitude of an array's numbers: what the interface takes, or for a variance the square of it.
+fn limit(name: &str) -> f64 {
+    match name {
+        "styles" => LARGEST_STYLE,
+        "left_over" => LARGEST * LARGEST,
+        _ => LARGEST,
+    }
+}
+
 impl Constants {
     fn check(&self) -> Result<()> {
         let (a, b) = match self.canonical {
@@ -276,10 +289,15 @@ impl Constants {
         };
         let slope = self.slope.unwrap_or(1.0);
         Warp { segments: 1, slope }.check(1).map_err(|error| Error::File(error.to_string()))?;
-        for (name, value) in
-            [("tau", self.tau), ("alpha_z", self.alpha_z), ("beta_z", self.beta_z), ("alpha_x or mu", a), ("u_end", b)]
-        {
-            if !(1e-12..=1e12).contains(&value) {
+        // The bounds within which these are learnt.
+        for (name, value, limit) in [
+            ("tau", self.tau, MAX_TAU),
+            ("alpha_z", self.alpha_z, MAX_RATE),
+            ("beta_z", self.beta_z, MAX_RATE),
+            ("alpha_x or mu", a, MAX_RATE),
+            ("u_end", b, 1.01e3),
+        ] {
+            if !(1.0 / limit..=limit).contains(&value) {
                 return Err(Error::File(format!("{name} = {value} is out of range")));
             }
         }

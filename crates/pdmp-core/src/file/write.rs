@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
-use super::{Constants, KEY, Map, SCHEMA, Sealed, check_size, checksum};
+use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header};
 use crate::context::{ContextMap, Recipe, Stack};
 use crate::error::{Error, Result};
 use crate::model::Model;
@@ -59,7 +59,7 @@ impl Model {
             .map_err(|error| Error::File(error.to_string()))?;
         let metadata = HashMap::from([(KEY.to_string(), json)]);
         let bytes = serialize(views, Some(metadata)).map_err(|error| Error::File(error.to_string()))?;
-        check_size(&bytes)?;
+        header::constants(&bytes)?;
         Ok(bytes)
     }
 

@@ -7,6 +7,7 @@ use crate::align::Aligned;
 use crate::attractor::Attractor;
 use crate::basis::Domain;
 use crate::error::{Error, Result, check_positive};
+use crate::model::{MAX_RATE, MAX_TAU};
 use crate::phase::{Canonical, Kind};
 
 /// The constants of a primitive, and what follows from them alone.
@@ -52,6 +53,10 @@ impl Constants {
                 (Canonical::Rhythmic { mu: options.mu }, duration / TAU)
             }
         };
+        if !(1.0 / MAX_TAU..=MAX_TAU).contains(&tau) {
+            let allowed = "seconds: must lie between 1e-12 and 1e12; check the unit of time";
+            return Err(Error::Range { name: "tau", value: tau, allowed });
+        }
         Ok(Self { attractor, canonical, tau })
     }
 
@@ -65,7 +70,7 @@ impl Constants {
 
 /// Rates of the systems: far enough from the ends of the number range for their products.
 fn check_rate(name: &'static str, value: f64) -> Result<()> {
-    if (1e-6..=1e6).contains(&value) {
+    if (1.0 / MAX_RATE..=MAX_RATE).contains(&value) {
         Ok(())
     } else {
         Err(Error::Range { name, value, allowed: "must lie between 1e-6 and 1e6" })

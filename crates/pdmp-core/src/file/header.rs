@@ -1,0 +1,96 @@
+//! The header of a file, checked in one pass before anything is built from it.
+
+use std::fmt;
+
+use serde::Deserialize;
+use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, Visitor};
+
+use super::check_size;
+use crate::error::{Error, Result};
+
+/// Most entries of a header: the metadata and the arrays, of which a model has fewer.
+const MAX_ENTRIES: usize = 64;
+/// Most bytes of a header besides the letters of labels, names and units: those of a model with 200,000 labels.
+const MAX_STRUCTURE: usize = 1 << 20;
+
+/// The metadata, of one key alone.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Metadata {
+    pdmp: String,
+}
+
+/// The constants of a header, as text.
+struct Header(Option<String>);
+
+impl<'de> Deserialize<'de> for Header {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct Entries;
+        impl<'de> Visitor<'de> for Entries {
+            type Value = Header;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("the entries of a header")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> std::result::Result<Header, A::Error> {
+                let (mut json, mut count) = (None, 0);
+                while let Some(key) = map.next_key::<String>()? {
+                    count += 1;
+                    if count > MAX_ENTRIES {
+                        return Err(A::Error::custom("more arrays than any model has"));
+                    }
+                    if key != "__metadata__" {
+                        map.next_value::<IgnoredAny>()?;
+                    } else if json.replace(map.next_value::<Metadata>()?.pdmp).is_some() {
+                        return Err(A::Error::custom("metadata twice"));
+                    }
+                }
+                Ok(Header(json))
+            }
+        }
+        deserializer.deserialize_map(Entries)
+    }
+}
+
+/// The constants as JSON, after the size of the header was checked: its labels apart, it takes little.
+pub(super) fn constants(bytes: &[u8]) -> Result<String> {
+    check_size(bytes)?;
+    let bad = |reason: &str| Error::File(reason.to_string());
+    let (head, rest) = bytes.split_first_chunk().ok_or(bad("shorter than a header"))?;
+    let length = usize::try_from(u64::from_le_bytes(*head)).map_err(|_| bad("not a safetensors file"))?;
+    let header = rest.get(..length).ok_or(bad("not whole: it ends within its header"))?;
+    let Header(json) = serde_json::from_slice(header).map_err(|error| Error::File(format!("header: {error}")))?;
+    let json = json.ok_or(bad("no pdmp metadata"))?;
+    if header.len() - json.len().min(header.len()) + structure(&json) > MAX_STRUCTURE {
+        return Err(bad("a header larger than any model has"));
+    }
+    Ok(json)
+}
+
+/// Bytes of a JSON text that are not within strings.
+fn structure(json: &str) -> usize {
+    let (mut count, mut within, mut escaped) = (0, false, false);
+    for byte in json.bytes() {
+        match byte {
+            _ if escaped => escaped = false,
+            b'\\' if within => escaped = true,
+            b'"' => (within, count) = (!within, count + 1),
+            _ if !within => count += 1,
+            _ => {}
+        }
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::structure;
+
+    #[test]
+    fn letters_within_strings_are_no_structure() {
+        for (json, expected) in [("[1,2]", 5), (r#"["abc"]"#, 4), (r#"["a\"],","b"]"#, 7), (r#"["\\"]"#, 4)] {
+            assert_eq!(structure(json), expected, "{json}");
+        }
+    }
+}
