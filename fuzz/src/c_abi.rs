@@ -232,8 +232,7 @@ impl Caller<'_> {
     fn update(&mut self, slot: usize, input: &mut Input) {
         let (n_dofs, n_styles) = (self.info.n_dofs, self.info.n_styles);
         let style = Numbers::of(n_styles, input);
-        let [goal, anchor, measured, velocity, acceleration] =
-            std::array::from_fn(|_| Numbers::of(n_dofs, input));
+        let [goal, anchor, measured, velocity, acceleration] = std::array::from_fn(|_| Numbers::of(n_dofs, input));
         let [tau, amplitude, dt] = std::array::from_fn(|_| scalar(input));
         let command = pdmp_command {
             style: style.vector(),
@@ -317,9 +316,8 @@ impl Caller<'_> {
         // SAFETY: the text has the room that it tells.
         with_text(room, |text| unsafe { pdmp_controller_error(self.handle(slot).as_deref(), text) });
         let mut motion = vec![0.0; 3 * n_dofs];
-        let mut parts = motion
-            .chunks_exact_mut(n_dofs)
-            .map(|part| pdmp_buffer { data: part.as_mut_ptr(), length: part.len() });
+        let mut parts =
+            motion.chunks_exact_mut(n_dofs).map(|part| pdmp_buffer { data: part.as_mut_ptr(), length: part.len() });
         let mut part = || parts.next().unwrap_or(pdmp_buffer { data: ptr::null_mut(), length: 0 });
         let places = pdmp_motion { position: part(), velocity: part(), acceleration: part() };
         let (mut time, mut phase) = (MaybeUninit::new(0.0), MaybeUninit::new(0.0));

@@ -168,7 +168,8 @@ impl Forged {
         let key = input.byte();
         let nearest = |(name, _): &&(String, _)| crc32fast::hash(name.as_bytes()) as u8 ^ key;
         let Some(name) = scalars.iter().min_by_key(nearest).map(|(name, _)| name) else { return };
-        let places: Vec<_> = scalars.iter().filter(|(other, _)| other == name).map(|(_, place)| place.clone()).collect();
+        let places: Vec<_> =
+            scalars.iter().filter(|(other, _)| other == name).map(|(_, place)| place.clone()).collect();
         let place = places[input.choice(places.len())].clone();
         let whole = self.constants[place.clone()].bytes().all(|c| c.is_ascii_digit());
         let text = match input.byte() {
