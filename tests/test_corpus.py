@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 import readers
 
 CASES = [(path.parent.name, path) for path in sorted(readers.CORPUS.glob("*/*"))]
