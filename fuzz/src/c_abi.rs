@@ -36,8 +36,8 @@ pub fn check(data: &[u8]) {
     }
 }
 
-static MODELS_IN_C: LazyLock<Vec<Box<pdmp_model>>> = LazyLock::new(|| {
-    MODELS.iter().map(|bytes| load(bytes, 0).expect("a model of the library's own cannot be loaded")).collect()
+static MODELS_IN_C: LazyLock<Vec<pdmp_model>> = LazyLock::new(|| {
+    MODELS.iter().map(|bytes| *load(bytes, 0).expect("a model of the library's own cannot be loaded")).collect()
 });
 
 fn load(bytes: &[u8], room: usize) -> Option<Box<pdmp_model>> {
