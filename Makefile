@@ -14,7 +14,17 @@ ROBOT := robosuite==1.5.2
 # Recordings of people walking, where they are at hand, for Fig. 5.
 WALKS := $(wildcard ../shared/data/walk_styles_bandai/demos)
 
-.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases report rtsan capi header clean needs
+# Seconds of `make fuzz` for each target.
+TIME ?= 60
+HOST = $(shell rustc -vV | sed -n 's/^host: //p')
+# Coverage for libFuzzer, as cargo-fuzz asks for it, and AddressSanitizer, which the stable compiler hides.
+COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
+	-Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
+	-Cllvm-args=-sanitizer-coverage-trace-compares
+SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
+
+.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases report rtsan fuzz asan licences capi header \
+	clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to demo/
 	$(BIN)/pdmp demo -o demo
@@ -26,7 +36,7 @@ test: .venv/with-test  ## Runs every test, Rust and Python
 	cargo test --release --workspace
 	$(BIN)/pytest
 
-check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, and the stubs against the module
+check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, stubs against the module, and licences
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --release --no-deps --package pdmp-core
@@ -34,6 +44,7 @@ check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, 
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/stubtest pdmp._native
+	$(PYTHON) .ci/licences.py
 
 bench: | needs  ## Times, latencies and instructions of the core
 	cargo bench --package pdmp-core
@@ -59,18 +70,37 @@ rtsan: | needs  ## Runs the control loop under the real-time sanitizer of a nigh
 		--test realtime --target "$$(rustc -vV | sed -n 's/^host: //p')" --target-dir target/rtsan; \
 	fi
 
+fuzz: .venv/with-test  ## Searches each border for inputs that break its claim, TIME=60 seconds each; those found into fuzz/found/
+	$(SANITIZED) --cfg fuzzing $(COVERAGE)' cargo build --release --manifest-path fuzz/Cargo.toml --locked \
+		--target $(HOST) --target-dir target/fuzz
+	@status=0; for target in model_file c_abi; do \
+		mkdir -p fuzz/found/$$target; \
+		target/fuzz/$(HOST)/release/$$target -max_total_time=$(TIME) -max_len=512 -timeout=10 -rss_limit_mb=2048 \
+			-verbosity=0 -print_final_stats=1 -artifact_prefix=fuzz/found/$$target/ \
+			fuzz/found/$$target fuzz/corpus/$$target || status=1; \
+	done; \
+	$(BIN)/python fuzz/readers.py --seconds $(TIME) --found fuzz/found || status=1; exit $$status
+
+asan: | needs  ## Runs the tests of the C ABI under AddressSanitizer
+	$(SANITIZED)' cargo test --release --package pdmp-capi --lib --test refusals --test corpus \
+		--target $(HOST) --target-dir target/asan
+
+licences: | needs  ## Collects the licences of the linked crates into LICENSE-THIRD-PARTY, which the wheel holds
+	$(PYTHON) .ci/licences.py --write
+
 capi: | needs  ## Builds the libraries for C and C++ and puts them and their headers into dist/capi/
 	cargo build --release --package pdmp-capi
 	mkdir -p dist/capi/lib dist/capi/include
 	cp target/release/libpdmp.a target/release/libpdmp.$(SHARED) dist/capi/lib
 	cp crates/pdmp-capi/include/pdmp.h crates/pdmp-capi/include/pdmp.hpp dist/capi/include
+	cp LICENSE* dist/capi
 
 header: | needs  ## Makes pdmp.h anew from the sources of the C ABI
 	PDMP_WRITE_HEADER=1 cargo test --release --package pdmp-capi --test header
 
 clean:  ## Removes what the targets above made
 	cargo clean
-	rm -rf .venv demo reproduction report dist python/pdmp/_native*.so
+	rm -rf .venv demo reproduction report dist fuzz/found python/pdmp/_native*.so
 
 .venv/with-%: $(SOURCES) | $(BIN)/python
 	@echo 'building the extension and installing what "$*" needs: some minutes the first time'

@@ -1,0 +1,143 @@
+"""Checks licences and sources of the linked crates, and collects their licence texts.
+
+`licences.py` checks that every crate in the extension or the C library comes from crates.io, that
+its licence is among those allowed, and that LICENSE-THIRD-PARTY, which the wheel holds, is up to
+date; `licences.py --write` writes that file. Cargo reads what it has downloaded, nothing else.
+"""
+
+import json
+import re
+import subprocess
+import sys
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+OUTPUT = ROOT / "LICENSE-THIRD-PARTY"
+PACKAGES = ("pdmp-py", "pdmp-capi")
+REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
+# Permissive, and met by reproducing their texts; the first that a crate offers is chosen.
+ALLOWED = {
+    "MIT": "MIT",
+    "Apache-2.0": "APACHE",
+    "Zlib": "ZLIB",
+    "BSD-2-Clause": "BSD",
+    "BSD-3-Clause": "BSD",
+    "ISC": "ISC",
+    "Unicode-3.0": "UNICODE",
+}
+HEAD = """Licences of the third-party software in the compiled parts of pdmp
+==================================================================
+
+The extension module and the library for C contain the Rust standard library (The Rust Project
+Developers, MIT OR Apache-2.0) and the crates below, as linked on Linux for x86-64. The source of
+each, unchanged, is at https://crates.io/crates/NAME/VERSION. Each text follows the crates that it
+applies to. Made by .ci/licences.py --write.
+"""
+
+
+def cargo(*arguments: str) -> str:
+    """Return what cargo prints; it reads Cargo.lock and does not change it."""
+    command = ["cargo", *arguments, "--locked"]
+    return subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def linked() -> list[dict[str, Any]]:
+    """Return the crates of others that the libraries contain, as cargo describes them."""
+    target = "x86_64-unknown-linux-gnu"
+    packages = [argument for package in PACKAGES for argument in ("-p", package)]
+    options = ["-e", "normal,no-proc-macro", "--prefix", "none", "-f", "{p}", "--target", target]
+    tree = cargo("tree", *packages, *options).splitlines()
+    names = {tuple(line.split()[:2]) for line in tree if line}
+    described = json.loads(cargo("metadata", "--format-version", "1", "--filter-platform", target))
+    members = set(described["workspace_members"])
+    found = [
+        crate
+        for crate in described["packages"]
+        if (crate["name"], f"v{crate['version']}") in names and crate["id"] not in members
+    ]
+    return sorted(found, key=lambda crate: (crate["name"], crate["version"]))
+
+
+def chosen(crate: dict[str, Any]) -> list[str] | None:
+    """Return the licences chosen from those that a crate offers, or None if one is not allowed."""
+    found = []
+    for part in re.split(r"\s+AND\s+", crate["license"] or ""):
+        offered = re.split(r"\s+OR\s+|/", part.strip("() "))
+        allowed = [licence for licence in ALLOWED if licence in offered]
+        if not allowed:
+            return None
+        found.append(allowed[0])
+    return found
+
+
+def texts(crate: dict[str, Any], licence: str) -> list[str]:
+    """Return the texts of a licence, and notices, in the source of a crate."""
+    folder = Path(crate["manifest_path"]).parent
+    files = [
+        path
+        for path in sorted(folder.iterdir())
+        if path.is_file() and re.match("(?i)(licen[sc]e|copying|notice|copyright)", path.name)
+    ]
+    named = [path for path in files if ALLOWED[licence] in path.name.upper()]
+    others = [tag for tag in {*ALLOWED.values(), "UNLICENSE"} if tag != ALLOWED[licence]]
+    general = [path for path in files if not any(tag in path.name.upper() for tag in others)]
+    notices = [path for path in files if path.name.upper().startswith(("NOTICE", "COPYRIGHT"))]
+    found = [path.read_text(encoding="utf-8").strip() for path in {*(named or general), *notices}]
+    return sorted(found) or [standard(crate, licence)]
+
+
+def standard(crate: dict[str, Any], licence: str) -> str:
+    """Return the standard text of a licence for a crate that names it but has no copy."""
+    if licence == "Apache-2.0":
+        return (ROOT / "LICENSE-APACHE").read_text(encoding="utf-8").strip()
+    if licence == "MIT":
+        holders = ", ".join(crate["authors"]) or f"the authors of {crate['name']}"
+        text = (ROOT / "LICENSE-MIT").read_text(encoding="utf-8").strip()
+        return re.sub("Copyright.*", f"Copyright (c) {holders}", text, count=1)
+    raise SystemExit(f"{crate['name']} {crate['version']}: no text of its licence {licence}")
+
+
+def collected(crates: list[dict[str, Any]]) -> str:
+    """Return all texts, each once, after the crates that it applies to."""
+    groups: dict[str, list[str]] = defaultdict(list)
+    whole: dict[str, str] = {}
+    for crate in crates:
+        for licence in chosen(crate) or []:
+            for text in texts(crate, licence):
+                key = " ".join(text.split())
+                whole.setdefault(key, text)
+                label = f"{crate['name']} {crate['version']} ({licence})"
+                groups[key] += [label] if label not in groups[key] else []
+    parts = [
+        "\n".join([*labels, "", *(line.rstrip() for line in whole[key].splitlines())])
+        for key, labels in groups.items()
+    ]
+    return f"\n\n{'-' * 78}\n".join([HEAD.strip(), *parts]) + "\n"
+
+
+def main() -> int:
+    """Check or write, and return 1 if something is not as it must be."""
+    crates = linked()
+    wrong = [
+        f"{crate['name']} {crate['version']}: {problem}"
+        for crate in crates
+        for problem in (
+            crate["source"] != REGISTRY and f"comes from {crate['source']}, not from crates.io",
+            chosen(crate) is None and f"its licence {crate['license']} is not allowed",
+        )
+        if problem
+    ]
+    if not wrong and "--write" in sys.argv[1:]:
+        OUTPUT.write_text(collected(crates), encoding="utf-8")
+    elif not wrong and (not OUTPUT.exists() or OUTPUT.read_text("utf-8") != collected(crates)):
+        wrong = [f"{OUTPUT.name} is out of date: run `make licences`"]
+    versions = Counter(crate["name"] for crate in crates)
+    twice = ", ".join(name for name, count in versions.items() if count > 1) or "none"
+    print(*wrong, f"{len(crates)} crates linked; in two versions: {twice}", sep="\n")
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,139 @@
+//! Input bytes read as choices and numbers, and the models that both targets start from.
+
+use std::f64::consts::TAU;
+use std::sync::LazyLock;
+
+use ndarray::Array2;
+use pdmp_core::basis::{Basis, NGnet};
+use pdmp_core::{
+    ContextValue, Demonstration, FitOptions, Kind, MapChoice, MapKind, Sampling, StyleCount, TimeScaling, Warp, fit,
+};
+
+/// Numbers at which formulas and checks of ranges tend to fail.
+const ODD: [f64; 32] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    2.0,
+    1e-3,
+    -1e-3,
+    1e-9,
+    1e-12,
+    1e-15,
+    1e-100,
+    1e-150,
+    1e-300,
+    5e-324,
+    f64::MIN_POSITIVE,
+    1e3,
+    -1e3,
+    1e9,
+    1e12,
+    -1e12,
+    1e15,
+    1e18,
+    1e100,
+    1e149,
+    1e150,
+    -1e150,
+    1e300,
+    f64::MAX,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    f64::NAN,
+];
+
+/// Bytes of an input, read from the front; zeros follow the last.
+pub struct Input<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Input<'a> {
+    pub fn new(rest: &'a [u8]) -> Self {
+        Self { rest }
+    }
+
+    /// The next byte, while there is one.
+    pub fn next(&mut self) -> Option<u8> {
+        let (&first, rest) = self.rest.split_first()?;
+        self.rest = rest;
+        Some(first)
+    }
+
+    pub fn byte(&mut self) -> u8 {
+        self.next().unwrap_or(0)
+    }
+
+    /// A choice among `n`.
+    pub fn choice(&mut self, n: usize) -> usize {
+        usize::from(self.byte()) % n.max(1)
+    }
+
+    /// An index below `n`, of two bytes.
+    pub fn index(&mut self, n: usize) -> usize {
+        usize::from(u16::from_le_bytes([self.byte(), self.byte()])) % n.max(1)
+    }
+
+    /// A number: mostly small ones, often odd ones, now and then one of any bits.
+    pub fn number(&mut self) -> f64 {
+        let kind = self.byte();
+        match kind {
+            0..96 => (f64::from(kind) - 32.0) / 16.0,
+            96..240 => ODD[usize::from(kind) % ODD.len()],
+            _ => f64::from_le_bytes(std::array::from_fn(|_| self.byte())),
+        }
+    }
+}
+
+/// The bytes of small model files: with labels and warped time, rhythmic, and with a context and each kind of map.
+pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
+    let reaches = [0.0, 0.1, 0.2, 0.4, 0.5, 0.7, 0.8, 1.0].map(|h| reach(h).with_context(vec![h]).unwrap());
+    let labelled = |h: f64| {
+        let label = ContextValue::Label(if h < 0.5 { "low" } else { "high" }.to_string());
+        reach(h).with_context(vec![label, ContextValue::Number(h)]).unwrap()
+    };
+    let mut warped = options(Kind::Discrete);
+    warped.alignment.time_scaling = TimeScaling::Warp(Warp { segments: 4, slope: 1.5 });
+    let maps = MapKind::ALL
+        .into_iter()
+        .map(|kind| (reaches.to_vec(), FitOptions { map: MapChoice::Given(kind), ..options(Kind::Discrete) }));
+    let others = [
+        ([0.1, 0.3, 0.4, 0.6, 0.8, 1.0].map(labelled).to_vec(), warped),
+        ([0.0, 0.1, 0.25, 0.4].map(cycle).to_vec(), options(Kind::Rhythmic)),
+    ];
+    // The others first: a new kind of map does not renumber them.
+    others
+        .into_iter()
+        .chain(maps)
+        .map(|(demos, options)| fit(&demos, &options, &mut |_, _| Ok(())).unwrap().to_bytes().unwrap())
+        .collect()
+});
+
+fn options(kind: Kind) -> FitOptions {
+    FitOptions {
+        styles: StyleCount::Given(2).into(),
+        basis: Basis::NGnet(NGnet { n_basis: 10, ..NGnet::default() }),
+        ..FitOptions::new(kind)
+    }
+}
+
+/// A reach of D = 2 over an obstacle of height `h`.
+fn reach(h: f64) -> Demonstration {
+    let position = Array2::from_shape_fn((41, 2), |(c, d)| {
+        let s = c as f64 / 40.0;
+        let bump = 64.0 * (s * (1.0 - s)).powi(3);
+        if d == 0 { s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s) } else { h * bump * (1.0 + h * s) }
+    });
+    Demonstration::new(position, Sampling::Uniform { dt: 0.02 + 0.005 * h }).unwrap()
+}
+
+/// A cycle of D = 2.
+fn cycle(style: f64) -> Demonstration {
+    let position = Array2::from_shape_fn((40, 2), |(c, d)| {
+        let phi = TAU * c as f64 / 40.0;
+        if d == 0 { (0.5 + style) * phi.sin() + 0.2 * style * (2.0 * phi).cos() } else { (phi + style).cos() }
+    });
+    Demonstration::new(position, Sampling::Uniform { dt: 0.025 }).unwrap()
+}
