@@ -109,6 +109,8 @@ typedef struct {
     const double *amplitude;
     /// Time constant tau, in seconds.
     const double *tau;
+    /// Phase phi at which a rhythmic movement starts, in rad, on its limit cycle; otherwise 0.
+    const double *phase;
 } pdmp_conditions;
 
 /// Room for numbers; `{NULL, 0}` if they are not wanted. More room than needed is left as it is.
@@ -150,8 +152,8 @@ typedef struct {
 
 /// All that one tick is told; what is not told stays as it was.
 ///
-/// Style, goal, anchor, tau and amplitude stay in force until they are commanded again; dt, measured and coupling hold
-/// for this tick alone.
+/// Style, goal, anchor, tau and amplitude stay in force until they are commanded again, measured until it is measured
+/// again or pdmp_controller_release; dt and coupling hold for this tick alone.
 typedef struct {
     /// Style s (n_styles) to go to.
     pdmp_vector style;
@@ -165,7 +167,7 @@ typedef struct {
     const double *amplitude;
     /// Length of this tick, in seconds, if it differs from the controller's.
     const double *dt;
-    /// Position (n_dofs) at which the robot is now, in the unit of each DoF.
+    /// Position (n_dofs) at which the robot is now, in the unit of each DoF; NULL if it was not measured anew.
     pdmp_vector measured;
     /// The user's own terms.
     pdmp_coupling coupling;
@@ -261,6 +263,16 @@ pdmp_status pdmp_controller_new(const pdmp_model *model,
                                 pdmp_controller **controller,
                                 pdmp_text error);
 
+/// Makes a controller that goes on bit for bit as another would, to look ahead from where that is; it is made like the
+/// other in memory of the caller's, or allocated. The copy is NULL if it is refused.
+///
+/// # Safety
+/// `memory` is used by nothing else, and `error` has the room that it tells.
+pdmp_status pdmp_controller_clone(const pdmp_controller *controller,
+                                  pdmp_memory memory,
+                                  pdmp_controller **copy,
+                                  pdmp_text error);
+
 /// Frees a controller. Memory of the caller's is the caller's again. With NULL it does nothing.
 ///
 /// # Safety
@@ -297,11 +309,18 @@ pdmp_status pdmp_controller_set_tau(pdmp_controller *controller, double tau);
 /// Sets the amplitude r_0 of a rhythmic movement; r follows by Eq. (4).
 pdmp_status pdmp_controller_set_amplitude(pdmp_controller *controller, double amplitude);
 
+/// Sets the speed, the share of the rate 1/tau at which the path is followed: 0 pauses on the path, 1 goes on. A change
+/// passes the filter of tau, and stays in force over pdmp_controller_reset.
+pdmp_status pdmp_controller_set_speed(pdmp_controller *controller, double speed);
+
 /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
 ///
 /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 over the
 /// demonstrated stretch of the clock, T/tau or 2 pi; 0 is without.
 pdmp_status pdmp_controller_set_compliance(pdmp_controller *controller, double stopping, double tracking);
+
+/// Forgets the measured position: no robot follows any more, until the next one is measured.
+pdmp_status pdmp_controller_release(pdmp_controller *controller);
 
 /// One tick with nothing new commanded. Answers whether the movement goes on.
 pdmp_status pdmp_controller_step(pdmp_controller *controller);
@@ -312,11 +331,13 @@ pdmp_status pdmp_controller_step(pdmp_controller *controller);
 /// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is
 /// held over the tick:
 ///
-///     tau y' = z + w(u) + k_t (m - y) + tau c_v
+///     tau y' = z + w(u) + k_t d + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
-///     tau u' = 1 / (1 + k_s |(m - y) / range|^2)
+///     tau u' = k = 1 / (1 + k_s |d / range|^2)
+///     tau o' = 5 k (e - o) / extent
 ///
-/// with the measured position m and the coupling terms c_v and c_a.
+/// with the coupling terms c_v and c_a, and d, what of the error e = m - y at the measured position m lies beyond the
+/// error o that is expected by now. The last e stays in force until the next measurement or pdmp_controller_release.
 ///
 /// # Safety
 /// What `command` and `motion` point to is valid.

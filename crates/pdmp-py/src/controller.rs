@@ -403,7 +403,7 @@ impl Controller {
     }
 
     #[setter]
-    fn set_speed(&mut self, py: Python<'_>, speed: f64) -> PyResult<()> {
+    fn set_speed(&mut self, speed: f64) -> PyResult<()> {
         let result = self.inner.set_speed(speed);
         self.command(result)
     }
@@ -430,7 +430,7 @@ impl Controller {
     }
 
     /// Forget the measured position: no robot follows any more, until the next one is measured.
-    fn release(&mut self, py: Python<'_>) {
+    fn release(&mut self) {
         self.inner.release();
         self.publish();
     }
