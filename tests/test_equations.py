@@ -118,9 +118,9 @@ def test_cycling_solves_the_equations(amplitude: float) -> None:
 
 
 def test_changed_amplitude_follows_its_equation() -> None:
-    """After r0 is set in the loop, r goes there by tau r' = mu (r0 - r), and y with it."""
+    """After r0 is switched in the loop, r goes there by tau r' = mu (r0 - r), and y with it."""
     model = pdmp.fit(loops(), kind="rhythmic", n_styles=2, mu=3.0)
-    controller = model.controller(0.001, style=STYLE, anchor=[0.0, 0.0])
+    controller = model.controller(0.001, style=STYLE, anchor=[0.0, 0.0], transition=0)
     controller.step()
     start, velocity = controller.position.copy(), controller.velocity.copy()
     controller.amplitude = 1.7
@@ -161,7 +161,7 @@ SHAPE = np.column_stack([np.sin(2 * np.pi * S) ** 3, S**3 * (10 - 15 * S + 6 * S
 def linear() -> pdmp.Model:
     """Return a model of five movements of the linear family."""
     demos = [Demonstration(BASE + h * SHAPE, dt=DT, context=[h]) for h in (0, 0.2, 0.5, 0.9, 1.0)]
-    return pdmp.fit(demos, n_styles=2)
+    return pdmp.fit(demos, n_styles=2, map="linear")
 
 
 @pytest.mark.parametrize("height", [0.35, 0.7, 1.3])

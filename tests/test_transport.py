@@ -45,7 +45,7 @@ def test_start_and_goal_of_another_lead_to_its_path() -> None:
         start * (1 - EARLY[:, None]) + goal * EARLY[:, None] + DETOUR[:, None] * [0.6, -0.3]
         for start, goal in zip(starts, goals, strict=True)
     ]
-    model = pdmp.fit(paths, dt=0.01)
+    model = pdmp.fit(paths, dt=0.01, n_styles=1)
     for m in range(6):
         made = model.rollout(model.styles[0], start=starts[m], goal=goals[m], dt=0.01).position
         np.testing.assert_allclose(made, paths[m], atol=0.02 * np.ptp(paths[m]))

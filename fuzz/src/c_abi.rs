@@ -338,6 +338,7 @@ struct Conditions {
     vectors: [Numbers; 5],
     amplitude: Option<Box<f64>>,
     tau: Option<Box<f64>>,
+    phase: Option<Box<f64>>,
 }
 
 impl Conditions {
@@ -347,12 +348,12 @@ impl Conditions {
         }
         let lengths = [info.n_styles, info.n_dofs, info.n_dofs, info.n_dofs, info.n_dofs];
         let vectors = lengths.map(|length| Numbers::of(length, input));
-        Some(Self { vectors, amplitude: scalar(input), tau: scalar(input) })
+        Some(Self { vectors, amplitude: scalar(input), tau: scalar(input), phase: scalar(input) })
     }
 
     fn get(&self) -> pdmp_conditions {
         let [style, goal, anchor, start, velocity] = self.vectors.each_ref().map(Numbers::vector);
-        let (amplitude, tau) = (pointer(&self.amplitude), pointer(&self.tau));
-        pdmp_conditions { style, goal, anchor, start, velocity, amplitude, tau }
+        let [amplitude, tau, phase] = [&self.amplitude, &self.tau, &self.phase].map(pointer);
+        pdmp_conditions { style, goal, anchor, start, velocity, amplitude, tau, phase }
     }
 }

@@ -231,11 +231,20 @@ impl ContextMap {
             })
         });
         if mean.iter().chain(covariance.iter().flatten()).any(|x| !x.is_finite()) {
-            return Err(Error::Fit(format!(
-                "context {context:?} is so far from those of the demonstrations that the prediction overflows"
-            )));
+            return Err(too_far(&context, &outside));
         }
         Ok(Expected { mean, covariance, outside })
+    }
+}
+
+/// The error of a context (Q,) whose prediction overflows: that names the value that is farthest outside.
+pub(crate) fn too_far(context: &[f64], outside: &[f64]) -> Error {
+    let farthest = (0..context.len()).max_by(|&a, &b| outside[a].total_cmp(&outside[b]));
+    let value = farthest.map_or(f64::NAN, |q| context[q]);
+    Error::Range {
+        name: "context",
+        value,
+        allowed: "is so far from those of the demonstrations that the prediction overflows",
     }
 }
 
