@@ -41,7 +41,7 @@ pdmp_vector view(const Numbers &&) = delete;
 /// What a movement starts with; what is empty is that of the nominal demonstration.
 struct Conditions {
     std::vector<double> style, goal, anchor, start, velocity;
-    std::optional<double> amplitude, tau;
+    std::optional<double> amplitude, tau, phase;
 };
 
 /// A motion, one number per DoF.
@@ -69,7 +69,7 @@ inline const double *told(const std::optional<double> &number) noexcept { return
 
 inline pdmp_conditions told(const Conditions &c) noexcept {
     return {told(c.style),    told(c.goal),      told(c.anchor), told(c.start),
-            told(c.velocity), told(c.amplitude), told(c.tau)};
+            told(c.velocity), told(c.amplitude), told(c.tau),    told(c.phase)};
 }
 
 inline std::vector<double> copy(pdmp_vector numbers) { return {numbers.data, numbers.data + numbers.length}; }
@@ -146,7 +146,7 @@ private:
         detail::check([&](pdmp_text error) { return call(&told, {numbers.data(), numbers.size()}, error); });
         using detail::copy;
         return {copy(told.style),    copy(told.goal), copy(told.anchor), copy(told.start),
-                copy(told.velocity), std::nullopt,    *told.tau};
+                copy(told.velocity), std::nullopt,    *told.tau,          std::nullopt};
     }
 
     struct Free {

@@ -18,15 +18,15 @@ fn omega(transition: f64) -> f64 {
     6.638_352_067_993_813 / transition
 }
 
-/// Everything that moves: y − (g − y₀)(m − 1), z, u and r, then style, rate 1/τ and centre, each with its derivative.
+/// Everything that moves: y − (g − y₀)(m − 1), z, u and r, then style, rate 1/τ, centre and r₀, each with its derivative:
+/// that of the rate with respect to time, of the others with respect to the clock in seconds at the model's own τ.
 struct Reference<'a> {
     model: &'a Model,
     /// g − y₀ at the start.
     way: Vec<f64>,
     state: Vec<f64>,
-    /// Style, rate and centre, to which their filters go, and r₀.
+    /// Style, rate, centre and r₀, to which their filters go.
     target: Vec<f64>,
-    amplitude: f64,
     /// ω of the filters, that of the centre last.
     omega: [f64; 2],
 }
@@ -39,27 +39,24 @@ impl Reference<'_> {
         let (z, rest) = rest.split_at(n);
         let (u, r, filters) = (rest[0], rest[1], &rest[2..]);
         let (style, rate, centre) = (&filters[..n_styles], filters[n_styles], &filters[n_styles + 1..]);
+        let amplitude = filters[n_styles + 1 + n];
         let (mut outputs, mut rises) = ([0.0; 16], [0.0; 16]);
         self.model.landscape().evaluate(u, &mut outputs[..n * n_styles], &mut rises[..n * n_styles]);
         let w = |d: usize| r * style.iter().enumerate().map(|(j, s)| s * outputs[j * n + d]).sum::<f64>();
         let growth = match self.model.canonical() {
             Canonical::Discrete { .. } => 0.0,
-            Canonical::Rhythmic { mu } => mu * (self.amplitude - r),
+            Canonical::Rhythmic { mu } => mu * (amplitude - r),
         };
         let mut slope: Vec<f64> = (0..n).map(|d| rate * (z[d] + w(d))).collect();
         slope.extend((0..n).map(|d| rate * alpha_z * (beta_z * (centre[d] - y[d]) - z[d])));
         slope.extend([rate, rate * growth]);
         let (value, speed) = filters.split_at(self.target.len());
-        slope.extend(speed);
-        slope.extend(
-            value
-                .iter()
-                .zip(speed)
-                .zip(&self.target)
-                .enumerate()
-                .map(|(i, ((x, v), target))| (self.omega[usize::from(i > n_styles)], x, v, target))
-                .map(|(omega, x, v, target)| -2.0 * omega * v - omega.powi(2) * (x - target)),
-        );
+        let pace = |i: usize| if i == n_styles { 1.0 } else { rate * self.model.tau() };
+        slope.extend(speed.iter().enumerate().map(|(i, v)| pace(i) * v));
+        slope.extend(value.iter().zip(speed).zip(&self.target).enumerate().map(|(i, ((x, v), target))| {
+            let omega = self.omega[usize::from((n_styles + 1..n_styles + 1 + n).contains(&i))];
+            pace(i) * (-2.0 * omega * v - omega.powi(2) * (x - target))
+        }));
         slope
     }
 
@@ -99,14 +96,14 @@ fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
     // As for a model of a movement of this duration.
     let transition = if discrete { 0.1 } else { 0.25 } * model.duration() * tau / model.tau();
     let mut controller = Controller::new(Arc::clone(model), dt, &conditions, Some(transition)).unwrap();
-    let target: Vec<f64> = style.iter().copied().chain([1.0 / tau]).chain(centre.clone()).collect();
+    let target: Vec<f64> = style.iter().copied().chain([1.0 / tau]).chain(centre.clone()).chain([1.0]).collect();
     // ẏ = ρ(z + w): at rest, or with z = 0.
     let z = controller.velocity().iter().map(|v| v * tau);
     let way: Vec<f64> = centre.iter().zip(&start).map(|(g, y)| if discrete { g - y } else { 0.0 }).collect();
     let lag = if discrete { model.transport(0.0).unwrap() - 1.0 } else { 0.0 };
     let state = start.iter().zip(&way).map(|(y, way)| y - way * lag).collect();
     let omegas = [omega(transition); 2];
-    let mut reference = Reference { model, way, state, target: target.clone(), amplitude: 1.0, omega: omegas };
+    let mut reference = Reference { model, way, state, target: target.clone(), omega: omegas };
     reference.state.extend(vec![0.0; n]);
     reference.state.extend([0.0, 1.0]);
     reference.state.extend(&target);
@@ -130,14 +127,15 @@ fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
             } else {
                 controller.set_anchor(&centre).unwrap();
                 controller.set_amplitude(1.4).unwrap();
-                reference.amplitude = 1.4;
             }
             if discrete && model.transport(0.0).unwrap() == 0.0 {
                 let lead = 1.0 / model.attractor().beta_z;
                 let remaining = model.canonical().extent() - reference.state[2 * n] - lead;
-                reference.omega[1] = omega(transition.max(1.3 * remaining * tau));
+                reference.omega[1] = omega(transition.max(remaining * model.tau()));
             }
-            reference.target = style.iter().copied().chain([1.0 / (1.3 * tau)]).chain(centre).collect();
+            let amplitude = if discrete { 1.0 } else { 1.4 };
+            reference.target =
+                style.iter().copied().chain([1.0 / (1.3 * tau)]).chain(centre).chain([amplitude]).collect();
         }
         controller.step().unwrap();
         // As many parts as make the reference's own error, that of the kink at u_end included, negligible.
