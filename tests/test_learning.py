@@ -287,3 +287,28 @@ def test_cut_off_damps_as_stated(hz: float, gain: float) -> None:
     inner = slice(100, 301)
     found = 2 * np.mean(rest[inner] * tremor[inner]) / 0.02
     assert found == pytest.approx(gain, abs=0.03)
+
+
+def test_noise_that_is_large_is_reported() -> None:
+    """A tenth of the range is named with its size; half a percent is smoothed without a word."""
+    random = np.random.default_rng(0)
+    clean = _reach()
+    with pytest.warns(UserWarning, match=r'"y0" has measurement noise of standard deviation 0\.'):
+        pdmp.fit([clean + 0.1 * random.normal(size=clean.shape) for _ in range(10)], dt=0.01)
+    model = pdmp.fit([clean + 0.005 * random.normal(size=clean.shape) for _ in range(10)], dt=0.01)
+    assert "measurement noise 4." in repr(model) or "measurement noise 5." in repr(model)
+
+
+def test_small_degrees_of_freedom_that_are_left_out_are_reported() -> None:
+    """Radians beside millimetres of unknown unit are named where the styles leave them out."""
+    random = np.random.default_rng(0)
+    s = np.linspace(0, 1, 101)
+    rise, bump = s**3 * (10 - 15 * s + 6 * s**2), (4 * s * (1 - s)) ** 3
+    demos = [
+        np.column_stack([400 * far * rise, 0.2 * turn * bump])
+        for far, turn in random.uniform(-1, 1, (12, 2))
+    ]
+    with pytest.warns(UserWarning, match=r'1 styles leave out \d+ % of "y1"'):
+        pdmp.fit(demos, dt=0.01, n_styles=1)
+    made = pdmp.fit(demos, dt=0.01)
+    assert made.n_styles == 2

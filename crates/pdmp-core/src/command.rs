@@ -59,10 +59,8 @@ impl Command<'_> {
             Some(vector) => check_vector(name, vector, n_dofs, "DoF"),
             None => Ok(()),
         };
-        if let Some(dt) = self.dt {
-            if !(0.0..f64::INFINITY).contains(&dt) {
-                return Err(Error::Range { name: "dt", value: dt, allowed: "must be finite and not negative" });
-            }
+        if let Some(dt) = self.dt.filter(|dt| !(0.0..f64::INFINITY).contains(dt)) {
+            return Err(Error::Range { name: "dt", value: dt, allowed: "must be finite and not negative" });
         }
         if let Some(style) = self.style {
             check_style(style, model.n_styles())?;

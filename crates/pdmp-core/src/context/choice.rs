@@ -143,12 +143,15 @@ pub(super) struct Trend {
     pub(super) stack: Stack,
 }
 
-/// Returns the map of a choice, its trend if it has one, and the error of each that was tried at contexts left out.
-pub(super) fn choose(
-    choice: MapChoice,
-    labels_alone: bool,
-    shown: &Shown,
-) -> Result<(Candidate, Option<Trend>, Vec<(MapKind, f64)>)> {
+/// The map of a choice, its trend if it has one, and the error of each map that was tried at contexts left out.
+pub(super) struct Choice {
+    pub(super) candidate: Candidate,
+    pub(super) trend: Option<Trend>,
+    pub(super) errors: Vec<(MapKind, f64)>,
+}
+
+/// Makes a choice.
+pub(super) fn choose(choice: MapChoice, labels_alone: bool, shown: &Shown) -> Result<Choice> {
     let kind = match choice {
         MapChoice::Given(kind) => kind,
         MapChoice::Auto if labels_alone || !(MIN_CONTEXTS..=MOST).contains(&shown.inputs.nrows()) => MapKind::Linear,
@@ -170,7 +173,7 @@ pub(super) fn choose(
         }
         _ => None,
     };
-    Ok((candidate, trend, tried))
+    Ok(Choice { candidate, trend, errors: tried })
 }
 
 /// The trend of a stacked map with known constants.

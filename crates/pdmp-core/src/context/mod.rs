@@ -27,7 +27,7 @@ pub use space::ContextColumn;
 pub(crate) use space::tabulate;
 
 use axes::Axes;
-use choice::{Candidate, MOST, Shown, Trend, choose};
+use choice::{Candidate, Choice, MOST, Shown, choose};
 use kriging::Kriging;
 use space::{Scale, numbers};
 pub(crate) use stack::Stack;
@@ -137,8 +137,8 @@ impl ContextMap {
         let axes = Axes::principal(data.means.view(), metric)?;
         let data = data.along(&axes);
         let labels_alone = data.columns.iter().all(|column| matches!(column, ContextColumn::Label(_)));
-        let (candidate, trend, errors) = choose(choice, labels_alone, &data.shown())?;
-        Ok(data.map(axes, candidate, trend, errors))
+        let choice = choose(choice, labels_alone, &data.shown())?;
+        Ok(data.map(axes, choice))
     }
 
     /// The same map again, from the data that it was learnt from.
@@ -155,7 +155,7 @@ impl ContextMap {
         let data = data.along(&axes);
         let candidate = Candidate::with(kind, kernel, &data.shown(), |_, _| ratios)?;
         let trend = trend.map(|(ratios, stack)| choice::trend(&data.shown(), ratios, stack)).transpose()?;
-        Ok(data.map(axes, candidate, trend, errors))
+        Ok(data.map(axes, Choice { candidate, trend, errors }))
     }
 
     pub(crate) fn recipe(&self) -> Recipe {
@@ -371,7 +371,8 @@ impl Data {
         Shown { inputs: self.inputs.view(), n_inputs: self.scale.n_inputs(), outputs: self.means.view() }
     }
 
-    fn map(self, axes: Axes, candidate: Candidate, trend: Option<Trend>, errors: Vec<(MapKind, f64)>) -> ContextMap {
+    fn map(self, axes: Axes, choice: Choice) -> ContextMap {
+        let Choice { candidate, trend, errors } = choice;
         let (kind, kernel, ratios) = (candidate.kind, candidate.kernel, candidate.ratios.clone());
         let (noise, freedom) = match (candidate.kriging.freedom(), &self.within) {
             // As many coefficients as contexts: what is left is the noise of the averages.

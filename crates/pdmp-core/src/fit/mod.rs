@@ -2,6 +2,7 @@
 
 mod constants;
 mod cycle_phase;
+mod noise;
 mod options;
 mod scaling;
 mod selection;
@@ -108,6 +109,9 @@ pub fn fit(
             all.leading(n_styles)
         }
     };
+    findings.extend(noise::noisy(&aligned.noise, &ranges, &names));
+    let unknown = units.iter().all(String::is_empty);
+    findings.extend(noise::left_out(&targets, &factors, &aligned.noise, &names).filter(|_| unknown));
     let Targets { forcing, goals, starts, anchors, .. } = targets;
     drop(forcing);
 

@@ -96,6 +96,30 @@ pub enum Finding {
         /// Samples C after alignment.
         n_samples: usize,
     },
+    /// Measurement noise that is large beside the movement.
+    Noisy {
+        /// Name of the degree of freedom.
+        dof: String,
+        /// Standard deviation of the noise, in the unit of the degree of freedom.
+        level: f64,
+        /// The same as a share of the range.
+        share: f64,
+        /// Cut-off of the smoothing, in Hz.
+        cut_off: f64,
+    },
+    /// A degree of freedom of small range whose movement the styles leave out.
+    LeftOut {
+        /// Name of the degree of freedom.
+        dof: String,
+        /// Its range, in its unit.
+        range: f64,
+        /// The largest range of all.
+        largest: f64,
+        /// Share of its targets that the styles leave out, by root mean square.
+        share: f64,
+        /// Style dimension J.
+        n_styles: usize,
+    },
 }
 
 /// Where in a demonstration.
@@ -188,6 +212,22 @@ impl fmt::Display for Finding {
                 short(*alpha_z),
                 short(*reproduced),
                 short(*shown)
+            ),
+            Self::Noisy { dof, level, share, cut_off } => write!(
+                f,
+                "{dof:?} has measurement noise of standard deviation {}, {} % of its range; it is smoothed at {} Hz: check \
+                 the recordings, or choose the cut-off by smoothing",
+                short(*level),
+                short(100.0 * share),
+                short(*cut_off)
+            ),
+            Self::LeftOut { dof, range, largest, share, n_styles } => write!(
+                f,
+                "{n_styles} styles leave out {} % of {dof:?}, whose range of {} is small beside {}: if its unit is another \
+                 one, give units or dof_scale = \"range\"; otherwise raise n_styles",
+                short((100.0 * share).round()),
+                short(*range),
+                short(*largest)
             ),
         }
     }

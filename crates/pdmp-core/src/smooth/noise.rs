@@ -250,11 +250,11 @@ impl Thinned {
         for (group, hz) in grid.chunks_exact(WIDTH).enumerate() {
             let pad = samples.pad(hz[0]);
             let roughness = Roughness::new(&samples.knots(pad));
-            let lambda = Lanes::new([0, 1, 2, 3].map(|k| lambda(hz[k] * self.interval)));
-            let factor = roughness.factor(lambda);
+            let lambdas = [0, 1, 2, 3].map(|k| lambda(hz[k] * self.interval));
+            let factor = roughness.factor(Lanes::new(lambdas));
             // The columns of Q that belong to a cycle, or all.
             let own = if self.period.is_some() { pad - 1..pad - 1 + n } else { 0..n - 2 };
-            let trace = roughness.trace(&factor, own);
+            let traces = roughness.trace(&factor, own).to_array();
             for (column, shares) in shares.iter().enumerate() {
                 let Some((scale, shares)) = shares else { continue };
                 let mut bend = shares.clone();
@@ -263,12 +263,12 @@ impl Thinned {
                 factor.solve(&mut bend);
                 roughness.residual(&mut bend);
                 let squares = bend[pad..pad + n].iter().fold(Lanes::ZERO, |sum, r| sum + *r * *r).to_array();
-                for k in 0..WIDTH {
-                    let (at, lambda, trace) = ([column, group * WIDTH + k], lambda.to_array()[k], trace.to_array()[k]);
+                for (k, ((square, lambda), trace)) in squares.into_iter().zip(lambdas).zip(traces).enumerate() {
+                    let at = [column, group * WIDTH + k];
                     // n‖Qγ‖²/tr(QM⁻¹Qᵀ)², from which λ is cancelled: no 0/0 where the spline interpolates.
-                    let score = n as f64 * squares[k] / (trace * trace);
+                    let score = n as f64 * square / (trace * trace);
                     scores.logarithms[at] = score.max(f64::MIN_POSITIVE).ln();
-                    scores.squares[at] = squares[k] * (lambda * scale).powi(2) * self.block;
+                    scores.squares[at] = square * (lambda * scale).powi(2) * self.block;
                     scores.traces[at] = lambda * trace;
                 }
             }
