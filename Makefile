@@ -4,6 +4,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SHARED := $(if $(filter Darwin,$(shell uname)),dylib,so)
+# Version of the C ABI, as in the library's SONAME: a program looks for libpdmp.so.$(ABI) when it runs.
+ABI := $(shell sed -n 's/^version = "\([0-9]*\.[0-9]*\)\..*/\1/p' Cargo.toml)
 SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
 
 # The bindings are compiled against the interpreter that will import them.
@@ -94,6 +96,7 @@ capi: | needs  ## Builds the libraries for C and C++ and puts them and their hea
 	cp target/release/libpdmp.a target/release/libpdmp.$(SHARED) dist/capi/lib
 	cp crates/pdmp-capi/include/pdmp.h crates/pdmp-capi/include/pdmp.hpp dist/capi/include
 	cp LICENSE* dist/capi
+	$(if $(filter so,$(SHARED)),ln -sf libpdmp.so dist/capi/lib/libpdmp.so.$(ABI))
 
 header: | needs  ## Makes pdmp.h anew from the sources of the C ABI
 	PDMP_WRITE_HEADER=1 cargo test --release --package pdmp-capi --test header

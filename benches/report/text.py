@@ -21,11 +21,11 @@ in turn, or, where there are more than twelve, each of twelve folds of neighbour
 are learnt from, and the movement is foreseen from the context alone. What lies outside the convex
 hull of the contexts learnt from is extrapolation.
 
-The primitive aligns demonstrations by linear time scaling, its J keeps nine tenths of the sum of
-the singular values, and its map from context to style, goal, start or anchor, and duration is the
-one that it chooses by itself. Beside it stand four that differ in one of these: all J, the linear
-map, J by cross-validation (`n_styles="auto"`), and a time warp of four segments. The ProMP of
-movement_primitives takes part where that is installed.
+The primitive has its defaults: linear time scaling, automatic smoothing, the systematic J, and a
+map from context to style, goal, start or anchor, and duration that stacks a Gaussian process and a
+line. Beside it stand four that differ in one of these: all J, the linear map, J by cross-validation
+(`n_styles="auto"`), and a time warp of four segments. The ProMP of movement_primitives takes part
+where that is installed.
 
 ## Error beside simpler predictors
 
