@@ -4,8 +4,6 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from typing import Any
 
-from pdmp._shown import printable
-
 
 def path(text: str) -> str:
     """Return the name of a file or folder, which must not stand for a stream."""
@@ -69,7 +67,7 @@ def add_learning(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--styles",
-        type=_or_auto(int, "whole number"),
+        type=_or_named(int, "whole number", auto="auto"),
         metavar="J",
         help="number of style parameters, or auto: as few as foresee movements in other contexts",
     )
@@ -88,7 +86,7 @@ def add_learning(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--smoothing",
-        type=_smoothing,
+        type=_or_named(float, "frequency [Hz]", auto="auto", none=None),
         default="auto",
         metavar="HZ",
         help="cut-off [Hz], auto (default: by cross-validation), or none",
@@ -114,23 +112,14 @@ def settings(options: Namespace) -> dict[str, Any]:
     }
 
 
-def _smoothing(text: str) -> float | str | None:
-    """Read a cut-off, auto or none."""
-    if text in ("auto", "none"):
-        return None if text == "none" else text
-    try:
-        return float(text)
-    except ValueError:
-        raise ArgumentTypeError(f'"{text}" is no frequency [Hz], auto or none') from None
-
-
-def _or_auto(read: Callable[[str], Any], wanted: str) -> Callable[[str], Any]:
-    """Return what reads an argument that may be auto instead."""
+def _or_named(read: Callable[[str], Any], wanted: str, **named: str | None) -> Callable[[str], Any]:
+    """Return a reader of an argument that may be one of some names instead."""
 
     def value(text: str) -> Any:
         try:
-            return text if text == "auto" else read(text)
+            return named[text] if text in named else read(text)
         except ValueError:
-            raise ArgumentTypeError(f'"{printable(text)}" is neither a {wanted} nor auto') from None
+            names = " or ".join(named)
+            raise ArgumentTypeError(f'"{text}" is neither a {wanted} nor {names}') from None
 
     return value
