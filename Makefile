@@ -1,5 +1,5 @@
-# Everything runs in .venv, which each target sets up as far as it needs. A stamp .venv/with-EXTRA says that
-# the extension was built from the present sources and installed with that extra.
+# Everything runs in .venv, which each target sets up as far as it needs. A stamp .venv/extension says that the extension
+# was built from the present sources, and .venv/with-EXTRA that what an extra requires is installed beside it.
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -105,10 +105,15 @@ clean:  ## Removes what the targets above made
 	cargo clean
 	rm -rf .venv demo reproduction report dist fuzz/found python/pdmp/_native*.so
 
-.venv/with-%: $(SOURCES) | $(BIN)/python
-	@echo 'building the extension and installing what "$*" needs: some minutes the first time'
-	$(BIN)/pip install --quiet --no-warn-conflicts --editable '.[$*]'
+.venv/with-%: .venv/extension
+	@$(BIN)/python .ci/requirements.py $* > .venv/requirements-$*.txt
+	$(BIN)/pip install --quiet --no-warn-conflicts --requirement .venv/requirements-$*.txt
 	$(if $(filter reproduce test dev,$*),$(BIN)/pip install --quiet --no-deps $(ROBOT))
+	@touch $@
+
+.venv/extension: $(SOURCES) | $(BIN)/python
+	@echo 'building the extension: some minutes the first time'
+	$(BIN)/pip install --quiet --editable .
 	@touch $@
 
 $(BIN)/python: | needs
