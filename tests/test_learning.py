@@ -239,6 +239,15 @@ def test_noise_does_not_kick_a_joint_at_rest() -> None:
     assert np.abs(kicked.rollout(**pdmp.as_demonstrated(kicked, 0)).acceleration[:, 1]).max() > 10
 
 
+def test_layout_of_noisy_arrays_does_not_matter() -> None:
+    """Columns of a data frame and rows of an array, both smoothed, give one model to the last bit."""
+    random = np.random.default_rng(4)
+    recorded = [_reach(0.1) + 0.003 * random.normal(size=(101, 2)) for _ in range(6)]
+    by_rows = pdmp.fit(recorded, dt=0.01)
+    by_columns = pdmp.fit([np.asfortranarray(x) for x in recorded], dt=0.01)
+    assert np.all(by_rows.noise > 0) and by_rows.to_bytes() == by_columns.to_bytes()
+
+
 def test_clean_demonstrations_are_not_smoothed() -> None:
     """Automatic smoothing leaves a clean model as it is, to the last bit."""
     clean = [_reach(bend) for bend in (-0.2, 0.0, 0.1, 0.3)]

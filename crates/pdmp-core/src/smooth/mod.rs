@@ -121,9 +121,9 @@ impl Samples<'_> {
         (self.values.outer_iter().map(deviation).collect(), largest)
     }
 
-    /// The smoothed values (n, D), each column at its cut-off in Hz; columns without one stay.
+    /// The smoothed values (n, D) by rows, each column at its cut-off in Hz; columns without one stay.
     pub(crate) fn smoothed(&self, cut_offs: &[Option<f64>]) -> Array2<f64> {
-        let mut smoothed = self.values.to_owned();
+        let mut smoothed = self.values.as_standard_layout().into_owned();
         let Some(lowest) = cut_offs.iter().flatten().copied().reduce(f64::min) else { return smoothed };
         let (n, pad) = (self.len(), self.pad(lowest));
         let roughness = Roughness::new(&self.knots(pad));
