@@ -270,6 +270,7 @@ def test_trajectories_are_demonstrations(trajectory: pdmp.Trajectory) -> None:
 def test_trajectories_come_back_from_files(trajectory: pdmp.Trajectory, tmp_path: Path) -> None:
     """CSV and NPZ keep every bit, names and units."""
     trajectory.to_csv(tmp_path / "a.csv")
+    assert_back(demos.read_csv(tmp_path / "a.csv"), trajectory)
     assert_back(demos.read_csv(tmp_path / "a.csv", columns=trajectory.names), trajectory)
     np.savez(tmp_path / "a.npz", **trajectory.to_dict())
     (demo,) = demos.read_npz(tmp_path / "a.npz").values()

@@ -322,7 +322,7 @@ impl Trajectory {
         slf.py().import("pdmp._described")?.call_method1("dataframe", (slf,))
     }
 
-    /// Writes a CSV file, which `demos.read_csv` with `columns=names` reads back: `demos.write_csv` describes it.
+    /// Writes a CSV file, whose positions `demos.read_csv` reads back: `demos.write_csv` describes it.
     ///
     /// Parameters
     /// ----------

@@ -47,7 +47,8 @@ def read_csv(
     path : path
         UTF-8 text with a row of names, then one sample a row.
     columns : sequence of str, optional
-        Names of the degrees of freedom to keep, in this order; all but `time` by default.
+        Names of the degrees of freedom to keep, in this order; by default all but `time`, and but
+        `<name>_velocity` and `<name>_acceleration` of a column `<name>`, as `write_csv` writes.
     time : str
         Column of the time stamps, by default `t` or `time`, in s unless its header, or this name,
         has ms, µs or ns in brackets. Stamps in ms, µs or ns since 1970 are recognised, with a
@@ -83,7 +84,8 @@ def read_csv(
             "name it with time=, or pass dt="
         )
     if columns is None:
-        names = [name for name in names if name != stamped]
+        derived = {f"{name}{suffix}" for name in names for suffix, _ in DERIVATIVES[1:]}
+        names = [name for name in names if name != stamped and name not in derived]
     else:
         names = _text.listed("columns", columns)
     where = _text.places(path, header, names)
@@ -186,7 +188,7 @@ def write_csv(
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
 ) -> None:
-    """Write a trajectory as CSV; `read_csv` with `columns=names` reads its positions back.
+    """Write a trajectory as CSV; `read_csv` reads its positions back.
 
     The columns are `t` [s], then the position of each degree of freedom under its name, then
     velocities under `<name>_velocity` and accelerations under `<name>_acceleration`, with the units
