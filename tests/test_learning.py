@@ -240,7 +240,7 @@ def test_noise_does_not_kick_a_joint_at_rest() -> None:
 
 
 def test_layout_of_noisy_arrays_does_not_matter() -> None:
-    """Columns of a data frame and rows of an array, both smoothed, give one model to the last bit."""
+    """Arrays by columns and by rows, both smoothed, give one model to the last bit."""
     random = np.random.default_rng(4)
     recorded = [_reach(0.1) + 0.003 * random.normal(size=(101, 2)) for _ in range(6)]
     by_rows = pdmp.fit(recorded, dt=0.01)
