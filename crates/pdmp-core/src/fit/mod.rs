@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use ndarray::{Array2, s};
 
-use crate::align::{Aligned, TimeScaling};
+use crate::align::{Aligned, Template, TimeScaling};
 use crate::context::{ContextColumn, ContextMap, tabulate};
 use crate::demo::{ContextValue, Demonstration};
 use crate::error::{Error, Result};
@@ -54,28 +54,7 @@ pub fn fit(
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
     let mut aligning = |share| proceed(Stage::Align, share);
-    let unit = options.dof_scale.given(demos[0].n_dofs())?;
-    let linear = aligned.clone();
-    let compared = options.alignment.time_scaling == TimeScaling::WarpIfBetter && contexts.is_some();
-    let mut warping = |share| aligning(if compared { 0.5 * share } else { share });
-    let mut template = options.alignment.time_scaling.apply(&mut aligned, unit, threads, &mut warping)?;
-    if let (true, Some((columns, numbers))) = (compared, &contexts) {
-        let n_styles = |aligned: &Aligned| {
-            let count = match options.styles {
-                StyleChoice::Given(count) => count,
-                StyleChoice::Systematic => StyleCount::Spectrum(0.9),
-                StyleChoice::Auto => StyleCount::Spectrum(1.0),
-            };
-            let mut targets = Targets::of(aligned, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
-            targets.scale(&options.dof_scale.of(&targets.ranges(), &units));
-            Ok(Factors::of(targets.forcing.view(), count, &mut |_| Ok(()))?.styles.ncols())
-        };
-        let contexts = scaling::Contexts { columns, numbers, map: options.map, n_styles: &n_styles };
-        let mut comparing = |share: f64| aligning(0.5 + 0.5 * share);
-        if !contexts.favour(&aligned, &linear, options.alignment.kind, &mut comparing)? {
-            (aligned, template) = (linear, None);
-        }
-    }
+    let template = scale_time(&mut aligned, options, &constants, &units, contexts.as_ref(), &mut aligning)?;
     let mut targeting = |share| proceed(Stage::Targets, share);
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
@@ -89,26 +68,8 @@ pub fn fit(
     targets.scale(&dof_scale);
 
     let mut factorising = |share| proceed(Stage::Factorise, share);
-    let factors = match options.styles {
-        StyleChoice::Systematic => {
-            let noise = selection::noise_limit(&aligned, &constants, &dof_scale, threads)?;
-            let tables = contexts.as_ref().map(|(columns, numbers)| (columns.as_slice(), numbers));
-            selection::systematic(targets.forcing.view(), noise, tables, &mut factorising)?
-        }
-        StyleChoice::Given(count) => Factors::of(targets.forcing.view(), count, &mut factorising)?,
-        StyleChoice::Auto => {
-            let (columns, numbers) = contexts.as_ref().ok_or(Error::Arguments(
-                "n_styles = \"auto\" goes by contexts: pass contexts, a number, or None to go by the spectrum",
-            ))?;
-            let mut first = |share: f64| factorising(0.5 * share);
-            let all = Factors::of(targets.forcing.view(), StyleCount::Spectrum(1.0), &mut first)?;
-            let foresight =
-                Foresight::new(&aligned, &targets, &all, &transport, constants.attractor, constants.canonical)?;
-            let mut second = |share: f64| factorising(0.5 + 0.5 * share);
-            let n_styles = foresight.styles(columns, numbers, options.map, &mut second)?;
-            all.leading(n_styles)
-        }
-    };
+    let shown = Shown { aligned: &aligned, targets: &targets, transport: &transport, constants: &constants };
+    let factors = shown.factors(options, &dof_scale, contexts.as_ref(), &mut factorising)?;
     findings.extend(noise::noisy(&aligned.noise, &ranges, &names));
     let unknown = units.iter().all(String::is_empty);
     findings.extend(noise::left_out(&targets, &factors, &aligned.noise, &names).filter(|_| unknown));
@@ -175,6 +136,83 @@ pub fn fit(
     Ok(Arc::unwrap_or_clone(model))
 }
 
+/// Contexts (M, Q) of the demonstrations, with what their columns mean.
+type Contexts = (Vec<ContextColumn>, Array2<f64>);
+
+/// Scales the time of demonstrations, and returns the template of a warp, if one is made and kept.
+fn scale_time(
+    aligned: &mut Aligned,
+    options: &FitOptions,
+    constants: &Constants,
+    units: &[String],
+    contexts: Option<&Contexts>,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Option<Template>> {
+    let (scaling, threads) = (&options.alignment.time_scaling, options.threads);
+    let unit = options.dof_scale.given(aligned.demo(0).n_dofs())?;
+    let Some((columns, numbers)) = contexts.filter(|_| *scaling == TimeScaling::WarpIfBetter) else {
+        return scaling.apply(aligned, unit, threads, progress);
+    };
+    let linear = aligned.clone();
+    let template = scaling.apply(aligned, unit, threads, &mut |share| progress(0.5 * share))?;
+    let n_styles = |aligned: &Aligned| {
+        let count = match options.styles {
+            StyleChoice::Given(count) => count,
+            StyleChoice::Systematic => StyleCount::Spectrum(0.9),
+            StyleChoice::Auto => StyleCount::Spectrum(1.0),
+        };
+        let mut targets = Targets::of(aligned, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
+        targets.scale(&options.dof_scale.of(&targets.ranges(), units));
+        Ok(Factors::of(targets.forcing.view(), count, &mut |_| Ok(()))?.styles.ncols())
+    };
+    let contexts = scaling::Contexts { columns, numbers, map: options.map, n_styles: &n_styles };
+    if contexts.favour(aligned, &linear, options.alignment.kind, &mut |share| progress(0.5 + 0.5 * share))? {
+        return Ok(template);
+    }
+    *aligned = linear;
+    Ok(None)
+}
+
+/// Targets to factorise, and where they come from.
+struct Shown<'a> {
+    aligned: &'a Aligned<'a>,
+    targets: &'a Targets,
+    transport: &'a Transport,
+    constants: &'a Constants,
+}
+
+impl Shown<'_> {
+    /// The factors of the targets, as many as the options ask for.
+    fn factors(
+        &self,
+        options: &FitOptions,
+        dof_scale: &[f64],
+        contexts: Option<&Contexts>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Factors> {
+        let Self { aligned, targets, transport, constants } = *self;
+        let forcing = targets.forcing.view();
+        match options.styles {
+            StyleChoice::Systematic => {
+                let noise = selection::noise_limit(aligned, constants, transport, dof_scale, options.threads)?;
+                selection::systematic(forcing, noise, contexts, progress)
+            }
+            StyleChoice::Given(count) => Factors::of(forcing, count, progress),
+            StyleChoice::Auto => {
+                let (columns, numbers) = contexts.ok_or(Error::Arguments(
+                    "n_styles = \"auto\" goes by contexts: pass contexts, a number, or None to go by the spectrum",
+                ))?;
+                let all = Factors::of(forcing, StyleCount::Spectrum(1.0), &mut |share| progress(0.5 * share))?;
+                let foresight =
+                    Foresight::new(aligned, targets, &all, transport, constants.attractor, constants.canonical)?;
+                let mut second = |share: f64| progress(0.5 + 0.5 * share);
+                let n_styles = foresight.styles(columns, numbers, options.map, &mut second)?;
+                Ok(all.leading(n_styles))
+            }
+        }
+    }
+}
+
 /// F_basis (J, C·D) as outputs over the clock (C, J·D), in the unit of each DoF.
 fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
     let n_dofs = dof_scale.len();
@@ -189,10 +227,7 @@ fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
 }
 
 /// Contexts (M, Q), with what their columns mean: those given, or those of the demonstrations if they carry any.
-fn contexts_of(
-    demos: &[Demonstration],
-    given: Option<&[Vec<ContextValue>]>,
-) -> Result<Option<(Vec<ContextColumn>, Array2<f64>)>> {
+fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> Result<Option<Contexts>> {
     if let Some(contexts) = given
         && contexts.len() != demos.len()
     {

@@ -18,6 +18,7 @@ use crate::factor::{Factors, StyleCount};
 use crate::smooth::Smoothing;
 use crate::targets::Targets;
 use crate::threads::Threads;
+use crate::transport::Transport;
 
 /// Share of the sum of the singular values that the styles carry, as in the paper.
 const SHARE: f64 = 0.9;
@@ -47,6 +48,7 @@ const CONTEXTS_PER_SQUARE: usize = 4;
 pub(super) fn noise_limit(
     aligned: &Aligned,
     constants: &Constants,
+    transport: &Transport,
     dof_scale: &[f64],
     threads: Threads,
 ) -> Result<f64> {
@@ -80,6 +82,7 @@ pub(super) fn noise_limit(
     let mut rows = alignment.align(&noise, threads)?;
     rows.noise = aligned.noise.clone();
     let mut targets = Targets::of(&rows, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
+    targets.carry(transport, constants.attractor, constants.canonical);
     targets.scale(dof_scale);
     let squares: f64 = targets.forcing.iter().map(|f| f * f).sum();
     let factors = Factors::of(targets.forcing.view(), StyleCount::Given(1), &mut |_| Ok(()))?;
@@ -94,7 +97,7 @@ pub(super) fn noise_limit(
 pub(super) fn systematic(
     targets: ArrayView2<f64>,
     noise: f64,
-    contexts: Option<(&[ContextColumn], &Array2<f64>)>,
+    contexts: Option<&(Vec<ContextColumn>, Array2<f64>)>,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Factors> {
     let count = StyleCount::AboveNoise { noise, share: SHARE };
