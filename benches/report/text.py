@@ -35,7 +35,7 @@ standard error over folds: at 1 the context told nothing, at 0 all.
 PRIMITIVE_ITSELF = """\
 ## The primitive itself
 
-J and map of all demonstrations together, and J by cross-validation; E with J by spectrum, ±
+J and map of all demonstrations together, and J by cross-validation; E with the primitive's own J, ±
 standard deviation over folds; share of the positions inside its 90 % band; how far off the duration
 is; and E less that of the best of the simpler predictors, on the same folds, ± standard error:
 negative where the primitive is better.
@@ -43,9 +43,7 @@ negative where the primitive is better.
 Where another is ahead, contexts tell little of the movement. Walks of ten styles differ by what
 their speed does not say, and the slowest and the fastest are foreseen best by the mean; so are the
 highest grabs of other actors. The three doors within the hull of the other twelve are nearer to a
-plane than to what a process makes of three coordinates, which fewer styles (J by cross-validation)
-half make good. Bands are too narrow for the fastest and slowest walking of two subjects, where the
-process follows their trend no more, and too wide beyond the heights of grabs and deposits.
+plane than to what a process and a line together make of three coordinates.
 """
 TIME = """\
 ## Linear and warped time
