@@ -72,19 +72,9 @@ pub unsafe extern "C" fn pdmp_controller_new(
         let transition = unsafe { transition.as_ref() }.copied();
         // SAFETY: the caller's promise is the same.
         let conditions = conditions.map(|conditions| unsafe { conditions.get(model) }).transpose()?.unwrap_or_default();
-        let made = pdmp_controller {
-            inner: Controller::new(Arc::clone(model), dt, &conditions, transition)?,
-            fault: None,
-            owned: given.is_none(),
-        };
-        *place = match given {
-            // SAFETY: large enough, aligned, and used by nothing else.
-            Some(memory) => unsafe {
-                memory.write(made);
-                memory
-            },
-            None => Box::into_raw(Box::new(made)),
-        };
+        let inner = Controller::new(Arc::clone(model), dt, &conditions, transition)?;
+        // SAFETY: it comes from place_in, and the caller's promise is that nothing else uses it.
+        *place = unsafe { put(inner, given) };
         Ok(PDMP_OK)
     };
     // SAFETY: the caller's promise is the same.
@@ -100,6 +90,22 @@ fn place_in(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> 
         (0, _) => Err(Fault::Null("memory")),
         _ if size < needed || address % alignment != 0 => Err(Fault::Memory { size, address, needed, alignment }),
         _ => Ok(Some(memory.data.cast())),
+    }
+}
+
+/// Puts a controller into memory of the caller's, or allocates it.
+///
+/// # Safety
+/// The memory comes from [`place_in`] and is used by nothing else.
+unsafe fn put(inner: Controller, memory: Option<*mut pdmp_controller>) -> *mut pdmp_controller {
+    let made = pdmp_controller { inner, fault: None, owned: memory.is_none() };
+    match memory {
+        // SAFETY: large enough and aligned, as place_in has seen, and used by nothing else.
+        Some(memory) => unsafe {
+            memory.write(made);
+            memory
+        },
+        None => Box::into_raw(Box::new(made)),
     }
 }
 
@@ -119,15 +125,8 @@ pub unsafe extern "C" fn pdmp_controller_clone(
         let place = copy.ok_or(Fault::Null("copy"))?.write(ptr::null_mut());
         let inner = controller.ok_or(Fault::Null("controller"))?.inner.clone();
         let given = place_in(memory)?;
-        let made = pdmp_controller { inner, fault: None, owned: given.is_none() };
-        *place = match given {
-            // SAFETY: large enough, aligned, and used by nothing else.
-            Some(memory) => unsafe {
-                memory.write(made);
-                memory
-            },
-            None => Box::into_raw(Box::new(made)),
-        };
+        // SAFETY: it comes from place_in, and the caller's promise is that nothing else uses it.
+        *place = unsafe { put(inner, given) };
         Ok(PDMP_OK)
     };
     // SAFETY: the caller's promise is the same.
