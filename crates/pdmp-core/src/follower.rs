@@ -118,6 +118,9 @@ impl Filter {
 }
 
 impl Glide {
+    /// Over no time: what is there stays.
+    pub(crate) const START: Self = Self { dt: 0.0, value: [1.0, 0.0], rate: [0.0, 1.0], integral: [0.0; 2] };
+
     /// Length of the tick in seconds.
     pub(crate) fn dt(&self) -> f64 {
         self.dt

@@ -3,6 +3,7 @@
 use super::{Controller, Status};
 use crate::command::Command;
 use crate::error::{Error, Result};
+use crate::follower::Glide;
 
 impl Controller {
     /// Sets the style s (J,) to go to.
@@ -102,7 +103,7 @@ impl Controller {
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
             self.centre_filter = self.centre_filter();
-            self.centre_course = self.centre_filter.pass(self.course.dt());
+            self.centre_course = Glide::START;
             self.centre.follow(centre, &self.centre_filter);
             self.set_tolerance();
             news = true;

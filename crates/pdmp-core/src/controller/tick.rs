@@ -132,12 +132,15 @@ impl Controller {
         }
     }
 
-    /// Gets the filters on the clock ready for a stretch `h` of it.
+    /// Gets the filters on the clock that are at work ready for a stretch `h` of it.
     #[inline(always)]
     fn measure_clock(&mut self, h: f64) {
         let seconds = h * self.model.tau();
-        if seconds != self.course.dt() && !(self.style.settled() && self.centre.settled() && self.amplitude.settled()) {
-            (self.course, self.centre_course) = (self.filter.pass(seconds), self.centre_filter.pass(seconds));
+        if seconds != self.course.dt() && !(self.style.settled() && self.amplitude.settled()) {
+            self.course = self.filter.pass(seconds);
+        }
+        if seconds != self.centre_course.dt() && !self.centre.settled() {
+            self.centre_course = self.centre_filter.pass(seconds);
         }
     }
 
