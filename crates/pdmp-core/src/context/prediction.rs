@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
 use super::Expected;
 use crate::error::{Error, Result};
-use crate::phase::Kind;
+use crate::kind::Kind;
 
 /// The movement predicted for a condition. What the kind of primitive does not have is `None`.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,21 @@
+//! Learning of a model from demonstrations.
+
+pub(crate) mod alignment;
+mod constants;
+mod cycle_phase;
+pub(crate) mod factorization;
+mod fit;
+mod noise_findings;
+pub(crate) mod options;
+pub mod regression;
+mod stiffness;
+mod style_inference;
+pub(crate) mod style_selection;
+mod tabulation;
+mod targets;
+mod time_scaling;
+mod transport_profile;
+
+pub use fit::fit;
+pub use options::{DofScale, FitOptions, Stage, StyleChoice, TransportChoice};
+pub use style_inference::style_of;

@@ -1,0 +1,12 @@
+//! Motion of a primitive: the control loop, whole trajectories and many at once.
+
+pub(crate) mod batch;
+pub(crate) mod command;
+pub(crate) mod controller;
+pub(crate) mod jacobian;
+pub(crate) mod perturbation;
+pub(crate) mod prediction_band;
+pub(crate) mod rollout;
+pub(crate) mod superposition;
+pub(crate) mod trajectory;
+pub(crate) mod unit_responses;
