@@ -41,12 +41,14 @@ test: .venv/with-test  ## Runs every test, Rust and Python
 check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, stubs against the module, and licences
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
+	cargo clippy --release --package pdmp-core --no-default-features -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --release --no-deps --package pdmp-core
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/stubtest pdmp._native
 	$(PYTHON) .ci/licences.py
+	$(PYTHON) .ci/runtime.py
 
 bench: | needs  ## Times, latencies and instructions of the core
 	cargo bench --package pdmp-core

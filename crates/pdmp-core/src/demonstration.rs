@@ -3,6 +3,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
+pub use crate::validate::LARGEST;
 use crate::validate::{check_matrix, check_number, check_positive, check_time, check_vector};
 
 /// Fewest samples that carry a cubic spline with not-a-knot ends.

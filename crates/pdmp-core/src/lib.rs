@@ -44,9 +44,9 @@
 //!     Demonstration::new(position, Sampling::Uniform { dt: 0.01 })
 //! };
 //! let demos = [bend(0.5)?, bend(1.0)?, bend(2.0)?];
-//! let model = Arc::new(fit(&demos, &FitOptions::new(Kind::Discrete), &mut |_, _| Ok(()))?);
+//! let model = Arc::new(fit(&demos, &FitOptions::new(Kind::Discrete))?);
 //!
-//! let mut controller = Controller::new(model, 1e-3, &Conditions::default(), None)?;
+//! let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
 //! controller.set_goal(&[1.2, 0.1])?;
 //! while controller.step()? == Status::Working {
 //!     let _command = (controller.position(), controller.velocity());
@@ -61,41 +61,27 @@
 //!
 //! [doi:10.1016/j.neunet.2011.02.004]: https://doi.org/10.1016/j.neunet.2011.02.004
 
-mod context;
-mod demonstration;
-mod dynamics;
+// A build without learning keeps the few lines of shared modules that learning alone uses.
+#![cfg_attr(not(feature = "learning"), allow(dead_code, unused_imports))]
+
+pub mod context;
+pub mod demonstration;
+pub mod dynamics;
 mod error;
 mod kind;
-mod learning;
-mod model;
-mod motion;
-mod numerics;
+#[cfg(feature = "learning")]
+pub mod learning;
+pub mod model;
+pub mod motion;
+pub mod numerics;
+#[cfg(feature = "learning")]
 pub mod preprocessing;
 mod validate;
 
-pub use context::{ContextColumn, ContextMap, Expected, MapChoice, MapKind, Prediction};
-pub use demonstration::{ContextValue, Demonstration, LEAST_SAMPLES, Sampling};
-pub use dynamics::canonical::Canonical;
-pub use dynamics::forcing_table::Landscape;
-pub use dynamics::output_system::Attractor;
+pub use demonstration::{Demonstration, Sampling};
 pub use error::{Error, Result};
 pub use kind::Kind;
-pub use learning::alignment::{Alignment, TimeScaling};
-pub use learning::factorization::{Factors, StyleCount};
-pub use learning::regression as basis;
-pub use learning::{DofScale, FitOptions, Stage, StyleChoice, TransportChoice, fit, style_of};
-pub use model::conditions::Conditions;
-pub use model::responses::Derivative;
-pub use model::template::{Template, Warp};
-pub use model::{Demonstrated, Learnt, Model};
-pub use motion::batch::{Batch, BatchConditions, Chunks, Rows};
-pub use motion::command::{Command, Coupling, Motion};
-pub use motion::controller::{Controller, Status};
-pub use motion::jacobian::Variable;
-pub use motion::rollout::Timing;
-pub use motion::trajectory::Trajectory;
-pub use numerics::smoothing_spline::{Noise, Smoothing};
-pub use numerics::threads::Threads;
-pub use preprocessing as recording;
-pub use preprocessing::inspection;
-pub use validate::LARGEST;
+#[cfg(feature = "learning")]
+pub use learning::{FitOptions, fit};
+pub use model::{Conditions, Model, Primitive};
+pub use motion::{Command, Controller, Motion, Status, rollout};

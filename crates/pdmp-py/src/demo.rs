@@ -261,7 +261,12 @@ pub(crate) struct Trajectory {
 }
 
 impl Trajectory {
-    pub(crate) fn new(py: Python<'_>, trajectory: pdmp_core::Trajectory, names: &[String], units: &[String]) -> Self {
+    pub(crate) fn new(
+        py: Python<'_>,
+        trajectory: pdmp_core::motion::Trajectory,
+        names: &[String],
+        units: &[String],
+    ) -> Self {
         let convert = |matrix: Array2<f64>| matrix.into_pyarray(py).unbind();
         Self {
             time: to_numpy(py, &trajectory.time).unbind(),

@@ -9,7 +9,7 @@ mod encoding;
 mod kernel;
 mod kriging;
 mod model_selection;
-mod prediction;
+mod outputs;
 mod principal_axes;
 mod stacking;
 #[cfg(test)]
@@ -22,8 +22,7 @@ pub use encoding::ContextColumn;
 pub(crate) use encoding::tabulate;
 pub(crate) use kernel::Kernel;
 pub use model_selection::{MapChoice, MapKind};
-pub use prediction::Prediction;
-pub(crate) use prediction::{outputs, relative_changes};
+pub(crate) use outputs::{outputs, relative_changes};
 
 use encoding::{Scale, numbers};
 use kriging::Kriging;

@@ -4,11 +4,10 @@
 //! them: they say the same thing several times, and styles are ordered by what they force, not by how far they move.
 //! The principal components of the movements themselves vary independently, and the errors of each count alike.
 
-use faer::linalg::solvers::DenseSolveCore;
-use faer::{Mat, Side};
 use ndarray::{Array2, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
+use crate::numerics::linear_algebra::{inverse, symmetric_eigen};
 
 /// Least size of a movement per unit of an output, relative to the largest: what moves nothing is foreseen too.
 const FLOOR: f64 = 1e-5;
@@ -27,7 +26,7 @@ impl Axes {
         // Styles, goals and times come in units of their own, which may be far apart.
         let units = metric.diag().mapv(|g| if g > 0.0 { g.sqrt() } else { 1.0 });
         let balanced = Array2::from_shape_fn(metric.dim(), |(p, q)| metric[[p, q]] / units[p] / units[q]);
-        let (sizes, vectors) = eigen(balanced.view())?;
+        let (sizes, vectors) = symmetric_eigen(balanced.view(), "covariance of the outputs")?;
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |most, size| most.max(*size));
         let sizes: Vec<f64> = sizes.iter().map(|size| size.max(largest * FLOOR * FLOOR).sqrt()).collect();
         // In these coordinates every error counts alike, and stays so where they are rotated.
@@ -36,7 +35,7 @@ impl Axes {
         };
         let mut deviations = (&outputs - &outputs.mean_axis(Axis(0)).unwrap_or_default()).dot(&scaled(1));
         deviations /= deviations.fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
-        let (_, rotation) = eigen(deviations.t().dot(&deviations).view())?;
+        let (_, rotation) = symmetric_eigen(deviations.t().dot(&deviations).view(), "covariance of the outputs")?;
         // In rows, as a file gives them: sums are then the same to the last bit.
         Self::new(rotation.t().dot(&scaled(-1).t()).as_standard_layout().into_owned())
     }
@@ -46,9 +45,7 @@ impl Axes {
     /// # Errors
     /// Directions that do not span the outputs.
     pub(super) fn new(directions: Array2<f64>) -> Result<Self> {
-        let n = directions.nrows();
-        let inverse = Mat::from_fn(n, n, |i, j| directions[[i, j]]).partial_piv_lu().inverse();
-        let components = Array2::from_shape_fn((n, n), |(i, j)| inverse[(i, j)]);
+        let components = inverse(directions.view());
         if components.iter().any(|x| !x.is_finite()) {
             return Err(Error::Fit("the axes of the map from contexts depend on each other".to_string()));
         }
@@ -69,14 +66,4 @@ impl Axes {
     pub(super) fn covariance(&self, scatter: &Array2<f64>) -> Array2<f64> {
         self.directions.t().dot(scatter).dot(&self.directions)
     }
-}
-
-/// Eigenvalues and, by columns, eigenvectors of a symmetric matrix.
-fn eigen(matrix: ArrayView2<f64>) -> Result<(Vec<f64>, Array2<f64>)> {
-    let n = matrix.nrows();
-    let found = Mat::from_fn(n, n, |i, j| matrix[[i, j]])
-        .self_adjoint_eigen(Side::Lower)
-        .map_err(|_| Error::Fit(format!("the eigenvalues of a covariance of {n} outputs did not converge")))?;
-    let values = found.S().column_vector().iter().copied().collect();
-    Ok((values, Array2::from_shape_fn((n, n), |(i, k)| found.U()[(i, k)])))
 }

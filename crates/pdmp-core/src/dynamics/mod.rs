@@ -8,3 +8,7 @@ pub(crate) mod output_system;
 pub(crate) mod propagator_series;
 pub(crate) mod time_warp;
 pub(crate) mod transport;
+
+pub use canonical::Canonical;
+pub use forcing_table::Landscape;
+pub use output_system::Attractor;

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
 use crate::learning::regression::Domain;
-use crate::model::{MAX_RATE, MAX_TAU};
+use crate::model::primitive::{MAX_RATE, MAX_TAU};
 use crate::validate::check_positive;
 
 /// The constants of a primitive, and what follows from them alone.

@@ -14,27 +14,38 @@ use crate::learning::factorization::{Factors, StyleCount};
 use crate::learning::options::TransportChoice;
 use crate::learning::style_selection::cross_validation::Foresight;
 use crate::learning::targets::Targets;
+use crate::model::primitive::{Parts, Primitive};
 use crate::model::template::Template;
 use crate::model::{Demonstrated, Learnt, Model};
 use crate::preprocessing::inspection::{inspect, unwound};
 
 use super::constants::Constants;
+use super::movement_metric::{metric, residual_variance};
 use super::options::{FitOptions, Stage, StyleChoice};
+use super::stiffness::stiffness;
 use super::style_selection::spectrum;
 use super::tabulation::compile;
-use super::{noise_findings, stiffness, time_scaling};
+use super::{noise_findings, time_scaling};
 
-/// Learns a primitive.
-///
-/// `proceed` is told now and then the stage and the share of it that is done; an error that it returns, such as
-/// [`Error::Interrupted`], ends the fit.
+/// Fits a model to demonstrations.
 ///
 /// # Errors
-/// Demonstrations or options that do not fit together, or whatever `proceed` returns.
-pub fn fit(
+/// Demonstrations or options that do not fit together.
+pub fn fit(demos: &[Demonstration], options: &FitOptions) -> Result<Model> {
+    fit_with(demos, options, &mut |_, _| Ok(()))
+}
+
+/// Fits a model as [`fit`] does, and reports its progress.
+///
+/// `progress` is called periodically with the stage and the completed share of it; an error that it returns, such as
+/// [`Error::Interrupted`], cancels the fit.
+///
+/// # Errors
+/// Demonstrations or options that do not fit together, or the error that `progress` returned.
+pub fn fit_with(
     demos: &[Demonstration],
     options: &FitOptions,
-    proceed: &mut dyn FnMut(Stage, f64) -> Result<()>,
+    progress: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
     if let StyleChoice::Given(count) = options.styles {
         count.check(demos.len(), "demonstrations")?;
@@ -47,9 +58,9 @@ pub fn fit(
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
-    let mut aligning = |share| proceed(Stage::Align, share);
+    let mut aligning = |share| progress(Stage::Align, share);
     let template = scale_time(&mut aligned, options, &constants, &units, contexts.as_ref(), &mut aligning)?;
-    let mut targeting = |share| proceed(Stage::Targets, share);
+    let mut targeting = |share| progress(Stage::Targets, share);
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
     let dof_scale = options.dof_scale.of(&ranges, &units);
@@ -61,7 +72,7 @@ pub fn fit(
     targets.carry(&transport, constants.attractor, constants.canonical);
     targets.scale(&dof_scale);
 
-    let mut factorising = |share| proceed(Stage::Factorise, share);
+    let mut factorising = |share| progress(Stage::Factorise, share);
     let shown = Shown { aligned: &aligned, targets: &targets, transport: &transport, constants: &constants };
     let factors = shown.factors(options, &dof_scale, contexts.as_ref(), &mut factorising)?;
     findings.extend(noise_findings::noisy(&aligned.noise, &ranges, &names));
@@ -70,63 +81,43 @@ pub fn fit(
     let Targets { forcing, goals, starts, anchors, .. } = targets;
     drop(forcing);
 
-    proceed(Stage::Regress, 0.0)?;
+    progress(Stage::Regress, 0.0)?;
     let clock = constants.canonical.clock(aligned.n_samples);
     let basis_targets = by_clock(&factors.basis, &dof_scale);
-    let mut regressing = |share| proceed(Stage::Regress, share);
+    let mut regressing = |share| progress(Stage::Regress, share);
     let regression = options.basis.regress(constants.domain(), &clock, basis_targets.view(), &mut regressing)?;
 
-    let mut compiling = |share| proceed(Stage::Compile, share);
+    let mut compiling = |share| progress(Stage::Compile, share);
     let shape = (factors.basis.nrows(), demos[0].n_dofs());
     let n_samples = clock.len();
     let landscape = compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
 
-    let durations = aligned.durations();
-    let (breaks, timings, nominal) = (aligned.breaks.clone(), aligned.timings.clone(), aligned.nominal);
+    let (timings, nominal) = (aligned.timings.clone(), aligned.nominal);
     let (columns, contexts) = contexts.unzip();
     let left_out = factors.left_out();
     let Factors { styles, singular_values, .. } = factors;
-    let demonstrated = Demonstrated { styles, goals, starts, anchors, breaks, timings, durations, contexts, nominal };
-    let learnt = Learnt {
-        n_samples,
-        noise: aligned.noise.clone(),
-        template,
-        dof_scale,
-        singular_values,
-        left_out,
-        left_over: None,
-        basis: regression.describe(),
-        findings: Vec::new(),
+    let durations = aligned.durations();
+    let demonstrated = Demonstrated { styles, goals, starts, anchors, timings, durations, contexts, nominal };
+    let Constants { attractor, canonical, tau } = constants;
+    let breaks = aligned.breaks.clone();
+    let nominal = demonstrated.nominal(canonical.kind());
+    let parts = Parts { attractor, landscape, transport, braking, tau, names, units, ranges, breaks, nominal };
+    let primitive = Arc::new(Primitive::new(parts));
+    findings.extend(stiffness(&primitive, &aligned)?);
+    let noise = aligned.noise.clone();
+    let (map, left_over) = match (columns, &demonstrated.contexts) {
+        (Some(columns), Some(contexts)) => {
+            let outputs = demonstrated.outputs(canonical.kind());
+            let metric = metric(&primitive, outputs.view(), demonstrated.timings.view())?;
+            let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
+            (Some(map), Some(residual_variance(&primitive, outputs.view(), aligned)?))
+        }
+        _ => (None, None),
     };
-    let Constants { attractor, tau, .. } = constants;
-    let (cycle, responses) = Default::default();
-    let map = None;
-    let model = Model {
-        attractor,
-        landscape,
-        transport,
-        braking,
-        tau,
-        names,
-        units,
-        ranges,
-        demonstrated,
-        learnt,
-        map,
-        cycle,
-        responses,
-    };
-    let mut model = Arc::new(model.with_cycle());
-    findings.extend(stiffness::stiffness(&model, &aligned)?);
-    Arc::make_mut(&mut model).learnt.findings = findings;
-    if let (Some(columns), Some(contexts)) = (columns, &model.demonstrated.contexts) {
-        let (outputs, metric) = (model.outputs(), model.metric()?);
-        let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
-        let left_over = model.left_over(aligned)?;
-        let model = Arc::make_mut(&mut model);
-        (model.map, model.learnt.left_over) = (Some(map), Some(left_over));
-    }
-    Ok(Arc::unwrap_or_clone(model))
+    let basis = regression.describe();
+    let learnt =
+        Learnt { n_samples, noise, template, dof_scale, singular_values, left_out, left_over, basis, findings };
+    Ok(Model { primitive, demonstrated, learnt, map })
 }
 
 /// Contexts (M, Q) of the demonstrations, with what their columns mean.

@@ -5,6 +5,7 @@ mod constants;
 mod cycle_phase;
 pub(crate) mod factorization;
 mod fit;
+mod movement_metric;
 mod noise_findings;
 pub(crate) mod options;
 pub mod regression;
@@ -16,6 +17,8 @@ mod targets;
 mod time_scaling;
 mod transport_profile;
 
-pub use fit::fit;
+pub use alignment::{Alignment, TimeScaling};
+pub use factorization::{Factors, StyleCount};
+pub use fit::{fit, fit_with};
 pub use options::{DofScale, FitOptions, Stage, StyleChoice, TransportChoice};
 pub use style_inference::style_of;

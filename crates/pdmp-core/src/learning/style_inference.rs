@@ -1,7 +1,5 @@
 //! Where a demonstration lies that a model was not fitted to.
 
-use std::sync::Arc;
-
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use ndarray::{Array2, ArrayView2};
@@ -14,7 +12,7 @@ use crate::learning::alignment::{Alignment, TimeScaling};
 use crate::learning::targets::Targets;
 use crate::model::Model;
 use crate::model::conditions::Conditions;
-use crate::motion::rollout::Timing;
+use crate::motion::rollout::{Timing, rollout};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
 
@@ -38,7 +36,7 @@ const MAX_LEFT_OUT: f64 = 3.0;
 /// # Errors
 /// A demonstration that does not fit the model or that no style of it describes, or events where the others had none.
 pub fn style_of(
-    model: &Arc<Model>,
+    model: &Model,
     demo: &Demonstration,
     dt: Option<f64>,
     period: Option<f64>,
@@ -70,7 +68,7 @@ pub fn style_of(
     aligned.noise = model.learnt.noise.clone();
     let by_events = model.learnt.template.is_none() && model.demonstrated.timings.ncols() > 1;
     match (&model.learnt.template, events) {
-        (None, Some(events)) if by_events => aligned.register_to(&model.demonstrated.breaks, events)?,
+        (None, Some(events)) if by_events => aligned.register_to(model.breaks(), events)?,
         (None, None) if by_events => {
             return Err(Error::Arguments("the model was fitted with events: pass events= of this demonstration too"));
         }
@@ -179,10 +177,10 @@ fn check_size(style: &[f64], model: &Model) -> Result<()> {
 
 /// The deviation of the model's movement from positions (C, D), over their own from their mean, by root mean square, each
 /// DoF over its range.
-fn off(model: &Arc<Model>, conditions: &Conditions, position: ArrayView2<f64>) -> Result<f64> {
+fn off(model: &Model, conditions: &Conditions, position: ArrayView2<f64>) -> Result<f64> {
     let steps = model.kind().steps(position.nrows());
     let timing = Timing { dt: model.duration() / steps as f64, duration: None };
-    let made = model.rollout(conditions, timing)?.position;
+    let made = rollout(model.primitive(), conditions, timing)?.position;
     let widest = model.ranges.iter().fold(0.0f64, |most, range| most.max(*range));
     let [mut deviation, mut movement] = [0.0; 2];
     for (d, range) in model.ranges.iter().enumerate() {

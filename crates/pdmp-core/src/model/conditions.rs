@@ -1,12 +1,9 @@
-//! What a movement starts with, checked against its model.
+//! What a movement starts with, checked against its primitive.
 
-use ndarray::Array2;
-
-use crate::context::Prediction;
 use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::Model;
+use crate::model::primitive::Primitive;
 use crate::validate::{check_positive, check_vector};
 
 /// What a movement starts with; what is `None` is that of the nominal demonstration.
@@ -27,24 +24,10 @@ pub struct Conditions {
     /// Time constant τ, in seconds.
     pub tau: Option<f64>,
     /// Time in each segment of the movement (K,), in seconds, in place of τ. A rollout follows it; a controller, whose τ
-    /// can be set at any tick, takes its sum: see [`Model::tau_at`].
+    /// can be set at any tick, takes its sum: see [`Primitive::tau_at`].
     pub timing: Option<Vec<f64>>,
     /// Phase φ at which a rhythmic movement starts, in rad: on its limit cycle, with nothing to die away; otherwise 0.
     pub phase: Option<f64>,
-}
-
-impl Model {
-    /// The conditions of a prediction, timing included.
-    pub fn conditions(&self, prediction: &Prediction) -> Conditions {
-        Conditions {
-            style: Some(prediction.style.clone()),
-            goal: prediction.goal.clone(),
-            anchor: prediction.anchor.clone(),
-            start: prediction.start.clone(),
-            timing: Some(prediction.timing.clone()),
-            ..Conditions::default()
-        }
-    }
 }
 
 impl Conditions {
@@ -52,40 +35,39 @@ impl Conditions {
     ///
     /// # Errors
     /// A wrong length, a number that is not finite, τ that is not positive, or a condition of the other kind.
-    pub(crate) fn complete(&self, model: &Model) -> Result<Complete> {
-        let nominal = model.demonstrated.nominal;
-        let pick = |name, given: &Option<Vec<f64>>, matrix: &Array2<f64>| match given {
-            Some(value) => check_vector(name, value, matrix.ncols(), "DoF").map(|()| value.clone()),
-            None => Ok(matrix.row(nominal).to_vec()),
+    pub(crate) fn complete(&self, primitive: &Primitive) -> Result<Complete> {
+        let nominal = &primitive.nominal;
+        let centre = |name, given: &Option<Vec<f64>>| match given {
+            Some(value) => check_vector(name, value, nominal.centre.len(), "DoF").map(|()| value.clone()),
+            None => Ok(nominal.centre.clone()),
         };
-        let kind = model.kind();
-        let demonstrated = &model.demonstrated;
+        let kind = primitive.kind();
         let centre = match kind {
             Kind::Discrete => {
                 refuse(kind, "anchor", self.anchor.is_some())?;
                 refuse(kind, "amplitude", self.amplitude.is_some_and(|amplitude| amplitude != 1.0))?;
-                pick("goal", &self.goal, &demonstrated.goals)?
+                centre("goal", &self.goal)?
             }
             Kind::Rhythmic => {
                 refuse(kind, "goal", self.goal.is_some())?;
-                pick("anchor", &self.anchor, &demonstrated.anchors)?
+                centre("anchor", &self.anchor)?
             }
         };
         for (name, value) in [("start", &self.start), ("velocity", &self.velocity)] {
             if let Some(value) = value {
-                check_vector(name, value, model.n_dofs(), "DoF")?;
+                check_vector(name, value, primitive.n_dofs(), "DoF")?;
             }
         }
-        let tau = self.time_constant(model)?;
+        let tau = self.time_constant(primitive)?;
         let amplitude = self.amplitude.unwrap_or(1.0);
         check_amplitude(amplitude)?;
         let start = match (&self.start, kind) {
-            (None, Kind::Discrete) => Some(demonstrated.starts.row(nominal).to_vec()),
+            (None, Kind::Discrete) => Some(nominal.start.clone()),
             (start, _) => start.clone(),
         };
         let style = match &self.style {
-            Some(style) => check_style(style, model.n_styles()).map(|()| style.clone())?,
-            None => demonstrated.styles.row(nominal).to_vec(),
+            Some(style) => check_style(style, primitive.n_styles()).map(|()| style.clone())?,
+            None => nominal.style.clone(),
         };
         refuse(kind, "phase", kind == Kind::Discrete && self.phase.is_some())?;
         let phase = self.phase.unwrap_or(0.0);
@@ -98,19 +80,19 @@ impl Conditions {
     /// τ in seconds: as given, that of a movement as long as the timing, or the nominal demonstration's.
     ///
     /// # Errors
-    /// Both of them, a τ that is not positive, or a timing that does not fit the model.
-    pub fn time_constant(&self, model: &Model) -> Result<f64> {
+    /// Both of them, a τ that is not positive, or a timing that does not fit the primitive.
+    pub fn time_constant(&self, primitive: &Primitive) -> Result<f64> {
         let tau = match (self.tau, &self.timing) {
             (Some(_), Some(_)) => {
                 return Err(Error::Arguments("pass tau or timing, not both: a timing tells the duration"));
             }
             (None, Some(timing)) => {
-                model.check_timing(timing)?;
-                model.tau * timing.iter().sum::<f64>() / model.duration()
+                primitive.check_timing(timing)?;
+                primitive.tau * timing.iter().sum::<f64>() / primitive.duration()
             }
-            (tau, None) => tau.unwrap_or(model.tau),
+            (tau, None) => tau.unwrap_or(primitive.tau),
         };
-        check_tau(tau, model.tau).map(|()| tau)
+        check_tau(tau, primitive.tau).map(|()| tau)
     }
 }
 

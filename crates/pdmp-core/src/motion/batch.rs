@@ -7,11 +7,12 @@ use ndarray::{Array2, Array3, ArrayView1, ArrayViewMut3, Axis, aview1};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::Model;
 use crate::model::conditions::{Conditions, LARGEST_STYLE};
+use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::rollout::Timing;
 use crate::motion::superposition::Combination;
+use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
 use crate::validate::check_vector;
 use crate::validate::{check_matrix, zeros};
@@ -63,62 +64,60 @@ pub struct Batch {
     amplitude: f64,
 }
 
-impl Model {
-    /// Movements of many styles, checked and ready to be written.
-    ///
-    /// `proceed` is told now and then the share that is done of responses which the model does not remember.
-    ///
-    /// # Errors
-    /// Conditions or times that do not fit the model, another number of rows than there are styles, or whatever
-    /// `proceed` returns.
-    pub fn batch(
-        self: &Arc<Self>,
-        conditions: BatchConditions,
-        timing: Timing,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Batch> {
-        let BatchConditions { styles, goals, anchors, starts, velocities, amplitude, tau } = conditions;
-        check_styles(&styles, self.n_styles())?;
-        let kind = self.kind();
-        let (centres, (name, other, instead)) = match kind {
-            Kind::Discrete => (goals, ("anchors", anchors, ": they move to goals; set goals")),
-            Kind::Rhythmic => (anchors, ("goals", goals, ": they move about anchors; set anchors")),
-        };
-        if other.is_some() {
-            return Err(Error::Kind { name, kind, instead });
-        }
-        let centre = if kind == Kind::Discrete { "goals" } else { "anchors" };
-        for (name, rows) in [(centre, &centres), ("starts", &starts), ("velocities", &velocities)] {
-            if let Some(rows) = rows {
-                rows.check(name, styles.nrows(), self.n_dofs())?;
-            }
-        }
-        let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(self)?;
-        Ok(Batch {
-            responses: self.responses(nominal.tau, timing, proceed)?,
-            styles,
-            centres: centres.unwrap_or(Rows::All(nominal.centre)),
-            starts: starts.or(nominal.start.map(Rows::All)),
-            velocities,
-            amplitude: nominal.amplitude,
-        })
+/// Movements of many styles, checked and ready to be written.
+///
+/// `proceed` is told now and then the share that is done of responses which the model does not remember.
+///
+/// # Errors
+/// Conditions or times that do not fit the model, another number of rows than there are styles, or whatever
+/// `proceed` returns.
+pub fn batch(
+    primitive: &Arc<Primitive>,
+    conditions: BatchConditions,
+    timing: Timing,
+    proceed: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Batch> {
+    let BatchConditions { styles, goals, anchors, starts, velocities, amplitude, tau } = conditions;
+    check_styles(&styles, primitive.n_styles())?;
+    let kind = primitive.kind();
+    let (centres, (name, other, instead)) = match kind {
+        Kind::Discrete => (goals, ("anchors", anchors, ": they move to goals; set goals")),
+        Kind::Rhythmic => (anchors, ("goals", goals, ": they move about anchors; set anchors")),
+    };
+    if other.is_some() {
+        return Err(Error::Kind { name, kind, instead });
     }
+    let centre = if kind == Kind::Discrete { "goals" } else { "anchors" };
+    for (name, rows) in [(centre, &centres), ("starts", &starts), ("velocities", &velocities)] {
+        if let Some(rows) = rows {
+            rows.check(name, styles.nrows(), primitive.n_dofs())?;
+        }
+    }
+    let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(primitive)?;
+    Ok(Batch {
+        responses: responses(primitive, nominal.tau, timing, proceed)?,
+        styles,
+        centres: centres.unwrap_or(Rows::All(nominal.centre)),
+        starts: starts.or(nominal.start.map(Rows::All)),
+        velocities,
+        amplitude: nominal.amplitude,
+    })
+}
 
-    /// Movements of many styles: positions and their derivatives up to `highest`, each (B, T, D).
-    ///
-    /// # Errors
-    /// As for [`Model::batch`], or movements that memory does not hold.
-    pub fn rollouts(
-        self: &Arc<Self>,
-        conditions: BatchConditions,
-        timing: Timing,
-        highest: Derivative,
-        threads: Threads,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Vec<Array3<f64>>> {
-        let batch = self.batch(conditions, timing, proceed)?;
-        batch.rollouts(0..batch.shape().0, highest, threads, proceed)
-    }
+/// Movements of many styles: positions and their derivatives up to `highest`, each (B, T, D).
+///
+/// # Errors
+/// As for [`batch`], or movements that memory does not hold.
+pub fn rollouts(
+    primitive: &Arc<Primitive>,
+    conditions: BatchConditions,
+    timing: Timing,
+    highest: Derivative,
+    threads: Threads,
+    proceed: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Vec<Array3<f64>>> {
+    let batch = batch(primitive, conditions, timing, proceed)?;
+    batch.rollouts(0..batch.shape().0, highest, threads, proceed)
 }
 
 impl Batch {

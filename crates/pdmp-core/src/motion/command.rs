@@ -2,8 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::Model;
 use crate::model::conditions::{check_amplitude, check_style, check_tau, refuse};
+use crate::model::primitive::Primitive;
 use crate::validate::check_vector;
 
 /// All that one tick is told; what is `None` stays as it was.
@@ -54,7 +54,7 @@ pub struct Motion<'a> {
 
 impl Command<'_> {
     /// Checks every number against the model.
-    pub(crate) fn check(&self, model: &Model) -> Result<()> {
+    pub(crate) fn check(&self, model: &Primitive) -> Result<()> {
         let (kind, n_dofs) = (model.kind(), model.n_dofs());
         let vector = |name, vector: Option<&[f64]>| match vector {
             Some(vector) => check_vector(name, vector, n_dofs, "DoF"),

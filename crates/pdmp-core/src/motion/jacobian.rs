@@ -6,10 +6,11 @@ use ndarray::{Array3, Axis};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::Model;
 use crate::model::conditions::{Complete, Conditions, refuse};
+use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::rollout::Timing;
+use crate::motion::unit_responses::responses;
 use crate::validate::zeros;
 
 /// The condition with respect to which a movement is differentiated.
@@ -25,50 +26,46 @@ pub enum Variable {
     Start,
 }
 
-impl Model {
-    /// Jacobian of a rollout, (T, D, J) with respect to the style and (T, D, D) otherwise; exact, and the same wherever
-    /// it is taken, since a movement is linear in all of these:
-    ///
-    /// ```text
-    /// ∂y/∂sⱼ = r₀(Rⱼ − Rⱼ(0)·E − Ṙⱼ(0)·V)
-    /// ∂y/∂g = 1 − E
-    /// ∂y/∂y_a = 1, or 1 − E if a start is given
-    /// ∂y/∂y(0) = E
-    /// ```
-    ///
-    /// with the curves R of the unit styles, E of a unit start, and V of a unit start velocity, where the terms with E and
-    /// V belong to a given start and a given start velocity. Which of the two are given matters, their values do not.
-    /// `derivative` asks for the same of ẏ or ÿ. `proceed` is told now and then the share that is done.
-    ///
-    /// # Errors
-    /// A variable of the other kind of primitive, a timing of several segments, conditions or times that do not fit the
-    /// model, or whatever `proceed` returns.
-    pub fn jacobian(
-        self: &Arc<Self>,
-        variable: Variable,
-        derivative: Derivative,
-        conditions: &Conditions,
-        timing: Timing,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Array3<f64>> {
-        refuse(self.kind(), "goal", variable == Variable::Goal && self.kind() == Kind::Rhythmic)?;
-        refuse(self.kind(), "anchor", variable == Variable::Anchor && self.kind() == Kind::Discrete)?;
-        if conditions.timing.as_ref().is_some_and(|timing| timing.len() > 1) {
-            return Err(Error::Arguments(
-                "a Jacobian is that of a movement in linear time: pass tau in place of timing",
-            ));
+/// Jacobian of a rollout, (T, D, J) with respect to the style and (T, D, D) otherwise; exact, and the same wherever
+/// it is taken, since a movement is linear in all of these:
+///
+/// ```text
+/// ∂y/∂sⱼ = r₀(Rⱼ − Rⱼ(0)·E − Ṙⱼ(0)·V)
+/// ∂y/∂g = 1 − E
+/// ∂y/∂y_a = 1, or 1 − E if a start is given
+/// ∂y/∂y(0) = E
+/// ```
+///
+/// with the curves R of the unit styles, E of a unit start, and V of a unit start velocity, where the terms with E and
+/// V belong to a given start and a given start velocity. Which of the two are given matters, their values do not.
+/// `derivative` asks for the same of ẏ or ÿ. `proceed` is told now and then the share that is done.
+///
+/// # Errors
+/// A variable of the other kind of primitive, a timing of several segments, conditions or times that do not fit the
+/// model, or whatever `proceed` returns.
+pub fn jacobian(
+    primitive: &Arc<Primitive>,
+    variable: Variable,
+    derivative: Derivative,
+    conditions: &Conditions,
+    timing: Timing,
+    proceed: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Array3<f64>> {
+    refuse(primitive.kind(), "goal", variable == Variable::Goal && primitive.kind() == Kind::Rhythmic)?;
+    refuse(primitive.kind(), "anchor", variable == Variable::Anchor && primitive.kind() == Kind::Discrete)?;
+    if conditions.timing.as_ref().is_some_and(|timing| timing.len() > 1) {
+        return Err(Error::Arguments("a Jacobian is that of a movement in linear time: pass tau in place of timing"));
+    }
+    let conditions = conditions.complete(primitive)?;
+    let responses = responses(primitive, conditions.tau, timing, proceed)?;
+    let still = if derivative == Derivative::Position { 1.0 } else { 0.0 };
+    match variable {
+        Variable::Style => by_style(&responses, derivative, &conditions),
+        Variable::Goal | Variable::Anchor if conditions.start.is_some() => {
+            by_dof(&responses, derivative, |response| still - response)
         }
-        let conditions = conditions.complete(self)?;
-        let responses = self.responses(conditions.tau, timing, proceed)?;
-        let still = if derivative == Derivative::Position { 1.0 } else { 0.0 };
-        match variable {
-            Variable::Style => by_style(&responses, derivative, &conditions),
-            Variable::Goal | Variable::Anchor if conditions.start.is_some() => {
-                by_dof(&responses, derivative, |response| still - response)
-            }
-            Variable::Goal | Variable::Anchor => by_dof(&responses, derivative, |_| still),
-            Variable::Start => by_dof(&responses, derivative, |response| response),
-        }
+        Variable::Goal | Variable::Anchor => by_dof(&responses, derivative, |_| still),
+        Variable::Start => by_dof(&responses, derivative, |response| response),
     }
 }
 

@@ -6,8 +6,8 @@ use ndarray::Array2;
 
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
-use crate::model::Model;
 use crate::model::conditions::{Conditions, check_tau};
+use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::controller::Controller;
 use crate::motion::trajectory::Trajectory;
@@ -32,15 +32,15 @@ pub struct Timing {
 
 impl Timing {
     /// Number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋: a whole multiple of dt keeps its last sample.
-    pub(crate) fn steps(&self, model: &Model, tau: f64) -> Result<usize> {
+    pub(crate) fn steps(&self, primitive: &Primitive, tau: f64) -> Result<usize> {
         check_positive("dt", self.dt)?;
-        check_tau(tau, model.tau)?;
+        check_tau(tau, primitive.tau)?;
         let duration = match self.duration {
             Some(duration) if duration.is_finite() && duration >= 0.0 => duration,
             Some(value) => {
                 return Err(Error::Range { name: "duration", value, allowed: "must be finite and not negative" });
             }
-            None => model.duration() * tau / model.tau,
+            None => primitive.duration() * tau / primitive.tau,
         };
         let steps = (duration / self.dt * (1.0 + 1e-12) + 1e-9).floor();
         if steps > MOST_STEPS {
@@ -54,57 +54,55 @@ impl Timing {
     }
 }
 
-impl Model {
-    /// The movement under constant conditions: n + 1 samples at t = 0, dt, …, start included.
-    ///
-    /// # Errors
-    /// Conditions or times that do not fit the model.
-    pub fn rollout(self: &Arc<Self>, conditions: &Conditions, timing: Timing) -> Result<Trajectory> {
-        self.rollout_with(conditions, timing, &mut |_| Ok(()))
-    }
+/// The movement under constant conditions: n + 1 samples at t = 0, dt, …, start included.
+///
+/// # Errors
+/// Conditions or times that do not fit the primitive.
+pub fn rollout(primitive: &Arc<Primitive>, conditions: &Conditions, timing: Timing) -> Result<Trajectory> {
+    rollout_with(primitive, conditions, timing, &mut |_| Ok(()))
+}
 
-    /// [`Model::rollout`] that can be stopped: `proceed` is told the share that is done.
-    ///
-    /// # Errors
-    /// Conditions or times that do not fit the model, or whatever `proceed` returns.
-    pub fn rollout_with(
-        self: &Arc<Self>,
-        conditions: &Conditions,
-        timing: Timing,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Trajectory> {
-        let steps = timing.steps(self, conditions.time_constant(self)?)?;
-        let mut clock = Clock::of(self, conditions)?;
-        if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
-            return Err(Error::Arguments(
-                "pass phase or a timing of several segments, not both: a timing starts at phase 0",
-            ));
-        }
-        let conditions = clock.conditions(conditions);
-        let mut controller = Controller::new(Arc::clone(self), timing.dt, &conditions, Some(0.0))?.looking_ahead(LEAD);
-        let shape = (steps + 1, self.n_dofs());
-        let mut trajectory = Trajectory {
-            time: (0..=steps).map(|k| k as f64 * timing.dt).collect(),
-            position: zeros("rollout", shape)?,
-            velocity: zeros("rollout", shape)?,
-            acceleration: zeros("rollout", shape)?,
-        };
-        let Trajectory { time, position, velocity, acceleration } = &mut trajectory;
-        let rows = |array| Array2::as_slice_mut(array).unwrap_or_default().chunks_exact_mut(self.n_dofs());
-        let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
-        for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
-            if k % PORTION == 0 {
-                proceed(k as f64 / (steps + 1) as f64)?;
-            }
-            if k > 0 {
-                clock.step(&mut controller, *time)?;
-            }
-            let mut motion = Motion { position, velocity, acceleration };
-            controller.read(&mut motion);
-            clock.pace(&mut motion);
-        }
-        Ok(trajectory)
+/// [`rollout`] that can be stopped: `proceed` is told the share that is done.
+///
+/// # Errors
+/// Conditions or times that do not fit the model, or whatever `proceed` returns.
+pub fn rollout_with(
+    primitive: &Arc<Primitive>,
+    conditions: &Conditions,
+    timing: Timing,
+    proceed: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Trajectory> {
+    let steps = timing.steps(primitive, conditions.time_constant(primitive)?)?;
+    let mut clock = Clock::of(primitive, conditions)?;
+    if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
+        return Err(Error::Arguments(
+            "pass phase or a timing of several segments, not both: a timing starts at phase 0",
+        ));
     }
+    let conditions = clock.conditions(conditions);
+    let mut controller = Controller::new(primitive, timing.dt, &conditions, Some(0.0))?.looking_ahead(LEAD);
+    let shape = (steps + 1, primitive.n_dofs());
+    let mut trajectory = Trajectory {
+        time: (0..=steps).map(|k| k as f64 * timing.dt).collect(),
+        position: zeros("rollout", shape)?,
+        velocity: zeros("rollout", shape)?,
+        acceleration: zeros("rollout", shape)?,
+    };
+    let Trajectory { time, position, velocity, acceleration } = &mut trajectory;
+    let rows = |array| Array2::as_slice_mut(array).unwrap_or_default().chunks_exact_mut(primitive.n_dofs());
+    let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
+    for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
+        if k % PORTION == 0 {
+            proceed(k as f64 / (steps + 1) as f64)?;
+        }
+        if k > 0 {
+            clock.step(&mut controller, *time)?;
+        }
+        let mut motion = Motion { position, velocity, acceleration };
+        controller.read(&mut motion);
+        clock.pace(&mut motion);
+    }
+    Ok(trajectory)
 }
 
 /// What drives a rollout: time itself, or time warped to the nominal demonstration's by a timing.
@@ -122,13 +120,13 @@ enum Clock {
 }
 
 impl Clock {
-    fn of(model: &Model, conditions: &Conditions) -> Result<Self> {
+    fn of(primitive: &Primitive, conditions: &Conditions) -> Result<Self> {
         let Some(timing) = conditions.timing.as_ref().filter(|timing| timing.len() > 1) else {
             return Ok(Self::Linear);
         };
-        let warp = model.warping_function(timing)?;
+        let warp = primitive.warping_function(timing)?;
         let phase = warp.phase(0.0);
-        Ok(Self::Warped { warp, extent: model.tau * model.canonical().extent(), phase })
+        Ok(Self::Warped { warp, extent: primitive.tau * primitive.canonical().extent(), phase })
     }
 
     /// The conditions in the time of the controller.

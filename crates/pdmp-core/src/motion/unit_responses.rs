@@ -15,71 +15,77 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::kind::Kind;
-use crate::model::Model;
 use crate::model::conditions::Conditions;
+use crate::model::primitive::Primitive;
 use crate::model::responses::{Curves, Key, Responses};
-use crate::motion::rollout::Timing;
+use crate::model::sensitivity::STEPS;
+use crate::motion::rollout::{Timing, rollout_with};
 use crate::motion::trajectory::Trajectory;
 
-impl Model {
-    /// The responses at these times, from the cache where they are found.
-    pub(crate) fn responses(
-        self: &Arc<Self>,
-        tau: f64,
-        timing: Timing,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Arc<Responses>> {
-        let key = Key { dt: timing.dt, tau, steps: timing.steps(self, tau)? };
-        if let Some(found) = self.responses.find(key) {
-            return Ok(found);
-        }
-        // The cache is free meanwhile: whoever computes the same finds the same.
-        let responses = Arc::new(self.compute_responses(tau, timing, proceed)?);
-        self.responses.keep(key, &responses);
-        Ok(responses)
+/// The responses at these times, from the cache where they are found.
+pub(crate) fn responses(
+    primitive: &Arc<Primitive>,
+    tau: f64,
+    timing: Timing,
+    proceed: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Arc<Responses>> {
+    let key = Key { dt: timing.dt, tau, steps: timing.steps(primitive, tau)? };
+    if let Some(found) = primitive.responses.find(key) {
+        return Ok(found);
     }
+    // The cache is free meanwhile: whoever computes the same finds the same.
+    let responses = Arc::new(compute_responses(primitive, tau, timing, proceed)?);
+    primitive.responses.keep(key, &responses);
+    Ok(responses)
+}
 
-    fn compute_responses(
-        self: &Arc<Self>,
-        tau: f64,
-        timing: Timing,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Responses> {
-        let (n_dofs, n_styles) = (self.n_dofs(), self.n_styles());
-        let n_runs = (n_styles + 2) as f64;
-        let mut run = |done: usize, conditions: Conditions| {
-            let Trajectory { position, velocity, acceleration, .. } =
-                self.rollout_with(&conditions, timing, &mut |share| proceed((done as f64 + share) / n_runs))?;
-            Ok([position, velocity, acceleration])
-        };
-        let zeros = || Some(vec![0.0; n_dofs]);
-        let ones = || Some(vec![1.0; n_dofs]);
-        let still =
-            Conditions { style: Some(vec![0.0; n_styles]), start: zeros(), tau: Some(tau), ..self.about_zero() };
-        let start = run(0, Conditions { start: ones(), ..still.clone() })?;
-        let velocity = run(1, Conditions { velocity: ones(), ..still.clone() })?;
-        let mut curves = std::iter::zip(start, velocity).map(|(start, velocity)| Curves {
-            styles: Vec::with_capacity(n_styles),
-            start,
-            velocity,
-        });
-        let mut responses = Responses(std::array::from_fn(|_| curves.next().expect("three of each")));
-        for j in 0..n_styles {
-            let style = (0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect();
-            let unit = Conditions { style: Some(style), tau: Some(tau), ..self.about_zero() };
-            for (curves, curve) in responses.0.iter_mut().zip(run(j + 2, unit)?) {
-                curves.styles.push(curve);
-            }
+/// Responses over the demonstrated duration, in as many steps as errors are averaged over.
+pub(crate) fn phases(primitive: &Arc<Primitive>) -> Result<Arc<Responses>> {
+    responses(primitive, primitive.tau, Timing { dt: primitive.duration() / STEPS as f64, duration: None }, &mut |_| {
+        Ok(())
+    })
+}
+
+fn compute_responses(
+    primitive: &Arc<Primitive>,
+    tau: f64,
+    timing: Timing,
+    proceed: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Responses> {
+    let (n_dofs, n_styles) = (primitive.n_dofs(), primitive.n_styles());
+    let n_runs = (n_styles + 2) as f64;
+    let mut run = |done: usize, conditions: Conditions| {
+        let Trajectory { position, velocity, acceleration, .. } =
+            rollout_with(primitive, &conditions, timing, &mut |share| proceed((done as f64 + share) / n_runs))?;
+        Ok([position, velocity, acceleration])
+    };
+    let zeros = || Some(vec![0.0; n_dofs]);
+    let ones = || Some(vec![1.0; n_dofs]);
+    let still =
+        Conditions { style: Some(vec![0.0; n_styles]), start: zeros(), tau: Some(tau), ..about_zero(primitive) };
+    let start = run(0, Conditions { start: ones(), ..still.clone() })?;
+    let velocity = run(1, Conditions { velocity: ones(), ..still.clone() })?;
+    let mut curves = std::iter::zip(start, velocity).map(|(start, velocity)| Curves {
+        styles: Vec::with_capacity(n_styles),
+        start,
+        velocity,
+    });
+    let mut responses = Responses(std::array::from_fn(|_| curves.next().expect("three of each")));
+    for j in 0..n_styles {
+        let style = (0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect();
+        let unit = Conditions { style: Some(style), tau: Some(tau), ..about_zero(primitive) };
+        for (curves, curve) in responses.0.iter_mut().zip(run(j + 2, unit)?) {
+            curves.styles.push(curve);
         }
-        Ok(responses)
     }
+    Ok(responses)
+}
 
-    /// A goal and start, or an anchor, of zero.
-    fn about_zero(&self) -> Conditions {
-        let zeros = Some(vec![0.0; self.n_dofs()]);
-        match self.kind() {
-            Kind::Discrete => Conditions { goal: zeros.clone(), start: zeros, ..Conditions::default() },
-            Kind::Rhythmic => Conditions { anchor: zeros, ..Conditions::default() },
-        }
+/// A goal and start, or an anchor, of zero.
+fn about_zero(primitive: &Primitive) -> Conditions {
+    let zeros = Some(vec![0.0; primitive.n_dofs()]);
+    match primitive.kind() {
+        Kind::Discrete => Conditions { goal: zeros.clone(), start: zeros, ..Conditions::default() },
+        Kind::Rhythmic => Conditions { anchor: zeros, ..Conditions::default() },
     }
 }

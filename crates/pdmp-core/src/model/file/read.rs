@@ -1,5 +1,7 @@
 //! The bytes of a file into its model: dimensions, numbers and checksum are checked before one comes out.
 
+use std::sync::Arc;
+
 use ndarray::{Array2, Axis};
 use safetensors::tensor::{Dtype, SafeTensors};
 use serde::Deserialize;
@@ -12,10 +14,12 @@ use crate::dynamics::hermite_table::{Jets, MOST_CELLS};
 use crate::dynamics::output_system::Attractor;
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
+use crate::kind::Kind;
 use crate::model::conditions::LARGEST_STYLE;
+use crate::model::primitive::{MAX_RATE, MAX_TAU, Parts, Primitive};
 use crate::model::sensitivity::STEPS;
 use crate::model::template::{Template, Warp};
-use crate::model::{Demonstrated, Learnt, MAX_RATE, MAX_TAU, Model};
+use crate::model::{Demonstrated, Learnt, Model};
 use crate::numerics::smoothing_spline::Noise;
 use crate::validate::LARGEST;
 
@@ -104,6 +108,7 @@ impl Reader<'_> {
 
     fn model(&self, constants: Constants, crc32: u32) -> Result<Model> {
         let bad = |reason: &str| Error::File(reason.to_string());
+        let kind = constants.canonical.kind();
         let [n_demos, n_styles] = self.shape("styles")?;
         let [n_knots, _, n_dofs] = self.shape("landscape.values")?;
         let [n_values] = self.shape("singular_values")?;
@@ -157,7 +162,6 @@ impl Reader<'_> {
             goals: self.matrix("goals", (n_demos, n_dofs))?,
             starts: self.matrix("starts", (n_demos, n_dofs))?,
             anchors: self.matrix("anchors", (n_demos, n_dofs))?,
-            breaks,
             durations: timings.sum_axis(Axis(1)).to_vec(),
             timings,
             contexts,
@@ -169,7 +173,16 @@ impl Reader<'_> {
         if singular_values.iter().chain(&ranges).any(|x| *x < 0.0) {
             return Err(bad("a range or singular value is negative"));
         }
-        let attractor = Attractor { alpha_z: constants.alpha_z, beta_z: constants.beta_z };
+        let (map, left_over) = match &constants.map {
+            Some(map) => {
+                let left_over = self.matrix("left_over", (kind.samples(STEPS), n_dofs))?;
+                if left_over.iter().any(|x| *x < 0.0) {
+                    return Err(bad("left_over holds no variances"));
+                }
+                (Some(self.map(map, &demonstrated, kind)?), Some(left_over))
+            }
+            None => (None, None),
+        };
         let learnt = Learnt {
             n_samples: constants.n_samples,
             noise: self.noise(n_dofs)?,
@@ -177,37 +190,23 @@ impl Reader<'_> {
             dof_scale,
             singular_values,
             left_out: constants.left_out,
-            left_over: None,
+            left_over,
             findings: Vec::new(),
             basis: constants.basis.clone(),
         };
-        let (tau, names, units) = (constants.tau, constants.names.clone(), constants.units.clone());
-        let (cycle, responses) = Default::default();
-        let map = None;
-        let mut model = Model {
-            attractor,
+        let primitive = Primitive::new(Parts {
+            attractor: Attractor { alpha_z: constants.alpha_z, beta_z: constants.beta_z },
             landscape,
             transport,
             braking,
-            tau,
-            names,
-            units,
+            tau: constants.tau,
+            names: constants.names.clone(),
+            units: constants.units.clone(),
             ranges,
-            demonstrated,
-            learnt,
-            map,
-            cycle,
-            responses,
-        }
-        .with_cycle();
-        if let Some(map) = &constants.map {
-            model.map = Some(self.map(map, &model)?);
-            let left_over = self.matrix("left_over", (model.kind().samples(STEPS), n_dofs))?;
-            if left_over.iter().any(|x| *x < 0.0) {
-                return Err(bad("left_over holds no variances"));
-            }
-            model.learnt.left_over = Some(left_over);
-        }
+            breaks,
+            nominal: demonstrated.nominal(kind),
+        });
+        let model = Model { primitive: Arc::new(primitive), demonstrated, learnt, map };
         self.verify(&constants, &model, crc32)?;
         Ok(model)
     }
@@ -219,9 +218,9 @@ impl Reader<'_> {
     }
 
     /// The map, had again from what was demonstrated.
-    fn map(&self, map: &Map, model: &Model) -> Result<ContextMap> {
+    fn map(&self, map: &Map, demonstrated: &Demonstrated, kind: Kind) -> Result<ContextMap> {
         let bad = |reason: &str| Error::File(reason.to_string());
-        let outputs = model.outputs();
+        let outputs = demonstrated.outputs(kind);
         let ratios = self.array("map.ratios", &[outputs.ncols()])?;
         let sound = match map.kernel {
             None => ratios.iter().all(|ratio| *ratio == 0.0),
@@ -229,7 +228,7 @@ impl Reader<'_> {
             Some(Kernel::Quadratic) => ratios.iter().all(|ratio| *ratio >= 0.0),
             Some(Kernel::Matern { length }) => length > 0.0 && ratios.iter().all(|ratio| *ratio >= 0.0),
         };
-        let contexts = model.demonstrated.contexts.as_ref().ok_or(bad("no contexts"))?;
+        let contexts = demonstrated.contexts.as_ref().ok_or(bad("no contexts"))?;
         for (q, column) in map.columns.iter().enumerate() {
             if contexts.column(q).iter().any(|&number| column.value(q, number).is_err()) {
                 return Err(bad("a context is none of its labels"));

@@ -74,7 +74,7 @@ impl Model {
             matrix("goals", &demonstrated.goals),
             matrix("starts", &demonstrated.starts),
             matrix("anchors", &demonstrated.anchors),
-            vector("breaks", &demonstrated.breaks),
+            vector("breaks", &self.breaks),
             matrix("timings", &demonstrated.timings),
             vector("singular_values", &self.learnt.singular_values),
             vector("dof_scale", &self.learnt.dof_scale),

@@ -26,8 +26,8 @@ use crate::dynamics::propagator_series::Series;
 use crate::dynamics::transport::Stretch;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::Model;
 use crate::model::conditions::{Complete, Conditions};
+use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::perturbation::{Held, STILL, widest};
 use crate::numerics::simd::{Lanes, copy, groups, repack, unpack};
@@ -54,7 +54,7 @@ pub enum Status {
 /// A running primitive: a model, its commands and its state.
 #[derive(Clone, Debug)]
 pub struct Controller {
-    model: Arc<Model>,
+    model: Arc<Primitive>,
     dt: f64,
     conditions: Complete,
     started: bool,
@@ -122,7 +122,8 @@ impl Controller {
     ///
     /// # Errors
     /// Conditions that do not fit the model, `dt` that is not positive, or a negative `transition`.
-    pub fn new(model: Arc<Model>, dt: f64, conditions: &Conditions, transition: Option<f64>) -> Result<Self> {
+    pub fn new(primitive: &Arc<Primitive>, dt: f64, conditions: &Conditions, transition: Option<f64>) -> Result<Self> {
+        let model = Arc::clone(primitive);
         check_positive("dt", dt)?;
         let share = if model.kind() == Kind::Discrete { 0.1 } else { 0.25 };
         let transition = transition.unwrap_or(share * model.duration());
@@ -356,7 +357,7 @@ impl Controller {
     }
 
     /// The model that is run.
-    pub fn model(&self) -> &Arc<Model> {
+    pub fn primitive(&self) -> &Arc<Primitive> {
         &self.model
     }
 

@@ -412,8 +412,8 @@ mod tests {
             basis: crate::learning::regression::Basis::NGnet(Default::default()),
             ..FitOptions::new(Kind::Discrete)
         };
-        let model = Arc::new(fit(&demos, &options, &mut |_, _| Ok(())).unwrap());
-        let mut any = Controller::new(model, 1e-3, &Conditions::default(), None).unwrap();
+        let model = Arc::new(fit(&demos, &options).unwrap());
+        let mut any = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
         any.step().unwrap();
         any.set_goal(&[0.3; 6]).unwrap();
         any.set_tau(0.8).unwrap();

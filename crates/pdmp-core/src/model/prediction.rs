@@ -2,25 +2,18 @@
 
 use std::ops::RangeInclusive;
 
-use ndarray::{Array2, ArrayView2, Axis, concatenate};
+use ndarray::Array2;
 
-use super::Expected;
+use super::conditions::Conditions;
+use crate::context::{Expected, relative_changes};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 
-/// The movement predicted for a condition. What the kind of primitive does not have is `None`.
+/// The movement predicted for a condition.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
-    /// Style (J,).
-    pub style: Vec<f64>,
-    /// Goal (D,), discrete.
-    pub goal: Option<Vec<f64>>,
-    /// Start (D,), discrete.
-    pub start: Option<Vec<f64>>,
-    /// Anchor (D,), rhythmic.
-    pub anchor: Option<Vec<f64>>,
-    /// Time in each segment of the movement (K,), in seconds.
-    pub timing: Vec<f64>,
+    /// Style, goal and start or anchor, and timing.
+    pub conditions: Conditions,
     /// Duration or period, in seconds: the sum of the timing.
     pub duration: f64,
     /// Covariance (P, P) of a new movement's style, goal and start or anchor, and timing, in this order; `None` where the
@@ -31,36 +24,6 @@ pub struct Prediction {
     /// How far each value of the context lies outside of those demonstrated, in their range (Q,): 0 inside, infinite
     /// where a value that was never varied differs.
     pub outside: Vec<f64>,
-}
-
-/// The outputs of the map (M, P): style, goal and start or anchor, and the timing (M, K) as logarithms: that of the
-/// duration, and those of each segment's time relative to the last one's.
-pub(crate) fn outputs(
-    kind: Kind,
-    styles: ArrayView2<f64>,
-    [goals, starts, anchors]: [ArrayView2<f64>; 3],
-    timings: ArrayView2<f64>,
-) -> Array2<f64> {
-    let last = timings.ncols() - 1;
-    let logarithms = Array2::from_shape_fn(timings.dim(), |(m, k)| match k {
-        0 => timings.row(m).sum().ln(),
-        _ => (timings[[m, k - 1]] / timings[[m, last]]).ln(),
-    });
-    let parts = match kind {
-        Kind::Discrete => vec![styles, goals, starts, logarithms.view()],
-        Kind::Rhythmic => vec![styles, anchors, logarithms.view()],
-    };
-    // Row counts are equal by construction.
-    concatenate(Axis(1), &parts).unwrap_or_default()
-}
-
-/// Relative change of each time (K,) in a timing per unit of the outputs that it is foreseen by (K,).
-pub(crate) fn relative_changes(timing: &[f64]) -> Array2<f64> {
-    let duration: f64 = timing.iter().sum();
-    Array2::from_shape_fn((timing.len(), timing.len()), |(k, output)| match output {
-        0 => 1.0,
-        i => f64::from(u8::from(k == i - 1)) - timing[i - 1] / duration,
-    })
 }
 
 impl Prediction {
@@ -99,7 +62,8 @@ impl Prediction {
             Kind::Discrete => (part(0), part(1), None),
             Kind::Rhythmic => (None, None, part(0)),
         };
-        let style = mean[..n_styles].to_vec();
-        Ok(Self { style, goal, start, anchor, timing, duration, covariance, freedom, outside })
+        let style = Some(mean[..n_styles].to_vec());
+        let conditions = Conditions { style, goal, start, anchor, timing: Some(timing), ..Conditions::default() };
+        Ok(Self { conditions, duration, covariance, freedom, outside })
     }
 }
