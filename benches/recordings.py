@@ -14,7 +14,7 @@ import numpy as np
 
 from pdmp import Demonstration
 from pdmp.datasets import handwriting
-from pdmp.demos import read_csv, read_folder
+from pdmp.io import read_csv, read_folder
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 MOST_DEMOS = 10

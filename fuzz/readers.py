@@ -29,9 +29,9 @@ import pdmp
 
 CORPUS = Path(__file__).parent / "corpus"
 READERS: dict[str, Callable[..., Any]] = {
-    "csv": pdmp.demos.read_csv,
-    "bvh": pdmp.demos.read_bvh,
-    "npz": pdmp.demos.read_npz,
+    "csv": pdmp.io.read_csv,
+    "bvh": pdmp.io.read_bvh,
+    "npz": pdmp.io.read_npz,
 }
 REFUSALS = (ValueError, OSError)
 MAX_SIZE = 1 << 14  # bytes of a changed file; larger ones only take longer

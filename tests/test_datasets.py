@@ -39,7 +39,9 @@ def test_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         handwriting()
 
 
-@pytest.mark.parametrize("module", ["pdmp", "pdmp.demos", "pdmp.datasets", "pdmp.plot", "pdmp.cli"])
+@pytest.mark.parametrize(
+    "module", ["pdmp", "pdmp.io", "pdmp.preprocessing", "pdmp.datasets", "pdmp.plot", "pdmp.cli"]
+)
 def test_importing_needs_numpy_alone(module: str) -> None:
     """No module of the package pulls in an extra when it is imported."""
     code = f"import sys, {module}; print(*sys.modules)"

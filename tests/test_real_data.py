@@ -9,7 +9,7 @@ import pytest
 
 import pdmp
 from pdmp import Demonstration
-from pdmp.demos import read_folder
+from pdmp.io import read_folder
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -137,9 +137,9 @@ def test_cycles_of_walks_last_as_long_as_their_strides() -> None:
     """
     refused, doubled = [], []
     for name, durations in strides().items():
-        recording = pdmp.demos.read_csv(DATA / "walk_styles_bandai" / "demos" / f"{name}.csv")
+        recording = pdmp.io.read_csv(DATA / "walk_styles_bandai" / "demos" / f"{name}.csv")
         try:
-            cycles = pdmp.demos.cycles(recording)
+            cycles = pdmp.preprocessing.cycles(recording)
         except ValueError as error:
             assert "no period" in str(error)
             refused.append(name)
@@ -158,16 +158,16 @@ def test_bvh_walks_give_the_period_of_their_strides() -> None:
     name = "walk_normal_001"
     durations = strides()[name]
     path = DATA / "walk_styles_bandai" / "raw" / f"dataset-1_{name}.bvh"
-    recording = pdmp.demos.unwrap(pdmp.demos.read_bvh(path))
+    recording = pdmp.preprocessing.unwrap(pdmp.io.read_bvh(path))
     assert recording.n_dofs == 132
-    assert pdmp.demos.period(recording) == pytest.approx(np.mean(durations), rel=0.03)
+    assert pdmp.preprocessing.period(recording) == pytest.approx(np.mean(durations), rel=0.03)
 
 
 def test_walks_of_two_gaits_become_one_rhythmic_primitive() -> None:
     """Walks and runs of one person, at their own periods, are learnt in one phase, on the spot."""
     demos = recordings("walk_run_cmu35", 1)
     with pytest.warns(UserWarning, match=r"'root_z' gains 2\.\d+ in recording"):
-        cycles = pdmp.demos.cycles(demos)
+        cycles = pdmp.preprocessing.cycles(demos)
     assert set(cycles.recordings) == set(range(len(demos)))
     model = pdmp.fit(cycles, kind="rhythmic", n_styles=3)
     assert (cycles.periods < 0.8).sum() == sum(demo.n_samples < 50 for demo in demos)

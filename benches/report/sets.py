@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pdmp import Demonstration
-from pdmp.demos import read_csv, read_folder
+from pdmp.io import read_csv, read_folder
 from recordings import ARM, DATA, HAND, at_hand, cycle
 
 LEGS = [f"{side}_{angle}" for side in "rl" for angle in ("hip_flex", "knee_flex", "ank_dorsi")]

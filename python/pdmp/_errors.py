@@ -3,7 +3,7 @@
 import numpy as np
 
 from pdmp._native import Demonstration, Model
-from pdmp.arguments import as_demonstrated
+from pdmp.conditions import as_demonstrated
 
 
 def reproduction_error(model: Model, demo: Demonstration, m: int) -> float:

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
+from pdmp._messages import value_error
 from pdmp._native import Demonstration
-from pdmp._shown import refusal
-from pdmp.demos._text import listed
+from pdmp.io._fields import listed
 
 
 def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstration]]:
@@ -37,7 +37,7 @@ def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstra
     chosen = listed("shapes", shapes or known)
     for shape in chosen:
         if shape not in known:
-            raise refusal(f"shapes: no '{shape}' among {', '.join(known)}")
+            raise value_error(f"shapes: no '{shape}' among {', '.join(known)}")
     return {shape: _demonstrations(folder / f"{shape}.mat") for shape in chosen}
 
 

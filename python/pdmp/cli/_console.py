@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from pdmp._shown import printable
+from pdmp._messages import printable
 
 
 def say(text: object, *, file: TextIO | None = None) -> None:

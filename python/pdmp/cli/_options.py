@@ -37,7 +37,7 @@ def add_reading(parser: ArgumentParser) -> None:
 
 
 def reading(options: Namespace) -> dict[str, Any]:
-    """Return the arguments of `pdmp.demos.read` that these options are."""
+    """Return the arguments of `pdmp.io.read` that these options are."""
     return {name: getattr(options, name) for name in ("columns", "time", "dt", "max_gap")}
 
 

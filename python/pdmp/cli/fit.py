@@ -7,10 +7,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import pdmp
-from pdmp import demos
 from pdmp.cli import _options
 from pdmp.cli._console import say
 from pdmp.cli._progress import progress
+from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -36,7 +36,7 @@ def run(options: Namespace) -> None:
         raise FileNotFoundError(f"{output.parent}: no such folder; make it first")
     if output.is_dir():
         raise IsADirectoryError(f"{output}: a folder; name a file in it")
-    recordings = demos.read(options.paths, context=options.context, **_options.reading(options))
+    recordings = read(options.paths, context=options.context, **_options.reading(options))
     with progress() as show:
         model = pdmp.fit(
             recordings,

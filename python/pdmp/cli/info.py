@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import pdmp
-from pdmp._shown import printable
+from pdmp._messages import printable
 from pdmp.cli._console import say
 from pdmp.cli._options import path
 

@@ -6,8 +6,8 @@ import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
+from pdmp._messages import printable
 from pdmp._native import PdmpError, __version__
-from pdmp._shown import printable
 from pdmp.cli import demo, evaluate, fit, info, plot, reproduce, rollout
 from pdmp.cli._console import console
 

@@ -9,9 +9,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import pdmp
-from pdmp import demos, plot
+from pdmp import plot
 from pdmp.cli import _options
 from pdmp.cli._console import say
+from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -52,7 +53,7 @@ def run(options: Namespace) -> None:
     if model.kind == "rhythmic":
         figures["phase_portrait"] = plot.phase_portrait(model)
     if options.paths:
-        recordings = demos.read(options.paths, **_options.reading(options))
+        recordings = read(options.paths, **_options.reading(options))
         figures["demonstrations"] = plot.demonstrations(model, recordings)
     for name, figure in figures.items():
         path = Path(options.output, f"{name}.png")

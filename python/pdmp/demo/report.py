@@ -6,7 +6,7 @@ import numpy as np
 
 import pdmp
 from pdmp._errors import reproduction_error
-from pdmp._tables import table
+from pdmp._markdown import markdown_table
 from pdmp.demo.loop import Run
 
 
@@ -14,7 +14,7 @@ def spectrum_table(model: pdmp.Model) -> str:
     """Tell how much of the singular-value sum each style parameter adds, and two left out."""
     shares = model.singular_values / model.singular_values.sum()
     sums = shares.cumsum()
-    return table(
+    return markdown_table(
         ["singular value", "share", "sum"],
         ([k + 1, f"{shares[k]:.1%}", f"{sums[k]:.1%}"] for k in range(model.n_styles + 2)),
     )
@@ -26,7 +26,7 @@ def error_table(
     members: Mapping[str, Sequence[int]],
 ) -> str:
     """Tell the mean error of the reproductions of each shape, with each of the models."""
-    return table(
+    return markdown_table(
         ["shape", *(f"error, J = {model.n_styles}" for model in models)],
         (
             [
@@ -43,7 +43,7 @@ def error_table(
 
 def loop_table(runs: Mapping[str, Run]) -> str:
     """Tell where each loop ended and how long its ticks took."""
-    return table(
+    return markdown_table(
         ["control loop at 1 kHz", "left to the goal", "mean tick", "worst tick"],
         (
             [name, f"{run.left:.1e} mm", f"{run.ticks.mean():.2f} µs", f"{run.ticks.max():.1f} µs"]
@@ -54,4 +54,6 @@ def loop_table(runs: Mapping[str, Run]) -> str:
 
 def time_table(times: Mapping[str, float]) -> str:
     """Tell how long each part took."""
-    return table(["part", "time"], ([name, f"{1e3 * time:.1f} ms"] for name, time in times.items()))
+    return markdown_table(
+        ["part", "time"], ([name, f"{1e3 * time:.1f} ms"] for name, time in times.items())
+    )

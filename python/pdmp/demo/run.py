@@ -10,7 +10,7 @@ import numpy as np
 
 import pdmp
 from pdmp import plot
-from pdmp._files import replacing
+from pdmp._atomic_write import atomic_write
 from pdmp.datasets import handwriting
 from pdmp.demo.loop import DT, control, draw_control
 from pdmp.demo.report import error_table, loop_table, spectrum_table, time_table
@@ -94,7 +94,7 @@ def run_demo(
         ]
     )
     images = "\n\n".join(f"![{name}]({name}.png)" for name in figures)
-    with replacing(folder / "report.md") as draft:
+    with atomic_write(folder / "report.md") as draft:
         draft.write_text(f"{report}\n\n{images}\n", encoding="utf-8")
     return report
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pdmp._shown import printable, refusal
-from pdmp._tables import table
+from pdmp._markdown import markdown_table
+from pdmp._messages import printable, value_error
 from pdmp.evaluation.predictors import BAND, WIDTH, Forecast, Predictor
 from pdmp.evaluation.recordings import Array, Recordings
 from pdmp.evaluation.splits import Reach, Split
@@ -103,7 +103,7 @@ class Evaluation:
     def score(self, predictor: str) -> Scores:
         """Return the figures of one predictor, split by split."""
         if predictor not in self.scores:
-            raise refusal(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
+            raise value_error(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
         return self.scores[predictor]
 
     def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
@@ -150,7 +150,12 @@ class Evaluation:
         """Return the tables in Markdown."""
         lines = []
         for reach in self.reaches():
-            lines += [f"**{self._title(reach)}**", "", table(HEADER, self.table(reach)), ""]
+            lines += [
+                f"**{self._title(reach)}**",
+                "",
+                markdown_table(HEADER, self.table(reach)),
+                "",
+            ]
         return "\n".join([*lines, *self._notes()])
 
     def __repr__(self) -> str:
@@ -180,7 +185,7 @@ class Evaluation:
     def _rows(self, reach: Reach | None) -> list[int]:
         rows = [k for k, split in enumerate(self.splits) if reach in (None, split.reach)]
         if not rows:
-            raise refusal(f'reach = "{reach}": no split is of this sort')
+            raise value_error(f'reach = "{reach}": no split is of this sort')
         return rows
 
 

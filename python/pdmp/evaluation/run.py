@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pdmp._shown import refusal
+from pdmp._messages import value_error
 from pdmp.evaluation.baselines import (
     Components,
     LinearWeights,
@@ -141,7 +141,7 @@ def evaluate(
     _check_labels(read, folds)
     chosen = baselines() | {"PDMP": PDMP()} if predictors is None else dict(predictors)
     if not isinstance(chosen.get(REFERENCE, MeanDemonstration()), MeanDemonstration):
-        raise refusal(f"predictors: '{REFERENCE}' is always tried: give yours another name")
+        raise value_error(f"predictors: '{REFERENCE}' is always tried: give yours another name")
     tried = {REFERENCE: MeanDemonstration()} | chosen
     forecasts, left_out = {}, {}
     for k, (name, predictor) in enumerate(tried.items()):
@@ -181,7 +181,7 @@ def _foreseen(
 
 def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> None:
     if not isinstance(forecast, Forecast):
-        raise refusal(
+        raise value_error(
             f"predictors: '{name}' foresees a {type(forecast).__name__}, expected an "
             "evaluation.Forecast"
         )
@@ -190,12 +190,12 @@ def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> No
         if kind == "variance" and values is None:
             continue
         if np.shape(values) != shape:
-            raise refusal(
+            raise value_error(
                 f"predictors: '{name}' foresees {kind}s of shape {np.shape(values)}, "
                 f"expected (C, D) = {shape}"
             )
         if not np.isfinite(values).all():
-            raise refusal(f"predictors: '{name}' foresees a {kind} that is not finite")
+            raise value_error(f"predictors: '{name}' foresees a {kind} that is not finite")
 
 
 def _check_labels(read: Recordings, splits: Sequence[Split]) -> None:
@@ -204,7 +204,7 @@ def _check_labels(read: Recordings, splits: Sequence[Split]) -> None:
         for split in splits:
             column = read.contexts[:, q]
             if unseen := sorted(set(column[split.test]) - set(column[split.train])):
-                raise refusal(
+                raise value_error(
                     f'contexts[:, {q}]: "{unseen[0]}" is held out altogether, and nothing tells of '
                     "it: show it in several conditions, or pass splits= that leave some of it"
                 )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from pdmp._files import replacing
+from pdmp._atomic_write import atomic_write
 from pdmp._native import Model
 
 if TYPE_CHECKING:
@@ -144,5 +144,5 @@ def save(figure: Figure, path: str | PathLike[str]) -> None:
     OSError
         A file that cannot be written.
     """
-    with replacing(path) as draft:
+    with atomic_write(path) as draft:
         figure.savefig(draft, format=Path(path).suffix[1:] or "png")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pdmp._native import Demonstration, Model
-from pdmp.arguments import as_demonstrated, blend
+from pdmp.conditions import as_demonstrated, blend
 from pdmp.plot._canvas import BLUE, GREY, draw_movement, gradient, legend, movement_panels
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from math import ceil, pi
 from typing import TYPE_CHECKING
 
 from pdmp._native import Model
-from pdmp.arguments import as_demonstrated
+from pdmp.conditions import as_demonstrated
 from pdmp.plot._canvas import BLUE, GREY, canvas, dof_labels, dress, legend
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._tables import table
-from pdmp.demos import resample
+from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, legend
+from pdmp.preprocessing import resample
 from pdmp.reproduction import paths
 from pdmp.reproduction.loop import PACE, NewGoal, reach_over
 from pdmp.reproduction.reaching import (
@@ -141,7 +141,7 @@ def figure_4(seed: int = SEED) -> Section:
         "Learnt from nine reaches over none, two and three boxes; six over one box and over four "
         "are foreseen by U(h) = β[h, 1]. E in 10⁻³ rad², mean ± standard deviation over the six; "
         "at best is in the style for which E is least.",
-        table(
+        markdown_table(
             ["J", "E foreseen", "E at best"],
             (
                 [n + 1, *(f"{1e3 * row.mean():.1f} ± {1e3 * row.std():.1f}" for row in rows)]
@@ -150,7 +150,7 @@ def figure_4(seed: int = SEED) -> Section:
         ),
         "For how long the foreseen movement touches a box, on the robot, and how far a joint is "
         "off its command at most, which is far where the command is beyond the joint's limit:",
-        table(
+        markdown_table(
             [
                 "J",
                 *(f"touches {pile(height)}" for height in TESTED),
@@ -159,7 +159,7 @@ def figure_4(seed: int = SEED) -> Section:
             by_styles,
         ),
         "With J = 3, what is left to the goal, as printed or moved in mid-movement:",
-        table(
+        markdown_table(
             ["", "as printed", "moved"],
             (
                 [

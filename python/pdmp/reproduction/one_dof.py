@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import pdmp
 from pdmp._errors import reproduction_error
-from pdmp._tables import table
+from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, gradient, legend
 from pdmp.reproduction.section import SEED, Section
 
@@ -103,7 +103,7 @@ def figure_2(seed: int = SEED) -> Section:
     text = [
         f"{N_DEMOS} demonstrations of each kind, J = {N_STYLES}. Errors are RMSE over the range of "
         "the demonstration.",
-        table(
+        markdown_table(
             [
                 "",
                 "σ₄/σ₁",

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._tables import table
+from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, legend
 from pdmp.reproduction.heights import N_SAMPLES, TESTED, aligned, lasting, learn, new_goal
 from pdmp.reproduction.loop import PACE, Held, Movement, NewGoal, drive, from_rest
@@ -220,7 +220,7 @@ def comparison(seed: int = SEED) -> Section:
         "second on its way; speed once let go is the largest of any joint, over the largest of the "
         "same movement undisturbed. Primitives are told where the robot is, and wait; components "
         "have no way to. A run ends after 30 s.",
-        table(header, rows),
+        markdown_table(header, rows),
     ]
     held = {name: trials[name, TESTED[0]] for name in ("PDMP, J = 3", "principal components, 3")}
     return Section("What the paper argues with", text, {"held": draw_held(held)})

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from pdmp import plot
-from pdmp._files import replacing
+from pdmp._atomic_write import atomic_write
 from pdmp.plot._canvas import canvas
 from pdmp.reproduction.section import SEED, Section
 
@@ -73,7 +73,7 @@ def reproduce(
         for file, picture in section.figures.items():
             plot.save(picture, folder / f"{file}.png")
         images = "\n\n".join(f"![{file}]({file}.png)" for file in section.figures)
-        with replacing(folder / f"{name}.md") as draft:
+        with atomic_write(folder / f"{name}.md") as draft:
             draft.write_text(f"{reports[-1]}\n\n{images}\n", encoding="utf-8")
     return "\n\n".join(reports)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._tables import table
+from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import GREY, PALETTE, canvas
 from pdmp.reproduction import film, paths
 from pdmp.reproduction.loop import reach_over
@@ -82,12 +82,12 @@ def figure_3(seed: int = SEED) -> Section:
         f"Fifteen reaches, {model.n_dofs} joints; the first three singular values make "
         f"{shares[:3].sum():.1%} of the sum, the first four {shares[:4].sum():.1%}. On the robot, "
         "tau = 0.6 s, to the goal as printed:",
-        table(
+        markdown_table(
             ["", "style", "touches a box for", "left to the goal", "largest tracking error"], lines
         ),
         "How many of the three styles shown over each pile clear it, at the pace of the "
         "demonstrations:",
-        table(["J", *map(pile, HEIGHTS)], by_styles),
+        markdown_table(["J", *map(pile, HEIGHTS)], by_styles),
     ]
     section = Section(
         "Fig. 3: reaching over boxes",

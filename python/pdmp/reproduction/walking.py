@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._tables import table
-from pdmp.demos import cycles, read_csv
+from pdmp._markdown import markdown_table
+from pdmp.io import read_csv
 from pdmp.plot._canvas import BLUE, ORANGE, canvas, dress
+from pdmp.preprocessing import cycles
 from pdmp.reproduction import film
 from pdmp.reproduction.robot import DT, Robot
 from pdmp.reproduction.section import SEED, Section
@@ -239,4 +240,6 @@ def _spectrum(model: pdmp.Model) -> str:
 def _settling(commands: Sequence[Switch], done: Swinging) -> str:
     rows = zip(commands, done.off, strict=True)
     header = ["switch", "off the new cycle in the sixth period"]
-    return table(header, ([switch.name, f"{off:.2%} of its range"] for switch, off in rows))
+    return markdown_table(
+        header, ([switch.name, f"{off:.2%} of its range"] for switch, off in rows)
+    )

@@ -1,18 +1,18 @@
-"""Functions of one demonstration, called with several."""
+"""Functions of one demonstration, applied to each of several."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
+from pdmp._messages import value_error
 from pdmp._native import Demonstration
-from pdmp._shown import refusal
 
 P = ParamSpec("P")
 R = TypeVar("R")
 Name = TypeVar("Name")
 
 
-class Each(Protocol[P, R]):
+class Vectorized(Protocol[P, R]):
     """A function of one demonstration, or of each of several, which gives as many results."""
 
     @overload
@@ -27,11 +27,11 @@ class Each(Protocol[P, R]):
     ) -> list[R]: ...
 
 
-def each(function: Callable[Concatenate[Demonstration, P], R]) -> Each[P, R]:
+def vectorized(function: Callable[Concatenate[Demonstration, P], R]) -> Vectorized[P, R]:
     """Return a function that takes a list or a mapping of demonstrations too."""
 
     @wraps(function)
-    def of_each(demo: Any, *args: Any, **kwargs: Any) -> Any:
+    def for_each(demo: Any, *args: Any, **kwargs: Any) -> Any:
         if isinstance(demo, Mapping):
             return {name: _named(name, one, args, kwargs) for name, one in demo.items()}
         if isinstance(demo, Sequence) and not isinstance(demo, str):
@@ -42,6 +42,6 @@ def each(function: Callable[Concatenate[Demonstration, P], R]) -> Each[P, R]:
         try:
             return function(demo, *args, **kwargs)
         except ValueError as error:
-            raise refusal(f"{name}: {error}") from None
+            raise value_error(f"{name}: {error}") from None
 
-    return of_each
+    return for_each

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import pdmp
-from pdmp import demos
 from synthetic import reaches
 
 TABLE = "t,x,y\n0.0,1,10\n0.1,2,20\n0.2,3,30\n0.4,4,40\n"
@@ -37,7 +36,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_csv_gives_positions_times_and_names(table: Path) -> None:
     """The column t is the time; all others are degrees of freedom under their names."""
-    demo = demos.read_csv(table)
+    demo = pdmp.io.read_csv(table)
     np.testing.assert_array_equal(demo.position, POSITION)
     np.testing.assert_array_equal(demo.time, TIME)
     assert list(demo.names) == ["x", "y"]
@@ -45,20 +44,20 @@ def test_csv_gives_positions_times_and_names(table: Path) -> None:
 
 def test_csv_columns_are_kept_in_the_order_asked_for(table: Path) -> None:
     """Columns choose and order the degrees of freedom."""
-    demo = demos.read_csv(table, columns=["y", "x"])
+    demo = pdmp.io.read_csv(table, columns=["y", "x"])
     np.testing.assert_array_equal(demo.position, POSITION[:, ::-1])
 
 
 def test_csv_time_may_have_another_name(table: Path) -> None:
     """The time column is the one that is named, and t becomes a degree of freedom."""
-    demo = demos.read_csv(table, time="y [s]")
+    demo = pdmp.io.read_csv(table, time="y [s]")
     np.testing.assert_array_equal(demo.time, POSITION[:, 1])
     assert list(demo.names) == ["t", "x"]
 
 
 def test_dt_takes_the_place_of_time_stamps(table: Path) -> None:
     """With dt, the time column is neither needed nor a degree of freedom."""
-    demo = demos.read_csv(table, dt=0.5)
+    demo = pdmp.io.read_csv(table, dt=0.5)
     assert demo.dt == 0.5
     assert list(demo.names) == ["x", "y"]
 
@@ -67,7 +66,7 @@ def test_csv_bears_what_spreadsheets_write(tmp_path: Path) -> None:
     """A byte-order mark, spaces, blank lines and CRLF do not matter."""
     path = tmp_path / "demo.csv"
     path.write_bytes(b"\xef\xbb\xbf" + TABLE.replace(",", " , ").replace("\n", "\r\n\r\n").encode())
-    np.testing.assert_array_equal(demos.read_csv(path).position, POSITION)
+    np.testing.assert_array_equal(pdmp.io.read_csv(path).position, POSITION)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +90,7 @@ def test_bad_csv_is_refused_with_file_and_place(tmp_path: Path, text: str, messa
     path = tmp_path / "broken.csv"
     path.write_text(text)
     with pytest.raises(ValueError, match=rf"broken\.csv.*{message}"):
-        demos.read_csv(path)
+        pdmp.io.read_csv(path)
 
 
 def test_csv_in_another_encoding_is_refused(tmp_path: Path) -> None:
@@ -99,20 +98,20 @@ def test_csv_in_another_encoding_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "latin.csv"
     path.write_bytes("t,höhe\n0,1\n".encode("latin-1"))
     with pytest.raises(ValueError, match=r"latin\.csv: not UTF-8"):
-        demos.read_csv(path)
+        pdmp.io.read_csv(path)
 
 
 def test_missing_column_names_those_there_are(table: Path) -> None:
     """The error lists what could have been meant."""
     with pytest.raises(ValueError, match=r"no column 'z' among t, x, y"):
-        demos.read_csv(table, columns=["z"])
+        pdmp.io.read_csv(table, columns=["z"])
 
 
 def test_npz_gives_an_array_per_demonstration(tmp_path: Path) -> None:
     """Arrays are demonstrations under their own names, with their time stamps under NAME.t."""
     path = tmp_path / "demos.npz"
     np.savez(path, **{"a": POSITION, "a.t": TIME, "b": 2 * POSITION, "b.t": TIME})
-    found = demos.read_npz(path)
+    found = pdmp.io.read_npz(path)
     assert list(found) == ["a", "b"]
     np.testing.assert_array_equal(found["b"].position, 2 * POSITION)
     np.testing.assert_array_equal(found["b"].time, TIME)
@@ -123,7 +122,7 @@ def test_npz_gives_demonstrations_stored_one_after_another(tmp_path: Path) -> No
     path = tmp_path / "demos.npz"
     rows = np.concatenate([POSITION, POSITION + 1]).astype(np.float32)
     np.savez(path, y=rows, t=np.tile(TIME, 2), start=[0, 4, 8], names=["x", "y"])
-    found = demos.read_npz(path, columns=["y"])
+    found = pdmp.io.read_npz(path, columns=["y"])
     assert list(found) == ["0", "1"]
     np.testing.assert_array_equal(found["1"].position, POSITION[:, 1:] + 1)
 
@@ -132,16 +131,16 @@ def test_npz_gives_time_and_position(tmp_path: Path) -> None:
     """What most would write first is read; a stack holds several demonstrations."""
     path = tmp_path / "demos.npz"
     np.savez(path, time=TIME, position=POSITION, velocity=POSITION, names=["x", "y"])
-    (demo,) = demos.read_npz(path).values()
+    (demo,) = pdmp.io.read_npz(path).values()
     np.testing.assert_array_equal(demo.position, POSITION)
     np.testing.assert_array_equal(demo.time, TIME)
     assert demo.names == ["x", "y"]
     np.savez(path, position=POSITION[:, 0])
-    (demo,) = demos.read_npz(path, dt=0.5).values()
+    (demo,) = pdmp.io.read_npz(path, dt=0.5).values()
     np.testing.assert_array_equal(demo.position, POSITION[:, :1])
     for time in (TIME, np.array([TIME, 2 * TIME])):
         np.savez(path, time=time, position=np.array([POSITION, -POSITION]))
-        found = demos.read_npz(path)
+        found = pdmp.io.read_npz(path)
         np.testing.assert_array_equal(found["1"].position, -POSITION)
         np.testing.assert_array_equal(found["1"].time, time if time.ndim == 1 else time[1])
 
@@ -151,11 +150,11 @@ def test_npz_stamps_are_seconds(tmp_path: Path) -> None:
     path, steps = tmp_path / "demos.npz", 10_000_000 * np.arange(4)
     np.savez(path, time=1_700_000_000_000_000_000 + steps, position=POSITION)
     with pytest.warns(UserWarning, match="read as ns since 1970"):
-        (demo,) = demos.read_npz(path).values()
+        (demo,) = pdmp.io.read_npz(path).values()
     np.testing.assert_allclose(demo.time, 0.01 * np.arange(4), atol=1e-15)
     np.savez(path, time=steps, position=POSITION)
     with pytest.raises(ValueError, match="store them in s instead of ns, or pass dt="):
-        demos.read_npz(path)
+        pdmp.io.read_npz(path)
 
 
 @pytest.mark.parametrize(
@@ -186,7 +185,7 @@ def test_bad_npz_is_refused(tmp_path: Path, arrays: dict[str, object], message: 
     path = tmp_path / "broken.npz"
     np.savez(path, **arrays)
     with pytest.raises(ValueError, match=rf"broken\.npz.*{message}"):
-        demos.read_npz(path)
+        pdmp.io.read_npz(path)
 
 
 def test_a_file_that_is_no_npz_is_refused(tmp_path: Path) -> None:
@@ -194,12 +193,12 @@ def test_a_file_that_is_no_npz_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "broken.npz"
     path.write_bytes(b"PK\x03\x04 and nothing more")
     with pytest.raises(ValueError, match=r"broken\.npz: not an NPZ file"):
-        demos.read_npz(path)
+        pdmp.io.read_npz(path)
 
 
 def test_folder_gives_demonstrations_by_id_with_their_context(folder: Path) -> None:
     """Columns of the index make the context."""
-    found = demos.read_folder(folder, context=["height"])
+    found = pdmp.io.read_folder(folder, context=["height"])
     assert list(found) == ["a", "b"]
     np.testing.assert_array_equal(found["b"].context, [0.2])
 
@@ -208,7 +207,7 @@ def test_folder_may_hold_an_npz(folder: Path) -> None:
     """A demos.npz is read in the order of the index."""
     rows = np.concatenate([POSITION, POSITION + 1])
     np.savez(folder / "demos.npz", y=rows, t=np.tile(TIME, 2), start=[0, 4, 8])
-    found = demos.read_folder(folder, context=["height"])
+    found = pdmp.io.read_folder(folder, context=["height"])
     np.testing.assert_array_equal(found["b"].position, POSITION + 1)
     np.testing.assert_array_equal(found["b"].context, [0.2])
 
@@ -217,7 +216,7 @@ def test_npz_and_index_must_agree(folder: Path) -> None:
     """A demonstration too many or too few is refused."""
     np.savez(folder / "demos.npz", y=POSITION, t=TIME, start=[0, 4])
     with pytest.raises(ValueError, match=r"holds 1 demonstrations, but index\.csv lists 2"):
-        demos.read_folder(folder)
+        pdmp.io.read_folder(folder)
 
 
 @pytest.mark.parametrize("place", [".", "demos"])
@@ -226,21 +225,21 @@ def test_folder_without_an_index_is_read_by_its_files(tmp_path: Path, place: str
     (tmp_path / place).mkdir(exist_ok=True)
     for name in ("take 10", "take 9", "b"):
         (tmp_path / place / f"{name}.csv").write_text(TABLE)
-    assert list(demos.read_folder(tmp_path)) == ["b", "take 9", "take 10"]
-    assert len(demos.read(tmp_path)) == 3
+    assert list(pdmp.io.read_folder(tmp_path)) == ["b", "take 9", "take 10"]
+    assert len(pdmp.io.read(tmp_path)) == 3
     with pytest.raises(ValueError, match=r"no index\.csv: expected an index\.csv with a row per"):
-        demos.read_folder(tmp_path, context=["height"])
+        pdmp.io.read_folder(tmp_path, context=["height"])
 
 
 def test_folder_with_nothing_to_read_is_answered_with_the_format(tmp_path: Path) -> None:
     """No index and no files, an index without rows, or no folder at all."""
     with pytest.raises(ValueError, match=r"and no files: expected an index\.csv .*demos/<id>\.csv"):
-        demos.read_folder(tmp_path)
+        pdmp.io.read_folder(tmp_path)
     (tmp_path / "index.csv").write_text("id,height\n")
     with pytest.raises(ValueError, match=r"lists no demonstrations: expected an index\.csv"):
-        demos.read_folder(tmp_path)
+        pdmp.io.read_folder(tmp_path)
     with pytest.raises(FileNotFoundError):
-        demos.read_folder(tmp_path / "none")
+        pdmp.io.read_folder(tmp_path / "none")
 
 
 @pytest.mark.parametrize(
@@ -251,25 +250,25 @@ def test_id_names_a_file_in_the_folder(folder: Path, name: str) -> None:
     (folder / "a.csv").write_text(TABLE)
     (folder / "index.csv").write_text(f"id,height\n{name},1\n")
     with pytest.raises(ValueError, match=r"index\.csv.* is no name of a file: expected an index"):
-        demos.read_folder(folder)
+        pdmp.io.read_folder(folder)
 
 
 def test_id_may_be_the_name_of_the_file(folder: Path) -> None:
     """With its suffix, there is only one file that it can be."""
     (folder / "index.csv").write_text("id;height\na.csv;0,5\nb;1\n")
-    found = demos.read_folder(folder, context=["height"])
+    found = pdmp.io.read_folder(folder, context=["height"])
     assert [demo.context.tolist() for demo in found.values()] == [[0.5], [1.0]]
 
 
 def test_index_of_pandas_is_read(folder: Path) -> None:
     """A column without a name before the others is passed over."""
     (folder / "index.csv").write_text(",id,height\n0,a,0.1\n1,b,0.2\n")
-    assert demos.read_folder(folder, context=["height"])["b"].context == [0.2]
+    assert pdmp.io.read_folder(folder, context=["height"])["b"].context == [0.2]
 
 
 def test_context_may_be_labels(folder: Path) -> None:
     """A column of words makes labels."""
-    found = demos.read_folder(folder, context=["shape", "height"])
+    found = pdmp.io.read_folder(folder, context=["shape", "height"])
     assert found["a"].context == ["C", 0.1]
 
 
@@ -278,51 +277,51 @@ def test_context_is_all_numbers_or_all_labels(folder: Path) -> None:
     index = folder / "index.csv"
     index.write_text(index.read_text().replace("0.1", "low"))
     with pytest.raises(ValueError, match=r"index\.csv, line 2, column 'height': 'low' is not a n"):
-        demos.read_folder(folder, context=["height"])
+        pdmp.io.read_folder(folder, context=["height"])
 
 
 def test_label_must_not_be_missing(folder: Path) -> None:
     """An empty field is no label of its own, and a mark of a missing number is none."""
     (folder / "index.csv").write_text("id,height\na,NA\nb,1\n")
     with pytest.raises(ValueError, match=r"index\.csv, line 2, column 'height': no number"):
-        demos.read_folder(folder, context=["height"])
+        pdmp.io.read_folder(folder, context=["height"])
     (folder / "index.csv").write_text("id,hand [side]\na,left\nb,\n")
     with pytest.raises(ValueError, match=r"index\.csv, line 3, column 'hand': no label"):
-        demos.read_folder(folder, context=["hand"])
+        pdmp.io.read_folder(folder, context=["hand"])
 
 
 def test_id_must_be_unique(folder: Path) -> None:
     """Two rows of the index with the same id are refused."""
     (folder / "index.csv").write_text("id\na\na\n")
     with pytest.raises(ValueError, match=r"line 3: id 'a' appears twice"):
-        demos.read_folder(folder)
+        pdmp.io.read_folder(folder)
 
 
 def test_read_takes_files_and_folders_together(folder: Path) -> None:
     """Demonstrations come in the order of the paths."""
     single = folder / "demos" / "a.csv"
-    assert len(demos.read([single, folder, single])) == 4
-    assert len(demos.read(single)) == 1
+    assert len(pdmp.io.read([single, folder, single])) == 4
+    assert len(pdmp.io.read(single)) == 1
 
 
 def test_read_refuses_what_it_does_not_know(tmp_path: Path) -> None:
     """Another suffix is refused with those that are read."""
     with pytest.raises(ValueError, match=r"expected a \.csv, \.bvh or \.npz file or a folder"):
-        demos.read([tmp_path / "demo.txt"])
+        pdmp.io.read([tmp_path / "demo.txt"])
 
 
 def test_context_needs_an_index(table: Path) -> None:
     """A context asked of a lone file is refused, not left out."""
     with pytest.raises(ValueError, match=r"index\.csv"):
-        demos.read([table], context=["height"])
+        pdmp.io.read([table], context=["height"])
 
 
 def test_names_come_in_a_list(table: Path, folder: Path) -> None:
     """A text is not taken apart letter by letter."""
     with pytest.raises(ValueError, match=r"columns = 'xy': pass a list of names, \['xy'\]"):
-        demos.read_csv(table, columns="xy")
+        pdmp.io.read_csv(table, columns="xy")
     with pytest.raises(ValueError, match="context = 'height': pass a list"):
-        demos.read_folder(folder, context="height")
+        pdmp.io.read_folder(folder, context="height")
 
 
 @pytest.mark.parametrize(
@@ -332,21 +331,21 @@ def test_time_has_its_unit(table: Path, header: str, second: float) -> None:
     """Time stamps come in the unit that their header tells, in brackets or parentheses."""
     table.write_text(TABLE.replace("t,", f"{header},", 1))
     name = header if "(" in header else "t"
-    time = demos.read_csv(table, time=name).time
+    time = pdmp.io.read_csv(table, time=name).time
     np.testing.assert_allclose(time, second * TIME, rtol=1e-15)
 
 
 def test_missing_file_is_an_os_error(tmp_path: Path) -> None:
     """A file that is not there is no matter of its contents."""
     with pytest.raises(FileNotFoundError):
-        demos.read([tmp_path / "none.csv"])
+        pdmp.io.read([tmp_path / "none.csv"])
 
 
 @pytest.mark.parametrize("names", [["1", "2"], ["t", "x"], ["x", "x_velocity"], [" ", "x"]])
 def test_csv_that_would_not_be_read_is_not_written(tmp_path: Path, names: list[str]) -> None:
     """Names that `read_csv` refuses are refused when they are written."""
     with pytest.raises(ValueError, match="is not a name|two columns are called"):
-        demos.write_csv(tmp_path / "out.csv", pdmp.fit(reaches()).rollout(), names)
+        pdmp.io.write_csv(tmp_path / "out.csv", pdmp.fit(reaches()).rollout(), names)
     assert not (tmp_path / "out.csv").exists()
 
 
@@ -354,7 +353,7 @@ def test_what_a_link_leads_to_is_replaced(tmp_path: Path) -> None:
     """A link stays one, in a table as in a model file."""
     model = pdmp.fit(reaches())
     for name, write in (
-        ("table", lambda path: demos.write_csv(path, model.rollout(), model.names)),
+        ("table", lambda path: pdmp.io.write_csv(path, model.rollout(), model.names)),
         ("model", model.save),
     ):
         file, link = tmp_path / name, tmp_path / f"{name}-link"
@@ -374,7 +373,7 @@ def test_files_have_the_mode_of_others(tmp_path: Path, older: int | None) -> Non
     before = os.umask(0o027)
     try:
         for name, write in (
-            ("table", lambda path: demos.write_csv(path, model.rollout(), model.names)),
+            ("table", lambda path: pdmp.io.write_csv(path, model.rollout(), model.names)),
             ("model", model.save),
         ):
             path = tmp_path / name
@@ -392,7 +391,7 @@ def test_pipes_are_written_to(tmp_path: Path) -> None:
     model, pipe = pdmp.fit(reaches()), tmp_path / "pipe"
     os.mkfifo(pipe)
     for write in (
-        lambda: demos.write_csv(pipe, model.rollout(), model.names),
+        lambda: pdmp.io.write_csv(pipe, model.rollout(), model.names),
         lambda: model.save(pipe),
     ):
         writer = threading.Thread(target=write)
@@ -405,15 +404,15 @@ def test_pipes_are_written_to(tmp_path: Path) -> None:
 def test_folder_is_no_file(tmp_path: Path) -> None:
     """A folder in place of a file is told by its own name."""
     with pytest.raises(IsADirectoryError, match=tmp_path.name):
-        demos.write_csv(tmp_path, pdmp.fit(reaches()).rollout(), ["x", "y"])
+        pdmp.io.write_csv(tmp_path, pdmp.fit(reaches()).rollout(), ["x", "y"])
 
 
 def test_written_csv_reads_back_to_the_last_bit(tmp_path: Path) -> None:
     """Positions and times survive a round trip unchanged."""
     model = pdmp.fit(reaches())
     trajectory = model.rollout()
-    demos.write_csv(tmp_path / "out.csv", trajectory, model.names)
-    demo = demos.read_csv(tmp_path / "out.csv", columns=model.names)
+    pdmp.io.write_csv(tmp_path / "out.csv", trajectory, model.names)
+    demo = pdmp.io.read_csv(tmp_path / "out.csv", columns=model.names)
     np.testing.assert_array_equal(demo.position, trajectory.position)
     np.testing.assert_array_equal(demo.time, trajectory.time)
 
@@ -431,7 +430,7 @@ def test_interrupted_write_leaves_the_old_file(
     path.write_text("before")
     monkeypatch.setattr(os, "replace", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        demos.write_csv(path, trajectory, ["x", "y"])
+        pdmp.io.write_csv(path, trajectory, ["x", "y"])
     assert path.read_text() == "before"
     assert os.listdir(tmp_path) == ["out.csv"]
 
@@ -439,17 +438,17 @@ def test_interrupted_write_leaves_the_old_file(
 def test_each_dof_needs_a_name(tmp_path: Path) -> None:
     """A name too few is refused before anything is written."""
     with pytest.raises(ValueError, match="names has length 1, expected 2"):
-        demos.write_csv(tmp_path / "out.csv", pdmp.fit(reaches()).rollout(), ["x"])
+        pdmp.io.write_csv(tmp_path / "out.csv", pdmp.fit(reaches()).rollout(), ["x"])
     assert os.listdir(tmp_path) == []
 
 
 def test_written_csv_keeps_units(tmp_path: Path) -> None:
     """Headers tell the units that are known, and reading takes them off the names."""
     model = pdmp.fit(reaches())
-    demos.write_csv(tmp_path / "out.csv", model.rollout(), model.names, model.units)
+    pdmp.io.write_csv(tmp_path / "out.csv", model.rollout(), model.names, model.units)
     header = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header.startswith("t,x [m],y [m],x_velocity [m/s],")
-    demo = demos.read_csv(tmp_path / "out.csv", columns=["y", "x_velocity"])
+    demo = pdmp.io.read_csv(tmp_path / "out.csv", columns=["y", "x_velocity"])
     assert (demo.names, demo.units) == (["y", "x_velocity"], ["m", "m/s"])
 
 
@@ -457,15 +456,15 @@ def test_csv_headers_tell_units(tmp_path: Path) -> None:
     """Names go without them, and a time in ms comes in s."""
     path = tmp_path / "demo.csv"
     path.write_text("t [ms],knee [rad],height[m],count\n0,1,2,3\n1,1,2,3\n2,1,2,3\n3,1,2,3\n")
-    demo = demos.read_csv(path)
+    demo = pdmp.io.read_csv(path)
     assert (demo.names, demo.units) == (["knee", "height", "count"], ["rad", "m", ""])
     np.testing.assert_allclose(demo.time, [0, 0.001, 0.002, 0.003])
     path.write_text("t [min],x\n0,1\n1,1\n2,1\n3,1\n")
     with pytest.raises(ValueError, match=r"demo\.csv, column 't': its unit is 'min': expected s"):
-        demos.read_csv(path)
+        pdmp.io.read_csv(path)
     path.write_text("t,x [m],x [rad]\n")
     with pytest.raises(ValueError, match="two columns are called 'x'"):
-        demos.read_csv(path)
+        pdmp.io.read_csv(path)
 
 
 @pytest.mark.parametrize("gap", ["", "nan", "NaN"])
@@ -474,15 +473,15 @@ def test_csv_gaps_are_interpolated_up_to_a_length(tmp_path: Path, gap: str) -> N
     path = tmp_path / "demo.csv"
     rows = [f"{0.1 * k:.1f},{k},{gap if k in (3, 4) else k**3}" for k in range(8)]
     path.write_text("\n".join(["t,x,y", *rows]))
-    filled = demos.read_csv(path, max_gap=0.3).position
+    filled = pdmp.io.read_csv(path, max_gap=0.3).position
     np.testing.assert_allclose(filled[:, 1], np.arange(8.0) ** 3, atol=1e-9)
     place = r"demo\.csv: column 'y': no sample between t = 0\.2 s and t = 0\.5 s"
     with pytest.raises(ValueError, match=place):
-        demos.read_csv(path, max_gap=0.2)
+        pdmp.io.read_csv(path, max_gap=0.2)
     with pytest.raises(ValueError, match=r"demo\.csv, line 5, column 'y'"):
-        demos.read_csv(path)
+        pdmp.io.read_csv(path)
     with pytest.raises(ValueError, match="max_gap = -1"):
-        demos.read_csv(path, columns=["x"], max_gap=-1)
+        pdmp.io.read_csv(path, columns=["x"], max_gap=-1)
 
 
 def test_npz_has_units_and_gaps(tmp_path: Path) -> None:
@@ -491,14 +490,14 @@ def test_npz_has_units_and_gaps(tmp_path: Path) -> None:
     holed = np.arange(16.0).reshape(8, 2) / 10
     holed[3, 1] = np.nan
     np.savez(path, reach=holed, names=["x", "yaw"], units=["m", "rad"])
-    (demo,) = demos.read_npz(path, dt=0.1, max_gap=0.2, columns=["yaw"]).values()
+    (demo,) = pdmp.io.read_npz(path, dt=0.1, max_gap=0.2, columns=["yaw"]).values()
     assert demo.units == ["rad"]
     np.testing.assert_allclose(demo.position[:, 0], np.arange(8) * 0.2 + 0.1)
     with pytest.raises(ValueError, match=r"npz, 'reach': column 'yaw': no sample between t = 0\.2"):
-        demos.read_npz(path, dt=0.1)
+        pdmp.io.read_npz(path, dt=0.1)
     np.savez(path, reach=holed, names=["x", "yaw"], units=["m"])
     with pytest.raises(ValueError, match=r"'reach': shape \(8, 2\), expected \(T, 1\)"):
-        demos.read_npz(path, dt=0.1)
+        pdmp.io.read_npz(path, dt=0.1)
 
 
 BVH = """HIERARCHY
@@ -536,7 +535,7 @@ def bvh(tmp_path: Path) -> Path:
 
 def test_bvh_gives_every_channel_as_it_is_written(bvh: Path) -> None:
     """Angles come in rad, beyond half a turn too; positions as they are, of any joint."""
-    demo = demos.read_bvh(bvh)
+    demo = pdmp.io.read_bvh(bvh)
     assert demo.dt == 0.01
     assert demo.names is not None
     assert demo.names[1] == "Hips.Yposition"
@@ -548,12 +547,12 @@ def test_bvh_gives_every_channel_as_it_is_written(bvh: Path) -> None:
 
 def test_bvh_is_read_wherever_csv_is(bvh: Path) -> None:
     """Among files, and in a folder under the id of its index."""
-    (demo,) = demos.read([bvh], columns=["Left Leg.Zrotation"])
+    (demo,) = pdmp.io.read([bvh], columns=["Left Leg.Zrotation"])
     assert demo.position.shape == (4, 1)
     (bvh.parent / "demos").mkdir()
     bvh.rename(bvh.parent / "demos" / "leg.bvh")
     (bvh.parent / "index.csv").write_text("id,speed\nleg,1.5\n")
-    demo = demos.read_folder(bvh.parent, context=["speed"])["leg"]
+    demo = pdmp.io.read_folder(bvh.parent, context=["speed"])["leg"]
     assert demo.context == [1.5]
 
 
@@ -575,11 +574,11 @@ def test_bad_bvh_is_refused_with_file_and_place(
     """Whatever is wrong, the error is a ValueError that names the file and where to look."""
     bvh.write_text(BVH.replace(old, new))
     with pytest.raises(ValueError, match=rf"leg\.bvh.*{message}"):
-        demos.read_bvh(bvh)
+        pdmp.io.read_bvh(bvh)
 
 
 def test_missing_bvh_package_is_named(bvh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the extra, one sentence says what to install."""
     monkeypatch.setitem(sys.modules, "bvh", None)
     with pytest.raises(ImportError, match=r"^BVH files need .*: pip install 'pdmp\[bvh\]'$"):
-        demos.read_bvh(bvh)
+        pdmp.io.read_bvh(bvh)

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._described import DERIVATIVES, label
-from pdmp._files import replacing
+from pdmp._atomic_write import atomic_write
+from pdmp._labels import DERIVATIVES, split_label
+from pdmp._messages import value_error
 from pdmp._native import Demonstration, Trajectory
-from pdmp._shown import refusal
-from pdmp.demos import _clock, _text
-from pdmp.demos._recording import demonstration
-from pdmp.demos._sheet import Sheet, sheet
+from pdmp.io import _fields, _time_units
+from pdmp.io._csv_layout import CsvTable, parse_layout
+from pdmp.io._demonstration import make_demonstration
 
 THOUSANDS = re.compile(r"[^,]*|[-+]?[1-9]\d{0,2}(,\d{3})+")
 CLOCKS = ("t", "time", "Time", "TIME")
@@ -72,14 +72,14 @@ def read_csv(
         A file that cannot be read.
     """
     path = Path(path)
-    times = CLOCKS if time == CLOCKS[0] else (time, label(time)[0])
-    found = sheet(path, times if dt is None else ())
+    times = CLOCKS if time == CLOCKS[0] else (time, split_label(time)[0])
+    found = parse_layout(path, times if dt is None else ())
     header, units = _labels(found)
     names = [name for name in header if name]
-    _text.check_names(path, found.line, names)
+    _fields.check_names(path, found.line, names)
     stamped = next((name for name in times if name in header), None)
     if dt is None and stamped is None:
-        raise refusal(
+        raise value_error(
             f"{path}: no column '{time}' with the time among {', '.join(names)}: "
             "name it with time=, or pass dt="
         )
@@ -87,17 +87,17 @@ def read_csv(
         derived = {f"{name}{suffix}" for name in names for suffix, _ in DERIVATIVES[1:]}
         names = [name for name in names if name != stamped and name not in derived]
     else:
-        names = _text.listed("columns", columns)
-    where = _text.places(path, header, names)
+        names = _fields.listed("columns", columns)
+    where = _fields.places(path, header, names)
     clock = header.index(stamped) if dt is None and stamped is not None else None
     position, stamps = _numbers(found, header, where, clock, gaps=max_gap > 0)
     if clock is not None and stamps is not None:
         name = header[clock]
-        given = units[clock] or ("" if name == time else label(time)[1])
+        given = units[clock] or ("" if name == time else split_label(time)[1])
         remedy = f"write '{name} [{{unit}}]' in the header or as time="
-        unit = _clock.unit_of(path, name, given)
-        stamps = _clock.seconds(f"{path}, column '{name}'", stamps, unit, remedy)
-    return demonstration(
+        unit = _time_units.unit_of(path, name, given)
+        stamps = _time_units.seconds(f"{path}, column '{name}'", stamps, unit, remedy)
+    return make_demonstration(
         path,
         position,
         dt=dt,
@@ -109,16 +109,16 @@ def read_csv(
     )
 
 
-def _labels(found: Sheet) -> tuple[list[str], list[str]]:
+def _labels(found: CsvTable) -> tuple[list[str], list[str]]:
     """Return names and units of the columns; those of the header go before those below it."""
-    header, units = map(list, zip(*map(label, found.fields), strict=True))
+    header, units = map(list, zip(*map(split_label, found.fields), strict=True))
     if found.units is not None:
         units = [unit or below for unit, below in zip(units, found.units, strict=True)]
     return header, units
 
 
 def _numbers(
-    found: Sheet, header: list[str], where: list[int], clock: int | None, *, gaps: bool
+    found: CsvTable, header: list[str], where: list[int], clock: int | None, *, gaps: bool
 ) -> tuple[NDArray[Any], NDArray[Any] | None]:
     """Return positions (T, D), NaN in gaps, and time stamps (T,) as they are written."""
     path = found.path
@@ -140,17 +140,17 @@ def _numbers(
         if "." in text:
             decimal[False] = line
         if found.separator != "," and all(decimal.values()):
-            raise refusal(
+            raise value_error(
                 f"{path}, line {line}: numbers have decimal commas and decimal points: write all "
                 "of them with one of the two, and no separators of thousands"
             )
         if clock is not None:
-            value = _text.number(path, line, header[clock], stamp)
+            value = _fields.number(path, line, header[clock], stamp)
             # ns since 1970 have more digits than a double, and fewer than an integer.
             stamps.append(int(stamp) if stamp.isdecimal() and value < 2**63 else value)
         numbers.append(_row(path, line, kept, names, gaps=gaps))
     if decimal[True] and thousands:
-        raise refusal(
+        raise value_error(
             f"{path}, line {decimal[True]}: commas may be decimal or separate thousands: write "
             "decimal points"
         )
@@ -167,7 +167,7 @@ def _row(path: Path, line: int, cells: list[str], names: list[str], *, gaps: boo
     except ValueError:
         pass
     return [
-        _text.number(path, line, name, cell, gaps=gaps)
+        _fields.number(path, line, name, cell, gaps=gaps)
         for name, cell in zip(names, cells, strict=True)
     ]
 
@@ -176,7 +176,7 @@ def _check_unnamed(path: Path, line: int, row: list[str], unnamed: list[int], sa
     """Check that what has no name is the index that pandas writes, or nothing."""
     for k in unnamed:
         if row[k] and not (k == 0 and row[k] == str(sample)):
-            raise refusal(
+            raise value_error(
                 f"{path}, line {line}: '{row[k]}' stands in column {k + 1}, which has no name: "
                 "the first row must name the columns"
             )
@@ -213,8 +213,8 @@ def write_csv(
         A file that cannot be written.
     """
     path = Path(path)
-    names = trajectory.names if names is None else _text.listed("names", names)
-    units = trajectory.units if units is None else _text.listed("units", units)
+    names = trajectory.names if names is None else _fields.listed("names", names)
+    units = trajectory.units if units is None else _fields.listed("units", units)
     n_dofs = trajectory.position.shape[1]
     for kind, given in (("name", names), ("unit", units)):
         if len(given) != n_dofs:
@@ -222,16 +222,16 @@ def write_csv(
                 f"{kind}s has length {len(given)}, expected {n_dofs}: one {kind} per DoF"
             )
     header = [f"{name}{suffix}" for suffix, _ in DERIVATIVES for name in names]
-    _text.check_names(path, 1, ["t", *header])
+    _fields.check_names(path, 1, ["t", *header])
     units = [unit and f"{unit}{per}" for _, per in DERIVATIVES for unit in units]
     fields = [
         f"{name} [{unit}]" if unit else name for name, unit in zip(header, units, strict=True)
     ]
     for name, unit, field in zip(header, units, fields, strict=True):
-        if label(field) != (name, unit):
-            raise refusal(f"{path}: '{field}' would not be read back as '{name}' in '{unit}'")
+        if split_label(field) != (name, unit):
+            raise value_error(f"{path}: '{field}' would not be read back as '{name}' in '{unit}'")
     columns = (trajectory.time, trajectory.position, trajectory.velocity, trajectory.acceleration)
-    with replacing(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
+    with atomic_write(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["t", *fields])
         writer.writerows(np.column_stack(columns).tolist())

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pdmp._labels import FULL_TURN
 from pdmp._native import Demonstration
-from pdmp.demos._recording import TURNS
 
 
 def unwrap(demo: Demonstration) -> Demonstration:
@@ -27,8 +27,8 @@ def unwrap(demo: Demonstration) -> Demonstration:
     units = demo.units or ["rad"] * demo.n_dofs
     unwrapped = position.copy()
     for d, unit in enumerate(units):
-        if unit in TURNS:
-            unwrapped[:, d] = np.unwrap(position[:, d], period=TURNS[unit])
+        if unit in FULL_TURN:
+            unwrapped[:, d] = np.unwrap(position[:, d], period=FULL_TURN[unit])
     if demo.goal is not None:
         rest["goal"] = demo.goal + unwrapped[-1] - position[-1]
     return Demonstration(unwrapped, **rest)

@@ -1,7 +1,8 @@
-"""Data frames and labelled arrays: the names and units that they know, and one of a trajectory."""
+"""Names and units of degrees of freedom, in headers, data frames and labelled arrays."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -11,15 +12,17 @@ if TYPE_CHECKING:
 
 DERIVATIVES = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
 """Suffixes of the name and the unit of each derivative, in the columns of a table."""
+FULL_TURN = {"rad": math.tau, "deg": 360.0, "°": 360.0}
+"""Full turn in each unit of angle."""
 
 
-def label(field: str) -> tuple[str, str]:
+def split_label(field: str) -> tuple[str, str]:
     """Return name and unit of a header field such as `knee [rad]`; the unit is "" without one."""
     found = re.fullmatch(r"(.*\S)\s*\[([^][]*)\]", field.strip(), re.DOTALL)
     return (found[1], found[2].strip()) if found else (field.strip(), "")
 
 
-def described(value: Any) -> tuple[list[str] | None, list[str] | None]:
+def names_and_units(value: Any) -> tuple[list[str] | None, list[str] | None]:
     """Return names and units of the degrees of freedom, each None where the object has none.
 
     Names are the columns of a data frame, or the coordinate along the last axis of a labelled
@@ -28,7 +31,7 @@ def described(value: Any) -> tuple[list[str] | None, list[str] | None]:
     fields = _fields(value)
     if not fields:
         return None, None
-    names, units = map(list, zip(*map(label, fields), strict=True))
+    names, units = map(list, zip(*map(split_label, fields), strict=True))
     noted = getattr(value, "attrs", None)
     noted = noted.get("units") if isinstance(noted, Mapping) else None
     if isinstance(noted, str):
@@ -55,7 +58,7 @@ def _fields(value: Any) -> list[str] | None:
     return [str(field) for field in listed] if named else None
 
 
-def dataframe(trajectory: Trajectory) -> Any:
+def to_dataframe(trajectory: Trajectory) -> Any:
     """Return a trajectory as a data frame, as `Trajectory.to_dataframe` describes."""
     try:
         import pandas

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from pdmp._shown import refusal
+from pdmp._messages import value_error
 
 MAX_DEFLATION = 1100
 """Bytes that one of a compressed member can stand for; deflate reaches 1032."""
 MAX_MEMBERS = 1_000_000
 
 
-def arrays(path: Path) -> dict[str, NDArray[Any]]:
+def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Return the arrays of an NPZ file by name.
 
     Raises
@@ -37,7 +37,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         except Exception as error:
             # zipfile, zlib and numpy raise a dozen kinds of errors at damaged files.
             reason = f"{error}" if isinstance(error, ValueError) else f"it is damaged ({error})"
-            raise refusal(f"{path}: not an NPZ file of plain arrays: {reason}") from None
+            raise value_error(f"{path}: not an NPZ file of plain arrays: {reason}") from None
 
 
 def _arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:

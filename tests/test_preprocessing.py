@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp import demos
 
 STRIDE = 1.17
 UNITS = ["rad", "rad", "m"]
@@ -53,7 +52,7 @@ def raw(tmp_path: Path) -> Path:
 
 def test_a_raw_walk_becomes_a_rhythmic_primitive(raw: Path) -> None:
     """Two lines lead from a file to a model, in its units, of its period, without a jump."""
-    cycles = demos.cycles(demos.read_csv(raw, max_gap=0.1))
+    cycles = pdmp.preprocessing.cycles(pdmp.io.read_csv(raw, max_gap=0.1))
     model = pdmp.fit(cycles, kind="rhythmic", smoothing="auto")
     assert model.units == UNITS
     assert np.median(model.durations) == pytest.approx(STRIDE, rel=0.01)
@@ -67,7 +66,7 @@ def test_a_raw_walk_becomes_a_rhythmic_primitive(raw: Path) -> None:
 
 def test_cycles_last_as_long_as_their_samples() -> None:
     """T · dt is the period, and names, units and context go along; the goal does not."""
-    cycles = demos.cycles(recording(context=[1.3], goal=[0, 0, 9]))
+    cycles = pdmp.preprocessing.cycles(recording(context=[1.3], goal=[0, 0, 9]))
     for cycle, period in zip(cycles, cycles.periods, strict=True):
         assert cycle.dt is not None
         assert cycle.n_samples * cycle.dt == pytest.approx(period, rel=1e-12)
@@ -82,14 +81,16 @@ def test_a_mean_cycle_has_less_noise() -> None:
     def noise(cycle: pdmp.Demonstration) -> float:
         return float(np.std(np.diff(cycle.position[:, 0], 3)))
 
-    each, mean = demos.cycles(noisy), demos.cycles(noisy, average=True)
+    each, mean = pdmp.preprocessing.cycles(noisy), pdmp.preprocessing.cycles(noisy, average=True)
     assert len(mean) == 1
     assert noise(mean[0]) < 0.5 * np.median([noise(cycle) for cycle in each])
 
 
 def test_recordings_are_told_apart_and_in_phase() -> None:
     """Each cycle tells its recording, and begins where those of the first recording do."""
-    found = demos.cycles([pdmp.Demonstration(walk(phase=p), dt=0.01) for p in (0.0, 2.0, 5.0)])
+    found = pdmp.preprocessing.cycles(
+        [pdmp.Demonstration(walk(phase=p), dt=0.01) for p in (0.0, 2.0, 5.0)]
+    )
     assert set(found.recordings) == {0, 1, 2}
     starts = np.array([cycle.position[0, :2] for cycle in found])
     np.testing.assert_allclose(starts, starts[:1].repeat(len(starts), axis=0), atol=0.02)
@@ -106,13 +107,13 @@ def test_a_recording_without_a_period_is_refused_with_the_figure() -> None:
     with pytest.raises(
         ValueError, match=r"demo 0: no period: .* correlation of -?\d\.\d+, below 0\."
     ):
-        demos.cycles([reach(), reach()])
+        pdmp.preprocessing.cycles([reach(), reach()])
 
 
 def test_a_recording_without_a_period_among_others_is_left_out_with_a_warning() -> None:
     """The others are cut; what is left out is listed with its figure and its duration."""
     with pytest.warns(UserWarning, match=r"recording 1 is left out: no period: .* correlation of"):
-        found = demos.cycles([recording(), reach(), recording()])
+        found = pdmp.preprocessing.cycles([recording(), reach(), recording()])
     assert set(found.recordings) == {0, 2}
     (rejected,) = [cycle for cycle in found.rejected if cycle.recording == 1]
     assert (rejected.start, rejected.period) == (0.0, pytest.approx(1.99))
@@ -125,7 +126,9 @@ def test_the_turns_of_a_crank_are_taken_off() -> None:
     crank = 2 * np.pi * t / STRIDE + 0.2 * np.sin(2 * np.pi * t / STRIDE)
     turning = np.column_stack([walk()[:, :2], crank])
     for unit in ("rad", ""):
-        found = demos.cycles(pdmp.Demonstration(turning, dt=0.01, units=["rad", "rad", unit]))
+        found = pdmp.preprocessing.cycles(
+            pdmp.Demonstration(turning, dt=0.01, units=["rad", "rad", unit])
+        )
         (growth,) = found.growths
         assert (growth.dof, growth.turns) == (2, 1)
         assert growth.gain == pytest.approx(2 * np.pi, rel=0.01)
@@ -136,7 +139,7 @@ def test_the_turns_of_a_crank_are_taken_off() -> None:
 def test_a_way_gained_in_each_cycle_is_warned_of_with_its_size() -> None:
     """Someone who walks off has cycles in place, and the warning gives name, gain and unit."""
     with pytest.warns(UserWarning, match=r"'pelvis' gains 1\.52 m in recording 0; closed cycles"):
-        found = demos.cycles(recording())
+        found = pdmp.preprocessing.cycles(recording())
     assert found.gains.shape == (len(found), 3)
     np.testing.assert_allclose(found.gains[:, 2], 1.3 * STRIDE, rtol=0.01)
     assert np.abs(found.gains[:, :2]).max() < 0.02
@@ -151,10 +154,10 @@ def test_sampling_anew_makes_no_styles_of_noise() -> None:
         pdmp.Demonstration(path + 0.003 * rng.standard_normal(path.shape), dt=0.01)
         for _ in range(50)
     ]
-    twice = [demos.resample(demo, 0.005) for demo in reaches]
+    twice = [pdmp.preprocessing.resample(demo, 0.005) for demo in reaches]
     assert pdmp.fit(twice, smoothing="auto").n_styles == 1
     noisy = walk(3000)[:, :2] + 0.003 * rng.standard_normal((3000, 2))
-    cycles = demos.cycles(pdmp.Demonstration(noisy, dt=0.01))
+    cycles = pdmp.preprocessing.cycles(pdmp.Demonstration(noisy, dt=0.01))
     assert pdmp.fit(cycles, kind="rhythmic", smoothing="auto").n_styles == 1
 
 
@@ -164,16 +167,16 @@ def test_trimming_finds_the_rests_beside_a_noisy_movement() -> None:
     path = np.column_stack([s**3 * (10 - 15 * s + 6 * s**2), -(s**2) * (3 - 2 * s)])
     for seed in range(5):
         noise = 1e-3 * np.random.default_rng(seed).standard_normal(path.shape)
-        kept = demos.trim(pdmp.Demonstration(path + noise, dt=0.01))
+        kept = pdmp.preprocessing.trim(pdmp.Demonstration(path + noise, dt=0.01))
         assert 90 <= kept.n_samples <= 110
 
 
 def test_events_take_the_place_of_the_search() -> None:
     """One list of events serves one recording; several need one each."""
-    found = demos.cycles(recording(), events=[0.5, 1.5, 2.6])
+    found = pdmp.preprocessing.cycles(recording(), events=[0.5, 1.5, 2.6])
     np.testing.assert_allclose(found.periods, [1.0, 1.1])
     with pytest.raises(ValueError, match="events has length 1, expected 2"):
-        demos.cycles([recording(), recording()], events=[[0.5, 1.5]])
+        pdmp.preprocessing.cycles([recording(), recording()], events=[[0.5, 1.5]])
 
 
 @given(st.floats(-3, 3), st.floats(-0.9, 0.9), st.integers(5, 60), st.sampled_from(["rad", "deg"]))
@@ -183,7 +186,7 @@ def test_unwrapping_undoes_wrapping(start: float, step: float, n: int, unit: str
     angle = start + step * np.pi * np.arange(n)
     wrapped = ((angle + np.pi) % (2 * np.pi) - np.pi) * turn / (2 * np.pi)
     position = np.column_stack([wrapped, wrapped])
-    demo = demos.unwrap(pdmp.Demonstration(position, dt=0.1, units=[unit, "m"]))
+    demo = pdmp.preprocessing.unwrap(pdmp.Demonstration(position, dt=0.1, units=[unit, "m"]))
     expected = (angle - angle[0]) * turn / (2 * np.pi)
     np.testing.assert_allclose(demo.position[:, 0] - wrapped[0], expected, atol=1e-9 * turn * n)
     np.testing.assert_array_equal(demo.position[:, 1], wrapped)
@@ -192,7 +195,7 @@ def test_unwrapping_undoes_wrapping(start: float, step: float, n: int, unit: str
 def test_a_goal_turns_with_the_last_sample() -> None:
     """Half a turn past the wrap, the goal is still as far from the end as it was."""
     wrapped = np.array([[3.0], [3.1], [-3.1], [-3.0]])
-    demo = demos.unwrap(pdmp.Demonstration(wrapped, dt=0.1, goal=[-2.9]))
+    demo = pdmp.preprocessing.unwrap(pdmp.Demonstration(wrapped, dt=0.1, goal=[-2.9]))
     assert demo.goal is not None
     assert demo.goal[0] - demo.position[-1, 0] == pytest.approx(0.1)
 
@@ -200,7 +203,11 @@ def test_a_goal_turns_with_the_last_sample() -> None:
 def test_preparing_keeps_what_belongs_to_the_movement() -> None:
     """Filter, resampling and trimming keep names, units, context and goal."""
     whole = recording(context=[1.0], goal=[0, 0, 9])
-    for demo in (demos.lowpass(whole, 6), demos.resample(whole, 0.02), demos.trim(whole)):
+    for demo in (
+        pdmp.preprocessing.lowpass(whole, 6),
+        pdmp.preprocessing.resample(whole, 0.02),
+        pdmp.preprocessing.trim(whole),
+    ):
         assert (demo.names, demo.units) == (whole.names, UNITS)
         assert demo.context == [1.0]
         np.testing.assert_array_equal(demo.goal, [0, 0, 9])
@@ -208,7 +215,7 @@ def test_preparing_keeps_what_belongs_to_the_movement() -> None:
 
 def test_units_survive_pickling_and_saving(tmp_path: Path) -> None:
     """Demonstration, model and model file tell the same units."""
-    cycles = demos.cycles(recording())
+    cycles = pdmp.preprocessing.cycles(recording())
     assert pickle.loads(pickle.dumps(cycles[0])).units == UNITS
     model = pdmp.fit(cycles, kind="rhythmic")
     model.save(tmp_path / "walk.safetensors")
@@ -228,6 +235,6 @@ def test_units_must_agree() -> None:
 def test_a_recording_needs_a_clock() -> None:
     """Whatever asks for times says so where there are none."""
     bare = pdmp.Demonstration(walk())
-    for call in (demos.period, demos.trim, demos.cycles):
+    for call in (pdmp.preprocessing.period, pdmp.preprocessing.trim, pdmp.preprocessing.cycles):
         with pytest.raises(ValueError, match=r"does not tell when .* dt= or time="):
             call(bare)

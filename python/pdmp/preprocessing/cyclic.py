@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pdmp import _native
+from pdmp._messages import value_error, warn
 from pdmp._native import Demonstration
-from pdmp._shown import refusal, warn
 
 
 class Rejected(NamedTuple):
@@ -86,7 +86,7 @@ class Cycles(Sequence[Demonstration]):
     def __repr__(self) -> str:
         """Return how many there are, and of what periods."""
         span = f" of {min(self.periods):.3f} to {max(self.periods):.3f} s" if len(self) else ""
-        return f"<pdmp.demos.Cycles: {len(self)}{span}, {len(self.rejected)} rejected>"
+        return f"<pdmp.preprocessing.Cycles: {len(self)}{span}, {len(self.rejected)} rejected>"
 
 
 def cycles(
@@ -153,7 +153,7 @@ def cycles(
     """
     if isinstance(recordings, Mapping) and isinstance(events, Mapping):
         if lone := sorted(map(str, recordings.keys() ^ events.keys())):
-            raise refusal(f"events: '{lone[0]}' is among the recordings or the events alone")
+            raise value_error(f"events: '{lone[0]}' is among the recordings or the events alone")
         events = [events[name] for name in recordings]
     begins = cast("Sequence[ArrayLike] | None", events)
     if isinstance(recordings, Demonstration):

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from pdmp._shown import refusal
+from pdmp._messages import value_error
 
 MAX_SHOWN = 80
 """Characters of a field that an error quotes."""
@@ -34,7 +34,7 @@ GAPS = frozenset(
 def listed(argument: str, names: Sequence[str]) -> list[str]:
     """Return several names as a list; a text would be taken apart letter by letter."""
     if isinstance(names, str):
-        raise refusal(f"{argument} = '{names}': pass a list of names, ['{names}']")
+        raise value_error(f"{argument} = '{names}': pass a list of names, ['{names}']")
     return list(names)
 
 
@@ -43,12 +43,12 @@ def check_names(path: Path, line: int, names: Sequence[str]) -> None:
     seen: set[str] = set()
     for name in names:
         if not is_name(name):
-            raise refusal(
+            raise value_error(
                 f"{path}, line {line}: '{short(name)}' is not a name: the first row must name the "
                 "columns"
             )
         if name in seen:
-            raise refusal(
+            raise value_error(
                 f"{path}, line {line}: two columns are called '{short(name)}': rename one"
             )
         seen.add(name)
@@ -65,7 +65,7 @@ def places(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]
     for name in names:
         if name not in where:
             known = ", ".join(header) if len(header) <= 40 else f"{len(header)} columns"
-            raise refusal(f"{path}: no column '{name}' among {known}")
+            raise value_error(f"{path}: no column '{name}' among {known}")
     return [where[name] for name in names]
 
 
@@ -78,7 +78,7 @@ def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) 
         if gaps:
             return math.nan
         found = f"{field} is not finite" if value is not None else f"'{field}' marks a gap"
-        raise refusal(
+        raise value_error(
             f"{place}: {found if field else 'empty'}: pass max_gap= to interpolate what is "
             "missing, or cut the row out"
         )
@@ -86,9 +86,9 @@ def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) 
         hint = ""
         if parsed(field.replace(",", ".")) is not None:
             hint = ": decimal commas are read where semicolons or tabs separate the fields"
-        raise refusal(f"{place}: '{field}' is not a number{hint}")
+        raise value_error(f"{place}: '{field}' is not a number{hint}")
     if not math.isfinite(value):
-        raise refusal(f"{place}: {field} is not finite: cut the row out")
+        raise value_error(f"{place}: {field} is not finite: cut the row out")
     return value
 
 

@@ -6,15 +6,15 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pdmp._described import label
+from pdmp._labels import split_label
+from pdmp._messages import value_error
 from pdmp._native import Demonstration
-from pdmp._shown import refusal
-from pdmp.demos import _text
-from pdmp.demos._recording import demonstration
-from pdmp.demos._sheet import sheet
-from pdmp.demos.archive import read_npz, recordings
-from pdmp.demos.bvh import read_bvh
-from pdmp.demos.table import read_csv
+from pdmp.io import _fields
+from pdmp.io._csv_layout import parse_layout
+from pdmp.io._demonstration import make_demonstration
+from pdmp.io.bvh import read_bvh
+from pdmp.io.csv import read_csv
+from pdmp.io.npz import read_npz, recordings
 
 SINGLE = (".csv", ".bvh")
 """Formats with one demonstration a file."""
@@ -64,13 +64,13 @@ def read(
         if path.is_dir():
             demos += read_folder(path, time=time, context=context, **options).values()
         elif context is not None:
-            raise refusal(f"{path}: a context is read from the index.csv of a folder: pass one")
+            raise value_error(f"{path}: a context is read from the index.csv of a folder: pass one")
         elif path.suffix.lower() in SINGLE:
             demos.append(_read_single(path, time, **options))
         elif path.suffix.lower() == ".npz":
             demos += read_npz(path, **options).values()
         else:
-            raise refusal(f"{path}: expected a .csv, .bvh or .npz file or a folder")
+            raise value_error(f"{path}: expected a .csv, .bvh or .npz file or a folder")
     return demos
 
 
@@ -91,7 +91,7 @@ def read_folder(
     Parameters
     ----------
     path : path
-        A folder as `pdmp.demos` describes.
+        A folder as `pdmp.io` describes.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
     time : str
@@ -126,11 +126,11 @@ def read_folder(
         }
     found = list(recordings(archive, columns, dt))
     if len(found) != len(contexts):
-        raise refusal(
+        raise value_error(
             f"{archive}: holds {len(found)} demonstrations, but index.csv lists {len(contexts)}"
         )
     return {
-        name: demonstration(
+        name: make_demonstration(
             f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **given
         )
         for (name, values), (_, position, given) in zip(contexts.items(), found, strict=True)
@@ -148,7 +148,7 @@ def _read_unlisted(
         if files and context is None:
             files.sort(key=lambda file: _natural(file.name))
             return {file.stem: _read_single(file, time, **options) for file in files}
-    raise refusal(f"{path}: no index.csv{'' if context else ', and no files'}: {FORMAT}")
+    raise value_error(f"{path}: no index.csv{'' if context else ', and no files'}: {FORMAT}")
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
@@ -159,7 +159,7 @@ def _natural(name: str) -> list[tuple[int, str]]:
 def _file(path: Path, name: str) -> Path:
     """Return the one file of that name, a CSV file where there is none."""
     if not name or re.search(r"[/\\:\x00-\x1f]", name) or name in (".", ".."):
-        raise refusal(f"{path / 'index.csv'}: id '{name}' is no name of a file: {FORMAT}")
+        raise value_error(f"{path / 'index.csv'}: id '{name}' is no name of a file: {FORMAT}")
     folder = path / "demos"
     paths = [folder / f"{name}{suffix}" for suffix in SINGLE]
     if name.lower().endswith(SINGLE):
@@ -179,25 +179,27 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
 
     A column without any number holds labels.
     """
-    found = sheet(path, index=True)
-    header, lines = [label(field)[0] for field in found.fields], list(found.rows())
+    found = parse_layout(path, index=True)
+    header, lines = [split_label(field)[0] for field in found.fields], list(found.rows())
     if found.separator != ",":
         lines = [(line, list(map(_pointed, fields))) for line, fields in lines]
-    _text.check_names(path, found.line, header if header[0] else header[1:])
-    name, *where = _text.places(path, header, ["id", *_text.listed("context", columns)])
+    _fields.check_names(path, found.line, header if header[0] else header[1:])
+    name, *where = _fields.places(path, header, ["id", *_fields.listed("context", columns)])
     if not lines:
-        raise refusal(f"{path}: lists no demonstrations: {FORMAT}")
-    labels = {k for k in where if not any(_text.is_number(fields[k]) for _, fields in lines)}
+        raise value_error(f"{path}: lists no demonstrations: {FORMAT}")
+    labels = {k for k in where if not any(_fields.is_number(fields[k]) for _, fields in lines)}
     contexts: dict[str, list[float | str] | None] = {}
     for line, fields in lines:
         if fields[name] in contexts:
-            raise refusal(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
+            raise value_error(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
         for k in where:
-            if not fields[k] or (k not in labels and _text.is_gap(fields[k])):
+            if not fields[k] or (k not in labels and _fields.is_gap(fields[k])):
                 kind = "label" if k in labels else "number"
-                raise refusal(f"{path}, line {line}, column '{header[k]}': no {kind}: fill it in")
+                raise value_error(
+                    f"{path}, line {line}, column '{header[k]}': no {kind}: fill it in"
+                )
         values = [
-            fields[k] if k in labels else _text.number(path, line, header[k], fields[k])
+            fields[k] if k in labels else _fields.number(path, line, header[k], fields[k])
             for k in where
         ]
         contexts[fields[name]] = values or None
@@ -207,4 +209,4 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
 def _pointed(field: str) -> str:
     """Return a number with a decimal point, in place of a comma, and texts as they are."""
     pointed = field.replace(",", ".")
-    return pointed if _text.is_number(pointed) else field
+    return pointed if _fields.is_number(pointed) else field

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdmp._messages import value_error
 from pdmp._native import Demonstration
-from pdmp._shown import refusal
-from pdmp.demos import _clock, _npz, _text
-from pdmp.demos._recording import demonstration
+from pdmp.io import _fields, _npz_arrays, _time_units
+from pdmp.io._demonstration import make_demonstration
 
 LAYOUT = "store time (T,) and position (T, D), or each demonstration beside its time stamps NAME.t"
 
@@ -29,7 +29,7 @@ def read_npz(
     Parameters
     ----------
     path : path
-        An NPZ file in one of the layouts that `pdmp.demos` describes.
+        An NPZ file in one of the layouts that `pdmp.io` describes.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
     dt : float, optional
@@ -47,7 +47,7 @@ def read_npz(
         A file that cannot be read.
     """
     return {
-        name: demonstration(f"{path}, '{name}'", position, max_gap=max_gap, **given)
+        name: make_demonstration(f"{path}, '{name}'", position, max_gap=max_gap, **given)
         for name, position, given in recordings(Path(path), columns, dt)
     }
 
@@ -56,25 +56,27 @@ def recordings(
     path: Path, columns: Sequence[str] | None, dt: float | None
 ) -> Iterator[tuple[str, NDArray[Any], dict[str, Any]]]:
     """Yield name, positions (T, D) and the other arguments of each demonstration in the file."""
-    arrays = _npz.arrays(path)
+    arrays = _npz_arrays.read_arrays(path)
     names, units = _labels(path, arrays, "names"), _labels(path, arrays, "units")
     if columns is not None and names is None:
-        raise refusal(f"{path}: no array 'names' to tell which columns are {', '.join(columns)}")
+        raise value_error(
+            f"{path}: no array 'names' to tell which columns are {', '.join(columns)}"
+        )
     for name, position, time in _parts(path, arrays):
         source = f"{path}, '{name}'"
         for labels in (names, units):
             expected = "D" if labels is None else len(labels)
             if position.ndim != 2 or expected not in (position.shape[1], "D"):
-                raise refusal(
+                raise value_error(
                     f"{source}: shape {position.shape}, expected (T, {expected}): " + LAYOUT
                 )
         if dt is None and time is None:
-            raise refusal(f"{source}: no time stamps: pass dt=")
+            raise value_error(f"{source}: no time stamps: pass dt=")
         kept = list(range(position.shape[1]))
         if columns is not None and names is not None:
-            kept = _text.places(path, names, _text.listed("columns", columns))
+            kept = _fields.places(path, names, _fields.listed("columns", columns))
         if dt is None and time is not None:
-            time = _clock.seconds(
+            time = _time_units.seconds(
                 source, time, "", "store them in s instead of {unit}, or pass dt="
             )
         given = {
@@ -90,13 +92,13 @@ def _labels(path: Path, arrays: dict[str, NDArray[Any]], kind: str) -> list[str]
         return None
     labels = np.atleast_1d(arrays.pop(kind))
     if labels.ndim != 1 or labels.dtype.kind not in "US":
-        raise refusal(f"{path}: '{kind}' must be a vector of texts, one per DoF")
+        raise value_error(f"{path}: '{kind}' must be a vector of texts, one per DoF")
     try:
         texts = [label.decode() if isinstance(label, bytes) else label for label in labels.tolist()]
         "".join(texts).encode()
     except (SystemError, ValueError):
         # numpy checks no letters before it makes texts of them.
-        raise refusal(f"{path}: '{kind}' holds letters that there are none of") from None
+        raise value_error(f"{path}: '{kind}' holds letters that there are none of") from None
     return texts
 
 
@@ -119,7 +121,7 @@ def _parts(
             if not name.endswith(".t"):
                 yield name, position, arrays.get(f"{name}.t")
             elif name.removesuffix(".t") not in arrays:
-                raise refusal(f"{path}: '{name}' has time stamps of nothing")
+                raise value_error(f"{path}: '{name}' has time stamps of nothing")
 
 
 def _joined(
@@ -132,12 +134,12 @@ def _joined(
     start = given.tolist() if whole and (given == np.floor(given)).all() else []
     rises = all(before < after for before, after in pairwise(start))
     if len(start) < 2 or not rises or (start[0], start[-1]) != (0, n_samples):
-        raise refusal(
+        raise value_error(
             f"{path}: 'start' must rise from 0 to {n_samples}, where the last demonstration "
             f"ends, in whole numbers, "
             f"got {np.array2string(given, threshold=9) if whole else given.dtype}"
         )
     if time is not None and time.shape != (n_samples,):
-        raise refusal(f"{path}: 't' has shape {time.shape}, expected ({n_samples},)")
+        raise value_error(f"{path}: 't' has shape {time.shape}, expected ({n_samples},)")
     for demo, (begin, end) in enumerate(pairwise(map(int, start))):
         yield str(demo), position[begin:end], None if time is None else time[begin:end]

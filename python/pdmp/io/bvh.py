@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pdmp._messages import value_error
 from pdmp._native import Demonstration
-from pdmp._shown import refusal
-from pdmp.demos import _text
-from pdmp.demos._recording import demonstration
+from pdmp.io import _fields
+from pdmp.io._demonstration import make_demonstration
 
 if TYPE_CHECKING:
     from bvh import Bvh
@@ -66,18 +66,20 @@ def read_bvh(
         n_frames, interval = motion.nframes, motion.frame_time
     except Exception:
         # The parser has no errors of its own.
-        raise refusal(f"{path}: not a whole BVH file: joints, channels or frames lack") from None
+        raise value_error(
+            f"{path}: not a whole BVH file: joints, channels or frames lack"
+        ) from None
     if len(motion.frames) != n_frames:
-        raise refusal(
+        raise value_error(
             f"{path}: holds {len(motion.frames)} frames, but announces {n_frames}: export it anew"
         )
-    names = found if columns is None else _text.listed("columns", columns)
-    where = _text.places(path, found, names)
+    names = found if columns is None else _fields.listed("columns", columns)
+    where = _fields.places(path, found, names)
     position = np.array([_frame(path, k, row, found) for k, row in enumerate(motion.frames)])
     position = position.reshape(n_frames, len(found))[:, where]
     turning = [name.endswith("rotation") for name in names]
     position[:, turning] = np.deg2rad(position[:, turning])
-    return demonstration(
+    return make_demonstration(
         path,
         position,
         dt=interval if dt is None else dt,
@@ -97,21 +99,23 @@ def _parsed(path: Path) -> Bvh:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
-        raise refusal(f"{path}: not UTF-8 text: save it as UTF-8") from None
+        raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
     try:
         # The parser takes a blank line for a joint, and the last line only with its end.
         return Bvh("\n".join(line for line in lines if line.strip()) + "\n")
     except Exception:
-        raise refusal(f"{path}: not a BVH file: its braces do not match") from None
+        raise value_error(f"{path}: not a BVH file: its braces do not match") from None
 
 
 def _frame(path: Path, frame: int, row: Sequence[str], names: Sequence[str]) -> list[float]:
     if len(row) != len(names):
-        raise refusal(f"{path}, frame {frame}: {len(row)} numbers, expected {len(names)}")
+        raise value_error(f"{path}, frame {frame}: {len(row)} numbers, expected {len(names)}")
     numbers = []
     for name, field in zip(names, row, strict=True):
         try:
             numbers.append(float(field))
         except ValueError:
-            raise refusal(f"{path}, frame {frame}, '{name}': '{field}' is not a number") from None
+            raise value_error(
+                f"{path}, frame {frame}, '{name}': '{field}' is not a number"
+            ) from None
     return numbers

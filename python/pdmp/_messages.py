@@ -17,7 +17,7 @@ def printable(text: object, *, keep: str = "") -> str:
     return "".join(c if c in keep or category(c) not in HIDDEN else ascii(c)[1:-1] for c in text)
 
 
-def refusal(message: str) -> ValueError:
+def value_error(message: str) -> ValueError:
     """Return an error whose text, which may quote a file or a name, has no control characters."""
     return ValueError(printable(message))
 

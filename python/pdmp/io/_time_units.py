@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._described import label
-from pdmp._shown import refusal, warn
+from pdmp._labels import split_label
+from pdmp._messages import value_error, warn
 
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 LONG = {
@@ -24,11 +24,11 @@ MAX_STAMP = 1e11  # s, as for Demonstration
 
 def unit_of(source: object, name: str, unit: str) -> str:
     """Return the unit of a time column, which may stand in parentheses too, or be missing."""
-    unit = unit or label(re.sub(r"\((.*)\)$", r"[\1]", name))[1]
+    unit = unit or split_label(re.sub(r"\((.*)\)$", r"[\1]", name))[1]
     unit = LONG.get(unit.lower(), unit)
     if unit not in SECONDS:
         known = ", ".join(filter(None, SECONDS))
-        raise refusal(f"{source}, column '{name}': its unit is '{unit}': expected {known}")
+        raise value_error(f"{source}, column '{name}': its unit is '{unit}': expected {known}")
     return unit
 
 
@@ -48,7 +48,7 @@ def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[
         if not unit:
             likely = [unit for unit in ("ms", "us", "ns") if 1e-4 < step * SECONDS[unit] < 1]
             likely_unit = likely[0] if likely else "s"
-            raise refusal(
+            raise value_error(
                 f"{source}: time stamps from {first:g} in steps of {step:g} are not in seconds: "
                 + remedy.replace("{unit}", likely_unit)
                 + f" ({step * SECONDS[likely_unit]:g} s between samples), or [s] if they are"

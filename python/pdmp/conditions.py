@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pdmp._messages import value_error
 from pdmp._native import Model
-from pdmp._shown import refusal
 
 
 def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
@@ -40,10 +40,12 @@ def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
     if rows.size == 0:
         raise ValueError("demos is empty: pass at least one index")
     if rows.dtype.kind not in "iu" or rows.ndim > 1:
-        raise refusal(f"demos = {demos!r}: pass the index of a demonstration, or a list of them")
+        raise value_error(
+            f"demos = {demos!r}: pass the index of a demonstration, or a list of them"
+        )
     for row in rows:
         if not 0 <= row < model.n_demos:
-            raise refusal(f"demos: {row} must lie between 0 and {model.n_demos - 1}")
+            raise value_error(f"demos: {row} must lie between 0 and {model.n_demos - 1}")
     arguments = {"style": model.styles[rows].mean(axis=0)}
     timing = model.timings[rows].mean(axis=0)
     if len(timing) > 1:
@@ -75,14 +77,14 @@ def blend(a: Mapping[str, ArrayLike], b: Mapping[str, ArrayLike], share: float) 
         share that is not finite.
     """
     if not np.isfinite(share):
-        raise refusal(f"share = {share}: must be finite")
+        raise value_error(f"share = {share}: must be finite")
     if single := sorted(a.keys() ^ b.keys()):
-        raise refusal(f"{', '.join(single)}: given for one of the two only; give it for both")
+        raise value_error(f"{', '.join(single)}: given for one of the two only; give it for both")
     blended = {}
     for name in a:
         ends = np.asarray(a[name]), np.asarray(b[name])
         if any(end.dtype.kind not in "iuf" for end in ends) or ends[0].shape != ends[1].shape:
-            raise refusal(
+            raise value_error(
                 f"{name}: {a[name]!r} and {b[name]!r} cannot be blended: expected numbers, as many "
                 "in both"
             )

@@ -1,20 +1,18 @@
 """A demonstration from what a file holds, with errors that name the file."""
 
 from collections.abc import Sequence
-from math import tau
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pdmp._labels import FULL_TURN
+from pdmp._messages import value_error
 from pdmp._native import Demonstration, fill
-from pdmp._shown import refusal
-
-TURNS = {"rad": tau, "deg": 360.0, "°": 360.0}
 
 
-def demonstration(
+def make_demonstration(
     source: Path | str,
     position: NDArray[Any],
     *,
@@ -28,10 +26,10 @@ def demonstration(
     """Return a demonstration with its gaps filled, and `source` before the text of its errors."""
     n_samples, n_dofs = position.shape
     columns = [f"y{d}" for d in range(n_dofs)] if names is None else names
-    turns = [TURNS.get(unit, 0.0) if unit else np.nan for unit in units or [""] * n_dofs]
+    turns = [FULL_TURN.get(unit, 0.0) if unit else np.nan for unit in units or [""] * n_dofs]
     clock = np.arange(n_samples) * (dt or 1.0) if time is None else time
     try:
         whole = fill(position, clock, columns, turns, max_gap)
         return Demonstration(whole, dt=dt, time=time, context=context, names=names, units=units)
     except ValueError as error:
-        raise refusal(f"{source}: {error}") from None
+        raise value_error(f"{source}: {error}") from None

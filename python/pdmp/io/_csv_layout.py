@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
-from pdmp._described import label
-from pdmp._shown import refusal
-from pdmp.demos import _text
+from pdmp._labels import split_label
+from pdmp._messages import value_error
+from pdmp.io import _fields
 
 SAMPLE = 200
 """Rows from which the form of a file is found; a preamble must end among them."""
@@ -29,7 +29,7 @@ Row = tuple[int, list[str]]
 
 
 @dataclass
-class Sheet:
+class CsvTable:
     """Header of a CSV file, and what is needed to go through its rows."""
 
     path: Path
@@ -53,7 +53,7 @@ class Sheet:
                 hint = ""
                 if len(fields) > len(self.fields) and self.separator == ",":
                     hint = "; where commas are decimal, separate fields by semicolons"
-                raise refusal(
+                raise value_error(
                     f"{self.path}, line {line}: {len(fields)} fields, "
                     f"expected {len(self.fields)} as in the header{hint}"
                 )
@@ -66,7 +66,7 @@ class Sheet:
             yield line, fields
 
 
-def sheet(path: Path, times: Collection[str] = (), *, index: bool = False) -> Sheet:
+def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False) -> CsvTable:
     """Find separator, header and units of a CSV file.
 
     Comments, which begin with #, a line such as `sep=;` and other lines before the header are
@@ -80,12 +80,12 @@ def sheet(path: Path, times: Collection[str] = (), *, index: bool = False) -> Sh
         # Spreadsheets write UTF-16 with a mark, and call it Unicode.
         text = raw.decode("utf-16" if raw[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8-sig")
     except UnicodeDecodeError:
-        raise refusal(f"{path}: not UTF-8 text: save it as UTF-8") from None
+        raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
     separator = _separator(path, text)
     sample = [row for row in islice(_parse(path, text, separator), SAMPLE) if any(row[1])]
     sample = [row for row in sample if not _separating(separator.join(row[1]))]
     if not sample:
-        raise refusal(f"{path}: empty: expected a header row with names, then one sample a row")
+        raise value_error(f"{path}: empty: expected a header row with names, then one sample a row")
     width = _width([fields for _, fields in sample])
     line, fields = sample[0]
     if not index:
@@ -95,7 +95,7 @@ def sheet(path: Path, times: Collection[str] = (), *, index: bool = False) -> Sh
     if not index and below is not None and len(below[1]) == width and _are_units(below[1]):
         units, first = [unit.strip("[]()-") for unit in below[1]], below[0]
     fields = [re.sub(r"^%\s+", "", fields[0]), *fields[1:]]
-    return Sheet(path, line, fields, units, first, separator, text)
+    return CsvTable(path, line, fields, units, first, separator, text)
 
 
 def _parse(path: Path, text: str, separator: str) -> Iterator[Row]:
@@ -108,7 +108,7 @@ def _parse(path: Path, text: str, separator: str) -> Iterator[Row]:
         for row in reader:
             yield reader.line_num, [cell.strip() for cell in row]
     except csv.Error as error:
-        raise refusal(f"{path}, line {reader.line_num}: {error}") from None
+        raise value_error(f"{path}, line {reader.line_num}: {error}") from None
 
 
 def _is_comment(line: str) -> bool:
@@ -157,9 +157,9 @@ def _header(
         if len(fields) == width and not units and _are_names(fields):
             named.append((line, fields))
         before = fields
-    timed = [row for row in named if any(label(cell)[0] in times for cell in row[1])]
+    timed = [row for row in named if any(split_label(cell)[0] in times for cell in row[1])]
     if len(timed or named) > 1 and not timed:
-        raise refusal(
+        raise value_error(
             f"{path}: lines {named[0][0]} and {named[1][0]} may both name the columns: delete what "
             "stands before the header"
         )
@@ -181,20 +181,20 @@ def _are_names(fields: list[str]) -> bool:
     inner = fields[1:-1] if len(fields) > 2 else [cell for cell in fields if cell]
     return (
         any(fields)
-        and all(map(_text.is_name, inner))
-        and not any(_text.is_number(fields[k]) for k in (0, -1))
+        and all(map(_fields.is_name, inner))
+        and not any(_fields.is_number(fields[k]) for k in (0, -1))
     )
 
 
 def _are_numbers(fields: list[str]) -> bool:
     """Return whether a row is a sample."""
-    values = [cell for cell in fields if not _text.is_gap(cell)]
-    return bool(values) and all(_text.is_number(cell.replace(",", ".", 1)) for cell in values)
+    values = [cell for cell in fields if not _fields.is_gap(cell)]
+    return bool(values) and all(_fields.is_number(cell.replace(",", ".", 1)) for cell in values)
 
 
 def _are_units(fields: list[str]) -> bool:
     """Return whether a row gives units: each in brackets, or one that is known."""
-    said = [cell for cell in fields if cell.strip("-") and not _text.is_number(cell)]
+    said = [cell for cell in fields if cell.strip("-") and not _fields.is_number(cell)]
     # By itself, a word above the samples is rather a name.
     lone = len(fields) == 1 and not fields[0].startswith(("[", "("))
     return bool(said) and not lone and all(map(_is_unit, fields))
