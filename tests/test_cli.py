@@ -13,7 +13,7 @@ from pdmp.cli import main
 from pdmp.evaluation import PDMP, baselines
 from synthetic import DT, loops, reaches
 
-COMMANDS = ["fit", "rollout", "evaluate", "info", "plot", "demo", "reproduce"]
+COMMANDS = ["fit", "rollout", "evaluate", "info", "plot"]
 
 
 @pytest.fixture
@@ -211,19 +211,6 @@ def test_plot_draws_the_phase_portrait_of_a_rhythmic_model(tmp_path: Path) -> No
     pdmp.fit(loops(), kind="rhythmic").save(path)
     assert run("plot", path, "-o", tmp_path) == 0
     assert (tmp_path / "phase_portrait.png").exists()
-
-
-def test_demo_writes_model_report_and_the_figures_it_shows(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Every figure that the report shows is there, and the tables are printed."""
-    assert run("demo", "-o", tmp_path) == 0
-    report = (tmp_path / "report.md").read_text(encoding="utf-8")
-    figures = re.findall(r"\((\w+\.png)\)", report)
-    assert len(figures) == 5
-    for name in [*figures, "model.safetensors"]:
-        assert (tmp_path / name).stat().st_size > 0
-    assert capsys.readouterr().out.strip() in report
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -158,8 +158,6 @@ def test_info_tells_names_and_labels_in_their_lines(
         ["info", "-"],
         ["plot", "-", "-o", "figures"],
         ["plot", "m", "-", "-o", "figures"],
-        ["demo", "-o", "-"],
-        ["reproduce", "fig3", "-o", "-"],
     ],
 )
 def test_a_dash_is_no_file(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""``make report`` prints the table and draws figures into report/; ``--write`` writes docs too."""
+"""``make report`` prints the table and draws figures into out/report/; ``--write`` writes docs too."""
 
 import argparse
 from concurrent.futures import ProcessPoolExecutor
@@ -10,7 +10,7 @@ from report.sets import Question, questions
 from report.text import FORESEEN, PRIMITIVE, WARPED, text
 
 ROOT = Path(__file__).resolve().parents[2]
-FIGURES = ROOT / "report"
+FIGURES = ROOT / "out" / "report"
 CURVES = {"raise_hand, whole", "walking_force, subject 0"}
 PRIMITIVES = {
     PRIMITIVE: PDMP(),

@@ -15,7 +15,7 @@ WARPED = "PDMP, warped time"
 INTRODUCTION = """\
 # Movements foreseen from their context
 
-`make report` prints these tables and draws figures into `report/`;
+`make report` prints these tables and draws figures into `out/report/`;
 `PYTHONPATH=benches .venv/bin/python -m report --write` puts them here. Each condition is held out
 in turn, or, where there are more than twelve, each of twelve folds of neighbouring ones; the others
 are learnt from, and the movement is foreseen from the context alone. What lies outside the convex

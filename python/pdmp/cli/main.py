@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from pdmp._messages import printable
 from pdmp._native import PdmpError, __version__
-from pdmp.cli import demo, evaluate, fit, info, plot, reproduce, rollout
+from pdmp.cli import evaluate, fit, info, plot, rollout
 from pdmp.cli._console import console
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
@@ -25,8 +25,6 @@ COMMANDS = {
     "evaluate": evaluate,
     "info": info,
     "plot": plot,
-    "demo": demo,
-    "reproduce": reproduce,
 }
 
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 import pdmp
 from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import GREY, PALETTE, canvas
-from pdmp.reproduction import film, paths
-from pdmp.reproduction.loop import reach_over
-from pdmp.reproduction.reaching import CONSTANTS, HEIGHTS, Reaching, demonstrate, height_of
-from pdmp.reproduction.robot import Robot, pile
-from pdmp.reproduction.section import SEED, Section
+from reproduction import film, paths
+from reproduction.loop import reach_over
+from reproduction.reaching import CONSTANTS, HEIGHTS, Reaching, demonstrate, height_of
+from reproduction.robot import Robot, pile
+from reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,10 +16,10 @@ from pdmp._markdown import markdown_table
 from pdmp.io import read_csv
 from pdmp.plot._canvas import BLUE, ORANGE, canvas, dress
 from pdmp.preprocessing import cycles
-from pdmp.reproduction import film
-from pdmp.reproduction.robot import DT, Robot
-from pdmp.reproduction.section import SEED, Section
-from pdmp.reproduction.swing import NAMES, STYLES, demonstrate
+from reproduction import film
+from reproduction.robot import DT, Robot
+from reproduction.section import SEED, Section
+from reproduction.swing import NAMES, STYLES, demonstrate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp.reproduction.baxter import DIRECTIONS, JOINTS, engine, specification
-from pdmp.reproduction.human import BOX, RESTING, Task
+from reproduction.baxter import DIRECTIONS, JOINTS, engine, specification
+from reproduction.human import BOX, RESTING, Task
 
 Array = NDArray[np.float64]
 

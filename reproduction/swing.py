@@ -28,7 +28,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.reproduction.section import SEED
+from reproduction.section import SEED
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from pdmp import plot
 from pdmp._atomic_write import atomic_write
 from pdmp.plot._canvas import canvas
-from pdmp.reproduction.section import SEED, Section
+from reproduction.section import SEED, Section
 
 Folder: TypeAlias = str | PathLike[str]
 FIGURES = ("fig2", "fig3", "fig4", "fig5", "comparison")
@@ -49,7 +49,7 @@ def reproduce(
     ValueError
         A figure that there is not; a negative seed; recordings in which too few arms swing.
     ImportError
-        The extra `reproduce` or the model of the robot is not installed.
+        The dependency group `reproduction` or the model of the robot is not installed.
     OSError
         A file that cannot be read or written.
     """
@@ -82,22 +82,22 @@ def _make(figure: str, seed: int, recordings: Folder | None) -> Section:
     """Make one of `FIGURES`; its room is imported here, and other commands do not wait for it."""
     match figure:
         case "fig2":
-            from pdmp.reproduction.one_dof import figure_2
+            from reproduction.one_dof import figure_2
 
             return figure_2(seed)
         case "fig3":
-            from pdmp.reproduction.styles import figure_3
+            from reproduction.styles import figure_3
 
             return figure_3(seed)
         case "fig4":
-            from pdmp.reproduction.heights import figure_4
+            from reproduction.heights import figure_4
 
             return figure_4(seed)
         case "fig5":
-            from pdmp.reproduction.walking import figure_5
+            from reproduction.walking import figure_5
 
             return figure_5(recordings, seed)
         case _:
-            from pdmp.reproduction.rivals import comparison
+            from reproduction.rivals import comparison
 
             return comparison(seed)

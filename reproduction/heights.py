@@ -12,9 +12,9 @@ import pdmp
 from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, legend
 from pdmp.preprocessing import resample
-from pdmp.reproduction import paths
-from pdmp.reproduction.loop import PACE, NewGoal, reach_over
-from pdmp.reproduction.reaching import (
+from reproduction import paths
+from reproduction.loop import PACE, NewGoal, reach_over
+from reproduction.reaching import (
     CONSTANTS,
     HEIGHTS,
     TRAINED,
@@ -23,8 +23,8 @@ from pdmp.reproduction.reaching import (
     duration_of,
     height_of,
 )
-from pdmp.reproduction.robot import DT, Robot, pile
-from pdmp.reproduction.section import SEED, Section
+from reproduction.robot import DT, Robot, pile
+from reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -63,8 +63,9 @@ def engine() -> Any:
         import mujoco
         import scipy  # noqa: F401
     except ModuleNotFoundError as missing:
-        needed = f"the robot needs {missing.name}: pip install 'pdmp[reproduce]'"
-        raise ImportError(needed) from None
+        raise ImportError(
+            f"the robot needs {missing.name}: pip install --group reproduction"
+        ) from None
     except (AttributeError, ImportError, OSError, RuntimeError) as error:
         asked = os.environ.get("MUJOCO_GL", "")
         raise ImportError(

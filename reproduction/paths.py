@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp.plot._canvas import GREY, PALETTE, canvas, dress, legend
-from pdmp.reproduction.human import BOX
-from pdmp.reproduction.reaching import NAMES, Reaching
-from pdmp.reproduction.robot import DT, SHADES, Robot, boxes
+from reproduction.human import BOX
+from reproduction.reaching import NAMES, Reaching
+from reproduction.robot import DT, SHADES, Robot, boxes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 import pdmp
-from pdmp._errors import reproduction_error
 from pdmp._markdown import markdown_table
-from pdmp.demo.loop import Run
+from reproduction.demo.loop import Run
+from reproduction.metrics import reproduction_error
 
 
 def spectrum_table(model: pdmp.Model) -> str:

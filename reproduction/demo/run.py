@@ -12,8 +12,8 @@ import pdmp
 from pdmp import plot
 from pdmp._atomic_write import atomic_write
 from pdmp.datasets import handwriting
-from pdmp.demo.loop import DT, control, draw_control
-from pdmp.demo.report import error_table, loop_table, spectrum_table, time_table
+from reproduction.demo.loop import DT, control, draw_control
+from reproduction.demo.report import error_table, loop_table, spectrum_table, time_table
 
 SHAPES = ("CShape", "GShape", "NShape", "Sshape", "WShape")
 BLENDED = ("CShape", "Sshape")
@@ -41,7 +41,7 @@ def run_demo(
     Raises
     ------
     ImportError
-        The extra `demo` is not installed.
+        The dependency group `demo` is not installed.
     OSError
         A file that cannot be written.
     """

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pdmp.plot._canvas import canvas
-from pdmp.reproduction.baxter import engine
-from pdmp.reproduction.robot import DT, Robot
-from pdmp.reproduction.section import Section
+from reproduction.baxter import engine
+from reproduction.robot import DT, Robot
+from reproduction.section import Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.reproduction.baxter import Arm, OutOfReach
-from pdmp.reproduction.human import RESTING, Task, reach
-from pdmp.reproduction.section import SEED
+from reproduction.baxter import Arm, OutOfReach
+from reproduction.human import RESTING, Task, reach
+from reproduction.section import SEED
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._errors import reproduction_error
 from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, gradient, legend
-from pdmp.reproduction.section import SEED, Section
+from reproduction.metrics import reproduction_error
+from reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

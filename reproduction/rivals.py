@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 import pdmp
 from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, legend
-from pdmp.reproduction.heights import N_SAMPLES, TESTED, aligned, lasting, learn, new_goal
-from pdmp.reproduction.loop import PACE, Held, Movement, NewGoal, drive, from_rest
-from pdmp.reproduction.reaching import (
+from reproduction.heights import N_SAMPLES, TESTED, aligned, lasting, learn, new_goal
+from reproduction.loop import PACE, Held, Movement, NewGoal, drive, from_rest
+from reproduction.reaching import (
     CONSTANTS,
     TRAINED,
     Reaching,
@@ -32,8 +32,8 @@ from pdmp.reproduction.reaching import (
     duration_of,
     height_of,
 )
-from pdmp.reproduction.robot import DT, Robot, boxes, pile
-from pdmp.reproduction.section import SEED, Section
+from reproduction.robot import DT, Robot, boxes, pile
+from reproduction.section import SEED, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.reproduction.reaching import Reaching
-from pdmp.reproduction.robot import DT, Robot, boxes
+from reproduction.reaching import Reaching
+from reproduction.robot import DT, Robot, boxes
 
 Array = NDArray[np.float64]
 
