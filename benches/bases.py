@@ -15,7 +15,7 @@ import numpy as np
 
 import pdmp
 from peers.arena import machine
-from recordings import Group, groups
+from recordings import Group, groups, sources
 
 KERNELS = ("matern32", "matern52", "squared_exponential")
 SIZES = (20, 35, 50, 75, 100, 150, 200)
@@ -207,6 +207,7 @@ def report(scores: dict[str, dict[Group, Score]]) -> str:
             of_set = {group: s for group, s in scores[name].items() if group.source == source}
             rows.append([source, name, *over_sets(of_set)])
     lines += table(["set", "basis"], rows)
+    lines += [sources(dict.fromkeys(group.source for group in seen)), ""]
     return "\n".join(lines)
 
 

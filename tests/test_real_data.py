@@ -11,15 +11,18 @@ import pdmp
 from pdmp import Demonstration
 from pdmp.io import read_folder
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+def folder(name: str) -> Path:
+    """Returns the folder of a set of recordings, or skips the test without it."""
+    try:
+        return pdmp.datasets.folder(name)
+    except FileNotFoundError as reason:
+        pytest.skip(str(reason))
 
 
 def recordings(name: str, step: int, **options: Any) -> list[Demonstration]:
-    """Return every `step`-th demonstration of a set, or skip where the data are not at hand."""
-    folder = DATA / name
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there: the recordings' licences forbid copying them here")
-    return list(read_folder(folder, **options).values())[::step]
+    """Returns every `step`-th demonstration of a set."""
+    return list(read_folder(folder(name), **options).values())[::step]
 
 
 def worst_error(model: pdmp.Model, demos: list[Demonstration]) -> float:
@@ -118,9 +121,7 @@ def test_running_strides_are_given_back() -> None:
 
 def strides() -> dict[str, list[float]]:
     """Return the durations [s] of the strides of each walk that has several."""
-    path = DATA / "walk_styles_bandai" / "strides.csv"
-    if not path.is_file():
-        pytest.skip(f"{path} is not there: the recordings' licences forbid copying them here")
+    path = folder("walk_styles_bandai") / "strides.csv"
     durations: dict[str, list[float]] = {}
     with path.open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -137,7 +138,7 @@ def test_cycles_of_walks_last_as_long_as_their_strides() -> None:
     """
     refused, doubled = [], []
     for name, durations in strides().items():
-        recording = pdmp.io.read_csv(DATA / "walk_styles_bandai" / "demos" / f"{name}.csv")
+        recording = pdmp.io.read_csv(folder("walk_styles_bandai") / "demos" / f"{name}.csv")
         try:
             cycles = pdmp.preprocessing.cycles(recording)
         except ValueError as error:
@@ -157,7 +158,7 @@ def test_bvh_walks_give_the_period_of_their_strides() -> None:
     """Joints with positions, which few parsers read, come in whole."""
     name = "walk_normal_001"
     durations = strides()[name]
-    path = DATA / "walk_styles_bandai" / "raw" / f"dataset-1_{name}.bvh"
+    path = folder("walk_styles_bandai") / "raw" / f"dataset-1_{name}.bvh"
     recording = pdmp.preprocessing.unwrap(pdmp.io.read_bvh(path))
     assert recording.n_dofs == 132
     assert pdmp.preprocessing.period(recording) == pytest.approx(np.mean(durations), rel=0.03)

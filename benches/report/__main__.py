@@ -1,4 +1,8 @@
-"""``make report`` prints the table and draws figures into out/report/; ``--write`` writes docs too."""
+"""Predicts movements from their context, with the primitive and with simpler predictors.
+
+``make report`` prints the tables and draws figures into out/report/; ``--write`` writes
+docs/report.md too.
+"""
 
 import argparse
 from concurrent.futures import ProcessPoolExecutor
@@ -11,7 +15,7 @@ from report.text import FORESEEN, PRIMITIVE, WARPED, text
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "out" / "report"
-CURVES = {"raise_hand, whole", "walking_force, subject 0"}
+CURVES = {"raise_hand_bandai, whole", "walking_force_speed, subject 0"}
 PRIMITIVES = {
     PRIMITIVE: PDMP(),
     "PDMP, full J": PDMP(spectrum=1.0),

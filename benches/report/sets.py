@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from pdmp import Demonstration
+from pdmp.datasets import folder
 from pdmp.io import read_csv, read_folder
-from recordings import ARM, DATA, HAND, at_hand, cycle
+from recordings import ARM, HAND, cycle, is_available
 
 LEGS = [f"{side}_{angle}" for side in "rl" for angle in ("hip_flex", "knee_flex", "ank_dorsi")]
 MOST = 120  # demonstrations of a question: Gaussian processes take a second each beyond
@@ -27,28 +28,33 @@ class Question:
     contexts: np.ndarray  # (M, Q)
     options: dict[str, Any] = field(default_factory=dict)  # of `pdmp.evaluate`
 
+    @property
+    def source(self) -> str:
+        """Name of the set of recordings in `pdmp.datasets.REGISTRY`."""
+        return self.name.partition(",")[0]
+
 
 def questions() -> Iterator[Question]:
-    """Give every question whose recordings are at hand."""
+    """Yields every question whose recordings are available."""
     for source, ask in ASKED.items():
-        if at_hand(source):
+        if is_available(source):
             yield from ask()
 
 
 def raised_hands() -> Iterator[Question]:
     """Raise a hand, hold it, and bring it back; or the rise alone."""
     index = rows("raise_hand_bandai")
-    demos = list(read_folder(DATA / "raise_hand_bandai", columns=ARM).values())
+    demos = list(read_folder(folder("raise_hand_bandai"), columns=ARM).values())
     heights = numbers(index, "hold_height_m")
-    yield Question("raise_hand, whole", "height held", "rad", demos, heights)
+    yield Question("raise_hand_bandai, whole", "height held", "rad", demos, heights)
     rises = cut(demos, numbers(index, "rise_start_s", "rise_end_s"))
-    yield Question("raise_hand, rise", "height held", "rad", rises, heights)
+    yield Question("raise_hand_bandai, rise", "height held", "rad", rises, heights)
 
 
 def high_and_low() -> Iterator[Question]:
     """Grab something high, or deposit something on the floor: three actors of different size."""
     index = rows("arms_hdm05")
-    demos = list(read_folder(DATA / "arms_hdm05", columns=ARM).values())
+    demos = list(read_folder(folder("arms_hdm05"), columns=ARM).values())
     columns = {"grabHighR": "peak_height_m", "depositFloorR": "low_height_m"}
     heights, chosen = np.full((len(index), 1), np.nan), {}
     for motion, column in columns.items():
@@ -63,21 +69,23 @@ def high_and_low() -> Iterator[Question]:
 def walking_forces() -> Iterator[Question]:
     """Load the ground, as five people do who walk at many speeds."""
     index = rows("walking_force_speed")
-    demos = list(read_folder(DATA / "walking_force_speed").values())
+    demos = list(read_folder(folder("walking_force_speed")).values())
     speeds = numbers(index, "speed_m_s")
     subjects = np.array([row["subject"] for row in index])
     for subject in np.unique(subjects):
         members = np.flatnonzero(subjects == subject)
         some = [demos[k] for k in members]
-        yield Question(f"walking_force, subject {subject}", "speed", "BW", some, speeds[members])
+        yield Question(
+            f"walking_force_speed, subject {subject}", "speed", "BW", some, speeds[members]
+        )
     step = -(-len(demos) // MOST)
-    yield Question("walking_force, all", "speed", "BW", demos[::step], speeds[::step])
+    yield Question("walking_force_speed, all", "speed", "BW", demos[::step], speeds[::step])
 
 
 def doors() -> Iterator[Question]:
     """Reach for the handle of a door that is somewhere else each time, and open it."""
     index = rows("door_adroit")
-    demos = list(read_folder(DATA / "door_adroit", columns=HAND).values())
+    demos = list(read_folder(folder("door_adroit"), columns=HAND).values())
     places = numbers(index, "door_x", "door_y", "door_z")
     ends = numbers(index, "latch_turns_at_s")
     reaches = cut(demos, np.hstack([0 * ends, ends]))
@@ -96,13 +104,13 @@ def styled_walks() -> Iterator[Question]:
             demos.append(cycle(whole.position[start:end], float(stride["duration_s"]), whole.names))
             contexts.append([speeds[stride["id"]]])
     options = {"kind": "rhythmic"}
-    yield Question("walk_styles", "speed", "rad", demos, np.array(contexts), options)
+    yield Question("walk_styles_bandai", "speed", "rad", demos, np.array(contexts), options)
 
 
 def runners() -> Iterator[Question]:
     """Run, as runners of different age, height and mass do."""
     index = rows("running_strides")
-    strides = list(read_folder(DATA / "running_strides").values())
+    strides = list(read_folder(folder("running_strides")).values())
     seen: dict[str, int] = {}
     members = []
     for k, row in enumerate(index):
@@ -119,7 +127,7 @@ def runners() -> Iterator[Question]:
 def pushes() -> Iterator[Question]:
     """Push an object to a target with a planar arm."""
     index = rows("arm3_pushing")
-    demos = list(read_folder(DATA / "arm3_pushing").values())
+    demos = list(read_folder(folder("arm3_pushing")).values())
     places = numbers(index, "object_x", "object_y", "target_x", "target_y")
     yield Question("arm3_pushing", "object and target", "rad", demos, places)
 
@@ -137,7 +145,7 @@ ASKED = {
 
 def rows(source: str, name: str = "index.csv") -> list[dict[str, str]]:
     """Read a table of a set."""
-    with open(DATA / source / name, newline="", encoding="utf-8") as file:
+    with open(folder(source) / name, newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
@@ -157,5 +165,5 @@ def cut(demos: list[Demonstration], bounds: np.ndarray) -> list[Demonstration]:
 
 def walk(name: str) -> Demonstration:
     """Read one recording of a walk: the right arm and what flexes the legs."""
-    folder = DATA / "walk_styles_bandai" / "demos"
-    return read_csv(folder / f"{name}.csv", columns=[*ARM, *LEGS])
+    path = folder("walk_styles_bandai") / "demos" / f"{name}.csv"
+    return read_csv(path, columns=[*ARM, *LEGS])

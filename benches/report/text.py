@@ -7,6 +7,7 @@ import pdmp
 from pdmp import Warp
 from pdmp.evaluation import Evaluation, baselines
 from pdmp.evaluation.result import REFERENCE
+from recordings import sources
 from report.sets import Question
 
 PRIMITIVE = "PDMP"
@@ -85,6 +86,8 @@ def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
             "",
             TIME,
             *table(["recordings", "reach", *spectrum], time),
+            "",
+            sources(dict.fromkeys(question.source for question, _ in answers)),
             "",
         ]
     )

