@@ -33,7 +33,7 @@ MOUTH = np.array([0.20, 0.0, 0.55])
 
 
 def mjcf() -> Path:
-    """Return the file of the model.
+    """Returns the file of the model.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def mjcf() -> Path:
 
 
 def engine() -> Any:
-    """Return the module of MuJoCo.
+    """Returns the module of MuJoCo.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def engine() -> Any:
 
 
 def specification() -> Any:
-    """Return the model, a `mujoco.MjSpec` to be added to.
+    """Returns the model, a `mujoco.MjSpec` to be added to.
 
     Raises
     ------
@@ -112,17 +112,17 @@ class Arm:
         self._kinematics = mujoco.mj_kinematics
 
     def places(self, q: ArrayLike) -> Array:
-        """Return where shoulder, elbow and hand are (3, 3) [m] at joint angles q (4,) [rad]."""
+        """Returns the positions (3, 3) [m] of shoulder, elbow and hand at angles q (4,) [rad]."""
         self._data.qpos[self._addresses] = self._directions * q
         self._kinematics(self._model, self._data)
         return np.array(self._data.xpos[self._bodies])
 
     def hands(self, path: ArrayLike) -> Array:
-        """Return where the hand is (T, 3) [m] along joint angles (T, 4) [rad]."""
+        """Returns the positions of the hand (T, 3) [m] along joint angles (T, 4) [rad]."""
         return np.array([self.places(q)[2] for q in np.asarray(path)])
 
     def swivel(self, q: ArrayLike) -> float:
-        """Return the angle [rad] of the elbow about the line from shoulder to hand.
+        """Returns the angle [rad] of the elbow about the line from shoulder to hand.
 
         It is zero where the plane of the arm holds the mouth, on the other side of that line: a
         hand so held would be brought to the mouth by bending the elbow alone. People reach within
@@ -132,7 +132,7 @@ class Arm:
         return _swivel(self.places(q))
 
     def reach(self, hands: Array, swivels: Array, near: ArrayLike) -> Array:
-        """Return joint angles (T, 4) [rad] that bring hand and elbow along a path.
+        """Returns joint angles (T, 4) [rad] that bring hand and elbow along a path.
 
         Least squares of the hand's distance [m] and of 0.1 m times the sine of half the swivel's
         error, twice: from each solution to the next, the first from `near`.
@@ -172,7 +172,7 @@ class Arm:
 
 
 def _windowless() -> str:
-    """Name what MuJoCo may draw with; asked for what is missing, it could not even be imported."""
+    """Returns the available renderer: with a missing one, MuJoCo cannot be imported at all."""
     if find_library("EGL") and (find_library("OpenGL") or find_library("GL")):
         return "egl"
     return "osmesa" if find_library("OSMesa") else "disable"

@@ -42,7 +42,7 @@ class NoRenderer(Exception):
 def attach(
     section: Section, name: str, rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: Shot
 ) -> Section:
-    """Add a strip to a section, or the reason why there is none."""
+    """Adds a strip to a section, or the reason why there is none."""
     try:
         section.figures[name] = strip(rows, shot)
     except NoRenderer as reason:
@@ -51,7 +51,7 @@ def attach(
 
 
 def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: Shot) -> Figure:
-    """Draw how robots stood at some times [s], a row for each, and the way of the right hand.
+    """Draws robots at some times [s], a row for each, and the path of the right hand.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def _pictures(robot: Robot, times: Sequence[float], shot: Shot) -> list[Any]:
 
 
 def _trail(scene: Any, places: Sequence[Any]) -> None:
-    """Add a line through some places to a scene, as far as it has room."""
+    """Adds a line through some places to a scene, as far as it has room."""
     mujoco = engine()
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
     for start, end in itertools.pairwise(places[: scene.maxgeom - scene.ngeom]):
@@ -114,7 +114,7 @@ def _trail(scene: Any, places: Sequence[Any]) -> None:
 
 @cache
 def _missing() -> str:
-    """Try to draw, and return why it fails; once, since a second attempt may end the process."""
+    """Returns the reason why drawing fails; tried once, a second attempt may end the process."""
     mujoco = engine()
     try:
         mujoco.Renderer(mujoco.MjSpec().compile(), 1, 1).close()

@@ -38,18 +38,18 @@ MOVED_AT = 0.4  # of the demonstrated duration
 
 
 def learn(reaching: Reaching, n_styles: int) -> pdmp.Model:
-    """Learn from the reaches over none, two and three boxes, and U: h ↦ β[h, 1]."""
+    """Learns from the reaches over none, two and three boxes, and U: h ↦ β[h, 1]."""
     return pdmp.fit(reaching.of(TRAINED), n_styles=n_styles, map="linear", **CONSTANTS)
 
 
 def error(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration, style: Array) -> float:
-    """Return E = (1/T) Σ ‖ŷ − y‖² [rad²] of a movement in this style, in aligned time."""
+    """Returns E = (1/T) Σ ‖ŷ − y‖² [rad²] of a movement in this style, in aligned time."""
     gap = movement(model, reaching, style) - aligned(demo)
     return float(np.mean(np.sum(gap**2, axis=1)))
 
 
 def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
-    """Return the movement in this style at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
+    """Returns the movement in this style at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
     duration = float(model.durations[model.nominal])
     made = model.rollout(
         style,
@@ -62,7 +62,7 @@ def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
 
 
 def best_style(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration) -> Array:
-    """Return the style of least E for a demonstration: movements are linear in it."""
+    """Returns the style of least E for a demonstration: movements are linear in it."""
     plain = movement(model, reaching, np.zeros(model.n_styles))
     duration = float(model.durations[model.nominal])
     added = model.style_jacobian(duration / (N_SAMPLES - 1), duration=duration)
@@ -71,7 +71,7 @@ def best_style(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration) 
 
 
 def aligned(demo: pdmp.Demonstration) -> Array:
-    """Return a demonstration at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
+    """Returns a demonstration at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
     return resample(demo, duration_of(demo) / (N_SAMPLES - 1)).position
 
 
@@ -86,7 +86,7 @@ class Errors:
 
 
 def errors(reaching: Reaching, most: int = 9) -> Errors:
-    """Return the errors of one to `most` styles on the heights that were not trained."""
+    """Returns the errors of one to `most` styles on the heights that were not trained."""
     tests = reaching.of(TESTED)
     foreseen, best = [], []
     for n_styles in range(1, most + 1):
@@ -99,13 +99,13 @@ def errors(reaching: Reaching, most: int = 9) -> Errors:
 
 
 def foresee(model: pdmp.Model, reaching: Reaching, height: float, *events: NewGoal) -> Robot:
-    """Reach over a height [m] in the style that is foreseen for it."""
+    """Reaches over a height [m] in the style predicted for it."""
     style = model.predict([height]).style
     return reach_over(model, reaching, height, style, *events)
 
 
 def new_goal(model: pdmp.Model, reaching: Reaching) -> NewGoal:
-    """Return a goal 12 cm farther from the body, given in mid-movement."""
+    """Returns a goal 12 cm farther from the body, given in mid-movement."""
     usual = np.array([reaching.arm.swivel(reaching.goal)])
     place = (reaching.task.goal + MOVED)[None]
     goal = reaching.arm.reach(place, usual, reaching.goal)[0]
@@ -113,12 +113,12 @@ def new_goal(model: pdmp.Model, reaching: Reaching) -> NewGoal:
 
 
 def lasting(model: pdmp.Model) -> float:
-    """Return how long the nominal demonstration lasts at the robot's pace [s]."""
+    """Returns the duration of the nominal demonstration at the robot's pace [s]."""
     return float(model.durations[model.nominal] * PACE / model.tau)
 
 
 def figure_4(seed: int = SEED) -> Section:
-    """Reproduce Fig. 4."""
+    """Reproduces Fig. 4."""
     reaching = demonstrate(seed)
     found = errors(reaching)
     models = {n_styles: learn(reaching, n_styles) for n_styles in range(1, 5)}
@@ -182,7 +182,7 @@ def figure_4(seed: int = SEED) -> Section:
 
 
 def draw_errors(found: Errors) -> Figure:
-    """Draw E over J."""
+    """Draws E over J."""
     figure = canvas(None, 5.2, 3.8)
     axes = figure.subplots()
     n_styles = np.arange(1, len(found.foreseen) + 1)
@@ -201,7 +201,7 @@ def draw_errors(found: Errors) -> Figure:
 def draw_paths(
     reaching: Reaching, robots: dict[float, Robot], moved: dict[float, Robot], command: NewGoal
 ) -> Figure:
-    """Draw the hand from the side, as foreseen and as shown."""
+    """Draws the predicted and the demonstrated path of the hand from the side."""
     figure = canvas(None, 9.5, 4.6)
     panels = figure.subplots(1, len(robots), sharey=True)
     for axes, height in zip(panels, robots, strict=True):

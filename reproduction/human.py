@@ -80,7 +80,7 @@ class Reach:
 
 
 def reach(task: Task, height: float, noise: Generator) -> Reach:
-    """Reach once over an obstacle of this height [m]."""
+    """Reaches once over an obstacle of this height [m]."""
     clear = CLEARANCE * np.sqrt(0.5)
     lift = height + clear - RESTING if height > 0 else 0.0
     spread = np.hypot(VIA_NOISE, [0, 0, LIFT_NOISE * lift])
@@ -97,7 +97,7 @@ def reach(task: Task, height: float, noise: Generator) -> Reach:
 
 
 def minimum_jerk(points: Array, late: float = 0.0) -> Callable[[Array], Array]:
-    """Return the path from rest to rest through two points, over the share of its duration.
+    """Returns the path from rest to rest through two points, over the share of its duration.
 
     Of all paths through points at given times the one of least ∫‖y⃛‖² is a spline of fifth degree;
     of all times as long before the middle as after it, those of least jerk are taken, and then

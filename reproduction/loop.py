@@ -25,7 +25,7 @@ class Movement(Protocol):
     goal: Any
 
     def step(self, *, measured: Array | None = None) -> pdmp.Status:
-        """Take one tick."""
+        """Takes one tick."""
 
     @property
     def position(self) -> Array: ...  # noqa: D102
@@ -43,7 +43,7 @@ class NewGoal:
     goal: Array
 
     def __call__(self, time: float, movement: Movement, robot: Robot) -> None:
-        """Give it, when it is time."""
+        """Gives the command, when it is time."""
         if _same_tick(time, self.time):
             movement.goal = self.goal
 
@@ -57,7 +57,7 @@ class Held:
     end: float
 
     def __call__(self, time: float, movement: Movement, robot: Robot) -> None:
-        """Grip it or let go, when it is time."""
+        """Grips or releases the joint, when it is time."""
         if _same_tick(time, self.start):
             robot.hold(self.joint)
         if _same_tick(time, self.end):
@@ -75,7 +75,7 @@ def drive(
     *,
     feedback: bool = False,
 ) -> Robot:
-    """Drive the robot along a movement until it has settled on its goal.
+    """Drives the robot along a movement until it has settled on its goal.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def reach_over(
     *events: NewGoal | Held,
     tau: float = PACE,
 ) -> Robot:
-    """Reach over an obstacle of this height [m] from rest, in this style."""
+    """Reaches over an obstacle of this height [m] from rest, in this style."""
     robot = Robot(reaching.start, reaching.task, boxes(height))
     return drive(robot, from_rest(model, reaching, style, tau), events)
 
@@ -114,7 +114,7 @@ def reach_over(
 def from_rest(
     model: pdmp.Model, reaching: Reaching, style: Array, tau: float = PACE
 ) -> pdmp.Controller:
-    """Return a controller that starts with the robot at rest and goes to the goal as printed."""
+    """Returns a controller that starts with the robot at rest and goes to the goal as printed."""
     return model.controller(
         dt=DT,
         style=style,

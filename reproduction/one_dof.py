@@ -38,18 +38,18 @@ class Example:
     """Goal or anchor elsewhere."""
 
     def shown(self, m: int) -> tuple[Array, Array]:
-        """Return time [s] and position of a demonstration."""
+        """Returns time [s] and position of a demonstration."""
         span = self.model.durations[m]
         ends = self.model.kind == "discrete"
         return np.linspace(0, span, N_SAMPLES, endpoint=ends), self.demos[m].position[:, 0]
 
     def error(self, m: int) -> float:
-        """Return the RMSE of the reproduction of a demonstration, over its range."""
+        """Returns the RMSE of the reproduction of a demonstration, over its range."""
         return reproduction_error(self.model, self.demos[m], m)
 
 
 def discrete(noise: Generator) -> Example:
-    """Learn reaches of three dimensions: how far, and how much of two detours."""
+    """Learns reaches of three dimensions: how far, and how much of two detours."""
     s = np.linspace(0, 1, N_SAMPLES)
     straight = s**3 * (10 - 15 * s + 6 * s**2)
     detour = (4 * s * (1 - s)) ** 3
@@ -61,7 +61,7 @@ def discrete(noise: Generator) -> Example:
 
 
 def rhythmic(noise: Generator) -> Example:
-    """Learn cycles of three dimensions: how much of three waves."""
+    """Learns cycles of three dimensions: how much of three waves."""
     phase = 2 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES
     shapes = np.column_stack([np.sin(phase), np.cos(2 * phase), np.sin(3 * phase)])
     weights = noise.normal([1.0, 0.0, 0.0], [0.3, 0.3, 0.2], (N_DEMOS, 3))
@@ -73,14 +73,14 @@ def rhythmic(noise: Generator) -> Example:
 
 
 def extremes(model: pdmp.Model) -> tuple[int, int]:
-    """Return the two demonstrations whose styles are farthest from each other."""
+    """Returns the two demonstrations whose styles are farthest from each other."""
     gaps = np.linalg.norm(model.styles[:, None] - model.styles, axis=2)
     first, second = np.unravel_index(np.argmax(gaps), gaps.shape)
     return int(first), int(second)
 
 
 def figure_2(seed: int = SEED) -> Section:
-    """Reproduce Fig. 2."""
+    """Reproduces Fig. 2."""
     noise = np.random.default_rng(seed)
     examples = [discrete(noise), rhythmic(noise)]
     rows = []
@@ -119,7 +119,7 @@ def figure_2(seed: int = SEED) -> Section:
 
 
 def draw(examples: Sequence[Example]) -> Figure:
-    """Draw demonstrations, reproductions under other goals and paces, and styles in between."""
+    """Draws demonstrations, reproductions under other goals and paces, and styles in between."""
     figure = canvas(None, 12.0, 6.8)
     grid = figure.subplots(len(examples), 3)
     for row, example in zip(grid, examples, strict=True):
@@ -144,7 +144,7 @@ def draw(examples: Sequence[Example]) -> Figure:
 
 
 def _variants(axes: Axes, example: Example, m: int, color: str, name: str) -> None:
-    """Draw a demonstration, its reproduction, and that elsewhere and slower."""
+    """Draws a demonstration, its reproduction, and that elsewhere and slower."""
     model = example.model
     own = pdmp.as_demonstrated(model, m)
     slower = {**own, "tau": 1.5 * own["tau"]}
@@ -167,7 +167,7 @@ def _variants(axes: Axes, example: Example, m: int, color: str, name: str) -> No
 def _path(
     model: pdmp.Model, arguments: dict[str, Any], m: int, slower: float = 1.0
 ) -> pdmp.Trajectory:
-    """Roll out for a little longer than a demonstration takes, or its cycle twice."""
+    """Rolls out for a little longer than a demonstration takes, or its cycle twice."""
     span = 1.2 * _n_periods(model) * model.durations[m] * slower
     return model.rollout(**arguments, dt=0.002, duration=span)
 
@@ -177,6 +177,6 @@ def _n_periods(model: pdmp.Model) -> int:
 
 
 def _demos(positions: Array, intervals: Array) -> list[pdmp.Demonstration]:
-    """Return demonstrations of one degree of freedom from the rows of (M, N_SAMPLES)."""
+    """Returns demonstrations of one degree of freedom from the rows of (M, N_SAMPLES)."""
     pairs = zip(positions, intervals, strict=True)
     return [pdmp.Demonstration(position[:, None], dt=dt) for position, dt in pairs]

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def draw_boxes(axes: Axes, reaching: Reaching, height: float, **look: Any) -> None:
-    """Draw a pile of boxes from the side."""
+    """Draws a pile of boxes from the side."""
     from matplotlib.patches import Rectangle
 
     middle = 0.5 * np.linalg.norm(reaching.task.goal - reaching.task.start)
@@ -32,17 +32,17 @@ def draw_boxes(axes: Axes, reaching: Reaching, height: float, **look: Any) -> No
 
 
 def draw_hand(axes: Axes, reaching: Reaching, hands: Array, **look: Any) -> None:
-    """Draw the path of a hand (T, 3) from the side."""
+    """Draws the path of a hand (T, 3) from the side."""
     axes.plot(*reaching.side_view(hands), **look)
 
 
 def dress_side(axes: Axes, title: str) -> None:
-    """Label a view from the side."""
+    """Labels a view from the side."""
     dress(axes, "way from start to goal [m]", "height over the table [m]", title)
 
 
 def joints(robots: Mapping[str, Robot], until: float) -> Figure:
-    """Draw what the joints were told and what they did, and the distance between the two.
+    """Draws commanded and measured joint angles, and the distance between them.
 
     Parameters
     ----------

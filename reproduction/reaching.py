@@ -43,23 +43,23 @@ class Reaching:
     demos: list[pdmp.Demonstration]
 
     def miss(self, hand: Array, goal: Array | None = None) -> float:
-        """Return how far a hand (3,) [m] is from where it belongs at a goal [rad], in mm."""
+        """Returns the distance [mm] of a hand (3,) [m] from its position at a goal [rad]."""
         place = self.arm.places(self.goal if goal is None else goal)[2]
         return 1e3 * float(np.linalg.norm(hand - place))
 
     def side_view(self, hands: Array) -> tuple[Array, Array]:
-        """Return how far hands (T, 3) are on the way from start to goal, and how high, in m."""
+        """Returns the way of hands (T, 3) from start to goal, and their height, in m."""
         way = (hands - self.task.start) @ self.task.forward
         return way, hands[:, 2] - self.task.goal[2] + RESTING
 
     def of(self, heights: tuple[float, ...]) -> list[pdmp.Demonstration]:
-        """Return the demonstrations over obstacles of these heights [m]."""
+        """Returns the demonstrations over obstacles of these heights [m]."""
         return [demo for demo in self.demos if height_of(demo) in heights]
 
 
 @cache
 def demonstrate(seed: int = SEED) -> Reaching:
-    """Let a person reach over every obstacle, and bring that to the robot's right arm.
+    """Lets a person reach over every obstacle, and brings that to the robot's right arm.
 
     A trial that the robot cannot follow, with the elbow at its limit, is made anew.
 
@@ -89,7 +89,7 @@ def demonstrate(seed: int = SEED) -> Reaching:
 def _trial(
     arm: Arm, task: Task, height: float, usual: float, start: Array, noise: np.random.Generator
 ) -> tuple[Array, float]:
-    """Return the joint angles of one reach [rad], and the time between two of them [s]."""
+    """Returns the joint angles of one reach [rad], and the time between two of them [s]."""
     for _ in range(MOST_TRIALS):
         trial = reach(task, height, noise)
         with suppress(OutOfReach):
@@ -99,10 +99,10 @@ def _trial(
 
 
 def height_of(demo: pdmp.Demonstration) -> float:
-    """Return the height of the obstacle that was reached over [m]."""
+    """Returns the height of the obstacle that was reached over [m]."""
     return float(np.asarray(demo.context)[0])
 
 
 def duration_of(demo: pdmp.Demonstration) -> float:
-    """Return how long a demonstration lasts [s]."""
+    """Returns the duration of a demonstration [s]."""
     return (demo.n_samples - 1) * float(np.asarray(demo.dt))

@@ -49,20 +49,20 @@ HELD_AT = 0.3  # of the demonstrated duration
 
 
 def styles(reaching: Reaching) -> Callable[[float], Movement]:
-    """Learn one primitive with three styles, foreseen from the height."""
+    """Learns one primitive with three styles, predicted from the height."""
     model = learn(reaching, N_STYLES)
     return lambda height: from_rest(model, reaching, model.predict([height]).style)
 
 
 def one_demonstration(reaching: Reaching) -> Callable[[float], Movement]:
-    """Learn a DMP from the demonstration of median duration."""
+    """Learns a DMP from the demonstration of median duration."""
     nominal = learn(reaching, N_STYLES).nominal
     model = pdmp.fit([reaching.of(TRAINED)[nominal]], n_styles=1, **CONSTANTS)
     return lambda height: from_rest(model, reaching, model.styles[0])
 
 
 def library(reaching: Reaching) -> Callable[[float], Movement]:
-    """Keep all demonstrations, and learn a DMP for each height from those shown near it.
+    """Keeps all demonstrations, and learns a DMP for each height from those of similar heights.
 
     The target is linear in the trajectory, so that the weighted regression of all targets is the
     regression of the weighted mean; the kernel is (1 − (|h − hᵐ|/width)³)³.
@@ -87,7 +87,7 @@ class Recording:
     tick: int = 0
 
     def step(self, *, measured: Array | None = None) -> pdmp.Status:
-        """Go on to the next sample, or stay at the last."""
+        """Goes on to the next sample, or stays at the last."""
         self.tick = min(self.tick + 1, len(self.trajectory[0]) - 1)
         ended = self.tick == len(self.trajectory[0]) - 1
         return pdmp.Status.FINISHED if ended else pdmp.Status.WORKING
@@ -112,7 +112,7 @@ class Recording:
 
 
 def components(reaching: Reaching) -> Callable[[float], Movement]:
-    """Learn principal components of the trajectories, and their weights from the height."""
+    """Learns principal components of the trajectories, and their weights from the height."""
     from scipy.interpolate import CubicSpline
 
     paths, heights, duration = _shown(reaching)
@@ -155,19 +155,19 @@ class Trial:
     """Median time to have the movement for a height, ready for its first tick [ms]."""
 
     def speed_ratio(self) -> float:
-        """Return the largest joint speed once let go, over the largest when left alone."""
+        """Returns the largest joint speed once let go, over the largest when left alone."""
         return _fastest(self.held, after=self.grip.end) / _fastest(self.alone)
 
 
 def disturbances(reaching: Reaching) -> tuple[NewGoal, Held]:
-    """Return what is done to every rival, by the clock of the primitive: goal moved, elbow held."""
+    """Returns the disturbances, timed by the clock of the primitive: goal moved, elbow held."""
     model = learn(reaching, N_STYLES)
     start = HELD_AT * lasting(model)
     return new_goal(model, reaching), Held(HELD_JOINT, start, start + HELD_FOR)
 
 
 def attempt(rival: Rival, reaching: Reaching, height: float, command: NewGoal, grip: Held) -> Trial:
-    """Let one rival reach over a height [m]."""
+    """Lets one rival reach over a height [m]."""
     movement_for = rival(reaching)
     times = []
     for _ in range(21):
@@ -184,7 +184,7 @@ def attempt(rival: Rival, reaching: Reaching, height: float, command: NewGoal, g
 
 
 def comparison(seed: int = SEED) -> Section:
-    """Compare what the paper compares in words."""
+    """Compares the methods that the paper compares in words."""
     reaching = demonstrate(seed)
     command, grip = disturbances(reaching)
     trials = {
@@ -227,7 +227,7 @@ def comparison(seed: int = SEED) -> Section:
 
 
 def draw_held(trials: dict[str, Trial]) -> Figure:
-    """Draw what the elbow was told and did while it was held and after."""
+    """Draws commanded and measured elbow angle while it was held and after."""
     figure = canvas(None, 9.5, 3.8)
     panels = figure.subplots(1, len(trials), sharey=True)
     for axes, (name, trial) in zip(panels, trials.items(), strict=True):
@@ -245,13 +245,13 @@ def draw_held(trials: dict[str, Trial]) -> Figure:
 
 
 def _fastest(robot: Robot, after: float = 0.0) -> float:
-    """Return the largest speed of a joint from some time on [rad/s]."""
+    """Returns the largest speed of a joint from some time on [rad/s]."""
     _, done = robot.log.rows()
     return float(np.abs(np.diff(done[round(after / DT) :], axis=0)).max() / DT)
 
 
 def _shown(reaching: Reaching) -> tuple[Array, Array, float]:
-    """Return the training reaches (M, N, D), their heights (M,) [m], and their median duration."""
+    """Returns the training reaches (M, N, D), their heights (M,) [m], and their median duration."""
     shown = reaching.of(TRAINED)
     paths = np.array([aligned(demo) for demo in shown])
     heights = np.array([height_of(demo) for demo in shown])

@@ -34,16 +34,16 @@ class Log:
     states: list[Array] = field(default_factory=list)  # of MuJoCo, for pictures
 
     def rows(self) -> tuple[Array, Array]:
-        """Return what the joints were told and what they did, (T, D) each [rad]."""
+        """Returns commanded and measured joint angles, (T, D) each [rad]."""
         return np.array(self.commanded), np.array(self.measured)
 
     def tracking_error(self) -> float:
-        """Return the largest distance of a joint from its command [rad]."""
+        """Returns the largest distance of a joint from its command [rad]."""
         told, done = self.rows()
         return float(np.abs(told - done).max())
 
     def contact(self) -> float:
-        """Return for how long the robot touched a box [s]."""
+        """Returns the time during which the robot touched a box [s]."""
         return DT * sum(self.touching)
 
 
@@ -104,7 +104,7 @@ class Robot:
         return np.array(self._signs * self.data.qpos[self._moved])
 
     def hold(self, joint: int | None) -> None:
-        """Grip the joint of this index where it is, or let go."""
+        """Grips the joint of this index at its position, or releases it."""
         if joint is None:
             self._grip = None
             self.data.qfrc_applied[:] = 0
@@ -113,7 +113,7 @@ class Robot:
             self._grip = (at, float(self.data.qpos[at]))
 
     def move(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> None:
-        """Drive the arms towards a state for one tick: (D,) [rad, rad/s, rad/s²]."""
+        """Drives the arms towards a state for one tick: (D,) [rad, rad/s, rad/s²]."""
         model, data, mujoco = self.model, self.data, self._mujoco
         wanted, rate, asked = self._target, np.zeros(model.nv), np.zeros(model.nv)
         wanted[self._moved] = self._signs * position
@@ -147,7 +147,7 @@ class Robot:
 
 
 def _furnish(specified: Any, task: Task, n_boxes: int) -> None:
-    """Put a table below start and goal, and a pile of boxes half way."""
+    """Puts a table below start and goal, and a pile of boxes half way."""
     box = engine().mjtGeom.mjGEOM_BOX
     forward = task.forward
     turned = [0, 0, float(np.arctan2(forward[1], forward[0]))]
@@ -164,7 +164,7 @@ def _furnish(specified: Any, task: Task, n_boxes: int) -> None:
 
 
 def _free_the_arms(specified: Any) -> None:
-    """Let the upper arms pass through the convex hull that stands for the torso.
+    """Lets the upper arms pass through the convex hull that stands for the torso.
 
     Lowered arms are inside of it while their shells are five centimetres from the robot's own.
     """
@@ -173,7 +173,7 @@ def _free_the_arms(specified: Any) -> None:
 
 
 def _light(specified: Any) -> None:
-    """Add two lamps, and a white background."""
+    """Adds two lamps, and a white background."""
     mujoco = engine()
     sky = specified.add_texture(type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=16, height=96)
     sky.builtin, sky.rgb1, sky.rgb2 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, [1, 1, 1], [1, 1, 1]
@@ -182,15 +182,15 @@ def _light(specified: Any) -> None:
 
 
 def _root(model: Any, geom: int) -> str:
-    """Return the name of the body below the world that a shape belongs to."""
+    """Returns the name of the body below the world that a shape belongs to."""
     return str(model.body(model.body_rootid[model.geom_bodyid[geom]]).name)
 
 
 def boxes(height: float) -> int:
-    """Return how many boxes make this height [m]."""
+    """Returns the number of boxes in a pile of this height [m]."""
     return round(height / float(BOX[2]))
 
 
 def pile(height: float) -> str:
-    """Return what a pile of this height [m] is, in words."""
+    """Returns the description of a pile of this height [m]."""
     return {0: "no box", 1: "1 box"}.get(boxes(height), f"{boxes(height)} boxes")

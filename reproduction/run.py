@@ -23,7 +23,7 @@ def reproduce(
     seed: int = SEED,
     progress: Callable[[str], object] | None = None,
 ) -> str:
-    """Make a figure of Matsubara, Hyon and Morimoto (2011), or all of them, and their numbers.
+    """Makes a figure of Matsubara, Hyon and Morimoto (2011), or all of them, and their numbers.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def reproduce(
 
 
 def _make(figure: str, seed: int, recordings: Folder | None) -> Section:
-    """Make one of `FIGURES`; its room is imported here, and other commands do not wait for it."""
+    """Makes one of `FIGURES`; imports its module here, so that others do not wait for it."""
     match figure:
         case "fig2":
             from reproduction.one_dof import figure_2

@@ -28,12 +28,12 @@ ASIDE = np.array([[0.12, 0.0, 0.0], [0.05, 0.05, 0.12]])  # m, of the hand, from
 
 
 def learn(reaching: Reaching, n_styles: int = N_STYLES) -> pdmp.Model:
-    """Learn from all fifteen reaches, with the constants as printed."""
+    """Learns from all fifteen reaches, with the constants as printed."""
     return pdmp.fit(reaching.demos, n_styles=n_styles, **CONSTANTS)
 
 
 def goals(reaching: Reaching) -> list[Array]:
-    """Return the goal as printed and two beside it [rad]."""
+    """Returns the goal as printed and two beside it [rad]."""
     usual = reaching.arm.swivel(reaching.goal)
     aside = reaching.arm.reach(
         reaching.task.goal + ASIDE, np.full(len(ASIDE), usual), reaching.goal
@@ -42,7 +42,7 @@ def goals(reaching: Reaching) -> list[Array]:
 
 
 def touched(model: pdmp.Model, reaching: Reaching) -> list[float]:
-    """Return for how long each demonstration's style touches the boxes it was shown over [s].
+    """Returns how long the style of each demonstration touches its own boxes [s].
 
     The movements are as fast as the demonstrations.
     """
@@ -53,7 +53,7 @@ def touched(model: pdmp.Model, reaching: Reaching) -> list[float]:
 
 
 def figure_3(seed: int = SEED) -> Section:
-    """Reproduce Fig. 3."""
+    """Reproduces Fig. 3."""
     reaching = demonstrate(seed)
     model = learn(reaching)
     shares = model.singular_values / model.singular_values.sum()
@@ -102,7 +102,7 @@ def figure_3(seed: int = SEED) -> Section:
 
 
 def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) -> Figure:
-    """Draw the hand from the side: over several styles, and to several goals."""
+    """Draws the hand from the side: over several styles, and to several goals."""
     figure = canvas(None, 9.5, 4.2)
     styles, places = figure.subplots(1, 2, sharey=True)
     tallest = max(HEIGHTS)

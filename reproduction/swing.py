@@ -80,13 +80,13 @@ STYLES = {
 
 
 def cycle(style: Style, noise: Generator) -> Array:
-    """Return joint angles of one stride (N_SAMPLES, 8) [rad], the right arm's before the left's."""
+    """Returns joint angles of one stride (N_SAMPLES, 8) [rad], right arm before left arm."""
     phase = 2 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES
     return np.hstack([_arm(style, phase, noise), _arm(style, phase + np.pi, noise)])
 
 
 def demonstrate(seed: int = SEED) -> list[pdmp.Demonstration]:
-    """Return a cycle of each style."""
+    """Returns a cycle of each style."""
     noise = np.random.default_rng(seed)
     return [
         pdmp.Demonstration(

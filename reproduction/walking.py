@@ -59,12 +59,12 @@ class Swinging:
 
 
 def learn(demos: Sequence[pdmp.Demonstration]) -> pdmp.Model:
-    """Learn as many styles as the spectrum asks for, with the constants as printed."""
+    """Learns as many styles as the spectrum asks for, with the constants as printed."""
     return pdmp.fit(demos, kind="rhythmic", **CONSTANTS)
 
 
 def switches(model: pdmp.Model, styles: Sequence[int], names: Sequence[str]) -> list[Switch]:
-    """Return a style to begin with; then a new style, amplitude, frequency, and style again.
+    """Returns a style to begin with; then a new style, amplitude, frequency, and style again.
 
     A style goes with its anchor. The frequency stays that of the first until it is switched.
     """
@@ -85,7 +85,7 @@ def swing(
     robot: Robot | None = None,
     lasting: float = LASTING,
 ) -> Swinging:
-    """Swing the arms, with a command every so often [s]; a robot, if there is one, goes along."""
+    """Swings the arms, with a command every `lasting` seconds; a robot, if given, follows."""
     controller = model.controller(dt=DT, **switches[0].command)
     done = Swinging()
     for switch in switches:
@@ -123,13 +123,13 @@ class _Cycle:
         self._range = np.ptp(self._position, axis=0).max()
 
     def off(self, controller: pdmp.Controller) -> float:
-        """Return the distance from the cycle at the phase of a controller, over its range."""
+        """Returns the distance from the cycle at the phase of a controller, over its range."""
         here = [np.interp(controller.phase, self._phases, joint) for joint in self._position.T]
         return float(np.abs(controller.position - here).max() / self._range)
 
 
 def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) -> Section:
-    """Reproduce Fig. 5, with generated cycles on the robot, and with recordings if there are."""
+    """Reproduces Fig. 5, with generated cycles on the robot, and with recordings if there are."""
     walks = None if recordings is None else recorded(Path(recordings))
     names = list(STYLES)
     model = learn(demonstrate(seed))
@@ -157,7 +157,7 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
 def draw(
     model: pdmp.Model, commands: Sequence[Switch], done: Swinging, names: Sequence[str]
 ) -> Figure:
-    """Draw the joints of one arm about each switch."""
+    """Draws the joints of one arm about each switch."""
     position = np.array(done.position)
     lasting = len(position) * DT / len(commands)
     figure = canvas(None, 11.0, 7.0)
@@ -184,7 +184,7 @@ def _style(model: pdmp.Model, m: int) -> dict[str, Any]:
 def _instants(
     model: pdmp.Model, robot: Robot, chosen: Sequence[int], names: Sequence[str]
 ) -> dict[str, tuple[Robot, list[float]]]:
-    """Return six moments of a stride in each style, late in the first, second and last spell."""
+    """Returns six moments of a stride in each style, late in the first, second and last spell."""
     normal, marching, girly = (names[m] for m in chosen)
     stride = np.arange(6) / 6 * model.durations[chosen[0]]
     spells = {normal: 1, marching: 2, girly: 5}
@@ -192,7 +192,7 @@ def _instants(
 
 
 def recorded(folder: Path) -> tuple[list[str], Figure]:
-    """Learn from recordings of people who walk, one mean stride of each."""
+    """Learns from recordings of people who walk, one mean stride of each."""
     files = sorted(folder.glob("*.csv"))
     if not files:
         raise ValueError(f"recordings: {folder} has no CSV file; each is one person walking")
@@ -229,7 +229,7 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
 
 
 def _spectrum(model: pdmp.Model) -> str:
-    """Tell how many styles the spectrum asks for, and what the paper's four make."""
+    """Returns a sentence on the number of styles, and the share of the paper's four."""
     share = model.singular_values[:4].sum() / model.singular_values.sum()
     return (
         f"To exceed 90 % of the sum, the spectrum asks for J = {model.n_styles}; "

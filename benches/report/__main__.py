@@ -26,7 +26,7 @@ PRIMITIVES = {
 
 
 def main() -> None:
-    """Answer every question at hand."""
+    """Evaluates every question whose recordings are available."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--write", action="store_true", help="write docs/report.md")
     write = arguments.parse_args().write
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def answer(question: Question) -> Evaluation:
-    """Evaluate all predictors on one question, and draw what they foresee."""
+    """Evaluates all predictors on one question, and draws their predictions."""
     given = {"contexts": question.contexts} | question.options
     found = evaluate(question.demos, predictors=baselines() | PRIMITIVES, **given)
     figure = plot.held_out(found, PRIMITIVE, unit=question.unit)
@@ -56,7 +56,7 @@ def answer(question: Question) -> Evaluation:
 
 
 def slug(name: str) -> str:
-    """Return a name for a file."""
+    """Returns a name for a file."""
     return name.replace(", ", "_").replace(" ", "_")
 
 

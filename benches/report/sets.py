@@ -42,7 +42,7 @@ def questions() -> Iterator[Question]:
 
 
 def raised_hands() -> Iterator[Question]:
-    """Raise a hand, hold it, and bring it back; or the rise alone."""
+    """Yields raised hands: up, hold and back, or the rise alone."""
     index = rows("raise_hand_bandai")
     demos = list(read_folder(folder("raise_hand_bandai"), columns=ARM).values())
     heights = numbers(index, "hold_height_m")
@@ -52,7 +52,7 @@ def raised_hands() -> Iterator[Question]:
 
 
 def high_and_low() -> Iterator[Question]:
-    """Grab something high, or deposit something on the floor: three actors of different size."""
+    """Yields grabs from high up and deposits on the floor, by three actors of different size."""
     index = rows("arms_hdm05")
     demos = list(read_folder(folder("arms_hdm05"), columns=ARM).values())
     columns = {"grabHighR": "peak_height_m", "depositFloorR": "low_height_m"}
@@ -67,7 +67,7 @@ def high_and_low() -> Iterator[Question]:
 
 
 def walking_forces() -> Iterator[Question]:
-    """Load the ground, as five people do who walk at many speeds."""
+    """Yields ground forces of five people who walk at many speeds."""
     index = rows("walking_force_speed")
     demos = list(read_folder(folder("walking_force_speed")).values())
     speeds = numbers(index, "speed_m_s")
@@ -83,7 +83,7 @@ def walking_forces() -> Iterator[Question]:
 
 
 def doors() -> Iterator[Question]:
-    """Reach for the handle of a door that is somewhere else each time, and open it."""
+    """Yields reaches for the handle of a door at many places, and the opening of the door."""
     index = rows("door_adroit")
     demos = list(read_folder(folder("door_adroit"), columns=HAND).values())
     places = numbers(index, "door_x", "door_y", "door_z")
@@ -94,7 +94,7 @@ def doors() -> Iterator[Question]:
 
 
 def styled_walks() -> Iterator[Question]:
-    """Walk in ten styles, right foot to right foot; a recording has one speed."""
+    """Yields walks in ten styles, right foot to right foot; a recording has one speed."""
     speeds = {row["id"]: float(row["speed_m_s"]) for row in rows("walk_styles_bandai")}
     demos, contexts = [], []
     for stride in rows("walk_styles_bandai", "strides.csv"):
@@ -108,7 +108,7 @@ def styled_walks() -> Iterator[Question]:
 
 
 def runners() -> Iterator[Question]:
-    """Run, as runners of different age, height and mass do."""
+    """Yields strides of runners of different age, height and mass."""
     index = rows("running_strides")
     strides = list(read_folder(folder("running_strides")).values())
     seen: dict[str, int] = {}
@@ -125,7 +125,7 @@ def runners() -> Iterator[Question]:
 
 
 def pushes() -> Iterator[Question]:
-    """Push an object to a target with a planar arm."""
+    """Yields pushes of an object to a target with a planar arm."""
     index = rows("arm3_pushing")
     demos = list(read_folder(folder("arm3_pushing")).values())
     places = numbers(index, "object_x", "object_y", "target_x", "target_y")
@@ -144,18 +144,18 @@ ASKED = {
 
 
 def rows(source: str, name: str = "index.csv") -> list[dict[str, str]]:
-    """Read a table of a set."""
+    """Reads a table of a set."""
     with open(folder(source) / name, newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
 def numbers(index: list[dict[str, str]], *columns: str) -> np.ndarray:
-    """Return columns of a table (M, Q)."""
+    """Returns columns of a table (M, Q)."""
     return np.array([[float(row[column]) for column in columns] for row in index])
 
 
 def cut(demos: list[Demonstration], bounds: np.ndarray) -> list[Demonstration]:
-    """Return what lies between two times [s] of each demonstration."""
+    """Returns the part of each demonstration between two times [s]."""
     parts = []
     for demo, (begin, end) in zip(demos, bounds, strict=True):
         kept = (demo.time >= begin - 1e-3) & (demo.time <= end + 1e-3)
@@ -164,6 +164,6 @@ def cut(demos: list[Demonstration], bounds: np.ndarray) -> list[Demonstration]:
 
 
 def walk(name: str) -> Demonstration:
-    """Read one recording of a walk: the right arm and what flexes the legs."""
+    """Reads one recording of a walk: the right arm and the flexion of the legs."""
     path = folder("walk_styles_bandai") / "demos" / f"{name}.csv"
     return read_csv(path, columns=[*ARM, *LEGS])

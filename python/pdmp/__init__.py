@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 else:
 
     def __getattr__(name):
-        """Import what a control loop has no use for when it is first asked for."""
+        """Imports modules that a control loop does not need at their first use."""
         if name == "evaluate":
             return import_module("pdmp.evaluation").evaluate
         if name in ("datasets", "evaluation"):

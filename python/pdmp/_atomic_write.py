@@ -11,7 +11,7 @@ from pathlib import Path
 
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a path to write to that takes the place of `path` once all went well.
+    """Yields a temporary path, whose file replaces `path` when the block ends without an error.
 
     An error or an interruption leaves what was at `path` before, and nothing beside it. What a link
     leads to is replaced, not the link; a pipe or a device is written to.

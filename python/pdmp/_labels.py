@@ -17,13 +17,13 @@ FULL_TURN = {"rad": math.tau, "deg": 360.0, "°": 360.0}
 
 
 def split_label(field: str) -> tuple[str, str]:
-    """Return name and unit of a header field such as `knee [rad]`; the unit is "" without one."""
+    """Returns name and unit of a header field such as `knee [rad]`; the unit is "" without one."""
     found = re.fullmatch(r"(.*\S)\s*\[([^][]*)\]", field.strip(), re.DOTALL)
     return (found[1], found[2].strip()) if found else (field.strip(), "")
 
 
 def names_and_units(value: Any) -> tuple[list[str] | None, list[str] | None]:
-    """Return names and units of the degrees of freedom, each None where the object has none.
+    """Returns names and units of the degrees of freedom, each None where the object has none.
 
     Names are the columns of a data frame, or the coordinate along the last axis of a labelled
     array. Units stand in the names, as `knee [rad]`, or in `attrs["units"]`.
@@ -45,7 +45,7 @@ def names_and_units(value: Any) -> tuple[list[str] | None, list[str] | None]:
 
 
 def _fields(value: Any) -> list[str] | None:
-    """Return what the columns are called, if all of them have a name."""
+    """Returns the names of the columns, if all of them have one."""
     fields = getattr(value, "columns", None)
     dims, coords = getattr(value, "dims", None), getattr(value, "coords", None)
     if fields is None and isinstance(dims, tuple) and dims and isinstance(coords, Mapping):
@@ -59,7 +59,7 @@ def _fields(value: Any) -> list[str] | None:
 
 
 def to_dataframe(trajectory: Trajectory) -> Any:
-    """Return a trajectory as a data frame, as `Trajectory.to_dataframe` describes."""
+    """Returns a trajectory as a data frame, as `Trajectory.to_dataframe` describes."""
     try:
         import pandas
     except ImportError:

@@ -10,7 +10,7 @@ HIDDEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 
 def printable(text: object, *, keep: str = "") -> str:
-    """Return a text with its control characters escaped, but for those to keep."""
+    """Returns a text with its control characters escaped, but for those to keep."""
     text = str(text)
     if text.isprintable():
         return text
@@ -18,12 +18,12 @@ def printable(text: object, *, keep: str = "") -> str:
 
 
 def value_error(message: str) -> ValueError:
-    """Return an error whose text, which may quote a file or a name, has no control characters."""
+    """Returns an error whose text, which may quote a file or a name, has no control characters."""
     return ValueError(printable(message))
 
 
 def warn(message: str) -> None:
-    """Warn the caller of this package, without control characters."""
+    """Issues a `UserWarning` at the caller of this package, without control characters."""
     frame: FrameType | None = sys._getframe(1)
     level = 2
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "pdmp":

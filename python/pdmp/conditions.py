@@ -11,7 +11,7 @@ from pdmp._native import Model
 
 
 def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
-    """Return the arguments that repeat one demonstration, or the mean of several.
+    """Returns the arguments that repeat one demonstration, or the mean of several.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def as_demonstrated(model: Model, demos: int | Sequence[int]) -> dict[str, Any]:
 
 
 def blend(a: Mapping[str, ArrayLike], b: Mapping[str, ArrayLike], share: float) -> dict[str, Any]:
-    """Return the arguments (1 - share) a + share b, name by name.
+    """Returns the arguments (1 - share) a + share b, name by name.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ class Run:
         self._begin()
 
     def __iter__(self) -> Iterator[Tick]:
-        """Begin a loop that sleeps between its ticks."""
+        """Begins a loop that sleeps between its ticks."""
         with _alone(self._controller):
             self._begin()
             while not self._over():
@@ -83,7 +83,7 @@ class Run:
                 yield self._tick()
 
     async def __aiter__(self) -> AsyncIterator[Tick]:
-        """Begin a loop that lets others run between its ticks."""
+        """Begins a loop that lets other tasks run between its ticks."""
         from asyncio import sleep
 
         for _ in range(3):  # a loop that was left is closed by the event loop
@@ -104,7 +104,7 @@ class Run:
         self._start = perf_counter()
 
     def _over(self) -> bool:
-        """Tell whether to end, with what the body commanded taken into account."""
+        """Returns whether the loop ends, given the commands of its last iteration."""
         if self._last is None:
             return self.ticks > 0 and self._controller.status == Status.FINISHED
         # A movement that has settled is held, and may be commanded anew.
@@ -140,7 +140,7 @@ _lock = Lock()
 
 @contextmanager
 def _alone(controller: Controller) -> Iterator[None]:
-    """Keep a controller to one loop, which ends with its iterator."""
+    """Reserves a controller for one loop, which ends with its iterator."""
     key = id(controller)
     with _lock:
         if key in _running:
@@ -157,14 +157,14 @@ def _alone(controller: Controller) -> Iterator[None]:
 
 
 def _countable(name: str, value: float) -> float:
-    """Return a number that clocks can count with."""
+    """Returns a number that clocks can count with."""
     if not (isinstance(value, Real) and 1e-9 <= value <= 1e9):
         raise ValueError(f"{name} = {value!r}: must be a number between 1e-9 and 1e9")
     return float(value)
 
 
 def _periods(duration: float, rate: float) -> int:
-    """Return how many whole periods a duration has."""
+    """Returns the number of whole periods in a duration."""
     periods = round(_countable("duration", duration) * rate)
     if periods < 1:
         raise ValueError(f"duration = {duration}: must be at least one period, {1 / rate} s")
@@ -172,7 +172,7 @@ def _periods(duration: float, rate: float) -> int:
 
 
 def _function(name: str, ask: Callable[[], T] | None) -> Callable[[], T | None]:
-    """Return a function to ask before each tick."""
+    """Returns a function to ask before each tick."""
     if ask is None:
         return lambda: None
     if not callable(ask):

@@ -35,7 +35,7 @@ class Run:
 
 
 def control(model: pdmp.Model, arguments: Mapping[str, Any], command: Mapping[str, Any]) -> Run:
-    """Run a movement at 1 kHz and give it a command half way."""
+    """Runs a movement at 1 kHz and gives it a command half way."""
     duration = model.durations[model.nominal] * arguments["tau"] / model.tau
     switch = round(0.5 * duration / DT)
     controller = model.controller(dt=DT, **arguments)
@@ -56,7 +56,7 @@ def control(model: pdmp.Model, arguments: Mapping[str, Any], command: Mapping[st
 def draw_control(
     model: pdmp.Model, arguments: Mapping[str, Any], runs: Mapping[str, Run]
 ) -> Figure:
-    """Draw what each command made of the movement."""
+    """Draws the movement under each command."""
     figure, columns = movement_panels(model, list(runs), None)
     longest = DT * max(len(run.ticks) for run in runs.values())
     plain = model.rollout(**arguments, dt=DT, duration=longest)

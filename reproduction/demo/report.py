@@ -11,7 +11,7 @@ from reproduction.metrics import reproduction_error
 
 
 def spectrum_table(model: pdmp.Model) -> str:
-    """Tell how much of the singular-value sum each style parameter adds, and two left out."""
+    """Returns the share of each singular value in their sum, two beyond J included."""
     shares = model.singular_values / model.singular_values.sum()
     sums = shares.cumsum()
     return markdown_table(
@@ -25,7 +25,7 @@ def error_table(
     demos: Sequence[pdmp.Demonstration],
     members: Mapping[str, Sequence[int]],
 ) -> str:
-    """Tell the mean error of the reproductions of each shape, with each of the models."""
+    """Returns the mean reproduction error of each shape, for each model."""
     return markdown_table(
         ["shape", *(f"error, J = {model.n_styles}" for model in models)],
         (
@@ -42,7 +42,7 @@ def error_table(
 
 
 def loop_table(runs: Mapping[str, Run]) -> str:
-    """Tell where each loop ended and how long its ticks took."""
+    """Returns the distance to the goal at the end and the tick times of each loop."""
     return markdown_table(
         ["control loop at 1 kHz", "left to the goal", "mean tick", "worst tick"],
         (
@@ -53,7 +53,7 @@ def loop_table(runs: Mapping[str, Run]) -> str:
 
 
 def time_table(times: Mapping[str, float]) -> str:
-    """Tell how long each part took."""
+    """Returns the duration of each part."""
     return markdown_table(
         ["part", "time"], ([name, f"{1e3 * time:.1f} ms"] for name, time in times.items())
     )

@@ -24,7 +24,7 @@ GOAL_SHIFT = np.array([10.0, 15.0])  # mm
 def run_demo(
     folder: str | PathLike[str], progress: Callable[[str, float], object] | None = None
 ) -> str:
-    """Learn five handwritten shapes together; write model, figures and a report.
+    """Learns five handwritten shapes together; writes model, figures and a report.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def run_demo(
 
 @contextmanager
 def timed(times: dict[str, float], name: str) -> Iterator[None]:
-    """Note how long a part took [s]."""
+    """Records the duration of a part [s]."""
     begin = perf_counter()
     yield
     times[name] = perf_counter() - begin

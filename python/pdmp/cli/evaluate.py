@@ -18,7 +18,7 @@ MOST_STYLES = 8  # of the figure of E over J
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Declares the arguments of the command."""
     parser.add_argument(
         "paths", nargs="+", type=_options.path, metavar="PATH", help="folder with an index.csv"
     )
@@ -35,7 +35,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Read, evaluate, tell, draw."""
+    """Reads recordings, evaluates predictors, prints and draws the result."""
     from pdmp.evaluation import PDMP, baselines, evaluate, over_styles
 
     folder = options.output and Path(options.output)

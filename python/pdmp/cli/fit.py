@@ -14,7 +14,7 @@ from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Declares the arguments of the command."""
     parser.add_argument(
         "paths",
         type=_options.path,
@@ -30,7 +30,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Read, learn, write."""
+    """Reads demonstrations, fits a model and writes it."""
     output = Path(options.output).absolute()
     if not output.parent.is_dir():
         raise FileNotFoundError(f"{output.parent}: no such folder; make it first")

@@ -29,7 +29,7 @@ COMMANDS = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Runs the command line.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(options: Namespace) -> int:
-    """Run a command and return the exit code."""
+    """Runs a command and returns the exit code."""
     try:
         options.run(options)
         sys.stdout.flush()
@@ -89,7 +89,7 @@ def _parser() -> ArgumentParser:
 
 
 def _in_one_line(error: Exception) -> str:
-    """Return what an error says, with options in place of the arguments that they are in Python."""
+    """Returns the text of an error, with options in place of the arguments of Python."""
     if isinstance(error, OSError) and error.filename is not None:
         return printable(f"{error.filename}: {error.strerror}")
     text = printable(" ".join(str(error).split()))

@@ -16,7 +16,7 @@ from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Declares the arguments of the command."""
     parser.add_argument("model", type=_options.path, metavar="MODEL", help="model file")
     parser.add_argument(
         "paths",
@@ -37,7 +37,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Load, draw, write."""
+    """Loads a model, draws it and writes the figures."""
     model = pdmp.load(options.model)
     first = model.styles[:, 0]
     ends = [int(first.argmin()), int(first.argmax())]

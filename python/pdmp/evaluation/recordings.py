@@ -49,7 +49,7 @@ class Recordings:
     sampled: Array
 
     def numbers(self, contexts: Array) -> Array:
-        """Return contexts (B, Q) as numbers (B, F): each label has a column, 1 where it is."""
+        """Returns contexts (B, Q) as numbers (B, F): each label has a column, 1 where it is."""
         columns = []
         for values, labels in zip(contexts.T, self.labels, strict=True):
             if labels is None:
@@ -74,7 +74,7 @@ class Recordings:
         return self.durations if self.kind == "rhythmic" else None
 
     def interval(self, duration: float) -> float:
-        """Return the time [s] between two of C samples of a movement."""
+        """Returns the time [s] between two of C samples of a movement."""
         return duration / (self.n_samples - (self.kind == "discrete"))
 
     @property
@@ -88,7 +88,7 @@ class Recordings:
         return self.demos[0].units or [""] * self.sampled.shape[2]
 
     def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
-        """Return some of them."""
+        """Returns some of them."""
         demos = tuple(self.demos[row] for row in rows)
         chosen = (array[rows] for array in (self.contexts, self.durations, self.sampled))
         contexts, durations, sampled = chosen
@@ -104,7 +104,7 @@ def recordings(
     period: ArrayLike | None,
     n_samples: int,
 ) -> Recordings:
-    """Check demonstrations and contexts, and read each demonstration over its own duration."""
+    """Checks demonstrations and contexts, and reads each demonstration over its own duration."""
     if kind not in ("discrete", "rhythmic"):
         raise value_error(f'kind = "{kind}": must be "discrete" or "rhythmic"')
     if n_samples < 4:
@@ -140,7 +140,7 @@ def recordings(
 
 
 def _rated(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> Demonstration:
-    """Return a demonstration, with the rate that is given for those without."""
+    """Returns a demonstration, with the rate that is given for those without."""
     if isinstance(demo, Trajectory):
         return Demonstration(demo)
     if not isinstance(demo, Demonstration):
@@ -154,7 +154,7 @@ def _rated(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> De
 def _read(
     demo: Demonstration, m: int, kind: Kind, period: float, n_samples: int
 ) -> tuple[float, Array]:
-    """Return the duration [s] and the positions (C, D), linear between the samples."""
+    """Returns the duration [s] and the positions (C, D), linear between the samples."""
     if demo.time is None:
         raise value_error(f"demo {m}: no sampling interval: pass dt= in seconds")
     time = demo.time - demo.time[0]
@@ -174,7 +174,7 @@ def _read(
 
 
 def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
-    """Return the checked contexts (M, Q)."""
+    """Returns the checked contexts (M, Q)."""
     values: Any = contexts
     if contexts is None:
         values = [demo.context for demo in demos]
@@ -204,7 +204,7 @@ def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
 
 
 def _labels(q: int, values: Array) -> list[str] | None:
-    """Return the labels of one context value of all demonstrations, or None for a number."""
+    """Returns the labels of one context value of all demonstrations, or None for a number."""
     labels = sorted({value for value in values if isinstance(value, str)})
     if not labels:
         return None

@@ -101,13 +101,13 @@ class Evaluation:
     left_out: dict[str, str]
 
     def score(self, predictor: str) -> Scores:
-        """Return the figures of one predictor, split by split."""
+        """Returns the figures of one predictor, split by split."""
         if predictor not in self.scores:
             raise value_error(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
         return self.scores[predictor]
 
     def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
-        """Return the means of one predictor over the splits of one reach, or all."""
+        """Returns the means of one predictor over the splits of one reach, or all."""
         rows = self._rows(reach)
         error, duration, coverage = (values[rows] for values in self.score(predictor))
         reference = self.scores[REFERENCE].error[rows]
@@ -126,18 +126,18 @@ class Evaluation:
         )
 
     def compare(self, a: str, b: str, reach: Reach | None = None) -> Comparison:
-        """Return E of `a` less E of `b`, split by split; negative where `a` is better."""
+        """Returns E of `a` less E of `b`, split by split; negative where `a` is better."""
         rows = self._rows(reach)
         differences = (self.score(a).error - self.score(b).error)[rows]
         return Comparison(differences, float(differences.mean()), _standard_error(differences))
 
     def reaches(self) -> list[Reach]:
-        """Return the sorts of splits that there are."""
+        """Returns the sorts of splits that there are."""
         present = {split.reach for split in self.splits}
         return [reach for reach in ("interpolation", "extrapolation") if reach in present]
 
     def table(self, reach: Reach) -> list[list[str]]:
-        """Return the rows of a table over the splits of one reach, below `HEADER`."""
+        """Returns the rows of a table over the splits of one reach, below `HEADER`."""
         rows = []
         for name in self.scores:
             found = self.summary(name, reach)
@@ -147,7 +147,7 @@ class Evaluation:
         return rows
 
     def markdown(self) -> str:
-        """Return the tables in Markdown."""
+        """Returns the tables in Markdown."""
         lines = []
         for reach in self.reaches():
             lines += [
@@ -159,7 +159,7 @@ class Evaluation:
         return "\n".join([*lines, *self._notes()])
 
     def __repr__(self) -> str:
-        """Return the tables as text."""
+        """Returns the tables as text."""
         lines = []
         for reach in self.reaches():
             cells = [list(map(_plain, row)) for row in (HEADER, *self.table(reach))]
@@ -192,7 +192,7 @@ class Evaluation:
 def score(
     recordings: Recordings, splits: Sequence[Split], forecasts: Sequence[Sequence[Forecast]]
 ) -> Scores:
-    """Compare forecasts with the demonstrations held out."""
+    """Compares forecasts with the demonstrations held out."""
     rows = []
     for split, made in zip(splits, forecasts, strict=True):
         each = []
@@ -216,7 +216,7 @@ def _standard_error(values: Array) -> float:
 
 
 def _plain(cell: str) -> str:
-    """Return a cell without what not every console has."""
+    """Returns a cell without what not every console has."""
     return cell.replace("±", "+-").replace("–", "-")
 
 

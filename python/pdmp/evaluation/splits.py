@@ -34,7 +34,7 @@ class Split(NamedTuple):
 
 
 def held_out(contexts: Array, max_folds: int) -> list[Split]:
-    """Hold out each condition in turn, or, where they are many, each fold of neighbours.
+    """Holds out each condition in turn, or, where they are many, each fold of neighbours.
 
     What lies outside the convex hull of the contexts learnt from is extrapolation. A fold with
     conditions of both sorts gives two splits.
@@ -60,7 +60,7 @@ def held_out(contexts: Array, max_folds: int) -> list[Split]:
 
 
 def neighbours(conditions: Array, max_folds: int) -> list[Rows]:
-    """Part conditions (K, Q) into at most so many folds of neighbours.
+    """Parts conditions (K, Q) into at most so many folds of neighbours.
 
     The fold of most conditions is halved along its longest side, until there are enough.
     """
@@ -76,7 +76,7 @@ def neighbours(conditions: Array, max_folds: int) -> list[Rows]:
 
 
 def within_hull(point: Array, points: Array) -> bool:
-    """Say whether a point (Q,) is a convex combination of others (K, Q).
+    """Returns whether a point (Q,) is a convex combination of others (K, Q).
 
     Weight moves between two points at a time, from the one farthest against the way to the one
     farthest along it, until the combination is there or a plane parts it from the point. One so
@@ -102,7 +102,7 @@ def within_hull(point: Array, points: Array) -> bool:
 
 
 def checked(splits: Iterable[Sequence[object]], n_demos: int) -> list[Split]:
-    """Return a user's splits, each (train, test, "interpolation" or "extrapolation")."""
+    """Returns a user's splits, each (train, test, "interpolation" or "extrapolation")."""
     found = []
     for k, split in enumerate(splits):
         if len(split) != 3 or split[2] not in ("interpolation", "extrapolation"):
@@ -128,6 +128,6 @@ def checked(splits: Iterable[Sequence[object]], n_demos: int) -> list[Split]:
 
 
 def _unit(conditions: Array) -> Array:
-    """Return conditions over their ranges."""
+    """Returns conditions over their ranges."""
     spread = np.ptp(conditions, axis=0)
     return conditions / np.where(spread > 0, spread, 1)

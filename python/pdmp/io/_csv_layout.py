@@ -41,7 +41,7 @@ class CsvTable:
     text: str = field(default="", repr=False)
 
     def rows(self, *, blank: bool = False) -> Iterator[Row]:
-        """Yield line number and fields of each sample; with `blank`, those that have none too.
+        """Yields line number and fields of each sample; with `blank`, those that have none too.
 
         Rows without any field, and empty rows at the end, are left out.
         """
@@ -67,7 +67,7 @@ class CsvTable:
 
 
 def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False) -> CsvTable:
-    """Find separator, header and units of a CSV file.
+    """Finds separator, header and units of a CSV file.
 
     Comments, which begin with #, a line such as `sep=;` and other lines before the header are
     passed over. The header is the row with as many fields as the samples have that names the
@@ -99,7 +99,7 @@ def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False
 
 
 def _parse(path: Path, text: str, separator: str) -> Iterator[Row]:
-    """Yield line number and fields of each row; comments are blank ones."""
+    """Yields line number and fields of each row; comments are blank ones."""
     lines = ("\n" if _is_comment(line) else line for line in io.StringIO(text, newline=""))
     if separator == " ":
         lines = (line.strip() + "\n" for line in lines)
@@ -116,7 +116,7 @@ def _is_comment(line: str) -> bool:
 
 
 def _separator(path: Path, text: str) -> str:
-    """Return what separates the fields: what parts most of the first rows alike."""
+    """Returns the separator that gives most of the first rows the same number of fields."""
     head = "".join(islice(io.StringIO(text, newline=""), SAMPLE))
     for line in head.splitlines():
         if separator := _separating(line):
@@ -132,13 +132,13 @@ def _separator(path: Path, text: str) -> str:
 
 
 def _separating(line: str) -> str:
-    """Return the separator that a line such as `sep=;` names, or none."""
+    """Returns the separator that a line such as `sep=;` names, or none."""
     found = re.fullmatch(r'"?sep=(.|\\t)"?', line.strip("\r\n"), re.IGNORECASE)
     return found[1].replace("\\t", "\t") if found else ""
 
 
 def _width(rows: list[list[str]]) -> int:
-    """Return the number of fields that most rows have; words before the header have one."""
+    """Returns the number of fields that most rows have; words before the header have one."""
     counts = Counter(len(fields) for fields in rows)
     wide = {n: count for n, count in counts.items() if n > 1} or counts
     return max(wide, key=lambda n: (wide[n], n))
@@ -147,7 +147,7 @@ def _width(rows: list[list[str]]) -> int:
 def _header(
     path: Path, text: str, separator: str, sample: list[Row], width: int, times: Collection[str]
 ) -> Row:
-    """Return the row that names the columns; the first one if there is none."""
+    """Returns the row that names the columns; the first one if there is none."""
     named: list[Row] = []
     before: list[str] = []
     for line, fields in sample:
@@ -177,7 +177,7 @@ def _header(
 
 
 def _are_names(fields: list[str]) -> bool:
-    """Return whether a row may name the columns; the first may have no name, nor the last."""
+    """Returns whether a row may name the columns; the first may have no name, nor the last."""
     inner = fields[1:-1] if len(fields) > 2 else [cell for cell in fields if cell]
     return (
         any(fields)
@@ -187,13 +187,13 @@ def _are_names(fields: list[str]) -> bool:
 
 
 def _are_numbers(fields: list[str]) -> bool:
-    """Return whether a row is a sample."""
+    """Returns whether a row is a sample."""
     values = [cell for cell in fields if not _fields.is_gap(cell)]
     return bool(values) and all(_fields.is_number(cell.replace(",", ".", 1)) for cell in values)
 
 
 def _are_units(fields: list[str]) -> bool:
-    """Return whether a row gives units: each in brackets, or one that is known."""
+    """Returns whether a row gives units: each in brackets, or one that is known."""
     said = [cell for cell in fields if cell.strip("-") and not _fields.is_number(cell)]
     # By itself, a word above the samples is rather a name.
     lone = len(fields) == 1 and not fields[0].startswith(("[", "("))

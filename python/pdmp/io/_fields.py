@@ -32,14 +32,14 @@ GAPS = frozenset(
 
 
 def listed(argument: str, names: Sequence[str]) -> list[str]:
-    """Return several names as a list; a text would be taken apart letter by letter."""
+    """Returns several names as a list; a text would be taken apart letter by letter."""
     if isinstance(names, str):
         raise value_error(f"{argument} = '{names}': pass a list of names, ['{names}']")
     return list(names)
 
 
 def check_names(path: Path, line: int, names: Sequence[str]) -> None:
-    """Check that the first row names the columns, each by a name of its own."""
+    """Checks that the first row names the columns, each by a name of its own."""
     seen: set[str] = set()
     for name in names:
         if not is_name(name):
@@ -55,12 +55,12 @@ def check_names(path: Path, line: int, names: Sequence[str]) -> None:
 
 
 def is_name(field: str) -> bool:
-    """Return whether a field may head a column."""
+    """Returns whether a field may head a column."""
     return bool(field.strip()) and parsed(field.replace(",", ".", 1)) is None
 
 
 def places(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]:
-    """Return the index of the column of each name."""
+    """Returns the index of the column of each name."""
     where = {name: k for k, name in enumerate(header)}
     for name in names:
         if name not in where:
@@ -70,7 +70,7 @@ def places(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]
 
 
 def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) -> float:
-    """Return the finite number in a field of the column called `name`, or NaN for a gap."""
+    """Returns the finite number in a field of the column called `name`, or NaN for a gap."""
     value = parsed(field)
     field = short(field)
     place = f"{path}, line {line}, column '{name}'"
@@ -93,22 +93,22 @@ def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) 
 
 
 def short(field: str) -> str:
-    """Return a field, or its beginning where it is long."""
+    """Returns a field, or its beginning where it is long."""
     return field if len(field) <= MAX_SHOWN else field[:MAX_SHOWN] + "..."
 
 
 def is_gap(field: str) -> bool:
-    """Return whether a field marks a missing number."""
+    """Returns whether a field marks a missing number."""
     return not field or field.lower() in GAPS
 
 
 def is_number(field: str) -> bool:
-    """Return whether a field holds a number, finite or not."""
+    """Returns whether a field holds a number, finite or not."""
     return parsed(field) is not None
 
 
 def parsed(field: str) -> float | None:
-    """Return the number in a field, if it is one."""
+    """Returns the number in a field, if it is one."""
     try:
         # Python takes 1_000 for a thousand.
         return None if "_" in field else float(field)

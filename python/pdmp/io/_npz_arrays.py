@@ -20,7 +20,7 @@ MAX_MEMBERS = 1_000_000
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an NPZ file by name.
+    """Returns the arrays of an NPZ file by name.
 
     Raises
     ------

@@ -23,7 +23,7 @@ MAX_STAMP = 1e11  # s, as for Demonstration
 
 
 def unit_of(source: object, name: str, unit: str) -> str:
-    """Return the unit of a time column, which may stand in parentheses too, or be missing."""
+    """Returns the unit of a time column, which may stand in parentheses too, or be missing."""
     unit = unit or split_label(re.sub(r"\((.*)\)$", r"[\1]", name))[1]
     unit = LONG.get(unit.lower(), unit)
     if unit not in SECONDS:
@@ -33,7 +33,7 @@ def unit_of(source: object, name: str, unit: str) -> str:
 
 
 def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[Any]:
-    """Return time stamps (T,) in s; those since 1970 in ms, µs or ns count from the first.
+    """Returns time stamps (T,) in s; those since 1970 in ms, µs or ns count from the first.
 
     `remedy` says how a unit, in place of {unit}, is given.
     """

@@ -26,7 +26,7 @@ def read_bvh(
     max_gap: float = 0.0,
     context: Sequence[float | str] | None = None,
 ) -> Demonstration:
-    """Read one demonstration from a BVH file; needs the extra `bvh`.
+    """Reads one demonstration from a BVH file; needs the extra `bvh`.
 
     Each channel is a degree of freedom, called after joint and channel, such as
     `LeftLeg.Xrotation`. Rotations, in degrees in the file, come in rad; positions keep the unit of

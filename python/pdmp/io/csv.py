@@ -35,7 +35,7 @@ def read_csv(
     max_gap: float = 0.0,
     context: Sequence[float | str] | None = None,
 ) -> Demonstration:
-    """Read one demonstration from a CSV file.
+    """Reads one demonstration from a CSV file.
 
     A column headed `knee [rad]` is called `knee`, and its unit is rad; units may stand in a row of
     their own below the header too. Fields are separated by commas, semicolons, tabs or spaces;
@@ -110,7 +110,7 @@ def read_csv(
 
 
 def _labels(found: CsvTable) -> tuple[list[str], list[str]]:
-    """Return names and units of the columns; those of the header go before those below it."""
+    """Returns names and units of the columns; those of the header go before those below it."""
     header, units = map(list, zip(*map(split_label, found.fields), strict=True))
     if found.units is not None:
         units = [unit or below for unit, below in zip(units, found.units, strict=True)]
@@ -120,7 +120,7 @@ def _labels(found: CsvTable) -> tuple[list[str], list[str]]:
 def _numbers(
     found: CsvTable, header: list[str], where: list[int], clock: int | None, *, gaps: bool
 ) -> tuple[NDArray[Any], NDArray[Any] | None]:
-    """Return positions (T, D), NaN in gaps, and time stamps (T,) as they are written."""
+    """Returns positions (T, D), NaN in gaps, and time stamps (T,) as they are written."""
     path = found.path
     numbers: list[list[float]] = []
     stamps: list[float] = []
@@ -159,7 +159,7 @@ def _numbers(
 
 
 def _row(path: Path, line: int, cells: list[str], names: list[str], *, gaps: bool) -> list[float]:
-    """Return the numbers of a row."""
+    """Returns the numbers of a row."""
     try:
         values = list(map(float, cells))
         if all(map(math.isfinite, values)) and "_" not in "".join(cells):
@@ -173,7 +173,7 @@ def _row(path: Path, line: int, cells: list[str], names: list[str], *, gaps: boo
 
 
 def _check_unnamed(path: Path, line: int, row: list[str], unnamed: list[int], sample: int) -> None:
-    """Check that what has no name is the index that pandas writes, or nothing."""
+    """Checks that a column without a name is empty or the index that pandas writes."""
     for k in unnamed:
         if row[k] and not (k == 0 and row[k] == str(sample)):
             raise value_error(
@@ -188,7 +188,7 @@ def write_csv(
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
 ) -> None:
-    """Write a trajectory as CSV; `read_csv` reads its positions back.
+    """Writes a trajectory as CSV; `read_csv` reads its positions back.
 
     The columns are `t` [s], then the position of each degree of freedom under its name, then
     velocities under `<name>_velocity` and accelerations under `<name>_acceleration`, with the units

@@ -33,7 +33,7 @@ def read(
     max_gap: float = 0.0,
     context: Sequence[str] | None = None,
 ) -> list[Demonstration]:
-    """Read every demonstration in CSV, BVH and NPZ files and folders, in the order given.
+    """Reads every demonstration in CSV, BVH and NPZ files and folders, in the order given.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def read_folder(
     max_gap: float = 0.0,
     context: Sequence[str] | None = None,
 ) -> dict[str, Demonstration]:
-    """Read the demonstrations that a folder's `index.csv` lists, by their ids.
+    """Reads the demonstrations that a folder's `index.csv` lists, by their ids.
 
     Of a folder without an index, all CSV and BVH files are read, or all in its folder `demos`, or
     its `demos.npz`, by their names in natural order; they have no context.
@@ -140,7 +140,7 @@ def read_folder(
 def _read_unlisted(
     path: Path, time: str, context: Sequence[str] | None, **options: Any
 ) -> dict[str, Demonstration]:
-    """Read all files of a folder without an index."""
+    """Reads all files of a folder without an index."""
     if context is None and (path / "demos.npz").exists():
         return read_npz(path / "demos.npz", **options)
     for folder in (path, path / "demos"):
@@ -152,12 +152,12 @@ def _read_unlisted(
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
-    """Return what sorts "2" before "10"."""
+    """Returns a sort key in natural order, "2" before "10"."""
     return [(int(part) if part.isdecimal() else -1, part) for part in re.split(r"(\d+)", name)]
 
 
 def _file(path: Path, name: str) -> Path:
-    """Return the one file of that name, a CSV file where there is none."""
+    """Returns the one file of that name, a CSV file where there is none."""
     if not name or re.search(r"[/\\:\x00-\x1f]", name) or name in (".", ".."):
         raise value_error(f"{path / 'index.csv'}: id '{name}' is no name of a file: {FORMAT}")
     folder = path / "demos"
@@ -168,14 +168,14 @@ def _file(path: Path, name: str) -> Path:
 
 
 def _read_single(path: Path, time: str, **options: Any) -> Demonstration:
-    """Read a file of one demonstration; BVH files tell their interval and need no column."""
+    """Reads a file of one demonstration; BVH files hold their interval and need no column."""
     if path.suffix.lower() == ".bvh":
         return read_bvh(path, **options)
     return read_csv(path, time=time, **options)
 
 
 def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str] | None]:
-    """Read the ids in an index, each with its context.
+    """Reads the ids in an index, each with its context.
 
     A column without any number holds labels.
     """
@@ -207,6 +207,6 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
 
 
 def _pointed(field: str) -> str:
-    """Return a number with a decimal point, in place of a comma, and texts as they are."""
+    """Returns a number with a decimal point, in place of a comma, and texts as they are."""
     pointed = field.replace(",", ".")
     return pointed if _fields.is_number(pointed) else field

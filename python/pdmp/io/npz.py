@@ -24,7 +24,7 @@ def read_npz(
     dt: float | None = None,
     max_gap: float = 0.0,
 ) -> dict[str, Demonstration]:
-    """Read the demonstrations in an NPZ file, by name ("0", "1", … where they have none).
+    """Reads the demonstrations in an NPZ file, by name ("0", "1", … where they have none).
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def read_npz(
 def recordings(
     path: Path, columns: Sequence[str] | None, dt: float | None
 ) -> Iterator[tuple[str, NDArray[Any], dict[str, Any]]]:
-    """Yield name, positions (T, D) and the other arguments of each demonstration in the file."""
+    """Yields name, positions (T, D) and the other arguments of each demonstration in the file."""
     arrays = _npz_arrays.read_arrays(path)
     names, units = _labels(path, arrays, "names"), _labels(path, arrays, "units")
     if columns is not None and names is None:
@@ -87,7 +87,7 @@ def recordings(
 
 
 def _labels(path: Path, arrays: dict[str, NDArray[Any]], kind: str) -> list[str] | None:
-    """Take the names or units of the degrees of freedom out of the arrays."""
+    """Removes the names or units of the degrees of freedom from the arrays, and returns them."""
     if kind not in arrays:
         return None
     labels = np.atleast_1d(arrays.pop(kind))
@@ -105,7 +105,7 @@ def _labels(path: Path, arrays: dict[str, NDArray[Any]], kind: str) -> list[str]
 def _parts(
     path: Path, arrays: dict[str, NDArray[Any]]
 ) -> Iterator[tuple[str, NDArray[Any], NDArray[Any] | None]]:
-    """Yield name, positions and time stamps of each demonstration, in any layout."""
+    """Yields name, positions and time stamps of each demonstration, in any layout."""
     if "y" in arrays and "start" in arrays:
         yield from _joined(path, arrays["y"], arrays.get("t"), arrays["start"])
     elif "position" in arrays and "position.t" not in arrays:
@@ -127,7 +127,7 @@ def _parts(
 def _joined(
     path: Path, position: NDArray[Any], time: NDArray[Any] | None, given: NDArray[Any]
 ) -> Iterator[tuple[str, NDArray[Any], NDArray[Any] | None]]:
-    """Yield the demonstrations that lie one after another."""
+    """Yields the demonstrations that lie one after another."""
     n_samples = len(position) if position.ndim else 0
     given = np.atleast_1d(given)
     whole = given.dtype.kind in "iuf" and given.ndim == 1 and np.isfinite(given).all()

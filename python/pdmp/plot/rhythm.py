@@ -17,7 +17,7 @@ PERIODS = 4
 
 
 def phase_portrait(model: Model, *, figure: Figure | None = None) -> Figure:
-    """Draw velocity over position: the limit cycles, and how a movement from rest joins one.
+    """Draws velocity over position: the limit cycles, and how a movement from rest joins one.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from pdmp._native import Demonstration
 
 
 def unwrap(demo: Demonstration) -> Demonstration:
-    """Take the jumps by a full turn out of the angles of a recording.
+    """Removes jumps by a full turn from the angles of a recording.
 
     Where an angle jumps by more than half a turn from one sample to the next, the full turns that
     bring it nearest are added from there on. A goal is moved by as many turns as the last sample.

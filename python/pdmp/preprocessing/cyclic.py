@@ -72,7 +72,7 @@ class Cycles(Sequence[Demonstration]):
         self.growths = growths
 
     def __len__(self) -> int:
-        """Return the number of cycles K."""
+        """Returns the number of cycles K."""
         return len(self._demos)
 
     @overload
@@ -80,11 +80,11 @@ class Cycles(Sequence[Demonstration]):
     @overload
     def __getitem__(self, index: slice) -> list[Demonstration]: ...
     def __getitem__(self, index: Any) -> Any:
-        """Return a cycle, or a list of several."""
+        """Returns a cycle, or a list of several."""
         return self._demos[index]
 
     def __repr__(self) -> str:
-        """Return how many there are, and of what periods."""
+        """Returns the number of cycles and the range of their periods."""
         span = f" of {min(self.periods):.3f} to {max(self.periods):.3f} s" if len(self) else ""
         return f"<pdmp.preprocessing.Cycles: {len(self)}{span}, {len(self.rejected)} rejected>"
 
@@ -95,7 +95,7 @@ def cycles(
     events: ArrayLike | Sequence[ArrayLike] | Mapping[str, ArrayLike] | None = None,
     average: bool = False,
 ) -> Cycles:
-    """Cut cyclic recordings into closed cycles that begin in the same phase.
+    """Cuts cyclic recordings into closed cycles that begin in the same phase.
 
     Without events, `period` finds the period of each recording, and a template of its mean cycle
     when each cycle begins: in the phase of the first recording's first sample, to which the others
@@ -171,7 +171,7 @@ def cycles(
 
 
 def _gains(growths: list[Growth], demos: list[Demonstration]) -> str:
-    """Return a warning of what grows from cycle to cycle, with its gains."""
+    """Returns a warning of what grows from cycle to cycle, with its gains."""
     names, units = (demos[0].names, demos[0].units) if demos else (None, None)
     gains = []
     for dof in sorted({growth.dof for growth in growths}):
