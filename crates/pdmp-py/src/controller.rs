@@ -260,7 +260,7 @@ impl Controller {
             Some(rate_hz) => rate_hz,
             None => PyFloat::new(py, 1.0 / slf.try_borrow()?.inner.dt()).into_any(),
         };
-        py.import("pdmp.pacing")?.call_method1("Run", (slf, rate_hz, duration, measured, coupling, late))
+        py.import("pdmp.realtime")?.call_method1("Run", (slf, rate_hz, duration, measured, coupling, late))
     }
 
     /// Start again.

@@ -197,7 +197,7 @@ type Growth = (usize, usize, f64, i32);
 /// Cycles, their periods (K,) in s, their gains (K, D), the indices of their recordings, the rejected, and what grows.
 type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, Vec<Rejected>, Vec<Growth>);
 
-/// Cuts recordings into cycles: what `pdmp.demos.cycles` calls.
+/// Cuts recordings into cycles: what `pdmp.preprocessing.cycles` calls.
 #[pyfunction]
 pub(crate) fn cycles<'py>(
     py: Python<'py>,

@@ -192,7 +192,7 @@ impl fmt::Display for Finding {
             Self::Wrap { demo, dof, place, jump, turn } => write!(
                 f,
                 "demo {demo}: {dof:?} jumps by {jump:.4} at {place}, about a full turn of {turn:.4}: an angle that was \
-                 wrapped? Unwrap it with pdmp.demos.unwrap"
+                 wrapped? Unwrap it with pdmp.preprocessing.unwrap"
             ),
             Self::TurnsApart { demo, dof, turns, turn, mended } => {
                 write!(
