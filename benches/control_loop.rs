@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use ndarray::Array2;
-use pdmp_core::learning::StyleCount;
+use pdmp_core::learning::Truncation;
 use pdmp_core::learning::regression::{Basis, NGnet};
 use pdmp_core::{Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Motion, Sampling, fit};
 
@@ -143,6 +143,6 @@ pub(crate) fn primitive(n_dofs: usize, n_styles: usize) -> Arc<Model> {
     };
     let demos: Vec<_> = (0..10).map(demonstration).collect();
     let basis = Basis::NGnet(NGnet::default());
-    let options = FitOptions { styles: StyleCount::Given(n_styles).into(), basis, ..FitOptions::new(Kind::Discrete) };
+    let options = FitOptions { styles: Truncation::Given(n_styles).into(), basis, ..FitOptions::new(Kind::Discrete) };
     Arc::new(fit(&demos, &options).expect("a fit"))
 }

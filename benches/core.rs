@@ -9,25 +9,25 @@ use std::sync::Arc;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use movements::movements;
 use ndarray::{Array2, Array3};
-use pdmp_core::learning::StyleCount;
+use pdmp_core::learning::Truncation;
 use pdmp_core::learning::regression::{Basis, Domain, Gp, Kernel, NGnet};
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::batch;
 use pdmp_core::motion::jacobian;
-use pdmp_core::motion::{BatchConditions, Timing, Variable};
+use pdmp_core::motion::{BatchConditions, TimeGrid, WithRespectTo};
 use pdmp_core::numerics::{Smoothing, Threads};
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, FitOptions, Kind, Model, fit};
 
 fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
-    let mut options = FitOptions { styles: StyleCount::Given(3).into(), basis, ..FitOptions::new(Kind::Discrete) };
+    let mut options = FitOptions { styles: Truncation::Given(3).into(), basis, ..FitOptions::new(Kind::Discrete) };
     options.alignment.smoothing = smoothing;
     options
 }
 
 fn learn(n_styles: usize) -> Arc<Model> {
     let options = options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate);
-    let options = FitOptions { styles: StyleCount::Given(n_styles).into(), ..options };
+    let options = FitOptions { styles: Truncation::Given(n_styles).into(), ..options };
     Arc::new(fit(&movements(40, 1001), &options).expect("a fit"))
 }
 
@@ -93,16 +93,16 @@ fn processes(criterion: &mut Criterion) {
 }
 
 fn rollouts(criterion: &mut Criterion) {
-    let timing = Timing { dt: 1e-3, duration: None };
+    let grid = TimeGrid { dt: 1e-3, duration: None };
     let model = learn(3);
     let mut group = criterion.benchmark_group("1 s at 1 kHz, D=7");
     group.sample_size(20);
-    group.bench_function("rollout", |bench| bench.iter(|| rollout(model.primitive(), &Conditions::default(), timing)));
+    group.bench_function("rollout", |bench| bench.iter(|| rollout(model.primitive(), &Conditions::default(), grid)));
     for n_styles in [3, 35] {
         let model = learn(n_styles);
         let styles = Array2::from_shape_fn((1000, n_styles), |(b, j)| (b + j) as f64 / 1000.0);
         let conditions = BatchConditions { styles, ..BatchConditions::default() };
-        let batch = batch(model.primitive(), conditions, timing, &mut |_| Ok(())).expect("a batch");
+        let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(())).expect("a batch");
         let mut outputs = [(); 2].map(|()| Array3::zeros(batch.shape()));
         for n_threads in [1, 2] {
             let threads = Threads::new(n_threads).expect("some");
@@ -118,8 +118,8 @@ fn rollouts(criterion: &mut Criterion) {
         }
     }
     let jacobian = |model: &Arc<Model>| {
-        let (variable, derivative) = (Variable::Style, Derivative::Position);
-        jacobian(model.primitive(), variable, derivative, &Conditions::default(), timing, &mut |_| Ok(()))
+        let (variable, derivative) = (WithRespectTo::Style, Derivative::Position);
+        jacobian(model.primitive(), variable, derivative, &Conditions::default(), grid, &mut |_| Ok(()))
     };
     group.bench_function("style Jacobian", |bench| bench.iter(|| jacobian(&model)));
     group.bench_function("style Jacobian of a model that never moved", |bench| {

@@ -3,7 +3,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
-use pdmp_core::learning::{Factors, StyleCount};
+use pdmp_core::learning::{Factors, Truncation};
 
 /// A library whose singular values fall by a tenth from one to the next, down to noise.
 fn library(rows: usize, columns: usize) -> Array2<f64> {
@@ -22,12 +22,12 @@ fn library(rows: usize, columns: usize) -> Array2<f64> {
 fn factors(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("factor");
     for (rows, columns, styles, samples) in [
-        (20, 28_000, StyleCount::Given(20), 100),
-        (20, 28_000, StyleCount::Spectrum(0.9), 100),
-        (1000, 40_000, StyleCount::Given(5), 10),
-        (1000, 40_000, StyleCount::Spectrum(0.9), 10),
-        (5000, 1400, StyleCount::Given(5), 10),
-        (5000, 1400, StyleCount::Spectrum(0.9), 10),
+        (20, 28_000, Truncation::Given(20), 100),
+        (20, 28_000, Truncation::Spectrum(0.9), 100),
+        (1000, 40_000, Truncation::Given(5), 10),
+        (1000, 40_000, Truncation::Spectrum(0.9), 10),
+        (5000, 1400, Truncation::Given(5), 10),
+        (5000, 1400, Truncation::Spectrum(0.9), 10),
     ] {
         let targets = library(rows, columns);
         group.sample_size(samples).bench_function(format!("{rows} x {columns} {styles:?}"), |bench| {

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 use movements::movements;
 use pdmp_core::learning::fit_with;
 use pdmp_core::learning::regression::{Basis, NGnet};
-use pdmp_core::learning::{Stage, StyleCount, TimeScaling};
-use pdmp_core::model::Warp;
+use pdmp_core::learning::{Stage, TimeScaling, Truncation};
+use pdmp_core::model::TimeWarp;
 use pdmp_core::numerics::Smoothing;
 use pdmp_core::{Demonstration, FitOptions, Kind};
 
@@ -21,13 +21,13 @@ const STAGES: [Stage; 5] = [Stage::Align, Stage::Targets, Stage::Factorise, Stag
 /// model.
 fn stages(demos: &[Demonstration], options: &FitOptions) -> [Duration; 5] {
     let mut marks = vec![Instant::now()];
-    let mut proceed = |stage, _| {
+    let mut progress = |stage, _| {
         if STAGES.get(marks.len()) == Some(&stage) {
             marks.push(Instant::now());
         }
         Ok(())
     };
-    let model = fit_with(demos, options, &mut proceed).expect("a fit");
+    let model = fit_with(demos, options, &mut progress).expect("a fit");
     marks.push(Instant::now());
     drop(model);
     std::array::from_fn(|stage| marks[stage + 1] - marks[stage])
@@ -65,15 +65,15 @@ fn main() {
         return;
     }
     let network = FitOptions {
-        styles: StyleCount::Given(3).into(),
+        styles: Truncation::Given(3).into(),
         basis: Basis::NGnet(NGnet::default()),
         ..FitOptions::new(Kind::Discrete)
     };
     let mut smoothed = network.clone();
     smoothed.alignment.smoothing = Smoothing::Auto;
     let mut warped = network.clone();
-    warped.alignment.time_scaling = TimeScaling::Warp(Warp::default());
-    let process = FitOptions { styles: StyleCount::Given(3).into(), ..FitOptions::new(Kind::Discrete) };
+    warped.alignment.time_scaling = TimeScaling::Warp(TimeWarp::default());
+    let process = FitOptions { styles: Truncation::Given(3).into(), ..FitOptions::new(Kind::Discrete) };
 
     let demos = movements(20, 1001);
     heading("Milliseconds of a fit, M = 20, C = 1001, D = 7, J = 3");
@@ -85,8 +85,8 @@ fn main() {
     let demos = movements(5000, 200);
     let before = most_memory();
     heading("Milliseconds of a fit, M = 5000, C = 200, D = 7");
-    row("NGnet, J = 5", 3, &demos, &FitOptions { styles: StyleCount::Given(5).into(), ..network.clone() });
-    row("NGnet, J by spectrum", 3, &demos, &FitOptions { styles: StyleCount::Spectrum(0.9).into(), ..network });
+    row("NGnet, J = 5", 3, &demos, &FitOptions { styles: Truncation::Given(5).into(), ..network.clone() });
+    row("NGnet, J by spectrum", 3, &demos, &FitOptions { styles: Truncation::Spectrum(0.9).into(), ..network });
     if let (Some(before), Some(after)) = (before, most_memory()) {
         println!("\nMost memory: {after}, of which {before} before the first of these fits.");
     }

@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 use ndarray::Array2;
-use pdmp_core::context::{MapChoice, MapKind};
+use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::demonstration::ContextValue;
 use pdmp_core::learning::regression::{Basis, NGnet};
-use pdmp_core::learning::{StyleCount, TimeScaling};
-use pdmp_core::model::Warp;
+use pdmp_core::learning::{TimeScaling, Truncation};
+use pdmp_core::model::TimeWarp;
 use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
 
 /// Numbers at which formulas and checks of ranges tend to fail.
@@ -97,10 +97,10 @@ pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
         reach(h).with_context(vec![label, ContextValue::Number(h)]).unwrap()
     };
     let mut warped = options(Kind::Discrete);
-    warped.alignment.time_scaling = TimeScaling::Warp(Warp { segments: 4, slope: 1.5 });
-    let maps = MapKind::ALL
+    warped.alignment.time_scaling = TimeScaling::Warp(TimeWarp { n_segments: 4, max_slope: 1.5 });
+    let maps = ContextMapKind::ALL
         .into_iter()
-        .map(|kind| (reaches.to_vec(), FitOptions { map: MapChoice::Given(kind), ..options(Kind::Discrete) }));
+        .map(|kind| (reaches.to_vec(), FitOptions { map: MapSelection::Given(kind), ..options(Kind::Discrete) }));
     let others = [
         ([0.1, 0.3, 0.4, 0.6, 0.8, 1.0].map(labelled).to_vec(), warped),
         ([0.0, 0.1, 0.25, 0.4].map(cycle).to_vec(), options(Kind::Rhythmic)),
@@ -111,7 +111,7 @@ pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
 
 fn options(kind: Kind) -> FitOptions {
     FitOptions {
-        styles: StyleCount::Given(2).into(),
+        styles: Truncation::Given(2).into(),
         basis: Basis::NGnet(NGnet { n_basis: 10, ..NGnet::default() }),
         ..FitOptions::new(kind)
     }

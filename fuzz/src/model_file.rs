@@ -10,7 +10,7 @@ use pdmp_core::model::Derivative;
 use pdmp_core::motion::jacobian;
 use pdmp_core::motion::prediction_band;
 use pdmp_core::motion::rollouts;
-use pdmp_core::motion::{BatchConditions, Timing, Variable};
+use pdmp_core::motion::{BatchConditions, TimeGrid, WithRespectTo};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, Controller, Model};
@@ -28,7 +28,7 @@ const ORDER: [&str; 19] = [
     "starts",
     "anchors",
     "breaks",
-    "timings",
+    "segment_durations",
     "singular_values",
     "dof_scale",
     "ranges",
@@ -260,19 +260,19 @@ fn exercise(model: &Arc<Model>) {
     let again = Model::from_bytes(&model.to_bytes().expect("a loaded model cannot be saved"));
     assert!(again.is_ok(), "a loaded and saved model cannot be loaded: {again:?}");
     let nominal = Conditions::default();
-    let timing = Timing { dt: model.duration() / 50.0, duration: None };
-    if let Ok(trajectory) = rollout(model.primitive(), &nominal, timing) {
+    let grid = TimeGrid { dt: model.duration() / 50.0, duration: None };
+    if let Ok(trajectory) = rollout(model.primitive(), &nominal, grid) {
         finite("rollout", trajectory.position.iter().chain(&trajectory.velocity).chain(&trajectory.acceleration));
     }
     if let Ok(jacobian) =
-        jacobian(model.primitive(), Variable::Style, Derivative::Position, &nominal, timing, &mut |_| Ok(()))
+        jacobian(model.primitive(), WithRespectTo::Style, Derivative::Position, &nominal, grid, &mut |_| Ok(()))
     {
         finite("Jacobian", &jacobian);
     }
     let styles = Array2::zeros((2, model.n_styles()));
     let batch = BatchConditions { styles, ..Default::default() };
     if let Ok(outputs) =
-        rollouts(model.primitive(), batch, timing, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(()))
+        rollouts(model.primitive(), batch, grid, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(()))
     {
         outputs.iter().for_each(|output| finite("batch", output));
     }
@@ -281,14 +281,14 @@ fn exercise(model: &Arc<Model>) {
     let (Some(map), Some(contexts)) = (model.map(), &demonstrated.contexts) else { return };
     for row in contexts.rows().into_iter().take(2) {
         let Ok(prediction) = map.context(&row.to_vec()).and_then(|context| model.predict(&context)) else { continue };
-        let Conditions { style, timing: times, .. } = &prediction.conditions;
+        let Conditions { style, segment_durations: times, .. } = &prediction.conditions;
         finite("prediction", style.iter().chain(times).flatten().chain([&prediction.duration]));
         finite("covariance", prediction.covariance.iter().flatten());
         finite("distance", &prediction.outside);
-        if let Ok([lower, upper]) = prediction_band(model, &prediction, 0.9, timing) {
+        if let Ok([lower, upper]) = prediction_band(model, &prediction, 0.9, grid) {
             finite("band", lower.iter().chain(&upper));
         }
-        if let Ok(trajectory) = rollout(model.primitive(), &prediction.conditions, timing) {
+        if let Ok(trajectory) = rollout(model.primitive(), &prediction.conditions, grid) {
             finite("predicted rollout", &trajectory.position);
         }
     }

@@ -98,7 +98,7 @@ impl pdmp_conditions {
             amplitude: unsafe { self.amplitude.as_ref() }.copied(),
             // SAFETY: NULL or valid.
             tau: unsafe { self.tau.as_ref() }.copied(),
-            timing: None,
+            segment_durations: None,
             // SAFETY: NULL or valid.
             phase: unsafe { self.phase.as_ref() }.copied(),
         })

@@ -263,7 +263,7 @@ unsafe fn lay_down(
         numbers.check("numbers", n_conditions(model), "style dimension, two per DoF and one for tau")?;
         let selected = select(model)?;
         let tau = Some(selected.time_constant(model)?);
-        let selected = Conditions { tau, timing: None, ..selected };
+        let selected = Conditions { tau, segment_durations: None, ..selected };
         // SAFETY: style, at most two vectors of the DoFs and tau fit.
         conditions.write(unsafe { pdmp_conditions::put(&selected, numbers.data) });
         Ok(PDMP_OK)

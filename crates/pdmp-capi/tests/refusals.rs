@@ -386,14 +386,14 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
             amplitude: unsafe { told.amplitude.as_ref() }.copied(),
             // SAFETY: as above.
             tau: unsafe { told.tau.as_ref() }.copied(),
-            timing: None,
+            segment_durations: None,
             // SAFETY: as above.
             phase: unsafe { told.phase.as_ref() }.copied(),
         };
         // In C a movement has one time constant.
         let by_tau = |conditions: pdmp_core::Conditions| {
             let tau = Some(conditions.time_constant(&rust).unwrap());
-            pdmp_core::Conditions { tau, timing: None, ..conditions }
+            pdmp_core::Conditions { tau, segment_durations: None, ..conditions }
         };
         for m in 0..demos.len() {
             let mut told = MaybeUninit::uninit();

@@ -7,10 +7,10 @@ pub use crate::validate::LARGEST;
 use crate::validate::{check_matrix, check_number, check_positive, check_time, check_vector};
 
 /// Fewest samples that carry a cubic spline with not-a-knot ends.
-pub const LEAST_SAMPLES: usize = 4;
+pub const MIN_SAMPLES_PER_DEMONSTRATION: usize = 4;
 
 /// Longest name or unit of a DoF, in bytes.
-const LONGEST_NAME: usize = 1000;
+const MAX_NAME_LENGTH: usize = 1000;
 
 /// When the samples of a demonstration were taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,8 +79,8 @@ impl Demonstration {
         if n_dofs == 0 {
             return Err(Error::Arguments("position has no DoFs: pass an array of shape (T, D) with D of at least 1"));
         }
-        if found < LEAST_SAMPLES {
-            return Err(Error::Samples { found, least: LEAST_SAMPLES });
+        if found < MIN_SAMPLES_PER_DEMONSTRATION {
+            return Err(Error::Samples { found, least: MIN_SAMPLES_PER_DEMONSTRATION });
         }
         match &sampling {
             Sampling::Unknown => {}
@@ -120,7 +120,7 @@ impl Demonstration {
             let (expected, found) = (self.n_dofs(), names.len());
             return Err(Error::Length { name: "names", expected, found, per: "DoF" });
         }
-        if names.iter().enumerate().any(|(d, name)| names[..d].contains(name) || name.len() > LONGEST_NAME) {
+        if names.iter().enumerate().any(|(d, name)| names[..d].contains(name) || name.len() > MAX_NAME_LENGTH) {
             return Err(Error::Arguments("names must differ from each other and have at most 1000 bytes each"));
         }
         self.names = Some(names);
@@ -136,7 +136,7 @@ impl Demonstration {
             let (expected, found) = (self.n_dofs(), units.len());
             return Err(Error::Length { name: "units", expected, found, per: "DoF" });
         }
-        if units.iter().any(|unit| unit.len() > LONGEST_NAME) {
+        if units.iter().any(|unit| unit.len() > MAX_NAME_LENGTH) {
             return Err(Error::Arguments("units must have at most 1000 bytes each"));
         }
         self.units = Some(units);

@@ -181,10 +181,12 @@ pub enum Error {
         end: f64,
     },
     /// More segments of a warp than the samples tell apart.
-    #[error("segments = {segments}: must lie between 1 and {most}, half the fewest samples of a demonstration or 1000")]
+    #[error(
+        "n_segments = {n_segments}: must lie between 1 and {most}, half the fewest samples of a demonstration or 1000"
+    )]
     Segments {
         /// The segments asked for.
-        segments: usize,
+        n_segments: usize,
         /// The most that are possible.
         most: usize,
     },

@@ -10,19 +10,19 @@ use ndarray::{Array2, Array3, Axis, array, s};
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::batch;
 use pdmp_core::motion::rollouts;
-use pdmp_core::motion::{self, BatchConditions, Rows, Timing, Trajectory, Variable};
+use pdmp_core::motion::{self, BatchConditions, PerMovement, TimeGrid, Trajectory, WithRespectTo};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, Controller, Error, Kind, Model};
 use proptest::prelude::*;
 
-fn all(conditions: &BatchConditions, model: &Arc<Model>, timing: Timing) -> Vec<Array3<f64>> {
+fn all(conditions: &BatchConditions, model: &Arc<Model>, grid: TimeGrid) -> Vec<Array3<f64>> {
     let (highest, threads) = (Derivative::Acceleration, Threads::ONE);
-    rollouts(model.primitive(), conditions.clone(), timing, highest, threads, &mut |_| Ok(())).unwrap()
+    rollouts(model.primitive(), conditions.clone(), grid, highest, threads, &mut |_| Ok(())).unwrap()
 }
 
-fn jacobian(variable: Variable, order: Derivative, model: &Arc<Model>, conditions: &Conditions) -> Array3<f64> {
-    motion::jacobian(model.primitive(), variable, order, conditions, timing(0.01, 1.5), &mut |_| Ok(())).unwrap()
+fn jacobian(variable: WithRespectTo, order: Derivative, model: &Arc<Model>, conditions: &Conditions) -> Array3<f64> {
+    motion::jacobian(model.primitive(), variable, order, conditions, grid(0.01, 1.5), &mut |_| Ok(())).unwrap()
 }
 
 fn of(trajectory: &Trajectory, order: Derivative) -> &Array2<f64> {
@@ -45,18 +45,18 @@ fn each(n: usize) -> impl Strategy<Value = Array2<f64>> {
 }
 
 /// None, one for all, or one for each.
-fn rows(n: usize) -> impl Strategy<Value = Option<Rows>> {
+fn rows(n: usize) -> impl Strategy<Value = Option<PerMovement>> {
     prop_oneof![
         Just(None),
-        each(n).prop_map(|rows| Some(Rows::All(rows.row(0).to_vec()))),
-        each(n).prop_map(|rows| Some(Rows::Each(rows))),
+        each(n).prop_map(|rows| Some(PerMovement::All(rows.row(0).to_vec()))),
+        each(n).prop_map(|rows| Some(PerMovement::Each(rows))),
     ]
 }
 
-fn row(rows: &Option<Rows>, b: usize) -> Option<Vec<f64>> {
+fn row(rows: &Option<PerMovement>, b: usize) -> Option<Vec<f64>> {
     rows.as_ref().map(|rows| match rows {
-        Rows::All(row) => row.clone(),
-        Rows::Each(rows) => rows.row(b).to_vec(),
+        PerMovement::All(row) => row.clone(),
+        PerMovement::Each(rows) => rows.row(b).to_vec(),
     })
 }
 
@@ -73,9 +73,9 @@ proptest! {
     ) {
         for model in [&*REACH, &*CYCLE] {
             let (kind, n) = (model.kind(), model.n_dofs());
-            let cut = |rows: &Option<Rows>| rows.clone().map(|rows| match rows {
-                Rows::All(row) => Rows::All(row[..n].to_vec()),
-                Rows::Each(rows) => Rows::Each(rows.slice(s![.., ..n]).to_owned()),
+            let cut = |rows: &Option<PerMovement>| rows.clone().map(|rows| match rows {
+                PerMovement::All(row) => PerMovement::All(row[..n].to_vec()),
+                PerMovement::Each(rows) => PerMovement::Each(rows.slice(s![.., ..n]).to_owned()),
             });
             let (centres, starts, velocities) = (cut(&rows.0), cut(&rows.1), cut(&rows.2));
             let discrete = kind == Kind::Discrete;
@@ -90,7 +90,7 @@ proptest! {
                 tau,
             };
             let duration = length * factor * model.duration();
-            let made = all(&conditions, model, timing(dt, duration));
+            let made = all(&conditions, model, grid(dt, duration));
             for b in 0..3 {
                 let one = Conditions {
                     style: Some(styles.row(b).to_vec()),
@@ -100,7 +100,7 @@ proptest! {
                     velocity: row(&velocities, b),
                     amplitude: conditions.amplitude,
                     tau,
-                    timing: None,
+                    segment_durations: None,
                     phase: None,
                 };
                 let mut controller = Controller::new(model.primitive(), dt, &one, Some(0.0)).unwrap();
@@ -126,11 +126,11 @@ proptest! {
     #[test]
     fn division_of_the_work_leaves_the_bits(size in 1usize..50, n_threads in 1usize..5, samples in 1usize..900) {
         let styles = Array2::from_shape_fn((41, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
-        let velocities = Some(Rows::Each(Array2::from_shape_fn((41, 3), |(b, d)| (b * d) as f64 * 0.01)));
+        let velocities = Some(PerMovement::Each(Array2::from_shape_fn((41, 3), |(b, d)| (b * d) as f64 * 0.01)));
         let conditions = BatchConditions { styles, velocities, ..BatchConditions::default() };
-        let timing = timing(1e-3, (samples - 1) as f64 * 1e-3);
-        let expected = all(&conditions, &REACH, timing);
-        let batch = batch(REACH.primitive(), conditions, timing, &mut |_| Ok(())).unwrap();
+        let grid = grid(1e-3, (samples - 1) as f64 * 1e-3);
+        let expected = all(&conditions, &REACH, grid);
+        let batch = batch(REACH.primitive(), conditions, grid, &mut |_| Ok(())).unwrap();
         let mut ends = vec![0];
         for chunk in batch.chunks(size).unwrap() {
             prop_assert_eq!(chunk.start, *ends.last().unwrap());
@@ -152,18 +152,18 @@ proptest! {
 fn large_batches_are_the_same_on_several_threads() {
     let styles = Array2::from_shape_fn((2000, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
     let batch =
-        batch(REACH.primitive(), BatchConditions { styles, ..Default::default() }, timing(1e-3, 0.4), &mut |_| Ok(()))
+        batch(REACH.primitive(), BatchConditions { styles, ..Default::default() }, grid(1e-3, 0.4), &mut |_| Ok(()))
             .unwrap();
     let expected = batch.rollouts(0..2000, Derivative::Position, Threads::ONE, &mut |_| Ok(())).unwrap();
     let mut shares = Vec::new();
     let threads = Threads::new(3).unwrap();
     let mut strided = Array3::zeros((401, 2000, 6));
     let output = strided.slice_mut(s![.., .., ..;2]).permuted_axes([1, 0, 2]);
-    let mut proceed = |share| {
+    let mut progress = |share| {
         shares.push(share);
         Ok(())
     };
-    batch.write(0..2000, vec![output], threads, &mut proceed).unwrap();
+    batch.write(0..2000, vec![output], threads, &mut progress).unwrap();
     assert_eq!(strided.slice(s![.., .., ..;2]).permuted_axes([1, 0, 2]), expected[0]);
     assert!(strided.slice(s![.., .., 1..;2]).iter().all(|x| *x == 0.0));
     assert!(shares[0] == 0.0 && shares.is_sorted() && shares.iter().all(|share| (0.0..1.0).contains(share)));
@@ -176,7 +176,7 @@ fn batches_can_be_interrupted() {
     let batch = motion::batch(
         REACH.primitive(),
         BatchConditions { styles, ..Default::default() },
-        timing(1e-3, 1.0),
+        grid(1e-3, 1.0),
         &mut |_| Ok(()),
     )
     .unwrap();
@@ -187,7 +187,7 @@ fn batches_can_be_interrupted() {
     let stopped = motion::batch(
         new.primitive(),
         BatchConditions { styles: array![[0.0, 0.0]], ..Default::default() },
-        timing(1e-3, 1.0),
+        grid(1e-3, 1.0),
         &mut |_| Err(Error::Interrupted),
     );
     assert!(matches!(stopped, Err(Error::Interrupted)));
@@ -201,12 +201,12 @@ fn remembered_responses_have_the_same_bits() {
         let conditions = BatchConditions { styles: styles.clone(), ..Default::default() };
         let slower = BatchConditions { tau: Some(other), ..conditions.clone() };
         let fresh = || Arc::new(Model::clone(model));
-        let (expected, expected_slower) = [&conditions, &slower].map(|c| all(c, &fresh(), timing(0.01, 1.0))).into();
+        let (expected, expected_slower) = [&conditions, &slower].map(|c| all(c, &fresh(), grid(0.01, 1.0))).into();
         let used = fresh();
         for k in 0..40 {
-            assert_eq!(all(&conditions, &used, timing(0.01, 1.0)), expected);
-            assert_eq!(all(&slower, &used, timing(0.01, 1.0)), expected_slower);
-            all(&conditions, &used, timing(0.01, 0.1 + 0.01 * k as f64));
+            assert_eq!(all(&conditions, &used, grid(0.01, 1.0)), expected);
+            assert_eq!(all(&slower, &used, grid(0.01, 1.0)), expected_slower);
+            all(&conditions, &used, grid(0.01, 0.1 + 0.01 * k as f64));
         }
     }
 }
@@ -226,23 +226,23 @@ fn jacobians_are_differences_of_rollouts() {
                 velocity,
                 amplitude: Some(if discrete { 1.0 } else { 0.7 }),
                 tau: Some(1.4 * model.tau()),
-                timing: None,
+                segment_durations: None,
                 phase: None,
             };
-            let rollout = |conditions: &Conditions| rollout(model.primitive(), conditions, timing(0.01, 1.5)).unwrap();
-            let centre = if discrete { Variable::Goal } else { Variable::Anchor };
-            for variable in [Variable::Style, centre, Variable::Start] {
-                if variable == Variable::Start && base.start.is_none() && !discrete {
+            let rollout = |conditions: &Conditions| rollout(model.primitive(), conditions, grid(0.01, 1.5)).unwrap();
+            let centre = if discrete { WithRespectTo::Goal } else { WithRespectTo::Anchor };
+            for variable in [WithRespectTo::Style, centre, WithRespectTo::Start] {
+                if variable == WithRespectTo::Start && base.start.is_none() && !discrete {
                     continue;
                 }
-                let entries = if variable == Variable::Style { 2 } else { n };
+                let entries = if variable == WithRespectTo::Style { 2 } else { n };
                 for entry in 0..entries {
                     let mut moved = base.clone();
                     let vector = match variable {
-                        Variable::Style => &mut moved.style,
-                        Variable::Goal => &mut moved.goal,
-                        Variable::Anchor => &mut moved.anchor,
-                        Variable::Start => &mut moved.start,
+                        WithRespectTo::Style => &mut moved.style,
+                        WithRespectTo::Goal => &mut moved.goal,
+                        WithRespectTo::Anchor => &mut moved.anchor,
+                        WithRespectTo::Start => &mut moved.start,
                     };
                     let nominal = || model.demonstrated().starts.row(model.demonstrated().nominal).to_vec();
                     vector.get_or_insert_with(nominal)[entry] += 0.5;
@@ -268,12 +268,12 @@ fn variables_of_the_other_kind_are_refused() {
             variable,
             Derivative::Position,
             &Conditions::default(),
-            timing(0.1, 1.0),
+            grid(0.1, 1.0),
             &mut |_| Ok(()),
         )
     };
-    assert!(matches!(ask(&REACH, Variable::Anchor), Err(Error::Kind { name: "anchor", .. })));
-    assert!(matches!(ask(&CYCLE, Variable::Goal), Err(Error::Kind { name: "goal", .. })));
+    assert!(matches!(ask(&REACH, WithRespectTo::Anchor), Err(Error::Kind { name: "anchor", .. })));
+    assert!(matches!(ask(&CYCLE, WithRespectTo::Goal), Err(Error::Kind { name: "goal", .. })));
     assert!(matches!(Derivative::of_order("derivative", 3), Err(Error::Range { name: "derivative", .. })));
 }
 
@@ -282,7 +282,7 @@ fn variables_of_the_other_kind_are_refused() {
 fn bad_batches_are_refused() {
     let good = || BatchConditions { styles: Array2::zeros((4, 2)), ..Default::default() };
     let refused = |model: &Arc<Model>, conditions| {
-        batch(model.primitive(), conditions, timing(0.1, 1.0), &mut |_| Ok(())).unwrap_err().to_string()
+        batch(model.primitive(), conditions, grid(0.1, 1.0), &mut |_| Ok(())).unwrap_err().to_string()
     };
     let mut nan = Array2::zeros((4, 3));
     nan[[2, 1]] = f64::NAN;
@@ -290,28 +290,31 @@ fn bad_batches_are_refused() {
         (BatchConditions { styles: Array2::zeros((4, 3)), ..good() }, "styles has length 3, expected 2"),
         (BatchConditions { styles: array![[0.0, 1e101]], ..good() }, "styles[0, 1] = 1e101"),
         (
-            BatchConditions { goals: Some(Rows::Each(Array2::zeros((3, 3)))), ..good() },
+            BatchConditions { goals: Some(PerMovement::Each(Array2::zeros((3, 3)))), ..good() },
             "goals has 3 rows, but there are 4",
         ),
         (
-            BatchConditions { starts: Some(Rows::Each(Array2::zeros((4, 2)))), ..good() },
+            BatchConditions { starts: Some(PerMovement::Each(Array2::zeros((4, 2)))), ..good() },
             "starts has length 2, expected 3",
         ),
-        (BatchConditions { velocities: Some(Rows::Each(nan)), ..good() }, "velocities[2, 1] = NaN"),
+        (BatchConditions { velocities: Some(PerMovement::Each(nan)), ..good() }, "velocities[2, 1] = NaN"),
         (
-            BatchConditions { velocities: Some(Rows::All(vec![0.0; 4])), ..good() },
+            BatchConditions { velocities: Some(PerMovement::All(vec![0.0; 4])), ..good() },
             "velocities has length 4, expected 3",
         ),
-        (BatchConditions { anchors: Some(Rows::All(vec![0.0; 3])), ..good() }, "anchors does not apply to a discrete"),
+        (
+            BatchConditions { anchors: Some(PerMovement::All(vec![0.0; 3])), ..good() },
+            "anchors does not apply to a discrete",
+        ),
         (BatchConditions { amplitude: Some(2.0), ..good() }, "amplitude does not apply"),
         (BatchConditions { tau: Some(-1.0), ..good() }, "tau = -1"),
     ] {
         let found = refused(&REACH, conditions);
         assert!(found.starts_with(message), "{found}");
     }
-    let goals = Some(Rows::All(vec![0.0; 2]));
+    let goals = Some(PerMovement::All(vec![0.0; 2]));
     assert!(refused(&CYCLE, BatchConditions { goals, ..good() }).ends_with("they move about anchors; set anchors"));
-    let batch = batch(REACH.primitive(), good(), timing(0.1, 1.0), &mut |_| Ok(())).unwrap();
+    let batch = batch(REACH.primitive(), good(), grid(0.1, 1.0), &mut |_| Ok(())).unwrap();
     assert!(matches!(batch.chunks(0), Err(Error::Range { name: "size", .. })));
     let (mut narrow, mut good) = (Array3::zeros((4, 11, 2)), Array3::zeros((4, 11, 3)));
     for (movements, output) in [(0..4, narrow.view_mut()), (1..5, good.view_mut())] {
@@ -323,7 +326,7 @@ fn bad_batches_are_refused() {
 #[test]
 fn extreme_batches_are_finite() {
     for model in [&*REACH, &*CYCLE] {
-        let huge = Some(Rows::All(vec![1e150; model.n_dofs()]));
+        let huge = Some(PerMovement::All(vec![1e150; model.n_dofs()]));
         let conditions = BatchConditions {
             styles: array![[1e100, -1e100], [0.0, 0.0]],
             starts: huge.clone(),
@@ -331,8 +334,8 @@ fn extreme_batches_are_finite() {
             amplitude: Some(if model.kind() == Kind::Discrete { 1.0 } else { 1e150 }),
             ..Default::default()
         };
-        assert!(all(&conditions, model, timing(0.01, 2.0)).iter().flatten().all(|x| x.is_finite()));
+        assert!(all(&conditions, model, grid(0.01, 2.0)).iter().flatten().all(|x| x.is_finite()));
     }
     let none = BatchConditions { styles: Array2::zeros((0, 2)), ..Default::default() };
-    assert_eq!(all(&none, &REACH, timing(0.1, 1.0))[0].dim(), (0, 11, 3));
+    assert_eq!(all(&none, &REACH, grid(0.1, 1.0))[0].dim(), (0, 11, 3));
 }

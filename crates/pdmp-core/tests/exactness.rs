@@ -9,7 +9,7 @@ use std::sync::Arc;
 use common::*;
 use ndarray::Array2;
 use pdmp_core::dynamics::Canonical;
-use pdmp_core::learning::{StyleCount, TransportChoice};
+use pdmp_core::learning::{TransportSelection, Truncation};
 use pdmp_core::{Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Sampling};
 
 /// ω of a filter that has gone 99 % of its way after `transition` seconds: (1 + s)exp(−s) = 0.01.
@@ -160,13 +160,13 @@ fn ticks_solve_the_equations() {
     };
     let seven = reaches().iter().map(wide).collect();
     let cases = [
-        (Kind::Discrete, reaches(), TransportChoice::Learnt),
-        (Kind::Discrete, reaches(), TransportChoice::Immediate),
-        (Kind::Discrete, seven, TransportChoice::Learnt),
-        (Kind::Rhythmic, cycles(), TransportChoice::Learnt),
+        (Kind::Discrete, reaches(), TransportSelection::FitSummary),
+        (Kind::Discrete, reaches(), TransportSelection::Immediate),
+        (Kind::Discrete, seven, TransportSelection::FitSummary),
+        (Kind::Rhythmic, cycles(), TransportSelection::FitSummary),
     ];
     for (kind, demos, transport) in cases {
-        let styles = StyleCount::Given(2).into();
+        let styles = Truncation::Given(2).into();
         let model = learn(&demos, &FitOptions { styles, transport, ..options(kind) });
         for tau in [model.tau(), 0.3 / model.duration() * model.tau()] {
             for live in [false, true] {

@@ -6,7 +6,7 @@ mod common;
 use std::sync::{Arc, LazyLock};
 
 use common::*;
-use pdmp_core::motion::Timing;
+use pdmp_core::motion::TimeGrid;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, Error, Kind, Model};
 use proptest::prelude::*;
@@ -22,7 +22,7 @@ fn a_saved_model_moves_alike() {
         let path = folder.path().join("model.safetensors");
         model.save(&path).unwrap();
         let loaded = Arc::new(Model::load(&path).unwrap());
-        let timing = Timing { dt: 0.003, duration: Some(2.0) };
+        let grid = TimeGrid { dt: 0.003, duration: Some(2.0) };
         let conditions = match model.predict(&[0.2]) {
             Ok(prediction) => {
                 assert_eq!(prediction, loaded.predict(&[0.2]).unwrap());
@@ -31,8 +31,8 @@ fn a_saved_model_moves_alike() {
             Err(_) => Conditions::default(),
         };
         assert_eq!(
-            rollout(model.primitive(), &conditions, timing).unwrap(),
-            rollout(loaded.primitive(), &conditions, timing).unwrap()
+            rollout(model.primitive(), &conditions, grid).unwrap(),
+            rollout(loaded.primitive(), &conditions, grid).unwrap()
         );
         assert_eq!(model.demonstrated(), loaded.demonstrated());
         assert_eq!(model.learnt(), loaded.learnt());

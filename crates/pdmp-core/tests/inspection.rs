@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use ndarray::{Array2, s};
-use pdmp_core::learning::TransportChoice;
+use pdmp_core::learning::TransportSelection;
 use pdmp_core::preprocessing::inspection::{Finding, Padding, inspect, unwound};
 use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
 
@@ -223,7 +223,7 @@ fn angles_that_wrap_are_found() {
 fn gains_whose_transients_the_samples_do_not_resolve_are_found() {
     let found = |alpha_z: f64, n_samples: Option<usize>| {
         // Where the goal acts at once a movement starts with a transient of the gains' rate.
-        let transport = TransportChoice::Immediate;
+        let transport = TransportSelection::Immediate;
         let mut options = FitOptions { alpha_z, transport, ..FitOptions::new(Kind::Discrete) };
         options.alignment.n_samples = n_samples;
         fit(&demos(reaches()), &options).unwrap().learnt().findings.clone()

@@ -7,8 +7,8 @@ use common::*;
 use ndarray::Array2;
 use pdmp_core::dynamics::Canonical;
 use pdmp_core::learning::fit_with;
-use pdmp_core::learning::{DofScale, StyleCount, style_of};
-use pdmp_core::motion::Timing;
+use pdmp_core::learning::{DofScaling, Truncation, style_of};
+use pdmp_core::motion::TimeGrid;
 use pdmp_core::rollout;
 use pdmp_core::{Error, Kind, Sampling, fit};
 
@@ -19,7 +19,7 @@ fn every_reach_is_reproduced() {
     for basis in [options(Kind::Discrete).basis, gp()] {
         let model = learn(
             &demos,
-            &pdmp_core::FitOptions { basis, styles: StyleCount::Given(5).into(), ..options(Kind::Discrete) },
+            &pdmp_core::FitOptions { basis, styles: Truncation::Given(5).into(), ..options(Kind::Discrete) },
         );
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
@@ -35,7 +35,7 @@ fn every_cycle_is_reproduced_without_a_transient() {
     for basis in [options(Kind::Rhythmic).basis, gp()] {
         let model = learn(
             &demos,
-            &pdmp_core::FitOptions { basis, styles: StyleCount::Given(4).into(), ..options(Kind::Rhythmic) },
+            &pdmp_core::FitOptions { basis, styles: Truncation::Given(4).into(), ..options(Kind::Rhythmic) },
         );
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
@@ -49,7 +49,7 @@ fn every_cycle_is_reproduced_without_a_transient() {
 fn spectrum_rule_finds_the_intrinsic_dimension() {
     // y is affine in (h, h²): three dimensions at the most.
     let model =
-        learn(&reaches(), &pdmp_core::FitOptions { styles: StyleCount::Given(5).into(), ..options(Kind::Discrete) });
+        learn(&reaches(), &pdmp_core::FitOptions { styles: Truncation::Given(5).into(), ..options(Kind::Discrete) });
     let sigma = &model.learnt().singular_values;
     assert!(sigma[2] > 1e-6 * sigma[0] && sigma[3] < 1e-6 * sigma[0], "{sigma:?}");
 }
@@ -97,10 +97,10 @@ fn own_time_stamps_are_respected() {
     let stamped = pdmp_core::Demonstration::new(position, Sampling::Stamped { time }).unwrap();
     let model = learn(&even, &options(Kind::Discrete));
     let other = learn(&[stamped], &options(Kind::Discrete));
-    let timing = Timing { dt: 0.01, duration: Some(1.0) };
+    let grid = TimeGrid { dt: 0.01, duration: Some(1.0) };
     let (a, b) = (
-        rollout(model.primitive(), &Default::default(), timing).unwrap(),
-        rollout(other.primitive(), &Default::default(), timing).unwrap(),
+        rollout(model.primitive(), &Default::default(), grid).unwrap(),
+        rollout(other.primitive(), &Default::default(), grid).unwrap(),
     );
     assert!((a.position - b.position).iter().all(|d| d.abs() < 1e-5));
 }
@@ -111,7 +111,7 @@ fn own_time_stamps_are_respected() {
 fn style_of_finds_demonstrations_again() {
     let demos = reaches();
     let model =
-        learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(3).into(), ..options(Kind::Discrete) });
+        learn(&demos, &pdmp_core::FitOptions { styles: Truncation::Given(3).into(), ..options(Kind::Discrete) });
     for (m, demo) in demos.iter().enumerate() {
         let style = style_of(&model, demo, None, None, None).unwrap();
         for (j, s) in style.iter().enumerate() {
@@ -125,7 +125,7 @@ fn style_of_finds_demonstrations_again() {
 fn style_of_finds_a_cycle_in_any_phase() {
     let demos = cycles();
     let model =
-        learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(2).into(), ..options(Kind::Rhythmic) });
+        learn(&demos, &pdmp_core::FitOptions { styles: Truncation::Given(2).into(), ..options(Kind::Rhythmic) });
     for (m, demo) in demos.iter().enumerate() {
         let expected = style_of(&model, demo, None, None, None).unwrap();
         let n = demo.n_samples();
@@ -146,7 +146,7 @@ fn style_of_finds_a_cycle_in_any_phase() {
 fn style_of_refuses_what_the_model_does_not_describe() {
     let demos = reaches();
     let model =
-        learn(&demos, &pdmp_core::FitOptions { styles: StyleCount::Given(2).into(), ..options(Kind::Discrete) });
+        learn(&demos, &pdmp_core::FitOptions { styles: Truncation::Given(2).into(), ..options(Kind::Discrete) });
     let changed = |change: &dyn Fn(usize, f64) -> f64| {
         let position =
             Array2::from_shape_fn(demos[1].position().dim(), |(c, d)| change(c, demos[1].position()[[c, d]]));
@@ -160,7 +160,7 @@ fn style_of_refuses_what_the_model_does_not_describe() {
 
     let equal = vec![demos[1].clone(); 4];
     let model =
-        learn(&equal, &pdmp_core::FitOptions { styles: StyleCount::Given(3).into(), ..options(Kind::Discrete) });
+        learn(&equal, &pdmp_core::FitOptions { styles: Truncation::Given(3).into(), ..options(Kind::Discrete) });
     let style = style_of(&model, &equal[0], None, None, None).unwrap();
     assert!(style.iter().all(|s| s.abs() <= 1.0), "{style:?}");
     let style = style_of(&model, &demos[2], None, None, None);
@@ -191,12 +191,13 @@ fn a_fit_can_be_interrupted() {
     use pdmp_core::learning::Stage;
 
     for stop in [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile] {
-        let mut proceed = |stage, _| if stage == stop { Err(Error::Interrupted) } else { Ok(()) };
+        let mut progress = |stage, _| if stage == stop { Err(Error::Interrupted) } else { Ok(()) };
         let mut options = pdmp_core::FitOptions { basis: gp(), ..options(Kind::Discrete) };
         if stop == Stage::Align {
-            options.alignment.time_scaling = pdmp_core::learning::TimeScaling::Warp(pdmp_core::model::Warp::default());
+            options.alignment.time_scaling =
+                pdmp_core::learning::TimeScaling::Warp(pdmp_core::model::TimeWarp::default());
         }
-        assert!(matches!(fit_with(&reaches(), &options, &mut proceed), Err(Error::Interrupted)));
+        assert!(matches!(fit_with(&reaches(), &options, &mut progress), Err(Error::Interrupted)));
     }
 }
 
@@ -223,8 +224,8 @@ fn degenerate_demonstrations_are_learnt() {
             let options = pdmp_core::FitOptions { basis, ..options(Kind::Discrete) };
             let model = learn(demos, &options);
             for (m, demo) in demos.iter().enumerate() {
-                let timing = Timing { dt: 0.01, duration: None };
-                let found = rollout(model.primitive(), &conditions_of(&model, m), timing).unwrap().position;
+                let grid = TimeGrid { dt: 0.01, duration: None };
+                let found = rollout(model.primitive(), &conditions_of(&model, m), grid).unwrap().position;
                 let shown = demo.position();
                 let size = shown.iter().fold(0.0f64, |a, b| a.max(b.abs()));
                 for d in 0..found.ncols() {
@@ -236,7 +237,7 @@ fn degenerate_demonstrations_are_learnt() {
         }
     }
     let model = learn(&[still(0.7)], &options(Kind::Discrete));
-    let found = rollout(model.primitive(), &Default::default(), Timing { dt: 0.01, duration: Some(3.0) }).unwrap();
+    let found = rollout(model.primitive(), &Default::default(), TimeGrid { dt: 0.01, duration: Some(3.0) }).unwrap();
     assert!(found.position.rows().into_iter().all(|y| y.to_vec() == [0.7, 1.7]), "the model holds still");
 }
 
@@ -252,14 +253,14 @@ fn dof_scale_weighs_units_and_keeps_the_movement() {
         })
         .collect();
     let scaled = pdmp_core::FitOptions {
-        dof_scale: DofScale::Range,
-        styles: StyleCount::Given(5).into(),
+        dof_scale: DofScaling::Range,
+        styles: Truncation::Given(5).into(),
         ..options(Kind::Discrete)
     };
     let model = learn(&demos, &scaled);
     for (m, demo) in demos.iter().enumerate() {
-        let timing = Timing { dt: 0.01, duration: None };
-        let found = rollout(model.primitive(), &conditions_of(&model, m), timing).unwrap().position;
+        let grid = TimeGrid { dt: 0.01, duration: None };
+        let found = rollout(model.primitive(), &conditions_of(&model, m), grid).unwrap().position;
         let last = found.nrows() - 1;
         for c in 0..=last {
             assert!((found[[c, 2]] - demo.position()[[c, 2]]).abs() < 1e-4);
@@ -279,6 +280,6 @@ fn bad_demonstrations_are_refused_by_name() {
     assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
     assert!(message(&[], &options).contains("at least one demonstration"));
     assert!(message(&demos[1..], &options).contains("pass dt="));
-    let options = pdmp_core::FitOptions { styles: StyleCount::Given(2).into(), ..options };
+    let options = pdmp_core::FitOptions { styles: Truncation::Given(2).into(), ..options };
     assert!(message(&demos[..1], &options).contains("n_styles = 2: must lie between 1 and 1"));
 }

@@ -6,7 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use common::*;
-use pdmp_core::motion::Timing;
+use pdmp_core::motion::TimeGrid;
 use pdmp_core::motion::rollout_with;
 use pdmp_core::rollout;
 use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
@@ -36,7 +36,7 @@ proptest! {
     ) {
         let conditions =
             Conditions { style: Some(style), goal: Some(goal.clone()), start: Some(start), ..Default::default() };
-        let end = rollout(REACH.primitive(), &conditions, timing(0.01, 6.0)).unwrap();
+        let end = rollout(REACH.primitive(), &conditions, grid(0.01, 6.0)).unwrap();
         prop_assert!(distance(end.position.row(600).as_slice().unwrap(), &goal) < 1e-6);
         prop_assert!(end.velocity.row(600).iter().all(|v| v.abs() < 1e-6));
     }
@@ -46,8 +46,8 @@ proptest! {
     fn tau_leaves_the_path(factor in 0.2..5.0f64) {
         for model in [&*REACH, &*CYCLE] {
             let slow = Conditions { tau: Some(factor * model.tau()), ..Default::default() };
-            let a = rollout(model.primitive(), &Conditions::default(), timing(0.01, 1.5)).unwrap();
-            let b = rollout(model.primitive(), &slow, timing(0.01 * factor, 1.5 * factor)).unwrap();
+            let a = rollout(model.primitive(), &Conditions::default(), grid(0.01, 1.5)).unwrap();
+            let b = rollout(model.primitive(), &slow, grid(0.01 * factor, 1.5 * factor)).unwrap();
             prop_assert!((&a.position - &b.position).iter().all(|d| d.abs() < 1e-9));
             prop_assert!((&a.velocity - &b.velocity * factor).iter().all(|d| d.abs() < 1e-8));
         }
@@ -57,9 +57,9 @@ proptest! {
     #[test]
     fn amplitude_scales_the_oscillation(amplitude in 0.0..3.0f64, anchor in prop::collection::vec(-5.0..5.0f64, 2)) {
         let conditions = Conditions { anchor: Some(anchor.clone()), ..Default::default() };
-        let one = rollout(CYCLE.primitive(), &conditions, timing(0.01, 2.0)).unwrap().position;
+        let one = rollout(CYCLE.primitive(), &conditions, grid(0.01, 2.0)).unwrap().position;
         let conditions = Conditions { amplitude: Some(amplitude), ..conditions };
-        let scaled = rollout(CYCLE.primitive(), &conditions, timing(0.01, 2.0)).unwrap().position;
+        let scaled = rollout(CYCLE.primitive(), &conditions, grid(0.01, 2.0)).unwrap().position;
         for (one, scaled) in one.rows().into_iter().zip(scaled.rows()) {
             for d in 0..2 {
                 prop_assert!((scaled[d] - anchor[d] - amplitude * (one[d] - anchor[d])).abs() < 1e-12);
@@ -95,7 +95,7 @@ proptest! {
 #[test]
 fn rollout_is_the_repeated_step() {
     for model in [&*REACH, &*CYCLE] {
-        let rollout = rollout(model.primitive(), &Conditions::default(), timing(0.004, 2.0)).unwrap();
+        let rollout = rollout(model.primitive(), &Conditions::default(), grid(0.004, 2.0)).unwrap();
         assert_eq!(rollout.time.len(), 501);
         let mut controller = controller(model, 0.004);
         for k in 0..=500 {
@@ -112,9 +112,9 @@ fn tick_length_hardly_matters() {
     for model in [&*REACH, &*CYCLE] {
         for tau in [model.tau(), 0.3 * model.tau()] {
             let conditions = Conditions { tau: Some(tau), ..Default::default() };
-            let fine = rollout(model.primitive(), &conditions, timing(1e-4, 2.0)).unwrap().position;
+            let fine = rollout(model.primitive(), &conditions, grid(1e-4, 2.0)).unwrap().position;
             for (dt, every, bound) in [(1e-3, 10, 1e-8), (1e-2, 100, 1e-6)] {
-                let coarse = rollout(model.primitive(), &conditions, timing(dt, 2.0)).unwrap().position;
+                let coarse = rollout(model.primitive(), &conditions, grid(dt, 2.0)).unwrap().position;
                 for (k, row) in coarse.rows().into_iter().enumerate() {
                     let error = distance(row.as_slice().unwrap(), fine.row(k * every).as_slice().unwrap());
                     assert!(error <= bound, "dt {dt}, sample {k}: {error:e}");
@@ -210,7 +210,7 @@ fn online_changes_converge_to_the_new_cycle() {
     controller.set_tau(1.3 * CYCLE.tau()).unwrap();
     run(&mut controller, 20_000);
     let at = controller.phase() * 1.3 * CYCLE.tau();
-    let cycle = rollout(CYCLE.primitive(), &target, timing(at, at)).unwrap();
+    let cycle = rollout(CYCLE.primitive(), &target, grid(at, at)).unwrap();
     assert!(distance(controller.position(), cycle.position.row(1).as_slice().unwrap()) < 1e-8);
 }
 
@@ -219,8 +219,8 @@ fn online_changes_converge_to_the_new_cycle() {
 fn limit_cycle_attracts() {
     let off = Conditions { start: Some(vec![40.0, -30.0]), ..Default::default() };
     let (a, b) = (
-        rollout(CYCLE.primitive(), &off, timing(0.01, 4.0)).unwrap(),
-        rollout(CYCLE.primitive(), &Conditions::default(), timing(0.01, 4.0)).unwrap(),
+        rollout(CYCLE.primitive(), &off, grid(0.01, 4.0)).unwrap(),
+        rollout(CYCLE.primitive(), &Conditions::default(), grid(0.01, 4.0)).unwrap(),
     );
     assert_eq!(a.position.row(0).to_vec(), [40.0, -30.0]);
     assert!((&a.position - &b.position).row(400).iter().all(|d| d.abs() < 1e-8));
@@ -232,7 +232,7 @@ fn start_velocity_is_respected() {
     for model in [&*REACH, &*CYCLE] {
         let velocity: Vec<f64> = (0..model.n_dofs()).map(|d| d as f64 - 0.7).collect();
         let conditions = Conditions { velocity: Some(velocity.clone()), ..Default::default() };
-        let rollout = rollout(model.primitive(), &conditions, timing(0.01, 0.1)).unwrap();
+        let rollout = rollout(model.primitive(), &conditions, grid(0.01, 0.1)).unwrap();
         assert!(distance(rollout.velocity.row(0).as_slice().unwrap(), &velocity) < 1e-12);
     }
 }
@@ -246,7 +246,7 @@ fn commands_before_the_first_step_apply_at_once() {
         tau: Some(0.7),
         ..Default::default()
     };
-    let rollout = rollout(REACH.primitive(), &conditions, timing(1e-3, 0.5)).unwrap();
+    let rollout = rollout(REACH.primitive(), &conditions, grid(1e-3, 0.5)).unwrap();
     let mut controller = controller(&REACH, 1e-3);
     controller.set_style(&[0.3, 0.2]).unwrap();
     controller.set_goal(&[1.0, 2.0, 3.0]).unwrap();
@@ -325,8 +325,8 @@ fn ticks_beyond_all_measure_are_refused() {
     for dt in [1e100, 1e160, f64::MAX] {
         let mut controller = controller(&REACH, dt);
         assert!(matches!(controller.step(), Err(Error::Range { name: "dt", .. })));
-        let timing = Timing { dt, duration: Some(f64::MAX) };
-        let _ = rollout(REACH.primitive(), &Conditions::default(), timing);
+        let grid = TimeGrid { dt, duration: Some(f64::MAX) };
+        let _ = rollout(REACH.primitive(), &Conditions::default(), grid);
     }
 }
 
@@ -386,7 +386,7 @@ fn refused_commands_leave_the_last_good_value() {
 fn rollouts_have_the_stated_number_of_samples() {
     for (dt, duration, samples) in [(0.1, 0.3, 4), (0.1, 0.35, 4), (0.01, 1.0, 101), (0.001, 2.0, 2001), (0.7, 0.0, 1)]
     {
-        let rollout = rollout(REACH.primitive(), &Conditions::default(), timing(dt, duration)).unwrap();
+        let rollout = rollout(REACH.primitive(), &Conditions::default(), grid(dt, duration)).unwrap();
         assert_eq!(rollout.time.len(), samples);
     }
 }
@@ -413,7 +413,7 @@ fn rollouts_can_be_interrupted() {
         asked += 1;
         if share < 0.5 { Ok(()) } else { Err(Error::Interrupted) }
     };
-    let stopped = rollout_with(REACH.primitive(), &Conditions::default(), timing(1e-5, 1.0), &mut stop_later);
+    let stopped = rollout_with(REACH.primitive(), &Conditions::default(), grid(1e-5, 1.0), &mut stop_later);
     assert!(matches!(stopped, Err(Error::Interrupted)));
     assert!(asked > 10);
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use ndarray::{Array1, Array2, Axis, concatenate, s};
 use pdmp_core::numerics::Smoothing;
-use pdmp_core::preprocessing::{self, Cycles, Keep, Reason};
+use pdmp_core::preprocessing::{self, CycleOutput, Cycles, RejectionReason};
 use pdmp_core::{Demonstration, FitOptions, Kind, Result, Sampling};
 use proptest::prelude::*;
 
@@ -68,7 +68,7 @@ fn recorded(position: Array2<f64>) -> Demonstration {
 }
 
 fn one(recording: Demonstration) -> Result<Cycles> {
-    preprocessing::cycles(&[recording], None, Keep::Each)
+    preprocessing::cycles(&[recording], None, CycleOutput::Each)
 }
 
 /// Largest jump from the last sample of a cycle to the first, over the largest between neighbours.
@@ -212,7 +212,7 @@ fn cycles_of_all_recordings_begin_in_one_phase() {
     let recordings: Vec<_> = [(1.0, 0.4), (1.2, 3.0), (0.9, 5.5)]
         .map(|(period, phase)| recorded(walk(&even(450), |t| TAU * t / period + phase)))
         .into();
-    let found = preprocessing::cycles(&recordings, None, Keep::Mean).unwrap();
+    let found = preprocessing::cycles(&recordings, None, CycleOutput::Mean).unwrap();
     assert_eq!(found.kept.len(), 3);
     for cycle in &found.kept {
         for (d, y) in pose(0.4).into_iter().enumerate() {
@@ -241,7 +241,7 @@ fn cycles_are_no_denser_than_their_recording() {
     let fast = recorded(walk(&even(450), |t| TAU * t));
     let time: Vec<f64> = (0..150).map(|c| f64::from(c) * 0.03).collect();
     let slow = Demonstration::new(walk(&time, |t| TAU * t), Sampling::Uniform { dt: 0.03 }).unwrap();
-    let found = preprocessing::cycles(&[fast, slow], None, Keep::Each).unwrap();
+    let found = preprocessing::cycles(&[fast, slow], None, CycleOutput::Each).unwrap();
     for cycle in &found.kept {
         assert_eq!(cycle.demo.n_samples(), [100, 33][cycle.recording]);
     }
@@ -255,14 +255,19 @@ fn recordings_without_a_period_are_rejected_among_others() {
     let reaching = recorded(Array2::from_shape_fn((200, 4), |(c, d)| reach(c as f64 / 199.0) * (d as f64 - 1.5)));
     let still = recorded(Array2::ones((80, 4)));
     let walking = recorded(walk(&even(500), |t| TAU * t));
-    let found = preprocessing::cycles(&[reaching.clone(), walking, still.clone()], None, Keep::Each).unwrap();
+    let found = preprocessing::cycles(&[reaching.clone(), walking, still.clone()], None, CycleOutput::Each).unwrap();
     assert!(found.kept.len() >= 4 && found.kept.iter().all(|cycle| cycle.recording == 1));
     let [first, second] = &found.rejected[..] else { panic!("{:?}", found.rejected) };
-    assert!(matches!(first.reason, Reason::Aperiodic { .. }) && first.reason.to_string().contains("no period"));
-    assert_eq!((first.recording, first.start, first.period), (0, 0.0, 1.99));
-    assert_eq!((second.recording, second.reason), (2, Reason::Still));
     assert!(
-        preprocessing::cycles(&[still, reaching], None, Keep::Each).unwrap_err().to_string().contains("stands still")
+        matches!(first.reason, RejectionReason::Aperiodic { .. }) && first.reason.to_string().contains("no period")
+    );
+    assert_eq!((first.recording, first.start, first.period), (0, 0.0, 1.99));
+    assert_eq!((second.recording, second.reason), (2, RejectionReason::Still));
+    assert!(
+        preprocessing::cycles(&[still, reaching], None, CycleOutput::Each)
+            .unwrap_err()
+            .to_string()
+            .contains("stands still")
     );
 }
 
@@ -317,14 +322,14 @@ fn odd_cycles_are_rejected_with_a_reason() {
     let found = one(recorded(position)).unwrap();
     assert_eq!((found.kept.len(), found.rejected.len()), (7, 1));
     assert_abs_diff_eq!(found.rejected[0].start, 3.0, epsilon = 0.02);
-    assert!(matches!(found.rejected[0].reason, Reason::Shape { .. }));
+    assert!(matches!(found.rejected[0].reason, RejectionReason::Shape { .. }));
 
     // The fourth stride takes a fifth longer.
     let phi = |t: f64| TAU * if t < 3.0 { t } else { f64::max(3.0 + (t - 3.0) / 1.2, t - 0.2) };
     let found = one(recorded(walk(&even(821), phi))).unwrap();
     assert_eq!(found.rejected.len(), 1);
     assert_relative_eq!(found.rejected[0].period, 1.2, max_relative = 0.03);
-    assert!(matches!(found.rejected[0].reason, Reason::Period { .. }));
+    assert!(matches!(found.rejected[0].reason, RejectionReason::Period { .. }));
     assert!(found.rejected[0].reason.to_string().contains("median period is 1.0"));
 }
 
@@ -333,12 +338,12 @@ fn odd_cycles_are_rejected_with_a_reason() {
 fn events_tell_when_cycles_begin() {
     let events = vec![0.25, 1.26, 2.24, 3.25];
     let recording = recorded(walk(&even(400), |t| TAU * t));
-    let found = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[events]), Keep::Each).unwrap();
+    let found = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[events]), CycleOutput::Each).unwrap();
     let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
     assert_abs_diff_eq!(&periods[..], &[1.01, 0.98, 1.01][..], epsilon = 1e-12);
 
     for (events, wrong) in [(vec![0.5], "at least"), (vec![1.0, 0.5], "must increase"), (vec![1.0, 9.0], "within")] {
-        let message = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[events]), Keep::Each)
+        let message = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[events]), CycleOutput::Each)
             .unwrap_err()
             .to_string();
         assert!(message.starts_with("demo 0: events") && message.contains(wrong), "{message}");

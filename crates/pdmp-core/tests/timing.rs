@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use common::*;
 use ndarray::{Array2, array};
-use pdmp_core::learning::{StyleCount, TimeScaling, style_of};
-use pdmp_core::model::Warp;
-use pdmp_core::motion::Timing;
+use pdmp_core::learning::{TimeScaling, Truncation, style_of};
+use pdmp_core::model::TimeWarp;
+use pdmp_core::motion::TimeGrid;
 use pdmp_core::motion::jacobian;
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
@@ -54,7 +54,7 @@ fn with(kind: Kind, time_scaling: TimeScaling) -> FitOptions {
 }
 
 fn by_warp(kind: Kind) -> FitOptions {
-    with(kind, TimeScaling::Warp(Warp::default()))
+    with(kind, TimeScaling::Warp(TimeWarp::default()))
 }
 
 const KINDS: [Kind; 2] = [Kind::Discrete, Kind::Rhythmic];
@@ -69,11 +69,11 @@ fn known_warps_are_found_back() {
         for a in [1.0, 0.3, 2.5] {
             let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, a, &UNEVEN, 1.3), warped(kind, a, &SLOWER, 0.8)];
             let model = learn(&demos, &by_warp(kind));
-            let timings = &model.demonstrated().timings;
+            let segment_durations = &model.demonstrated().segment_durations;
             for (m, (slopes, duration)) in [(EVEN, 1.0), (UNEVEN, 1.3), (SLOWER, 0.8)].iter().enumerate() {
                 let (mut found, mut true_time) = (0.0, 0.0);
                 for k in 0..8 {
-                    found += timings[[m, k]] / duration;
+                    found += segment_durations[[m, k]] / duration;
                     true_time += slopes[k] / 8.0;
                     assert!((found - true_time).abs() < 1.01 / 80.0, "{kind} {a} {m} {k}: {found} {true_time}");
                 }
@@ -88,14 +88,16 @@ fn demonstrations_that_are_alike_are_not_warped() {
     for kind in KINDS {
         let demos: Vec<_> = [1.0, 0.5, 2.0].iter().map(|&a| warped(kind, a, &EVEN, 1.0 + a)).collect();
         let (model, linear) = (learn(&demos, &by_warp(kind)), learn(&demos, &with(kind, TimeScaling::Linear)));
-        for (timing, duration) in model.demonstrated().timings.rows().into_iter().zip([2.0, 1.5, 3.0]) {
-            assert!(timing.iter().all(|seconds| (seconds - duration / 8.0).abs() < 1e-12));
+        for (segment_durations, duration) in
+            model.demonstrated().segment_durations.rows().into_iter().zip([2.0, 1.5, 3.0])
+        {
+            assert!(segment_durations.iter().all(|seconds| (seconds - duration / 8.0).abs() < 1e-12));
         }
         assert_eq!(model.demonstrated().styles, linear.demonstrated().styles);
-        let (timing, nominal) = (Timing { dt: 0.01, duration: None }, Conditions::default());
+        let (grid, nominal) = (TimeGrid { dt: 0.01, duration: None }, Conditions::default());
         assert_eq!(
-            rollout(model.primitive(), &nominal, timing).unwrap(),
-            rollout(linear.primitive(), &nominal, timing).unwrap()
+            rollout(model.primitive(), &nominal, grid).unwrap(),
+            rollout(linear.primitive(), &nominal, grid).unwrap()
         );
     }
 }
@@ -104,22 +106,22 @@ fn demonstrations_that_are_alike_are_not_warped() {
 #[test]
 fn one_segment_is_linear() {
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
-        let one = learn(&demos, &with(kind, TimeScaling::Warp(Warp::new(1, 2.5).unwrap())));
+        let one = learn(&demos, &with(kind, TimeScaling::Warp(TimeWarp::new(1, 2.5).unwrap())));
         let linear = learn(&demos, &with(kind, TimeScaling::Linear));
         assert_eq!(one.demonstrated(), linear.demonstrated());
-        let timing = Timing { dt: 0.01, duration: None };
+        let grid = TimeGrid { dt: 0.01, duration: None };
         let nominal = Conditions::default();
         assert_eq!(
-            rollout(one.primitive(), &nominal, timing).unwrap(),
-            rollout(linear.primitive(), &nominal, timing).unwrap()
+            rollout(one.primitive(), &nominal, grid).unwrap(),
+            rollout(linear.primitive(), &nominal, grid).unwrap()
         );
         assert_eq!(linear.breaks(), [0.0, 1.0]);
-        assert_eq!(linear.demonstrated().timings.column(0).to_vec(), linear.demonstrated().durations);
-        let timed = Conditions { timing: Some(vec![1.7]), ..Default::default() };
+        assert_eq!(linear.demonstrated().segment_durations.column(0).to_vec(), linear.demonstrated().durations);
+        let timed = Conditions { segment_durations: Some(vec![1.7]), ..Default::default() };
         let scaled = Conditions { tau: Some(linear.tau() * 1.7 / linear.duration()), ..Default::default() };
         assert_eq!(
-            rollout(linear.primitive(), &timed, timing).unwrap(),
-            rollout(linear.primitive(), &scaled, timing).unwrap()
+            rollout(linear.primitive(), &timed, grid).unwrap(),
+            rollout(linear.primitive(), &scaled, grid).unwrap()
         );
     }
 }
@@ -144,10 +146,10 @@ fn every_demonstration_is_given_back_in_its_own_timing() {
             duration * [0.3 + 0.02 * m as f64, 0.7 - 0.05 * m as f64][e]
         });
         let error = |time_scaling| {
-            let model = learn(&demos, &FitOptions { styles: StyleCount::Given(4).into(), ..with(kind, time_scaling) });
+            let model = learn(&demos, &FitOptions { styles: Truncation::Given(4).into(), ..with(kind, time_scaling) });
             (0..demos.len()).map(|m| reproduction_error(&model, &demos, m)).fold(0.0, f64::max)
         };
-        let (linear, warp) = (error(TimeScaling::Linear), error(TimeScaling::Warp(Warp::default())));
+        let (linear, warp) = (error(TimeScaling::Linear), error(TimeScaling::Warp(TimeWarp::default())));
         let events = error(TimeScaling::Events(events));
         assert!(linear <= 1e-4 && warp <= 1e-4 && events <= 1e-4, "{kind}: {linear:e} {warp:e} {events:e}");
     }
@@ -166,19 +168,21 @@ fn events_fall_on_their_breaks() {
         let breaks = model.breaks();
         assert!((breaks[1] - 0.25).abs() < 1e-14 && (breaks[2] - 0.6).abs() < 1e-14);
         for m in 0..demos.len() {
-            assert!((model.demonstrated().timings[[m, 0]] - events[[m, 0]]).abs() < 1e-14);
+            assert!((model.demonstrated().segment_durations[[m, 0]] - events[[m, 0]]).abs() < 1e-14);
             assert!(
-                (model.demonstrated().timings[[m, 0]] + model.demonstrated().timings[[m, 1]] - events[[m, 1]]).abs()
+                (model.demonstrated().segment_durations[[m, 0]] + model.demonstrated().segment_durations[[m, 1]]
+                    - events[[m, 1]])
+                .abs()
                     < 1e-14
             );
             assert!((model.demonstrated().durations[m] - durations[m]).abs() < 1e-14);
             // The event is an instant of the recording and a phase of the movement, where all demonstrations have theirs.
-            let at = Timing { dt: events[[m, 0]], duration: Some(events[[m, 0]]) };
+            let at = TimeGrid { dt: events[[m, 0]], duration: Some(events[[m, 0]]) };
             let conditions = conditions_of(&model, m);
             let there = rollout(model.primitive(), &conditions, at).unwrap().position.row(1).to_vec();
-            let still = Conditions { timing: None, ..conditions };
+            let still = Conditions { segment_durations: None, ..conditions };
             let at = 0.25 * model.duration();
-            let same = rollout(model.primitive(), &still, Timing { dt: at, duration: Some(at) })
+            let same = rollout(model.primitive(), &still, TimeGrid { dt: at, duration: Some(at) })
                 .unwrap()
                 .position
                 .row(1)
@@ -194,13 +198,18 @@ fn a_timed_rollout_is_the_movement_along_its_timing() {
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3), warped(kind, 1.1, &SLOWER, 0.8)];
         let model = learn(&demos, &by_warp(kind));
-        let timing: Vec<f64> = SLOWER.iter().map(|slope| slope * 0.2).collect();
+        let segment_durations: Vec<f64> = SLOWER.iter().map(|slope| slope * 0.2).collect();
         for velocity in [None, Some(vec![0.7, -0.2])] {
             let start = (kind == Kind::Rhythmic).then(|| vec![0.1, 0.2]);
-            let timed = Conditions { timing: Some(timing.clone()), velocity, start, ..Default::default() };
+            let timed = Conditions {
+                segment_durations: Some(segment_durations.clone()),
+                velocity,
+                start,
+                ..Default::default()
+            };
             // Past the end, too, but for the instants at which acceleration jumps: it is smooth in between.
             let dt = 1e-3;
-            let made = rollout(model.primitive(), &timed, Timing { dt, duration: Some(1.9) }).unwrap();
+            let made = rollout(model.primitive(), &timed, TimeGrid { dt, duration: Some(1.9) }).unwrap();
             let scale = made.acceleration.iter().fold(0.0f64, |most, a| most.max(a.abs()));
             let mut worst = 0.0f64;
             for k in 1..made.time.len() - 1 {
@@ -209,7 +218,7 @@ fn a_timed_rollout_is_the_movement_along_its_timing() {
                     let slope = (after - before) / (2.0 * dt);
                     assert!((slope - made.velocity[[k, d]]).abs() < 1e-3 * scale, "{kind} {k} {d}");
                     let near_break = (0..=16).any(|i| {
-                        let at = timing.iter().cycle().take(i).sum::<f64>();
+                        let at = segment_durations.iter().cycle().take(i).sum::<f64>();
                         (made.time[k] - at).abs() < 1.5 * dt
                     });
                     if !near_break {
@@ -225,8 +234,8 @@ fn a_timed_rollout_is_the_movement_along_its_timing() {
             }
         }
         // As long as the timing, unless told otherwise.
-        let timed = Conditions { timing: Some(timing.clone()), ..Default::default() };
-        assert_eq!(rollout(model.primitive(), &timed, Timing { dt: 0.01, duration: None }).unwrap().time.len(), 161);
+        let timed = Conditions { segment_durations: Some(segment_durations.clone()), ..Default::default() };
+        assert_eq!(rollout(model.primitive(), &timed, TimeGrid { dt: 0.01, duration: None }).unwrap().time.len(), 161);
     }
 }
 
@@ -236,10 +245,10 @@ fn a_nominal_timing_is_linear_time() {
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3)];
         let model = learn(&demos, &by_warp(kind));
-        let timed = Conditions { timing: Some(vec![0.2; 8]), ..Default::default() };
+        let timed = Conditions { segment_durations: Some(vec![0.2; 8]), ..Default::default() };
         let scaled = Conditions { tau: Some(1.6 * model.tau()), ..Default::default() };
         let [timed, scaled] = [timed, scaled]
-            .map(|conditions| rollout(model.primitive(), &conditions, Timing { dt: 0.01, duration: None }).unwrap());
+            .map(|conditions| rollout(model.primitive(), &conditions, TimeGrid { dt: 0.01, duration: None }).unwrap());
         for (a, b) in [(timed.position, scaled.position), (timed.velocity, scaled.velocity)] {
             assert!((a - b).iter().all(|difference| difference.abs() < 1e-9));
         }
@@ -253,11 +262,11 @@ fn a_loop_follows_a_timing_by_its_tau() {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3)];
         let model = learn(&demos, &by_warp(kind));
         let conditions = conditions_of(&model, 1);
-        let timing = conditions.timing.clone().unwrap();
-        let made = rollout(model.primitive(), &conditions, Timing { dt: 1e-3, duration: None }).unwrap().position;
-        let at = |phase: f64| model.tau_at(phase, &timing).unwrap();
+        let segment_durations = conditions.segment_durations.clone().unwrap();
+        let made = rollout(model.primitive(), &conditions, TimeGrid { dt: 1e-3, duration: None }).unwrap().position;
+        let at = |phase: f64| model.tau_at(phase, &segment_durations).unwrap();
         let tau = Some(at(if kind == Kind::Discrete { 1.0 } else { 0.0 }));
-        let conditions = Conditions { tau, timing: None, ..conditions };
+        let conditions = Conditions { tau, segment_durations: None, ..conditions };
         let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, Some(0.0)).unwrap();
         for k in 1..made.nrows() {
             assert!(controller.step().unwrap() == Status::Working || k + 100 > made.nrows());
@@ -278,11 +287,11 @@ fn timings_are_predicted_from_contexts() {
     let contexts = Some(heights.iter().map(|&h| vec![h.into()]).collect());
     let model = learn(&demos, &FitOptions { contexts, ..by_warp(kind) });
     let found = model.predict(&[0.25]).unwrap();
-    let timing = found.conditions.timing.as_ref().unwrap();
-    let first: f64 = timing[..4].iter().sum();
+    let segment_durations = found.conditions.segment_durations.as_ref().unwrap();
+    let first: f64 = segment_durations[..4].iter().sum();
     assert!((first - 1.25 * 1.25 / 2.0).abs() < 0.02, "{first}");
     assert!((found.duration - 1.25).abs() < 0.02);
-    assert!((found.duration - timing.iter().sum::<f64>()).abs() < 1e-14);
+    assert!((found.duration - segment_durations.iter().sum::<f64>()).abs() < 1e-14);
     let size = model.n_styles() + 2 * model.n_dofs() + 8;
     assert_eq!(found.covariance.as_ref().unwrap().dim(), (size, size));
     let controller = Controller::new(model.primitive(), 1e-3, &found.conditions, None).unwrap();
@@ -295,9 +304,9 @@ fn style_of_finds_warped_demonstrations_again() {
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.7, &UNEVEN, 1.3), warped(kind, 1.4, &SLOWER, 0.8)];
         let events = array![[0.4], [0.5], [0.3]];
-        for time_scaling in [TimeScaling::Warp(Warp::default()), TimeScaling::Events(events.clone())] {
+        for time_scaling in [TimeScaling::Warp(TimeWarp::default()), TimeScaling::Events(events.clone())] {
             let by_events = matches!(time_scaling, TimeScaling::Events(_));
-            let model = learn(&demos, &FitOptions { styles: StyleCount::Given(3).into(), ..with(kind, time_scaling) });
+            let model = learn(&demos, &FitOptions { styles: Truncation::Given(3).into(), ..with(kind, time_scaling) });
             for (m, demo) in demos.iter().enumerate() {
                 let own = events.row(m).to_vec();
                 let style = style_of(&model, demo, None, None, by_events.then_some(&own)).unwrap();
@@ -311,7 +320,7 @@ fn style_of_finds_warped_demonstrations_again() {
     }
 }
 
-/// The model file keeps breaks, timings and the template; the number of threads changes no bit of it.
+/// The model file keeps breaks, segment_durations and the template; the number of threads changes no bit of it.
 #[test]
 fn a_warped_model_is_saved_and_does_not_depend_on_threads() {
     for kind in KINDS {
@@ -352,17 +361,17 @@ proptest! {
         };
         let scale = 10f64.powi(size);
         let demos = [demo(&noise[..60], scale), demo(&noise[60..140], 0.0), demo(&noise[140..], scale)];
-        let warp = Warp::new(segments, slope).unwrap();
+        let warp = TimeWarp::new(segments, slope).unwrap();
         let model = learn(&demos, &with(kind, TimeScaling::Warp(warp)));
         let shown = model.demonstrated();
-        prop_assert_eq!(shown.timings.dim(), (3, segments));
-        for (timing, duration) in shown.timings.rows().into_iter().zip(&shown.durations) {
+        prop_assert_eq!(shown.segment_durations.dim(), (3, segments));
+        for (segment_durations, duration) in shown.segment_durations.rows().into_iter().zip(&shown.durations) {
             let linear = duration / segments as f64;
-            for seconds in timing {
+            for seconds in segment_durations {
                 prop_assert!((1.0 / slope - 1e-9..=slope + 1e-9).contains(&(seconds / linear)), "{}", seconds / linear);
             }
         }
-        let made = rollout(model.primitive(), &conditions_of(&model, 2), Timing { dt: 0.01, duration: None }).unwrap();
+        let made = rollout(model.primitive(), &conditions_of(&model, 2), TimeGrid { dt: 0.01, duration: None }).unwrap();
         prop_assert!(made.position.iter().chain(&made.velocity).chain(&made.acceleration).all(|x| x.is_finite()));
     }
 }
@@ -373,14 +382,17 @@ proptest! {
 fn jacobian_of_a_timing_is_refused() {
     let demos = [EVEN, UNEVEN].map(|slopes| warped(Kind::Discrete, 1.0, &slopes, 2.0));
     let model = Arc::new(fit(&demos, &by_warp(Kind::Discrete)).unwrap());
-    let conditions = Conditions { timing: Some(model.demonstrated().timings.row(1).to_vec()), ..Conditions::default() };
-    let timing = Timing { dt: 0.01, duration: None };
+    let conditions = Conditions {
+        segment_durations: Some(model.demonstrated().segment_durations.row(1).to_vec()),
+        ..Conditions::default()
+    };
+    let grid = TimeGrid { dt: 0.01, duration: None };
     let found = jacobian(
         model.primitive(),
-        pdmp_core::motion::Variable::Style,
+        pdmp_core::motion::WithRespectTo::Style,
         pdmp_core::model::Derivative::Position,
         &conditions,
-        timing,
+        grid,
         &mut |_| Ok(()),
     );
     assert!(matches!(found, Err(Error::Arguments(_))));
@@ -396,7 +408,7 @@ fn bad_timings_are_refused() {
         (8, 0.9, "slope = 0.9: must lie between 1, which is linear, and 10"),
         (8, f64::NAN, "slope = NaN: must lie between 1, which is linear, and 10"),
     ] {
-        assert_eq!(refused(TimeScaling::Warp(Warp { segments, slope })), message);
+        assert_eq!(refused(TimeScaling::Warp(TimeWarp { n_segments: segments, max_slope: slope })), message);
     }
     let events = |rows: [[f64; 2]; 5]| refused(TimeScaling::Events(Array2::from_shape_fn((5, 2), |(m, e)| rows[m][e])));
     let good = [0.3, 0.6];
@@ -413,19 +425,24 @@ fn bad_timings_are_refused() {
 
     let model = learn(&demos, &by_warp(Kind::Discrete));
     let refused = |conditions: Conditions| {
-        let error: Error = rollout(model.primitive(), &conditions, Timing { dt: 0.01, duration: None }).unwrap_err();
+        let error: Error = rollout(model.primitive(), &conditions, TimeGrid { dt: 0.01, duration: None }).unwrap_err();
         error.to_string()
     };
-    let timed = |timing: &[f64]| refused(Conditions { timing: Some(timing.to_vec()), ..Default::default() });
-    assert_eq!(timed(&[0.1; 7]), "timing has length 7, expected 8: one value per segment between breaks");
+    let timed = |segment_durations: &[f64]| {
+        refused(Conditions { segment_durations: Some(segment_durations.to_vec()), ..Default::default() })
+    };
+    assert_eq!(timed(&[0.1; 7]), "segment_durations has length 7, expected 8: one value per segment between breaks");
     for bad in [0.0, -0.1, 1e9] {
-        let mut timing = [0.1; 8];
-        timing[3] = bad;
-        assert!(timed(&timing).contains("timing = ") && timed(&timing).contains("seconds must be positive"));
+        let mut segment_durations = [0.1; 8];
+        segment_durations[3] = bad;
+        assert!(
+            timed(&segment_durations).contains("segment_durations = ")
+                && timed(&segment_durations).contains("seconds must be positive")
+        );
     }
-    assert!(timed(&[f64::NAN; 8]).contains("timing[0] = NaN: every number must be finite"));
-    let both = Conditions { timing: Some(vec![0.1; 8]), tau: Some(1.0), ..Default::default() };
-    assert!(refused(both).starts_with("pass tau or timing, not both"));
+    assert!(timed(&[f64::NAN; 8]).contains("segment_durations[0] = NaN: every number must be finite"));
+    let both = Conditions { segment_durations: Some(vec![0.1; 8]), tau: Some(1.0), ..Default::default() };
+    assert!(refused(both).starts_with("pass tau or segment_durations, not both"));
     assert!(model.tau_at(0.0, &[0.1; 8]).unwrap() > 0.0, "long after the end");
     for phase in [-0.1, 1.1, f64::NAN] {
         assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] where discrete"));

@@ -7,7 +7,7 @@ use ndarray::{Ix1, Ix2};
 use numpy::PyArrayMethods;
 use pdmp_core::Error;
 use pdmp_core::model::Derivative;
-use pdmp_core::motion::{Batch, BatchConditions, Chunks, Rows, Timing, batch};
+use pdmp_core::motion::{Batch, BatchChunks, BatchConditions, PerMovement, TimeGrid, batch};
 use pdmp_core::numerics::Threads;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -80,7 +80,7 @@ impl Model {
         threads: Option<isize>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let arguments = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
-        let work = Work::new(py, self, arguments, Timing { dt, duration }, derivatives, threads)?;
+        let work = Work::new(py, self, arguments, TimeGrid { dt, duration }, derivatives, threads)?;
         let movements = 0..work.batch.shape().0;
         let out = match out {
             Some(out) => work.check(&movements, &items("out", out, |_, array| Ok(array.clone()))?)?,
@@ -136,7 +136,7 @@ impl Model {
         threads: Option<isize>,
     ) -> PyResult<RolloutChunks> {
         let arguments = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
-        let work = Work::new(py, self, arguments, Timing { dt, duration }, derivatives, threads)?;
+        let work = Work::new(py, self, arguments, TimeGrid { dt, duration }, derivatives, threads)?;
         let chunks = work.batch.chunks(count("size", size)?).map_err(raise)?;
         Ok(RolloutChunks { work, chunks: Mutex::new(chunks) })
     }
@@ -146,7 +146,7 @@ impl Model {
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct RolloutChunks {
     work: Work,
-    chunks: Mutex<Chunks>,
+    chunks: Mutex<BatchChunks>,
 }
 
 #[pymethods]
@@ -176,13 +176,13 @@ impl Work {
         py: Python<'_>,
         model: &Model,
         arguments: Arguments<'_, '_>,
-        timing: Timing,
+        grid: TimeGrid,
         derivatives: isize,
         n_threads: Option<isize>,
     ) -> PyResult<Self> {
         let highest = Derivative::of_order("derivatives", count("derivatives", derivatives)?).map_err(raise)?;
         let (threads, conditions) = (threads(n_threads)?, arguments.conditions()?);
-        let batch = interruptible(py, |proceed| batch(model.0.primitive(), conditions, timing, proceed))?;
+        let batch = interruptible(py, |progress| batch(model.0.primitive(), conditions, grid, progress))?;
         Ok(Self { batch, highest, threads })
     }
 
@@ -226,7 +226,7 @@ impl Work {
         let borrow = |out: &Cube<'py>| out.try_readwrite().map_err(|_| PyValueError::new_err(OVERLAP));
         let mut borrowed = out.iter().map(borrow).collect::<PyResult<Vec<_>>>()?;
         let outputs = borrowed.iter_mut().map(|out| out.as_array_mut()).collect();
-        interruptible(py, |proceed| self.batch.write(movements, outputs, self.threads, proceed))?;
+        interruptible(py, |progress| self.batch.write(movements, outputs, self.threads, progress))?;
         drop(borrowed);
         PyTuple::new(py, out)
     }
@@ -260,13 +260,13 @@ impl Arguments<'_, '_> {
 }
 
 /// A vector for all movements, or a matrix with one for each.
-fn rows(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Rows>> {
+fn rows(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<PerMovement>> {
     let Some(value) = value else { return Ok(None) };
     let array = array(name, value)?;
     let shape = array.shape().to_vec();
     let rows = match shape.len() {
-        1 => array.into_dimensionality::<Ix1>().map(|row| Rows::All(row.to_vec())),
-        _ => array.into_dimensionality::<Ix2>().map(Rows::Each),
+        1 => array.into_dimensionality::<Ix1>().map(|row| PerMovement::All(row.to_vec())),
+        _ => array.into_dimensionality::<Ix2>().map(PerMovement::Each),
     };
     rows.map(Some).map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected (D,) or (B, D)")))
 }

@@ -16,7 +16,7 @@ pub(crate) struct Arguments<'a, 'py> {
     pub(crate) anchor: Option<&'a Bound<'py, PyAny>>,
     pub(crate) amplitude: f64,
     pub(crate) tau: Option<f64>,
-    pub(crate) timing: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) segment_durations: Option<&'a Bound<'py, PyAny>>,
     pub(crate) phase: Option<f64>,
 }
 
@@ -30,7 +30,7 @@ impl Arguments<'_, '_> {
             velocity: optional("velocity", self.velocity)?,
             amplitude: Some(self.amplitude),
             tau: self.tau,
-            timing: optional("timing", self.timing)?,
+            segment_durations: optional("segment_durations", self.segment_durations)?,
             phase: self.phase,
         })
     }
@@ -56,7 +56,7 @@ impl Arguments<'_, '_> {
             velocity: given.velocity,
             amplitude: given.amplitude,
             // A tau that is given takes the place of the predicted timing.
-            timing: given.timing.or(predicted.timing.filter(|_| given.tau.is_none())),
+            segment_durations: given.segment_durations.or(predicted.segment_durations.filter(|_| given.tau.is_none())),
             tau: given.tau,
             phase: given.phase,
         })

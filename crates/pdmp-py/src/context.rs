@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, Array3, Axis};
 use numpy::IntoPyArray;
-use pdmp_core::context::MapChoice;
+use pdmp_core::context::MapSelection;
 use pyo3::prelude::*;
 
 use crate::convert::{Cube, Matrix, matrix};
@@ -46,7 +46,7 @@ impl ContextMap {
     #[pyo3(signature = (contexts, outputs, map="auto"))]
     fn new(contexts: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>, map: &str) -> PyResult<Self> {
         let (rows, outputs) = (crate::convert::contexts(contexts)?, matrix("outputs", "(M, P)", outputs)?);
-        let choice: MapChoice = map_of(map)?;
+        let choice: MapSelection = map_of(map)?;
         pdmp_core::context::ContextMap::fit(&rows, outputs.view(), choice).map(Self).map_err(raise)
     }
 
@@ -64,8 +64,8 @@ impl ContextMap {
 
     /// Degrees of freedom from which the covariance is known.
     #[getter]
-    fn freedom(&self) -> usize {
-        self.0.freedom()
+    fn degrees_of_freedom(&self) -> usize {
+        self.0.degrees_of_freedom()
     }
 
     /// Expected outputs (B, P) for contexts (B, Q), and the covariance (B, P, P) of new ones, or None if unknown.

@@ -275,7 +275,7 @@ impl Controller {
     /// ValueError
     ///     What `Model.rollout` refuses; the movement then goes on as it was.
     #[pyo3(signature = (
-        *, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, timing=None,
+        *, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, segment_durations=None,
         context=None, phase=None
     ))]
     #[allow(clippy::too_many_arguments)]
@@ -288,11 +288,11 @@ impl Controller {
         anchor: Option<&Bound<'_, PyAny>>,
         amplitude: f64,
         tau: Option<f64>,
-        timing: Option<&Bound<'_, PyAny>>,
+        segment_durations: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
         phase: Option<f64>,
     ) -> PyResult<()> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, segment_durations, phase };
         let conditions = arguments.in_context(&self.model, context)?;
         let result = self.inner.reset(&conditions);
         self.command(result)

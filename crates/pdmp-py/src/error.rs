@@ -109,5 +109,5 @@ pub(crate) fn interruptible<T: Send>(
     py: Python<'_>,
     call: impl FnOnce(&mut dyn FnMut(f64) -> Result<(), Error>) -> Result<T, Error> + Send,
 ) -> PyResult<T> {
-    detached(py, |_, (), _| Ok(()), |proceed| call(&mut |share| proceed((), share)))
+    detached(py, |_, (), _| Ok(()), |progress| call(&mut |share| progress((), share)))
 }

@@ -17,7 +17,7 @@ pub(crate) struct Factors {
     /// Singular values in decreasing order: all min(M, C·D), or the first J alone, where the others were not computed.
     singular_values: Py<PyArray1<f64>>,
     /// Share of the targets, by root mean square, that the factors leave out: ‖F − S·F_basis‖/‖F‖.
-    left_out: f64,
+    truncation_error: f64,
 }
 
 #[pymethods]
@@ -25,7 +25,10 @@ impl Factors {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let (styles, basis) = (self.styles.bind(py), self.basis.bind(py));
         let (rows, n_styles, columns) = (styles.shape()[0], styles.shape()[1], basis.shape()[1]);
-        Ok(format!("<pdmp.Factors: J = {n_styles} of targets ({rows}, {columns}), {:.1e} left out>", self.left_out))
+        Ok(format!(
+            "<pdmp.Factors: J = {n_styles} of targets ({rows}, {columns}), {:.1e} left out>",
+            self.truncation_error
+        ))
     }
 }
 
@@ -67,12 +70,12 @@ pub(crate) fn factorise(
 ) -> PyResult<Factors> {
     let styles = style_count(n_styles, spectrum)?;
     let targets = matrix("targets", "(M, C·D)", targets)?;
-    let factors = interruptible(py, |proceed| pdmp_core::learning::Factors::of(targets.view(), styles, proceed))?;
-    let left_out = factors.left_out();
+    let factors = interruptible(py, |progress| pdmp_core::learning::Factors::of(targets.view(), styles, progress))?;
+    let truncation_error = factors.truncation_error();
     Ok(Factors {
         styles: factors.styles.into_pyarray(py).unbind(),
         basis: factors.basis.into_pyarray(py).unbind(),
         singular_values: to_numpy(py, &factors.singular_values).unbind(),
-        left_out,
+        truncation_error,
     })
 }

@@ -4,10 +4,10 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use ndarray::Array2;
-use pdmp_core::context::{MapChoice, MapKind};
+use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::regression::Basis;
 use pdmp_core::learning::{
-    Alignment, DofScale, Stage, StyleChoice, StyleCount, TimeScaling, TransportChoice, fit_with,
+    Alignment, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
 };
 use pdmp_core::numerics::Smoothing;
 use pdmp_core::{FitOptions, Kind};
@@ -20,7 +20,7 @@ use crate::convert::{count, items, matrix, numbers};
 use crate::demo::{Demonstration, Source, Trajectory};
 use crate::error::detached;
 use crate::model::Model;
-use crate::warp::Warp;
+use crate::warp::TimeWarp;
 
 /// Learn one movement primitive from several demonstrations.
 ///
@@ -72,12 +72,12 @@ use crate::warp::Warp;
 ///     Unit of each degree of freedom in the factorisation. By default as recorded ("unit") where all units are equal or
 ///     unknown; otherwise the degrees of freedom of each unit are scaled together by the largest range among them.
 ///     "range" scales each by its own range. If given as numbers, in a warp of time too.
-/// alignment : {"linear", "warp"} or Warp
+/// alignment : {"linear", "warp"} or TimeWarp
 ///     How time is scaled to that of the nominal demonstration: linearly, or by the monotone warp that brings the
-///     demonstrations closest to each other, where they pause or hurry in different places. A `Warp` is applied as given;
+///     demonstrations closest to each other, where they pause or hurry in different places. A `TimeWarp` is applied as given;
 ///     "warp" has eight segments, fewer where a demonstration has fewer than 16 samples, and with at least three
 ///     different contexts is applied only if it lowers the error at contexts held out by more than its standard error;
-///     `model.timings` has one column where it is not.
+///     `model.segment_durations` has one column where it is not.
 /// events : (M, E) array_like, optional
 ///     Times in s of E landmarks in each demonstration, from its first sample or of its time stamps, in place of a
 ///     warp: all are aligned to those of the nominal demonstration.
@@ -180,14 +180,14 @@ pub(crate) fn fit(
         Some(progress) => progress.call1(py, (stage.name(), share)).map(drop),
         None => Ok(()),
     };
-    let model = detached(py, show, |proceed| fit_with(&demos, &options, proceed))?;
+    let model = detached(py, show, |progress| fit_with(&demos, &options, progress))?;
     crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
 }
 
-fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, spectrum: Option<f64>) -> PyResult<StyleChoice> {
+fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, spectrum: Option<f64>) -> PyResult<NStyles> {
     let Some(n_styles) = n_styles else {
-        return Ok(spectrum.map_or(StyleChoice::Systematic, |share| StyleCount::Spectrum(share).into()));
+        return Ok(spectrum.map_or(NStyles::Systematic, |share| Truncation::Spectrum(share).into()));
     };
     if spectrum.is_some() {
         return Err(PyValueError::new_err("n_styles and spectrum: pass one of them"));
@@ -195,19 +195,19 @@ fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, spectrum: Option<f64>) -> P
     if let Ok(name) = n_styles.extract::<String>() {
         let wanted = "must be a number, \"auto\" or None";
         return if name == "auto" {
-            Ok(StyleChoice::Auto)
+            Ok(NStyles::Auto)
         } else {
             Err(PyValueError::new_err(format!("n_styles = {name:?}: {wanted}")))
         };
     }
-    count("n_styles", n_styles.extract()?).map(|n_styles| StyleCount::Given(n_styles).into())
+    count("n_styles", n_styles.extract()?).map(|n_styles| Truncation::Given(n_styles).into())
 }
 
 /// J as given, or from a share of the spectrum.
-pub(crate) fn style_count(n_styles: Option<isize>, spectrum: f64) -> PyResult<StyleCount> {
+pub(crate) fn style_count(n_styles: Option<isize>, spectrum: f64) -> PyResult<Truncation> {
     match n_styles {
-        Some(n_styles) => count("n_styles", n_styles).map(StyleCount::Given),
-        None => Ok(StyleCount::Spectrum(spectrum)),
+        Some(n_styles) => count("n_styles", n_styles).map(Truncation::Given),
+        None => Ok(Truncation::Spectrum(spectrum)),
     }
 }
 
@@ -244,13 +244,13 @@ pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResu
     })
 }
 
-pub(crate) fn map_of(map: &str) -> PyResult<MapChoice> {
+pub(crate) fn map_of(map: &str) -> PyResult<MapSelection> {
     if map == "auto" {
-        return Ok(MapChoice::Auto);
+        return Ok(MapSelection::Auto);
     }
-    let found = MapKind::ALL.into_iter().find(|kind| kind.name() == map);
+    let found = ContextMapKind::ALL.into_iter().find(|kind| kind.name() == map);
     let wanted = "must be \"auto\", \"stacked\", \"gp\", \"linear\" or \"polynomial\"";
-    found.map(MapChoice::Given).ok_or_else(|| PyValueError::new_err(format!("map = {map:?}: {wanted}")))
+    found.map(MapSelection::Given).ok_or_else(|| PyValueError::new_err(format!("map = {map:?}: {wanted}")))
 }
 
 pub(crate) fn kind_of(kind: &str) -> PyResult<Kind> {
@@ -292,14 +292,14 @@ fn time_scaling_of(alignment: Option<&Bound<'_, PyAny>>, events: Option<&Bound<'
 }
 
 fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
-    if let Ok(warp) = alignment.cast::<Warp>() {
+    if let Ok(warp) = alignment.cast::<TimeWarp>() {
         return Ok(TimeScaling::Warp(warp.get().0.clone()));
     }
     match alignment.extract::<String>().as_deref() {
         Ok("linear") => Ok(TimeScaling::Linear),
         Ok("warp") => Ok(TimeScaling::WarpIfBetter),
         _ => {
-            let wanted = "must be \"linear\", \"warp\" or pdmp.Warp(...)";
+            let wanted = "must be \"linear\", \"warp\" or pdmp.TimeWarp(...)";
             Err(PyValueError::new_err(format!("alignment = {}: {wanted}", alignment.repr()?)))
         }
     }
@@ -331,22 +331,22 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
     }
 }
 
-fn transport_of(transport: &str) -> PyResult<TransportChoice> {
+fn transport_of(transport: &str) -> PyResult<TransportSelection> {
     match transport {
-        "learnt" => Ok(TransportChoice::Learnt),
-        "immediate" => Ok(TransportChoice::Immediate),
+        "learnt" => Ok(TransportSelection::FitSummary),
+        "immediate" => Ok(TransportSelection::Immediate),
         _ => Err(PyValueError::new_err(format!("transport = {transport:?}: must be \"learnt\" or \"immediate\""))),
     }
 }
 
-fn dof_scale_of(scale: Option<&Bound<'_, PyAny>>) -> PyResult<DofScale> {
-    let Some(scale) = scale else { return Ok(DofScale::Auto) };
+fn dof_scale_of(scale: Option<&Bound<'_, PyAny>>) -> PyResult<DofScaling> {
+    let Some(scale) = scale else { return Ok(DofScaling::Auto) };
     match scale.extract::<String>().as_deref() {
-        Ok("range") => Ok(DofScale::Range),
-        Ok("unit") => Ok(DofScale::Unit),
+        Ok("range") => Ok(DofScaling::Range),
+        Ok("unit") => Ok(DofScaling::Unit),
         Ok(other) => Err(PyValueError::new_err(format!(
             "dof_scale = {other:?}: must be None, \"unit\", \"range\" or one number per DoF"
         ))),
-        Err(_) => crate::convert::vector("dof_scale", scale).map(DofScale::Given),
+        Err(_) => crate::convert::vector("dof_scale", scale).map(DofScaling::Given),
     }
 }

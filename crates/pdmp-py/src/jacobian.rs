@@ -2,7 +2,7 @@
 
 use numpy::IntoPyArray;
 use pdmp_core::model::Derivative;
-use pdmp_core::motion::{Timing, Variable};
+use pdmp_core::motion::{TimeGrid, WithRespectTo};
 use pyo3::prelude::*;
 
 use crate::conditions::Arguments;
@@ -52,10 +52,10 @@ impl Model {
             anchor: None,
             amplitude,
             tau,
-            timing: None,
+            segment_durations: None,
             phase: None,
         };
-        self.jacobian(py, Variable::Style, derivative, arguments, Timing { dt, duration })
+        self.jacobian(py, WithRespectTo::Style, derivative, arguments, TimeGrid { dt, duration })
     }
 
     /// Jacobian ∂y/∂g of a discrete rollout's positions: exact, and the same for every style, goal and start.
@@ -82,7 +82,7 @@ impl Model {
         tau: Option<f64>,
         duration: Option<f64>,
     ) -> PyResult<Cube<'py>> {
-        self.jacobian(py, Variable::Goal, derivative, from(None, tau), Timing { dt, duration })
+        self.jacobian(py, WithRespectTo::Goal, derivative, from(None, tau), TimeGrid { dt, duration })
     }
 
     /// Jacobian ∂y/∂y_a of a rhythmic rollout's positions: exact, and the same for every style, anchor and start.
@@ -110,7 +110,7 @@ impl Model {
         tau: Option<f64>,
         duration: Option<f64>,
     ) -> PyResult<Cube<'py>> {
-        self.jacobian(py, Variable::Anchor, derivative, from(start, tau), Timing { dt, duration })
+        self.jacobian(py, WithRespectTo::Anchor, derivative, from(start, tau), TimeGrid { dt, duration })
     }
 
     /// Jacobian ∂y/∂y(0) of a rollout's positions with respect to a given start: exact, and the same everywhere.
@@ -132,7 +132,7 @@ impl Model {
         tau: Option<f64>,
         duration: Option<f64>,
     ) -> PyResult<Cube<'py>> {
-        self.jacobian(py, Variable::Start, derivative, from(None, tau), Timing { dt, duration })
+        self.jacobian(py, WithRespectTo::Start, derivative, from(None, tau), TimeGrid { dt, duration })
     }
 }
 
@@ -140,15 +140,15 @@ impl Model {
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        variable: Variable,
+        variable: WithRespectTo,
         derivative: isize,
         arguments: Arguments<'_, 'py>,
-        timing: Timing,
+        grid: TimeGrid,
     ) -> PyResult<Cube<'py>> {
         let derivative = Derivative::of_order("derivative", count("derivative", derivative)?).map_err(raise)?;
         let conditions = arguments.conditions()?;
-        let jacobian = interruptible(py, |proceed| {
-            pdmp_core::motion::jacobian(self.0.primitive(), variable, derivative, &conditions, timing, proceed)
+        let jacobian = interruptible(py, |progress| {
+            pdmp_core::motion::jacobian(self.0.primitive(), variable, derivative, &conditions, grid, progress)
         })?;
         Ok(jacobian.into_pyarray(py))
     }
@@ -164,7 +164,7 @@ fn from<'a, 'py>(start: Option<&'a Bound<'py, PyAny>>, tau: Option<f64>) -> Argu
         anchor: None,
         amplitude: 1.0,
         tau,
-        timing: None,
+        segment_durations: None,
         phase: None,
     }
 }

@@ -113,8 +113,8 @@ impl Model {
 
     /// Share of the targets F, by root mean square, that the J styles leave out: ‖F − S·F_basis‖/‖F‖.
     #[getter]
-    fn left_out(&self) -> f64 {
-        self.0.learnt().left_out
+    fn truncation_error(&self) -> f64 {
+        self.0.learnt().truncation_error
     }
 
     /// Standard deviation of the measurement noise of each degree of freedom (D,), in its unit, by generalised
@@ -164,11 +164,11 @@ impl Model {
 
     /// Timings of the demonstrations (M, K): the time in s that each spends in each segment.
     #[getter]
-    fn timings<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        self.0.demonstrated().timings.to_pyarray(py)
+    fn segment_durations<'py>(&self, py: Python<'py>) -> Matrix<'py> {
+        self.0.demonstrated().segment_durations.to_pyarray(py)
     }
 
-    /// Durations or periods of the demonstrations (M,) in s: the sums of their timings.
+    /// Durations or periods of the demonstrations (M,) in s: the sums of their segment_durations.
     #[getter]
     fn durations<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, &self.0.demonstrated().durations)

@@ -34,7 +34,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<basis::GpRegression>()?;
     module.add_class::<basis::NGnet>()?;
     module.add_class::<basis::NGnetRegression>()?;
-    module.add_class::<warp::Warp>()?;
+    module.add_class::<warp::TimeWarp>()?;
     module.add_class::<factor::Factors>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<batch::RolloutChunks>()?;

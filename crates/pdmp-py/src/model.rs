@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ndarray::Array3;
 use numpy::IntoPyArray;
 use pdmp_core::learning::style_of;
-use pdmp_core::motion::{Timing, prediction_band, rollout_with};
+use pdmp_core::motion::{TimeGrid, prediction_band, rollout_with};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -76,7 +76,7 @@ impl Model {
     /// dt : float
     ///     Interval between samples in s.
     /// duration : float, optional
-    ///     Length in s; otherwise the demonstrated duration scaled by `tau`, or the sum of `timing`; one period if
+    ///     Length in s; otherwise the demonstrated duration scaled by `tau`, or the sum of `segment_durations`; one period if
     ///     rhythmic.
     /// context : array_like, (Q,), optional
     ///     Predicts style, goal, start or anchor, and timing, where they are not given.
@@ -93,7 +93,7 @@ impl Model {
     /// ValueError
     ///     A wrong length, a number that is not finite, or an argument of the other kind of primitive.
     #[pyo3(signature = (
-        style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, timing=None,
+        style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, segment_durations=None,
         dt=0.01, duration=None, context=None, phase=None
     ))]
     #[allow(clippy::too_many_arguments)]
@@ -107,16 +107,16 @@ impl Model {
         anchor: Option<&Bound<'_, PyAny>>,
         amplitude: f64,
         tau: Option<f64>,
-        timing: Option<&Bound<'_, PyAny>>,
+        segment_durations: Option<&Bound<'_, PyAny>>,
         dt: f64,
         duration: Option<f64>,
         context: Option<&Bound<'_, PyAny>>,
         phase: Option<f64>,
     ) -> PyResult<Trajectory> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, segment_durations, phase };
         let conditions = arguments.in_context(&self.0, context)?;
-        let trajectory = interruptible(py, |proceed| {
-            rollout_with(self.0.primitive(), &conditions, Timing { dt, duration }, proceed)
+        let trajectory = interruptible(py, |progress| {
+            rollout_with(self.0.primitive(), &conditions, TimeGrid { dt, duration }, progress)
         })?;
         Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
     }
@@ -213,7 +213,7 @@ impl Model {
     /// The time constant in s at a phase of a movement with the given timing.
     ///
     /// A control loop that sets it at every tick follows the timing, as `rollout` does:
-    /// `controller.tau = model.tau_at(controller.phase, timing)`, with `transition=0`.
+    /// `controller.tau = model.tau_at(controller.phase, grid)`, with `transition=0`.
     ///
     /// Parameters
     /// ----------
@@ -226,8 +226,8 @@ impl Model {
     /// ------
     /// ValueError
     ///     A timing that does not fit the model, or a phase out of range.
-    fn tau_at(&self, phase: f64, timing: &Bound<'_, PyAny>) -> PyResult<f64> {
-        self.0.tau_at(phase, &vector("timing", timing)?).map_err(raise)
+    fn tau_at(&self, phase: f64, segment_durations: &Bound<'_, PyAny>) -> PyResult<f64> {
+        self.0.tau_at(phase, &vector("segment_durations", segment_durations)?).map_err(raise)
     }
 
     /// The movement for a condition, as in Section 4.1.2.
@@ -284,8 +284,8 @@ impl Model {
         dt: f64,
     ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
-        let timing = Timing { dt, duration: None };
-        let [lower, upper] = py.detach(|| prediction_band(&self.0, &prediction, level, timing)).map_err(raise)?;
+        let grid = TimeGrid { dt, duration: None };
+        let [lower, upper] = py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 
@@ -311,7 +311,7 @@ impl Model {
     /// ----------
     /// dt : float
     ///     Length of a tick in s.
-    /// style, goal, start, velocity, tau, timing, anchor, amplitude, context, phase
+    /// style, goal, start, velocity, tau, grid, anchor, amplitude, context, phase
     ///     As in `rollout`; of a timing the loop takes the sum, and follows it where `tau_at` sets its pace.
     /// transition : float, optional
     ///     Time to 99 % in s, at the model's own tau, of a changed style, goal, anchor or amplitude, and of a changed tau
@@ -323,7 +323,7 @@ impl Model {
     /// Controller
     #[pyo3(signature = (
         dt=0.001, style=None, goal=None, start=None, velocity=None, tau=None, transition=None, *, anchor=None,
-        amplitude=1.0, timing=None, context=None, phase=None
+        amplitude=1.0, segment_durations=None, context=None, phase=None
     ))]
     #[allow(clippy::too_many_arguments)]
     fn controller(
@@ -338,11 +338,11 @@ impl Model {
         transition: Option<f64>,
         anchor: Option<&Bound<'_, PyAny>>,
         amplitude: f64,
-        timing: Option<&Bound<'_, PyAny>>,
+        segment_durations: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
         phase: Option<f64>,
     ) -> PyResult<Controller> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
+        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, segment_durations, phase };
         let conditions = arguments.in_context(&self.0, context)?;
         let controller = pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
         Controller::new(py, Arc::clone(&self.0), controller)

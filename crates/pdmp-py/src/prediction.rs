@@ -17,14 +17,14 @@ pub(crate) struct Prediction {
     /// Anchor (D,), rhythmic.
     anchor: Option<Py<PyArray1<f64>>>,
     /// Time in each segment of the movement (K,) in s.
-    timing: Py<PyArray1<f64>>,
+    segment_durations: Py<PyArray1<f64>>,
     /// Duration or period in s: the sum of the timing.
     duration: f64,
     /// Covariance (P, P) of style, goal and start or anchor, and timing, in this order, for a new movement; None where
     /// the demonstrations leave no degree of freedom to estimate it.
     covariance: Option<Py<PyArray2<f64>>>,
     /// Degrees of freedom from which the covariance is known.
-    freedom: usize,
+    degrees_of_freedom: usize,
     /// How far each value of the context lies outside of those demonstrated, in their range (Q,): 0 inside and for
     /// labels, infinite where a value that was never varied differs.
     outside: Py<PyArray1<f64>>,
@@ -39,10 +39,10 @@ impl Prediction {
             goal: optional(conditions.goal),
             start: optional(conditions.start),
             anchor: optional(conditions.anchor),
-            timing: to_numpy(py, &conditions.timing.unwrap_or_default()).unbind(),
+            segment_durations: to_numpy(py, &conditions.segment_durations.unwrap_or_default()).unbind(),
             duration: prediction.duration,
             covariance: prediction.covariance.map(|covariance| covariance.into_pyarray(py).unbind()),
-            freedom: prediction.freedom,
+            degrees_of_freedom: prediction.degrees_of_freedom,
             outside: to_numpy(py, &prediction.outside).unbind(),
         }
     }
@@ -58,18 +58,19 @@ impl Prediction {
         goal: Option<Py<PyArray1<f64>>>,
         start: Option<Py<PyArray1<f64>>>,
         anchor: Option<Py<PyArray1<f64>>>,
-        timing: Py<PyArray1<f64>>,
+        segment_durations: Py<PyArray1<f64>>,
         duration: f64,
         covariance: Option<Py<PyArray2<f64>>>,
-        freedom: usize,
+        degrees_of_freedom: usize,
         outside: Py<PyArray1<f64>>,
     ) -> Self {
-        Self { style, goal, start, anchor, timing, duration, covariance, freedom, outside }
+        Self { style, goal, start, anchor, segment_durations, duration, covariance, degrees_of_freedom, outside }
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        let Self { style, goal, start, anchor, timing, duration, covariance, freedom, outside } = self;
-        let told = (style, goal, start, anchor, timing, *duration, covariance, *freedom, outside);
+        let Self { style, goal, start, anchor, segment_durations, duration, covariance, degrees_of_freedom, outside } =
+            self;
+        let told = (style, goal, start, anchor, segment_durations, *duration, covariance, *degrees_of_freedom, outside);
         Ok((py.get_type::<Self>().getattr("_of")?, told.into_pyobject(py)?))
     }
 

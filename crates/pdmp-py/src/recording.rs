@@ -2,7 +2,7 @@
 
 use numpy::IntoPyArray;
 use pdmp_core::preprocessing;
-use pdmp_core::preprocessing::{Keep, Reason};
+use pdmp_core::preprocessing::{CycleOutput, RejectionReason};
 use pyo3::prelude::*;
 
 use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
@@ -207,12 +207,12 @@ pub(crate) fn cycles<'py>(
 ) -> PyResult<Found<'py>> {
     let recordings = demonstrations("recordings", recordings)?;
     let events = events.map(|events| items("events", events, vector)).transpose()?;
-    let keep = if average { Keep::Mean } else { Keep::Each };
+    let keep = if average { CycleOutput::Mean } else { CycleOutput::Each };
     let found = py.detach(|| preprocessing::cycles(&recordings, events.as_deref(), keep)).map_err(raise)?;
     let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
     let of = found.kept.iter().map(|cycle| cycle.recording).collect();
     let rejected = found.rejected.iter().map(|cycle| {
-        let whole = matches!(cycle.reason, Reason::Aperiodic { .. } | Reason::Still);
+        let whole = matches!(cycle.reason, RejectionReason::Aperiodic { .. } | RejectionReason::Still);
         (cycle.recording, cycle.start, cycle.period, cycle.reason.to_string(), whole)
     });
     let rejected = rejected.collect();

@@ -12,10 +12,10 @@ use crate::error::raise;
 ///
 /// Parameters
 /// ----------
-/// segments : int
-///     Number K of segments of equal phase; 1 is linear. At most half the samples of each demonstration, and 1000.
-/// slope : float
-///     Bound of a segment's time, from 1 to 10: at most `slope` times that of linear scaling, at least 1 / `slope`.
+/// n_segments : int
+///     Number K of n_segments of equal phase; 1 is linear. At most half the samples of each demonstration, and 1000.
+/// max_slope : float
+///     Bound of a segment's time, from 1 to 10: at most `max_slope` times that of linear scaling, at least 1 / `max_slope`.
 ///
 /// Raises
 /// ------
@@ -28,36 +28,36 @@ use crate::error::raise;
 /// Smedsgaard, J. Chromatography A 805 (1998), https://doi.org/10.1016/S0021-9673(98)00021-1
 #[pyclass(frozen, module = "pdmp", from_py_object)]
 #[derive(Clone)]
-pub(crate) struct Warp(pub(crate) pdmp_core::model::Warp);
+pub(crate) struct TimeWarp(pub(crate) pdmp_core::model::TimeWarp);
 
 #[pymethods]
-impl Warp {
+impl TimeWarp {
     #[new]
     #[pyo3(
-        signature = (segments=pdmp_core::model::Warp::default().segments as isize, slope=pdmp_core::model::Warp::default().slope),
-        text_signature = "(segments=8, slope=2.5)"
+        signature = (n_segments=pdmp_core::model::TimeWarp::default().n_segments as isize, max_slope=pdmp_core::model::TimeWarp::default().max_slope),
+        text_signature = "(n_segments=8, max_slope=2.5)"
     )]
-    fn new(segments: isize, slope: f64) -> PyResult<Self> {
-        pdmp_core::model::Warp::new(count("segments", segments)?, slope).map(Self).map_err(raise)
+    fn new(n_segments: isize, max_slope: f64) -> PyResult<Self> {
+        pdmp_core::model::TimeWarp::new(count("segments", n_segments)?, max_slope).map(Self).map_err(raise)
     }
 
-    /// Number K of segments.
+    /// Number K of n_segments.
     #[getter]
-    fn segments(&self) -> usize {
-        self.0.segments
+    fn n_segments(&self) -> usize {
+        self.0.n_segments
     }
 
     /// Bound of a segment's time, relative to linear scaling.
     #[getter]
-    fn slope(&self) -> f64 {
-        self.0.slope
+    fn max_slope(&self) -> f64 {
+        self.0.max_slope
     }
 
     fn __getnewargs__(&self) -> (usize, f64) {
-        (self.0.segments, self.0.slope)
+        (self.0.n_segments, self.0.max_slope)
     }
 
     fn __repr__(&self) -> String {
-        format!("pdmp.Warp({}, slope={})", self.0.segments, self.0.slope)
+        format!("pdmp.TimeWarp({}, max_slope={})", self.0.n_segments, self.0.max_slope)
     }
 }

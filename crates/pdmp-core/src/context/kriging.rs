@@ -74,7 +74,7 @@ impl Kriging {
     }
 
     /// Degrees of freedom that the flat coefficients leave.
-    pub(super) fn freedom(&self) -> usize {
+    pub(super) fn degrees_of_freedom(&self) -> usize {
         self.flat.nrows() - self.flat.ncols()
     }
 
@@ -94,7 +94,7 @@ impl Kriging {
     }
 
     /// What each value lacks of its prediction from all others (n, P), in closed form.
-    pub(super) fn left_out(&self, values: &Values, ratios: &[f64]) -> Array2<f64> {
+    pub(super) fn leave_one_out_errors(&self, values: &Values, ratios: &[f64]) -> Array2<f64> {
         let (mut errors, weights) = match &self.smooth {
             None => {
                 let leverages = self.flat.map_axis(Axis(1), |row| 1.0 - row.dot(&row)).insert_axis(Axis(1));

@@ -21,7 +21,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 pub use encoding::ContextColumn;
 pub(crate) use encoding::tabulate;
 pub(crate) use kernel::Kernel;
-pub use model_selection::{MapChoice, MapKind};
+pub use model_selection::{ContextMapKind, MapSelection};
 pub(crate) use outputs::{outputs, relative_changes};
 
 use encoding::{Scale, numbers};
@@ -30,7 +30,7 @@ use model_selection::{Candidate, Choice, choose};
 use principal_axes::Axes;
 pub(crate) use stacking::Stack;
 use training_data::Data;
-pub(crate) use training_data::alike;
+pub(crate) use training_data::group_equal_contexts;
 
 use crate::demonstration::ContextValue;
 use crate::error::{Error, Result};
@@ -41,14 +41,14 @@ use crate::validate::check_matrix;
 pub struct ContextMap {
     columns: Vec<ContextColumn>,
     scale: Scale,
-    kind: MapKind,
+    kind: ContextMapKind,
     kernel: Option<Kernel>,
     axes: Axes,
     /// The ratio of signal to noise of each component (P,), as all that follows is of components.
     ratios: Vec<f64>,
     /// The same of the line (P,), if there is one.
     slopes: Vec<f64>,
-    errors: Vec<(MapKind, f64)>,
+    errors: Vec<(ContextMapKind, f64)>,
     process: Part,
     /// The line beside the process, and their weights.
     trend: Option<(Part, Stack)>,
@@ -58,7 +58,7 @@ pub struct ContextMap {
     noise: Option<Array2<f64>>,
     /// Covariance (P, P) that a new movement adds to it: that within a context, as far as it is not averaged away.
     within: Option<Array2<f64>>,
-    freedom: usize,
+    degrees_of_freedom: usize,
 }
 
 /// One prediction of the components: coefficients (q, P) and (r, P) of the two kinds of coordinates of a place.
@@ -86,17 +86,17 @@ impl Part {
 /// Constants of a map, which determine it together with the data.
 #[derive(Clone, Debug)]
 pub(crate) struct Recipe {
-    pub(crate) kind: MapKind,
+    pub(crate) kind: ContextMapKind,
     pub(crate) kernel: Option<Kernel>,
     pub(crate) directions: Array2<f64>,
     pub(crate) ratios: Vec<f64>,
     pub(crate) trend: Option<(Vec<f64>, Stack)>,
-    pub(crate) errors: Vec<(MapKind, f64)>,
+    pub(crate) errors: Vec<(ContextMapKind, f64)>,
 }
 
 /// What a map says of a context.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Expected {
+pub struct ContextPrediction {
     /// Expected outputs (P,).
     pub mean: Vec<f64>,
     /// Covariance (P, P) of new outputs; `None` where no context is left over to estimate it.
@@ -111,7 +111,7 @@ impl ContextMap {
     /// # Errors
     /// Contexts and outputs that do not fit together, numbers that are not finite, labels beside numbers in one
     /// column, or more contexts than the kind of map can have.
-    pub fn fit(contexts: &[Vec<ContextValue>], outputs: ArrayView2<f64>, choice: MapChoice) -> Result<Self> {
+    pub fn fit(contexts: &[Vec<ContextValue>], outputs: ArrayView2<f64>, choice: MapSelection) -> Result<Self> {
         check_matrix("outputs", outputs)?;
         if contexts.len() != outputs.nrows() {
             let (expected, found) = (outputs.nrows(), contexts.len());
@@ -128,10 +128,10 @@ impl ContextMap {
         contexts: &Array2<f64>,
         outputs: ArrayView2<f64>,
         metric: ArrayView2<f64>,
-        choice: MapChoice,
+        choice: MapSelection,
     ) -> Result<Self> {
         let data = Data::of(columns, contexts, outputs)?;
-        data.check_count(matches!(choice, MapChoice::Given(kind) if kind != MapKind::Linear))?;
+        data.check_count(matches!(choice, MapSelection::Given(kind) if kind != ContextMapKind::Linear))?;
         let axes = Axes::principal(data.means.view(), metric)?;
         let data = data.along(&axes);
         let labels_alone = data.columns.iter().all(|column| matches!(column, ContextColumn::Label(_)));
@@ -149,7 +149,7 @@ impl ContextMap {
         let Recipe { kind, kernel, directions, ratios, trend, errors } = recipe;
         let axes = Axes::new(directions)?;
         let data = Data::of(columns, contexts, outputs)?;
-        data.check_count(kernel.is_some() || kind != MapKind::Linear)?;
+        data.check_count(kernel.is_some() || kind != ContextMapKind::Linear)?;
         let data = data.along(&axes);
         let candidate = Candidate::with(kind, kernel, &data.shown(), |_, _| ratios)?;
         let trend = trend.map(|(ratios, stack)| model_selection::trend(&data.shown(), ratios, stack)).transpose()?;
@@ -187,18 +187,18 @@ impl ContextMap {
     }
 
     /// What kind of map it is.
-    pub fn kind(&self) -> MapKind {
+    pub fn kind(&self) -> ContextMapKind {
         self.kind
     }
 
     /// Mean squared error of each map that was tried, at contexts left out: in closed form, with the constants of all.
-    pub fn errors(&self) -> &[(MapKind, f64)] {
+    pub fn errors(&self) -> &[(ContextMapKind, f64)] {
         &self.errors
     }
 
     /// Degrees of freedom from which the covariance is known.
-    pub fn freedom(&self) -> usize {
-        self.freedom
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.degrees_of_freedom
     }
 
     /// The outputs for a context (Q,), with their covariance: that of the mean, of what the context does not tell, and
@@ -206,7 +206,7 @@ impl ContextMap {
     ///
     /// # Errors
     /// A context of another length, a label never shown, or a number that is not finite.
-    pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<Expected> {
+    pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<ContextPrediction> {
         let context: Vec<ContextValue> = context.iter().cloned().map(Into::into).collect();
         let context = numbers(&self.columns, &context)?;
         let features = self.scale.features(&context);
@@ -231,7 +231,7 @@ impl ContextMap {
         if mean.iter().chain(covariance.iter().flatten()).any(|x| !x.is_finite()) {
             return Err(too_far(&context, &outside));
         }
-        Ok(Expected { mean, covariance, outside })
+        Ok(ContextPrediction { mean, covariance, outside })
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) const MOST: usize = 1024;
 /// What leads from contexts to movements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum MapKind {
+pub enum ContextMapKind {
     /// Least squares, as in Section 4.1.2 of the paper.
     Linear,
     /// Ridge regression on polynomials of second degree, the penalty of each output by its evidence.
@@ -35,7 +35,7 @@ pub enum MapKind {
     Stacked,
 }
 
-impl MapKind {
+impl ContextMapKind {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Stacked, Self::Gp, Self::Polynomial, Self::Linear];
 
@@ -50,7 +50,7 @@ impl MapKind {
     }
 }
 
-impl fmt::Display for MapKind {
+impl fmt::Display for ContextMapKind {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self {
             Self::Linear => "linear",
@@ -63,19 +63,19 @@ impl fmt::Display for MapKind {
 
 /// How the map from contexts is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum MapChoice {
+pub enum MapSelection {
     /// Stacked. Labels alone, two different contexts, or more than 1024: least squares, which gives each label the mean
     /// of its demonstrations.
     #[default]
     Auto,
     /// This one.
-    Given(MapKind),
+    Given(ContextMapKind),
 }
 
 /// A map of one kind, with all its constants.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
-    pub(super) kind: MapKind,
+    pub(super) kind: ContextMapKind,
     pub(super) kernel: Option<Kernel>,
     pub(super) kriging: Kriging,
     pub(super) values: Values,
@@ -91,11 +91,11 @@ pub(super) struct Shown<'a> {
 
 impl Candidate {
     /// The best map of a kind.
-    pub(super) fn of(kind: MapKind, shown: &Shown) -> Result<Self> {
+    pub(super) fn of(kind: ContextMapKind, shown: &Shown) -> Result<Self> {
         match kind {
-            MapKind::Linear => Self::with(kind, None, shown, |_, _| vec![0.0; shown.outputs.ncols()]),
-            MapKind::Polynomial => Self::with(kind, Some(Kernel::Quadratic), shown, ratios),
-            MapKind::Gp | MapKind::Stacked => {
+            ContextMapKind::Linear => Self::with(kind, None, shown, |_, _| vec![0.0; shown.outputs.ncols()]),
+            ContextMapKind::Polynomial => Self::with(kind, Some(Kernel::Quadratic), shown, ratios),
+            ContextMapKind::Gp | ContextMapKind::Stacked => {
                 let of_length = |length| {
                     let candidate = Self::with(kind, Some(Kernel::Matern { length }), shown, ratios)?;
                     Ok((candidate.errors().sum(), candidate))
@@ -115,7 +115,7 @@ impl Candidate {
 
     /// The map with a known kernel, and ratios as `ratios` finds them.
     pub(super) fn with(
-        kind: MapKind,
+        kind: ContextMapKind,
         kernel: Option<Kernel>,
         shown: &Shown,
         ratios: impl FnOnce(&Kriging, &Values) -> Vec<f64>,
@@ -128,7 +128,7 @@ impl Candidate {
 
     /// Squared errors at each context left out (n,).
     fn errors(&self) -> Array1<f64> {
-        let errors = self.kriging.left_out(&self.values, &self.ratios);
+        let errors = self.kriging.leave_one_out_errors(&self.values, &self.ratios);
         if errors.iter().any(|error| !error.is_finite()) {
             return Array1::from_elem(errors.nrows(), f64::INFINITY);
         }
@@ -147,28 +147,34 @@ pub(super) struct Trend {
 pub(super) struct Choice {
     pub(super) candidate: Candidate,
     pub(super) trend: Option<Trend>,
-    pub(super) errors: Vec<(MapKind, f64)>,
+    pub(super) errors: Vec<(ContextMapKind, f64)>,
 }
 
 /// Makes a choice.
-pub(super) fn choose(choice: MapChoice, labels_alone: bool, shown: &Shown) -> Result<Choice> {
+pub(super) fn choose(choice: MapSelection, labels_alone: bool, shown: &Shown) -> Result<Choice> {
     let kind = match choice {
-        MapChoice::Given(kind) => kind,
-        MapChoice::Auto if labels_alone || !(MIN_CONTEXTS..=MOST).contains(&shown.inputs.nrows()) => MapKind::Linear,
-        MapChoice::Auto => MapKind::Stacked,
+        MapSelection::Given(kind) => kind,
+        MapSelection::Auto if labels_alone || !(MIN_CONTEXTS..=MOST).contains(&shown.inputs.nrows()) => {
+            ContextMapKind::Linear
+        }
+        MapSelection::Auto => ContextMapKind::Stacked,
     };
     let candidate = Candidate::of(kind, shown)?;
     let mut tried = vec![(kind, mean(&candidate.errors()))];
     let trend = match kind {
-        MapKind::Stacked => {
-            let line = Candidate::with(MapKind::Linear, Some(Kernel::Linear), shown, ratios)?;
+        ContextMapKind::Stacked => {
+            let line = Candidate::with(ContextMapKind::Linear, Some(Kernel::Linear), shown, ratios)?;
             let deviations = &shown.outputs - &shown.outputs.mean_axis(Axis(0)).unwrap_or_default();
-            let missed = |of: &Candidate| of.kriging.left_out(&of.values, &of.ratios);
+            let missed = |of: &Candidate| of.kriging.leave_one_out_errors(&of.values, &of.ratios);
             let (process, straight) = (missed(&candidate), missed(&line));
             let stack = Stack::find(&deviations, &process, &straight);
             let [g, l] = stack.inside;
             let errors = (process * g + straight * l).map_axis(Axis(1), |row| row.dot(&row));
-            tried = vec![(kind, mean(&errors)), (MapKind::Gp, tried[0].1), (MapKind::Linear, mean(&line.errors()))];
+            tried = vec![
+                (kind, mean(&errors)),
+                (ContextMapKind::Gp, tried[0].1),
+                (ContextMapKind::Linear, mean(&line.errors())),
+            ];
             Some(Trend { line, stack })
         }
         _ => None,
@@ -178,7 +184,7 @@ pub(super) fn choose(choice: MapChoice, labels_alone: bool, shown: &Shown) -> Re
 
 /// The trend of a stacked map with known constants.
 pub(super) fn trend(shown: &Shown, ratios: Vec<f64>, stack: Stack) -> Result<Trend> {
-    let line = Candidate::with(MapKind::Linear, Some(Kernel::Linear), shown, |_, _| ratios)?;
+    let line = Candidate::with(ContextMapKind::Linear, Some(Kernel::Linear), shown, |_, _| ratios)?;
     Ok(Trend { line, stack })
 }
 
@@ -231,9 +237,9 @@ impl<'a> Evidence<'a> {
     }
 
     fn value(&self, at: f64, sum: f64, volume: f64) -> f64 {
-        let freedom = self.eigenvalues.len() as f64;
+        let degrees_of_freedom = self.eigenvalues.len() as f64;
         let prior = ((at.exp() + 1e-3).ln() / 3.0).powi(2);
-        -0.5 * (freedom * (sum / freedom).max(1e-300).ln() + volume + prior)
+        -0.5 * (degrees_of_freedom * (sum / degrees_of_freedom).max(1e-300).ln() + volume + prior)
     }
 
     /// The ratio of one output, from the best place of the grid on.

@@ -10,12 +10,12 @@ pub(crate) fn outputs(
     kind: Kind,
     styles: ArrayView2<f64>,
     [goals, starts, anchors]: [ArrayView2<f64>; 3],
-    timings: ArrayView2<f64>,
+    segment_durations: ArrayView2<f64>,
 ) -> Array2<f64> {
-    let last = timings.ncols() - 1;
-    let logarithms = Array2::from_shape_fn(timings.dim(), |(m, k)| match k {
-        0 => timings.row(m).sum().ln(),
-        _ => (timings[[m, k - 1]] / timings[[m, last]]).ln(),
+    let last = segment_durations.ncols() - 1;
+    let logarithms = Array2::from_shape_fn(segment_durations.dim(), |(m, k)| match k {
+        0 => segment_durations.row(m).sum().ln(),
+        _ => (segment_durations[[m, k - 1]] / segment_durations[[m, last]]).ln(),
     });
     let parts = match kind {
         Kind::Discrete => vec![styles, goals, starts, logarithms.view()],
@@ -26,10 +26,10 @@ pub(crate) fn outputs(
 }
 
 /// Relative change of each time (K,) in a timing per unit of the outputs that it is foreseen by (K,).
-pub(crate) fn relative_changes(timing: &[f64]) -> Array2<f64> {
-    let duration: f64 = timing.iter().sum();
-    Array2::from_shape_fn((timing.len(), timing.len()), |(k, output)| match output {
+pub(crate) fn relative_changes(segment_durations: &[f64]) -> Array2<f64> {
+    let duration: f64 = segment_durations.iter().sum();
+    Array2::from_shape_fn((segment_durations.len(), segment_durations.len()), |(k, output)| match output {
         0 => 1.0,
-        i => f64::from(u8::from(k == i - 1)) - timing[i - 1] / duration,
+        i => f64::from(u8::from(k == i - 1)) - segment_durations[i - 1] / duration,
     })
 }

@@ -9,7 +9,7 @@ fn contexts(numbers: &[f64]) -> Vec<Vec<ContextValue>> {
 }
 
 fn linear(numbers: &[f64], outputs: &Array2<f64>) -> ContextMap {
-    ContextMap::fit(&contexts(numbers), outputs.view(), MapChoice::Given(MapKind::Linear)).unwrap()
+    ContextMap::fit(&contexts(numbers), outputs.view(), MapSelection::Given(ContextMapKind::Linear)).unwrap()
 }
 
 /// Data on a line are predicted exactly by least squares and to a millionth by `Auto`, inside the range and outside.
@@ -17,9 +17,9 @@ fn linear(numbers: &[f64], outputs: &Array2<f64>) -> ContextMap {
 fn linear_data_are_predicted_exactly() {
     let h = [0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9];
     let outputs = Array2::from_shape_fn((7, 1), |(m, _)| h[m]).dot(&array![[2.0, -1.0, 0.5, 0.1]]) + 0.7;
-    let maps = [MapChoice::Given(MapKind::Linear), MapChoice::Auto]
+    let maps = [MapSelection::Given(ContextMapKind::Linear), MapSelection::Auto]
         .map(|choice| ContextMap::fit(&contexts(&h), outputs.view(), choice).unwrap());
-    assert_eq!(maps[1].kind(), MapKind::Stacked);
+    assert_eq!(maps[1].kind(), ContextMapKind::Stacked);
     for (map, accuracy) in maps.iter().zip([1e-12, 1e-6]) {
         for at in [0.6, 2.0] {
             let found = map.predict(&[at]).unwrap();
@@ -38,7 +38,7 @@ fn contexts_that_are_none_are_refused() {
         let outputs = Array2::zeros((contexts.len(), 2));
         ContextMap::fit(contexts, outputs.view(), choice).unwrap_err().to_string()
     };
-    for choice in [MapKind::Linear, MapKind::Polynomial, MapKind::Gp].map(MapChoice::Given) {
+    for choice in [ContextMapKind::Linear, ContextMapKind::Polynomial, ContextMapKind::Gp].map(MapSelection::Given) {
         assert!(bad(&[], choice).contains("contexts is empty"));
         assert!(bad(&[vec![], vec![]], choice).contains("context is empty"));
         assert!(bad(&contexts(&[0.0, f64::NAN, 1.0]), choice).contains("demo 1: context[0] = NaN"));
@@ -86,13 +86,13 @@ fn errors_left_out_are_those_of_fits_without() {
         let inputs = Array2::from_shape_fn((6, 1), |(m, _)| h[m]);
         let ratios = if kernel.is_some() { [2.0, 0.3] } else { [0.0; 2] };
         let shown = Shown { inputs: inputs.view(), n_inputs: 1, outputs: y.view() };
-        let whole = Candidate::with(MapKind::Gp, kernel, &shown, |_, _| ratios.to_vec()).unwrap();
-        let errors = whole.kriging.left_out(&whole.values, &ratios);
+        let whole = Candidate::with(ContextMapKind::Gp, kernel, &shown, |_, _| ratios.to_vec()).unwrap();
+        let errors = whole.kriging.leave_one_out_errors(&whole.values, &ratios);
         for m in 0..6 {
             let others: Vec<usize> = (0..6).filter(|&k| k != m).collect();
             let (inputs, outputs) = (inputs.select(Axis(0), &others), y.select(Axis(0), &others));
             let shown = Shown { inputs: inputs.view(), n_inputs: 1, outputs: outputs.view() };
-            let part = Candidate::with(MapKind::Gp, kernel, &shown, |_, _| ratios.to_vec()).unwrap();
+            let part = Candidate::with(ContextMapKind::Gp, kernel, &shown, |_, _| ratios.to_vec()).unwrap();
             let place = part.kriging.place(&[h[m]]);
             let mean =
                 place.flat.dot(&part.values.flat) + place.rest.dot(&part.kriging.coefficients(&part.values, &ratios));
@@ -111,7 +111,7 @@ fn kriging_agrees_with_the_joint_density() {
     let (kernel, ratio, wide) = (Kernel::Matern { length: 0.7 }, 1.7, 1e6);
     let inputs = Array2::from_shape_fn((5, 1), |(m, _)| h[m]);
     let shown = Shown { inputs: inputs.view(), n_inputs: 1, outputs: y.view() };
-    let found = Candidate::with(MapKind::Gp, Some(kernel), &shown, |_, _| vec![ratio]).unwrap();
+    let found = Candidate::with(ContextMapKind::Gp, Some(kernel), &shown, |_, _| vec![ratio]).unwrap();
     let k = |a: f64, b: f64| ratio * kernel.of(&[a], &[b], 1) + wide;
     let covariance = nalgebra::DMatrix::from_fn(5, 5, |i, j| k(h[i], h[j]) + f64::from(i == j));
     let factor = covariance.cholesky().unwrap();
@@ -133,12 +133,12 @@ fn auto_follows_a_curve_and_leaves_noise_alone() {
     let h: Vec<f64> = (0..15).map(|k| k as f64 / 14.0).collect();
     let noise = |m: usize| 0.02 * ((m * m * 7 + 3 * m) as f64).sin();
     let curve = Array2::from_shape_fn((15, 1), |(m, _)| (6.0 * h[m]).sin() + noise(m));
-    let map = ContextMap::fit(&contexts(&h), curve.view(), MapChoice::Auto).unwrap();
+    let map = ContextMap::fit(&contexts(&h), curve.view(), MapSelection::Auto).unwrap();
     for at in [0.11, 0.5, 0.83] {
         assert_relative_eq!(map.predict(&[at]).unwrap().mean[0], (6.0 * at).sin(), epsilon = 0.05);
     }
     let flat = Array2::from_shape_fn((15, 1), |(m, _)| 1.0 + noise(m));
-    let map = ContextMap::fit(&contexts(&h), flat.view(), MapChoice::Auto).unwrap();
+    let map = ContextMap::fit(&contexts(&h), flat.view(), MapSelection::Auto).unwrap();
     for at in [0.5, 3.0] {
         assert_relative_eq!(map.predict(&[at]).unwrap().mean[0], 1.0, epsilon = 0.02);
     }
@@ -150,12 +150,12 @@ fn labels_are_told_apart() {
     let shown = [("old", 1.0), ("old", 1.2), ("proud", 3.0), ("proud", 3.2), ("young", 5.0), ("young", 5.2)];
     let contexts: Vec<Vec<ContextValue>> = shown.iter().map(|(label, _)| vec![(*label).into()]).collect();
     let outputs = Array2::from_shape_fn((6, 1), |(m, _)| shown[m].1);
-    for kind in [MapKind::Linear, MapKind::Gp] {
-        let map = ContextMap::fit(&contexts, outputs.view(), MapChoice::Given(kind)).unwrap();
+    for kind in [ContextMapKind::Linear, ContextMapKind::Gp] {
+        let map = ContextMap::fit(&contexts, outputs.view(), MapSelection::Given(kind)).unwrap();
         for (label, expected) in [("old", 1.1), ("proud", 3.1), ("young", 5.1)] {
             let found = map.predict(&[label]).unwrap();
             match kind {
-                MapKind::Linear => assert_relative_eq!(found.mean[0], expected, epsilon = 1e-12),
+                ContextMapKind::Linear => assert_relative_eq!(found.mean[0], expected, epsilon = 1e-12),
                 // Three labels know little of their spread: each is halfway to the mean of all, and no further.
                 _ => {
                     assert!((found.mean[0] - 3.1).abs() >= 0.3 * (expected - 3.1f64).abs(), "{label} {:?}", found.mean)
@@ -187,7 +187,8 @@ fn units_of_outputs_do_not_matter() {
     let foreseen = |units: [f64; 2]| {
         let outputs = &outputs * &ndarray::Array1::from(units.to_vec());
         let metric = Array2::from_shape_fn((2, 2), |(p, q)| metric[[p, q]] / units[p] / units[q]);
-        let map = ContextMap::learn(columns.clone(), &table, outputs.view(), metric.view(), MapChoice::Auto).unwrap();
+        let map =
+            ContextMap::learn(columns.clone(), &table, outputs.view(), metric.view(), MapSelection::Auto).unwrap();
         std::array::from_fn::<_, 2, _>(|p| map.expect(&[0.4])[p] / units[p])
     };
     let plain = foreseen([1.0, 1.0]);

@@ -27,7 +27,7 @@ pub(super) struct Data {
 
 impl Data {
     pub(super) fn of(columns: Vec<ContextColumn>, contexts: &Array2<f64>, outputs: ArrayView2<f64>) -> Result<Self> {
-        let groups = alike(contexts);
+        let groups = group_equal_contexts(contexts);
         // Each label is an input of its own.
         let n_inputs: usize = columns.iter().map(ContextColumn::n_features).sum();
         let work = groups.len() as f64 * (n_inputs as f64).powi(2);
@@ -51,8 +51,8 @@ impl Data {
                 scatter += &deviations.t().dot(&deviations);
             }
         }
-        let freedom = contexts.nrows() - groups.len();
-        let within = (freedom > 0).then(|| (scatter / freedom as f64, freedom));
+        let degrees_of_freedom = contexts.nrows() - groups.len();
+        let within = (degrees_of_freedom > 0).then(|| (scatter / degrees_of_freedom as f64, degrees_of_freedom));
         let kept = groups.iter().map(|group| 1.0 / group.len() as f64).sum::<f64>() / groups.len() as f64;
         Ok(Self { columns, scale, inputs, means, within, kept })
     }
@@ -69,7 +69,7 @@ impl Data {
 
     /// The same, of components along axes.
     pub(super) fn along(self, axes: &Axes) -> Self {
-        let within = self.within.map(|(within, freedom)| (axes.scatter(&within), freedom));
+        let within = self.within.map(|(within, degrees_of_freedom)| (axes.scatter(&within), degrees_of_freedom));
         Self { means: axes.components(&self.means), within, ..self }
     }
 
@@ -80,13 +80,13 @@ impl Data {
     pub(super) fn map(self, axes: Axes, choice: Choice) -> ContextMap {
         let Choice { candidate, trend, errors } = choice;
         let (kind, kernel, ratios) = (candidate.kind, candidate.kernel, candidate.ratios.clone());
-        let (noise, freedom) = match (candidate.kriging.freedom(), &self.within) {
+        let (noise, degrees_of_freedom) = match (candidate.kriging.degrees_of_freedom(), &self.within) {
             // As many coefficients as contexts: what is left is the noise of the averages.
             (0, None) => (None, 0),
-            (0, Some((within, freedom))) => (Some(within * self.kept), *freedom),
-            (freedom, _) => {
+            (0, Some((within, degrees_of_freedom))) => (Some(within * self.kept), *degrees_of_freedom),
+            (degrees_of_freedom, _) => {
                 let innovations = candidate.kriging.innovations(&candidate.values, &ratios);
-                (Some(innovations.t().dot(&innovations) / freedom as f64), freedom)
+                (Some(innovations.t().dot(&innovations) / degrees_of_freedom as f64), degrees_of_freedom)
             }
         };
         let within = self.within.map(|(within, _)| within * (1.0 - self.kept));
@@ -109,13 +109,13 @@ impl Data {
             centre,
             noise,
             within,
-            freedom,
+            degrees_of_freedom,
         }
     }
 }
 
 /// Demonstrations of equal contexts (M, Q), in the order of the first of each.
-pub(crate) fn alike(contexts: &Array2<f64>) -> Vec<Vec<usize>> {
+pub(crate) fn group_equal_contexts(contexts: &Array2<f64>) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     let mut known = HashMap::new();
     for (m, row) in contexts.rows().into_iter().enumerate() {

@@ -6,14 +6,14 @@
 //! ẍ = −2ωẋ − ω²(x − target), solved in closed form over a tick. Its impulse response is positive, so that a filtered
 //! positive command stays positive, whatever the order and time of its changes.
 
-use crate::numerics::simd::{Lanes, Register, pack, repack};
+use crate::numerics::simd::{F64x4, Register, pack, repack};
 
 /// Time to 99 % of a step, times ω: the root of (1 + s)exp(−s) = 0.01.
 const SETTLING: f64 = 6.638_352_067_993_813;
 /// A part of a transition, times ω, within which a cubic is off by some 1e-9 of the step.
-const FINEST: f64 = 0.07;
+const MAX_CLOCK_STEP: f64 = 0.07;
 /// Most parts of a tick for a transition's sake.
-const MOST_PARTS: f64 = 32.0;
+const MAX_PARTS: f64 = 32.0;
 /// Shortest transition, in seconds, that is filtered: a shorter one, whose ω² leaves the range of numbers, is immediate.
 const MIN_TRANSITION: f64 = 1e-15;
 /// After so long, times ω, what is left of a step lies far below rounding.
@@ -30,7 +30,7 @@ pub(crate) struct Filter {
 
 /// The filter's solution over a tick: what displacement d = x − target and rate v at its start become and add.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Glide {
+pub(crate) struct FilterStep {
     dt: f64,
     /// x − target at the end, of d and v.
     value: [f64; 2],
@@ -55,26 +55,26 @@ impl Filter {
     /// Parts in which `dt` seconds of a transition are well described by cubics; what is over within one of many need
     /// not be.
     pub(crate) fn parts(&self, dt: f64) -> f64 {
-        (self.omega * dt / FINEST).min(MOST_PARTS)
+        (self.omega * dt / MAX_CLOCK_STEP).min(MAX_PARTS)
     }
 
     /// How far a group may still go, at most.
-    pub(crate) fn left(&self, follower: &Follower, group: usize) -> Lanes {
-        let Follower { value, rate, target, .. } = follower;
+    pub(crate) fn left(&self, follower: &CommandFilter, group: usize) -> F64x4 {
+        let CommandFilter { value, rate, target, .. } = follower;
         (value[group] - target[group]).abs() + rate[group].abs() * (1.0 / self.omega)
     }
 
     /// The solution over `dt` seconds without its integral, which only the rate needs.
-    pub(crate) fn pass(&self, dt: f64) -> Glide {
+    pub(crate) fn pass(&self, dt: f64) -> FilterStep {
         let s = (self.omega * dt).min(1e4);
         let decay = (-s).exp();
         let (value, rate) = ([(1.0 + s) * decay, dt * decay], [-self.omega * (s * decay), (1.0 - s) * decay]);
-        Glide { dt, value, rate, integral: [0.0; 2] }
+        FilterStep { dt, value, rate, integral: [0.0; 2] }
     }
 
     /// What follows a filtered command x by q̇ = m(x − q), after `dt` seconds: the amplitude r of Eq. (4), or a target of
     /// its own that is at rest where the filter is immediate.
-    pub(crate) fn lag(&self, follower: &Follower, q: f64, m: f64, dt: f64) -> f64 {
+    pub(crate) fn lag(&self, follower: &CommandFilter, q: f64, m: f64, dt: f64) -> f64 {
         let [x, v, target] = [&follower.value, &follower.rate, &follower.target].map(|lanes| lanes[0].as_array()[0]);
         let (d, decay) = (x - target, (-m * dt).exp());
         if follower.settled() {
@@ -100,7 +100,7 @@ impl Filter {
     }
 
     /// The solution over `dt` seconds.
-    pub(crate) fn glide(&self, dt: f64) -> Glide {
+    pub(crate) fn glide(&self, dt: f64) -> FilterStep {
         let omega = self.omega;
         // A step that is over is over, however long since.
         let s = (omega * dt).min(1e4);
@@ -108,7 +108,7 @@ impl Filter {
         // ∫exp(−ωt) and ∫ωt·exp(−ωt), times ω.
         let first = -(-s).exp_m1();
         let second = first - s * decay;
-        Glide {
+        FilterStep {
             dt,
             value: [(1.0 + s) * decay, dt * decay],
             rate: [-omega * (s * decay), (1.0 - s) * decay],
@@ -117,7 +117,7 @@ impl Filter {
     }
 }
 
-impl Glide {
+impl FilterStep {
     /// Over no time: what is there stays.
     pub(crate) const START: Self = Self { dt: 0.0, value: [1.0, 0.0], rate: [0.0, 1.0], integral: [0.0; 2] };
 
@@ -129,33 +129,33 @@ impl Glide {
 
 /// Commands that set out together, in groups of four, padded with zeros.
 #[derive(Clone, Debug)]
-pub(crate) struct Follower {
-    value: Vec<Lanes>,
-    rate: Vec<Lanes>,
-    target: Vec<Lanes>,
+pub(crate) struct CommandFilter {
+    value: Vec<F64x4>,
+    rate: Vec<F64x4>,
+    target: Vec<F64x4>,
     /// Seconds until the values are their targets.
     remaining: f64,
 }
 
-impl Follower {
+impl CommandFilter {
     /// At rest on its targets.
     pub(crate) fn new(target: &[f64]) -> Self {
         let target = pack(target);
-        Self { value: target.clone(), rate: vec![Lanes::ZERO; target.len()], target, remaining: 0.0 }
+        Self { value: target.clone(), rate: vec![F64x4::ZERO; target.len()], target, remaining: 0.0 }
     }
 
     /// Values now.
-    pub(crate) fn value(&self) -> &[Lanes] {
+    pub(crate) fn value(&self) -> &[F64x4] {
         &self.value
     }
 
     /// Their derivatives with respect to time, per second.
-    pub(crate) fn rate(&self) -> &[Lanes] {
+    pub(crate) fn rate(&self) -> &[F64x4] {
         &self.rate
     }
 
     /// Where they go.
-    pub(crate) fn target(&self) -> &[Lanes] {
+    pub(crate) fn target(&self) -> &[F64x4] {
         &self.target
     }
 
@@ -181,13 +181,13 @@ impl Follower {
 
     fn settle(&mut self) {
         self.value.copy_from_slice(&self.target);
-        self.rate.fill(Lanes::ZERO);
+        self.rate.fill(F64x4::ZERO);
         self.remaining = 0.0;
     }
 
     /// Moves on by a tick.
     #[inline(always)]
-    pub(crate) fn advance<T: Register>(&mut self, glide: &Glide) {
+    pub(crate) fn advance<T: Register>(&mut self, glide: &FilterStep) {
         if self.elapse(glide) {
             for group in 0..self.value.len() {
                 self.advance_group::<T>(group, glide);
@@ -196,7 +196,7 @@ impl Follower {
     }
 
     /// Takes a tick off the time to come, and tells whether each group is now to be moved on.
-    pub(crate) fn elapse(&mut self, glide: &Glide) -> bool {
+    pub(crate) fn elapse(&mut self, glide: &FilterStep) -> bool {
         let moving = !self.settled();
         if moving {
             self.remaining -= glide.dt;
@@ -206,9 +206,9 @@ impl Follower {
 
     /// Moves one group on by a tick.
     #[inline(always)]
-    pub(crate) fn advance_group<T: Register>(&mut self, group: usize, glide: &Glide) {
+    pub(crate) fn advance_group<T: Register>(&mut self, group: usize, glide: &FilterStep) {
         if self.settled() {
-            (self.value[group], self.rate[group]) = (self.target[group], Lanes::ZERO);
+            (self.value[group], self.rate[group]) = (self.target[group], F64x4::ZERO);
             return;
         }
         let [x, v, target] = [&self.value, &self.rate, &self.target].map(|lanes| T::load(&lanes[group]));
@@ -218,7 +218,7 @@ impl Follower {
     }
 
     /// ∫ of the first value over a tick.
-    pub(crate) fn integral(&self, glide: &Glide) -> f64 {
+    pub(crate) fn integral(&self, glide: &FilterStep) -> f64 {
         let [x, v, target] = [&self.value, &self.rate, &self.target].map(|lanes| lanes[0].as_array()[0]);
         target * glide.dt + ((x - target) * glide.integral[0] + v * glide.integral[1])
     }
@@ -244,13 +244,13 @@ mod tests {
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
-    fn first(lanes: &[Lanes]) -> f64 {
+    fn first(lanes: &[F64x4]) -> f64 {
         lanes[0].as_array()[0]
     }
 
     /// One command that sets out from 2 for 5, to be there after 0.3 s.
-    fn command() -> (Follower, Filter) {
-        let (mut follower, filter) = (Follower::new(&[2.0]), Filter::new(0.3));
+    fn command() -> (CommandFilter, Filter) {
+        let (mut follower, filter) = (CommandFilter::new(&[2.0]), Filter::new(0.3));
         follower.follow(&[5.0], &filter);
         (follower, filter)
     }
@@ -260,7 +260,7 @@ mod tests {
     fn transition_is_the_time_to_99_percent() {
         for ticks in [1, 7, 1000] {
             let (mut follower, filter) = command();
-            (0..ticks).for_each(|_| follower.advance::<Lanes>(&filter.glide(0.3 / f64::from(ticks))));
+            (0..ticks).for_each(|_| follower.advance::<F64x4>(&filter.glide(0.3 / f64::from(ticks))));
             assert_relative_eq!(first(follower.value()), 2.0 + 0.99 * 3.0, epsilon = 1e-12);
         }
     }
@@ -280,7 +280,7 @@ mod tests {
             x += h / 6.0 * (a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0);
             v += h / 6.0 * (a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1);
         }
-        follower.advance::<Lanes>(&filter.glide(0.2));
+        follower.advance::<F64x4>(&filter.glide(0.2));
         assert_relative_eq!(first(follower.value()), x, max_relative = 1e-9);
         assert_relative_eq!(first(follower.rate()), v, max_relative = 1e-8);
     }
@@ -289,10 +289,10 @@ mod tests {
     #[test]
     fn integral_is_that_of_the_values() {
         let (mut follower, filter) = command();
-        follower.advance::<Lanes>(&filter.glide(0.02));
+        follower.advance::<F64x4>(&filter.glide(0.02));
         let at = |t: f64| {
             let mut follower = follower.clone();
-            follower.advance::<Lanes>(&filter.glide(t));
+            follower.advance::<F64x4>(&filter.glide(t));
             first(follower.value())
         };
         let n = 1000;
@@ -312,7 +312,7 @@ mod tests {
             let h = 0.1 / f64::from(n);
             let x = |t: f64| {
                 let mut follower = start.clone();
-                follower.advance::<Lanes>(&filter.pass(t));
+                follower.advance::<F64x4>(&filter.pass(t));
                 first(follower.value())
             };
             for k in 0..n {
@@ -337,7 +337,7 @@ mod tests {
                 follower.follow(&[target], &filter);
                 let glide = filter.glide(dt);
                 let area = follower.integral(&glide);
-                follower.advance::<Lanes>(&glide);
+                follower.advance::<F64x4>(&glide);
                 prop_assert!(first(follower.value()) > 0.0 && area > 0.0);
             }
         }

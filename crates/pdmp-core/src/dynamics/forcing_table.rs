@@ -4,13 +4,13 @@
 //! on a uniform grid of the clock.
 
 use crate::dynamics::canonical::{Canonical, faded, turn};
-use crate::dynamics::hermite_table::Jets;
-use crate::dynamics::output_system::Jet;
-use crate::numerics::simd::{Lanes, Real, Register, WIDTH, groups};
+use crate::dynamics::hermite_table::KnotTable;
+use crate::dynamics::output_system::CubicSample;
+use crate::numerics::simd::{F64x4, Real, Register, WIDTH, groups};
 
 /// Forcing w of unit styles over the clock: discrete x·b(x; W), rhythmic b(φ; W).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Landscape {
+pub struct ForcingTable {
     canonical: Canonical,
     n_styles: usize,
     n_dofs: usize,
@@ -54,7 +54,7 @@ pub(crate) struct Fade {
 
 impl Fade {
     /// Magnitude of what still pushes where z has settled, for a + b·p as value and b as slope.
-    pub(crate) fn push(&self, Jet { value, slope }: Jet<Lanes>) -> Lanes {
+    pub(crate) fn push(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> F64x4 {
         let push = if self.braked { slope * (self.share * self.value) } else { value * self.value };
         push.abs()
     }
@@ -63,18 +63,18 @@ impl Fade {
 /// Coefficients of a cubic from a knot on, over the clock; the first two are value and slope at the knot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(64))]
-struct Cubic([Lanes; 4]);
+struct Cubic([F64x4; 4]);
 
 /// A place on the clock: the first cubic at a knot, and how far beyond it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct TableIndex {
     first: usize,
     t: f64,
 }
 
 impl Cubic {
     /// The cubic with given values and slopes at both ends of a cell.
-    fn hermite(from: Jet<Lanes>, to: Jet<Lanes>, width: f64) -> Self {
+    fn hermite(from: CubicSample<F64x4>, to: CubicSample<F64x4>, width: f64) -> Self {
         let scale = 1.0 / width;
         let rise = (to.value - from.value) * scale;
         let square = (rise * 3.0 - from.slope * 2.0 - to.slope) * scale;
@@ -88,23 +88,23 @@ impl Cubic {
         [T::load(value), T::load(slope), T::load(square), T::load(cube)]
     }
 
-    fn at(&self, t: f64) -> Jet<Lanes> {
+    fn at(&self, t: f64) -> CubicSample<F64x4> {
         evaluate(self.load(), t)
     }
 }
 
 /// A cubic of given coefficients.
 #[inline(always)]
-fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> Jet<T> {
-    Jet {
+fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> CubicSample<T> {
+    CubicSample {
         value: value + slope * t + (square + cube * t) * (t * t),
         slope: slope + (square * (2.0 * t) + cube * (3.0 * t * t)),
     }
 }
 
-impl Landscape {
+impl ForcingTable {
     /// A table from values and slopes of J·D outputs at its knots, two at least.
-    pub(crate) fn from_knots(canonical: Canonical, n_dofs: usize, knots: &Jets, error: f64) -> Self {
+    pub(crate) fn from_knots(canonical: Canonical, n_dofs: usize, knots: &KnotTable, error: f64) -> Self {
         let (cells, n_styles, extent) = (knots.len() - 1, knots.n_outputs / n_dofs, canonical.extent());
         let width = extent / cells as f64;
         let mut cubics = Vec::with_capacity((cells + 2) * groups(n_dofs) * n_styles);
@@ -114,7 +114,7 @@ impl Landscape {
                 cubics.extend((0..n_styles).map(|j| {
                     let from = knots.jet(k, j * n_dofs + first, n);
                     if k == cells {
-                        return Cubic([from.value, from.slope, Lanes::ZERO, Lanes::ZERO]);
+                        return Cubic([from.value, from.slope, F64x4::ZERO, F64x4::ZERO]);
                     }
                     Cubic::hermite(from, knots.jet(k + 1, j * n_dofs + first, n), width)
                 }));
@@ -122,7 +122,7 @@ impl Landscape {
         }
         let at_knot = groups(n_dofs) * n_styles;
         for i in cells * at_knot..(cells + 1) * at_knot {
-            cubics.push(Cubic([cubics[i].0[0], Lanes::ZERO, Lanes::ZERO, Lanes::ZERO]));
+            cubics.push(Cubic([cubics[i].0[0], F64x4::ZERO, F64x4::ZERO, F64x4::ZERO]));
         }
         let ending = Ending::Phase;
         Self {
@@ -140,11 +140,11 @@ impl Landscape {
     }
 
     /// The same with a forcing that brakes past the end, for `z` of unit styles there, by groups of DoFs and styles.
-    pub(crate) fn braked(mut self, alpha_z: f64, braking: f64, z: &[Lanes]) -> Self {
+    pub(crate) fn braked(mut self, alpha_z: f64, braking: f64, z: &[F64x4]) -> Self {
         let [end, beyond] = [self.cells, self.cells + 1].map(|row| row * self.at_knot);
         for (i, z) in z.iter().enumerate() {
             let value = self.cubics[end + i].0[0];
-            self.cubics[beyond + i] = Cubic([-*z, value + *z, Lanes::ZERO, Lanes::ZERO]);
+            self.cubics[beyond + i] = Cubic([-*z, value + *z, F64x4::ZERO, F64x4::ZERO]);
         }
         self.ending = Ending::Braked { alpha_z, braking };
         self
@@ -162,8 +162,8 @@ impl Landscape {
     }
 
     /// Values and slopes at the knots.
-    pub(crate) fn knots(&self) -> Jets {
-        let mut knots = Jets::zeros(self.cells + 1, self.n_outputs());
+    pub(crate) fn knots(&self) -> KnotTable {
+        let mut knots = KnotTable::zeros(self.cells + 1, self.n_outputs());
         for (k, (values, slopes)) in knots.rows_mut(1).enumerate() {
             self.scatter(|group, j| self.knot(k, group, j), values, slopes);
         }
@@ -171,7 +171,7 @@ impl Landscape {
     }
 
     /// The forcing of a style at a knot, for one group of DoFs.
-    pub(crate) fn knot(&self, k: usize, group: usize, j: usize) -> Jet<Lanes> {
+    pub(crate) fn knot(&self, k: usize, group: usize, j: usize) -> CubicSample<F64x4> {
         self.cubics(k * self.at_knot, group)[j].at(0.0)
     }
 
@@ -205,8 +205,10 @@ impl Landscape {
         let jet = |group: usize, j: usize| self.cubics(place.first, group)[j].at(place.t);
         match self.fading(u) {
             Some(Fade { value: r, growth, along, .. }) => {
-                let faded =
-                    |Jet { value, slope }: Jet<Lanes>| Jet { value: value * r, slope: value * growth + slope * along };
+                let faded = |CubicSample { value, slope }: CubicSample<F64x4>| CubicSample {
+                    value: value * r,
+                    slope: value * growth + slope * along,
+                };
                 self.scatter(|group, j| faded(jet(group, j)), value, slope);
             }
             None => self.scatter(jet, value, slope),
@@ -236,7 +238,7 @@ impl Landscape {
     }
 
     /// Writes what is known by groups and styles as (J, D) by rows.
-    fn scatter(&self, jet: impl Fn(usize, usize) -> Jet<Lanes>, value: &mut [f64], slope: &mut [f64]) {
+    fn scatter(&self, jet: impl Fn(usize, usize) -> CubicSample<F64x4>, value: &mut [f64], slope: &mut [f64]) {
         let rows = value.chunks_mut(self.n_dofs).zip(slope.chunks_mut(self.n_dofs));
         for (j, (value, slope)) in rows.enumerate() {
             for (group, (value, slope)) in value.chunks_mut(WIDTH).zip(slope.chunks_mut(WIDTH)).enumerate() {
@@ -248,24 +250,24 @@ impl Landscape {
     }
 
     /// A place on the clock. What lies beyond a discrete movement is faded by the reader.
-    pub(crate) fn place(&self, u: f64) -> Place {
+    pub(crate) fn place(&self, u: f64) -> TableIndex {
         match self.fading(u) {
-            Some(Fade { share, .. }) => Place { first: (self.cells + 1) * self.at_knot, t: share },
+            Some(Fade { share, .. }) => TableIndex { first: (self.cells + 1) * self.at_knot, t: share },
             None => self.place_within(u),
         }
     }
 
     /// A place of the demonstrated stretch, its end for all that lies beyond.
     #[inline(always)]
-    pub(crate) fn place_within(&self, u: f64) -> Place {
+    pub(crate) fn place_within(&self, u: f64) -> TableIndex {
         let u = if let Canonical::Rhythmic { .. } = self.canonical { turn(u) } else { u };
         let position = u * self.per_clock;
         // A saturating cast: what lies below the table is read in its first cell.
         let cell = position as u32;
         if cell < self.cells as u32 {
-            Place { first: cell as usize * self.at_knot, t: (position - f64::from(cell)) * self.width }
+            TableIndex { first: cell as usize * self.at_knot, t: (position - f64::from(cell)) * self.width }
         } else {
-            Place { first: self.cells * self.at_knot, t: 0.0 }
+            TableIndex { first: self.cells * self.at_knot, t: 0.0 }
         }
     }
 
@@ -290,7 +292,7 @@ impl Landscape {
 
     /// Forcing sᵀb at a place, for one group of DoFs, with its slope.
     #[inline(always)]
-    pub(crate) fn blend<T: Register>(&self, place: Place, group: usize, style: &[f64]) -> Jet<T> {
+    pub(crate) fn blend<T: Register>(&self, place: TableIndex, group: usize, style: &[f64]) -> CubicSample<T> {
         let mut sum = [T::default(); 4];
         for (s, cubic) in style.iter().zip(self.cubics(place.first, group)) {
             accumulate(&mut sum, cubic.load(), *s);
@@ -300,7 +302,12 @@ impl Landscape {
 
     /// Forcings of two styles, which take no more reading than one.
     #[inline(always)]
-    pub(crate) fn blend_both<T: Register>(&self, place: Place, group: usize, styles: [&[f64]; 2]) -> [Jet<T>; 2] {
+    pub(crate) fn blend_both<T: Register>(
+        &self,
+        place: TableIndex,
+        group: usize,
+        styles: [&[f64]; 2],
+    ) -> [CubicSample<T>; 2] {
         let mut sums = [[T::default(); 4]; 2];
         for ((s, v), cubic) in styles[0].iter().zip(styles[1]).zip(self.cubics(place.first, group)) {
             let cubic = cubic.load();

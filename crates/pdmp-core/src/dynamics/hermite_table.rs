@@ -1,22 +1,22 @@
 //! Values and slopes at the knots of a table.
 
-use crate::dynamics::output_system::Jet;
-use crate::numerics::simd::{Lanes, padded};
+use crate::dynamics::output_system::CubicSample;
+use crate::numerics::simd::{F64x4, padded};
 
 /// Error of the table, relative to the largest forcing, at which cells are halved no more.
 pub(crate) const TOLERANCE: f64 = 1e-9;
 /// Cells beyond which a table is not refined.
-pub(crate) const MOST_CELLS: usize = 8192;
+pub(crate) const MAX_CELLS: usize = 8192;
 
 /// Values and slopes of several outputs at increasing places on the clock, each by rows (places, outputs).
 #[derive(Clone, Debug)]
-pub(crate) struct Jets {
+pub(crate) struct KnotTable {
     pub(crate) n_outputs: usize,
     pub(crate) values: Vec<f64>,
     pub(crate) slopes: Vec<f64>,
 }
 
-impl Jets {
+impl KnotTable {
     /// Room for `n` places.
     pub(crate) fn zeros(n: usize, n_outputs: usize) -> Self {
         let [values, slopes] = [0, 1].map(|_| vec![0.0; n * n_outputs]);
@@ -35,10 +35,10 @@ impl Jets {
     }
 
     /// Up to four outputs at a place.
-    pub(crate) fn jet(&self, place: usize, first: usize, n: usize) -> Jet<Lanes> {
+    pub(crate) fn jet(&self, place: usize, first: usize, n: usize) -> CubicSample<F64x4> {
         let [value, slope] =
             [&self.values, &self.slopes].map(|table| padded(&table[place * self.n_outputs + first..][..n]));
-        Jet { value, slope }
+        CubicSample { value, slope }
     }
 
     /// These knots with room for the middles of their cells between them.

@@ -10,5 +10,5 @@ pub(crate) mod time_warp;
 pub(crate) mod transport;
 
 pub use canonical::Canonical;
-pub use forcing_table::Landscape;
+pub use forcing_table::ForcingTable;
 pub use output_system::Attractor;

@@ -23,7 +23,7 @@ pub struct Attractor {
 
 /// A value and its derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Jet<T = f64> {
+pub(crate) struct CubicSample<T = f64> {
     /// The value.
     pub(crate) value: T,
     /// Its derivative.
@@ -43,7 +43,7 @@ pub(crate) struct State<T = f64> {
 type CubicWeights = [f64; 4];
 
 #[inline(always)]
-fn weigh<T: Real>(weights: &CubicWeights, [from, to]: [Jet<T>; 2]) -> T {
+fn weigh<T: Real>(weights: &CubicWeights, [from, to]: [CubicSample<T>; 2]) -> T {
     from.value * weights[0] + to.value * weights[1] + (from.slope * weights[2] + to.slope * weights[3])
 }
 
@@ -115,7 +115,7 @@ impl Inverse {
     /// one turn, on its periodic steady state.
     pub(crate) fn target<T: Real>(&self, position: &mut [T], slope: &[T], attractor: T, periodic: bool) {
         let n = position.len();
-        let jet = |y: T, dy: T| Jet { value: attractor - y, slope: T::default() - dy };
+        let jet = |y: T, dy: T| CubicSample { value: attractor - y, slope: T::default() - dy };
         let mut z = T::default();
         if periodic {
             for (c, next) in (0..n).zip((1..n).chain([0])) {
@@ -135,7 +135,7 @@ impl Inverse {
 
     /// z one step on, given g − y at both ends of it.
     #[inline(always)]
-    fn step<T: Real>(&self, z: T, driving: [Jet<T>; 2]) -> T {
+    fn step<T: Real>(&self, z: T, driving: [CubicSample<T>; 2]) -> T {
         z * self.decay + weigh(&self.weights, driving)
     }
 }
@@ -153,7 +153,7 @@ impl Propagator {
 
     /// The state after the step under the forcing w.
     #[inline(always)]
-    pub(crate) fn advance<T: Real>(&self, state: State<T>, forcing: [Jet<T>; 2]) -> State<T> {
+    pub(crate) fn advance<T: Real>(&self, state: State<T>, forcing: [CubicSample<T>; 2]) -> State<T> {
         let [e, z] = [0, 1].map(|row| {
             let [from_e, from_z] = self.transition[row];
             (state.e * from_e + state.z * from_z) + weigh(&self.forcing[row], forcing)
@@ -163,7 +163,7 @@ impl Propagator {
 
     /// What a goal moving by γ adds to the state, still relative to where the goal was at the start of the step.
     #[inline(always)]
-    pub(crate) fn follow<T: Real>(&self, goal: [Jet<T>; 2]) -> State<T> {
+    pub(crate) fn follow<T: Real>(&self, goal: [CubicSample<T>; 2]) -> State<T> {
         let [e, z] = [0, 1].map(|row| weigh(&self.goal[row], goal));
         State { e, z }
     }
@@ -266,9 +266,9 @@ mod tests {
         s
     }
 
-    fn jets(c: [f64; 4], h: f64) -> [Jet; 2] {
-        let from = Jet { value: c[0], slope: c[1] / h };
-        let to = Jet { value: c.iter().sum(), slope: (c[1] + 2.0 * c[2] + 3.0 * c[3]) / h };
+    fn jets(c: [f64; 4], h: f64) -> [CubicSample; 2] {
+        let from = CubicSample { value: c[0], slope: c[1] / h };
+        let to = CubicSample { value: c.iter().sum(), slope: (c[1] + 2.0 * c[2] + 3.0 * c[3]) / h };
         [from, to]
     }
 
@@ -314,7 +314,7 @@ mod tests {
             let mut state = State { e: 1.0, z: 0.0 };
             let propagator = system.propagator(h);
             for _ in 0..1000 {
-                state = propagator.advance(state, [Jet::default(); 2]);
+                state = propagator.advance(state, [CubicSample::default(); 2]);
                 prop_assert!(state.e.abs() <= 1.0 + 1e-12 && state.z.is_finite());
             }
         }
@@ -337,7 +337,7 @@ mod tests {
             let (from, to) = (c.saturating_sub(1), (c + 1).min(n - 1));
             (w[to] - w[from]) / ((to - from) as f64 * h)
         };
-        let jet = |c: usize| Jet { value: w[c], slope: slope(c) };
+        let jet = |c: usize| CubicSample { value: w[c], slope: slope(c) };
         let mut state = State { e: y[0] - goal, z: 0.0 };
         for c in 0..n - 1 {
             state = propagator.advance(state, [jet(c), jet(c + 1)]);

@@ -11,14 +11,14 @@
 //! faster than scaling and squaring, and as exact.
 
 use crate::dynamics::output_system::{Attractor, Propagator};
-use crate::numerics::simd::{Lanes, Register};
+use crate::numerics::simd::{F64x4, Register};
 
 /// What is left off, relative to what is kept.
 const TOLERANCE: f64 = 1e-17;
 /// Largest step times the size of A: beyond, large terms would cancel.
-const LARGEST_STEP: f64 = 1.0;
+const MAX_STEP: f64 = 1.0;
 /// A size of A up to which its powers stay finite; beyond, no loop has steps short enough for a series.
-const LARGEST_SIZE: f64 = 1e9;
+const MAX_SIZE: f64 = 1e9;
 /// The weights of a propagator in groups of four: responses of e and z to the forcing, to the goal, and exp(Ah).
 const GROUPS: usize = 5;
 
@@ -26,7 +26,7 @@ const GROUPS: usize = 5;
 #[derive(Clone, Debug)]
 pub(crate) struct Series {
     attractor: Attractor,
-    coefficients: Vec<[[Lanes; 2]; GROUPS]>,
+    coefficients: Vec<[[F64x4; 2]; GROUPS]>,
     /// Longest step.
     reach: f64,
 }
@@ -39,7 +39,7 @@ impl Series {
         // No eigenvalue is larger. A is not normal, but its powers exceed those of its eigenvalues by a factor of their
         // number at most, which the factorials make up for within a term or two.
         let size = 0.5 * (alpha_z + (alpha_z * alpha_z + 4.0 * stiffness).sqrt());
-        let reach = if size < LARGEST_SIZE { reach.min(LARGEST_STEP / size) } else { 0.0 };
+        let reach = if size < MAX_SIZE { reach.min(MAX_STEP / size) } else { 0.0 };
         // No weight begins with a higher power of h than the third.
         let (mut terms, mut left) = (3, 1.0);
         while left > TOLERANCE {
@@ -63,7 +63,7 @@ impl Series {
             let cubic = |column: usize, row: usize, scale: f64| {
                 let at = |shift: usize| if n >= shift { scale * power[n - shift][column][row] } else { 0.0 };
                 let (first, second) = (at(1), at(2));
-                Lanes::new([values[0] * first, values[1] * first, slopes[0] * second, slopes[1] * second])
+                F64x4::new([values[0] * first, values[1] * first, slopes[0] * second, slopes[1] * second])
             };
             let [e, z] = power[n].map(|column| column.map(|x| x * phi(0, 0)));
             [
@@ -71,7 +71,7 @@ impl Series {
                 cubic(0, 1, 1.0),
                 cubic(1, 0, stiffness),
                 cubic(1, 1, stiffness),
-                Lanes::new([e[0], z[0], e[1], z[1]]),
+                F64x4::new([e[0], z[0], e[1], z[1]]),
             ]
         };
         let pair = |k: usize| {
@@ -123,7 +123,7 @@ mod tests {
             let attractor = Attractor { alpha_z, beta_z: alpha_z * ratio };
             let series = Series::new(attractor, reach);
             let h = share * reach;
-            let (found, expected) = (series.propagator::<Lanes>(h), attractor.propagator(h));
+            let (found, expected) = (series.propagator::<F64x4>(h), attractor.propagator(h));
             // The weights of two values or of two slopes are of one size, where one of them may pass through zero.
             for (found, expected) in weights(&found).chunks(2).zip(weights(&expected).chunks(2)) {
                 let size = expected[0].abs().max(expected[1].abs());

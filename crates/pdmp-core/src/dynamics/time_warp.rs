@@ -32,13 +32,13 @@ pub(crate) struct WarpingFunction {
 
 impl WarpingFunction {
     /// The caller has checked that breaks (K+1,) increase from 0 to 1 and that the timing (K,) is positive.
-    pub(crate) fn new(kind: Kind, breaks: &[f64], timing: &[f64]) -> Self {
-        let n = timing.len();
+    pub(crate) fn new(kind: Kind, breaks: &[f64], segment_durations: &[f64]) -> Self {
+        let n = segment_durations.len();
         let mut times = vec![0.0; n + 1];
-        for (k, seconds) in timing.iter().enumerate() {
+        for (k, seconds) in segment_durations.iter().enumerate() {
             times[k + 1] = times[k] + seconds;
         }
-        let chords: Vec<f64> = (0..n).map(|k| timing[k] / (breaks[k + 1] - breaks[k])).collect();
+        let chords: Vec<f64> = (0..n).map(|k| segment_durations[k] / (breaks[k + 1] - breaks[k])).collect();
         let between = |left: f64, right: f64| 2.0 / (1.0 / left + 1.0 / right);
         let mut slopes = vec![chords[0]; n + 1];
         for k in 1..n {
@@ -165,7 +165,7 @@ mod tests {
     /// Breaks and timing of some segments, up to a thousandfold apart.
     fn timings() -> impl Strategy<Value = (Vec<f64>, Vec<f64>)> {
         prop::collection::vec((-3.0..3.0, -3.0..3.0), 1..12).prop_map(|logarithms: Vec<(f64, f64)>| {
-            let [runs, timing]: [Vec<f64>; 2] =
+            let [runs, segment_durations]: [Vec<f64>; 2] =
                 [logarithms.iter().map(|(p, _)| p.exp()).collect(), logarithms.iter().map(|(_, t)| t.exp()).collect()];
             let total: f64 = runs.iter().sum();
             let mut breaks: Vec<f64> = runs
@@ -177,7 +177,7 @@ mod tests {
                 })
                 .collect();
             breaks.push(1.0);
-            (breaks, timing)
+            (breaks, segment_durations)
         })
     }
 
@@ -185,12 +185,12 @@ mod tests {
         /// Time increases, its slope is that of the breaks' neighbours on both sides, and phase of time is its inverse.
         #[test]
         fn time_is_monotone_and_smooth_and_phase_is_its_inverse(
-            (breaks, timing) in timings(), place in any::<prop::sample::Index>(), share in 0.01..0.99f64,
+            (breaks, segment_durations) in timings(), place in any::<prop::sample::Index>(), share in 0.01..0.99f64,
         ) {
             for kind in [Kind::Discrete, Kind::Rhythmic] {
-                let warp = WarpingFunction::new(kind, &breaks, &timing);
-                for k in 0..timing.len() {
-                    let (piece, chord) = (warp.piece(k), timing[k] / (breaks[k + 1] - breaks[k]));
+                let warp = WarpingFunction::new(kind, &breaks, &segment_durations);
+                for k in 0..segment_durations.len() {
+                    let (piece, chord) = (warp.piece(k), segment_durations[k] / (breaks[k + 1] - breaks[k]));
                     for i in 0..=50 {
                         prop_assert!(piece.at(f64::from(i) / 50.0)[1] >= 0.25 * piece.from.min(piece.to).min(1.0));
                     }
@@ -199,24 +199,24 @@ mod tests {
                     prop_assert!((piece.at(0.0)[1] * chord / warp.slopes[k] - 1.0).abs() < 1e-9);
                 }
                 if kind == Kind::Rhythmic {
-                    prop_assert_eq!(warp.slopes[0], warp.slopes[timing.len()]);
+                    prop_assert_eq!(warp.slopes[0], warp.slopes[segment_durations.len()]);
                 }
                 // Within a segment: the chords of a difference quotient would cut the corners of the rate at breaks.
-                let k = place.index(timing.len());
-                let (time, h) = (warp.times[k] + share * timing[k], 1e-4 * timing[k]);
+                let k = place.index(segment_durations.len());
+                let (time, h) = (warp.times[k] + share * segment_durations[k], 1e-4 * segment_durations[k]);
                 let [phase, rate, bend] = warp.phase(time);
                 prop_assert!((warp.share(phase) * warp.duration() - time).abs() < 1e-12 * warp.duration());
                 prop_assert!((rate * warp.slope(phase) - 1.0).abs() < 1e-9);
                 let [[before, slower, _], [after, faster, _]] = [time - h, time + h].map(|time| warp.phase(time));
                 prop_assert!(((after - before) / (2.0 * h * rate) - 1.0).abs() < 1e-4);
-                prop_assert!(((faster - slower) / (2.0 * h) - bend).abs() < 1e-3 * (bend.abs() + rate / timing[k]));
+                prop_assert!(((faster - slower) / (2.0 * h) - bend).abs() < 1e-3 * (bend.abs() + rate / segment_durations[k]));
             }
         }
 
         /// At the breaks time is that of the timing, whatever lies between.
         #[test]
-        fn breaks_are_met((breaks, timing) in timings()) {
-            let warp = WarpingFunction::new(Kind::Discrete, &breaks, &timing);
+        fn breaks_are_met((breaks, segment_durations) in timings()) {
+            let warp = WarpingFunction::new(Kind::Discrete, &breaks, &segment_durations);
             for (k, phase) in breaks.iter().enumerate() {
                 prop_assert_eq!(warp.share(*phase), warp.times[k] / warp.duration());
                 prop_assert!((warp.phase(warp.times[k])[0] - phase).abs() < 1e-14);

@@ -10,18 +10,18 @@ use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::learning::alignment::{Aligned, TimeScaling};
-use crate::learning::factorization::{Factors, StyleCount};
-use crate::learning::options::TransportChoice;
-use crate::learning::style_selection::cross_validation::Foresight;
+use crate::learning::factorization::{Factors, Truncation};
+use crate::learning::options::TransportSelection;
+use crate::learning::style_selection::cross_validation::StyleSelection;
 use crate::learning::targets::Targets;
 use crate::model::primitive::{Parts, Primitive};
-use crate::model::template::Template;
-use crate::model::{Demonstrated, Learnt, Model};
+use crate::model::template::WarpTemplate;
+use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{inspect, unwound};
 
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
-use super::options::{FitOptions, Stage, StyleChoice};
+use super::options::{FitOptions, NStyles, Stage};
 use super::stiffness::stiffness;
 use super::style_selection::spectrum;
 use super::tabulation::compile;
@@ -47,7 +47,7 @@ pub fn fit_with(
     options: &FitOptions,
     progress: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
-    if let StyleChoice::Given(count) = options.styles {
+    if let NStyles::Given(count) = options.styles {
         count.check(demos.len(), "demonstrations")?;
     }
     let threads = options.threads;
@@ -65,7 +65,7 @@ pub fn fit_with(
     let ranges = targets.ranges();
     let dof_scale = options.dof_scale.of(&ranges, &units);
     let transport = match (options.transport, constants.canonical.kind()) {
-        (TransportChoice::Learnt, Kind::Discrete) => targets.transport(constants.canonical, &dof_scale)?,
+        (TransportSelection::FitSummary, Kind::Discrete) => targets.transport(constants.canonical, &dof_scale)?,
         _ => Transport::immediate(),
     };
     let braking = (!transport.is_immediate()).then(|| targets.braking(constants.attractor));
@@ -77,7 +77,7 @@ pub fn fit_with(
     let factors = shown.factors(options, &dof_scale, contexts.as_ref(), &mut factorising)?;
     findings.extend(noise_findings::noisy(&aligned.noise, &ranges, &names));
     let unknown = units.iter().all(String::is_empty);
-    findings.extend(noise_findings::left_out(&targets, &factors, &aligned.noise, &names).filter(|_| unknown));
+    findings.extend(noise_findings::truncation_error(&targets, &factors, &aligned.noise, &names).filter(|_| unknown));
     let Targets { forcing, goals, starts, anchors, .. } = targets;
     drop(forcing);
 
@@ -92,12 +92,13 @@ pub fn fit_with(
     let n_samples = clock.len();
     let landscape = compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
 
-    let (timings, nominal) = (aligned.timings.clone(), aligned.nominal);
+    let (segment_durations, nominal) = (aligned.segment_durations.clone(), aligned.nominal);
     let (columns, contexts) = contexts.unzip();
-    let left_out = factors.left_out();
+    let truncation_error = factors.truncation_error();
     let Factors { styles, singular_values, .. } = factors;
     let durations = aligned.durations();
-    let demonstrated = Demonstrated { styles, goals, starts, anchors, timings, durations, contexts, nominal };
+    let demonstrated =
+        DemonstrationParameters { styles, goals, starts, anchors, segment_durations, durations, contexts, nominal };
     let Constants { attractor, canonical, tau } = constants;
     let breaks = aligned.breaks.clone();
     let nominal = demonstrated.nominal(canonical.kind());
@@ -105,18 +106,27 @@ pub fn fit_with(
     let primitive = Arc::new(Primitive::new(parts));
     findings.extend(stiffness(&primitive, &aligned)?);
     let noise = aligned.noise.clone();
-    let (map, left_over) = match (columns, &demonstrated.contexts) {
+    let (map, residual_variance) = match (columns, &demonstrated.contexts) {
         (Some(columns), Some(contexts)) => {
             let outputs = demonstrated.outputs(canonical.kind());
-            let metric = metric(&primitive, outputs.view(), demonstrated.timings.view())?;
+            let metric = metric(&primitive, outputs.view(), demonstrated.segment_durations.view())?;
             let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
             (Some(map), Some(residual_variance(&primitive, outputs.view(), aligned)?))
         }
         _ => (None, None),
     };
     let basis = regression.describe();
-    let learnt =
-        Learnt { n_samples, noise, template, dof_scale, singular_values, left_out, left_over, basis, findings };
+    let learnt = FitSummary {
+        n_samples,
+        noise,
+        template,
+        dof_scale,
+        singular_values,
+        truncation_error,
+        residual_variance,
+        basis,
+        findings,
+    };
     Ok(Model { primitive, demonstrated, learnt, map })
 }
 
@@ -131,7 +141,7 @@ fn scale_time(
     units: &[String],
     contexts: Option<&Contexts>,
     progress: &mut dyn FnMut(f64) -> Result<()>,
-) -> Result<Option<Template>> {
+) -> Result<Option<WarpTemplate>> {
     let (scaling, threads) = (&options.alignment.time_scaling, options.threads);
     let unit = options.dof_scale.given(aligned.demo(0).n_dofs())?;
     let Some((columns, numbers)) = contexts.filter(|_| *scaling == TimeScaling::WarpIfBetter) else {
@@ -141,9 +151,9 @@ fn scale_time(
     let template = scaling.apply(aligned, unit, threads, &mut |share| progress(0.5 * share))?;
     let n_styles = |aligned: &Aligned| {
         let count = match options.styles {
-            StyleChoice::Given(count) => count,
-            StyleChoice::Systematic => StyleCount::Spectrum(0.9),
-            StyleChoice::Auto => StyleCount::Spectrum(1.0),
+            NStyles::Given(count) => count,
+            NStyles::Systematic => Truncation::Spectrum(0.9),
+            NStyles::Auto => Truncation::Spectrum(1.0),
         };
         let mut targets = Targets::of(aligned, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
         targets.scale(&options.dof_scale.of(&targets.ranges(), units));
@@ -177,18 +187,18 @@ impl Shown<'_> {
         let Self { aligned, targets, transport, constants } = *self;
         let forcing = targets.forcing.view();
         match options.styles {
-            StyleChoice::Systematic => {
+            NStyles::Systematic => {
                 let noise = spectrum::noise_limit(aligned, constants, transport, dof_scale, options.threads)?;
                 spectrum::systematic(forcing, noise, contexts, progress)
             }
-            StyleChoice::Given(count) => Factors::of(forcing, count, progress),
-            StyleChoice::Auto => {
+            NStyles::Given(count) => Factors::of(forcing, count, progress),
+            NStyles::Auto => {
                 let (columns, numbers) = contexts.ok_or(Error::Arguments(
                     "n_styles = \"auto\" goes by contexts: pass contexts, a number, or None to go by the spectrum",
                 ))?;
-                let all = Factors::of(forcing, StyleCount::Spectrum(1.0), &mut |share| progress(0.5 * share))?;
+                let all = Factors::of(forcing, Truncation::Spectrum(1.0), &mut |share| progress(0.5 * share))?;
                 let foresight =
-                    Foresight::new(aligned, targets, &all, transport, constants.attractor, constants.canonical)?;
+                    StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical)?;
                 let mut second = |share: f64| progress(0.5 + 0.5 * share);
                 let n_styles = foresight.styles(columns, numbers, options.map, &mut second)?;
                 Ok(all.leading(n_styles))
@@ -229,8 +239,8 @@ fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> 
 /// Names and units of the DoFs: those of the demonstrations if they carry any, which must agree.
 fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
     let n_dofs = demos.first().map_or(0, Demonstration::n_dofs);
-    let names = agreed(demos, Demonstration::names, "names differ from those of the other demonstrations")?;
-    let units = agreed(demos, Demonstration::units, "units differ from those of the other demonstrations")?;
+    let names = common_labels(demos, Demonstration::names, "names differ from those of the other demonstrations")?;
+    let units = common_labels(demos, Demonstration::units, "units differ from those of the other demonstrations")?;
     Ok((
         names.unwrap_or_else(|| (0..n_dofs).map(|d| format!("y{d}")).collect()),
         units.unwrap_or_else(|| vec![String::new(); n_dofs]),
@@ -238,7 +248,7 @@ fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
 }
 
 /// What all demonstrations that tell it tell alike.
-fn agreed(
+fn common_labels(
     demos: &[Demonstration],
     told: impl Fn(&Demonstration) -> Option<&[String]>,
     otherwise: &'static str,

@@ -18,7 +18,7 @@ mod time_scaling;
 mod transport_profile;
 
 pub use alignment::{Alignment, TimeScaling};
-pub use factorization::{Factors, StyleCount};
+pub use factorization::{Factors, Truncation};
 pub use fit::{fit, fit_with};
-pub use options::{DofScale, FitOptions, Stage, StyleChoice, TransportChoice};
+pub use options::{DofScaling, FitOptions, NStyles, Stage, TransportSelection};
 pub use style_inference::style_of;

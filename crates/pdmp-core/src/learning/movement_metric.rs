@@ -15,11 +15,11 @@ use crate::motion::unit_responses::phases;
 pub(super) fn metric(
     primitive: &Arc<Primitive>,
     outputs: ArrayView2<f64>,
-    timings: ArrayView2<f64>,
+    segment_durations: ArrayView2<f64>,
 ) -> Result<Array2<f64>> {
     let responses = phases(primitive)?;
     let sensitivity = Sensitivity::new(primitive.kind(), responses.of(Derivative::Position), Vec::new());
-    Ok(sensitivity.metric(outputs, timings))
+    Ok(sensitivity.metric(outputs, segment_durations))
 }
 
 /// Variance (S, D) over the phase of what the styles leave out of the demonstrations, measurement noise included.

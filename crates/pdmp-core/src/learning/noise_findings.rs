@@ -32,7 +32,12 @@ pub(super) fn noisy(noise: &Noise, ranges: &[f64], names: &[String]) -> Vec<Find
 /// Returns the degree of freedom of small range of which the styles leave out most.
 ///
 /// S is orthonormal and F_basis = SᵀF, so that ‖F_d − S·F_basis,d‖² = ‖F_d‖² − ‖F_basis,d‖² for each DoF d.
-pub(super) fn left_out(targets: &Targets, factors: &Factors, noise: &Noise, names: &[String]) -> Option<Finding> {
+pub(super) fn truncation_error(
+    targets: &Targets,
+    factors: &Factors,
+    noise: &Noise,
+    names: &[String],
+) -> Option<Finding> {
     let (ranges, n_dofs) = (targets.ranges(), names.len());
     let largest = ranges.iter().fold(0.0f64, |most, range| most.max(*range));
     let squares = |rows: &ndarray::Array2<f64>, d: usize| {

@@ -1,11 +1,11 @@
 //! What can be chosen about a fit, and what a fit tells on its way.
 
-use crate::context::MapChoice;
+use crate::context::MapSelection;
 use crate::demonstration::ContextValue;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::learning::alignment::{Alignment, TimeScaling};
-use crate::learning::factorization::StyleCount;
+use crate::learning::factorization::Truncation;
 use crate::learning::regression::{Basis, Gp};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
@@ -13,7 +13,7 @@ use crate::validate::check_vector;
 
 /// The unit of each degree of freedom in the factorisation.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub enum DofScale {
+pub enum DofScaling {
     /// As recorded where all DoFs have one unit, or none is known. Of DoFs in different units, those in one unit are
     /// scaled together, by the largest range among them: what hardly moves, or not at all, stays small.
     #[default]
@@ -26,7 +26,7 @@ pub enum DofScale {
     Given(Vec<f64>),
 }
 
-impl DofScale {
+impl DofScaling {
     /// The units (D,) that were given, if any were.
     pub(super) fn given(&self, n_dofs: usize) -> Result<Option<&[f64]>> {
         let Self::Given(scale) = self else { return Ok(None) };
@@ -66,15 +66,15 @@ pub struct FitOptions {
     /// Conditions of the demonstrations (M rows of Q); otherwise those that they carry.
     pub contexts: Option<Vec<Vec<ContextValue>>>,
     /// What leads from contexts to movements.
-    pub map: MapChoice,
+    pub map: MapSelection,
     /// Style dimension J.
-    pub styles: StyleChoice,
+    pub styles: NStyles,
     /// Function approximator of the landscape.
     pub basis: Basis,
     /// How the way from start to goal is spread over a discrete movement.
-    pub transport: TransportChoice,
+    pub transport: TransportSelection,
     /// Unit of each DoF in the factorisation.
-    pub dof_scale: DofScale,
+    pub dof_scale: DofScaling,
     /// Time constant τ in seconds, discrete; otherwise the nominal duration.
     pub tau: Option<f64>,
     /// α_z of the output system.
@@ -104,11 +104,11 @@ impl FitOptions {
                 time_scaling: TimeScaling::Linear,
             },
             contexts: None,
-            map: MapChoice::Auto,
-            styles: StyleChoice::Systematic,
+            map: MapSelection::Auto,
+            styles: NStyles::Systematic,
             basis: Basis::Gp(Gp::default()),
-            transport: TransportChoice::Learnt,
-            dof_scale: DofScale::Auto,
+            transport: TransportSelection::FitSummary,
+            dof_scale: DofScaling::Auto,
             tau: None,
             alpha_z: 25.0,
             beta_z: None,
@@ -121,20 +121,20 @@ impl FitOptions {
 
 /// The choice of the style dimension J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum StyleChoice {
+pub enum NStyles {
     /// As many as carry nine tenths of the sum of the singular values, at least five, and at least as many as the
     /// contexts explain; never more than exceed the measurement noise.
     #[default]
     Systematic,
     /// By number, or by the spectrum.
-    Given(StyleCount),
+    Given(Truncation),
     /// The fewest that foresee movements, in contexts held out, with an error above the least that any number has by no
     /// more than the standard error of the difference: cross-validation over the contexts, in at most ten folds.
     Auto,
 }
 
-impl From<StyleCount> for StyleChoice {
-    fn from(count: StyleCount) -> Self {
+impl From<Truncation> for NStyles {
+    fn from(count: Truncation) -> Self {
         Self::Given(count)
     }
 }
@@ -169,10 +169,10 @@ impl Stage {
 
 /// How the way from start to goal is spread over a discrete movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum TransportChoice {
+pub enum TransportSelection {
     /// By a profile learnt from the demonstrations.
     #[default]
-    Learnt,
+    FitSummary,
     /// At once, as in the paper: m ≡ 1.
     Immediate,
 }

@@ -14,7 +14,7 @@ use crate::learning::alignment::Aligned;
 use crate::model::conditions::Conditions;
 use crate::model::finding::Finding;
 use crate::model::primitive::Primitive;
-use crate::motion::rollout::{Timing, rollout};
+use crate::motion::rollout::{TimeGrid, rollout};
 
 /// Accelerations this many times the recorded ones are not of the movement.
 const MAX_RATIO: f64 = 3.0;
@@ -36,7 +36,7 @@ pub(super) fn stiffness(primitive: &Arc<Primitive>, aligned: &Aligned) -> Result
     let mut position = Array2::zeros((n_samples, n_dofs));
     aligned.sample(demo, position.as_slice_mut().unwrap_or_default());
     let dt = primitive.duration() / kind.steps(n_samples) as f64;
-    let reproduced = rollout(primitive, &Conditions::default(), Timing { dt, duration: None })?.acceleration;
+    let reproduced = rollout(primitive, &Conditions::default(), TimeGrid { dt, duration: None })?.acceleration;
     let mut worst = None;
     let mut most = MAX_RATIO;
     for (d, name) in primitive.names().iter().enumerate() {

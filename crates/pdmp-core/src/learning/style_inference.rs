@@ -12,7 +12,7 @@ use crate::learning::alignment::{Alignment, TimeScaling};
 use crate::learning::targets::Targets;
 use crate::model::Model;
 use crate::model::conditions::Conditions;
-use crate::motion::rollout::{Timing, rollout};
+use crate::motion::rollout::{TimeGrid, rollout};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
 
@@ -66,7 +66,7 @@ pub fn style_of(
     };
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
-    let by_events = model.learnt.template.is_none() && model.demonstrated.timings.ncols() > 1;
+    let by_events = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
     match (&model.learnt.template, events) {
         (None, Some(events)) if by_events => aligned.register_to(model.breaks(), events)?,
         (None, None) if by_events => {
@@ -91,7 +91,7 @@ pub fn style_of(
         target.rotate_left(samples * n_dofs);
         position.as_slice_mut().unwrap_or_default().rotate_left(samples * n_dofs);
     }
-    let (style, left_out) = likeliest(&design, &target, &model.demonstrated.styles);
+    let (style, truncation_error) = likeliest(&design, &target, &model.demonstrated.styles);
     check_size(&style, model)?;
     let row = |rows: &Array2<f64>| Some(rows.row(0).to_vec());
     let mut conditions = Conditions { style: Some(style.clone()), ..Conditions::default() };
@@ -100,14 +100,14 @@ pub fn style_of(
         Kind::Rhythmic => conditions.anchor = row(&targets.anchors),
     }
     let off = off(model, &conditions, position.view())?;
-    let times = left_out / usual_left_out(model, target.len());
+    let times = truncation_error / usual_left_out(model, target.len());
     if off > MAX_OFF && times > MAX_LEFT_OUT { Err(Error::Undescribed { off, times }) } else { Ok(style) }
 }
 
 /// Root mean square of the forcing that the styles leave out of the demonstrations, in the units of the factorisation.
 fn usual_left_out(model: &Model, n_values: usize) -> f64 {
     let kept: f64 = model.learnt.singular_values.iter().take(model.n_styles()).map(|s| s * s).sum();
-    let share = model.learnt.left_out;
+    let share = model.learnt.truncation_error;
     let all = kept / (1.0 - share * share).max(f64::EPSILON);
     share * (all / (model.n_demos() * n_values) as f64).sqrt()
 }
@@ -155,13 +155,13 @@ fn likeliest(design: &Mat<f64>, target: &[f64], styles: &Array2<f64>) -> (Vec<f6
         let solution = left.col_piv_qr().solve_lstsq(&right);
         let style: Vec<f64> = (0..n_styles).map(|j| solution[(j, 0)]).collect();
         let error = |i: usize| right[(i, 0)] - style.iter().enumerate().map(|(j, s)| left[(i, j)] * s).sum::<f64>();
-        let left_out = ((0..n_values).map(|i| error(i).powi(2)).sum::<f64>() / n_values as f64).sqrt();
-        (style, left_out)
+        let truncation_error = ((0..n_values).map(|i| error(i).powi(2)).sum::<f64>() / n_values as f64).sqrt();
+        (style, truncation_error)
     };
     let size = (target.iter().map(|f| (f / largest).powi(2)).sum::<f64>() / n_values as f64).sqrt();
     let (_, deviation) = solve(ROUNDING * size);
-    let (style, left_out) = solve(deviation.max(ROUNDING * size));
-    (style.iter().zip(&unit).map(|(s, unit)| s * unit).collect(), left_out * largest)
+    let (style, truncation_error) = solve(deviation.max(ROUNDING * size));
+    (style.iter().zip(&unit).map(|(s, unit)| s * unit).collect(), truncation_error * largest)
 }
 
 /// Deviations of a target that are not known better, as a share of it.
@@ -179,8 +179,8 @@ fn check_size(style: &[f64], model: &Model) -> Result<()> {
 /// DoF over its range.
 fn off(model: &Model, conditions: &Conditions, position: ArrayView2<f64>) -> Result<f64> {
     let steps = model.kind().steps(position.nrows());
-    let timing = Timing { dt: model.duration() / steps as f64, duration: None };
-    let made = rollout(model.primitive(), conditions, timing)?.position;
+    let grid = TimeGrid { dt: model.duration() / steps as f64, duration: None };
+    let made = rollout(model.primitive(), conditions, grid)?.position;
     let widest = model.ranges.iter().fold(0.0f64, |most, range| most.max(*range));
     let [mut deviation, mut movement] = [0.0; 2];
     for (d, range) in model.ranges.iter().enumerate() {

@@ -4,14 +4,14 @@
 //! between its samples and has a kink at each: where all samples are knots, a cell or two from one to the next suffice.
 
 use crate::dynamics::canonical::Canonical;
-use crate::dynamics::forcing_table::Landscape;
-use crate::dynamics::hermite_table::{Jets, MOST_CELLS, TOLERANCE};
+use crate::dynamics::forcing_table::ForcingTable;
+use crate::dynamics::hermite_table::{KnotTable, MAX_CELLS, TOLERANCE};
 use crate::error::Result;
 use crate::learning::regression::Regression;
 use crate::numerics::threads::Threads;
 
 /// Fewest cells of the first table.
-const FEWEST_CELLS: usize = 128;
+const MIN_CELLS: usize = 128;
 /// Knots between two questions whether to go on, which one thread reads.
 const PORTION: usize = 1024;
 /// Knots that are read at once.
@@ -20,42 +20,42 @@ const BLOCK: usize = 64;
 /// Compiles a regression of J·D outputs on so many samples.
 ///
 /// # Errors
-/// Whatever `proceed` returns, which is told the share of the finest possible table that is done.
+/// Whatever `progress` returns, which is told the share of the finest possible table that is done.
 pub(super) fn compile(
     canonical: Canonical,
     (n_styles, n_dofs): (usize, usize),
     n_samples: usize,
     regression: &dyn Regression,
     threads: Threads,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
-) -> Result<Landscape> {
+    progress: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<ForcingTable> {
     let steps = canonical.kind().steps(n_samples);
-    let (mut knots, error) = tabulate(canonical.extent(), steps, n_styles * n_dofs, regression, threads, proceed)?;
+    let (mut knots, error) = tabulate(canonical.extent(), steps, n_styles * n_dofs, regression, threads, progress)?;
     if let Canonical::Rhythmic { .. } = canonical {
         knots.close();
     }
-    Ok(Landscape::from_knots(canonical, n_dofs, &knots, error))
+    Ok(ForcingTable::from_knots(canonical, n_dofs, &knots, error))
 }
 
 /// Values and slopes (cells + 1, outputs) at both ends of cells that are halved until their midpoints agree, and the error
 /// between the knots, relative to the largest forcing. What was learnt from samples at equal `steps` is read there too.
 ///
 /// # Errors
-/// Whatever `proceed` returns, which is told the share of the finest possible table that is done.
+/// Whatever `progress` returns, which is told the share of the finest possible table that is done.
 fn tabulate(
     extent: f64,
     steps: usize,
     n_outputs: usize,
     regression: &dyn Regression,
     threads: Threads,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
-) -> Result<(Jets, f64)> {
+    progress: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<(KnotTable, f64)> {
     let mut done = 0;
     // Reads the rows of `jets` from one to the next in steps, the place of each being a multiple of the width.
-    let mut read = |jets: &mut Jets, (first, step): (usize, usize), width: f64| {
+    let mut read = |jets: &mut KnotTable, (first, step): (usize, usize), width: f64| {
         let n = (jets.len() - first).div_ceil(step);
-        let scratch = || (Vec::with_capacity(BLOCK), Jets::zeros(BLOCK, n_outputs));
-        let evaluate = |(u, jets): &mut (Vec<f64>, Jets), (portion, rows): (usize, (&mut [f64], &mut [f64]))| {
+        let scratch = || (Vec::with_capacity(BLOCK), KnotTable::zeros(BLOCK, n_outputs));
+        let evaluate = |(u, jets): &mut (Vec<f64>, KnotTable), (portion, rows): (usize, (&mut [f64], &mut [f64]))| {
             let size = step * BLOCK * n_outputs;
             let blocks = rows.0.chunks_mut(size).zip(rows.1.chunks_mut(size));
             for (block, (values, slopes)) in blocks.enumerate() {
@@ -71,7 +71,7 @@ fn tabulate(
             }
             Ok(())
         };
-        let mut telling = |share: f64| proceed((done as f64 + share * n as f64) / (MOST_CELLS + 1) as f64);
+        let mut telling = |share: f64| progress((done as f64 + share * n as f64) / (MAX_CELLS + 1) as f64);
         threads.try_for_each_told(
             jets.rows_mut(step * PORTION).enumerate().collect(),
             scratch,
@@ -82,7 +82,7 @@ fn tabulate(
         Ok(())
     };
     let mut cells = coarsest(steps);
-    let mut knots = Jets::zeros(cells + 1, n_outputs);
+    let mut knots = KnotTable::zeros(cells + 1, n_outputs);
     read(&mut knots, (0, 1), extent / cells as f64)?;
     loop {
         let largest = knots.values.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
@@ -99,7 +99,7 @@ fn tabulate(
         if error <= 4.0 * TOLERANCE {
             return Ok((finer, error / 4.0));
         }
-        if 2 * cells > MOST_CELLS {
+        if 2 * cells > MAX_CELLS {
             return Ok((finer, error));
         }
         knots = finer;
@@ -109,10 +109,10 @@ fn tabulate(
 /// Cells of the first table, whose halves have a knot at every sample sooner or later, if a table can.
 fn coarsest(steps: usize) -> usize {
     let mut cells = steps >> steps.trailing_zeros();
-    if 2 * cells > MOST_CELLS {
-        return FEWEST_CELLS;
+    if 2 * cells > MAX_CELLS {
+        return MIN_CELLS;
     }
-    while cells < FEWEST_CELLS {
+    while cells < MIN_CELLS {
         cells *= 2;
     }
     cells

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
 use crate::learning::transport_profile::{profile_samples, transport_profile};
-use crate::numerics::simd::{Lanes, gather, groups, pack, scatter, unpack};
+use crate::numerics::simd::{F64x4, gather, groups, pack, scatter, unpack};
 use crate::numerics::spline::Knots;
 use crate::numerics::threads::Threads;
 use crate::validate::zeros;
@@ -53,16 +53,16 @@ struct Rows<'a> {
 }
 
 impl Targets {
-    /// The targets of all demonstrations about their goals or anchors; `proceed` is told the share that is done.
+    /// The targets of all demonstrations about their goals or anchors; `progress` is told the share that is done.
     ///
     /// # Errors
-    /// No memory, or whatever `proceed` returns.
+    /// No memory, or whatever `progress` returns.
     pub(crate) fn of(
         aligned: &Aligned,
         attractor: Attractor,
         canonical: Canonical,
         threads: Threads,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
         let (n_demos, n_dofs) = (aligned.n_demos(), aligned.demo(0).n_dofs());
         let kept = match canonical.kind() {
@@ -80,13 +80,13 @@ impl Targets {
             moved: Array3::zeros((n_demos, kept, n_dofs)),
         };
         let work = Work::new(attractor, canonical, aligned.n_samples);
-        let columns = || [0, 1].map(|_| vec![Lanes::ZERO; aligned.n_samples]);
-        let learn = |columns: &mut [Vec<Lanes>; 2], (m, rows): (usize, Rows)| {
+        let columns = || [0, 1].map(|_| vec![F64x4::ZERO; aligned.n_samples]);
+        let learn = |columns: &mut [Vec<F64x4>; 2], (m, rows): (usize, Rows)| {
             aligned.sample(m, rows.forcing);
             work.learn(rows, aligned.demo(m).goal(), columns);
             Ok(())
         };
-        threads.try_for_each_told(targets.rows().enumerate().collect(), columns, learn, proceed)?;
+        threads.try_for_each_told(targets.rows().enumerate().collect(), columns, learn, progress)?;
         Ok(targets)
     }
 
@@ -197,7 +197,7 @@ impl Work {
     /// The output system does not care where a movement takes place, but for rounding: demonstrations are translated to
     /// start at 0, and a DoF that does not move has a target of exactly zero, and its own position as its mean, to the
     /// last digit.
-    fn learn(&self, rows: Rows, given: Option<&[f64]>, [column, slopes]: &mut [Vec<Lanes>; 2]) {
+    fn learn(&self, rows: Rows, given: Option<&[f64]>, [column, slopes]: &mut [Vec<F64x4>; 2]) {
         let Rows { forcing: position, start, goal, anchor, range, bend, end, moved } = rows;
         let n_dofs = start.len();
         start.copy_from_slice(&position[..n_dofs]);
@@ -206,14 +206,14 @@ impl Work {
             moved.iter_mut().zip(sample).zip(&*start).for_each(|((moved, y), start)| *moved = y - start);
         }
         goal.copy_from_slice(given.unwrap_or(&position[position.len() - n_dofs..]));
-        let n_samples = Lanes::splat(column.len() as f64);
+        let n_samples = F64x4::splat(column.len() as f64);
         let goals = pack(goal);
-        let [mut means, mut ranges, mut bends, mut ends] = [(); 4].map(|()| vec![Lanes::ZERO; goals.len()]);
+        let [mut means, mut ranges, mut bends, mut ends] = [(); 4].map(|()| vec![F64x4::ZERO; goals.len()]);
         let per_step = 1.0 / self.clock[1];
         for group in 0..groups(n_dofs) {
             gather(position, n_dofs, group, column);
             let start = column[0];
-            let [mut low, mut high, mut sum] = [Lanes::ZERO; 3];
+            let [mut low, mut high, mut sum] = [F64x4::ZERO; 3];
             for y in column.iter_mut() {
                 *y -= start;
                 (low, high, sum) = (low.fast_min(*y), high.fast_max(*y), sum + *y);
@@ -221,8 +221,8 @@ impl Work {
             (means[group], ranges[group]) = (start + sum / n_samples, high - low);
             let centre = if self.kind == Kind::Discrete { goals[group] } else { means[group] };
             self.knots.slopes(column, slopes);
-            let bend = |pair: &[Lanes]| (pair[1] - pair[0]).abs() * per_step;
-            bends[group] = slopes.windows(2).fold(Lanes::ZERO, |most, pair| most.fast_max(bend(pair)));
+            let bend = |pair: &[F64x4]| (pair[1] - pair[0]).abs() * per_step;
+            bends[group] = slopes.windows(2).fold(F64x4::ZERO, |most, pair| most.fast_max(bend(pair)));
             ends[group] = slopes[slopes.len() - 1].abs();
             self.inverse.target(column, slopes, centre - start, self.kind == Kind::Rhythmic);
             scatter(column, n_dofs, group, position);

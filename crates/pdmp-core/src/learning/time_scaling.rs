@@ -6,12 +6,12 @@
 
 use ndarray::{Array2, ArrayView1, Axis, s};
 
-use crate::context::{ContextColumn, ContextMap, MapChoice, alike};
+use crate::context::{ContextColumn, ContextMap, MapSelection, group_equal_contexts};
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
-use crate::learning::factorization::{Factors, StyleCount};
+use crate::learning::factorization::{Factors, Truncation};
 use crate::model::sensitivity::STEPS;
 
 /// Most folds that contexts are dealt to, and the fewest different ones.
@@ -23,7 +23,7 @@ pub(super) struct Contexts<'a> {
     pub(super) n_styles: &'a dyn Fn(&Aligned) -> Result<usize>,
     pub(super) columns: &'a [ContextColumn],
     pub(super) numbers: &'a Array2<f64>,
-    pub(super) map: MapChoice,
+    pub(super) map: MapSelection,
 }
 
 impl Contexts<'_> {
@@ -31,21 +31,21 @@ impl Contexts<'_> {
     /// where there are too few contexts to hold one out.
     ///
     /// # Errors
-    /// A map that does not suit the contexts, or whatever `proceed` returns.
+    /// A map that does not suit the contexts, or whatever `progress` returns.
     pub(super) fn favour(
         &self,
         warped: &Aligned,
         linear: &Aligned,
         kind: Kind,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<bool> {
-        if alike(self.numbers).len() < FEWEST {
+        if group_equal_contexts(self.numbers).len() < FEWEST {
             return Ok(true);
         }
         let recorded = positions(linear, kind)?;
         let mut share = 0.0;
         let mut errors = |aligned: &Aligned| {
-            let errors = self.errors(aligned, &recorded, kind, &mut |done| proceed(share + 0.5 * done));
+            let errors = self.errors(aligned, &recorded, kind, &mut |done| progress(share + 0.5 * done));
             share = 0.5;
             errors
         };
@@ -61,21 +61,21 @@ impl Contexts<'_> {
         aligned: &Aligned,
         recorded: &Array2<f64>,
         kind: Kind,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Vec<f64>> {
         let positions = positions(aligned, kind)?;
         let n_styles = (self.n_styles)(aligned)?;
-        let conditions = alike(self.numbers);
+        let conditions = group_equal_contexts(self.numbers);
         let n_folds = conditions.len().min(FOLDS);
         let mut errors = Vec::new();
         for fold in 0..n_folds {
-            proceed(fold as f64 / n_folds as f64)?;
+            progress(fold as f64 / n_folds as f64)?;
             let held_out: Vec<&Vec<usize>> = conditions.iter().skip(fold).step_by(n_folds).collect();
             let kept: Vec<usize> =
                 (0..positions.nrows()).filter(|m| !held_out.iter().any(|group| group.contains(m))).collect();
             let shown = positions.select(Axis(0), &kept);
-            let factors = Factors::of(shown.view(), StyleCount::Given(n_styles.min(kept.len())), &mut |_| Ok(()))?;
-            let (outputs, metric) = outputs(&factors, &aligned.timings.select(Axis(0), &kept));
+            let factors = Factors::of(shown.view(), Truncation::Given(n_styles.min(kept.len())), &mut |_| Ok(()))?;
+            let (outputs, metric) = outputs(&factors, &aligned.segment_durations.select(Axis(0), &kept));
             let numbers = self.numbers.select(Axis(0), &kept);
             let map = ContextMap::learn(self.columns.to_vec(), &numbers, outputs.view(), metric.view(), self.map)?;
             for group in held_out {
@@ -100,16 +100,17 @@ fn positions(aligned: &Aligned, kind: Kind) -> Result<Array2<f64>> {
     Ok(positions)
 }
 
-/// The components and the logarithms of the timings, as the map foresees them, and what errors of them weigh: those of the
+/// The components and the logarithms of the segment_durations, as the map foresees them, and what errors of them weigh: those of the
 /// timing as much as the movement about its mean.
-fn outputs(factors: &Factors, timings: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
-    let (n, last) = (factors.styles.ncols(), timings.ncols() - 1);
+fn outputs(factors: &Factors, segment_durations: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
+    let (n, last) = (factors.styles.ncols(), segment_durations.ncols() - 1);
     let sizes: Vec<f64> = factors.basis.rows().into_iter().map(|row| row.dot(&row)).collect();
-    let movement = factors.basis.var_axis(Axis(1), 0.0).sum() * factors.basis.ncols() as f64 / timings.nrows() as f64;
-    let outputs = Array2::from_shape_fn((timings.nrows(), n + last + 1), |(m, p)| match p.checked_sub(n) {
+    let movement =
+        factors.basis.var_axis(Axis(1), 0.0).sum() * factors.basis.ncols() as f64 / segment_durations.nrows() as f64;
+    let outputs = Array2::from_shape_fn((segment_durations.nrows(), n + last + 1), |(m, p)| match p.checked_sub(n) {
         None => factors.styles[[m, p]],
-        Some(k) if k < last => (timings[[m, k]] / timings[[m, last]]).ln(),
-        Some(_) => timings.row(m).sum().ln(),
+        Some(k) if k < last => (segment_durations[[m, k]] / segment_durations[[m, last]]).ln(),
+        Some(_) => segment_durations.row(m).sum().ln(),
     });
     let weight = |p: usize| if p < n { sizes[p] } else { movement };
     let weights: ndarray::Array1<f64> = (0..n + last + 1).map(weight).collect();
@@ -119,14 +120,15 @@ fn outputs(factors: &Factors, timings: &Array2<f64>) -> (Array2<f64>, Array2<f64
 
 /// The movement (S·D) over linear time that is expected.
 fn foreseen(expected: &[f64], factors: &Factors, aligned: &Aligned, kind: Kind) -> ndarray::Array1<f64> {
-    let (styles, timing) = expected.split_at(factors.styles.ncols());
+    let (styles, segment_durations) = expected.split_at(factors.styles.ncols());
     let curve = ArrayView1::from(styles).dot(&factors.basis);
-    let last = timing.len() - 1;
+    let last = segment_durations.len() - 1;
     if last == 0 {
         return curve;
     }
-    let timing: Vec<f64> = timing[..last].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
-    let time = WarpingFunction::new(kind, &aligned.breaks, &timing);
+    let segment_durations: Vec<f64> =
+        segment_durations[..last].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
+    let time = WarpingFunction::new(kind, &aligned.breaks, &segment_durations);
     let n_dofs = aligned.demo(0).n_dofs();
     let n_samples = curve.len() / n_dofs;
     let mut moved = curve.clone();

@@ -26,7 +26,7 @@ const CELLS: usize = 16;
 /// start 1.6 times as hard; 0.1 predicts worse by a hundredth and a half.
 const SMOOTHING: f64 = 0.068;
 /// Most samples of a demonstration that a profile is learnt from: sixteen to a cell.
-const MOST_SAMPLES: usize = 16 * CELLS + 1;
+const MAX_SAMPLES: usize = 16 * CELLS + 1;
 /// Share of its size by which a movement's starts and goals must vary to count as much as the progress along the arc does.
 /// Below a hundredth the noise of starts and goals is learnt where they do not vary; above a tenth, what they tell of
 /// real movements is lost.
@@ -63,7 +63,7 @@ pub(super) fn transport_profile(
 
 /// Which of `n` samples a profile is learnt from.
 pub(super) fn profile_samples(n: usize) -> impl ExactSizeIterator<Item = usize> + Clone {
-    let kept = n.min(MOST_SAMPLES);
+    let kept = n.min(MAX_SAMPLES);
     (0..kept).map(move |k| k * (n - 1) / (kept - 1))
 }
 

@@ -25,7 +25,7 @@ pub struct Conditions {
     pub tau: Option<f64>,
     /// Time in each segment of the movement (K,), in seconds, in place of τ. A rollout follows it; a controller, whose τ
     /// can be set at any tick, takes its sum: see [`Primitive::tau_at`].
-    pub timing: Option<Vec<f64>>,
+    pub segment_durations: Option<Vec<f64>>,
     /// Phase φ at which a rhythmic movement starts, in rad: on its limit cycle, with nothing to die away; otherwise 0.
     pub phase: Option<f64>,
 }
@@ -35,7 +35,7 @@ impl Conditions {
     ///
     /// # Errors
     /// A wrong length, a number that is not finite, τ that is not positive, or a condition of the other kind.
-    pub(crate) fn complete(&self, primitive: &Primitive) -> Result<Complete> {
+    pub(crate) fn complete(&self, primitive: &Primitive) -> Result<ResolvedConditions> {
         let nominal = &primitive.nominal;
         let centre = |name, given: &Option<Vec<f64>>| match given {
             Some(value) => check_vector(name, value, nominal.centre.len(), "DoF").map(|()| value.clone()),
@@ -44,12 +44,12 @@ impl Conditions {
         let kind = primitive.kind();
         let centre = match kind {
             Kind::Discrete => {
-                refuse(kind, "anchor", self.anchor.is_some())?;
-                refuse(kind, "amplitude", self.amplitude.is_some_and(|amplitude| amplitude != 1.0))?;
+                reject_for_kind(kind, "anchor", self.anchor.is_some())?;
+                reject_for_kind(kind, "amplitude", self.amplitude.is_some_and(|amplitude| amplitude != 1.0))?;
                 centre("goal", &self.goal)?
             }
             Kind::Rhythmic => {
-                refuse(kind, "goal", self.goal.is_some())?;
+                reject_for_kind(kind, "goal", self.goal.is_some())?;
                 centre("anchor", &self.anchor)?
             }
         };
@@ -69,12 +69,20 @@ impl Conditions {
             Some(style) => check_style(style, primitive.n_styles()).map(|()| style.clone())?,
             None => nominal.style.clone(),
         };
-        refuse(kind, "phase", kind == Kind::Discrete && self.phase.is_some())?;
+        reject_for_kind(kind, "phase", kind == Kind::Discrete && self.phase.is_some())?;
         let phase = self.phase.unwrap_or(0.0);
         if !phase.is_finite() {
             return Err(Error::Range { name: "phase", value: phase, allowed: "must be a finite angle in rad" });
         }
-        Ok(Complete { style, centre, start, velocity: self.velocity.clone(), amplitude, tau, phase: turn(phase) })
+        Ok(ResolvedConditions {
+            style,
+            centre,
+            start,
+            velocity: self.velocity.clone(),
+            amplitude,
+            tau,
+            phase: turn(phase),
+        })
     }
 
     /// τ in seconds: as given, that of a movement as long as the timing, or the nominal demonstration's.
@@ -82,13 +90,15 @@ impl Conditions {
     /// # Errors
     /// Both of them, a τ that is not positive, or a timing that does not fit the primitive.
     pub fn time_constant(&self, primitive: &Primitive) -> Result<f64> {
-        let tau = match (self.tau, &self.timing) {
+        let tau = match (self.tau, &self.segment_durations) {
             (Some(_), Some(_)) => {
-                return Err(Error::Arguments("pass tau or timing, not both: a timing tells the duration"));
+                return Err(Error::Arguments(
+                    "pass tau or segment_durations, not both: a segment_durations tells the duration",
+                ));
             }
-            (None, Some(timing)) => {
-                primitive.check_timing(timing)?;
-                primitive.tau * timing.iter().sum::<f64>() / primitive.duration()
+            (None, Some(segment_durations)) => {
+                primitive.check_segment_durations(segment_durations)?;
+                primitive.tau * segment_durations.iter().sum::<f64>() / primitive.duration()
             }
             (tau, None) => tau.unwrap_or(primitive.tau),
         };
@@ -98,7 +108,7 @@ impl Conditions {
 
 /// Conditions with nothing left open but a start on the cycle and a demonstrated start velocity.
 #[derive(Clone, Debug)]
-pub(crate) struct Complete {
+pub(crate) struct ResolvedConditions {
     pub(crate) style: Vec<f64>,
     /// Goal or anchor.
     pub(crate) centre: Vec<f64>,
@@ -111,7 +121,7 @@ pub(crate) struct Complete {
 }
 
 /// Refuses an argument that this kind of primitive does not have.
-pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> {
+pub(crate) fn reject_for_kind(kind: Kind, name: &'static str, given: bool) -> Result<()> {
     let instead = match (kind, name) {
         (Kind::Discrete, "anchor") => ": it moves to a goal; set goal",
         (Kind::Discrete, "phase") => ": what it does later depends on where it started; it starts at its start",
@@ -122,13 +132,13 @@ pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> 
 }
 
 /// Largest magnitude of a style. Demonstrated ones are at most 1: the bound only keeps products finite.
-pub(crate) const LARGEST_STYLE: f64 = 1e100;
+pub(crate) const MAX_STYLE_MAGNITUDE: f64 = 1e100;
 
 /// Checks a style (J,).
 pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
     check_vector("style", style, n_styles, "style dimension")?;
-    match style.iter().position(|s| s.abs() > LARGEST_STYLE) {
-        Some(index) => Err(Error::TooLarge { name: "style", index, value: style[index], limit: LARGEST_STYLE }),
+    match style.iter().position(|s| s.abs() > MAX_STYLE_MAGNITUDE) {
+        Some(index) => Err(Error::TooLarge { name: "style", index, value: style[index], limit: MAX_STYLE_MAGNITUDE }),
         None => Ok(()),
     }
 }

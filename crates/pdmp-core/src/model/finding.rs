@@ -13,7 +13,7 @@ pub enum Finding {
         /// Name of the degree of freedom that changes most between them.
         dof: String,
         /// The later of the two samples.
-        place: Place,
+        place: SampleLocation,
         /// Seconds between them.
         interval: f64,
         /// Median interval of the demonstration, in seconds.
@@ -28,9 +28,9 @@ pub enum Finding {
         /// Names of the degrees of freedom.
         dofs: Vec<String>,
         /// First sample.
-        from: Place,
+        from: SampleLocation,
         /// Last sample.
-        to: Place,
+        to: SampleLocation,
         /// The smaller jump beside them, over the largest step elsewhere.
         ratio: f64,
     },
@@ -39,7 +39,7 @@ pub enum Finding {
         /// Index of the demonstration.
         demo: usize,
         /// First of these rows.
-        from: Place,
+        from: SampleLocation,
         /// How many there are.
         rows: usize,
         /// What they are.
@@ -62,7 +62,7 @@ pub enum Finding {
         /// Name of the degree of freedom.
         dof: String,
         /// The sample after the jump.
-        place: Place,
+        place: SampleLocation,
         /// The jump, in the unit of the degree of freedom.
         jump: f64,
         /// A full turn in that unit.
@@ -124,7 +124,7 @@ pub enum Finding {
 
 /// Where in a demonstration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct SampleLocation {
     /// Index of the sample.
     pub sample: usize,
     /// Its time in seconds, where that is known.
@@ -140,7 +140,7 @@ pub enum Padding {
     LastRow,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for SampleLocation {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "sample {}", self.sample)?;
         self.time.map_or(Ok(()), |time| write!(f, " (t = {} s)", short(time)))

@@ -25,11 +25,11 @@ pub use prediction::Prediction;
 use primitive::Nominal;
 pub use primitive::Primitive;
 pub use responses::Derivative;
-pub use template::{Template, Warp};
+pub use template::{TimeWarp, WarpTemplate};
 
 /// What was learnt from each demonstration, in absolute coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Demonstrated {
+pub struct DemonstrationParameters {
     /// Styles S (M, J).
     pub styles: Array2<f64>,
     /// Goals (M, D).
@@ -39,8 +39,8 @@ pub struct Demonstrated {
     /// Means (M, D), about which a cycle oscillates.
     pub anchors: Array2<f64>,
     /// Timings (M, K): the time spent in each segment, in seconds.
-    pub timings: Array2<f64>,
-    /// Durations or periods (M,), in seconds: the sums of the timings.
+    pub segment_durations: Array2<f64>,
+    /// Durations or periods (M,), in seconds: the sums of the segment_durations.
     pub durations: Vec<f64>,
     /// Contexts (M, Q), labels as their index among [`ContextMap::columns`].
     pub contexts: Option<Array2<f64>>,
@@ -50,22 +50,22 @@ pub struct Demonstrated {
 
 /// How the model was learnt, as far as a new demonstration must be treated alike.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Learnt {
+pub struct FitSummary {
     /// Samples C of the aligned demonstrations.
     pub n_samples: usize,
     /// Measurement noise of the demonstrations, and the cut-offs that take it off.
     pub noise: Noise,
     /// What time was warped to, if it was.
-    pub template: Option<Template>,
+    pub template: Option<WarpTemplate>,
     /// Unit of each DoF in the factorisation (D,).
     pub dof_scale: Vec<f64>,
     /// Singular values of the targets, in decreasing order: all, or the first J alone, where the factorization did not
     /// compute the others.
     pub singular_values: Vec<f64>,
     /// Share of the targets, by root mean square, that J styles leave out.
-    pub left_out: f64,
+    pub truncation_error: f64,
     /// Variance over the phase (S, D) of what J styles leave out of the demonstrations, where contexts are known.
-    pub left_over: Option<Array2<f64>>,
+    pub residual_variance: Option<Array2<f64>>,
     /// The basis functions, in one line.
     pub basis: String,
     /// What was implausible about the demonstrations or the fit; empty in a model that was read from a file.
@@ -82,8 +82,8 @@ const MAX_DURATION_RATIO: f64 = 3.0;
 #[derive(Clone, Debug)]
 pub struct Model {
     pub(crate) primitive: Arc<Primitive>,
-    pub(crate) demonstrated: Demonstrated,
-    pub(crate) learnt: Learnt,
+    pub(crate) demonstrated: DemonstrationParameters,
+    pub(crate) learnt: FitSummary,
     pub(crate) map: Option<ContextMap>,
 }
 
@@ -107,12 +107,12 @@ impl Model {
     }
 
     /// What was learnt from each demonstration.
-    pub fn demonstrated(&self) -> &Demonstrated {
+    pub fn demonstrated(&self) -> &DemonstrationParameters {
         &self.demonstrated
     }
 
     /// How the model was learnt.
-    pub fn learnt(&self) -> &Learnt {
+    pub fn learnt(&self) -> &FitSummary {
         &self.learnt
     }
 
@@ -126,12 +126,19 @@ impl Model {
             return Err(Error::Range { name: "demonstration", value: m as f64, allowed });
         }
         let of = |matrix: &Array2<f64>| Some(matrix.row(m).to_vec());
-        let Demonstrated { styles, goals, starts, anchors, timings, .. } = &self.demonstrated;
+        let DemonstrationParameters { styles, goals, starts, anchors, segment_durations, .. } = &self.demonstrated;
         let (goal, start, anchor) = match self.kind() {
             Kind::Discrete => (of(goals), of(starts), None),
             Kind::Rhythmic => (None, None, of(anchors)),
         };
-        Ok(Conditions { style: of(styles), goal, start, anchor, timing: of(timings), ..Conditions::default() })
+        Ok(Conditions {
+            style: of(styles),
+            goal,
+            start,
+            anchor,
+            segment_durations: of(segment_durations),
+            ..Conditions::default()
+        })
     }
 
     /// The map from contexts to style, goal and start or anchor, and logarithm of the duration, where contexts are
@@ -153,15 +160,22 @@ impl Model {
         let [shortest, longest] =
             [f64::min, f64::max].map(|of| demonstrated.clone().copied().reduce(of).unwrap_or(1.0));
         let durations = shortest / MAX_DURATION_RATIO..=longest * MAX_DURATION_RATIO;
-        Prediction::of(map.predict(context)?, map.freedom(), self.kind(), self.n_styles(), self.n_dofs(), durations)
+        Prediction::of(
+            map.predict(context)?,
+            map.degrees_of_freedom(),
+            self.kind(),
+            self.n_styles(),
+            self.n_dofs(),
+            durations,
+        )
     }
 }
 
-impl Demonstrated {
+impl DemonstrationParameters {
     /// Outputs of the context map (M, P): style, goal and start or anchor, and timing.
     pub(crate) fn outputs(&self, kind: Kind) -> Array2<f64> {
         let places = [self.goals.view(), self.starts.view(), self.anchors.view()];
-        outputs(kind, self.styles.view(), places, self.timings.view())
+        outputs(kind, self.styles.view(), places, self.segment_durations.view())
     }
 
     /// Conditions of the nominal demonstration.
@@ -171,6 +185,11 @@ impl Demonstrated {
             Kind::Discrete => &self.goals,
             Kind::Rhythmic => &self.anchors,
         };
-        Nominal { style: of(&self.styles), centre: of(centre), start: of(&self.starts), timing: of(&self.timings) }
+        Nominal {
+            style: of(&self.styles),
+            centre: of(centre),
+            start: of(&self.starts),
+            segment_durations: of(&self.segment_durations),
+        }
     }
 }

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use ndarray::Array2;
 
 use super::conditions::Conditions;
-use crate::context::{Expected, relative_changes};
+use crate::context::{ContextPrediction, relative_changes};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 
@@ -20,7 +20,7 @@ pub struct Prediction {
     /// demonstrations leave no degree of freedom to estimate it.
     pub covariance: Option<Array2<f64>>,
     /// Degrees of freedom from which the covariance is known.
-    pub freedom: usize,
+    pub degrees_of_freedom: usize,
     /// How far each value of the context lies outside of those demonstrated, in their range (Q,): 0 inside, infinite
     /// where a value that was never varied differs.
     pub outside: Vec<f64>,
@@ -32,29 +32,29 @@ impl Prediction {
     /// # Errors
     /// Times that overflow.
     pub(crate) fn of(
-        expected: Expected,
-        freedom: usize,
+        expected: ContextPrediction,
+        degrees_of_freedom: usize,
         kind: Kind,
         n_styles: usize,
         n_dofs: usize,
         durations: RangeInclusive<f64>,
     ) -> Result<Self> {
-        let Expected { mean, mut covariance, outside } = expected;
+        let ContextPrediction { mean, mut covariance, outside } = expected;
         let first = n_styles + n_dofs * if kind == Kind::Discrete { 2 } else { 1 };
         let duration = mean[first].exp().clamp(*durations.start(), *durations.end());
         let weights: Vec<f64> = mean[first + 1..].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
         let whole: f64 = weights.iter().sum();
-        let timing: Vec<f64> = weights.iter().map(|weight| duration * weight / whole).collect();
+        let segment_durations: Vec<f64> = weights.iter().map(|weight| duration * weight / whole).collect();
         if let Some(covariance) = &mut covariance {
-            let changes = relative_changes(&timing);
+            let changes = relative_changes(&segment_durations);
             let mut seconds = Array2::eye(mean.len());
             for ((k, i), change) in changes.indexed_iter() {
-                seconds[[first + k, first + i]] = timing[k] * change;
+                seconds[[first + k, first + i]] = segment_durations[k] * change;
             }
             *covariance = seconds.dot(covariance).dot(&seconds.t());
         }
         let finite = covariance.iter().flatten().all(|x| x.is_finite());
-        if !(finite && duration.is_finite() && timing.iter().all(|&time| time > 0.0)) {
+        if !(finite && duration.is_finite() && segment_durations.iter().all(|&time| time > 0.0)) {
             return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
         }
         let part = |k: usize| Some(mean[n_styles + k * n_dofs..n_styles + (k + 1) * n_dofs].to_vec());
@@ -63,7 +63,14 @@ impl Prediction {
             Kind::Rhythmic => (None, None, part(0)),
         };
         let style = Some(mean[..n_styles].to_vec());
-        let conditions = Conditions { style, goal, start, anchor, timing: Some(timing), ..Conditions::default() };
-        Ok(Self { conditions, duration, covariance, freedom, outside })
+        let conditions = Conditions {
+            style,
+            goal,
+            start,
+            anchor,
+            segment_durations: Some(segment_durations),
+            ..Conditions::default()
+        };
+        Ok(Self { conditions, duration, covariance, degrees_of_freedom, outside })
     }
 }

@@ -3,14 +3,14 @@
 use std::f64::consts::TAU;
 
 use crate::dynamics::canonical::Canonical;
-use crate::dynamics::forcing_table::Landscape;
+use crate::dynamics::forcing_table::ForcingTable;
 use crate::dynamics::output_system::{Attractor, State};
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::responses::Cache;
-use crate::numerics::simd::{Lanes, groups};
+use crate::numerics::simd::{F64x4, groups};
 use crate::validate::check_vector;
 
 /// Largest rate α_z, β_z, α_x or μ, and the inverse of the smallest: products of several stay finite.
@@ -28,7 +28,7 @@ pub(crate) struct Nominal {
     /// Start y₀ (D,), discrete.
     pub(crate) start: Vec<f64>,
     /// Time in each segment between two breaks (K,), in seconds.
-    pub(crate) timing: Vec<f64>,
+    pub(crate) segment_durations: Vec<f64>,
 }
 
 /// A parametric dynamic movement primitive: immutable, but for a cache of responses behind a lock, which the control
@@ -36,7 +36,7 @@ pub(crate) struct Nominal {
 #[derive(Clone, Debug)]
 pub struct Primitive {
     pub(crate) attractor: Attractor,
-    pub(crate) landscape: Landscape,
+    pub(crate) landscape: ForcingTable,
     pub(crate) transport: Transport,
     pub(crate) braking: Option<f64>,
     pub(crate) tau: f64,
@@ -47,7 +47,7 @@ pub struct Primitive {
     pub(crate) nominal: Nominal,
     /// Periodic steady state at φ = 0 per unit of style and amplitude, by groups of DoFs and styles; zero where discrete,
     /// which starts at rest in z.
-    pub(crate) cycle: Vec<State<Lanes>>,
+    pub(crate) cycle: Vec<State<F64x4>>,
     pub(crate) responses: Cache,
 }
 
@@ -55,7 +55,7 @@ pub struct Primitive {
 pub(crate) struct Parts {
     pub(crate) attractor: Attractor,
     /// The forcing term without its braking past the end.
-    pub(crate) landscape: Landscape,
+    pub(crate) landscape: ForcingTable,
     pub(crate) transport: Transport,
     /// κ, per unit of the clock, at which a movement brakes past its end; none where transport is immediate, and rhythmic.
     pub(crate) braking: Option<f64>,
@@ -79,7 +79,7 @@ impl Primitive {
             Kind::Discrete => {
                 if let Some(braking) = braking {
                     let end = from_rest(attractor, &landscape, shape);
-                    let z: Vec<Lanes> = end.iter().map(|state| state.z).collect();
+                    let z: Vec<F64x4> = end.iter().map(|state| state.z).collect();
                     landscape = landscape.braked(attractor.alpha_z, braking, &z);
                 }
                 vec![State::default(); groups(shape.0) * shape.1]
@@ -106,7 +106,7 @@ impl Primitive {
     }
 
     /// The attractor landscape, gated, per style dimension and DoF.
-    pub fn landscape(&self) -> &Landscape {
+    pub fn landscape(&self) -> &ForcingTable {
         &self.landscape
     }
 
@@ -142,7 +142,7 @@ impl Primitive {
 
     /// Duration or period of the nominal demonstration, in seconds.
     pub fn duration(&self) -> f64 {
-        self.nominal.timing.iter().sum()
+        self.nominal.segment_durations.iter().sum()
     }
 
     /// Phases (K+1,) from 0 to 1 that divide the movement into segments; K = 1 where time is scaled linearly.
@@ -156,7 +156,7 @@ impl Primitive {
     ///
     /// # Errors
     /// A timing that does not fit the model, or a phase outside [0, 1] or [0, 2π).
-    pub fn tau_at(&self, phase: f64, timing: &[f64]) -> Result<f64> {
+    pub fn tau_at(&self, phase: f64, segment_durations: &[f64]) -> Result<f64> {
         let extent = self.canonical().extent();
         let clock = self.canonical().clock_at(phase);
         // Long after the end x is zero, and the clock infinite.
@@ -165,7 +165,7 @@ impl Primitive {
             let allowed = "must lie in [0, 1] where discrete, in [0, 2π) where rhythmic";
             return Err(Error::Range { name: "phase", value: phase, allowed });
         }
-        Ok(self.warping_function(timing)?.slope(clock / extent) / extent)
+        Ok(self.warping_function(segment_durations)?.slope(clock / extent) / extent)
     }
 
     /// Time over phase for a timing (K,).
@@ -173,18 +173,18 @@ impl Primitive {
     /// # Errors
     /// Another number of times than the movement has segments, or one that is not within a millionfold of the nominal
     /// demonstration's.
-    pub(crate) fn warping_function(&self, timing: &[f64]) -> Result<WarpingFunction> {
-        self.check_timing(timing)?;
-        Ok(WarpingFunction::new(self.kind(), &self.breaks, timing))
+    pub(crate) fn warping_function(&self, segment_durations: &[f64]) -> Result<WarpingFunction> {
+        self.check_segment_durations(segment_durations)?;
+        Ok(WarpingFunction::new(self.kind(), &self.breaks, segment_durations))
     }
 
-    pub(crate) fn check_timing(&self, timing: &[f64]) -> Result<()> {
-        let nominal = &self.nominal.timing;
-        check_vector("timing", timing, nominal.len(), "segment between breaks")?;
-        match timing.iter().zip(nominal).find(|(time, own)| !(1e-6..=1e6).contains(&(*time / *own))) {
+    pub(crate) fn check_segment_durations(&self, segment_durations: &[f64]) -> Result<()> {
+        let nominal = &self.nominal.segment_durations;
+        check_vector("segment_durations", segment_durations, nominal.len(), "segment between breaks")?;
+        match segment_durations.iter().zip(nominal).find(|(time, own)| !(1e-6..=1e6).contains(&(*time / *own))) {
             Some((&value, _)) => {
                 let allowed = "seconds must be positive, within a millionfold of the nominal demonstration's";
-                Err(Error::Range { name: "timing", value, allowed })
+                Err(Error::Range { name: "segment_durations", value, allowed })
             }
             None => Ok(()),
         }
@@ -234,7 +234,7 @@ impl Primitive {
 }
 
 /// The states to which the demonstrated stretch leads from rest, of unit styles, by groups of DoFs and styles.
-fn from_rest(attractor: Attractor, landscape: &Landscape, (n_dofs, n_styles): (usize, usize)) -> Vec<State<Lanes>> {
+fn from_rest(attractor: Attractor, landscape: &ForcingTable, (n_dofs, n_styles): (usize, usize)) -> Vec<State<F64x4>> {
     let cells = landscape.cells();
     let cell = attractor.propagator(landscape.canonical().extent() / cells as f64);
     let mut states = Vec::with_capacity(groups(n_dofs) * n_styles);
@@ -248,11 +248,11 @@ fn from_rest(attractor: Attractor, landscape: &Landscape, (n_dofs, n_styles): (u
 }
 
 /// The states from which one turn leads back to itself, (I − exp(2πA))⁻¹ times the response of a turn from rest.
-fn steady_cycle(attractor: Attractor, landscape: &Landscape, shape: (usize, usize)) -> Vec<State<Lanes>> {
+fn steady_cycle(attractor: Attractor, landscape: &ForcingTable, shape: (usize, usize)) -> Vec<State<F64x4>> {
     let [[a, b], [c, d]] = attractor.propagator(TAU).transition();
     // A stable system never returns to where it was unforced: the determinant is positive.
     let scale = 1.0 / ((1.0 - a) * (1.0 - d) - b * c);
     let closed =
-        |State { e, z }: State<Lanes>| State { e: (e * (1.0 - d) + z * b) * scale, z: (e * c + z * (1.0 - a)) * scale };
+        |State { e, z }: State<F64x4>| State { e: (e * (1.0 - d) + z * b) * scale, z: (e * c + z * (1.0 - a)) * scale };
     from_rest(attractor, landscape, shape).into_iter().map(closed).collect()
 }

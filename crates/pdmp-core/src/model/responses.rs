@@ -9,8 +9,8 @@ use ndarray::Array2;
 use crate::error::{Error, Result};
 
 /// Most responses that a model keeps, and the most memory that they take, in bytes.
-const MOST_KEPT: usize = 8;
-const MOST_BYTES: usize = 64 << 20;
+const MAX_ENTRIES: usize = 8;
+const MAX_BYTES: usize = 64 << 20;
 
 /// How often a movement is differentiated with respect to time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,13 +90,13 @@ impl Cache {
 
     /// Keeps responses as long as no later ones need their place; those that are too large not at all.
     pub(crate) fn keep(&self, key: Key, responses: &Arc<Responses>) {
-        if responses.bytes() > MOST_BYTES {
+        if responses.bytes() > MAX_BYTES {
             return;
         }
         self.with(|kept| {
             kept.retain(|(k, _)| *k != key);
             kept.push_back((key, Arc::clone(responses)));
-            while kept.len() > MOST_KEPT || kept.iter().map(|(_, kept)| kept.bytes()).sum::<usize>() > MOST_BYTES {
+            while kept.len() > MAX_ENTRIES || kept.iter().map(|(_, kept)| kept.bytes()).sum::<usize>() > MAX_BYTES {
                 kept.pop_front();
             }
         });
@@ -139,13 +139,13 @@ mod tests {
         let kept = (0..100).filter(|&n| cache.find(key(n)).is_some()).collect::<Vec<_>>();
         assert_eq!(kept, [0, 93, 94, 95, 96, 97, 98, 99]);
         // Three eighths of the bytes each.
-        let large = responses(MOST_BYTES / (9 * 8) * 3 / 8);
+        let large = responses(MAX_BYTES / (9 * 8) * 3 / 8);
         for n in 0..20 {
             cache.keep(key(n), &large);
-            assert!(cache.with(|kept| kept.iter().map(|(_, kept)| kept.bytes()).sum::<usize>()) <= MOST_BYTES);
+            assert!(cache.with(|kept| kept.iter().map(|(_, kept)| kept.bytes()).sum::<usize>()) <= MAX_BYTES);
         }
         assert_eq!((0..20).filter(|&n| cache.find(key(n)).is_some()).collect::<Vec<_>>(), [18, 19]);
-        cache.keep(key(50), &responses(MOST_BYTES));
+        cache.keep(key(50), &responses(MAX_BYTES));
         assert!(cache.find(key(50)).is_none(), "too large to be kept");
         assert!(cache.find(key(18)).is_some() && cache.find(key(19)).is_some(), "others stay");
     }

@@ -54,7 +54,7 @@ impl<'a> Sensitivity<'a> {
 
     /// The matrix (P, P) that makes errors of the outputs (M, P) into the mean square of the movement's, summed over
     /// DoFs. A timing that is off by all of itself counts as much as the mean movement's own variation.
-    pub(crate) fn metric(&self, outputs: ArrayView2<f64>, timings: ArrayView2<f64>) -> Array2<f64> {
+    pub(crate) fn metric(&self, outputs: ArrayView2<f64>, segment_durations: ArrayView2<f64>) -> Array2<f64> {
         let (length, n_dofs) = self.curves.start.dim();
         let mut metric = Array2::zeros((outputs.ncols(), outputs.ncols()));
         for (k, d) in (0..length).flat_map(|k| (0..n_dofs).map(move |d| (k, d))) {
@@ -64,11 +64,11 @@ impl<'a> Sensitivity<'a> {
             }
         }
         let mean = |rows: ArrayView2<f64>| rows.mean_axis(Axis(0)).unwrap_or_default();
-        let changes = relative_changes(&mean(timings).to_vec());
+        let changes = relative_changes(&mean(segment_durations).to_vec());
         let variation = self.positions(mean(outputs).view()).var_axis(Axis(0), 0.0).sum();
         let first = outputs.ncols() - changes.nrows();
-        let timing = changes.t().dot(&changes) * (variation / changes.nrows() as f64);
-        metric.slice_mut(s![first.., first..]).assign(&timing);
+        let segment_durations = changes.t().dot(&changes) * (variation / changes.nrows() as f64);
+        metric.slice_mut(s![first.., first..]).assign(&segment_durations);
         metric
     }
 }

@@ -11,22 +11,22 @@ const STEEPEST: f64 = STEPS as f64;
 
 /// Settings of a time warp.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Warp {
+pub struct TimeWarp {
     /// Number K of segments of equal phase: how many times describe the timing of a movement.
-    pub segments: usize,
-    /// Bound of a segment's time: at most `slope` times that of linear scaling, at least as many times less.
-    pub slope: f64,
+    pub n_segments: usize,
+    /// Bound of a segment's time: at most `max_slope` times that of linear scaling, at least as many times less.
+    pub max_slope: f64,
 }
 
-impl Default for Warp {
+impl Default for TimeWarp {
     fn default() -> Self {
-        Self { segments: 8, slope: 2.5 }
+        Self { n_segments: 8, max_slope: 2.5 }
     }
 }
 
 /// What demonstrations were warped to, so that new ones can be.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Template {
+pub struct WarpTemplate {
     /// Bound of the slopes.
     pub(crate) slope: f64,
     /// What each DoF is counted in (D,).
@@ -35,20 +35,20 @@ pub struct Template {
     pub(crate) shape: Array2<f64>,
 }
 
-impl Template {
+impl WarpTemplate {
     /// Number of cells of a template of so many segments.
     pub(crate) fn cells(segments: usize) -> usize {
         segments * STEPS
     }
 }
 
-impl Warp {
-    /// A warp of so many segments, whose slopes lie between 1/`slope` and `slope`.
+impl TimeWarp {
+    /// A warp of so many segments, whose slopes lie between 1/`max_slope` and `max_slope`.
     ///
     /// # Errors
     /// No segment, or a slope outside 1 to 10.
-    pub fn new(segments: usize, slope: f64) -> Result<Self> {
-        let warp = Self { segments, slope };
+    pub fn new(n_segments: usize, max_slope: f64) -> Result<Self> {
+        let warp = Self { n_segments, max_slope };
         warp.check(usize::MAX)?;
         Ok(warp)
     }
@@ -56,13 +56,13 @@ impl Warp {
     /// Checks the settings, given the most segments that the samples carry.
     pub(crate) fn check(&self, most: usize) -> Result<()> {
         match *self {
-            Self { segments: 0, .. } => {
-                Err(Error::Range { name: "segments", value: 0.0, allowed: "must be at least 1, which is linear" })
+            Self { n_segments: 0, .. } => {
+                Err(Error::Range { name: "n_segments", value: 0.0, allowed: "must be at least 1, which is linear" })
             }
-            Self { segments, .. } if segments > most => Err(Error::Segments { segments, most }),
-            Self { slope, .. } if !(1.0..=STEEPEST).contains(&slope) => Err(Error::Range {
-                name: "slope",
-                value: slope,
+            Self { n_segments, .. } if n_segments > most => Err(Error::Segments { n_segments, most }),
+            Self { max_slope, .. } if !(1.0..=STEEPEST).contains(&max_slope) => Err(Error::Range {
+                name: "max_slope",
+                value: max_slope,
                 allowed: "must lie between 1, which is linear, and 10",
             }),
             _ => Ok(()),

@@ -7,10 +7,10 @@ use ndarray::{Array2, Array3, ArrayView1, ArrayViewMut3, Axis, aview1};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{Conditions, LARGEST_STYLE};
+use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE};
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
-use crate::motion::rollout::Timing;
+use crate::motion::rollout::TimeGrid;
 use crate::motion::superposition::Combination;
 use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
@@ -20,13 +20,13 @@ use crate::validate::{check_matrix, zeros};
 /// Numbers that one thread writes into each output before it takes new work, and fewest movements among them: the
 /// responses are read from cache memory for all of these.
 const BLOCK: usize = 1 << 17;
-const LEAST_IN_BLOCK: usize = 8;
+const MIN_MOVEMENTS_PER_BLOCK: usize = 8;
 /// Blocks for each thread between two questions whether to go on.
 const PORTION: usize = 16;
 
 /// A vector (D,) for all movements of a batch, or one for each.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Rows {
+pub enum PerMovement {
     /// The same for all, (D,).
     All(Vec<f64>),
     /// One for each, (B, D).
@@ -39,13 +39,13 @@ pub struct BatchConditions {
     /// Styles s (B, J).
     pub styles: Array2<f64>,
     /// Goals g, discrete.
-    pub goals: Option<Rows>,
+    pub goals: Option<PerMovement>,
     /// Anchors y_a, rhythmic.
-    pub anchors: Option<Rows>,
+    pub anchors: Option<PerMovement>,
     /// Start positions; rhythmic movements otherwise start on their cycles.
-    pub starts: Option<Rows>,
+    pub starts: Option<PerMovement>,
     /// Start velocities, per second; otherwise those of the demonstrations.
-    pub velocities: Option<Rows>,
+    pub velocities: Option<PerMovement>,
     /// Amplitude r₀ of all, rhythmic; otherwise 1.
     pub amplitude: Option<f64>,
     /// Time constant τ of all, in seconds.
@@ -58,24 +58,24 @@ pub struct Batch {
     responses: Arc<Responses>,
     styles: Array2<f64>,
     /// Goals or anchors.
-    centres: Rows,
-    starts: Option<Rows>,
-    velocities: Option<Rows>,
+    centres: PerMovement,
+    starts: Option<PerMovement>,
+    velocities: Option<PerMovement>,
     amplitude: f64,
 }
 
 /// Movements of many styles, checked and ready to be written.
 ///
-/// `proceed` is told now and then the share that is done of responses which the model does not remember.
+/// `progress` is told now and then the share that is done of responses which the model does not remember.
 ///
 /// # Errors
 /// Conditions or times that do not fit the model, another number of rows than there are styles, or whatever
-/// `proceed` returns.
+/// `progress` returns.
 pub fn batch(
     primitive: &Arc<Primitive>,
     conditions: BatchConditions,
-    timing: Timing,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
+    grid: TimeGrid,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Batch> {
     let BatchConditions { styles, goals, anchors, starts, velocities, amplitude, tau } = conditions;
     check_styles(&styles, primitive.n_styles())?;
@@ -95,10 +95,10 @@ pub fn batch(
     }
     let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(primitive)?;
     Ok(Batch {
-        responses: responses(primitive, nominal.tau, timing, proceed)?,
+        responses: responses(primitive, nominal.tau, grid, progress)?,
         styles,
-        centres: centres.unwrap_or(Rows::All(nominal.centre)),
-        starts: starts.or(nominal.start.map(Rows::All)),
+        centres: centres.unwrap_or(PerMovement::All(nominal.centre)),
+        starts: starts.or(nominal.start.map(PerMovement::All)),
         velocities,
         amplitude: nominal.amplitude,
     })
@@ -111,13 +111,13 @@ pub fn batch(
 pub fn rollouts(
     primitive: &Arc<Primitive>,
     conditions: BatchConditions,
-    timing: Timing,
+    grid: TimeGrid,
     highest: Derivative,
     threads: Threads,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Vec<Array3<f64>>> {
-    let batch = batch(primitive, conditions, timing, proceed)?;
-    batch.rollouts(0..batch.shape().0, highest, threads, proceed)
+    let batch = batch(primitive, conditions, grid, progress)?;
+    batch.rollouts(0..batch.shape().0, highest, threads, progress)
 }
 
 impl Batch {
@@ -132,43 +132,43 @@ impl Batch {
     ///
     /// # Errors
     /// A size of zero.
-    pub fn chunks(&self, size: usize) -> Result<Chunks> {
+    pub fn chunks(&self, size: usize) -> Result<BatchChunks> {
         match size {
             0 => Err(Error::Range { name: "size", value: 0.0, allowed: "must be at least 1" }),
-            _ => Ok(Chunks { left: 0..self.styles.nrows(), size }),
+            _ => Ok(BatchChunks { left: 0..self.styles.nrows(), size }),
         }
     }
 
     /// Some of the movements: positions and their derivatives up to `highest`.
     ///
     /// # Errors
-    /// Movements that memory does not hold, or whatever `proceed` returns.
+    /// Movements that memory does not hold, or whatever `progress` returns.
     pub fn rollouts(
         &self,
         movements: Range<usize>,
         highest: Derivative,
         threads: Threads,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Vec<Array3<f64>>> {
         let (_, n_samples, n_dofs) = self.shape();
         let mut outputs = (0..=highest as usize)
             .map(|_| zeros("rollouts", (movements.len(), n_samples, n_dofs)))
             .collect::<Result<Vec<Array3<f64>>>>()?;
-        self.write(movements, outputs.iter_mut().map(|output| output.view_mut()).collect(), threads, proceed)?;
+        self.write(movements, outputs.iter_mut().map(|output| output.view_mut()).collect(), threads, progress)?;
         Ok(outputs)
     }
 
     /// Writes some of the movements where the caller wants them: positions, velocities and accelerations in this order,
-    /// as many as there are outputs. `proceed` is told now and then the share that is done.
+    /// as many as there are outputs. `progress` is told now and then the share that is done.
     ///
     /// # Errors
-    /// Movements that the batch does not have, outputs of another shape, or whatever `proceed` returns.
+    /// Movements that the batch does not have, outputs of another shape, or whatever `progress` returns.
     pub fn write(
         &self,
         movements: Range<usize>,
         mut outputs: Vec<ArrayViewMut3<f64>>,
         threads: Threads,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<()> {
         let (n_movements, n_samples, n_dofs) = self.shape();
         let shape = (movements.len(), n_samples, n_dofs);
@@ -177,7 +177,7 @@ impl Batch {
                 "outputs must be at most three, each (movements, samples, DoFs) of the batch",
             ));
         }
-        let in_block = (BLOCK / (n_samples * n_dofs)).max(LEAST_IN_BLOCK);
+        let in_block = (BLOCK / (n_samples * n_dofs)).max(MIN_MOVEMENTS_PER_BLOCK);
         let mut chunks: Vec<_> =
             outputs.iter_mut().map(|output| output.axis_chunks_iter_mut(Axis(0), in_block)).collect();
         let mut blocks = movements
@@ -187,7 +187,7 @@ impl Batch {
         loop {
             let portion: Vec<_> = blocks.by_ref().take(PORTION * threads.get()).collect();
             let Some((first, _)) = portion.first() else { return Ok(()) };
-            proceed((first - movements.start) as f64 / movements.len() as f64)?;
+            progress((first - movements.start) as f64 / movements.len() as f64)?;
             threads.try_for_each(portion, |(first, outputs)| {
                 self.write_block(first, outputs);
                 Ok(())
@@ -209,7 +209,7 @@ impl Batch {
         let style: Vec<f64> = self.styles.row(b).iter().map(|s| self.amplitude * s).collect();
         let centre = self.centres.row(b).to_vec();
         // What a given condition adds to that of the movement which starts as demonstrated.
-        let beyond = |given: &Option<Rows>, derivative: Derivative, centre: &[f64]| match given {
+        let beyond = |given: &Option<PerMovement>, derivative: Derivative, centre: &[f64]| match given {
             Some(rows) => {
                 let curves = &self.responses.of(derivative).styles;
                 let row = rows.row(b);
@@ -229,12 +229,12 @@ impl Batch {
 
 /// Pieces of a batch: see [`Batch::chunks`].
 #[derive(Clone, Debug)]
-pub struct Chunks {
+pub struct BatchChunks {
     left: Range<usize>,
     size: usize,
 }
 
-impl Iterator for Chunks {
+impl Iterator for BatchChunks {
     type Item = Range<usize>;
 
     fn next(&mut self) -> Option<Range<usize>> {
@@ -244,7 +244,7 @@ impl Iterator for Chunks {
     }
 }
 
-impl Rows {
+impl PerMovement {
     fn row(&self, b: usize) -> ArrayView1<'_, f64> {
         match self {
             Self::All(row) => aview1(row),
@@ -271,9 +271,9 @@ fn check_width(name: &'static str, rows: &Array2<f64>, expected: usize, per: &'s
 /// Checks styles (B, J) as [`crate::model::conditions::check_style`] does one.
 fn check_styles(styles: &Array2<f64>, n_styles: usize) -> Result<()> {
     check_width("styles", styles, n_styles, "style dimension")?;
-    match styles.indexed_iter().find(|(_, s)| s.abs() > LARGEST_STYLE) {
+    match styles.indexed_iter().find(|(_, s)| s.abs() > MAX_STYLE_MAGNITUDE) {
         Some(((row, column), &value)) => {
-            Err(Error::Magnitude { name: "styles", row, column, value, limit: LARGEST_STYLE })
+            Err(Error::Magnitude { name: "styles", row, column, value, limit: MAX_STYLE_MAGNITUDE })
         }
         None => Ok(()),
     }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{check_amplitude, check_style, check_tau, refuse};
+use crate::model::conditions::{check_amplitude, check_style, check_tau, reject_for_kind};
 use crate::model::primitive::Primitive;
 use crate::validate::check_vector;
 
@@ -70,12 +70,12 @@ impl Command<'_> {
             check_tau(tau, model.tau())?;
         }
         if let Some(amplitude) = self.amplitude {
-            refuse(kind, "amplitude", kind == Kind::Discrete)?;
+            reject_for_kind(kind, "amplitude", kind == Kind::Discrete)?;
             check_amplitude(amplitude)?;
         }
-        refuse(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
+        reject_for_kind(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
         vector("goal", self.goal)?;
-        refuse(kind, "anchor", kind == Kind::Discrete && self.anchor.is_some())?;
+        reject_for_kind(kind, "anchor", kind == Kind::Discrete && self.anchor.is_some())?;
         vector("anchor", self.anchor)?;
         vector("measured", self.measured)?;
         if let Some(Coupling { velocity, acceleration }) = self.coupling {

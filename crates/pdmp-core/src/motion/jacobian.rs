@@ -6,16 +6,16 @@ use ndarray::{Array3, Axis};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{Complete, Conditions, refuse};
+use crate::model::conditions::{Conditions, ResolvedConditions, reject_for_kind};
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
-use crate::motion::rollout::Timing;
+use crate::motion::rollout::TimeGrid;
 use crate::motion::unit_responses::responses;
 use crate::validate::zeros;
 
 /// The condition with respect to which a movement is differentiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Variable {
+pub enum WithRespectTo {
     /// Style s (J,).
     Style,
     /// Goal g (D,), discrete.
@@ -38,38 +38,44 @@ pub enum Variable {
 ///
 /// with the curves R of the unit styles, E of a unit start, and V of a unit start velocity, where the terms with E and
 /// V belong to a given start and a given start velocity. Which of the two are given matters, their values do not.
-/// `derivative` asks for the same of ẏ or ÿ. `proceed` is told now and then the share that is done.
+/// `derivative` asks for the same of ẏ or ÿ. `progress` is told now and then the share that is done.
 ///
 /// # Errors
 /// A variable of the other kind of primitive, a timing of several segments, conditions or times that do not fit the
-/// model, or whatever `proceed` returns.
+/// model, or whatever `progress` returns.
 pub fn jacobian(
     primitive: &Arc<Primitive>,
-    variable: Variable,
+    variable: WithRespectTo,
     derivative: Derivative,
     conditions: &Conditions,
-    timing: Timing,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
+    grid: TimeGrid,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Array3<f64>> {
-    refuse(primitive.kind(), "goal", variable == Variable::Goal && primitive.kind() == Kind::Rhythmic)?;
-    refuse(primitive.kind(), "anchor", variable == Variable::Anchor && primitive.kind() == Kind::Discrete)?;
-    if conditions.timing.as_ref().is_some_and(|timing| timing.len() > 1) {
-        return Err(Error::Arguments("a Jacobian is that of a movement in linear time: pass tau in place of timing"));
+    reject_for_kind(primitive.kind(), "goal", variable == WithRespectTo::Goal && primitive.kind() == Kind::Rhythmic)?;
+    reject_for_kind(
+        primitive.kind(),
+        "anchor",
+        variable == WithRespectTo::Anchor && primitive.kind() == Kind::Discrete,
+    )?;
+    if conditions.segment_durations.as_ref().is_some_and(|segment_durations| segment_durations.len() > 1) {
+        return Err(Error::Arguments(
+            "a Jacobian is that of a movement in linear time: pass tau in place of segment_durations",
+        ));
     }
     let conditions = conditions.complete(primitive)?;
-    let responses = responses(primitive, conditions.tau, timing, proceed)?;
+    let responses = responses(primitive, conditions.tau, grid, progress)?;
     let still = if derivative == Derivative::Position { 1.0 } else { 0.0 };
     match variable {
-        Variable::Style => by_style(&responses, derivative, &conditions),
-        Variable::Goal | Variable::Anchor if conditions.start.is_some() => {
+        WithRespectTo::Style => by_style(&responses, derivative, &conditions),
+        WithRespectTo::Goal | WithRespectTo::Anchor if conditions.start.is_some() => {
             by_dof(&responses, derivative, |response| still - response)
         }
-        Variable::Goal | Variable::Anchor => by_dof(&responses, derivative, |_| still),
-        Variable::Start => by_dof(&responses, derivative, |response| response),
+        WithRespectTo::Goal | WithRespectTo::Anchor => by_dof(&responses, derivative, |_| still),
+        WithRespectTo::Start => by_dof(&responses, derivative, |response| response),
     }
 }
 
-fn by_style(responses: &Responses, derivative: Derivative, conditions: &Complete) -> Result<Array3<f64>> {
+fn by_style(responses: &Responses, derivative: Derivative, conditions: &ResolvedConditions) -> Result<Array3<f64>> {
     let curves = responses.of(derivative);
     let (n_samples, n_dofs) = curves.start.dim();
     let mut jacobian = zeros("jacobian", (n_samples, n_dofs, curves.styles.len()))?;

@@ -11,10 +11,10 @@ pub(crate) mod superposition;
 pub(crate) mod trajectory;
 pub(crate) mod unit_responses;
 
-pub use batch::{Batch, BatchConditions, Chunks, Rows, batch, rollouts};
+pub use batch::{Batch, BatchChunks, BatchConditions, PerMovement, batch, rollouts};
 pub use command::{Command, Coupling, Motion};
 pub use controller::{Controller, Status};
-pub use jacobian::{Variable, jacobian};
+pub use jacobian::{WithRespectTo, jacobian};
 pub use prediction_band::prediction_band;
-pub use rollout::{Timing, rollout, rollout_with};
+pub use rollout::{TimeGrid, rollout, rollout_with};
 pub use trajectory::Trajectory;

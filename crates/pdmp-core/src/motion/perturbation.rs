@@ -26,7 +26,7 @@
 
 use crate::error::{Error, Result};
 use crate::motion::command::{Command, Coupling};
-use crate::numerics::simd::{Lanes, groups, pack, repack};
+use crate::numerics::simd::{F64x4, groups, pack, repack};
 
 /// Default k_s: an error of a tenth of the range slows the phase elevenfold.
 const STOPPING: f64 = 1000.0;
@@ -37,24 +37,24 @@ const TRACKING: f64 = 10.0;
 /// smaller one takes longer over an error that is there from the start.
 const EXPECTING: f64 = 5.0;
 /// Largest gain; it only keeps products finite.
-const LARGEST_GAIN: f64 = 1e100;
+const MAX_GAIN: f64 = 1e100;
 /// A DoF whose range is no more than this share of the widest stands still.
-pub(crate) const STILL: f64 = 1e-6;
+pub(crate) const MIN_RANGE_RATIO: f64 = 1e-6;
 
 /// A range below which its inverse would leave what can be squared.
 const LEAST: f64 = 1e-140;
 
 /// What is added over a tick, by groups of DoFs.
 #[derive(Clone, Debug)]
-pub(crate) struct Push {
-    pub(crate) velocity: Vec<Lanes>,
-    pub(crate) acceleration: Vec<Lanes>,
+pub(crate) struct PerturbationTerms {
+    pub(crate) velocity: Vec<F64x4>,
+    pub(crate) acceleration: Vec<F64x4>,
 }
 
 /// The perturbation of the tick at work, and how much the movement gives way to it.
 #[derive(Clone, Debug)]
-pub(crate) struct Held {
-    push: Push,
+pub(crate) struct Perturbation {
+    push: PerturbationTerms,
     pushed: bool,
     pace: f64,
     /// k_s and k_t.
@@ -62,18 +62,18 @@ pub(crate) struct Held {
     /// Whether a measurement is in force.
     followed: bool,
     /// e of the last measurement, by groups of DoFs.
-    error: Vec<Lanes>,
+    error: Vec<F64x4>,
     /// o by groups of DoFs.
-    expected: Vec<Lanes>,
+    expected: Vec<F64x4>,
     /// λ, per unit of the clock.
     expecting: f64,
     /// Share of the way to ỹ that the ticks since the last measurement have not pulled yet.
     left: f64,
     /// A full turn of a DoF that is an angle and its inverse; zero of any other.
-    turn: Vec<Lanes>,
-    per_turn: Vec<Lanes>,
+    turn: Vec<F64x4>,
+    per_turn: Vec<F64x4>,
     /// 1/range by groups of DoFs; zero where a DoF stands still, so that an error there does not stop the phase.
-    per_range: Vec<Lanes>,
+    per_range: Vec<F64x4>,
 }
 
 /// The widest of the DoFs' ranges.
@@ -81,17 +81,17 @@ pub(crate) fn widest(ranges: &[f64]) -> f64 {
     ranges.iter().fold(0.0, |widest, range| widest.max(*range))
 }
 
-impl Held {
+impl Perturbation {
     /// No perturbation, for DoFs of these ranges and units and a movement of this extent on the clock.
     pub(crate) fn new(ranges: &[f64], units: &[String], extent: f64) -> Self {
         let widest = widest(ranges);
-        let inverse = |&range: &f64| if range > (STILL * widest).max(LEAST) { 1.0 / range } else { 0.0 };
-        let zeros = vec![Lanes::ZERO; groups(ranges.len())];
+        let inverse = |&range: &f64| if range > (MIN_RANGE_RATIO * widest).max(LEAST) { 1.0 / range } else { 0.0 };
+        let zeros = vec![F64x4::ZERO; groups(ranges.len())];
         let per_range: Vec<f64> = ranges.iter().map(inverse).collect();
         let turn: Vec<f64> = (0..ranges.len()).map(|d| units.get(d).map_or(0.0, |unit| full_turn(unit))).collect();
         let per_turn: Vec<f64> = turn.iter().map(|&turn| if turn > 0.0 { 1.0 / turn } else { 0.0 }).collect();
         Self {
-            push: Push { velocity: zeros.clone(), acceleration: zeros.clone() },
+            push: PerturbationTerms { velocity: zeros.clone(), acceleration: zeros.clone() },
             pushed: false,
             pace: 1.0,
             compliance: (STOPPING, TRACKING / extent),
@@ -115,7 +115,7 @@ impl Held {
     pub(crate) fn release(&mut self) {
         self.rest();
         self.followed = false;
-        self.expected.fill(Lanes::ZERO);
+        self.expected.fill(F64x4::ZERO);
     }
 
     /// Whether a measurement is in force.
@@ -125,7 +125,7 @@ impl Held {
 
     /// Takes the perturbation of a tick of `dt` seconds, `h` on the clock, that starts at `position`; its vectors have
     /// been checked.
-    pub(crate) fn take(&mut self, command: &Command, position: &[Lanes], dt: f64, h: f64) {
+    pub(crate) fn take(&mut self, command: &Command, position: &[F64x4], dt: f64, h: f64) {
         self.rest();
         if let Some(measured) = command.measured {
             (self.followed, self.left) = (true, 1.0);
@@ -143,8 +143,8 @@ impl Held {
             repack(&mut self.push.velocity, velocity);
             repack(&mut self.push.acceleration, acceleration);
         } else {
-            self.push.velocity.fill(Lanes::ZERO);
-            self.push.acceleration.fill(Lanes::ZERO);
+            self.push.velocity.fill(F64x4::ZERO);
+            self.push.acceleration.fill(F64x4::ZERO);
         }
         if self.followed {
             self.follow(dt, h);
@@ -159,10 +159,10 @@ impl Held {
         let share = -(-tracking * h).exp_m1();
         let pull = self.left * share / dt;
         self.left *= 1.0 - share;
-        let mut strain = Lanes::ZERO;
+        let mut strain = F64x4::ZERO;
         for (group, velocity) in self.push.velocity.iter_mut().enumerate() {
             let error = self.error[group];
-            let unexpected = error - self.expected[group].max(error.min(Lanes::ZERO)).min(error.max(Lanes::ZERO));
+            let unexpected = error - self.expected[group].max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
             *velocity += unexpected * pull;
             let share = unexpected * self.per_range[group] * stopping.sqrt();
             strain += share * share;
@@ -175,7 +175,7 @@ impl Held {
     }
 
     /// What is added, if anything.
-    pub(crate) fn push(&self) -> Option<&Push> {
+    pub(crate) fn push(&self) -> Option<&PerturbationTerms> {
         self.pushed.then_some(&self.push)
     }
 
@@ -192,7 +192,7 @@ impl Held {
     /// Sets k_s and k_t.
     pub(crate) fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
         for (name, value) in [("stopping", stopping), ("tracking", tracking)] {
-            if !(0.0..=LARGEST_GAIN).contains(&value) {
+            if !(0.0..=MAX_GAIN).contains(&value) {
                 return Err(Error::Range { name, value, allowed: "must lie between 0, which is without, and 1e100" });
             }
         }

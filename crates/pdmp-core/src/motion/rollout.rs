@@ -19,18 +19,18 @@ const PORTION: usize = 4096;
 /// Ticks that pass, one right after the other, while memory answers.
 const LEAD: f64 = 16.0;
 /// Most samples of a rollout.
-const MOST_STEPS: f64 = 1e7;
+const MAX_STEPS: f64 = 1e7;
 
 /// Times of a rollout, in seconds.
 #[derive(Clone, Copy, Debug)]
-pub struct Timing {
+pub struct TimeGrid {
     /// Interval between samples.
     pub dt: f64,
     /// Length of the rollout; otherwise the demonstrated duration scaled by τ, the sum of the timing, or one period.
     pub duration: Option<f64>,
 }
 
-impl Timing {
+impl TimeGrid {
     /// Number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋: a whole multiple of dt keeps its last sample.
     pub(crate) fn steps(&self, primitive: &Primitive, tau: f64) -> Result<usize> {
         check_positive("dt", self.dt)?;
@@ -43,7 +43,7 @@ impl Timing {
             None => primitive.duration() * tau / primitive.tau,
         };
         let steps = (duration / self.dt * (1.0 + 1e-12) + 1e-9).floor();
-        if steps > MOST_STEPS {
+        if steps > MAX_STEPS {
             return Err(Error::Range {
                 name: "dt",
                 value: self.dt,
@@ -58,32 +58,32 @@ impl Timing {
 ///
 /// # Errors
 /// Conditions or times that do not fit the primitive.
-pub fn rollout(primitive: &Arc<Primitive>, conditions: &Conditions, timing: Timing) -> Result<Trajectory> {
-    rollout_with(primitive, conditions, timing, &mut |_| Ok(()))
+pub fn rollout(primitive: &Arc<Primitive>, conditions: &Conditions, grid: TimeGrid) -> Result<Trajectory> {
+    rollout_with(primitive, conditions, grid, &mut |_| Ok(()))
 }
 
-/// [`rollout`] that can be stopped: `proceed` is told the share that is done.
+/// [`rollout`] that can be stopped: `progress` is told the share that is done.
 ///
 /// # Errors
-/// Conditions or times that do not fit the model, or whatever `proceed` returns.
+/// Conditions or times that do not fit the model, or whatever `progress` returns.
 pub fn rollout_with(
     primitive: &Arc<Primitive>,
     conditions: &Conditions,
-    timing: Timing,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
+    grid: TimeGrid,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Trajectory> {
-    let steps = timing.steps(primitive, conditions.time_constant(primitive)?)?;
+    let steps = grid.steps(primitive, conditions.time_constant(primitive)?)?;
     let mut clock = Clock::of(primitive, conditions)?;
     if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
         return Err(Error::Arguments(
-            "pass phase or a timing of several segments, not both: a timing starts at phase 0",
+            "pass phase or a segment_durations of several segments, not both: a segment_durations starts at phase 0",
         ));
     }
     let conditions = clock.conditions(conditions);
-    let mut controller = Controller::new(primitive, timing.dt, &conditions, Some(0.0))?.looking_ahead(LEAD);
+    let mut controller = Controller::new(primitive, grid.dt, &conditions, Some(0.0))?.looking_ahead(LEAD);
     let shape = (steps + 1, primitive.n_dofs());
     let mut trajectory = Trajectory {
-        time: (0..=steps).map(|k| k as f64 * timing.dt).collect(),
+        time: (0..=steps).map(|k| k as f64 * grid.dt).collect(),
         position: zeros("rollout", shape)?,
         velocity: zeros("rollout", shape)?,
         acceleration: zeros("rollout", shape)?,
@@ -93,7 +93,7 @@ pub fn rollout_with(
     let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
     for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
         if k % PORTION == 0 {
-            proceed(k as f64 / (steps + 1) as f64)?;
+            progress(k as f64 / (steps + 1) as f64)?;
         }
         if k > 0 {
             clock.step(&mut controller, *time)?;
@@ -121,10 +121,12 @@ enum Clock {
 
 impl Clock {
     fn of(primitive: &Primitive, conditions: &Conditions) -> Result<Self> {
-        let Some(timing) = conditions.timing.as_ref().filter(|timing| timing.len() > 1) else {
+        let Some(segment_durations) =
+            conditions.segment_durations.as_ref().filter(|segment_durations| segment_durations.len() > 1)
+        else {
             return Ok(Self::Linear);
         };
-        let warp = primitive.warping_function(timing)?;
+        let warp = primitive.warping_function(segment_durations)?;
         let phase = warp.phase(0.0);
         Ok(Self::Warped { warp, extent: primitive.tau * primitive.canonical().extent(), phase })
     }
@@ -134,7 +136,7 @@ impl Clock {
         match self {
             Self::Linear => given.clone(),
             Self::Warped { extent, phase: [_, rate, _], .. } => Conditions {
-                timing: None,
+                segment_durations: None,
                 velocity: given
                     .velocity
                     .as_ref()

@@ -19,44 +19,47 @@ use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Curves, Key, Responses};
 use crate::model::sensitivity::STEPS;
-use crate::motion::rollout::{Timing, rollout_with};
+use crate::motion::rollout::{TimeGrid, rollout_with};
 use crate::motion::trajectory::Trajectory;
 
 /// The responses at these times, from the cache where they are found.
 pub(crate) fn responses(
     primitive: &Arc<Primitive>,
     tau: f64,
-    timing: Timing,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
+    grid: TimeGrid,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Arc<Responses>> {
-    let key = Key { dt: timing.dt, tau, steps: timing.steps(primitive, tau)? };
+    let key = Key { dt: grid.dt, tau, steps: grid.steps(primitive, tau)? };
     if let Some(found) = primitive.responses.find(key) {
         return Ok(found);
     }
     // The cache is free meanwhile: whoever computes the same finds the same.
-    let responses = Arc::new(compute_responses(primitive, tau, timing, proceed)?);
+    let responses = Arc::new(compute_responses(primitive, tau, grid, progress)?);
     primitive.responses.keep(key, &responses);
     Ok(responses)
 }
 
 /// Responses over the demonstrated duration, in as many steps as errors are averaged over.
 pub(crate) fn phases(primitive: &Arc<Primitive>) -> Result<Arc<Responses>> {
-    responses(primitive, primitive.tau, Timing { dt: primitive.duration() / STEPS as f64, duration: None }, &mut |_| {
-        Ok(())
-    })
+    responses(
+        primitive,
+        primitive.tau,
+        TimeGrid { dt: primitive.duration() / STEPS as f64, duration: None },
+        &mut |_| Ok(()),
+    )
 }
 
 fn compute_responses(
     primitive: &Arc<Primitive>,
     tau: f64,
-    timing: Timing,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
+    grid: TimeGrid,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Responses> {
     let (n_dofs, n_styles) = (primitive.n_dofs(), primitive.n_styles());
     let n_runs = (n_styles + 2) as f64;
     let mut run = |done: usize, conditions: Conditions| {
         let Trajectory { position, velocity, acceleration, .. } =
-            rollout_with(primitive, &conditions, timing, &mut |share| proceed((done as f64 + share) / n_runs))?;
+            rollout_with(primitive, &conditions, grid, &mut |share| progress((done as f64 + share) / n_runs))?;
         Ok([position, velocity, acceleration])
     };
     let zeros = || Some(vec![0.0; n_dofs]);

@@ -7,7 +7,7 @@
 use std::ops::{Add, Mul, Range, Sub};
 
 /// Four DoFs, as they lie in memory, and as every processor can take them.
-pub(crate) type Lanes = wide::f64x4;
+pub(crate) type F64x4 = wide::f64x4;
 
 /// Number of DoFs in a group.
 pub(crate) const WIDTH: usize = 4;
@@ -19,29 +19,29 @@ pub(crate) trait Real:
 }
 
 impl Real for f64 {}
-impl Real for Lanes {}
+impl Real for F64x4 {}
 
 /// Four DoFs in a register.
 pub(crate) trait Register: Real {
     /// Takes them from memory.
-    fn load(lanes: &Lanes) -> Self;
+    fn load(lanes: &F64x4) -> Self;
     /// Gives them back.
-    fn store(self) -> Lanes;
+    fn store(self) -> F64x4;
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
-        Self::load(&Lanes::splat(value))
+        Self::load(&F64x4::splat(value))
     }
 }
 
-impl Register for Lanes {
+impl Register for F64x4 {
     #[inline(always)]
-    fn load(lanes: &Lanes) -> Self {
+    fn load(lanes: &F64x4) -> Self {
         *lanes
     }
 
     #[inline(always)]
-    fn store(self) -> Lanes {
+    fn store(self) -> F64x4 {
         self
     }
 }
@@ -59,21 +59,21 @@ pub(crate) fn groups(n: usize) -> usize {
 }
 
 /// A vector (D,) in groups.
-pub(crate) fn pack(values: &[f64]) -> Vec<Lanes> {
-    let mut lanes = vec![Lanes::ZERO; groups(values.len())];
+pub(crate) fn pack(values: &[f64]) -> Vec<F64x4> {
+    let mut lanes = vec![F64x4::ZERO; groups(values.len())];
     repack(&mut lanes, values);
     lanes
 }
 
 /// Writes a vector over another of its length.
-pub(crate) fn repack(lanes: &mut [Lanes], values: &[f64]) {
+pub(crate) fn repack(lanes: &mut [F64x4], values: &[f64]) {
     bytemuck::cast_slice_mut(lanes)[..values.len()].copy_from_slice(values);
 }
 
 /// Up to four numbers, padded with zeros. A call to copy so few would cost more than most of what is done with them.
 #[inline(always)]
-pub(crate) fn padded(numbers: &[f64]) -> Lanes {
-    Lanes::new(match *numbers {
+pub(crate) fn padded(numbers: &[f64]) -> F64x4 {
+    F64x4::new(match *numbers {
         [] => [0.0; WIDTH],
         [a] => [a, 0.0, 0.0, 0.0],
         [a, b] => [a, b, 0.0, 0.0],
@@ -84,7 +84,7 @@ pub(crate) fn padded(numbers: &[f64]) -> Lanes {
 
 /// Writes the first numbers of four, as many as there is room for.
 #[inline(always)]
-pub(crate) fn unpad(lanes: Lanes, numbers: &mut [f64]) {
+pub(crate) fn unpad(lanes: F64x4, numbers: &mut [f64]) {
     match (numbers, lanes.to_array()) {
         ([], _) => {}
         ([a], [x, ..]) => *a = x,
@@ -96,18 +96,18 @@ pub(crate) fn unpad(lanes: Lanes, numbers: &mut [f64]) {
 
 /// Writes the numbers of groups, as many as there is room for.
 #[inline(always)]
-pub(crate) fn copy(lanes: &[Lanes], numbers: &mut [f64]) {
+pub(crate) fn copy(lanes: &[F64x4], numbers: &mut [f64]) {
     numbers.chunks_mut(WIDTH).zip(lanes).for_each(|(numbers, lanes)| unpad(*lanes, numbers));
 }
 
 /// Takes the DoFs of one group out of rows (k, `n`): what is a loop over samples for one DoF is one for four.
-pub(crate) fn gather(rows: &[f64], n: usize, group: usize, column: &mut [Lanes]) {
+pub(crate) fn gather(rows: &[f64], n: usize, group: usize, column: &mut [F64x4]) {
     let dofs = dofs(n, group);
     column.iter_mut().zip(rows.chunks_exact(n)).for_each(|(lanes, row)| *lanes = padded(&row[dofs.clone()]));
 }
 
 /// Puts the DoFs of one group back into rows (k, `n`).
-pub(crate) fn scatter(column: &[Lanes], n: usize, group: usize, rows: &mut [f64]) {
+pub(crate) fn scatter(column: &[F64x4], n: usize, group: usize, rows: &mut [f64]) {
     let dofs = dofs(n, group);
     column.iter().zip(rows.chunks_exact_mut(n)).for_each(|(lanes, row)| unpad(*lanes, &mut row[dofs.clone()]));
 }
@@ -118,6 +118,6 @@ fn dofs(n: usize, group: usize) -> Range<usize> {
 }
 
 /// The first `n` numbers of groups.
-pub(crate) fn unpack(lanes: &[Lanes], n: usize) -> &[f64] {
+pub(crate) fn unpack(lanes: &[F64x4], n: usize) -> &[f64] {
     &bytemuck::cast_slice(lanes)[..n]
 }

@@ -14,7 +14,7 @@
 
 use ndarray::Array2;
 
-use crate::numerics::simd::{Lanes, Real, gather, groups, scatter};
+use crate::numerics::simd::{F64x4, Real, gather, groups, scatter};
 
 /// Knots of cubic splines, with the system that the slopes solve, factorised.
 #[derive(Clone, Debug)]
@@ -164,14 +164,14 @@ pub(crate) struct Splines {
     knots: Knots,
     n_dofs: usize,
     /// Values and slopes (n,) at the knots, for each group of DoFs.
-    groups: Vec<[Vec<Lanes>; 2]>,
+    groups: Vec<[Vec<F64x4>; 2]>,
 }
 
 impl Splines {
     /// Through values (n·D) at the knots, by rows: those of all D DoFs at the first knot, then at the next.
     pub(crate) fn through(knots: Knots, rows: &[f64], n_dofs: usize) -> Self {
         let of = |group| {
-            let [mut values, mut slopes] = [(); 2].map(|()| vec![Lanes::ZERO; knots.len()]);
+            let [mut values, mut slopes] = [(); 2].map(|()| vec![F64x4::ZERO; knots.len()]);
             gather(rows, n_dofs, group, &mut values);
             knots.slopes(&values, &mut slopes);
             [values, slopes]
@@ -196,7 +196,7 @@ impl Splines {
 
     /// Writes to `rows` (k·D) what the splines are worth at `times` (k), as [`Knots::sample`] does for one DoF.
     pub(crate) fn sample(&self, times: impl Iterator<Item = f64> + Clone, rows: &mut [f64]) {
-        let mut sampled = vec![Lanes::ZERO; rows.len() / self.n_dofs];
+        let mut sampled = vec![F64x4::ZERO; rows.len() / self.n_dofs];
         for (group, [values, slopes]) in self.groups.iter().enumerate() {
             self.knots.sample(values, slopes, times.clone(), &mut sampled);
             scatter(&sampled, self.n_dofs, group, rows);

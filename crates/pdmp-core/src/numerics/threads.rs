@@ -51,21 +51,21 @@ impl Threads {
         self.try_for_each_told(items, || (), |(), item| work(item), &mut |_| Ok(()))
     }
 
-    /// [`Self::try_for_each`] that asks `proceed` whether to go on, with the share of the items that have been taken.
+    /// [`Self::try_for_each`] that asks `progress` whether to go on, with the share of the items that have been taken.
     /// The calling thread asks, which alone may: at first, and before each item of its own. It also makes the `scratch`
     /// of each thread beforehand: the system takes back the memory of threads that end, and is slow to give it again.
     ///
     /// # Errors
-    /// Whatever `proceed` returns; otherwise that of the first item that has one.
+    /// Whatever `progress` returns; otherwise that of the first item that has one.
     pub(crate) fn try_for_each_told<T: Send, S: Send>(
         self,
         items: Vec<T>,
         scratch: impl Fn() -> S,
         work: impl Fn(&mut S, T) -> Result<()> + Sync,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<()> {
         // Asked once at least, also where others are quick to take all that there is.
-        proceed(0.0)?;
+        progress(0.0)?;
         let n_items = items.len();
         let others = self.get().min(n_items).saturating_sub(1);
         let queue = Mutex::new(items.into_iter().enumerate());
@@ -101,7 +101,7 @@ impl Threads {
                 if left == 0 {
                     return Ok(());
                 }
-                let told = proceed((n_items - left) as f64 / n_items as f64);
+                let told = progress((n_items - left) as f64 / n_items as f64);
                 stopped.fetch_or(told.is_err(), Relaxed);
                 if told.is_err() || !labour(&mut scratch) {
                     return told;

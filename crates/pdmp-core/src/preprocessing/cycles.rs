@@ -4,16 +4,16 @@ use ndarray::{Array1, Array2, Axis, s};
 
 use super::cycle_growth::{Growth, surpasses, turns, typical};
 use super::cycle_onsets::Track;
-use super::outliers::{Reason, median, odd};
+use super::outliers::{RejectionReason, median, odd};
 use super::periodicity::{period_of, traits};
 use super::resampling::check_times;
-use crate::demonstration::{Demonstration, LEAST_SAMPLES, Sampling};
+use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
 use crate::preprocessing::Curve;
 
 /// What becomes of the cycles of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Keep {
+pub enum CycleOutput {
     /// Each is a demonstration.
     Each,
     /// Their mean is one.
@@ -54,7 +54,7 @@ pub struct Rejected {
     /// Its period, or the duration of the recording, in seconds.
     pub period: f64,
     /// What is odd about it.
-    pub reason: Reason,
+    pub reason: RejectionReason,
 }
 
 /// Cuts cyclic recordings into cycles.
@@ -80,7 +80,7 @@ pub struct Rejected {
 ///
 /// # Errors
 /// No recording, none that repeats itself, one without times, events that do not increase or lie outside.
-pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: Keep) -> Result<Cycles> {
+pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: CycleOutput) -> Result<Cycles> {
     let n_dofs = recordings.first().ok_or(Error::NoDemonstrations)?.n_dofs();
     if let Some(found) = events.map(<[_]>::len).filter(|&found| found != recordings.len()) {
         return Err(Error::Length { name: "events", expected: recordings.len(), found, per: "recording" });
@@ -100,7 +100,7 @@ pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: K
             match found {
                 Ok((period, bounds)) => cycles.add(recording, demo, &curve, period, &bounds, keep),
                 Err(error) => {
-                    let Some(reason) = Reason::of(&error) else { return Err(error) };
+                    let Some(reason) = RejectionReason::of(&error) else { return Err(error) };
                     let (start, period) = (curve.first(), curve.last() - curve.first());
                     cycles.rejected.push(Rejected { recording, start, period, reason });
                     refusals.push(error.in_demo(recording));
@@ -182,14 +182,14 @@ impl Cycles {
         curve: &Curve,
         period: f64,
         bounds: &[f64],
-        keep: Keep,
+        keep: CycleOutput,
     ) -> Result<()> {
         if bounds.len() < 2 {
             let start = bounds.first().copied().unwrap_or(curve.first());
-            self.rejected.push(Rejected { recording, start, period, reason: Reason::Phase });
+            self.rejected.push(Rejected { recording, start, period, reason: RejectionReason::Phase });
             return Ok(());
         }
-        let n_samples = (period / curve.interval()).round().max(LEAST_SAMPLES as f64);
+        let n_samples = (period / curve.interval()).round().max(MIN_SAMPLES_PER_DEMONSTRATION as f64);
         let mut closed = Closed::between(curve, bounds, n_samples as usize)?;
         self.growths.extend(closed.turn_back(recording, demo.units()));
         let periods = intervals(bounds);
@@ -203,7 +203,7 @@ impl Cycles {
                 None => kept.push((periods[k], closed.gains[k].clone(), closed.cycles[k].clone())),
             }
         }
-        if keep == Keep::Mean {
+        if keep == CycleOutput::Mean {
             let n = kept.len() as f64;
             let sum = kept.into_iter().reduce(|a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2));
             kept = sum.into_iter().map(|(period, gain, cycle)| (period / n, gain / n, cycle / n)).collect();

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use ndarray::Array2;
 
-use crate::demonstration::LEAST_SAMPLES;
+use crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION;
 use crate::error::{Error, Result};
 use crate::numerics::spline::Knots;
 use crate::validate::check_time;
@@ -81,7 +81,9 @@ fn check(present: &[usize], time: &[f64], name: &str, max_gap: f64) -> Result<()
     let longest = max_gap * (1.0 + 1e-9);
     match present.windows(2).find(|pair| pair[1] > pair[0] + 1 && time[pair[1]] - time[pair[0]] > longest) {
         Some(pair) => Err(gap(time[pair[0]], time[pair[1]])),
-        None if present.len() < LEAST_SAMPLES => Err(Error::Samples { found: present.len(), least: LEAST_SAMPLES }),
+        None if present.len() < MIN_SAMPLES_PER_DEMONSTRATION => {
+            Err(Error::Samples { found: present.len(), least: MIN_SAMPLES_PER_DEMONSTRATION })
+        }
         None => Ok(()),
     }
 }

@@ -37,10 +37,10 @@ use crate::validate::check_duration;
 use curve::Curve;
 
 pub use cycle_growth::Growth;
-pub use cycles::{Cycle, Cycles, Keep, Rejected, cycles};
+pub use cycles::{Cycle, CycleOutput, Cycles, Rejected, cycles};
 pub use gaps::fill;
 pub use lowpass::{lowpass, residuals};
-pub use outliers::Reason;
+pub use outliers::RejectionReason;
 pub use periodicity::period;
 pub use resampling::{cut, resample};
 pub use trim::trim;

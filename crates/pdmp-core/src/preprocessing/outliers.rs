@@ -14,7 +14,7 @@ use super::periodicity::STANDS_STILL;
 use crate::error::Error;
 
 /// Largest modified z-score.
-const LARGEST_SCORE: f64 = 3.5;
+const MAX_SCORE: f64 = 3.5;
 /// The median absolute deviation of a normal distribution, over its standard deviation.
 const NORMAL: f64 = 0.6745;
 /// Periods may always differ from their median by this share,
@@ -26,7 +26,7 @@ const USUAL: f64 = 2.0;
 
 /// Why a cycle was left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reason {
+pub enum RejectionReason {
     /// It lasts longer or shorter than the others.
     Period {
         /// Median of the recording's cycles, in seconds.
@@ -54,7 +54,7 @@ pub enum Reason {
     Still,
 }
 
-impl Reason {
+impl RejectionReason {
     /// The reason for which a whole recording is left out, from what the search for its period says.
     pub(super) fn of(error: &Error) -> Option<Self> {
         match *error {
@@ -65,33 +65,35 @@ impl Reason {
     }
 }
 
-impl fmt::Display for Reason {
+impl fmt::Display for RejectionReason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match *self {
-            Reason::Period { median } => write!(f, "the median period is {median:.3} s"),
-            Reason::Shape { distance, median } => {
+            RejectionReason::Period { median } => write!(f, "the median period is {median:.3} s"),
+            RejectionReason::Shape { distance, median } => {
                 write!(f, "{distance:.2} standard deviations from the median cycle, the others {median:.2}")
             }
-            Reason::Phase => write!(f, "the recording holds no whole cycle from the phase in which the first begins"),
-            Reason::Aperiodic { lag, share, least } => Error::Aperiodic { lag, share, least }.fmt(f),
-            Reason::Still => write!(f, "{STANDS_STILL}"),
+            RejectionReason::Phase => {
+                write!(f, "the recording holds no whole cycle from the phase in which the first begins")
+            }
+            RejectionReason::Aperiodic { lag, share, least } => Error::Aperiodic { lag, share, least }.fmt(f),
+            RejectionReason::Still => write!(f, "{STANDS_STILL}"),
         }
     }
 }
 
 /// What is odd about each cycle of one recording, of such periods [s] and closed positions (C, D).
-pub(super) fn odd(periods: &[f64], cycles: &[Array2<f64>]) -> Vec<Option<Reason>> {
+pub(super) fn odd(periods: &[f64], cycles: &[Array2<f64>]) -> Vec<Option<RejectionReason>> {
     let middle = median(periods);
     let deviation = spread(periods, middle);
     let distances = distances(cycles);
     let usual = median(&distances);
     let scatter = spread(&distances, usual);
     let judge = |(&period, &distance): (&f64, &f64)| {
-        if (period - middle).abs() > f64::max(LARGEST_SCORE * deviation, PERIODS * middle) {
-            return Some(Reason::Period { median: middle });
+        if (period - middle).abs() > f64::max(MAX_SCORE * deviation, PERIODS * middle) {
+            return Some(RejectionReason::Period { median: middle });
         }
-        let limit = (usual + LARGEST_SCORE * scatter).max(USUAL * usual).max(SHAPES);
-        (distance > limit).then_some(Reason::Shape { distance, median: usual })
+        let limit = (usual + MAX_SCORE * scatter).max(USUAL * usual).max(SHAPES);
+        (distance > limit).then_some(RejectionReason::Shape { distance, median: usual })
     };
     periods.iter().zip(&distances).map(judge).collect()
 }

@@ -1,6 +1,6 @@
 //! Recordings at even times, and parts of them.
 
-use crate::demonstration::{Demonstration, LEAST_SAMPLES, Sampling};
+use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
 use crate::preprocessing::Curve;
 use crate::validate::{check_finite, check_positive};
@@ -21,7 +21,7 @@ pub fn resample(demo: &Demonstration, dt: f64) -> Result<Demonstration> {
     check_positive("dt", dt)?;
     let curve = Curve::of(demo)?;
     let steps = ((curve.last() - curve.first()) / dt * (1.0 + 1e-12) + 1e-9).floor();
-    if steps < (LEAST_SAMPLES - 1) as f64 {
+    if steps < (MIN_SAMPLES_PER_DEMONSTRATION - 1) as f64 {
         return Err(Error::Range {
             name: "dt",
             value: dt,
@@ -50,7 +50,7 @@ pub fn cut(demo: &Demonstration, times: &[f64]) -> Result<Vec<Demonstration>> {
     let part = |pair: &[f64]| {
         let duration = pair[1] - pair[0];
         let steps = (duration / curve.interval() * (1.0 + SLACK)).floor() as usize;
-        if steps + 1 < LEAST_SAMPLES {
+        if steps + 1 < MIN_SAMPLES_PER_DEMONSTRATION {
             let allowed = "a part must last at least three sampling intervals of the recording; leave the time out";
             return Err(Error::Range { name: "times", value: pair[1], allowed });
         }

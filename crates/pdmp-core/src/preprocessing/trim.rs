@@ -3,7 +3,7 @@
 use ndarray::{ArrayView1, s};
 
 use super::Curve;
-use crate::demonstration::{Demonstration, LEAST_SAMPLES, Sampling};
+use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
 
 /// How far above its mean the squared speed of noise counts as movement, in standard deviations: one degree of freedom
@@ -62,7 +62,7 @@ pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
     };
     let first = speeds[..first].iter().rposition(|v| !moves(v, least)).map_or(0, |rest| rest + 1);
     let last = speeds[last..].iter().position(|v| !moves(v, least)).map_or(speeds.len(), |rest| last + rest) - 1;
-    if last - first + 1 < LEAST_SAMPLES {
+    if last - first + 1 < MIN_SAMPLES_PER_DEMONSTRATION {
         let allowed = "leaves fewer than 4 samples at which the recording moves as fast; pass a lower one";
         return Err(Error::Range { name: "threshold", value: threshold, allowed });
     }

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use std::sync::{Arc, LazyLock};
 
 use ndarray::{Array1, Array2};
-use pdmp_core::learning::StyleCount;
+use pdmp_core::learning::Truncation;
 use pdmp_core::learning::regression::{Basis, Gp, NGnet};
-use pdmp_core::motion::Timing;
+use pdmp_core::motion::TimeGrid;
 use pdmp_core::rollout;
 use pdmp_core::{Command, Controller, Demonstration, FitOptions, Kind, Model, Motion, Result, Sampling, Status, fit};
 
@@ -55,7 +55,7 @@ pub(crate) fn cycles() -> Vec<Demonstration> {
 /// A network, which fits in a moment, and nearly all of the spectrum.
 pub(crate) fn options(kind: Kind) -> FitOptions {
     FitOptions {
-        styles: StyleCount::Spectrum(0.9999).into(),
+        styles: Truncation::Spectrum(0.9999).into(),
         basis: Basis::NGnet(NGnet::default()),
         ..FitOptions::new(kind)
     }
@@ -71,12 +71,12 @@ pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model>
 
 /// Reaches and cycles learnt with two styles.
 pub(crate) static REACH: LazyLock<Arc<Model>> =
-    LazyLock::new(|| learn(&reaches(), &FitOptions { styles: StyleCount::Given(2).into(), ..options(Kind::Discrete) }));
+    LazyLock::new(|| learn(&reaches(), &FitOptions { styles: Truncation::Given(2).into(), ..options(Kind::Discrete) }));
 pub(crate) static CYCLE: LazyLock<Arc<Model>> =
-    LazyLock::new(|| learn(&cycles(), &FitOptions { styles: StyleCount::Given(2).into(), ..options(Kind::Rhythmic) }));
+    LazyLock::new(|| learn(&cycles(), &FitOptions { styles: Truncation::Given(2).into(), ..options(Kind::Rhythmic) }));
 
-pub(crate) fn timing(dt: f64, duration: f64) -> Timing {
-    Timing { dt, duration: Some(duration) }
+pub(crate) fn grid(dt: f64, duration: f64) -> TimeGrid {
+    TimeGrid { dt, duration: Some(duration) }
 }
 
 /// One tick under a command; the motion is then read from the controller.
@@ -101,7 +101,7 @@ pub(crate) fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
         goal: row(&demonstrated.goals).filter(|_| discrete),
         anchor: row(&demonstrated.anchors).filter(|_| !discrete),
         start: row(&demonstrated.starts).filter(|_| discrete),
-        timing: row(&demonstrated.timings),
+        segment_durations: row(&demonstrated.segment_durations),
         ..Default::default()
     }
 }
@@ -111,8 +111,8 @@ pub(crate) fn reproduction_error(model: &Arc<Model>, demos: &[Demonstration], m:
     let n = demos[m].n_samples();
     let steps = if model.kind() == Kind::Discrete { n - 1 } else { n };
     let duration = model.demonstrated().durations[m];
-    let timing = Timing { dt: duration / steps as f64, duration: Some(duration) };
-    let found = rollout(model.primitive(), &conditions_of(model, m), timing).unwrap().position;
+    let grid = TimeGrid { dt: duration / steps as f64, duration: Some(duration) };
+    let found = rollout(model.primitive(), &conditions_of(model, m), grid).unwrap().position;
     let shown = demos[m].position();
     let error = (&found.slice(ndarray::s![..n, ..]) - &shown).mapv(|e| e * e).mean().unwrap().sqrt();
     let range = shown.columns().into_iter().map(|y| max(&y.to_owned()) + max(&-y.to_owned())).fold(0.0, f64::max);

@@ -21,12 +21,12 @@ use ndarray::{Array2, Axis};
 
 use super::{Aligned, WarpingFunction};
 use crate::error::Result;
-use crate::model::template::{STEPS, Template, Warp};
+use crate::model::template::{STEPS, TimeWarp, WarpTemplate};
 use crate::numerics::threads::Threads;
 use crate::validate::zeros;
 
 /// Segments whose search takes some 160 MB a thread: its memory grows with their square.
-const MOST_SEGMENTS: usize = 1000;
+const MAX_SEGMENTS: usize = 1000;
 /// λ, what a warp costs.
 const STIFFNESS: f64 = 0.05;
 
@@ -35,27 +35,27 @@ impl Aligned<'_> {
     /// what is aligned, in the nominal time still.
     ///
     /// # Errors
-    /// Settings out of range, no memory, or whatever `proceed` returns.
+    /// Settings out of range, no memory, or whatever `progress` returns.
     pub(super) fn warp(
         &mut self,
-        warp: &Warp,
+        warp: &TimeWarp,
         unit: Option<&[f64]>,
         threads: Threads,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Template> {
+        progress: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<WarpTemplate> {
         warp.check(self.most_segments())?;
         let (n_demos, n_dofs) = (self.n_demos(), self.demo(0).n_dofs());
         let unit = unit.map_or_else(|| ranges(self), <[f64]>::to_vec);
-        let search = Search::new(warp.segments, warp.slope, n_dofs);
+        let search = Search::new(warp.n_segments, warp.max_slope, n_dofs);
         let mut shapes: Array2<f64> = zeros("warp", (n_demos, search.cells() * n_dofs))?;
-        let mut paths = Array2::from_elem((n_demos, warp.segments), STEPS);
+        let mut paths = Array2::from_elem((n_demos, warp.n_segments), STEPS);
 
         let aligned: &Self = self;
         threads.try_for_each_told(
             shapes.axis_iter_mut(Axis(0)).enumerate().collect(),
             || (),
             |(), (m, mut shape)| aligned.shape(m, &unit, shape.as_slice_mut().unwrap_or_default()),
-            &mut |share| proceed(share / 3.0),
+            &mut |share| progress(share / 3.0),
         )?;
         let nominal = self.nominal;
         let mut template = shapes.row(nominal).to_vec();
@@ -69,7 +69,7 @@ impl Aligned<'_> {
                     search.run(&template, shape.unwrap_or_default(), path.unwrap_or_default(), scratch);
                     Ok(())
                 },
-                &mut |share| proceed((f64::from(pass) + share) / 3.0),
+                &mut |share| progress((f64::from(pass) + share) / 3.0),
             )?;
             if pass == 1 {
                 template = search.mean(&shapes, &paths);
@@ -78,34 +78,35 @@ impl Aligned<'_> {
 
         self.breaks = search.breaks();
         let seconds = self.durations();
-        self.timings = Array2::from_shape_fn(paths.dim(), |(m, k)| search.seconds(paths[[m, k]], seconds[m]));
-        for (m, (path, timing)) in paths.rows().into_iter().zip(self.timings.rows()).enumerate() {
+        self.segment_durations = Array2::from_shape_fn(paths.dim(), |(m, k)| search.seconds(paths[[m, k]], seconds[m]));
+        for (m, (path, segment_durations)) in paths.rows().into_iter().zip(self.segment_durations.rows()).enumerate() {
             let warped = path.iter().any(|&steps| steps != STEPS);
-            self.warps[m] = warped.then(|| WarpingFunction::new(self.kind, &self.breaks, &timing.to_vec()));
+            self.warps[m] = warped.then(|| WarpingFunction::new(self.kind, &self.breaks, &segment_durations.to_vec()));
         }
         let shape = Array2::from_shape_vec((search.cells(), n_dofs), template).unwrap_or_default();
-        Ok(Template { slope: warp.slope, unit, shape })
+        Ok(WarpTemplate { slope: warp.max_slope, unit, shape })
     }
 
     /// The most segments that the samples carry: half of them.
     pub(super) fn most_segments(&self) -> usize {
         let fewest = self.demos.iter().map(|demo| demo.n_samples()).min().unwrap_or(0).min(self.n_samples);
-        (fewest / 2).min(MOST_SEGMENTS)
+        (fewest / 2).min(MAX_SEGMENTS)
     }
 
     /// Warps the one demonstration to a template.
     ///
     /// # Errors
     /// A bad smoothing.
-    pub(crate) fn warp_to(&mut self, template: &Template) -> Result<()> {
+    pub(crate) fn warp_to(&mut self, template: &WarpTemplate) -> Result<()> {
         let (cells, n_dofs) = template.shape.dim();
         let search = Search::new(cells / STEPS, template.slope, n_dofs);
         let (mut shape, mut path) = (vec![0.0; cells * n_dofs], vec![STEPS; search.segments]);
         self.shape(0, &template.unit, &mut shape)?;
         let onto = template.shape.as_slice().unwrap_or_default();
         search.run(onto, &shape, &mut path, &mut Scratch::new(&search));
-        let timing: Vec<f64> = path.iter().map(|&steps| search.seconds(steps, self.clocks[0].duration)).collect();
-        self.warps[0] = Some(WarpingFunction::new(self.kind, &search.breaks(), &timing));
+        let segment_durations: Vec<f64> =
+            path.iter().map(|&steps| search.seconds(steps, self.clocks[0].duration)).collect();
+        self.warps[0] = Some(WarpingFunction::new(self.kind, &search.breaks(), &segment_durations));
         Ok(())
     }
 

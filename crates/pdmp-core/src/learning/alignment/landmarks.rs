@@ -27,19 +27,22 @@ impl Aligned<'_> {
                 "events have no times: pass an array of shape (M, E) with E of at least 1, in seconds",
             ));
         }
-        let mut timings = Array2::zeros((expected, events.ncols() + 1));
-        for (m, (row, mut timing)) in events.rows().into_iter().zip(timings.rows_mut()).enumerate() {
-            timing.assign(&ArrayView1::from(&self.timing(m, &row.to_vec()).map_err(|error| error.in_demo(m))?));
+        let mut segment_durations = Array2::zeros((expected, events.ncols() + 1));
+        for (m, (row, mut segment_durations)) in events.rows().into_iter().zip(segment_durations.rows_mut()).enumerate()
+        {
+            segment_durations.assign(&ArrayView1::from(
+                &self.segment_durations(m, &row.to_vec()).map_err(|error| error.in_demo(m))?,
+            ));
         }
-        let nominal = timings.row(self.nominal);
+        let nominal = segment_durations.row(self.nominal);
         let total = nominal.sum();
         self.breaks = nominal.iter().scan(0.0, |t, seconds| Some(std::mem::replace(t, *t + seconds) / total)).collect();
         self.breaks.push(1.0);
-        for (m, timing) in timings.rows().into_iter().enumerate() {
-            let warp = || WarpingFunction::new(self.kind, &self.breaks, &timing.to_vec());
+        for (m, segment_durations) in segment_durations.rows().into_iter().enumerate() {
+            let warp = || WarpingFunction::new(self.kind, &self.breaks, &segment_durations.to_vec());
             self.warps[m] = (m != self.nominal).then(warp);
         }
-        self.timings = timings;
+        self.segment_durations = segment_durations;
         Ok(())
     }
 
@@ -49,13 +52,13 @@ impl Aligned<'_> {
     /// Another number of events than there are breaks between segments, or as for a fit.
     pub(crate) fn register_to(&mut self, breaks: &[f64], events: &[f64]) -> Result<()> {
         check_vector("events", events, breaks.len() - 2, "break between segments")?;
-        let timing = self.timing(0, events)?;
-        self.warps[0] = Some(WarpingFunction::new(self.kind, breaks, &timing));
+        let segment_durations = self.segment_durations(0, events)?;
+        self.warps[0] = Some(WarpingFunction::new(self.kind, breaks, &segment_durations));
         Ok(())
     }
 
     /// The seconds (E+1,) before, between and after the events of demonstration `m`.
-    fn timing(&self, m: usize, events: &[f64]) -> Result<Vec<f64>> {
+    fn segment_durations(&self, m: usize, events: &[f64]) -> Result<Vec<f64>> {
         let clock = self.clocks[m];
         let start = match clock.ticks {
             Ticks::Even { .. } => 0.0,
@@ -63,17 +66,17 @@ impl Aligned<'_> {
         };
         let end = start + clock.duration;
         let mut before = start;
-        let mut timing = Vec::with_capacity(events.len() + 1);
+        let mut segment_durations = Vec::with_capacity(events.len() + 1);
         for (index, &time) in events.iter().enumerate() {
             // Not a number is out of order too.
             let in_order = time - before > SHORTEST * clock.duration && end - time > SHORTEST * clock.duration;
             if !in_order {
                 return Err(Error::Event { index, time, before, end });
             }
-            timing.push(time - before);
+            segment_durations.push(time - before);
             before = time;
         }
-        timing.push(end - before);
-        Ok(timing)
+        segment_durations.push(end - before);
+        Ok(segment_durations)
     }
 }

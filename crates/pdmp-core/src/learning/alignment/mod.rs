@@ -11,11 +11,11 @@ use std::borrow::Cow;
 
 use ndarray::{Array2, Axis};
 
-use crate::demonstration::{Demonstration, LEAST_SAMPLES};
+use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION};
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::template::{Template, Warp};
+use crate::model::template::{TimeWarp, WarpTemplate};
 use crate::numerics::smoothing_spline::{MIN_THINNED, Noise, Samples, Smoothing, pool};
 use crate::numerics::spline::{Knots, Splines};
 use crate::numerics::threads::Threads;
@@ -25,7 +25,7 @@ use sample_times::{Clock, Ticks};
 /// as many as it takes. The target between a few samples, where a movement turns sharply, is more than they show.
 const FINE: usize = 150;
 /// Most samples after alignment.
-const MOST_SAMPLES: usize = 1_000_000;
+const MAX_SAMPLES: usize = 1_000_000;
 
 /// How demonstrations are read as samples of one movement.
 #[derive(Clone, Debug)]
@@ -54,7 +54,7 @@ pub enum TimeScaling {
     #[default]
     Linear,
     /// By the monotone warp that brings the demonstrations closest to each other.
-    Warp(Warp),
+    Warp(TimeWarp),
     /// By the default warp, in fewer segments where a demonstration has fewer than 16 samples; in a fit with at least three
     /// different contexts only if movements at contexts held out are foreseen better so, by more than the standard error,
     /// and linearly otherwise.
@@ -77,7 +77,7 @@ pub(crate) struct Aligned<'a> {
     /// Phases (K+1,) that divide the movement into segments.
     pub(crate) breaks: Vec<f64>,
     /// Times (M, K) that the demonstrations spend in each segment, in seconds.
-    pub(crate) timings: Array2<f64>,
+    pub(crate) segment_durations: Array2<f64>,
     /// Index of the nominal demonstration.
     pub(crate) nominal: usize,
     /// Samples C of each after alignment.
@@ -112,14 +112,14 @@ impl Alignment {
         let nominal = self.nominal_of(&durations)?;
         let steps = self.kind.steps(demos[nominal].n_samples());
         let n_samples = self.n_samples.unwrap_or(self.kind.samples(steps * FINE.div_ceil(steps)));
-        if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&n_samples) {
+        if !(MIN_SAMPLES_PER_DEMONSTRATION..=MAX_SAMPLES).contains(&n_samples) {
             let value = n_samples as f64;
             return Err(Error::Range { name: "n_samples", value, allowed: "must lie between 4 and 1e6" });
         }
         let (kind, noise) = (self.kind, Noise::none(n_dofs));
         let (warps, breaks) = (vec![None; demos.len()], vec![0.0, 1.0]);
-        let timings = ndarray::Array1::from_vec(durations).insert_axis(Axis(1));
-        let mut aligned = Aligned { demos, clocks, kind, noise, warps, breaks, timings, nominal, n_samples };
+        let segment_durations = ndarray::Array1::from_vec(durations).insert_axis(Axis(1));
+        let mut aligned = Aligned { demos, clocks, kind, noise, warps, breaks, segment_durations, nominal, n_samples };
         aligned.noise = self.noise(&aligned, threads)?;
         Ok(aligned)
     }
@@ -159,21 +159,21 @@ impl TimeScaling {
     /// What the demonstrations were warped to is returned, so that others can be.
     ///
     /// # Errors
-    /// Settings out of range, events out of order, no memory, or whatever `proceed` returns.
+    /// Settings out of range, events out of order, no memory, or whatever `progress` returns.
     pub(crate) fn apply(
         &self,
         aligned: &mut Aligned,
         unit: Option<&[f64]>,
         threads: Threads,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Option<Template>> {
+        progress: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Option<WarpTemplate>> {
         match self {
             Self::Linear => Ok(None),
-            Self::Warp(warp) => aligned.warp(warp, unit, threads, proceed).map(Some),
+            Self::Warp(warp) => aligned.warp(warp, unit, threads, progress).map(Some),
             Self::WarpIfBetter => {
-                let warp = Warp::default();
-                let segments = warp.segments.min(aligned.most_segments());
-                aligned.warp(&Warp { segments, ..warp }, unit, threads, proceed).map(Some)
+                let warp = TimeWarp::default();
+                let segments = warp.n_segments.min(aligned.most_segments());
+                aligned.warp(&TimeWarp { n_segments: segments, ..warp }, unit, threads, progress).map(Some)
             }
             Self::Events(events) => aligned.register(events.view()).map(|()| None),
         }
@@ -198,7 +198,7 @@ impl Aligned<'_> {
 
     /// Durations or periods (M,), in seconds.
     pub(crate) fn durations(&self) -> Vec<f64> {
-        self.timings.sum_axis(Axis(1)).to_vec()
+        self.segment_durations.sum_axis(Axis(1)).to_vec()
     }
 
     /// Writes the positions of demonstration `m` (C·D, by rows), absolute.

@@ -22,13 +22,13 @@ pub(super) struct Gram {
 }
 
 impl Gram {
-    /// Half the work of a triangularisation, and all of it products. `proceed` is asked every so often.
-    pub(super) fn of(wide: MatRef<f64>, proceed: &mut dyn FnMut(f64) -> Result<()>) -> Result<Option<Self>> {
+    /// Half the work of a triangularisation, and all of it products. `progress` is asked every so often.
+    pub(super) fn of(wide: MatRef<f64>, progress: &mut dyn FnMut(f64) -> Result<()>) -> Result<Option<Self>> {
         let (k, length) = wide.shape();
         let most = (1_000_000_000 / (k * k)).max(1024);
         let mut matrix = Mat::zeros(k, k);
         for start in (0..length).step_by(most) {
-            proceed(start as f64 / length as f64)?;
+            progress(start as f64 / length as f64)?;
             add_square(matrix.as_mut(), wide.subcols(start, most.min(length - start)));
         }
         for j in 0..k {
@@ -57,12 +57,12 @@ impl Gram {
     pub(super) fn triangle(
         &self,
         wide: MatRef<f64>,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Option<Mat<f64>>> {
         let (k, length) = wide.shape();
         let (mut products, mut part) = (Mat::zeros(k, k), vec![0.0; k * PANEL.min(length)]);
         for start in (0..length).step_by(PANEL) {
-            proceed(start as f64 / length as f64)?;
+            progress(start as f64 / length as f64)?;
             let rows = turned(&mut part, self.vectors.as_ref(), wide.subcols(start, PANEL.min(length - start)));
             add_square(products.as_mut(), rows);
         }

@@ -32,15 +32,15 @@ pub(super) fn orthonormal(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
 }
 
 /// The triangle R (K, K) with RᵀR = A·Aᵀ for A (K, L), block of columns by block of columns, so that no copy of A is
-/// made. `proceed` is asked before each block.
-pub(super) fn triangle<E>(wide: MatRef<f64>, proceed: &mut dyn FnMut(f64) -> Result<(), E>) -> Result<Mat<f64>, E> {
+/// made. `progress` is asked before each block.
+pub(super) fn triangle<E>(wide: MatRef<f64>, progress: &mut dyn FnMut(f64) -> Result<(), E>) -> Result<Mat<f64>, E> {
     let (k, length) = wide.shape();
     let most = (4 * k).max(2048).min(length);
     let mut work = Mat::zeros(k + most, k);
     let mut factor = Mat::zeros(k, k);
     let mut memory = scratch(k + most, k);
     for start in (0..length).step_by(most) {
-        proceed(start as f64 / length as f64)?;
+        progress(start as f64 / length as f64)?;
         let taken = most.min(length - start);
         let mut rows = work.subrows_mut(0, k + taken);
         for j in 0..k {

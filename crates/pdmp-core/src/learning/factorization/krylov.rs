@@ -24,7 +24,7 @@ const FOUND: f64 = 1e-12;
 pub(super) fn leading(
     wide: MatRef<f64>,
     n_styles: usize,
-    proceed: &mut dyn FnMut(f64) -> Result<()>,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Option<Mat<f64>>> {
     let (k, length) = wide.shape();
     // Products are fastest for multiples of the width of the registers.
@@ -37,7 +37,7 @@ pub(super) fn leading(
     let mut projected = Mat::<f64>::zeros(0, 0);
     left.extend(start(k, block));
     for step in 0..steps {
-        proceed(step as f64 / steps as f64)?;
+        progress(step as f64 / steps as f64)?;
         let known = step * block;
         let coefficients = right.extend(product(wide.transpose(), left.last(block)));
         projected.resize_with(known + block, known + block, |_, _| 0.0);

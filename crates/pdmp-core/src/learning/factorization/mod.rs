@@ -58,7 +58,7 @@ pub struct Factors {
 
 /// How many style dimensions to keep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum StyleCount {
+pub enum Truncation {
     /// Exactly so many.
     Given(usize),
     /// The fewest whose singular values make up more than this share of the sum of all.
@@ -81,12 +81,12 @@ const MIN_STYLES: usize = 5;
 /// Smallest singular value, in shares of the largest, that is no rounding error of the targets or of the decomposition.
 const MIN_RATIO: f64 = 1e-6;
 
-impl StyleCount {
+impl Truncation {
     /// Checks the count against the number of things that limit it.
     pub(crate) fn check(self, most: usize, of: &'static str) -> Result<()> {
         match self {
-            StyleCount::Given(n_styles) if n_styles < 1 || n_styles > most => Err(Error::Styles { n_styles, most, of }),
-            StyleCount::Spectrum(value) | StyleCount::AboveNoise { share: value, .. }
+            Truncation::Given(n_styles) if n_styles < 1 || n_styles > most => Err(Error::Styles { n_styles, most, of }),
+            Truncation::Spectrum(value) | Truncation::AboveNoise { share: value, .. }
                 if !(value > 0.0 && value <= 1.0) =>
             {
                 Err(Error::Range { name: "spectrum", value, allowed: "must lie in (0, 1]" })
@@ -98,9 +98,9 @@ impl StyleCount {
     /// J for these singular values of so many demonstrations.
     pub(crate) fn among(self, singular_values: &[f64], n_demos: usize) -> usize {
         match self {
-            StyleCount::Given(n_styles) => n_styles,
-            StyleCount::Spectrum(share) => leading(singular_values, share),
-            StyleCount::AboveNoise { noise, share } => {
+            Truncation::Given(n_styles) => n_styles,
+            Truncation::Spectrum(share) => leading(singular_values, share),
+            Truncation::AboveNoise { noise, share } => {
                 let least = MIN_STYLES.min(n_demos / 2);
                 let floor = noise.max(MIN_RATIO * singular_values.first().copied().unwrap_or(0.0));
                 let above = singular_values.iter().take_while(|&&sigma| sigma > floor).count().max(1);
@@ -127,7 +127,7 @@ fn leading(singular_values: &[f64], share: f64) -> usize {
 
 impl Factors {
     /// Share of the targets, by root mean square, that the factors leave out: ‖F − S·F_basis‖/‖F‖.
-    pub fn left_out(&self) -> f64 {
+    pub fn truncation_error(&self) -> f64 {
         let first = self.singular_values[0];
         if first == 0.0 {
             return 0.0;
@@ -148,15 +148,15 @@ impl Factors {
 
     /// The leading J factors of the targets F (M, C·D).
     ///
-    /// `proceed` is asked between the passes over F whether to go on, and told the share that is done.
+    /// `progress` is asked between the passes over F whether to go on, and told the share that is done.
     ///
     /// # Errors
     /// A J below 1 or above K, a share outside (0, 1], no targets, or ones that are not finite or beyond [`crate::validate::LARGEST`];
-    /// or whatever `proceed` returns.
+    /// or whatever `progress` returns.
     pub fn of(
         targets: ArrayView2<f64>,
-        styles: StyleCount,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        styles: Truncation,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
         if targets.is_empty() {
             return Err(Error::Arguments("targets is empty: pass one row per demonstration, one column per value"));
@@ -164,11 +164,11 @@ impl Factors {
         styles.check(targets.nrows(), "demonstrations")?;
         styles.check(targets.ncols(), "target values")?;
         let Some(library) = Library::of(targets)? else { return Ok(Self::still(targets.dim(), styles)) };
-        library.factors(styles, proceed)
+        library.factors(styles, progress)
     }
 
     /// The factors of targets that are zero throughout.
-    fn still((rows, columns): (usize, usize), styles: StyleCount) -> Self {
+    fn still((rows, columns): (usize, usize), styles: Truncation) -> Self {
         let singular_values = vec![0.0; rows.min(columns)];
         let n_styles = styles.among(&singular_values, rows);
         let styles = Array2::from_shape_fn((rows, n_styles), |(i, j)| if i == j { 1.0 } else { 0.0 });
@@ -224,11 +224,11 @@ impl<'a> Library<'a> {
         if targets.nrows() > targets.ncols() { targets.transpose() } else { targets }
     }
 
-    fn factors(&self, styles: StyleCount, proceed: &mut dyn FnMut(f64) -> Result<()>) -> Result<Factors> {
+    fn factors(&self, styles: Truncation, progress: &mut dyn FnMut(f64) -> Result<()>) -> Result<Factors> {
         let wide = self.wide();
         let k = wide.nrows();
-        if let StyleCount::Given(n_styles) = styles
-            && let Some(vectors) = krylov::leading(wide, n_styles, &mut |share| proceed(share / 3.0))?
+        if let Truncation::Given(n_styles) = styles
+            && let Some(vectors) = krylov::leading(wide, n_styles, &mut |share| progress(share / 3.0))?
         {
             let (projection, products) = self.measured(vectors, n_styles)?;
             if products.are_sound(&projection.styles, n_styles) {
@@ -237,7 +237,7 @@ impl<'a> Library<'a> {
                 return Ok(self.finish(projection, n_styles, values, left + ROUNDING * self.squares));
             }
         }
-        if let Some(gram) = gram::Gram::of(wide, &mut |share| proceed((1.0 + share) / 3.0))? {
+        if let Some(gram) = gram::Gram::of(wide, &mut |share| progress((1.0 + share) / 3.0))? {
             let n_styles = styles.among(&gram.values, self.targets.nrows());
             // Of few demonstrations all factors cost little, and give all singular values their digits.
             let kept = if k <= 64 { k } else { n_styles };
@@ -250,22 +250,22 @@ impl<'a> Library<'a> {
                     return Ok(self.finish(projection, n_styles, values, left + ROUNDING * self.squares));
                 }
             }
-            if let Some(triangle) = gram.triangle(wide, &mut |share| proceed((2.0 + share) / 3.0))? {
+            if let Some(triangle) = gram.triangle(wide, &mut |share| progress((2.0 + share) / 3.0))? {
                 return self.of_triangle(styles, triangle.as_ref(), Some(gram.vectors.as_ref()));
             }
         }
-        self.exact(styles, &mut |share| proceed((2.0 + share) / 3.0))
+        self.exact(styles, &mut |share| progress((2.0 + share) / 3.0))
     }
 
     /// The way that cannot fail.
-    fn exact(&self, styles: StyleCount, proceed: &mut dyn FnMut(f64) -> Result<()>) -> Result<Factors> {
-        let triangle = householder::triangle(self.wide(), proceed)?;
+    fn exact(&self, styles: Truncation, progress: &mut dyn FnMut(f64) -> Result<()>) -> Result<Factors> {
+        let triangle = householder::triangle(self.wide(), progress)?;
         self.of_triangle(styles, triangle.as_ref(), None)
     }
 
     /// All singular values to the last digits, and factors to match: Aᵀ·X = Q·R, R = U·Σ·Vᵀ, of which Q and U are not
     /// needed; X is a `frame` of orthonormal columns, or one.
-    fn of_triangle(&self, styles: StyleCount, triangle: MatRef<f64>, frame: Option<MatRef<f64>>) -> Result<Factors> {
+    fn of_triangle(&self, styles: Truncation, triangle: MatRef<f64>, frame: Option<MatRef<f64>>) -> Result<Factors> {
         let small_svd::Svd { sigma: values, v, .. } = small_svd::Svd::of(triangle);
         let n_styles = styles.among(&values, self.targets.nrows());
         let v = v.subcols(0, n_styles);

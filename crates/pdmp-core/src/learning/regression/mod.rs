@@ -67,19 +67,19 @@ impl Basis {
     /// Regresses the landscape's `targets` (C, outputs) on the clock `u` (C,): a Gaussian process within
     /// [`NoiseBound::LANDSCAPE`].
     ///
-    /// `proceed` is asked now and then whether to go on, with the share done in [0, 1].
+    /// `progress` is asked now and then whether to go on, with the share done in [0, 1].
     ///
     /// # Errors
-    /// An ill-posed problem, or an interruption through `proceed`.
+    /// An ill-posed problem, or an interruption through `progress`.
     pub fn regress(
         &self,
         domain: Domain,
         u: &[f64],
         targets: ArrayView2<f64>,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Box<dyn Regression>> {
         Ok(match self {
-            Basis::Gp(gp) => Box::new(gp.regress_within(NoiseBound::LANDSCAPE, domain, u, targets, proceed)?),
+            Basis::Gp(gp) => Box::new(gp.regress_within(NoiseBound::LANDSCAPE, domain, u, targets, progress)?),
             Basis::NGnet(ngnet) => Box::new(ngnet.regress(domain, u, targets)?),
         })
     }

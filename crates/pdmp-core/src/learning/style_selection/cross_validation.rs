@@ -6,14 +6,14 @@
 
 use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, Axis, Zip, s};
 
-use crate::context::{ContextColumn, ContextMap, MapChoice, alike, outputs};
+use crate::context::{ContextColumn, ContextMap, MapSelection, group_equal_contexts, outputs};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::output_system::{Attractor, State};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
-use crate::learning::factorization::{Factors, StyleCount};
+use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::targets::Targets;
 use crate::model::responses::Curves;
 use crate::model::sensitivity::{STEPS, Sensitivity};
@@ -23,18 +23,18 @@ const FOLDS: usize = 10;
 const FEWEST: usize = 3;
 
 /// Demonstrations, of which some are to be foreseen from the others.
-pub(crate) struct Foresight<'a> {
+pub(crate) struct StyleSelection<'a> {
     kind: Kind,
     shown: &'a Targets,
     factors: &'a Factors,
-    timings: ArrayView2<'a, f64>,
+    segment_durations: ArrayView2<'a, f64>,
     /// The way back from a start of one, over the phase (S,).
     start: Array1<f64>,
     /// Positions (M, S, D) less what goal and start, or anchor, make of them.
     moved: Array3<f64>,
 }
 
-impl<'a> Foresight<'a> {
+impl<'a> StyleSelection<'a> {
     /// `factors` are all factors of the targets of the demonstrations shown.
     pub(crate) fn new(
         aligned: &'a Aligned,
@@ -63,7 +63,8 @@ impl<'a> Foresight<'a> {
         for (m, mut moved) in moved.outer_iter_mut().enumerate() {
             sampled.sample(m, moved.as_slice_mut().unwrap_or_default());
         }
-        let mut foresight = Self { kind, shown, factors, timings: aligned.timings.view(), start, moved };
+        let mut foresight =
+            Self { kind, shown, factors, segment_durations: aligned.segment_durations.view(), start, moved };
         for m in 0..shown.starts.nrows() {
             let places = foresight.places(foresight.centres().row(m).to_vec(), shown.starts.row(m).to_vec());
             let mut moved = foresight.moved.index_axis_mut(Axis(0), m);
@@ -75,15 +76,15 @@ impl<'a> Foresight<'a> {
     /// The fewest styles whose error at contexts held out is above the least by no more than its standard error.
     ///
     /// # Errors
-    /// Fewer than three different contexts, a map that does not suit them, or whatever `proceed` returns.
+    /// Fewer than three different contexts, a map that does not suit them, or whatever `progress` returns.
     pub(crate) fn styles(
         &self,
         columns: &[ContextColumn],
         contexts: &Array2<f64>,
-        choice: MapChoice,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        choice: MapSelection,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<usize> {
-        let conditions = alike(contexts);
+        let conditions = group_equal_contexts(contexts);
         if conditions.len() < FEWEST {
             return Err(Error::Arguments(
                 "n_styles = \"auto\" needs at least three different contexts: pass a number, or None to go by the spectrum",
@@ -92,7 +93,7 @@ impl<'a> Foresight<'a> {
         let n_folds = conditions.len().min(FOLDS);
         let mut errors: Vec<Vec<f64>> = Vec::new();
         for fold in 0..n_folds {
-            proceed(fold as f64 / n_folds as f64)?;
+            progress(fold as f64 / n_folds as f64)?;
             let of_fold = |(i, group)| if i % n_folds == fold { Some(group) } else { None };
             let held_out: Vec<&Vec<usize>> = conditions.iter().enumerate().filter_map(of_fold).collect();
             let kept: Vec<usize> =
@@ -109,12 +110,12 @@ impl<'a> Foresight<'a> {
         held_out: &[&Vec<usize>],
         columns: &[ContextColumn],
         contexts: &Array2<f64>,
-        choice: MapChoice,
+        choice: MapSelection,
     ) -> Result<Vec<Vec<f64>>> {
         let of = |rows: &Array2<f64>| rows.select(Axis(0), kept);
         let sizes = ArrayView1::from(&self.factors.singular_values[..self.factors.styles.ncols()]);
         let weights = of(&self.factors.styles) * sizes;
-        let styles = Factors::of(weights.view(), StyleCount::Spectrum(1.0), &mut |_| Ok(()))?.styles;
+        let styles = Factors::of(weights.view(), Truncation::Spectrum(1.0), &mut |_| Ok(()))?.styles;
         let moved = self.moved.select(Axis(0), kept);
         let response = |style: ArrayView1<f64>| Zip::from(moved.lanes(Axis(0))).map_collect(|lane| lane.dot(&style));
         let (n_samples, n_dofs) = (self.start.len(), self.shown.starts.ncols());
@@ -123,10 +124,10 @@ impl<'a> Foresight<'a> {
         let curves = Curves { styles: styles.columns().into_iter().map(response).collect(), start, velocity };
 
         let [goals, starts, anchors] = [&self.shown.goals, &self.shown.starts, &self.shown.anchors].map(of);
-        let timings = self.timings.select(Axis(0), kept);
+        let segment_durations = self.segment_durations.select(Axis(0), kept);
         let places = [goals.view(), starts.view(), anchors.view()];
-        let outputs = outputs(self.kind, styles.view(), places, timings.view());
-        let metric = Sensitivity::new(self.kind, &curves, Vec::new()).metric(outputs.view(), timings.view());
+        let outputs = outputs(self.kind, styles.view(), places, segment_durations.view());
+        let metric = Sensitivity::new(self.kind, &curves, Vec::new()).metric(outputs.view(), segment_durations.view());
         let map = ContextMap::learn(columns.to_vec(), &of(contexts), outputs.view(), metric.view(), choice)?;
 
         let foreseen = |group: &&Vec<usize>| {

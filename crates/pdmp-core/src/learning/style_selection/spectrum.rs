@@ -15,7 +15,7 @@ use crate::dynamics::transport::Transport;
 use crate::error::Result;
 use crate::learning::alignment::{Aligned, Alignment, TimeScaling};
 use crate::learning::constants::Constants;
-use crate::learning::factorization::{Factors, StyleCount};
+use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::targets::Targets;
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
@@ -85,7 +85,7 @@ pub(crate) fn noise_limit(
     targets.carry(transport, constants.attractor, constants.canonical);
     targets.scale(dof_scale);
     let squares: f64 = targets.forcing.iter().map(|f| f * f).sum();
-    let factors = Factors::of(targets.forcing.view(), StyleCount::Given(1), &mut |_| Ok(()))?;
+    let factors = Factors::of(targets.forcing.view(), Truncation::Given(1), &mut |_| Ok(()))?;
     let norm = (squares / n_rows as f64).sqrt();
     let growth = (n_demos as f64 / n_rows as f64).sqrt();
     let largest = norm + (factors.singular_values[0] - norm) * growth;
@@ -100,9 +100,9 @@ pub(crate) fn systematic(
     contexts: Option<&(Vec<ContextColumn>, Array2<f64>)>,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Factors> {
-    let count = StyleCount::AboveNoise { noise, share: SHARE };
+    let count = Truncation::AboveNoise { noise, share: SHARE };
     let Some((columns, numbers)) = contexts else { return Factors::of(targets, count, progress) };
-    let all = Factors::of(targets, StyleCount::AboveNoise { noise, share: 1.0 }, progress)?;
+    let all = Factors::of(targets, Truncation::AboveNoise { noise, share: 1.0 }, progress)?;
     let explained = explained(columns, numbers, &all.styles);
     let n_styles = count.among(&all.singular_values, targets.nrows()).max(explained);
     Ok(all.leading(n_styles))
@@ -123,7 +123,7 @@ fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<
             }
         }
     }
-    if crate::context::alike(contexts).len() >= CONTEXTS_PER_SQUARE * (2 * numbers().count() + 1) {
+    if crate::context::group_equal_contexts(contexts).len() >= CONTEXTS_PER_SQUARE * (2 * numbers().count() + 1) {
         for (_, values) in numbers() {
             let centre = values.mean().unwrap_or(0.0);
             span.add(values.map(|value| (value - centre).powi(2)).view());

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use draft::Draft;
 
-use crate::context::{ContextColumn, Kernel, MapKind};
+use crate::context::{ContextColumn, ContextMapKind, Kernel};
 use crate::dynamics::canonical::Canonical;
 use crate::error::{Error, Result};
 use crate::model::Model;
@@ -31,7 +31,7 @@ const SCHEMA: u32 = 5;
 /// The metadata key.
 const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.
-const LARGEST_FILE: u64 = 1 << 32;
+const MAX_FILE_SIZE: u64 = 1 << 32;
 /// Largest header that is read, in bytes: nearly all of it labels.
 const MAX_HEADER: u64 = 1 << 26;
 
@@ -59,7 +59,7 @@ struct Constants {
     n_samples: usize,
     /// Bound of the slopes, where time was warped.
     slope: Option<f64>,
-    left_out: f64,
+    truncation_error: f64,
     basis: String,
     table_error: f64,
     map: Option<Map>,
@@ -70,9 +70,9 @@ struct Constants {
 #[serde(deny_unknown_fields)]
 struct Map {
     columns: Vec<ContextColumn>,
-    kind: MapKind,
+    kind: ContextMapKind,
     kernel: Option<Kernel>,
-    errors: Vec<(MapKind, Option<f64>)>,
+    errors: Vec<(ContextMapKind, Option<f64>)>,
 }
 
 impl Model {
@@ -117,7 +117,7 @@ impl Model {
         // The header's length first: what is no model need not be read.
         Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(io)?;
         check_size(&bytes).map_err(named)?;
-        file.take(LARGEST_FILE).read_to_end(&mut bytes).map_err(io)?;
+        file.take(MAX_FILE_SIZE).read_to_end(&mut bytes).map_err(io)?;
         Self::from_bytes(&bytes).map_err(named)
     }
 }
@@ -126,7 +126,7 @@ impl Model {
 fn check_size(bytes: &[u8]) -> Result<()> {
     let bad = |reason: &str| Error::File(reason.to_string());
     match bytes.first_chunk().map(|head| u64::from_le_bytes(*head)) {
-        _ if bytes.len() as u64 > LARGEST_FILE => Err(bad("larger than any model")),
+        _ if bytes.len() as u64 > MAX_FILE_SIZE => Err(bad("larger than any model")),
         None => Err(bad("shorter than a header")),
         Some(0) => Err(bad("not a safetensors file")),
         Some(length) if length > MAX_HEADER => {

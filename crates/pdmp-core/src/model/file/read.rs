@@ -7,19 +7,19 @@ use safetensors::tensor::{Dtype, SafeTensors};
 use serde::Deserialize;
 
 use super::{Constants, Map, SCHEMA, Sealed, checksum, header};
-use crate::context::{ContextMap, Kernel, MapKind, Recipe, Stack};
+use crate::context::{ContextMap, ContextMapKind, Kernel, Recipe, Stack};
 use crate::dynamics::canonical::Canonical;
-use crate::dynamics::forcing_table::Landscape;
-use crate::dynamics::hermite_table::{Jets, MOST_CELLS};
+use crate::dynamics::forcing_table::ForcingTable;
+use crate::dynamics::hermite_table::{KnotTable, MAX_CELLS};
 use crate::dynamics::output_system::Attractor;
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::LARGEST_STYLE;
+use crate::model::conditions::MAX_STYLE_MAGNITUDE;
 use crate::model::primitive::{MAX_RATE, MAX_TAU, Parts, Primitive};
 use crate::model::sensitivity::STEPS;
-use crate::model::template::{Template, Warp};
-use crate::model::{Demonstrated, Learnt, Model};
+use crate::model::template::{TimeWarp, WarpTemplate};
+use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::numerics::smoothing_spline::Noise;
 use crate::validate::LARGEST;
 
@@ -112,16 +112,16 @@ impl Reader<'_> {
         let [n_demos, n_styles] = self.shape("styles")?;
         let [n_knots, _, n_dofs] = self.shape("landscape.values")?;
         let [n_values] = self.shape("singular_values")?;
-        let [_, n_segments] = self.shape("timings")?;
+        let [_, n_segments] = self.shape("segment_durations")?;
         if n_segments == 0 || n_demos == 0 || n_styles == 0 || n_dofs == 0 || n_values < n_styles {
             return Err(bad("an array is empty"));
         }
-        if !(2..=MOST_CELLS + 1).contains(&n_knots)
+        if !(2..=MAX_CELLS + 1).contains(&n_knots)
             || [&constants.names, &constants.units].iter().any(|labels| labels.len() != n_dofs)
         {
             return Err(bad("the landscape does not fit the rest"));
         }
-        if constants.nominal >= n_demos || constants.n_samples < crate::demonstration::LEAST_SAMPLES {
+        if constants.nominal >= n_demos || constants.n_samples < crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION {
             return Err(bad("nominal or n_samples is out of range"));
         }
         constants.check()?;
@@ -132,8 +132,8 @@ impl Reader<'_> {
         };
         let knots = |name| self.array(name, &[n_knots, n_styles, n_dofs]);
         let (values, slopes) = (knots("landscape.values")?, knots("landscape.slopes")?);
-        let knots = Jets { n_outputs: n_styles * n_dofs, values, slopes };
-        let landscape = Landscape::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
+        let knots = KnotTable { n_outputs: n_styles * n_dofs, values, slopes };
+        let landscape = ForcingTable::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
         let [n_coefficients] = self.shape("transport")?;
         let transport = self.array("transport", &[n_coefficients])?;
         let transport = Transport::from_coefficients(transport, constants.canonical)
@@ -148,22 +148,22 @@ impl Reader<'_> {
         if breaks[0] != 0.0 || breaks[n_segments] != 1.0 || breaks.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err(bad("breaks do not increase from 0 to 1"));
         }
-        let timings = self.matrix("timings", (n_demos, n_segments))?;
-        if timings.iter().any(|seconds| *seconds <= 0.0) {
+        let segment_durations = self.matrix("segment_durations", (n_demos, n_segments))?;
+        if segment_durations.iter().any(|seconds| *seconds <= 0.0) {
             return Err(bad("a time is not positive"));
         }
         // What a fit makes so: movements of default length and rate then have the number of samples that dt promises.
-        let share = timings.row(constants.nominal).sum() / (constants.tau * constants.canonical.extent());
+        let share = segment_durations.row(constants.nominal).sum() / (constants.tau * constants.canonical.extent());
         if !((1.0 - 1e-6)..=(1.0 + 1e-6)).contains(&share) {
             return Err(bad("tau does not agree with the nominal duration"));
         }
-        let demonstrated = Demonstrated {
+        let demonstrated = DemonstrationParameters {
             styles: self.matrix("styles", (n_demos, n_styles))?,
             goals: self.matrix("goals", (n_demos, n_dofs))?,
             starts: self.matrix("starts", (n_demos, n_dofs))?,
             anchors: self.matrix("anchors", (n_demos, n_dofs))?,
-            durations: timings.sum_axis(Axis(1)).to_vec(),
-            timings,
+            durations: segment_durations.sum_axis(Axis(1)).to_vec(),
+            segment_durations,
             contexts,
             nominal: constants.nominal,
         };
@@ -173,24 +173,24 @@ impl Reader<'_> {
         if singular_values.iter().chain(&ranges).any(|x| *x < 0.0) {
             return Err(bad("a range or singular value is negative"));
         }
-        let (map, left_over) = match &constants.map {
+        let (map, residual_variance) = match &constants.map {
             Some(map) => {
-                let left_over = self.matrix("left_over", (kind.samples(STEPS), n_dofs))?;
-                if left_over.iter().any(|x| *x < 0.0) {
+                let residual_variance = self.matrix("left_over", (kind.samples(STEPS), n_dofs))?;
+                if residual_variance.iter().any(|x| *x < 0.0) {
                     return Err(bad("left_over holds no variances"));
                 }
-                (Some(self.map(map, &demonstrated, kind)?), Some(left_over))
+                (Some(self.map(map, &demonstrated, kind)?), Some(residual_variance))
             }
             None => (None, None),
         };
-        let learnt = Learnt {
+        let learnt = FitSummary {
             n_samples: constants.n_samples,
             noise: self.noise(n_dofs)?,
             template: self.template(&constants, n_segments, n_dofs)?,
             dof_scale,
             singular_values,
-            left_out: constants.left_out,
-            left_over,
+            truncation_error: constants.truncation_error,
+            residual_variance,
             findings: Vec::new(),
             basis: constants.basis.clone(),
         };
@@ -211,14 +211,14 @@ impl Reader<'_> {
         Ok(model)
     }
 
-    fn template(&self, constants: &Constants, n_segments: usize, n_dofs: usize) -> Result<Option<Template>> {
+    fn template(&self, constants: &Constants, n_segments: usize, n_dofs: usize) -> Result<Option<WarpTemplate>> {
         let Some(slope) = constants.slope else { return Ok(None) };
-        let shape = self.matrix("template.shape", (Template::cells(n_segments), n_dofs))?;
-        Ok(Some(Template { slope, unit: self.positive("template.unit", n_dofs)?, shape }))
+        let shape = self.matrix("template.shape", (WarpTemplate::cells(n_segments), n_dofs))?;
+        Ok(Some(WarpTemplate { slope, unit: self.positive("template.unit", n_dofs)?, shape }))
     }
 
     /// The map, had again from what was demonstrated.
-    fn map(&self, map: &Map, demonstrated: &Demonstrated, kind: Kind) -> Result<ContextMap> {
+    fn map(&self, map: &Map, demonstrated: &DemonstrationParameters, kind: Kind) -> Result<ContextMap> {
         let bad = |reason: &str| Error::File(reason.to_string());
         let outputs = demonstrated.outputs(kind);
         let ratios = self.array("map.ratios", &[outputs.ncols()])?;
@@ -240,7 +240,7 @@ impl Reader<'_> {
         let errors = map.errors.iter().map(|&(kind, error)| (kind, error.unwrap_or(f64::INFINITY))).collect();
         let directions = self.matrix("map.directions", (outputs.ncols(), outputs.ncols()))?;
         let trend = match map.kind {
-            MapKind::Stacked => Some(self.trend(outputs.ncols())?),
+            ContextMapKind::Stacked => Some(self.trend(outputs.ncols())?),
             _ => None,
         };
         let recipe = Recipe { kind: map.kind, kernel: map.kernel, directions, ratios, trend, errors };
@@ -275,7 +275,7 @@ impl Reader<'_> {
 /// Largest magnitude of an array's numbers: what the interface takes, or for a variance the square of it.
 fn limit(name: &str) -> f64 {
     match name {
-        "styles" => LARGEST_STYLE,
+        "styles" => MAX_STYLE_MAGNITUDE,
         "left_over" => LARGEST * LARGEST,
         _ => LARGEST,
     }
@@ -288,7 +288,7 @@ impl Constants {
             Canonical::Rhythmic { mu } => (mu, 1.0),
         };
         let slope = self.slope.unwrap_or(1.0);
-        Warp { segments: 1, slope }.check(1).map_err(|error| Error::File(error.to_string()))?;
+        TimeWarp { n_segments: 1, max_slope: slope }.check(1).map_err(|error| Error::File(error.to_string()))?;
         // The bounds within which these are learnt.
         for (name, value, limit) in [
             ("tau", self.tau, MAX_TAU),

@@ -7,7 +7,7 @@ use safetensors::tensor::{Dtype, TensorView, serialize};
 
 use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header};
 use crate::context::{ContextMap, Recipe, Stack};
-use crate::dynamics::hermite_table::Jets;
+use crate::dynamics::hermite_table::KnotTable;
 use crate::error::{Error, Result};
 use crate::model::Model;
 
@@ -39,7 +39,7 @@ impl Model {
             nominal: self.demonstrated.nominal,
             n_samples: self.learnt.n_samples,
             slope: self.learnt.template.as_ref().map(|template| template.slope),
-            left_out: self.learnt.left_out,
+            truncation_error: self.learnt.truncation_error,
             basis: self.learnt.basis.clone(),
             table_error: self.landscape.error(),
             map: self.map.as_ref().map(Map::of),
@@ -65,7 +65,7 @@ impl Model {
 
     pub(super) fn arrays(&self) -> Vec<Array> {
         let demonstrated = &self.demonstrated;
-        let Jets { values, slopes, .. } = self.landscape.knots();
+        let KnotTable { values, slopes, .. } = self.landscape.knots();
         let knots = vec![self.landscape.cells() + 1, self.n_styles(), self.n_dofs()];
         // 0 where every sample is met.
         let cut_offs: Vec<f64> = self.learnt.noise.cut_offs().iter().map(|hz| hz.unwrap_or(0.0)).collect();
@@ -75,7 +75,7 @@ impl Model {
             matrix("starts", &demonstrated.starts),
             matrix("anchors", &demonstrated.anchors),
             vector("breaks", &self.breaks),
-            matrix("timings", &demonstrated.timings),
+            matrix("segment_durations", &demonstrated.segment_durations),
             vector("singular_values", &self.learnt.singular_values),
             vector("dof_scale", &self.learnt.dof_scale),
             vector("ranges", &self.ranges),
@@ -98,7 +98,9 @@ impl Model {
                 arrays.push(vector("map.slopes", slopes));
                 arrays.push(("map.weights", vec![2, 2], [*inside, *outside].concat()));
             }
-            arrays.extend(self.learnt.left_over.as_ref().map(|left_over| matrix("left_over", left_over)));
+            arrays.extend(
+                self.learnt.residual_variance.as_ref().map(|residual_variance| matrix("left_over", residual_variance)),
+            );
         }
         arrays
     }

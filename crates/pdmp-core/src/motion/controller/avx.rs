@@ -10,7 +10,7 @@ use std::arch::x86_64::{
 use std::ops::{Add, Mul, Sub};
 
 use super::Controller;
-use crate::numerics::simd::{Lanes, Real, Register};
+use crate::numerics::simd::{F64x4, Real, Register};
 
 /// Moves on as [`Controller::advance_in`] does, if the processor has AVX2.
 #[inline(always)]
@@ -74,14 +74,14 @@ impl Real for Avx {}
 
 impl Register for Avx {
     #[inline(always)]
-    fn load(lanes: &Lanes) -> Self {
+    fn load(lanes: &F64x4) -> Self {
         // SAFETY: see `default`; lanes are four doubles, aligned to 32 bytes.
         Self(unsafe { _mm256_load_pd(std::ptr::from_ref(lanes).cast()) })
     }
 
     #[inline(always)]
-    fn store(self) -> Lanes {
-        let mut lanes = Lanes::default();
+    fn store(self) -> F64x4 {
+        let mut lanes = F64x4::default();
         // SAFETY: see `load`.
         unsafe { _mm256_store_pd(std::ptr::from_mut(&mut lanes).cast(), self.0) };
         lanes

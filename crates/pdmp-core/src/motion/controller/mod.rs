@@ -20,22 +20,22 @@ mod step;
 use std::sync::Arc;
 
 use crate::dynamics::canonical::{Canonical, CompensatedSum};
-use crate::dynamics::command_filter::{Filter, Follower, Glide};
-use crate::dynamics::output_system::{Jet, Propagator, State};
+use crate::dynamics::command_filter::{CommandFilter, Filter, FilterStep};
+use crate::dynamics::output_system::{CubicSample, Propagator, State};
 use crate::dynamics::propagator_series::Series;
 use crate::dynamics::transport::Stretch;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{Complete, Conditions};
+use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
-use crate::motion::perturbation::{Held, STILL, widest};
-use crate::numerics::simd::{Lanes, copy, groups, repack, unpack};
+use crate::motion::perturbation::{MIN_RANGE_RATIO, Perturbation, widest};
+use crate::numerics::simd::{F64x4, copy, groups, repack, unpack};
 use crate::validate::check_positive;
 use step::Forcing;
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
-const FINEST: f64 = 1.0 / 500.0;
+const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
 /// A movement has settled within this share of its range.
 const SETTLED: f64 = 1e-3;
 
@@ -56,7 +56,7 @@ pub enum Status {
 pub struct Controller {
     model: Arc<Primitive>,
     dt: f64,
-    conditions: Complete,
+    conditions: ResolvedConditions,
     started: bool,
     status: Status,
     time: CompensatedSum,
@@ -67,44 +67,44 @@ pub struct Controller {
     filter: Filter,
     /// Seconds to 99 % of a changed command.
     transition: f64,
-    style: Follower,
+    style: CommandFilter,
     /// ρ = 1/τ.
-    rate: Follower,
+    rate: CommandFilter,
     /// Goal or anchor.
-    centre: Follower,
+    centre: CommandFilter,
     /// How a commanded goal is followed: [`Controller::centre_filter`].
     centre_filter: Filter,
     /// r₀.
-    amplitude: Follower,
+    amplitude: CommandFilter,
     /// Share of the rate 1/τ at which the path is followed.
     speed: f64,
     /// By groups of DoFs, as all that follows.
     forcing: Vec<Forcing>,
     /// Forcing at the start of the stretch at work, taken before anything moves: kept as numbers for the loop over the
     /// groups, it would not stay in registers.
-    from: Vec<Jet<Lanes>>,
+    from: Vec<CubicSample<F64x4>>,
     /// The way g − y₀ at the start, which the frame covers; zero where rhythmic.
-    way: Vec<Lanes>,
+    way: Vec<F64x4>,
     /// The share m − 1 of it by which the frame is off the goal at the clock.
     lag: f64,
     /// Where it is read.
     stretch: Stretch,
-    z: Vec<Lanes>,
-    position: Vec<Lanes>,
-    velocity: Vec<Lanes>,
-    acceleration: Vec<Lanes>,
+    z: Vec<F64x4>,
+    position: Vec<F64x4>,
+    velocity: Vec<F64x4>,
+    acceleration: Vec<F64x4>,
     /// Distance from the goal at which each DoF has settled.
-    tolerance: Vec<Lanes>,
+    tolerance: Vec<F64x4>,
     /// Far below the last digit of every movement.
     rest: f64,
-    held: Held,
+    held: Perturbation,
     /// A stretch of the clock that is not divided.
     finest: f64,
     /// Of the last tick, and good for the next if it is as long.
-    glide: Glide,
+    glide: FilterStep,
     /// The same of the filters on the clock.
-    course: Glide,
-    centre_course: Glide,
+    course: FilterStep,
+    centre_course: FilterStep,
     propagator: Propagator,
     series: Series,
     /// Ticks from now for which the landscape is fetched.
@@ -132,9 +132,9 @@ impl Controller {
             return Err(Error::Range { name: "transition", value: transition, allowed });
         }
         let conditions = conditions.complete(&model)?;
-        let (filter, zeros) = (Filter::new(transition), vec![Lanes::ZERO; groups(model.n_dofs())]);
+        let (filter, zeros) = (Filter::new(transition), vec![F64x4::ZERO; groups(model.n_dofs())]);
         // A tick of just this length is not divided for a rounding error.
-        let finest = FINEST * model.canonical().extent() * (1.0 + 1e-9);
+        let finest = MAX_CLOCK_STEP * model.canonical().extent() * (1.0 + 1e-9);
         let series = Series::new(model.attractor(), finest);
         let mut controller = Self {
             dt,
@@ -145,14 +145,14 @@ impl Controller {
             r: 1.0,
             filter,
             transition,
-            style: Follower::new(&conditions.style),
-            rate: Follower::new(&[1.0 / conditions.tau]),
-            centre: Follower::new(&conditions.centre),
+            style: CommandFilter::new(&conditions.style),
+            rate: CommandFilter::new(&[1.0 / conditions.tau]),
+            centre: CommandFilter::new(&conditions.centre),
             centre_filter: filter,
-            amplitude: Follower::new(&[conditions.amplitude]),
+            amplitude: CommandFilter::new(&[conditions.amplitude]),
             speed: 1.0,
             forcing: vec![Forcing::default(); zeros.len()],
-            from: vec![Jet::default(); zeros.len()],
+            from: vec![CubicSample::default(); zeros.len()],
             way: zeros.clone(),
             lag: 0.0,
             stretch: model.transport.stretch(0.0),
@@ -162,12 +162,12 @@ impl Controller {
             acceleration: zeros.clone(),
             tolerance: zeros,
             rest: REST * widest(model.ranges()),
-            held: Held::new(model.ranges(), model.units(), model.canonical().extent()),
+            held: Perturbation::new(model.ranges(), model.units(), model.canonical().extent()),
             finest,
             glide: filter.glide(dt),
-            course: Glide::START,
-            centre_course: Glide::START,
-            propagator: series.propagator::<Lanes>(0.0),
+            course: FilterStep::START,
+            centre_course: FilterStep::START,
+            propagator: series.propagator::<F64x4>(0.0),
             series,
             lead: 1.0,
             conditions,
@@ -219,7 +219,7 @@ impl Controller {
         let Self { model, conditions, r, .. } = self;
         for (group, (position, z)) in self.position.iter_mut().zip(&mut self.z).enumerate() {
             let cycle = &model.cycle[group * model.n_styles()..];
-            let on_cycle = conditions.style.iter().zip(cycle).fold(State::<Lanes>::default(), |sum, (s, cycle)| {
+            let on_cycle = conditions.style.iter().zip(cycle).fold(State::<F64x4>::default(), |sum, (s, cycle)| {
                 State { e: sum.e + cycle.e * (*r * s), z: sum.z + cycle.z * (*r * s) }
             });
             *position = self.centre.value()[group] + on_cycle.e;
@@ -263,7 +263,7 @@ impl Controller {
     /// Sets the distances at which the way from here to the goal counts as gone, not below what rounding leaves of it.
     pub(super) fn set_tolerance(&mut self) {
         let ranges = self.model.ranges();
-        let least = Lanes::splat(STILL * widest(ranges));
+        let least = F64x4::splat(MIN_RANGE_RATIO * widest(ranges));
         repack(&mut self.tolerance, ranges);
         for tolerance in &mut self.tolerance {
             *tolerance = tolerance.max(least) * SETTLED;

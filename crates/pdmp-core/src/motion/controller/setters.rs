@@ -1,7 +1,7 @@
 //! What can be commanded between ticks. A command that is refused leaves the last good one in force.
 
 use super::{Controller, Status};
-use crate::dynamics::command_filter::Glide;
+use crate::dynamics::command_filter::FilterStep;
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
 
@@ -103,7 +103,7 @@ impl Controller {
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
             self.centre_filter = self.centre_filter();
-            self.centre_course = Glide::START;
+            self.centre_course = FilterStep::START;
             self.centre.follow(centre, &self.centre_filter);
             self.set_tolerance();
             news = true;

@@ -2,38 +2,44 @@
 
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum, amplitude, faded};
-use crate::dynamics::forcing_table::{Fade, Landscape, Place};
-use crate::dynamics::output_system::{Attractor, Jet, State};
+use crate::dynamics::forcing_table::{Fade, ForcingTable, TableIndex};
+use crate::dynamics::output_system::{Attractor, CubicSample, State};
 use crate::dynamics::transport::Lag;
 use crate::error::{Error, Result};
-use crate::motion::perturbation::Push;
-use crate::numerics::simd::{Lanes, Real, Register, flush, unpack};
+use crate::motion::perturbation::PerturbationTerms;
+use crate::numerics::simd::{F64x4, Real, Register, flush, unpack};
 
 /// Most pieces of a tick; a longer one is still stable, only less exact.
-const MOST_PIECES: f64 = 1000.0;
+const MAX_PIECES: f64 = 1000.0;
 /// Lowest rate, relative to the nominal one, at which terms of the user's own act in full.
-const LEAST_RATE: f64 = 1e-6;
+const MIN_RATE: f64 = 1e-6;
 /// Longest tick, in units of τ.
-const LONGEST_TICK: f64 = 1000.0;
+const MAX_TICK: f64 = 1000.0;
 
 /// What the landscape gives a group of DoFs at the clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Forcing {
     /// sᵀb.
-    pub(super) shape: Lanes,
+    pub(super) shape: F64x4,
     /// Its derivative with respect to the phase's clock.
-    slope: Lanes,
+    slope: F64x4,
     /// ṡᵀb, per second at the nominal rate.
-    swing: Lanes,
+    swing: F64x4,
 }
 
 impl Forcing {
     /// Reads a group at a place, for a style s and, while it is on its way, ṡ.
     #[inline(always)]
-    fn read<T: Register>(landscape: &Landscape, place: Place, group: usize, s: &[f64], rate: Option<&[f64]>) -> Self {
+    fn read<T: Register>(
+        landscape: &ForcingTable,
+        place: TableIndex,
+        group: usize,
+        s: &[f64],
+        rate: Option<&[f64]>,
+    ) -> Self {
         let [along, swing] = match rate {
             Some(rate) => landscape.blend_both::<T>(place, group, [s, rate]),
-            None => [landscape.blend(place, group, s), Jet::default()],
+            None => [landscape.blend(place, group, s), CubicSample::default()],
         };
         Self { shape: along.value.store(), slope: along.slope.store(), swing: swing.value.store() }
     }
@@ -54,14 +60,14 @@ pub(super) struct Gate {
 
 impl Gate {
     #[inline(always)]
-    fn jet<T: Register>(&self, forcing: &Forcing) -> Jet<T> {
+    fn jet<T: Register>(&self, forcing: &Forcing) -> CubicSample<T> {
         let [shape, slope, swing] = [&forcing.shape, &forcing.slope, &forcing.swing].map(T::load);
-        Jet { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
+        CubicSample { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
     }
 
     /// ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w, where w has the motion c′ of the frame in it.
     #[inline(always)]
-    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: Jet<T>) -> [T; 2] {
+    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: CubicSample<T>) -> [T; 2] {
         let ([rate, change], flow) = (self.rate, state.z + w.value);
         [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
     }
@@ -69,8 +75,8 @@ impl Gate {
 
 /// Adds the motion of a frame that covers a `way` to the forcing, for m with respect to the output system's clock.
 #[inline(always)]
-fn carried<T: Real>(w: Jet<T>, way: T, [slope, bend]: [f64; 2]) -> Jet<T> {
-    Jet { value: w.value + way * slope, slope: w.slope + way * bend }
+fn carried<T: Real>(w: CubicSample<T>, way: T, [slope, bend]: [f64; 2]) -> CubicSample<T> {
+    CubicSample { value: w.value + way * slope, slope: w.slope + way * bend }
 }
 
 impl Controller {
@@ -79,7 +85,7 @@ impl Controller {
         let commanded = tau.map_or(first(self.rate.target()), |tau| self.speed / tau);
         let at_once = !self.started || self.filter.immediate();
         let fastest = if at_once { commanded } else { commanded.max(first(self.rate.value())) };
-        if dt * fastest > LONGEST_TICK {
+        if dt * fastest > MAX_TICK {
             return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
         }
         Ok(())
@@ -101,7 +107,7 @@ impl Controller {
         if parts <= 1.0 {
             self.piece(dt, h);
         } else {
-            let pieces = parts.ceil().min(MOST_PIECES);
+            let pieces = parts.ceil().min(MAX_PIECES);
             for _ in 0..pieces as u32 {
                 let h = self.stretch(dt / pieces);
                 self.piece(dt / pieces, h);
@@ -172,7 +178,7 @@ impl Controller {
         if h <= 0.0 {
             // A pause: nothing moves but the rate.
             self.measure(dt);
-            self.rate.advance::<Lanes>(&self.glide);
+            self.rate.advance::<F64x4>(&self.glide);
             self.held.rest();
             return self.read_out();
         }
@@ -180,7 +186,7 @@ impl Controller {
         if super::avx::advance(self, dt, h) {
             return;
         }
-        self.advance_in::<Lanes>(dt, h);
+        self.advance_in::<F64x4>(dt, h);
     }
 
     /// The same in registers of one kind.
@@ -195,8 +201,8 @@ impl Controller {
         let levers = self.held.push().map(|_| self.levers());
         let before = if demonstrated { self.gate_within() } else { self.gate() };
         for (from, forcing) in self.from.iter_mut().zip(&self.forcing) {
-            let Jet { value, slope } = before.jet::<T>(forcing);
-            *from = Jet { value: value.store(), slope: slope.store() };
+            let CubicSample { value, slope } = before.jet::<T>(forcing);
+            *from = CubicSample { value: value.store(), slope: slope.store() };
         }
         self.style.advance::<T>(&self.course);
         self.rate.advance::<T>(&self.glide);
@@ -233,7 +239,7 @@ impl Controller {
         let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
         let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
         for group in 0..n {
-            let from = Jet { value: T::load(&starts[group].value), slope: T::load(&starts[group].slope) };
+            let from = CubicSample { value: T::load(&starts[group].value), slope: T::load(&starts[group].slope) };
             forcing[group] = Forcing::read::<T>(landscape, place, group, style, swing);
             let to = after.jet(&forcing[group]);
 
@@ -243,11 +249,11 @@ impl Controller {
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
-                let set_out = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * nominal };
+                let set_out = CubicSample { value: T::default(), slope: T::load(&centre.rate()[group]) * nominal };
                 centre.advance_group::<T>(group, &self.centre_course);
                 let arrived = T::load(&centre.value()[group]);
                 let slope = T::load(&centre.rate()[group]) * nominal;
-                let moved = propagator.follow([set_out, Jet { value: arrived - goal, slope }]);
+                let moved = propagator.follow([set_out, CubicSample { value: arrived - goal, slope }]);
                 y = y + moved.e;
                 origin = arrived + way * lags[1];
                 next.z = next.z + moved.z;
@@ -265,11 +271,11 @@ impl Controller {
     }
 
     /// Adds what a perturbation does; the system is linear.
-    fn add_perturbation(&mut self, before: [Jet; 2]) {
+    fn add_perturbation(&mut self, before: [CubicSample; 2]) {
         let after = self.levers();
         let by_velocity = self.propagator.advance(State::default(), [before[0], after[0]]);
         let by_acceleration = self.propagator.follow([before[1], after[1]]);
-        let Some(Push { velocity, acceleration }) = self.held.push() else { return };
+        let Some(PerturbationTerms { velocity, acceleration }) = self.held.push() else { return };
         for group in 0..self.z.len() {
             let (v, a) = (velocity[group], acceleration[group]);
             self.position[group] += v * by_velocity.e + a * by_acceleration.e;
@@ -279,16 +285,16 @@ impl Controller {
 
     /// What a unit of c_v adds to the forcing, τ, and a unit of c_a to the centre: τ²/(α_zβ_z), for that is how far the
     /// centre must move to add τ² to the row of Eq. (1).
-    fn levers(&self) -> [Jet; 2] {
+    fn levers(&self) -> [CubicSample; 2] {
         let Attractor { alpha_z, beta_z } = self.model.attractor();
         // On the way into a pause the terms fade with it once τ lies beyond all that can be commanded.
-        let least = LEAST_RATE / self.model.tau();
+        let least = MIN_RATE / self.model.tau();
         let (rate, change) = (first(self.rate.value()), first(self.rate.rate()));
         let tau = 1.0 / rate.max(least);
         // dτ/du = τ·dτ/dt.
         let slope = if rate < least { 0.0 } else { -change * tau.powi(3) };
         let centre = tau / (alpha_z * beta_z);
-        [Jet { value: tau, slope }, Jet { value: tau * centre, slope: 2.0 * slope * centre }]
+        [CubicSample { value: tau, slope }, CubicSample { value: tau * centre, slope: 2.0 * slope * centre }]
     }
 
     /// The gate at the clock, at u_end with the slope of what follows.
@@ -333,7 +339,7 @@ impl Controller {
         let (model, place) = (&self.model, self.model.landscape().place(self.clock.value()));
         let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, model.n_styles()));
         for (group, forcing) in self.forcing.iter_mut().enumerate() {
-            *forcing = Forcing::read::<Lanes>(model.landscape(), place, group, style, Some(swing));
+            *forcing = Forcing::read::<F64x4>(model.landscape(), place, group, style, Some(swing));
         }
     }
 
@@ -349,7 +355,7 @@ impl Controller {
             let state = State { e, z: self.z[group] };
             [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, state, w);
         }
-        if let Some(Push { velocity, acceleration }) = self.held.push() {
+        if let Some(PerturbationTerms { velocity, acceleration }) = self.held.push() {
             for group in 0..self.z.len() {
                 self.velocity[group] += velocity[group];
                 self.acceleration[group] += acceleration[group];
@@ -372,7 +378,7 @@ impl Controller {
             let Forcing { shape, slope, .. } = self.forcing[group];
             let forcing = shape * fade.value;
             let flow = (self.z[group] + forcing).abs() * (2.0 / alpha_z);
-            let mut push = fade.push(Jet { value: shape, slope });
+            let mut push = fade.push(CubicSample { value: shape, slope });
             if !self.style.settled() {
                 push = push.max(fade.push(landscape.blend(place, group, target)));
             }
@@ -384,7 +390,7 @@ impl Controller {
 }
 
 /// The first of several commands, or the only one.
-fn first(lanes: &[Lanes]) -> f64 {
+fn first(lanes: &[F64x4]) -> f64 {
     lanes[0].as_array()[0]
 }
 
@@ -423,7 +429,7 @@ mod tests {
             let h = any.stretch(1e-3);
             any.advance(1e-3, h);
             four.stretch(1e-3);
-            four.advance_in::<Lanes>(1e-3, h);
+            four.advance_in::<F64x4>(1e-3, h);
             assert_eq!(any.position(), four.position());
             assert_eq!(any.acceleration(), four.acceleration());
         }

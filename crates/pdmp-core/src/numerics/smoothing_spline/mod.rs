@@ -27,7 +27,7 @@ use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::numerics::simd::{Lanes, WIDTH};
+use crate::numerics::simd::{F64x4, WIDTH};
 use crate::numerics::threads::Threads;
 use crate::validate::check_positive;
 pub use noise::Noise;
@@ -108,14 +108,14 @@ impl Samples<'_> {
     }
 
     /// Deviations of up to four columns from their first values (n,), with the largest of each.
-    fn deviations(&self, columns: &[usize]) -> (Vec<Lanes>, Lanes) {
-        let mut largest = Lanes::ZERO;
+    fn deviations(&self, columns: &[usize]) -> (Vec<F64x4>, F64x4) {
+        let mut largest = F64x4::ZERO;
         let mut first = [0.0; WIDTH];
         columns.iter().zip(&mut first).for_each(|(&d, first)| *first = self.values[[0, d]]);
         let deviation = |row: ArrayView1<f64>| {
             let mut value = first;
             columns.iter().zip(&mut value).for_each(|(&d, value)| *value = row[d]);
-            let deviation = Lanes::new(value) - Lanes::new(first);
+            let deviation = F64x4::new(value) - F64x4::new(first);
             largest = largest.fast_max(deviation.abs());
             deviation
         };
@@ -133,11 +133,11 @@ impl Samples<'_> {
             let mut lambdas = [1.0; WIDTH];
             let hz = columns.iter().filter_map(|&d| cut_offs[d]);
             lambdas.iter_mut().zip(hz).for_each(|(to, hz)| *to = lambda(hz * self.interval()));
-            let lambda = Lanes::new(lambdas);
+            let lambda = F64x4::new(lambdas);
             // A column is smoothed as shares of its largest deviation.
             let (deviations, largest) = self.deviations(columns);
-            let scale = largest.fast_max(Lanes::splat(f64::MIN_POSITIVE));
-            let mut shares: Vec<Lanes> = deviations.into_iter().map(|deviation| deviation / scale).collect();
+            let scale = largest.fast_max(F64x4::splat(f64::MIN_POSITIVE));
+            let mut shares: Vec<F64x4> = deviations.into_iter().map(|deviation| deviation / scale).collect();
             copy_cycle(&mut shares, pad);
             roughness.bend(&mut shares);
             roughness.factor(lambda).solve(&mut shares);
@@ -152,7 +152,7 @@ impl Samples<'_> {
 }
 
 /// Puts `pad` samples of the copies of a cycle on either side of it.
-fn copy_cycle(cycle: &mut Vec<Lanes>, pad: usize) {
+fn copy_cycle(cycle: &mut Vec<F64x4>, pad: usize) {
     let n = cycle.len();
     if pad > 0 {
         *cycle = (0..n + 2 * pad).map(|k| cycle[(k + MAX_COPIES * n - pad) % n]).collect();

@@ -14,7 +14,7 @@ use ndarray::{Array1, Array2, Axis};
 use super::roughness::Roughness;
 use super::{Samples, Smoothing, copy_cycle, lambda};
 use crate::error::Result;
-use crate::numerics::simd::{Lanes, WIDTH};
+use crate::numerics::simd::{F64x4, WIDTH};
 use crate::numerics::threads::Threads;
 
 /// Most recordings that are searched together, evenly chosen: of forces with an impact, twelve show noise in every fifth
@@ -238,7 +238,7 @@ impl Thinned {
     /// Fills the scores of the columns of this recording.
     fn score(&self, columns: &[usize], grid: &[f64], scores: &mut Scores) {
         let (samples, n) = (self.samples(), self.time.len());
-        let shares: Vec<Option<(f64, Vec<Lanes>)>> = columns.iter().map(|&d| shares(&samples, d)).collect();
+        let shares: Vec<Option<(f64, Vec<F64x4>)>> = columns.iter().map(|&d| shares(&samples, d)).collect();
         for (column, shares) in shares.iter().enumerate() {
             let Some((_, shares)) = shares else { continue };
             let y: Vec<f64> = shares.iter().map(|share| share.to_array()[0]).collect();
@@ -251,7 +251,7 @@ impl Thinned {
             let pad = samples.pad(hz[0]);
             let roughness = Roughness::new(&samples.knots(pad));
             let lambdas = [0, 1, 2, 3].map(|k| lambda(hz[k] * self.interval));
-            let factor = roughness.factor(Lanes::new(lambdas));
+            let factor = roughness.factor(F64x4::new(lambdas));
             // The columns of Q that belong to a cycle, or all.
             let own = if self.period.is_some() { pad - 1..pad - 1 + n } else { 0..n - 2 };
             let traces = roughness.trace(&factor, own).to_array();
@@ -262,7 +262,7 @@ impl Thinned {
                 roughness.bend(&mut bend);
                 factor.solve(&mut bend);
                 roughness.residual(&mut bend);
-                let squares = bend[pad..pad + n].iter().fold(Lanes::ZERO, |sum, r| sum + *r * *r).to_array();
+                let squares = bend[pad..pad + n].iter().fold(F64x4::ZERO, |sum, r| sum + *r * *r).to_array();
                 for (k, ((square, lambda), trace)) in squares.into_iter().zip(lambdas).zip(traces).enumerate() {
                     let at = [column, group * WIDTH + k];
                     // n‖Qγ‖²/tr(QM⁻¹Qᵀ)², from which λ is cancelled: no 0/0 where the spline interpolates.
@@ -277,7 +277,7 @@ impl Thinned {
 }
 
 /// Deviations of a column from its first value in shares of the largest, and the largest; `None` where all are equal.
-fn shares(samples: &Samples, d: usize) -> Option<(f64, Vec<Lanes>)> {
+fn shares(samples: &Samples, d: usize) -> Option<(f64, Vec<F64x4>)> {
     let (deviations, largest) = samples.deviations(&[d; WIDTH]);
     let [scale, ..] = largest.to_array();
     (scale > 0.0).then(|| (scale, deviations.into_iter().map(|deviation| deviation / largest).collect()))
@@ -297,9 +297,9 @@ fn noisy(pool: &[Samples]) -> Vec<usize> {
         return dofs;
     }
     let of_group = |dofs: &[usize]| {
-        let deviations: Vec<(Vec<Lanes>, Lanes)> = pool.iter().map(|samples| samples.deviations(dofs)).collect();
-        let largest = deviations.iter().fold(Lanes::splat(f64::MIN_POSITIVE), |most, (_, size)| most.fast_max(*size));
-        let (unit, [mut seconds, mut sixths]) = (Lanes::splat(1.0) / largest, [Lanes::ZERO; 2]);
+        let deviations: Vec<(Vec<F64x4>, F64x4)> = pool.iter().map(|samples| samples.deviations(dofs)).collect();
+        let largest = deviations.iter().fold(F64x4::splat(f64::MIN_POSITIVE), |most, (_, size)| most.fast_max(*size));
+        let (unit, [mut seconds, mut sixths]) = (F64x4::splat(1.0) / largest, [F64x4::ZERO; 2]);
         for (deviations, _) in &deviations {
             for y in deviations[..deviations.len().min(MAX_DIFFERENCED)].windows(7) {
                 let (middle, pair) = (y[3], y[2] + y[4]);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::numerics::simd::Lanes;
+use crate::numerics::simd::F64x4;
 
 /// Columns of Q, and the upper bands of R and QᵀQ: (diagonal, first, second) in each row.
 pub(super) struct Roughness {
@@ -12,7 +12,7 @@ pub(super) struct Roughness {
 }
 
 /// M = LDLᵀ: in row i, 1/d_i and the elements of L in rows i + 1 and i + 2 of column i.
-pub(super) struct Factor(Vec<[Lanes; 3]>);
+pub(super) struct Factor(Vec<[F64x4; 3]>);
 
 impl Roughness {
     /// The matrices of splines with these knots (n,), at least three.
@@ -32,14 +32,14 @@ impl Roughness {
     }
 
     /// M = R + λQᵀQ, factorised.
-    pub(super) fn factor(&self, lambda: Lanes) -> Factor {
-        let mut rows: Vec<[Lanes; 3]> = Vec::with_capacity(self.q.len());
+    pub(super) fn factor(&self, lambda: F64x4) -> Factor {
+        let mut rows: Vec<[F64x4; 3]> = Vec::with_capacity(self.q.len());
         // Of the two rows before: L's elements, and these times d.
         let ([mut first, mut second, mut earlier], [mut first_d, mut second_d, mut earlier_d]) =
-            ([Lanes::ZERO; 3], [Lanes::ZERO; 3]);
+            ([F64x4::ZERO; 3], [F64x4::ZERO; 3]);
         for (r, qq) in self.r.iter().zip(&self.qq) {
             let d = lambda * qq[0] + r[0] - first * first_d - earlier * earlier_d;
-            let inverse = Lanes::splat(1.0) / d;
+            let inverse = F64x4::splat(1.0) / d;
             let next_d = lambda * qq[1] + r[1] - first_d * second;
             let after_d = lambda * qq[2];
             (earlier, earlier_d) = (second, second_d);
@@ -50,16 +50,16 @@ impl Roughness {
     }
 
     /// Qᵀy of samples (n,), in their place; the last two become zero.
-    pub(super) fn bend(&self, y: &mut [Lanes]) {
+    pub(super) fn bend(&self, y: &mut [F64x4]) {
         for (i, q) in self.q.iter().enumerate() {
             y[i] = (y[i] - y[i + 1]) * q[0] + (y[i + 2] - y[i + 1]) * q[2];
         }
-        y[self.q.len()..].fill(Lanes::ZERO);
+        y[self.q.len()..].fill(F64x4::ZERO);
     }
 
     /// Qγ (n,) of γ = M⁻¹Qᵀy, in its place: λ times it is taken off the samples.
-    pub(super) fn residual(&self, gamma: &mut [Lanes]) {
-        let [mut next, mut after] = [Lanes::ZERO; 2];
+    pub(super) fn residual(&self, gamma: &mut [F64x4]) {
+        let [mut next, mut after] = [F64x4::ZERO; 2];
         for (gamma, q) in gamma.iter_mut().zip(&self.q) {
             let here = *gamma;
             *gamma = here * q[0] + next;
@@ -70,12 +70,12 @@ impl Roughness {
 
     /// tr(QᵀQ M⁻¹) = tr(I − A)/λ, the terms of some columns of Q, from the elements (i, i), (i, i + 1) and (i, i + 2) of M⁻¹ = L⁻ᵀD⁻¹ + M⁻¹(I − L)
     /// (Hutchinson and de Hoog).
-    pub(super) fn trace(&self, factor: &Factor, columns: Range<usize>) -> Lanes {
-        let [mut next, mut after] = [[Lanes::ZERO; 3]; 2];
-        let mut trace = Lanes::ZERO;
+    pub(super) fn trace(&self, factor: &Factor, columns: Range<usize>) -> F64x4 {
+        let [mut next, mut after] = [[F64x4::ZERO; 3]; 2];
+        let mut trace = F64x4::ZERO;
         for (i, (q, &[inverse, first, second])) in self.qq.iter().zip(&factor.0).enumerate().rev() {
-            let one = Lanes::ZERO - first * next[0] - second * next[1];
-            let two = Lanes::ZERO - first * next[1] - second * after[0];
+            let one = F64x4::ZERO - first * next[0] - second * next[1];
+            let two = F64x4::ZERO - first * next[1] - second * after[0];
             let here = [inverse - first * one - second * two, one, two];
             if columns.contains(&i) {
                 trace += here[0] * q[0] + (one * q[1] + two * q[2]) * 2.0;
@@ -88,15 +88,15 @@ impl Roughness {
 
 impl Factor {
     /// M⁻¹b, in place (n−2, at least).
-    pub(super) fn solve(&self, b: &mut [Lanes]) {
-        let [mut before, mut last, mut beyond] = [Lanes::ZERO; 3];
+    pub(super) fn solve(&self, b: &mut [F64x4]) {
+        let [mut before, mut last, mut beyond] = [F64x4::ZERO; 3];
         for (x, [_, first, second]) in b.iter_mut().zip(&self.0) {
             let here = *x - last - before;
             (before, last) = (beyond, here * *first);
             beyond = here * *second;
             *x = here;
         }
-        let [mut next, mut after] = [Lanes::ZERO; 2];
+        let [mut next, mut after] = [F64x4::ZERO; 2];
         for (x, [inverse, first, second]) in b.iter_mut().zip(&self.0).rev() {
             let here = *x * *inverse - *first * next - *second * after;
             (next, after) = (here, next);

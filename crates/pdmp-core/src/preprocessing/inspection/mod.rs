@@ -20,7 +20,7 @@ mod turns;
 use ndarray::ArrayView1;
 
 use crate::demonstration::{Demonstration, Sampling};
-use crate::model::finding::Place;
+use crate::model::finding::SampleLocation;
 pub use crate::model::finding::{Finding, Padding};
 
 pub use turns::{turn_of, unwound};
@@ -123,7 +123,7 @@ impl<'a> Survey<'a> {
         }
     }
 
-    fn place(&self, sample: usize) -> Place {
-        Place { sample, time: self.time(sample) }
+    fn place(&self, sample: usize) -> SampleLocation {
+        SampleLocation { sample, time: self.time(sample) }
     }
 }

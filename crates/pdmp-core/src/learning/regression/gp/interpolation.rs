@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 
 use super::kalman_filter::States;
 use super::matern_sde::{Square, Transition};
-use crate::numerics::simd::{Lanes, WIDTH};
+use crate::numerics::simd::{F64x4, WIDTH};
 
 /// What all samples say about the state.
 #[derive(Clone, Debug)]
@@ -68,13 +68,13 @@ impl<const D: usize> Trajectory<D> {
     }
 
     /// f and its derivative with respect to u, in groups, the columns behind the outputs included.
-    fn groups(&self, place: &Place<D>) -> impl Iterator<Item = (Lanes, Lanes)> {
+    fn groups(&self, place: &Place<D>) -> impl Iterator<Item = (F64x4, F64x4)> {
         let groups = self.states.len() / self.u.len();
         let (a, q) = (place.since.matrix, place.since.noise * place.until.transpose());
         let rate = self.rate;
         // f is the first component of the state, f′ = λ(v₁ − v₀).
         let read = move |m: &Square<D>, x: &States<D>| {
-            let row = |i: usize| (0..D).fold(Lanes::ZERO, |sum, j| sum + x[j] * m[(i, j)]);
+            let row = |i: usize| (0..D).fold(F64x4::ZERO, |sum, j| sum + x[j] * m[(i, j)]);
             (row(0), (row(1) - row(0)) * rate)
         };
         let states = &self.states[place.before * groups..][..groups];

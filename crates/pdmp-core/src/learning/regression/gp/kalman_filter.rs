@@ -9,10 +9,10 @@ use nalgebra::SVector;
 use super::matern_sde::{Square, Transition};
 use super::{PORTION, Progress};
 use crate::error::Result;
-use crate::numerics::simd::Lanes;
+use crate::numerics::simd::F64x4;
 
 /// The states of four outputs.
-pub(super) type States<const D: usize> = [Lanes; D];
+pub(super) type States<const D: usize> = [F64x4; D];
 
 /// The steps from each sample to the next, and from the last one on.
 pub(super) struct Path<const D: usize> {
@@ -166,12 +166,12 @@ pub(super) fn have_settled<const D: usize>(a: &Square<D>, b: &Square<D>) -> bool
 pub(super) fn means<const D: usize>(
     path: &Path<D>,
     steps: &Steps<D>,
-    targets: &[Lanes],
+    targets: &[F64x4],
     progress: &mut Progress,
 ) -> Result<Vec<States<D>>> {
     let n_samples = path.n_samples();
     let groups = targets.len() / n_samples;
-    let mut means = vec![[Lanes::ZERO; D]; (n_samples + 1) * groups];
+    let mut means = vec![[F64x4::ZERO; D]; (n_samples + 1) * groups];
     for i in 0..n_samples {
         if (i + 1) % PORTION == 0 {
             progress.ask()?;
@@ -191,17 +191,17 @@ pub(super) fn means<const D: usize>(
 /// A·x of an upper triangular A.
 #[inline(always)]
 pub(super) fn upper<const D: usize>(matrix: &Square<D>, x: &States<D>) -> States<D> {
-    std::array::from_fn(|i| (i..D).fold(Lanes::ZERO, |sum, j| sum + x[j] * matrix[(i, j)]))
+    std::array::from_fn(|i| (i..D).fold(F64x4::ZERO, |sum, j| sum + x[j] * matrix[(i, j)]))
 }
 
 /// Aᵀ·x of an upper triangular A.
 #[inline(always)]
 pub(super) fn transposed<const D: usize>(matrix: &Square<D>, x: &States<D>) -> States<D> {
-    std::array::from_fn(|j| (0..=j).fold(Lanes::ZERO, |sum, i| sum + x[i] * matrix[(i, j)]))
+    std::array::from_fn(|j| (0..=j).fold(F64x4::ZERO, |sum, i| sum + x[i] * matrix[(i, j)]))
 }
 
 /// M·x.
 #[inline(always)]
 pub(super) fn product<const D: usize>(matrix: &Square<D>, x: &States<D>) -> States<D> {
-    std::array::from_fn(|i| (0..D).fold(Lanes::ZERO, |sum, j| sum + x[j] * matrix[(i, j)]))
+    std::array::from_fn(|i| (0..D).fold(F64x4::ZERO, |sum, j| sum + x[j] * matrix[(i, j)]))
 }

@@ -26,19 +26,19 @@ use crate::error::{Error, Result};
 use crate::validate::check_positive;
 
 /// Smallest ratio of noise to signal variance: below, rounding makes the covariance matrix indefinite.
-const LEAST_NOISE: f64 = 1e-10;
+const MIN_NOISE: f64 = 1e-10;
 /// Largest ratio that the search considers: the signal is a hundredth of the noise, in deviations, and what more there is
 /// of noise no longer changes the likelihood.
-const MOST_NOISE: f64 = 1e4;
+const MAX_NOISE: f64 = 1e4;
 /// Weight, in halves of the number of values, of the square by which the logarithm of the noise exceeds its bound. The
 /// likelihood pulls by no more than half of that number: it is exceeded by a twentieth at most.
 const BARRIER: f64 = 20.0;
 /// Largest ratio that a failing factorisation is helped with.
-const MOST_HELP: f64 = 1.0;
+const MAX_HELPERS: f64 = 1.0;
 /// Samples that the scan for the neighbourhood of the likeliest hyperparameters looks at.
 const SCANNED: usize = 256;
 /// Most samples of the squared exponential, whose covariance matrix is dense.
-const MOST_SAMPLES: usize = 10_000;
+const MAX_SAMPLES: usize = 10_000;
 /// Samples between two questions whether to go on.
 const PORTION: usize = 4096;
 
@@ -86,7 +86,7 @@ pub struct NoiseBound {
 
 impl NoiseBound {
     /// As much as is likeliest, up to a ratio of 1e4.
-    pub const NONE: Self = Self { ratio: MOST_NOISE, share: None, points: 15 };
+    pub const NONE: Self = Self { ratio: MAX_NOISE, share: None, points: 15 };
 
     /// The bound in the landscape of a primitive: a thousandth of the signal's deviation, and of the targets.
     ///
@@ -119,37 +119,37 @@ impl Gp {
         domain: Domain,
         u: &[f64],
         targets: ArrayView2<f64>,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<GpPosterior> {
-        self.regress_within(NoiseBound::NONE, domain, u, targets, proceed)
+        self.regress_within(NoiseBound::NONE, domain, u, targets, progress)
     }
 
     /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease, with the likeliest noise within
     /// a bound. A noise that is given is used as it is.
     ///
-    /// `proceed` is asked before each evaluation of the likelihood, and now and then in a long one, with the share done
+    /// `progress` is asked before each evaluation of the likelihood, and now and then in a long one, with the share done
     /// in [0, 1].
     ///
     /// If rounding makes K indefinite, ν is raised tenfold, up to 1 at most; [`GpPosterior::noise`] is what was used.
     ///
     /// # Errors
     /// Hyperparameters out of range, arrays that do not match, numbers that are not finite; more samples than a dense
-    /// matrix can have; a covariance matrix that stays indefinite; whatever `proceed` returns.
+    /// matrix can have; a covariance matrix that stays indefinite; whatever `progress` returns.
     pub fn regress_within(
         &self,
         bound: NoiseBound,
         domain: Domain,
         u: &[f64],
         targets: ArrayView2<f64>,
-        proceed: &mut dyn FnMut(f64) -> Result<()>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<GpPosterior> {
         super::check(domain, u, targets)?;
         self.check(domain)?;
-        let progress = &mut Progress { proceed, share: 0.0 };
+        let progress = &mut Progress { progress, share: 0.0 };
         match self.kernel {
             Kernel::Matern32 => self.learn::<Chain<2>>(bound, domain, u, targets, progress),
             Kernel::Matern52 => self.learn::<Chain<3>>(bound, domain, u, targets, progress),
-            Kernel::SquaredExponential if u.len() > MOST_SAMPLES => {
+            Kernel::SquaredExponential if u.len() > MAX_SAMPLES => {
                 let allowed = "a squared exponential takes at most 10000; pass a smaller n_samples, or a Matérn kernel";
                 Err(Error::Range { name: "samples", value: u.len() as f64, allowed })
             }
@@ -172,7 +172,7 @@ impl Gp {
         let fitted = loop {
             match process.fit(at, progress)? {
                 Some(fitted) => break fitted,
-                None if at.noise < MOST_HELP => at.noise = (10.0 * at.noise).min(MOST_HELP),
+                None if at.noise < MAX_HELPERS => at.noise = (10.0 * at.noise).min(MAX_HELPERS),
                 None => {
                     let (kernel, Hyperparameters { length, noise }) = (self.kernel, at);
                     return Err(Error::Fit(format!(
@@ -219,12 +219,12 @@ impl Gp {
         if samples.targets.iter().all(|&value| value == 0.0) {
             // Nothing to learn, and nothing to learn from.
             let length = self.length.unwrap_or((lengths.0 * lengths.1).sqrt());
-            return Ok(Hyperparameters { length, noise: self.noise.unwrap_or(LEAST_NOISE) });
+            return Ok(Hyperparameters { length, noise: self.noise.unwrap_or(MIN_NOISE) });
         }
         let axis = |given: Option<f64>, (low, high): (f64, f64), points| {
             given.map_or(Axis { low: low.ln(), high: high.ln(), points }, |given| Axis::given(given.ln()))
         };
-        let noises = (LEAST_NOISE, within.ratio);
+        let noises = (MIN_NOISE, within.ratio);
         let axes = [axis(self.length, lengths, 12), axis(self.noise, noises, within.points)];
         let mean_square = || samples.targets.iter().map(|f| f * f).sum::<f64>() / samples.targets.len() as f64;
         let bound = within.share.filter(|_| self.noise.is_none()).map(|share| share * mean_square());
@@ -241,7 +241,7 @@ impl Gp {
 
 fn check_noise(noise: Option<f64>) -> Result<()> {
     match noise {
-        Some(value) if !(LEAST_NOISE..=1e6).contains(&value) => {
+        Some(value) if !(MIN_NOISE..=1e6).contains(&value) => {
             Err(Error::Range { name: "noise", value, allowed: "must lie between 1e-10 and 1e6" })
         }
         _ => Ok(()),
@@ -376,14 +376,14 @@ impl<P: Process> Objective for Likelihood<'_, '_, P> {
 
 /// Whom to ask whether to go on.
 struct Progress<'a> {
-    proceed: &'a mut dyn FnMut(f64) -> Result<()>,
+    progress: &'a mut dyn FnMut(f64) -> Result<()>,
     share: f64,
 }
 
 impl Progress<'_> {
     /// Asks, no further than before.
     fn ask(&mut self) -> Result<()> {
-        (self.proceed)(self.share)
+        (self.progress)(self.share)
     }
 
     fn reach(&mut self, share: f64) -> Result<()> {

@@ -21,7 +21,7 @@ use super::kalman_filter::{Path, States, Steps, product};
 use super::matern_sde::{Square, rate};
 use super::{PORTION, Progress};
 use crate::error::Result;
-use crate::numerics::simd::{Lanes, WIDTH};
+use crate::numerics::simd::{F64x4, WIDTH};
 
 /// A Matérn process on the circle.
 #[derive(Clone, Copy, Debug)]
@@ -79,7 +79,7 @@ impl<const D: usize> Closure<D> {
     pub(super) fn new(
         path: &Path<D>,
         steps: &Steps<D>,
-        targets: &[Lanes],
+        targets: &[F64x4],
         means: &mut [States<D>],
         n_outputs: usize,
         progress: &mut Progress,
@@ -88,7 +88,7 @@ impl<const D: usize> Closure<D> {
         let mut responses: Vec<Square<D>> = Vec::with_capacity(n_samples + 1);
         let mut response = Square::identity();
         let mut information = Square::zeros();
-        let mut scores = vec![[Lanes::ZERO; D]; groups];
+        let mut scores = vec![[F64x4::ZERO; D]; groups];
         for i in 0..n_samples {
             if (i + 1) % PORTION == 0 {
                 progress.ask()?;
@@ -134,10 +134,10 @@ impl<const D: usize> Closure<D> {
     }
 }
 
-fn set(lanes: &mut Lanes, lane: usize, value: f64) {
+fn set(lanes: &mut F64x4, lane: usize, value: f64) {
     let mut array = lanes.to_array();
     array[lane] = value;
-    *lanes = Lanes::from(array);
+    *lanes = F64x4::from(array);
 }
 
 /// W with M⁻¹ = WWᵀ, and ln|M|. The components of a state differ in size by powers of the step: M is scaled to a

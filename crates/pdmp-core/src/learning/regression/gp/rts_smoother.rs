@@ -8,7 +8,7 @@
 
 use super::kalman_filter::{Path, States, Steps, have_settled, transposed};
 use super::matern_sde::Square;
-use crate::numerics::simd::Lanes;
+use crate::numerics::simd::F64x4;
 
 /// On its way back along a path.
 pub(super) struct Smoother<'a, const D: usize> {
@@ -35,8 +35,8 @@ impl<'a, const D: usize> Smoother<'a, D> {
         &mut self,
         i: usize,
         means: &[States<D>],
-        targets: &[Lanes],
-        mut visit: impl FnMut(usize, Lanes),
+        targets: &[F64x4],
+        mut visit: impl FnMut(usize, F64x4),
     ) {
         let (step, matrix) = (self.steps.at(i), &self.path.after(i).matrix);
         let certainty = 1.0 / step.spread;
@@ -44,7 +44,7 @@ impl<'a, const D: usize> Smoother<'a, D> {
         let all = i * groups..(i + 1) * groups;
         for (group, ((r, x), y)) in self.adjoint.iter_mut().zip(&means[all.clone()]).zip(&targets[all]).enumerate() {
             *r = transposed(matrix, r);
-            let taken = (0..D).fold(Lanes::ZERO, |sum, k| sum + r[k] * step.gain[k]);
+            let taken = (0..D).fold(F64x4::ZERO, |sum, k| sum + r[k] * step.gain[k]);
             let weight = (*y - x[0]) * certainty - taken;
             r[0] += weight;
             visit(group, weight);

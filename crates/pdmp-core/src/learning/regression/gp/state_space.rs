@@ -11,7 +11,7 @@ use super::rts_smoother::Smoother;
 use super::{Fitted, Hyperparameters, PORTION, Process, Profile, Progress, Samples, Slope};
 use crate::error::Result;
 use crate::learning::regression::Domain;
-use crate::numerics::simd::{Lanes, WIDTH, groups};
+use crate::numerics::simd::{F64x4, WIDTH, groups};
 
 /// Samples of a Matérn process of order D − ½, in the order of the chain.
 pub(super) struct Chain<const D: usize> {
@@ -19,7 +19,7 @@ pub(super) struct Chain<const D: usize> {
     u: Vec<f64>,
     gaps: Gaps,
     /// (C, groups): the outputs, and on the circle D columns of zeros.
-    targets: Vec<Lanes>,
+    targets: Vec<F64x4>,
     n_outputs: usize,
 }
 
@@ -73,7 +73,7 @@ where
         order.sort_by(|&i, &j| u[i].total_cmp(&u[j]));
         let n_outputs = samples.targets.ncols();
         let groups = groups(n_outputs + end.map_or(0, |_| D));
-        let mut targets = vec![Lanes::ZERO; order.len() * groups];
+        let mut targets = vec![F64x4::ZERO; order.len() * groups];
         let rows: &mut [f64] = bytemuck::cast_slice_mut(&mut targets);
         for (k, &i) in order.iter().enumerate() {
             let row = &mut rows[k * groups * WIDTH..];
@@ -118,7 +118,7 @@ impl<const D: usize> Filtered<'_, D> {
     /// The signal variance, in units of the chain's kernel: Σ fᵀK⁻¹f/(CP).
     fn variance(&self) -> f64 {
         let groups = self.chain.groups();
-        let mut misfit = vec![Lanes::ZERO; groups];
+        let mut misfit = vec![F64x4::ZERO; groups];
         for i in 0..self.chain.u.len() {
             let (certainty, all) = (1.0 / self.steps.at(i).spread, i * groups..(i + 1) * groups);
             for ((misfit, x), y) in misfit.iter_mut().zip(&self.means[all.clone()]).zip(&self.chain.targets[all]) {
@@ -156,7 +156,7 @@ impl<const D: usize> Filtered<'_, D> {
                     close.first.iter().zip(last).map(|(first, last)| std::array::from_fn(|k| first[k] - last[k]));
                 (gaps.map(|gap| product(&close.precision, &gap)).collect(), close.precision)
             }
-            None => (vec![[Lanes::ZERO; D]; groups], Square::zeros()),
+            None => (vec![[F64x4::ZERO; D]; groups], Square::zeros()),
         };
         Smoother::new(&self.path, &self.steps, adjoint, precision)
     }
@@ -173,7 +173,7 @@ impl<const D: usize> Filtered<'_, D> {
         }
         let (n_outputs, groups) = (self.chain.n_outputs as f64, self.chain.groups());
         let mut smoother = self.smoother();
-        let (mut by_length, mut by_noise) = (vec![Lanes::ZERO; groups], vec![Lanes::ZERO; groups]);
+        let (mut by_length, mut by_noise) = (vec![F64x4::ZERO; groups], vec![F64x4::ZERO; groups]);
         let (mut shared_length, mut shared_noise) = (0.0, 0.0);
         let mut half_rise = Square::zeros();
         for i in (0..self.chain.u.len()).rev() {
@@ -199,7 +199,7 @@ impl<const D: usize> Filtered<'_, D> {
             shared_noise += smoother.inverse;
         }
         // The directions in which a circle's first state stays uncertain count once an output.
-        let total = |sums: &[Lanes], shared: f64| {
+        let total = |sums: &[F64x4], shared: f64| {
             let sums: &[f64] = bytemuck::cast_slice(sums);
             let (outputs, directions) = sums.split_at(self.chain.n_outputs);
             (outputs.iter().sum::<f64>() / self.variance(), n_outputs * (shared - directions.iter().sum::<f64>()))
@@ -219,7 +219,7 @@ impl<const D: usize> Filtered<'_, D> {
     /// The posterior everywhere.
     fn smooth(mut self, progress: &mut Progress) -> Result<Trajectory<D>> {
         let (n_samples, groups) = (self.chain.u.len(), self.chain.groups());
-        let mut adjoints = vec![[Lanes::ZERO; D]; (n_samples + 1) * groups];
+        let mut adjoints = vec![[F64x4::ZERO; D]; (n_samples + 1) * groups];
         let mut precisions = vec![Square::zeros(); n_samples + 1];
         let mut smoother = self.smoother();
         adjoints[n_samples * groups..].copy_from_slice(&smoother.adjoint);

@@ -132,7 +132,7 @@ impl Exact {
 }
 
 fn quietly<T>(work: impl FnOnce(&mut Progress) -> Result<T>) -> T {
-    work(&mut Progress { proceed: &mut |_| Ok(()), share: 0.0 }).unwrap()
+    work(&mut Progress { progress: &mut |_| Ok(()), share: 0.0 }).unwrap()
 }
 
 fn score(kernel: Kernel, domain: Domain, u: &[f64], targets: &Array2<f64>, at: Hyperparameters) -> Score {
@@ -313,12 +313,12 @@ fn no_hyperparameters_are_likelier_than_those_found() {
                 let mean_square = targets.iter().map(|f| f * f).sum::<f64>() / 120.0;
                 let most = within.share.map_or(f64::INFINITY, |share| share * mean_square);
                 assert!(found.noise() * found.signal_variance() < 1.06 * most);
-                assert!((LEAST_NOISE..=within.ratio).contains(&found.noise()));
+                assert!((MIN_NOISE..=within.ratio).contains(&found.noise()));
                 for i in 0..30 {
                     for j in 0..21 {
-                        let ratio = within.ratio * (LEAST_NOISE / within.ratio).powf(f64::from(j) / 20.0);
+                        let ratio = within.ratio * (MIN_NOISE / within.ratio).powf(f64::from(j) / 20.0);
                         let length = 0.017 * 1.17_f64.powi(i);
-                        let other = Gp { kernel, length: Some(length), noise: Some(ratio.max(LEAST_NOISE)) };
+                        let other = Gp { kernel, length: Some(length), noise: Some(ratio.max(MIN_NOISE)) };
                         let other = fit(&other, INTERVAL, &u, &targets);
                         let gain = other.log_likelihood() - found.log_likelihood();
                         assert!(
@@ -433,7 +433,7 @@ fn an_indefinite_matrix_is_helped_with_noise() {
     // 300 nearly equal rows.
     let u = grid(INTERVAL, 300);
     for kernel in Kernel::ALL {
-        let gp = Gp { kernel, length: Some(1e6), noise: Some(LEAST_NOISE) };
+        let gp = Gp { kernel, length: Some(1e6), noise: Some(MIN_NOISE) };
         let posterior = fit(&gp, INTERVAL, &u, &waves(INTERVAL, &u));
         assert!(posterior.noise() < 1e-6 && at(&posterior, 0.5).0[0].is_finite());
     }
@@ -541,7 +541,7 @@ fn a_flat_likelihood_is_left_as_it_is() {
     for kernel in Kernel::ALL {
         for domain in [INTERVAL, Domain::Circle] {
             let posterior = fit(&Gp { kernel, ..Gp::default() }, domain, &[0.0], &Array2::ones((1, 1)));
-            assert!(posterior.length() > 0.0 && posterior.noise() >= LEAST_NOISE);
+            assert!(posterior.length() > 0.0 && posterior.noise() >= MIN_NOISE);
             assert_abs_diff_eq!(at(&posterior, 0.0).0[0], 1.0, epsilon = 1e-5);
         }
     }
