@@ -143,6 +143,6 @@ pub(crate) fn primitive(n_dofs: usize, n_styles: usize) -> Arc<Model> {
     };
     let demos: Vec<_> = (0..10).map(demonstration).collect();
     let basis = Basis::NGnet(NGnet::default());
-    let options = FitOptions { styles: Truncation::Given(n_styles).into(), basis, ..FitOptions::new(Kind::Discrete) };
+    let options = FitOptions { n_styles: Truncation::Rank(n_styles).into(), basis, ..FitOptions::new(Kind::Discrete) };
     Arc::new(fit(&demos, &options).expect("a fit"))
 }

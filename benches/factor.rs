@@ -22,12 +22,12 @@ fn library(rows: usize, columns: usize) -> Array2<f64> {
 fn factors(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("factor");
     for (rows, columns, styles, samples) in [
-        (20, 28_000, Truncation::Given(20), 100),
-        (20, 28_000, Truncation::Spectrum(0.9), 100),
-        (1000, 40_000, Truncation::Given(5), 10),
-        (1000, 40_000, Truncation::Spectrum(0.9), 10),
-        (5000, 1400, Truncation::Given(5), 10),
-        (5000, 1400, Truncation::Spectrum(0.9), 10),
+        (20, 28_000, Truncation::Rank(20), 100),
+        (20, 28_000, Truncation::Share(0.9), 100),
+        (1000, 40_000, Truncation::Rank(5), 10),
+        (1000, 40_000, Truncation::Share(0.9), 10),
+        (5000, 1400, Truncation::Rank(5), 10),
+        (5000, 1400, Truncation::Share(0.9), 10),
     ] {
         let targets = library(rows, columns);
         group.sample_size(samples).bench_function(format!("{rows} x {columns} {styles:?}"), |bench| {

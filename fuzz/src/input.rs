@@ -111,7 +111,7 @@ pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
 
 fn options(kind: Kind) -> FitOptions {
     FitOptions {
-        styles: Truncation::Given(2).into(),
+        n_styles: Truncation::Rank(2).into(),
         basis: Basis::NGnet(NGnet { n_basis: 10, ..NGnet::default() }),
         ..FitOptions::new(kind)
     }

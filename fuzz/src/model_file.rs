@@ -34,14 +34,14 @@ const ORDER: [&str; 19] = [
     "ranges",
     "noise.levels",
     "noise.cut_offs",
-    "landscape.values",
-    "landscape.slopes",
+    "forcing_table.values",
+    "forcing_table.slopes",
     "template.unit",
     "template.shape",
     "contexts",
     "map.directions",
     "map.ratios",
-    "left_over",
+    "residual_variance",
 ];
 
 /// Loads a forged file; what loads must move in finite numbers, and be saved and loaded again.

@@ -40,7 +40,7 @@ impl Reference<'_> {
         let (style, rate, centre) = (&filters[..n_styles], filters[n_styles], &filters[n_styles + 1..]);
         let amplitude = filters[n_styles + 1 + n];
         let (mut outputs, mut rises) = ([0.0; 16], [0.0; 16]);
-        self.model.landscape().evaluate(u, &mut outputs[..n * n_styles], &mut rises[..n * n_styles]);
+        self.model.forcing_table().evaluate(u, &mut outputs[..n * n_styles], &mut rises[..n * n_styles]);
         let w = |d: usize| r * style.iter().enumerate().map(|(j, s)| s * outputs[j * n + d]).sum::<f64>();
         let growth = match self.model.canonical() {
             Canonical::Discrete { .. } => 0.0,
@@ -166,8 +166,8 @@ fn ticks_solve_the_equations() {
         (Kind::Rhythmic, cycles(), TransportSelection::FitSummary),
     ];
     for (kind, demos, transport) in cases {
-        let styles = Truncation::Given(2).into();
-        let model = learn(&demos, &FitOptions { styles, transport, ..options(kind) });
+        let styles = Truncation::Rank(2).into();
+        let model = learn(&demos, &FitOptions { n_styles: styles, transport, ..options(kind) });
         for tau in [model.tau(), 0.3 / model.duration() * model.tau()] {
             for live in [false, true] {
                 for (dt, bound) in [(1e-3, 1e-8), (1e-2, 1e-6)] {

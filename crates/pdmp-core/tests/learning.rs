@@ -19,11 +19,11 @@ fn every_reach_is_reproduced() {
     for basis in [options(Kind::Discrete).basis, gp()] {
         let model = learn(
             &demos,
-            &pdmp_core::FitOptions { basis, styles: Truncation::Given(5).into(), ..options(Kind::Discrete) },
+            &pdmp_core::FitOptions { basis, n_styles: Truncation::Rank(5).into(), ..options(Kind::Discrete) },
         );
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
-            assert!(error <= 1e-4, "{}: {error:e}", model.learnt().basis);
+            assert!(error <= 1e-4, "{}: {error:e}", model.learnt().regression);
         }
     }
 }
@@ -35,11 +35,11 @@ fn every_cycle_is_reproduced_without_a_transient() {
     for basis in [options(Kind::Rhythmic).basis, gp()] {
         let model = learn(
             &demos,
-            &pdmp_core::FitOptions { basis, styles: Truncation::Given(4).into(), ..options(Kind::Rhythmic) },
+            &pdmp_core::FitOptions { basis, n_styles: Truncation::Rank(4).into(), ..options(Kind::Rhythmic) },
         );
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
-            assert!(error <= 1e-4, "{}: {error:e}", model.learnt().basis);
+            assert!(error <= 1e-4, "{}: {error:e}", model.learnt().regression);
         }
     }
 }
@@ -49,7 +49,7 @@ fn every_cycle_is_reproduced_without_a_transient() {
 fn spectrum_rule_finds_the_intrinsic_dimension() {
     // y is affine in (h, h²): three dimensions at the most.
     let model =
-        learn(&reaches(), &pdmp_core::FitOptions { styles: Truncation::Given(5).into(), ..options(Kind::Discrete) });
+        learn(&reaches(), &pdmp_core::FitOptions { n_styles: Truncation::Rank(5).into(), ..options(Kind::Discrete) });
     let sigma = &model.learnt().singular_values;
     assert!(sigma[2] > 1e-6 * sigma[0] && sigma[3] < 1e-6 * sigma[0], "{sigma:?}");
 }
@@ -111,7 +111,7 @@ fn own_time_stamps_are_respected() {
 fn style_of_finds_demonstrations_again() {
     let demos = reaches();
     let model =
-        learn(&demos, &pdmp_core::FitOptions { styles: Truncation::Given(3).into(), ..options(Kind::Discrete) });
+        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(3).into(), ..options(Kind::Discrete) });
     for (m, demo) in demos.iter().enumerate() {
         let style = style_of(&model, demo, None, None, None).unwrap();
         for (j, s) in style.iter().enumerate() {
@@ -125,7 +125,7 @@ fn style_of_finds_demonstrations_again() {
 fn style_of_finds_a_cycle_in_any_phase() {
     let demos = cycles();
     let model =
-        learn(&demos, &pdmp_core::FitOptions { styles: Truncation::Given(2).into(), ..options(Kind::Rhythmic) });
+        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Rhythmic) });
     for (m, demo) in demos.iter().enumerate() {
         let expected = style_of(&model, demo, None, None, None).unwrap();
         let n = demo.n_samples();
@@ -146,7 +146,7 @@ fn style_of_finds_a_cycle_in_any_phase() {
 fn style_of_refuses_what_the_model_does_not_describe() {
     let demos = reaches();
     let model =
-        learn(&demos, &pdmp_core::FitOptions { styles: Truncation::Given(2).into(), ..options(Kind::Discrete) });
+        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Discrete) });
     let changed = |change: &dyn Fn(usize, f64) -> f64| {
         let position =
             Array2::from_shape_fn(demos[1].position().dim(), |(c, d)| change(c, demos[1].position()[[c, d]]));
@@ -160,7 +160,7 @@ fn style_of_refuses_what_the_model_does_not_describe() {
 
     let equal = vec![demos[1].clone(); 4];
     let model =
-        learn(&equal, &pdmp_core::FitOptions { styles: Truncation::Given(3).into(), ..options(Kind::Discrete) });
+        learn(&equal, &pdmp_core::FitOptions { n_styles: Truncation::Rank(3).into(), ..options(Kind::Discrete) });
     let style = style_of(&model, &equal[0], None, None, None).unwrap();
     assert!(style.iter().all(|s| s.abs() <= 1.0), "{style:?}");
     let style = style_of(&model, &demos[2], None, None, None);
@@ -254,7 +254,7 @@ fn dof_scale_weighs_units_and_keeps_the_movement() {
         .collect();
     let scaled = pdmp_core::FitOptions {
         dof_scale: DofScaling::Range,
-        styles: Truncation::Given(5).into(),
+        n_styles: Truncation::Rank(5).into(),
         ..options(Kind::Discrete)
     };
     let model = learn(&demos, &scaled);
@@ -280,6 +280,6 @@ fn bad_demonstrations_are_refused_by_name() {
     assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
     assert!(message(&[], &options).contains("at least one demonstration"));
     assert!(message(&demos[1..], &options).contains("pass dt="));
-    let options = pdmp_core::FitOptions { styles: Truncation::Given(2).into(), ..options };
+    let options = pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options };
     assert!(message(&demos[..1], &options).contains("n_styles = 2: must lie between 1 and 1"));
 }

@@ -55,7 +55,7 @@ fn slopes(model: &Model, (y, z, u): &Plain, velocity: &[f64], acceleration: &[f6
     let discrete = model.kind() == Kind::Discrete;
     let centre = if discrete { demonstrated.goals.row(nominal) } else { demonstrated.anchors.row(nominal) };
     let (mut outputs, mut rises) = (vec![0.0; style.len() * n], vec![0.0; style.len() * n]);
-    model.landscape().evaluate(*u, &mut outputs, &mut rises);
+    model.forcing_table().evaluate(*u, &mut outputs, &mut rises);
     let w = |d: usize| style.iter().enumerate().map(|(j, s)| s * outputs[j * n + d]).sum::<f64>();
     let pdmp_core::dynamics::Attractor { alpha_z, beta_z } = model.attractor();
     (

@@ -146,7 +146,7 @@ fn every_demonstration_is_given_back_in_its_own_timing() {
             duration * [0.3 + 0.02 * m as f64, 0.7 - 0.05 * m as f64][e]
         });
         let error = |time_scaling| {
-            let model = learn(&demos, &FitOptions { styles: Truncation::Given(4).into(), ..with(kind, time_scaling) });
+            let model = learn(&demos, &FitOptions { n_styles: Truncation::Rank(4).into(), ..with(kind, time_scaling) });
             (0..demos.len()).map(|m| reproduction_error(&model, &demos, m)).fold(0.0, f64::max)
         };
         let (linear, warp) = (error(TimeScaling::Linear), error(TimeScaling::Warp(TimeWarp::default())));
@@ -306,7 +306,7 @@ fn style_of_finds_warped_demonstrations_again() {
         let events = array![[0.4], [0.5], [0.3]];
         for time_scaling in [TimeScaling::Warp(TimeWarp::default()), TimeScaling::Events(events.clone())] {
             let by_events = matches!(time_scaling, TimeScaling::Events(_));
-            let model = learn(&demos, &FitOptions { styles: Truncation::Given(3).into(), ..with(kind, time_scaling) });
+            let model = learn(&demos, &FitOptions { n_styles: Truncation::Rank(3).into(), ..with(kind, time_scaling) });
             for (m, demo) in demos.iter().enumerate() {
                 let own = events.row(m).to_vec();
                 let style = style_of(&model, demo, None, None, by_events.then_some(&own)).unwrap();

@@ -43,8 +43,8 @@ impl Factors {
 /// targets : (M, C·D) array_like
 ///     One row per demonstration.
 /// n_styles : int, optional
-///     Number of factors J, at most min(M, C·D); otherwise from `spectrum`.
-/// spectrum : float
+///     Number of factors J, at most min(M, C·D); otherwise from `singular_value_share`.
+/// singular_value_share : float
 ///     Keep the fewest singular values whose sum exceeds this share of the sum of all.
 ///
 /// Returns
@@ -61,14 +61,14 @@ impl Factors {
 /// ----------
 /// Eckart and Young, Psychometrika 1 (1936), https://doi.org/10.1007/BF02288367
 #[pyfunction]
-#[pyo3(signature = (targets, *, n_styles=None, spectrum=0.9))]
+#[pyo3(signature = (targets, *, n_styles=None, singular_value_share=0.9))]
 pub(crate) fn factorise(
     py: Python<'_>,
     targets: &Bound<'_, PyAny>,
     n_styles: Option<isize>,
-    spectrum: f64,
+    singular_value_share: f64,
 ) -> PyResult<Factors> {
-    let styles = style_count(n_styles, spectrum)?;
+    let styles = style_count(n_styles, singular_value_share)?;
     let targets = matrix("targets", "(M, C·D)", targets)?;
     let factors = interruptible(py, |progress| pdmp_core::learning::Factors::of(targets.view(), styles, progress))?;
     let truncation_error = factors.truncation_error();

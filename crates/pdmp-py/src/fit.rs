@@ -51,7 +51,7 @@ use crate::warp::TimeWarp;
 ///     values, at least five (or half of the demonstrations) and as many as the contexts explain (F-test), but none
 ///     that measurement noise alone would give (parallel analysis). "auto" is cross-validation over contexts by the
 ///     one-standard-error rule, in at most ten folds.
-/// spectrum : float, optional
+/// singular_value_share : float, optional
 ///     The paper's rule instead: the fewest singular values whose sum exceeds this share of the sum of all, such as 0.9.
 /// basis : {"gp", "ngnet"}, GP or NGnet
 ///     Function approximator of the landscape.
@@ -119,10 +119,10 @@ use crate::warp::TimeWarp;
 /// Matsubara, Hyon, Morimoto, Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
 #[pyfunction]
 #[pyo3(signature = (
-    demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, spectrum=None, basis=None,
+    demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, singular_value_share=None, basis=None,
     smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, transport="learnt", dof_scale=None,
     alignment=None, events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
-), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, spectrum=None, \
+), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, singular_value_share=None, \
     basis='gp', smoothing='auto', nominal=None, n_samples=None, transport='learnt', dof_scale=None, \
     alignment='linear', events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
@@ -135,7 +135,7 @@ pub(crate) fn fit(
     contexts: Option<&Bound<'_, PyAny>>,
     map: &str,
     n_styles: Option<&Bound<'_, PyAny>>,
-    spectrum: Option<f64>,
+    singular_value_share: Option<f64>,
     basis: Option<&Bound<'_, PyAny>>,
     smoothing: SmoothingArgument,
     nominal: Option<isize>,
@@ -165,7 +165,7 @@ pub(crate) fn fit(
         },
         contexts: contexts.map(crate::convert::contexts).transpose()?,
         map: map_of(map)?,
-        styles: style_choice(n_styles, spectrum)?,
+        n_styles: style_choice(n_styles, singular_value_share)?,
         basis: basis_of(basis)?,
         transport: transport_of(transport)?,
         dof_scale: dof_scale_of(dof_scale)?,
@@ -185,29 +185,29 @@ pub(crate) fn fit(
     Ok(Model(Arc::new(model)))
 }
 
-fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, spectrum: Option<f64>) -> PyResult<NStyles> {
+fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {
     let Some(n_styles) = n_styles else {
-        return Ok(spectrum.map_or(NStyles::Systematic, |share| Truncation::Spectrum(share).into()));
+        return Ok(singular_value_share.map_or(NStyles::AboveNoise, |share| Truncation::Share(share).into()));
     };
-    if spectrum.is_some() {
-        return Err(PyValueError::new_err("n_styles and spectrum: pass one of them"));
+    if singular_value_share.is_some() {
+        return Err(PyValueError::new_err("n_styles and singular_value_share: pass one of them"));
     }
     if let Ok(name) = n_styles.extract::<String>() {
         let wanted = "must be a number, \"auto\" or None";
         return if name == "auto" {
-            Ok(NStyles::Auto)
+            Ok(NStyles::CrossValidated)
         } else {
             Err(PyValueError::new_err(format!("n_styles = {name:?}: {wanted}")))
         };
     }
-    count("n_styles", n_styles.extract()?).map(|n_styles| Truncation::Given(n_styles).into())
+    count("n_styles", n_styles.extract()?).map(|n_styles| Truncation::Rank(n_styles).into())
 }
 
 /// J as given, or from a share of the spectrum.
-pub(crate) fn style_count(n_styles: Option<isize>, spectrum: f64) -> PyResult<Truncation> {
+pub(crate) fn style_count(n_styles: Option<isize>, singular_value_share: f64) -> PyResult<Truncation> {
     match n_styles {
-        Some(n_styles) => count("n_styles", n_styles).map(Truncation::Given),
-        None => Ok(Truncation::Spectrum(spectrum)),
+        Some(n_styles) => count("n_styles", n_styles).map(Truncation::Rank),
+        None => Ok(Truncation::Share(singular_value_share)),
     }
 }
 

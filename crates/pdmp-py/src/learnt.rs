@@ -197,12 +197,12 @@ impl Model {
     /// What was chosen for the basis functions, in one line.
     #[getter]
     fn basis(&self) -> &str {
-        &self.0.learnt().basis
+        &self.0.learnt().regression
     }
 
     /// Estimated error of the compiled landscape, relative to its largest value.
     #[getter]
     fn table_error(&self) -> f64 {
-        self.0.landscape().error()
+        self.0.forcing_table().error()
     }
 }

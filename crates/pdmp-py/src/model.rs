@@ -178,7 +178,7 @@ impl Model {
         let u = vector("u", u)?;
         let mut landscape = Array3::zeros((u.len(), self.0.n_styles(), self.0.n_dofs()));
         for (&u, mut at) in u.iter().zip(landscape.outer_iter_mut()) {
-            let basis = self.0.basis(u).map_err(raise)?;
+            let basis = self.0.landscape(u).map_err(raise)?;
             for (value, b) in at.iter_mut().zip(basis) {
                 *value = b;
             }
@@ -373,7 +373,7 @@ impl Model {
             model.n_styles(),
             model.tau(),
             noise(model),
-            model.learnt().basis
+            model.learnt().regression
         ))
     }
 }

@@ -47,7 +47,7 @@ pub fn fit_with(
     options: &FitOptions,
     progress: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
-    if let NStyles::Given(count) = options.styles {
+    if let NStyles::Truncated(count) = options.n_styles {
         count.check(demos.len(), "demonstrations")?;
     }
     let threads = options.threads;
@@ -90,7 +90,7 @@ pub fn fit_with(
     let mut compiling = |share| progress(Stage::Compile, share);
     let shape = (factors.basis.nrows(), demos[0].n_dofs());
     let n_samples = clock.len();
-    let landscape = compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
+    let forcing_table = compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
 
     let (segment_durations, nominal) = (aligned.segment_durations.clone(), aligned.nominal);
     let (columns, contexts) = contexts.unzip();
@@ -102,7 +102,7 @@ pub fn fit_with(
     let Constants { attractor, canonical, tau } = constants;
     let breaks = aligned.breaks.clone();
     let nominal = demonstrated.nominal(canonical.kind());
-    let parts = Parts { attractor, landscape, transport, braking, tau, names, units, ranges, breaks, nominal };
+    let parts = Parts { attractor, forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal };
     let primitive = Arc::new(Primitive::new(parts));
     findings.extend(stiffness(&primitive, &aligned)?);
     let noise = aligned.noise.clone();
@@ -115,7 +115,7 @@ pub fn fit_with(
         }
         _ => (None, None),
     };
-    let basis = regression.describe();
+    let regression = regression.describe();
     let learnt = FitSummary {
         n_samples,
         noise,
@@ -124,7 +124,7 @@ pub fn fit_with(
         singular_values,
         truncation_error,
         residual_variance,
-        basis,
+        regression,
         findings,
     };
     Ok(Model { primitive, demonstrated, learnt, map })
@@ -150,10 +150,10 @@ fn scale_time(
     let linear = aligned.clone();
     let template = scaling.apply(aligned, unit, threads, &mut |share| progress(0.5 * share))?;
     let n_styles = |aligned: &Aligned| {
-        let count = match options.styles {
-            NStyles::Given(count) => count,
-            NStyles::Systematic => Truncation::Spectrum(0.9),
-            NStyles::Auto => Truncation::Spectrum(1.0),
+        let count = match options.n_styles {
+            NStyles::Truncated(count) => count,
+            NStyles::AboveNoise => Truncation::Share(0.9),
+            NStyles::CrossValidated => Truncation::Share(1.0),
         };
         let mut targets = Targets::of(aligned, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
         targets.scale(&options.dof_scale.of(&targets.ranges(), units));
@@ -186,17 +186,17 @@ impl Shown<'_> {
     ) -> Result<Factors> {
         let Self { aligned, targets, transport, constants } = *self;
         let forcing = targets.forcing.view();
-        match options.styles {
-            NStyles::Systematic => {
+        match options.n_styles {
+            NStyles::AboveNoise => {
                 let noise = spectrum::noise_limit(aligned, constants, transport, dof_scale, options.threads)?;
                 spectrum::systematic(forcing, noise, contexts, progress)
             }
-            NStyles::Given(count) => Factors::of(forcing, count, progress),
-            NStyles::Auto => {
+            NStyles::Truncated(count) => Factors::of(forcing, count, progress),
+            NStyles::CrossValidated => {
                 let (columns, numbers) = contexts.ok_or(Error::Arguments(
                     "n_styles = \"auto\" goes by contexts: pass contexts, a number, or None to go by the spectrum",
                 ))?;
-                let all = Factors::of(forcing, Truncation::Spectrum(1.0), &mut |share| progress(0.5 * share))?;
+                let all = Factors::of(forcing, Truncation::Share(1.0), &mut |share| progress(0.5 * share))?;
                 let foresight =
                     StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical)?;
                 let mut second = |share: f64| progress(0.5 + 0.5 * share);

@@ -68,7 +68,7 @@ pub struct FitOptions {
     /// What leads from contexts to movements.
     pub map: MapSelection,
     /// Style dimension J.
-    pub styles: NStyles,
+    pub n_styles: NStyles,
     /// Function approximator of the landscape.
     pub basis: Basis,
     /// How the way from start to goal is spread over a discrete movement.
@@ -105,7 +105,7 @@ impl FitOptions {
             },
             contexts: None,
             map: MapSelection::Auto,
-            styles: NStyles::Systematic,
+            n_styles: NStyles::AboveNoise,
             basis: Basis::Gp(Gp::default()),
             transport: TransportSelection::FitSummary,
             dof_scale: DofScaling::Auto,
@@ -125,17 +125,17 @@ pub enum NStyles {
     /// As many as carry nine tenths of the sum of the singular values, at least five, and at least as many as the
     /// contexts explain; never more than exceed the measurement noise.
     #[default]
-    Systematic,
+    AboveNoise,
     /// By number, or by the spectrum.
-    Given(Truncation),
+    Truncated(Truncation),
     /// The fewest that foresee movements, in contexts held out, with an error above the least that any number has by no
     /// more than the standard error of the difference: cross-validation over the contexts, in at most ten folds.
-    Auto,
+    CrossValidated,
 }
 
 impl From<Truncation> for NStyles {
     fn from(count: Truncation) -> Self {
-        Self::Given(count)
+        Self::Truncated(count)
     }
 }
 

@@ -117,11 +117,11 @@ fn design(model: &Model) -> Mat<f64> {
     let (n_dofs, n_styles) = (model.n_dofs(), model.n_styles());
     let scale = &model.learnt.dof_scale;
     let clock = model.canonical().clock(model.learnt.n_samples);
-    let n_outputs = model.landscape.n_outputs();
+    let n_outputs = model.forcing_table.n_outputs();
     let mut design = Mat::zeros(clock.len() * n_dofs, n_styles);
     let (mut value, mut slope) = (vec![0.0; n_outputs], vec![0.0; n_outputs]);
     for (c, &u) in clock.iter().enumerate() {
-        model.landscape.evaluate(u, &mut value, &mut slope);
+        model.forcing_table.evaluate(u, &mut value, &mut slope);
         for (o, w) in value.iter().enumerate() {
             let (j, d) = (o / n_dofs, o % n_dofs);
             design[(c * n_dofs + d, j)] = w / scale[d];

@@ -74,7 +74,7 @@ impl Contexts<'_> {
             let kept: Vec<usize> =
                 (0..positions.nrows()).filter(|m| !held_out.iter().any(|group| group.contains(m))).collect();
             let shown = positions.select(Axis(0), &kept);
-            let factors = Factors::of(shown.view(), Truncation::Given(n_styles.min(kept.len())), &mut |_| Ok(()))?;
+            let factors = Factors::of(shown.view(), Truncation::Rank(n_styles.min(kept.len())), &mut |_| Ok(()))?;
             let (outputs, metric) = outputs(&factors, &aligned.segment_durations.select(Axis(0), &kept));
             let numbers = self.numbers.select(Axis(0), &kept);
             let map = ContextMap::learn(self.columns.to_vec(), &numbers, outputs.view(), metric.view(), self.map)?;

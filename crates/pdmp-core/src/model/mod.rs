@@ -67,7 +67,7 @@ pub struct FitSummary {
     /// Variance over the phase (S, D) of what J styles leave out of the demonstrations, where contexts are known.
     pub residual_variance: Option<Array2<f64>>,
     /// The basis functions, in one line.
-    pub basis: String,
+    pub regression: String,
     /// What was implausible about the demonstrations or the fit; empty in a model that was read from a file.
     pub findings: Vec<Finding>,
 }

@@ -36,7 +36,7 @@ pub(crate) struct Nominal {
 #[derive(Clone, Debug)]
 pub struct Primitive {
     pub(crate) attractor: Attractor,
-    pub(crate) landscape: ForcingTable,
+    pub(crate) forcing_table: ForcingTable,
     pub(crate) transport: Transport,
     pub(crate) braking: Option<f64>,
     pub(crate) tau: f64,
@@ -55,7 +55,7 @@ pub struct Primitive {
 pub(crate) struct Parts {
     pub(crate) attractor: Attractor,
     /// The forcing term without its braking past the end.
-    pub(crate) landscape: ForcingTable,
+    pub(crate) forcing_table: ForcingTable,
     pub(crate) transport: Transport,
     /// κ, per unit of the clock, at which a movement brakes past its end; none where transport is immediate, and rhythmic.
     pub(crate) braking: Option<f64>,
@@ -73,21 +73,35 @@ pub(crate) struct Parts {
 impl Primitive {
     /// Returns the primitive of these parts, with its braking past the end or its limit cycle.
     pub(crate) fn new(parts: Parts) -> Self {
-        let Parts { attractor, mut landscape, transport, braking, tau, names, units, ranges, breaks, nominal } = parts;
+        let Parts { attractor, mut forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal } =
+            parts;
         let shape = (names.len(), nominal.style.len());
-        let cycle = match landscape.canonical().kind() {
+        let cycle = match forcing_table.canonical().kind() {
             Kind::Discrete => {
                 if let Some(braking) = braking {
-                    let end = from_rest(attractor, &landscape, shape);
+                    let end = from_rest(attractor, &forcing_table, shape);
                     let z: Vec<F64x4> = end.iter().map(|state| state.z).collect();
-                    landscape = landscape.braked(attractor.alpha_z, braking, &z);
+                    forcing_table = forcing_table.braked(attractor.alpha_z, braking, &z);
                 }
                 vec![State::default(); groups(shape.0) * shape.1]
             }
-            Kind::Rhythmic => steady_cycle(attractor, &landscape, shape),
+            Kind::Rhythmic => steady_cycle(attractor, &forcing_table, shape),
         };
         let responses = Cache::default();
-        Self { attractor, landscape, transport, braking, tau, names, units, ranges, breaks, nominal, cycle, responses }
+        Self {
+            attractor,
+            forcing_table,
+            transport,
+            braking,
+            tau,
+            names,
+            units,
+            ranges,
+            breaks,
+            nominal,
+            cycle,
+            responses,
+        }
     }
 
     /// Discrete or rhythmic.
@@ -97,7 +111,7 @@ impl Primitive {
 
     /// The canonical system and its constants.
     pub fn canonical(&self) -> Canonical {
-        self.landscape.canonical()
+        self.forcing_table.canonical()
     }
 
     /// The constants of the output system.
@@ -106,8 +120,8 @@ impl Primitive {
     }
 
     /// The attractor landscape, gated, per style dimension and DoF.
-    pub fn landscape(&self) -> &ForcingTable {
-        &self.landscape
+    pub fn forcing_table(&self) -> &ForcingTable {
+        &self.forcing_table
     }
 
     /// Number of degrees of freedom D.
@@ -216,15 +230,16 @@ impl Primitive {
     ///
     /// # Errors
     /// A clock that is not finite, or negative for a discrete movement.
-    pub fn basis(&self, u: f64) -> Result<Vec<f64>> {
+    pub fn landscape(&self, u: f64) -> Result<Vec<f64>> {
         let discrete = self.kind() == Kind::Discrete;
         if !u.is_finite() || (discrete && u < 0.0) {
             return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative if discrete" });
         }
         // Past the end gate and forcing fade together: b stays what it was.
         let u = if discrete { u.min(self.canonical().extent()) } else { u };
-        let (mut value, mut slope) = (vec![0.0; self.landscape.n_outputs()], vec![0.0; self.landscape.n_outputs()]);
-        self.landscape.evaluate(u, &mut value, &mut slope);
+        let (mut value, mut slope) =
+            (vec![0.0; self.forcing_table.n_outputs()], vec![0.0; self.forcing_table.n_outputs()]);
+        self.forcing_table.evaluate(u, &mut value, &mut slope);
         if discrete {
             let gate = self.canonical().phase(u);
             value.iter_mut().for_each(|w| *w /= gate);
@@ -234,13 +249,17 @@ impl Primitive {
 }
 
 /// The states to which the demonstrated stretch leads from rest, of unit styles, by groups of DoFs and styles.
-fn from_rest(attractor: Attractor, landscape: &ForcingTable, (n_dofs, n_styles): (usize, usize)) -> Vec<State<F64x4>> {
-    let cells = landscape.cells();
-    let cell = attractor.propagator(landscape.canonical().extent() / cells as f64);
+fn from_rest(
+    attractor: Attractor,
+    forcing_table: &ForcingTable,
+    (n_dofs, n_styles): (usize, usize),
+) -> Vec<State<F64x4>> {
+    let cells = forcing_table.cells();
+    let cell = attractor.propagator(forcing_table.canonical().extent() / cells as f64);
     let mut states = Vec::with_capacity(groups(n_dofs) * n_styles);
     for group in 0..groups(n_dofs) {
         states.extend((0..n_styles).map(|j| {
-            let jet = |k: usize| landscape.knot(k, group, j);
+            let jet = |k: usize| forcing_table.knot(k, group, j);
             (0..cells).fold(State::default(), |state, k| cell.advance(state, [jet(k), jet(k + 1)]))
         }));
     }
@@ -248,11 +267,11 @@ fn from_rest(attractor: Attractor, landscape: &ForcingTable, (n_dofs, n_styles):
 }
 
 /// The states from which one turn leads back to itself, (I − exp(2πA))⁻¹ times the response of a turn from rest.
-fn steady_cycle(attractor: Attractor, landscape: &ForcingTable, shape: (usize, usize)) -> Vec<State<F64x4>> {
+fn steady_cycle(attractor: Attractor, forcing_table: &ForcingTable, shape: (usize, usize)) -> Vec<State<F64x4>> {
     let [[a, b], [c, d]] = attractor.propagator(TAU).transition();
     // A stable system never returns to where it was unforced: the determinant is positive.
     let scale = 1.0 / ((1.0 - a) * (1.0 - d) - b * c);
     let closed =
         |State { e, z }: State<F64x4>| State { e: (e * (1.0 - d) + z * b) * scale, z: (e * c + z * (1.0 - a)) * scale };
-    from_rest(attractor, landscape, shape).into_iter().map(closed).collect()
+    from_rest(attractor, forcing_table, shape).into_iter().map(closed).collect()
 }

@@ -55,7 +55,7 @@ pub(crate) fn cycles() -> Vec<Demonstration> {
 /// A network, which fits in a moment, and nearly all of the spectrum.
 pub(crate) fn options(kind: Kind) -> FitOptions {
     FitOptions {
-        styles: Truncation::Spectrum(0.9999).into(),
+        n_styles: Truncation::Share(0.9999).into(),
         basis: Basis::NGnet(NGnet::default()),
         ..FitOptions::new(kind)
     }
@@ -70,10 +70,11 @@ pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model>
 }
 
 /// Reaches and cycles learnt with two styles.
-pub(crate) static REACH: LazyLock<Arc<Model>> =
-    LazyLock::new(|| learn(&reaches(), &FitOptions { styles: Truncation::Given(2).into(), ..options(Kind::Discrete) }));
+pub(crate) static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
+    learn(&reaches(), &FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Discrete) })
+});
 pub(crate) static CYCLE: LazyLock<Arc<Model>> =
-    LazyLock::new(|| learn(&cycles(), &FitOptions { styles: Truncation::Given(2).into(), ..options(Kind::Rhythmic) }));
+    LazyLock::new(|| learn(&cycles(), &FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Rhythmic) }));
 
 pub(crate) fn grid(dt: f64, duration: f64) -> TimeGrid {
     TimeGrid { dt, duration: Some(duration) }

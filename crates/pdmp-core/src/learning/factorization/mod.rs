@@ -60,9 +60,9 @@ pub struct Factors {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Truncation {
     /// Exactly so many.
-    Given(usize),
+    Rank(usize),
     /// The fewest whose singular values make up more than this share of the sum of all.
-    Spectrum(f64),
+    Share(f64),
     /// The same share of the singular values that exceed `noise`, and at least five of these, or as many as half of the
     /// demonstrations.
     AboveNoise {
@@ -85,8 +85,8 @@ impl Truncation {
     /// Checks the count against the number of things that limit it.
     pub(crate) fn check(self, most: usize, of: &'static str) -> Result<()> {
         match self {
-            Truncation::Given(n_styles) if n_styles < 1 || n_styles > most => Err(Error::Styles { n_styles, most, of }),
-            Truncation::Spectrum(value) | Truncation::AboveNoise { share: value, .. }
+            Truncation::Rank(n_styles) if n_styles < 1 || n_styles > most => Err(Error::Styles { n_styles, most, of }),
+            Truncation::Share(value) | Truncation::AboveNoise { share: value, .. }
                 if !(value > 0.0 && value <= 1.0) =>
             {
                 Err(Error::Range { name: "spectrum", value, allowed: "must lie in (0, 1]" })
@@ -98,8 +98,8 @@ impl Truncation {
     /// J for these singular values of so many demonstrations.
     pub(crate) fn among(self, singular_values: &[f64], n_demos: usize) -> usize {
         match self {
-            Truncation::Given(n_styles) => n_styles,
-            Truncation::Spectrum(share) => leading(singular_values, share),
+            Truncation::Rank(n_styles) => n_styles,
+            Truncation::Share(share) => leading(singular_values, share),
             Truncation::AboveNoise { noise, share } => {
                 let least = MIN_STYLES.min(n_demos / 2);
                 let floor = noise.max(MIN_RATIO * singular_values.first().copied().unwrap_or(0.0));
@@ -227,7 +227,7 @@ impl<'a> Library<'a> {
     fn factors(&self, styles: Truncation, progress: &mut dyn FnMut(f64) -> Result<()>) -> Result<Factors> {
         let wide = self.wide();
         let k = wide.nrows();
-        if let Truncation::Given(n_styles) = styles
+        if let Truncation::Rank(n_styles) = styles
             && let Some(vectors) = krylov::leading(wide, n_styles, &mut |share| progress(share / 3.0))?
         {
             let (projection, products) = self.measured(vectors, n_styles)?;

@@ -16,7 +16,7 @@ fn of(targets: &Array2<f64>, styles: Truncation) -> Factors {
 /// Every factor, by the way that cannot fail.
 fn exact(targets: &Array2<f64>) -> Factors {
     let library = Library::of(targets.view()).unwrap().unwrap();
-    library.exact(Truncation::Given(targets.nrows().min(targets.ncols())), &mut go).unwrap()
+    library.exact(Truncation::Rank(targets.nrows().min(targets.ncols())), &mut go).unwrap()
 }
 
 fn norm(a: &Array2<f64>) -> f64 {
@@ -91,7 +91,7 @@ fn singular_values_are_those_of_the_construction() {
         for sigma in &cases {
             for scale in [1e-150, 1e-30, 1.0, 1e30, 1e149] {
                 let targets = matrix(rows, columns, sigma) * scale;
-                let (default, exact) = (of(&targets, Truncation::Given(sigma.len())), exact(&targets));
+                let (default, exact) = (of(&targets, Truncation::Rank(sigma.len())), exact(&targets));
                 for (factors, digits) in [(default, 1e-11f64), (exact, 1e-14)] {
                     check(&targets, &factors);
                     for (k, found) in factors.singular_values.iter().enumerate() {
@@ -116,8 +116,7 @@ fn all_shapes_are_factorised() {
         let k = rows.min(columns);
         let targets = Array2::from_shape_fn((rows, columns), |(i, j)| ((i * i * 7 + j * 3 + i * j + 1) as f64).sin());
         check(&targets, &exact(&targets));
-        for styles in [Truncation::Given(1), Truncation::Given(k), Truncation::Spectrum(0.9), Truncation::Spectrum(1.0)]
-        {
+        for styles in [Truncation::Rank(1), Truncation::Rank(k), Truncation::Share(0.9), Truncation::Share(1.0)] {
             check(&targets, &of(&targets, styles));
         }
     }
@@ -130,15 +129,15 @@ fn degenerate_libraries_are_factorised() {
     for rows in [1, 2, 30, 600] {
         let targets = row.broadcast((rows, 500)).unwrap().to_owned();
         for factors in
-            [of(&targets, Truncation::Spectrum(0.9)), of(&targets, Truncation::Given(rows.min(500))), exact(&targets)]
+            [of(&targets, Truncation::Share(0.9)), of(&targets, Truncation::Rank(rows.min(500))), exact(&targets)]
         {
             check(&targets, &factors);
             let rounding = (factors.singular_values.len() as f64 * f64::EPSILON).sqrt();
             assert!(factors.singular_values.iter().skip(1).all(|&s| s < rounding * factors.singular_values[0]));
             assert!(factors.basis.axis_iter(Axis(1)).skip(3).step_by(7).all(|column| column.iter().all(|&x| x == 0.0)));
         }
-        assert_eq!(of(&targets, Truncation::Spectrum(1.0)).styles.ncols(), 1);
-        let still = of(&Array2::zeros((rows, 500)), Truncation::Spectrum(0.9));
+        assert_eq!(of(&targets, Truncation::Share(1.0)).styles.ncols(), 1);
+        let still = of(&Array2::zeros((rows, 500)), Truncation::Share(0.9));
         check(&Array2::zeros((rows, 500)), &still);
         assert_eq!(still.styles.ncols(), 1);
     }
@@ -150,7 +149,7 @@ fn few_leading_factors_are_those_of_all() {
     for (rows, columns) in [(300, 500), (500, 300), (260, 2000)] {
         for sigma in [decaying(260, 0.8), decaying(260, 0.2), vec![3.0, 2.0, 1.0, 0.5, 0.2], decaying(12, 1e-3)] {
             let targets = matrix(rows, columns, &sigma);
-            let (few, all) = (of(&targets, Truncation::Given(5)), exact(&targets));
+            let (few, all) = (of(&targets, Truncation::Rank(5)), exact(&targets));
             assert_eq!(few.singular_values.len(), 5, "not by the leading way");
             check(&targets, &few);
             for j in 0..5 {
@@ -204,7 +203,7 @@ fn slow_and_clustered_spectra_end_well() {
         let mut sorted = sigma.clone();
         sorted.sort_by(|a, b| b.total_cmp(a));
         for n_styles in [1, 4, 6] {
-            let factors = of(&targets, Truncation::Given(n_styles));
+            let factors = of(&targets, Truncation::Rank(n_styles));
             check(&targets, &factors);
             let least = sorted[n_styles..].iter().map(|s| s * s).sum::<f64>().sqrt();
             assert!((factors.error - least).abs() < 1e-6 * norm(&targets));
@@ -223,7 +222,7 @@ fn the_share_of_the_spectrum_decides() {
             let sigma = decaying(90, ratio);
             let targets = matrix(rows, columns, &sigma);
             for share in [0.5, 0.9, 0.999] {
-                let factors = of(&targets, Truncation::Spectrum(share));
+                let factors = of(&targets, Truncation::Share(share));
                 check(&targets, &factors);
                 assert_eq!(factors.styles.ncols(), leading(&sigma, share));
                 assert_eq!(factors.singular_values.len(), rows.min(columns));
@@ -285,7 +284,7 @@ fn small_singular_values_are_not_taken_from_the_gram_matrix() {
 #[test]
 fn factorising_can_be_interrupted() {
     let targets = matrix(300, 400, &decaying(300, 0.99));
-    for styles in [Truncation::Given(5), Truncation::Given(300), Truncation::Spectrum(0.9)] {
+    for styles in [Truncation::Rank(5), Truncation::Rank(300), Truncation::Share(0.9)] {
         let mut asked = 0;
         Factors::of(targets.view(), styles, &mut |share| {
             assert!((0.0..=1.0).contains(&share));
@@ -311,7 +310,7 @@ fn the_answer_is_always_the_same() {
     for sigma in [decaying(300, 0.7), decaying(300, 0.99)] {
         let targets = matrix(300, 400, &sigma);
         let turned = targets.t().as_standard_layout().into_owned();
-        for styles in [Truncation::Given(5), Truncation::Spectrum(0.9)] {
+        for styles in [Truncation::Rank(5), Truncation::Share(0.9)] {
             let first = of(&targets, styles);
             for again in [of(&targets, styles), Factors::of(turned.t(), styles, &mut go).unwrap()] {
                 assert_eq!(
@@ -336,8 +335,7 @@ fn spectrum_rule_is_the_papers() {
 #[test]
 fn style_counts_outside_the_data_are_refused() {
     let targets = matrix(5, 40, &decaying(5, 0.5));
-    for count in [Truncation::Given(0), Truncation::Given(6), Truncation::Spectrum(0.0), Truncation::Spectrum(f64::NAN)]
-    {
+    for count in [Truncation::Rank(0), Truncation::Rank(6), Truncation::Share(0.0), Truncation::Share(f64::NAN)] {
         assert!(Factors::of(targets.view(), count, &mut go).is_err());
     }
 }
@@ -347,10 +345,10 @@ fn targets_that_are_not_numbers_are_refused() {
     for value in [f64::NAN, f64::INFINITY, -1e151] {
         let mut targets = Array2::ones((5, 40));
         targets[[3, 7]] = value;
-        let error = Factors::of(targets.view(), Truncation::Given(1), &mut go).unwrap_err().to_string();
+        let error = Factors::of(targets.view(), Truncation::Rank(1), &mut go).unwrap_err().to_string();
         assert!(error.contains("targets[3, 7]"), "{error}");
     }
-    assert!(Factors::of(Array2::zeros((0, 4)).view(), Truncation::Spectrum(0.9), &mut go).is_err());
+    assert!(Factors::of(Array2::zeros((0, 4)).view(), Truncation::Share(0.9), &mut go).is_err());
 }
 
 proptest! {
@@ -365,7 +363,7 @@ proptest! {
         let right = Array2::from_shape_fn((rank, columns), |(r, j)| pick(1021 + r * columns + j));
         let targets = left.dot(&right) * 10f64.powi(exponent);
         let k = rows.min(columns);
-        for styles in [Truncation::Given(1 + rank % k), Truncation::Given(k), Truncation::Spectrum(share)] {
+        for styles in [Truncation::Rank(1 + rank % k), Truncation::Rank(k), Truncation::Share(share)] {
             check(&targets, &of(&targets, styles));
         }
         if targets.iter().any(|&x| x != 0.0) {
@@ -394,7 +392,7 @@ fn graded_libraries_have_a_triangle_of_products() {
             assert!(sigma[sigma.len() - 1] < 1e-8, "{sigma:?}");
             continue;
         };
-        let n_styles = Truncation::Given(sigma.len());
+        let n_styles = Truncation::Rank(sigma.len());
         let factors = library.of_triangle(n_styles, triangle.as_ref(), Some(gram.vectors.as_ref())).unwrap();
         check(&targets, &factors);
         for (j, sigma) in sigma.iter().enumerate() {
@@ -413,5 +411,5 @@ fn vanishing_rows_have_no_triangle_of_products() {
     let library = Library::of(targets.view()).unwrap().unwrap();
     let gram = Gram::of(library.wide(), &mut go).unwrap().unwrap();
     assert!(gram.triangle(library.wide(), &mut go).unwrap().is_none());
-    check(&targets, &of(&targets, Truncation::Given(6)));
+    check(&targets, &of(&targets, Truncation::Rank(6)));
 }

@@ -115,7 +115,7 @@ impl<'a> StyleSelection<'a> {
         let of = |rows: &Array2<f64>| rows.select(Axis(0), kept);
         let sizes = ArrayView1::from(&self.factors.singular_values[..self.factors.styles.ncols()]);
         let weights = of(&self.factors.styles) * sizes;
-        let styles = Factors::of(weights.view(), Truncation::Spectrum(1.0), &mut |_| Ok(()))?.styles;
+        let styles = Factors::of(weights.view(), Truncation::Share(1.0), &mut |_| Ok(()))?.styles;
         let moved = self.moved.select(Axis(0), kept);
         let response = |style: ArrayView1<f64>| Zip::from(moved.lanes(Axis(0))).map_collect(|lane| lane.dot(&style));
         let (n_samples, n_dofs) = (self.start.len(), self.shown.starts.ncols());

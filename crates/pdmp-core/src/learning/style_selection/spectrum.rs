@@ -85,7 +85,7 @@ pub(crate) fn noise_limit(
     targets.carry(transport, constants.attractor, constants.canonical);
     targets.scale(dof_scale);
     let squares: f64 = targets.forcing.iter().map(|f| f * f).sum();
-    let factors = Factors::of(targets.forcing.view(), Truncation::Given(1), &mut |_| Ok(()))?;
+    let factors = Factors::of(targets.forcing.view(), Truncation::Rank(1), &mut |_| Ok(()))?;
     let norm = (squares / n_rows as f64).sqrt();
     let growth = (n_demos as f64 / n_rows as f64).sqrt();
     let largest = norm + (factors.singular_values[0] - norm) * growth;

@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 use crate::model::Model;
 
 /// Version of the file's layout.
-const SCHEMA: u32 = 5;
+const SCHEMA: u32 = 6;
 /// The metadata key.
 const KEY: &str = "pdmp";
 /// Largest file that is read, in bytes.
@@ -60,7 +60,7 @@ struct Constants {
     /// Bound of the slopes, where time was warped.
     slope: Option<f64>,
     truncation_error: f64,
-    basis: String,
+    regression: String,
     table_error: f64,
     map: Option<Map>,
 }

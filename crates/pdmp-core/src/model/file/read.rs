@@ -110,7 +110,7 @@ impl Reader<'_> {
         let bad = |reason: &str| Error::File(reason.to_string());
         let kind = constants.canonical.kind();
         let [n_demos, n_styles] = self.shape("styles")?;
-        let [n_knots, _, n_dofs] = self.shape("landscape.values")?;
+        let [n_knots, _, n_dofs] = self.shape("forcing_table.values")?;
         let [n_values] = self.shape("singular_values")?;
         let [_, n_segments] = self.shape("segment_durations")?;
         if n_segments == 0 || n_demos == 0 || n_styles == 0 || n_dofs == 0 || n_values < n_styles {
@@ -119,7 +119,7 @@ impl Reader<'_> {
         if !(2..=MAX_CELLS + 1).contains(&n_knots)
             || [&constants.names, &constants.units].iter().any(|labels| labels.len() != n_dofs)
         {
-            return Err(bad("the landscape does not fit the rest"));
+            return Err(bad("the forcing table does not fit the rest"));
         }
         if constants.nominal >= n_demos || constants.n_samples < crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION {
             return Err(bad("nominal or n_samples is out of range"));
@@ -131,9 +131,9 @@ impl Reader<'_> {
             None => None,
         };
         let knots = |name| self.array(name, &[n_knots, n_styles, n_dofs]);
-        let (values, slopes) = (knots("landscape.values")?, knots("landscape.slopes")?);
+        let (values, slopes) = (knots("forcing_table.values")?, knots("forcing_table.slopes")?);
         let knots = KnotTable { n_outputs: n_styles * n_dofs, values, slopes };
-        let landscape = ForcingTable::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
+        let forcing_table = ForcingTable::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
         let [n_coefficients] = self.shape("transport")?;
         let transport = self.array("transport", &[n_coefficients])?;
         let transport = Transport::from_coefficients(transport, constants.canonical)
@@ -175,9 +175,9 @@ impl Reader<'_> {
         }
         let (map, residual_variance) = match &constants.map {
             Some(map) => {
-                let residual_variance = self.matrix("left_over", (kind.samples(STEPS), n_dofs))?;
+                let residual_variance = self.matrix("residual_variance", (kind.samples(STEPS), n_dofs))?;
                 if residual_variance.iter().any(|x| *x < 0.0) {
-                    return Err(bad("left_over holds no variances"));
+                    return Err(bad("residual_variance holds no variances"));
                 }
                 (Some(self.map(map, &demonstrated, kind)?), Some(residual_variance))
             }
@@ -192,11 +192,11 @@ impl Reader<'_> {
             truncation_error: constants.truncation_error,
             residual_variance,
             findings: Vec::new(),
-            basis: constants.basis.clone(),
+            regression: constants.regression.clone(),
         };
         let primitive = Primitive::new(Parts {
             attractor: Attractor { alpha_z: constants.alpha_z, beta_z: constants.beta_z },
-            landscape,
+            forcing_table,
             transport,
             braking,
             tau: constants.tau,
@@ -276,7 +276,7 @@ impl Reader<'_> {
 fn limit(name: &str) -> f64 {
     match name {
         "styles" => MAX_STYLE_MAGNITUDE,
-        "left_over" => LARGEST * LARGEST,
+        "residual_variance" => LARGEST * LARGEST,
         _ => LARGEST,
     }
 }

@@ -40,8 +40,8 @@ impl Model {
             n_samples: self.learnt.n_samples,
             slope: self.learnt.template.as_ref().map(|template| template.slope),
             truncation_error: self.learnt.truncation_error,
-            basis: self.learnt.basis.clone(),
-            table_error: self.landscape.error(),
+            regression: self.learnt.regression.clone(),
+            table_error: self.forcing_table.error(),
             map: self.map.as_ref().map(Map::of),
         };
         let arrays: Vec<(&str, Vec<usize>, Vec<u8>)> = self
@@ -65,8 +65,8 @@ impl Model {
 
     pub(super) fn arrays(&self) -> Vec<Array> {
         let demonstrated = &self.demonstrated;
-        let KnotTable { values, slopes, .. } = self.landscape.knots();
-        let knots = vec![self.landscape.cells() + 1, self.n_styles(), self.n_dofs()];
+        let KnotTable { values, slopes, .. } = self.forcing_table.knots();
+        let knots = vec![self.forcing_table.cells() + 1, self.n_styles(), self.n_dofs()];
         // 0 where every sample is met.
         let cut_offs: Vec<f64> = self.learnt.noise.cut_offs().iter().map(|hz| hz.unwrap_or(0.0)).collect();
         let mut arrays = vec![
@@ -82,8 +82,8 @@ impl Model {
             vector("noise.levels", self.learnt.noise.levels()),
             vector("noise.cut_offs", &cut_offs),
             vector("transport", self.transport.coefficients()),
-            ("landscape.values", knots.clone(), values),
-            ("landscape.slopes", knots, slopes),
+            ("forcing_table.values", knots.clone(), values),
+            ("forcing_table.slopes", knots, slopes),
         ];
         if let Some(template) = &self.learnt.template {
             arrays.push(vector("template.unit", &template.unit));
@@ -99,7 +99,10 @@ impl Model {
                 arrays.push(("map.weights", vec![2, 2], [*inside, *outside].concat()));
             }
             arrays.extend(
-                self.learnt.residual_variance.as_ref().map(|residual_variance| matrix("left_over", residual_variance)),
+                self.learnt
+                    .residual_variance
+                    .as_ref()
+                    .map(|residual_variance| matrix("residual_variance", residual_variance)),
             );
         }
         arrays

@@ -31,15 +31,15 @@ impl Forcing {
     /// Reads a group at a place, for a style s and, while it is on its way, ṡ.
     #[inline(always)]
     fn read<T: Register>(
-        landscape: &ForcingTable,
+        forcing_table: &ForcingTable,
         place: TableIndex,
         group: usize,
         s: &[f64],
         rate: Option<&[f64]>,
     ) -> Self {
         let [along, swing] = match rate {
-            Some(rate) => landscape.blend_both::<T>(place, group, [s, rate]),
-            None => [landscape.blend(place, group, s), CubicSample::default()],
+            Some(rate) => forcing_table.blend_both::<T>(place, group, [s, rate]),
+            None => [forcing_table.blend(place, group, s), CubicSample::default()],
         };
         Self { shape: along.value.store(), slope: along.slope.store(), swing: swing.value.store() }
     }
@@ -116,7 +116,7 @@ impl Controller {
         self.time.add(dt);
         // What has settled stays settled, unless it is pushed or commanded.
         if self.status == Status::Working || self.held.push().is_some() {
-            let past = self.model.landscape().is_past(self.clock.value());
+            let past = self.model.forcing_table().is_past(self.clock.value());
             self.status = if past { self.settled() } else { Status::Working };
         }
         self.status
@@ -197,7 +197,7 @@ impl Controller {
         if h != self.propagator.step() {
             self.propagator = self.series.propagator::<T>(h);
         }
-        let demonstrated = !self.model.landscape().is_past(self.clock.value());
+        let demonstrated = !self.model.forcing_table().is_past(self.clock.value());
         let levers = self.held.push().map(|_| self.levers());
         let before = if demonstrated { self.gate_within() } else { self.gate() };
         for (from, forcing) in self.from.iter_mut().zip(&self.forcing) {
@@ -229,8 +229,8 @@ impl Controller {
         let after = if demonstrated { self.gate_within() } else { self.gate() };
 
         let (model, propagator) = (&*self.model, &self.propagator);
-        let (landscape, attractor, clock) = (model.landscape(), model.attractor(), self.clock.value());
-        let place = if demonstrated { landscape.place_within(clock) } else { landscape.place(clock) };
+        let (forcing_table, attractor, clock) = (model.forcing_table(), model.attractor(), self.clock.value());
+        let place = if demonstrated { forcing_table.place_within(clock) } else { forcing_table.place(clock) };
         let style = unpack(self.style.value(), model.n_styles());
         let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
         let (n, rest, nominal) = (self.forcing.len(), T::splat(self.rest), model.tau());
@@ -240,7 +240,7 @@ impl Controller {
         let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
         for group in 0..n {
             let from = CubicSample { value: T::load(&starts[group].value), slope: T::load(&starts[group].slope) };
-            forcing[group] = Forcing::read::<T>(landscape, place, group, style, swing);
+            forcing[group] = Forcing::read::<T>(forcing_table, place, group, style, swing);
             let to = after.jet(&forcing[group]);
 
             let (goal, way) = (T::load(&centre.value()[group]), T::load(&way[group]));
@@ -263,7 +263,7 @@ impl Controller {
             let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, carried(to, way, carry));
             (velocity[group], acceleration[group]) = (speed.store(), change.store());
         }
-        landscape.prefetch(clock + self.lead * self.held.pace() * h);
+        forcing_table.prefetch(clock + self.lead * self.held.pace() * h);
         if let Some(before) = levers {
             self.add_perturbation(before);
             self.read_out();
@@ -301,7 +301,7 @@ impl Controller {
     #[inline(always)]
     pub(super) fn gate(&self) -> Gate {
         let within = self.gate_within();
-        match self.model.landscape().fading(self.clock.value()) {
+        match self.model.forcing_table().fading(self.clock.value()) {
             Some(Fade { value, growth, along, .. }) => {
                 let [along, growth] = [along, growth].map(|slope| self.held.pace() * slope);
                 Gate { r: value, along, swing: value * within.swing, growth, ..within }
@@ -336,10 +336,10 @@ impl Controller {
 
     /// Reads the forcing at the clock.
     pub(super) fn read_forcing(&mut self) {
-        let (model, place) = (&self.model, self.model.landscape().place(self.clock.value()));
+        let (model, place) = (&self.model, self.model.forcing_table().place(self.clock.value()));
         let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, model.n_styles()));
         for (group, forcing) in self.forcing.iter_mut().enumerate() {
-            *forcing = Forcing::read::<F64x4>(model.landscape(), place, group, style, Some(swing));
+            *forcing = Forcing::read::<F64x4>(model.forcing_table(), place, group, style, Some(swing));
         }
     }
 
@@ -367,12 +367,12 @@ impl Controller {
     /// left of its way, of its speed at critical damping, and of its forcing, be it of the style that is on its way, and
     /// as far as the goal itself still goes.
     fn settled(&self) -> Status {
-        let Some(fade) = self.model.landscape().fading(self.clock.value()) else {
+        let Some(fade) = self.model.forcing_table().fading(self.clock.value()) else {
             return Status::Working;
         };
         let Attractor { alpha_z, beta_z } = self.model.attractor();
-        let (landscape, target) = (self.model.landscape(), unpack(self.style.target(), self.model.n_styles()));
-        let place = landscape.place(self.clock.value());
+        let (forcing_table, target) = (self.model.forcing_table(), unpack(self.style.target(), self.model.n_styles()));
+        let place = forcing_table.place(self.clock.value());
         let over = (0..self.z.len()).all(|group| {
             let way = (self.position[group] - self.centre.target()[group]).abs();
             let Forcing { shape, slope, .. } = self.forcing[group];
@@ -380,7 +380,7 @@ impl Controller {
             let flow = (self.z[group] + forcing).abs() * (2.0 / alpha_z);
             let mut push = fade.push(CubicSample { value: shape, slope });
             if !self.style.settled() {
-                push = push.max(fade.push(landscape.blend(place, group, target)));
+                push = push.max(fade.push(forcing_table.blend(place, group, target)));
             }
             let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, group);
             left.simd_le(self.tolerance[group]).all()
