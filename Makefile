@@ -1,5 +1,5 @@
 # Everything runs in .venv, which each target sets up as far as it needs. A stamp .venv/extension says that the extension
-# was built from the present sources, and .venv/with-EXTRA that what an extra requires is installed beside it.
+# was built from the present sources, and .venv/with-GROUP that the dependency group GROUP is installed beside it.
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -13,8 +13,8 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 # The robot's model is read from a wheel whose dependencies are not needed.
 ROBOT := robosuite==1.5.2
-# Recordings of people walking, where they are at hand, for Fig. 5.
-WALKS := $(wildcard ../shared/data/walk_styles_bandai/demos)
+# Recordings of people walking, for Fig. 5, if PDMP_DATA names a folder of recordings that has them.
+WALKS := $(if $(PDMP_DATA),$(wildcard $(PDMP_DATA)/walk_styles_bandai/demos))
 
 # Seconds of `make fuzz` for each target.
 TIME ?= 60
@@ -28,11 +28,11 @@ SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 .PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases report rtsan fuzz asan licences capi header \
 	clean needs
 
-demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to demo/
-	$(BIN)/pdmp demo -o demo
+demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
+	$(BIN)/python -m reproduction.demo -o out/demo
 
-reproduce: .venv/with-reproduce  ## The paper's figures, on a simulated robot, into reproduction/
-	$(BIN)/pdmp reproduce all -o reproduction $(if $(WALKS),--recordings $(WALKS))
+reproduce: .venv/with-reproduction  ## The paper's figures, on a simulated robot, into out/reproduction/
+	$(BIN)/python -m reproduction all -o out/reproduction $(if $(WALKS),--recordings $(WALKS))
 
 test: .venv/with-test  ## Runs every test, Rust and Python
 	cargo test --release --workspace
@@ -41,12 +41,14 @@ test: .venv/with-test  ## Runs every test, Rust and Python
 check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, stubs against the module, and licences
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
+	cargo clippy --release --package pdmp-core --no-default-features -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --release --no-deps --package pdmp-core
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/stubtest pdmp._native
 	$(PYTHON) .ci/licences.py
+	$(PYTHON) .ci/runtime.py
 
 bench: | needs  ## Times, latencies and instructions of the core
 	cargo bench --package pdmp-core
@@ -57,10 +59,10 @@ bench-peers: .venv/with-peers  ## The same work done by pdmp and by its peers, o
 bench-scaling: .venv/with-peers  ## Draws how the time to learn grows with the data, into docs/scaling.png
 	OMP_NUM_THREADS=1 $(BIN)/python benches/scaling.py
 
-bench-bases: .venv/with-demo  ## How well each basis reproduces and foresees the recordings at hand
+bench-bases: .venv/with-demo  ## How well each basis reproduces and predicts the recordings in PDMP_DATA
 	OMP_NUM_THREADS=1 $(BIN)/python benches/bases.py
 
-report: .venv/with-test  ## How well movements are foreseen from their context, on the recordings at hand; figures into report/
+report: .venv/with-test  ## How well movements are foreseen from their context, on the recordings in PDMP_DATA; figures into out/report/
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report
 
 # The sanitizer may not touch build scripts, which a named target spares. A compiler without it says why.
@@ -103,12 +105,12 @@ header: | needs  ## Makes pdmp.h anew from the sources of the C ABI
 
 clean:  ## Removes what the targets above made
 	cargo clean
-	rm -rf .venv demo reproduction report dist fuzz/found python/pdmp/_native*.so
+	rm -rf .venv out dist fuzz/found python/pdmp/_native*.so
 
 .venv/with-%: .venv/extension
 	@$(BIN)/python .ci/requirements.py $* > .venv/requirements-$*.txt
 	$(BIN)/pip install --quiet --no-warn-conflicts --requirement .venv/requirements-$*.txt
-	$(if $(filter reproduce test dev,$*),$(BIN)/pip install --quiet --no-deps $(ROBOT))
+	$(if $(filter reproduction test dev,$*),$(BIN)/pip install --quiet --no-deps $(ROBOT))
 	@touch $@
 
 .venv/extension: $(SOURCES) | $(BIN)/python

@@ -38,13 +38,13 @@ applies to. Made by .ci/licences.py --write.
 
 
 def cargo(*arguments: str) -> str:
-    """Return what cargo prints; it reads Cargo.lock and does not change it."""
+    """Returns the output of cargo, which does not change Cargo.lock."""
     command = ["cargo", *arguments, "--locked"]
     return subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
 def linked() -> list[dict[str, Any]]:
-    """Return the crates of others that the libraries contain, as cargo describes them."""
+    """Returns the crates of others that the libraries contain, as cargo describes them."""
     target = "x86_64-unknown-linux-gnu"
     packages = [argument for package in PACKAGES for argument in ("-p", package)]
     options = ["-e", "normal,no-proc-macro", "--prefix", "none", "-f", "{p}", "--target", target]
@@ -61,7 +61,7 @@ def linked() -> list[dict[str, Any]]:
 
 
 def chosen(crate: dict[str, Any]) -> list[str] | None:
-    """Return the licences chosen from those that a crate offers, or None if one is not allowed."""
+    """Returns the licences chosen from those that a crate offers, or None if one is not allowed."""
     found = []
     for part in re.split(r"\s+AND\s+", crate["license"] or ""):
         offered = re.split(r"\s+OR\s+|/", part.strip("() "))
@@ -73,7 +73,7 @@ def chosen(crate: dict[str, Any]) -> list[str] | None:
 
 
 def texts(crate: dict[str, Any], licence: str) -> list[str]:
-    """Return the texts of a licence, and notices, in the source of a crate."""
+    """Returns the texts of a licence, and notices, in the source of a crate."""
     folder = Path(crate["manifest_path"]).parent
     files = [
         path
@@ -89,7 +89,7 @@ def texts(crate: dict[str, Any], licence: str) -> list[str]:
 
 
 def standard(crate: dict[str, Any], licence: str) -> str:
-    """Return the standard text of a licence for a crate that names it but has no copy."""
+    """Returns the standard text of a licence for a crate that names it but has no copy."""
     if licence == "Apache-2.0":
         return (ROOT / "LICENSE-APACHE").read_text(encoding="utf-8").strip()
     if licence == "MIT":
@@ -100,7 +100,7 @@ def standard(crate: dict[str, Any], licence: str) -> str:
 
 
 def collected(crates: list[dict[str, Any]]) -> str:
-    """Return all texts, each once, after the crates that it applies to."""
+    """Returns all texts, each once, after the crates that it applies to."""
     groups: dict[str, list[str]] = defaultdict(list)
     whole: dict[str, str] = {}
     for crate in crates:
@@ -118,7 +118,7 @@ def collected(crates: list[dict[str, Any]]) -> str:
 
 
 def main() -> int:
-    """Check or write, and return 1 if something is not as it must be."""
+    """Checks or writes, and returns 1 if a check fails."""
     crates = linked()
     wrong = [
         f"{crate['name']} {crate['version']}: {problem}"

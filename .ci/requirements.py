@@ -1,4 +1,7 @@
-"""Print what an extra of the package requires, one requirement a line, nested extras resolved."""
+"""Prints the requirements of a dependency group, one a line, with groups and extras resolved.
+
+pip reads dependency groups from version 25.1 on only, and would look for `pdmp[plot]` in an index.
+"""
 
 import re
 import sys
@@ -6,19 +9,22 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
-PROJECT = Path(__file__).parents[1] / "pyproject.toml"
-EXTRAS = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+PROJECT = tomllib.loads(Path(__file__).parents[1].joinpath("pyproject.toml").read_text("utf-8"))
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+GROUPS = PROJECT["dependency-groups"]
 
 
-def requirements(extra: str) -> Iterator[str]:
-    """Give the requirements of an extra."""
-    for line in EXTRAS[extra]:
-        if nested := re.fullmatch(r"pdmp\[(.*)\]", line):
-            for other in nested[1].split(","):
-                yield from requirements(other.strip())
+def requirements(lines: list[str | dict[str, str]]) -> Iterator[str]:
+    """Yields the requirements that the lines of a group or an extra stand for."""
+    for line in lines:
+        if isinstance(line, dict):
+            yield from requirements(GROUPS[line["include-group"]])
+        elif own := re.fullmatch(r"pdmp\[(.*)\]", line):
+            for extra in own[1].split(","):
+                yield from requirements(EXTRAS[extra.strip()])
         else:
             yield line
 
 
 if __name__ == "__main__":
-    print("\n".join(dict.fromkeys(requirements(sys.argv[1]))))
+    print("\n".join(dict.fromkeys(requirements(GROUPS[sys.argv[1]]))))

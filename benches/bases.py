@@ -15,7 +15,7 @@ import numpy as np
 
 import pdmp
 from peers.arena import machine
-from recordings import Group, groups
+from recordings import Group, groups, sources
 
 KERNELS = ("matern32", "matern52", "squared_exponential")
 SIZES = (20, 35, 50, 75, 100, 150, 200)
@@ -26,7 +26,7 @@ Basis = pdmp.GP | pdmp.NGnet
 
 
 def named(*bases: Basis) -> dict[str, Basis]:
-    """Return regressors by name."""
+    """Returns regressors by name."""
     return {
         f"GP, {basis.kernel}"
         if isinstance(basis, pdmp.GP)
@@ -76,7 +76,7 @@ class Score:
 
 
 def score(group: Group, basis: Basis) -> Score:
-    """Learn a group with a basis, and try it."""
+    """Learns a group with a basis, and tries it."""
     begin = perf_counter()
     model = pdmp.fit(
         group.demos, kind=group.kind, n_styles=len(group.demos), basis=basis, smoothing=None
@@ -86,7 +86,7 @@ def score(group: Group, basis: Basis) -> Score:
 
 
 def reproduction(model: pdmp.Model, group: Group) -> list[float]:
-    """Return the RMSE over range of every demonstration, rolled out as it was shown."""
+    """Returns the RMSE over range of every demonstration, rolled out in its own conditions."""
     errors = []
     for m, demo in enumerate(group.demos):
         made = model.rollout(**pdmp.as_demonstrated(model, m), dt=model.durations[m] / FINE)
@@ -98,7 +98,7 @@ def reproduction(model: pdmp.Model, group: Group) -> list[float]:
 
 
 def foresight(group: Group, basis: Basis) -> tuple[float, float]:
-    """Return RMSE over range and log density of every second sample, given the others."""
+    """Returns RMSE over range and log density of every second sample, given the others."""
     u, factors, extent = targets(group)
     periodic = group.kind == "rhythmic"
     shown = slice(0, None, 2)
@@ -117,7 +117,7 @@ def foresight(group: Group, basis: Basis) -> tuple[float, float]:
 
 
 def left_out(net: pdmp.NGnet, u: np.ndarray, targets: np.ndarray, periodic: bool) -> np.ndarray:
-    """Return by how much a network misses each sample that it is not shown (C, P).
+    """Returns the leave-one-out residuals (C, P) of a network.
 
     It is linear, f̂ = Hf, and so misses sample i by (fᵢ − f̂ᵢ)/(1 − Hᵢᵢ) without it.
     """
@@ -127,14 +127,14 @@ def left_out(net: pdmp.NGnet, u: np.ndarray, targets: np.ndarray, periodic: bool
 
 
 def rmse(error: np.ndarray, group: Group) -> float:
-    """Return the RMSE over demonstrations: with orthonormal styles, the factors' squares add up."""
+    """Returns the RMSE over demonstrations: squares of factors of orthonormal styles add up."""
     n_values = len(error) * len(group.demos) * group.demos[0].n_dofs
     return float(np.sqrt(np.sum(error**2) / n_values))
 
 
 @cache
 def targets(group: Group) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the clock (C,), the basis targets (C, J·D) and the largest range of the targets.
+    """Returns the clock (C,), the basis targets (C, J·D) and the largest range of the targets.
 
     A rough process with the least noise goes through every target, and so its landscape gives them
     back.
@@ -155,7 +155,7 @@ def targets(group: Group) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def over_sets(scores: dict[Group, Score]) -> list[str]:
-    """Return the figures of one basis: medians over sets, worst of all, median time."""
+    """Returns the figures of one basis: medians over sets, worst of all, median time."""
     sets = defaultdict(list)
     for group, found in scores.items():
         sets[group.source].append(found)
@@ -175,13 +175,13 @@ def over_sets(scores: dict[Group, Score]) -> list[str]:
 
 
 def table(names: list[str], rows: list[list[str]]) -> list[str]:
-    """Write a table in Markdown: names at the left, figures at the right."""
+    """Writes a table in Markdown: names at the left, figures at the right."""
     align = ["---"] * len(names) + ["---:"] * len(FIGURES)
     return [f"| {' | '.join(row)} |" for row in [[*names, *FIGURES], align, *rows]] + [""]
 
 
 def report(scores: dict[str, dict[Group, Score]]) -> str:
-    """Write everything that was found."""
+    """Returns the report in Markdown."""
     seen = list(next(iter(scores.values())))
     lines = ["# Bases, compared on recordings", ""]
     lines.append(
@@ -207,11 +207,12 @@ def report(scores: dict[str, dict[Group, Score]]) -> str:
             of_set = {group: s for group, s in scores[name].items() if group.source == source}
             rows.append([source, name, *over_sets(of_set)])
     lines += table(["set", "basis"], rows)
+    lines += [sources(dict.fromkeys(group.source for group in seen)), ""]
     return "\n".join(lines)
 
 
 def main() -> None:
-    """Score every basis on every group, and print or write the tables."""
+    """Scores every basis on every group, and prints or writes the tables."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--write", action="store_true", help="write docs/bases.md")
     write = arguments.parse_args().write

@@ -10,10 +10,9 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use ndarray::Array2;
-use pdmp_core::basis::{Basis, NGnet};
-use pdmp_core::{
-    Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Motion, Sampling, StyleCount, fit,
-};
+use pdmp_core::learning::StyleCount;
+use pdmp_core::learning::regression::{Basis, NGnet};
+use pdmp_core::{Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Motion, Sampling, fit};
 
 /// Degrees of freedom D that are measured.
 pub(crate) const N_DOFS: [usize; 5] = [1, 4, 7, 14, 32];
@@ -76,7 +75,7 @@ pub(crate) struct ControlLoop {
 
 impl ControlLoop {
     pub(crate) fn new(model: &Arc<Model>, told: Told) -> Self {
-        let controller = Controller::new(Arc::clone(model), DT, &Conditions::default(), None).expect("a controller");
+        let controller = Controller::new(model.primitive(), DT, &Conditions::default(), None).expect("a controller");
         // A τ that is never below the model's keeps the measured second within the demonstrations.
         let target = |m: usize, tau: f64| Target {
             style: model.demonstrated().styles.row(m).to_vec(),
@@ -145,5 +144,5 @@ pub(crate) fn primitive(n_dofs: usize, n_styles: usize) -> Arc<Model> {
     let demos: Vec<_> = (0..10).map(demonstration).collect();
     let basis = Basis::NGnet(NGnet::default());
     let options = FitOptions { styles: StyleCount::Given(n_styles).into(), basis, ..FitOptions::new(Kind::Discrete) };
-    Arc::new(fit(&demos, &options, &mut |_, _| Ok(())).expect("a fit"))
+    Arc::new(fit(&demos, &options).expect("a fit"))
 }

@@ -9,11 +9,15 @@ use std::sync::Arc;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use movements::movements;
 use ndarray::{Array2, Array3};
-use pdmp_core::basis::{Basis, Domain, Gp, Kernel, NGnet};
-use pdmp_core::{
-    BatchConditions, Conditions, Derivative, FitOptions, Kind, Model, Smoothing, StyleCount, Threads, Timing, Variable,
-    fit,
-};
+use pdmp_core::learning::StyleCount;
+use pdmp_core::learning::regression::{Basis, Domain, Gp, Kernel, NGnet};
+use pdmp_core::model::Derivative;
+use pdmp_core::motion::batch;
+use pdmp_core::motion::jacobian;
+use pdmp_core::motion::{BatchConditions, Timing, Variable};
+use pdmp_core::numerics::{Smoothing, Threads};
+use pdmp_core::rollout;
+use pdmp_core::{Conditions, FitOptions, Kind, Model, fit};
 
 fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
     let mut options = FitOptions { styles: StyleCount::Given(3).into(), basis, ..FitOptions::new(Kind::Discrete) };
@@ -24,7 +28,7 @@ fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
 fn learn(n_styles: usize) -> Arc<Model> {
     let options = options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate);
     let options = FitOptions { styles: StyleCount::Given(n_styles).into(), ..options };
-    Arc::new(fit(&movements(40, 1001), &options, &mut |_, _| Ok(())).expect("a fit"))
+    Arc::new(fit(&movements(40, 1001), &options).expect("a fit"))
 }
 
 fn fits(criterion: &mut Criterion) {
@@ -37,7 +41,7 @@ fn fits(criterion: &mut Criterion) {
         ("gp", Basis::Gp(Gp::default()), Smoothing::Interpolate),
     ] {
         let options = options(basis, smoothing);
-        group.bench_function(name, |bench| bench.iter(|| fit(&demos, &options, &mut |_, _| Ok(()))));
+        group.bench_function(name, |bench| bench.iter(|| fit(&demos, &options)));
     }
     group.finish();
 }
@@ -93,12 +97,12 @@ fn rollouts(criterion: &mut Criterion) {
     let model = learn(3);
     let mut group = criterion.benchmark_group("1 s at 1 kHz, D=7");
     group.sample_size(20);
-    group.bench_function("rollout", |bench| bench.iter(|| model.rollout(&Conditions::default(), timing)));
+    group.bench_function("rollout", |bench| bench.iter(|| rollout(model.primitive(), &Conditions::default(), timing)));
     for n_styles in [3, 35] {
         let model = learn(n_styles);
         let styles = Array2::from_shape_fn((1000, n_styles), |(b, j)| (b + j) as f64 / 1000.0);
         let conditions = BatchConditions { styles, ..BatchConditions::default() };
-        let batch = model.batch(conditions, timing, &mut |_| Ok(())).expect("a batch");
+        let batch = batch(model.primitive(), conditions, timing, &mut |_| Ok(())).expect("a batch");
         let mut outputs = [(); 2].map(|()| Array3::zeros(batch.shape()));
         for n_threads in [1, 2] {
             let threads = Threads::new(n_threads).expect("some");
@@ -115,7 +119,7 @@ fn rollouts(criterion: &mut Criterion) {
     }
     let jacobian = |model: &Arc<Model>| {
         let (variable, derivative) = (Variable::Style, Derivative::Position);
-        model.jacobian(variable, derivative, &Conditions::default(), timing, &mut |_| Ok(()))
+        jacobian(model.primitive(), variable, derivative, &Conditions::default(), timing, &mut |_| Ok(()))
     };
     group.bench_function("style Jacobian", |bench| bench.iter(|| jacobian(&model)));
     group.bench_function("style Jacobian of a model that never moved", |bench| {

@@ -3,7 +3,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
-use pdmp_core::{Factors, StyleCount};
+use pdmp_core::learning::{Factors, StyleCount};
 
 /// A library whose singular values fall by a tenth from one to the next, down to noise.
 fn library(rows: usize, columns: usize) -> Array2<f64> {

@@ -1,24 +1,28 @@
-"""Recordings of people and robots, as far as they are at hand, group by group.
+"""Recordings of people and robots in groups, from the folder that PDMP_DATA names.
 
-A group is what one primitive is learnt from: the repetitions of one task.
+A group is the repetitions of one task, from which one primitive is learnt.
 """
 
 import csv
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from pdmp import Demonstration
-from pdmp.datasets import handwriting
-from pdmp.demos import read_csv, read_folder
+from pdmp.datasets import REGISTRY, folder, handwriting
+from pdmp.io import read_csv, read_folder
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
-MOST_DEMOS = 10
-MOST_SAMPLES = 400
+MAX_DEMOS = 10
+MAX_SAMPLES = 400
+SOURCES = """\
+## Sources of the recordings
+
+Recordings are converted to the form that `pdmp.io.read_folder` reads, and found below the folder
+that the environment variable `PDMP_DATA` names. `pdmp.datasets.REGISTRY` holds this table.
+"""
 ARM = ["r_sh1", "r_sh2", "r_sh3", "r_elb"]
 # The first 28 columns of the door are joints; what follows is measured from them.
 HAND = [
@@ -30,25 +34,25 @@ HAND = [
 
 
 @dataclass(frozen=True)
-class Folder:
-    """A set of recordings: which columns it is about, and where the name of a group ends."""
+class Selection:
+    """Columns of a set of recordings, and the part of an id that names its group."""
 
     columns: list[str] | None = None
     group: int = 0  # parts of the id, between underscores, that name the group
 
 
 DISCRETE = {
-    "arm3_pushing": Folder(),
-    "arms_hdm05": Folder(ARM, group=1),
-    "box_closing_jaco": Folder(["x", "y", "z"]),
-    "door_adroit": Folder(HAND),
-    "franka_letters": Folder(group=1),
-    "franka_tasks": Folder(["x", "y", "z"], group=1),
-    "kuka_paths": Folder(group=2),
-    "obstacles_xarm": Folder([f"q{joint}" for joint in range(1, 8)]),
-    "raise_hand_bandai": Folder(ARM, group=2),
-    "walking_force_speed": Folder(group=1),
-    "writing_fda": Folder(),
+    "arm3_pushing": Selection(),
+    "arms_hdm05": Selection(ARM, group=1),
+    "box_closing_jaco": Selection(["x", "y", "z"]),
+    "door_adroit": Selection(HAND),
+    "franka_letters": Selection(group=1),
+    "franka_tasks": Selection(["x", "y", "z"], group=1),
+    "kuka_paths": Selection(group=2),
+    "obstacles_xarm": Selection([f"q{joint}" for joint in range(1, 8)]),
+    "raise_hand_bandai": Selection(ARM, group=2),
+    "walking_force_speed": Selection(group=1),
+    "writing_fda": Selection(),
 }
 
 
@@ -63,62 +67,83 @@ class Group:
 
 
 def groups() -> Iterator[Group]:
-    """Give every group at hand, and tell of the sets that are not."""
+    """Yields every group that is available, and prints the reasons why others are not."""
     try:
         for shape, demos in handwriting().items():
             yield Group("handwriting", shape, "discrete", [thinned(demo) for demo in demos])
     except ImportError as reason:
         print(f"left out: {reason}")
-    for source, folder in DISCRETE.items():
-        if not at_hand(source):
+    for source, selection in DISCRETE.items():
+        if not is_available(source):
             continue
         members = defaultdict(list)
-        for name, demo in read_folder(DATA / source, columns=folder.columns).items():
-            members["_".join(name.split("_")[: folder.group])].append(thinned(demo))
+        for name, demo in read_folder(folder(source), columns=selection.columns).items():
+            members["_".join(name.split("_")[: selection.group])].append(thinned(demo))
         for name, demos in members.items():
             yield Group(source, name, "discrete", few(demos))
-    if at_hand("gait_boys"):
-        boys = read_folder(DATA / "gait_boys").values()
+    if is_available("gait_boys"):
+        boys = read_folder(folder("gait_boys")).values()
         yield Group("gait_boys", "", "rhythmic", few([cycle(demo.position, 1.0) for demo in boys]))
-    if at_hand("running_strides"):
-        strides = read_folder(DATA / "running_strides").values()
+    if is_available("running_strides"):
+        strides = read_folder(folder("running_strides")).values()
         # The last of 101 points is the first of the next stride.
         closed = [cycle(demo.position[:-1], 1.0) for demo in strides]
         yield Group("running_strides", "", "rhythmic", few(closed))
-    if at_hand("walk_styles_bandai"):
+    if is_available("walk_styles_bandai"):
         yield Group("walk_styles_bandai", "", "rhythmic", few(list(styled_walks())))
 
 
-def at_hand(source: str) -> bool:
-    """Say whether a set is there, and tell if it is not."""
-    if not (DATA / source).is_dir():
-        print(f"left out: {source}, which is not in {DATA}")
+def is_available(source: str) -> bool:
+    """Returns whether a set of recordings is there, and prints the reason if it is not."""
+    try:
+        folder(source)
+    except FileNotFoundError as reason:
+        print(f"left out: {reason}")
         return False
     return True
 
 
+def sources(names: Iterable[str]) -> str:
+    """Returns a section in Markdown on the sources, licences and contents of some sets."""
+    header = ["recordings", "contents", "number", "what varies", "units", "source", "licence"]
+    rows = [
+        [
+            recordings.name,
+            recordings.contents,
+            recordings.n_recordings,
+            recordings.varies,
+            recordings.units,
+            f"[{recordings.source}]({recordings.url})",
+            "; ".join(filter(None, (recordings.licence, recordings.credit))),
+        ]
+        for recordings in map(REGISTRY.__getitem__, names)
+    ]
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join([SOURCES, *(f"| {' | '.join(map(str, line))} |" for line in lines)])
+
+
 def few(demos: list[Demonstration]) -> list[Demonstration]:
-    """Return at most so many, evenly chosen."""
-    return demos[:: -(-len(demos) // MOST_DEMOS)]
+    """Returns at most MAX_DEMOS demonstrations, evenly chosen."""
+    return demos[:: -(-len(demos) // MAX_DEMOS)]
 
 
 def thinned(demo: Demonstration) -> Demonstration:
-    """Return a discrete demonstration with at most so many samples, evenly chosen."""
-    step = -(-demo.n_samples // MOST_SAMPLES)
+    """Returns a discrete demonstration with at most MAX_SAMPLES samples, evenly chosen."""
+    step = -(-demo.n_samples // MAX_SAMPLES)
     return Demonstration(demo.position[::step], time=demo.time[::step])
 
 
 def cycle(position: np.ndarray, period: float, names: list[str] | None = None) -> Demonstration:
-    """Return one cycle, whose first sample follows upon the last."""
+    """Returns one cycle, whose first sample follows upon the last."""
     return Demonstration(position, dt=period / len(position), names=names)
 
 
 def styled_walks() -> Iterator[Demonstration]:
-    """Cut the first stride from each walk, foot strike to foot strike."""
-    folder = DATA / "walk_styles_bandai"
-    with open(folder / "strides.csv", newline="") as file:
+    """Yields the first stride of each walk, foot strike to foot strike."""
+    walks = folder("walk_styles_bandai")
+    with open(walks / "strides.csv", newline="") as file:
         for stride in csv.DictReader(file):
             if stride["stride"] == "0" and stride["id"].startswith("walk"):
-                whole = read_csv(folder / "demos" / f"{stride['id']}.csv", columns=ARM)
+                whole = read_csv(walks / "demos" / f"{stride['id']}.csv", columns=ARM)
                 start, end = int(stride["start_frame"]), int(stride["end_frame"])
                 yield cycle(whole.position[start:end], float(stride["duration_s"]))

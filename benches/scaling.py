@@ -28,34 +28,34 @@ Call = Callable[[], object]
 
 
 def process(**hyperparameters: float) -> Callable[[int], Call]:
-    """Regress as many samples with three outputs."""
+    """Regresses as many samples with three outputs."""
     return lambda count: partial(pdmp.GP("matern52", **hyperparameters).regress, *samples(count))
 
 
 def dense(count: int) -> Call:
-    """Do the same with scikit-learn, hyperparameters given."""
+    """Does the same with scikit-learn, hyperparameters given."""
     u, f = samples(count)
     gp = GaussianProcessRegressor(Matern(LENGTH, nu=2.5), alpha=NOISE, optimizer=None)
     return partial(gp.fit, u[:, None], f)
 
 
 def leading(n_demos: int) -> Call:
-    """Find the five leading factors."""
+    """Finds the five leading factors."""
     return partial(pdmp.factorise, library(n_demos, N_VALUES), n_styles=min(5, n_demos))
 
 
 def every(n_demos: int) -> Call:
-    """Find all factors."""
+    """Finds all factors."""
     return partial(pdmp.factorise, library(n_demos, N_VALUES), n_styles=n_demos)
 
 
 def lapack(n_demos: int) -> Call:
-    """Find all factors with numpy."""
+    """Finds all factors with numpy."""
     return partial(np.linalg.svd, library(n_demos, N_VALUES), full_matrices=False)
 
 
 def times(work: Callable[[int], Call], sizes: list[int]) -> dict[int, float]:
-    """Return the least time [s] by size, until one takes too long."""
+    """Returns the least time [s] by size, until one takes too long."""
     found: dict[int, float] = {}
     for size in sizes:
         call = work(size)
@@ -66,7 +66,7 @@ def times(work: Callable[[int], Call], sizes: list[int]) -> dict[int, float]:
 
 
 def timed(call: Call) -> float:
-    """Return the time of one call [s]."""
+    """Returns the time of one call [s]."""
     begin = perf_counter()
     call()
     return perf_counter() - begin
@@ -75,7 +75,7 @@ def timed(call: Call) -> float:
 def panel(
     axes: Axes, title: str, works: dict[str, Callable[[int], Call]], sizes: list[int], over: str
 ) -> None:
-    """Draw the times of several works over the size of the problem, and print them."""
+    """Draws the times of several works over the size of the problem, and prints them."""
     dress(axes, over, "time [s]")
     print(title)
     for look, (name, work) in enumerate(works.items()):
@@ -88,7 +88,7 @@ def panel(
 
 
 def main() -> None:
-    """Time both and draw the figure."""
+    """Times both and draws the figure."""
     processes = {
         "pdmp, hyperparameters given": process(length=LENGTH, noise=NOISE),
         "pdmp, with hyperparameters": process(),

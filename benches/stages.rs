@@ -8,8 +8,12 @@ use std::fs;
 use std::time::{Duration, Instant};
 
 use movements::movements;
-use pdmp_core::basis::{Basis, NGnet};
-use pdmp_core::{Demonstration, FitOptions, Kind, Smoothing, Stage, StyleCount, TimeScaling, Warp, fit};
+use pdmp_core::learning::fit_with;
+use pdmp_core::learning::regression::{Basis, NGnet};
+use pdmp_core::learning::{Stage, StyleCount, TimeScaling};
+use pdmp_core::model::Warp;
+use pdmp_core::numerics::Smoothing;
+use pdmp_core::{Demonstration, FitOptions, Kind};
 
 const STAGES: [Stage; 5] = [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile];
 
@@ -23,7 +27,7 @@ fn stages(demos: &[Demonstration], options: &FitOptions) -> [Duration; 5] {
         }
         Ok(())
     };
-    let model = fit(demos, options, &mut proceed).expect("a fit");
+    let model = fit_with(demos, options, &mut proceed).expect("a fit");
     marks.push(Instant::now());
     drop(model);
     std::array::from_fn(|stage| marks[stage + 1] - marks[stage])

@@ -11,7 +11,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ndarray::Array2;
-use pdmp_core::basis::{Basis, NGnet};
+use pdmp_core::learning::regression::{Basis, NGnet};
 use pdmp_core::{
     Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Motion, Result, Sampling, Status, fit,
 };
@@ -39,7 +39,7 @@ fn learn(path: &Path) -> Result<()> {
         Demonstration::new(position, Sampling::Uniform { dt: 0.003 })
     };
     let options = FitOptions { basis: Basis::NGnet(NGnet::default()), ..FitOptions::new(Kind::Discrete) };
-    fit(&[reach(0.2)?, reach(0.5)?], &options, &mut |_, _| Ok(()))?.save(path)
+    fit(&[reach(0.2)?, reach(0.5)?], &options)?.save(path)
 }
 
 /// Runs the model's nominal movement until it has settled: tick k is due at start + k periods. One that comes whole
@@ -49,7 +49,7 @@ fn run(path: &Path) -> Result<Report> {
     let n_dofs = model.n_dofs();
     assert!(n_dofs <= MOST_DOFS, "{n_dofs} degrees of freedom: raise MOST_DOFS");
     let dt = PERIOD.as_secs_f64();
-    let mut controller = Controller::new(Arc::clone(&model), dt, &Conditions::default(), None)?;
+    let mut controller = Controller::new(model.primitive(), dt, &Conditions::default(), None)?;
     let mut vectors = [[0.0; MOST_DOFS]; 4];
     let [goal, position, velocity, acceleration] = vectors.each_mut().map(|vector| &mut vector[..n_dofs]);
     goal.copy_from_slice(controller.centre());

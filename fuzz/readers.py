@@ -29,9 +29,9 @@ import pdmp
 
 CORPUS = Path(__file__).parent / "corpus"
 READERS: dict[str, Callable[..., Any]] = {
-    "csv": pdmp.demos.read_csv,
-    "bvh": pdmp.demos.read_bvh,
-    "npz": pdmp.demos.read_npz,
+    "csv": pdmp.io.read_csv,
+    "bvh": pdmp.io.read_bvh,
+    "npz": pdmp.io.read_npz,
 }
 REFUSALS = (ValueError, OSError)
 MAX_SIZE = 1 << 14  # bytes of a changed file; larger ones only take longer
@@ -90,7 +90,7 @@ SHAPES = [
 
 
 def check(target: str, path: Path) -> None:
-    """Read a file with and without options, and assert the claim."""
+    """Reads a file with and without options, and asserts the claim."""
     start = time.perf_counter()
     for options in ({}, {"dt": 0.01, "max_gap": 0.1}):
         with warnings.catch_warnings():
@@ -107,7 +107,7 @@ def check(target: str, path: Path) -> None:
 
 
 def seeds(target: str) -> list[bytes]:
-    """Return sound files, and those of the corpus."""
+    """Returns sound files, and those of the corpus."""
     rng = np.random.default_rng(1)
     y, t = rng.normal(size=(12, 2)).cumsum(0), np.arange(12) / 64
     made = {
@@ -133,7 +133,7 @@ def _archive(arrays: dict[str, Any]) -> bytes:
 
 
 def change(target: str, data: bytes, other: bytes, rng: random.Random) -> bytes:
-    """Return a file that was changed a few times."""
+    """Returns a file that was changed a few times."""
     for _ in range(rng.choice([1, 1, 2, 3, 5])):
         if target == "npz" and rng.random() < 0.7:
             data = _change_archive(data, rng)
@@ -181,7 +181,7 @@ def _change_bytes(data: bytes, other: bytes, tokens: list[str], rng: random.Rand
 
 
 def _change_archive(data: bytes, rng: random.Random) -> bytes:
-    """Change one array of an archive, and put all together again with checksums that hold."""
+    """Changes one array of an archive, and puts all together again with checksums that hold."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = [(name, archive.read(name)) for name in archive.namelist()]
@@ -242,7 +242,7 @@ class Search:
         self.executions = 0
 
     def run(self, seconds: float, path: Path) -> None:
-        """Change files for so many seconds."""
+        """Changes files for so many seconds."""
         rng = random.Random(zlib.crc32(self.target.encode()))
         start = time.monotonic()
         for data in seeds(self.target):
@@ -253,7 +253,7 @@ class Search:
             self.attempt(change(self.target, data, other, rng), path)
 
     def attempt(self, data: bytes, path: Path) -> None:
-        """Check one file, and keep it if it reached new lines or broke the claim."""
+        """Checks one file, and keeps it if it reached new lines or broke the claim."""
         known = len(self.lines)
         reason = self.reason(data, path)
         if reason is not None:
@@ -265,7 +265,7 @@ class Search:
             self.save("line", data)
 
     def reason(self, data: bytes, path: Path) -> str | None:
-        """Return the kind and place of the error that a file ends in, if it breaks the claim."""
+        """Returns the kind and place of the error that a file ends in, if it breaks the claim."""
         self.executions += 1
         path.write_bytes(data)
         # Tracing takes ten times as long as reading.
@@ -283,19 +283,19 @@ class Search:
         return None
 
     def trace(self, frame: FrameType, event: str, _: object) -> Any:
-        """Trace the lines of the readers and of what they call."""
+        """Traces the lines of the readers and of what they call."""
         name = frame.f_code.co_filename
         if name not in self.traced:
             self.traced[name] = any(part in name for part in TRACED)
         return self.line if self.traced[name] else None
 
     def line(self, frame: FrameType, event: str, _: object) -> Any:
-        """Note a line."""
+        """Notes a line."""
         self.lines.add((frame.f_code, frame.f_lineno))
         return self.line
 
     def smaller(self, data: bytes, reason: str, path: Path) -> bytes:
-        """Return a part of a file that ends in the same error."""
+        """Returns a part of a file that ends in the same error."""
         size = len(data) // 2
         while size:
             place = 0
@@ -309,7 +309,7 @@ class Search:
         return data
 
     def save(self, kind: str, data: bytes) -> None:
-        """Write a file beside those found before."""
+        """Writes a file beside those found before."""
         if self.folder is not None:
             folder = self.folder / self.target
             folder.mkdir(parents=True, exist_ok=True)
@@ -317,7 +317,7 @@ class Search:
 
 
 def main(arguments: Iterable[str] | None = None) -> int:
-    """Search in each target, print what was done, and return 1 if a file breaks the claim."""
+    """Searches in each target, prints a summary, and returns 1 if a file breaks the claim."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("targets", nargs="*", metavar="target", help=f"of {', '.join(READERS)}")
     parser.add_argument("--seconds", type=float, default=60.0)

@@ -8,7 +8,7 @@ DT = 0.02
 
 
 def reaches() -> list[pdmp.Demonstration]:
-    """Return five planar minimum-jerk reaches that differ in bend, goal and duration."""
+    """Returns five planar minimum-jerk reaches that differ in bend, goal and duration."""
     demos = []
     for bend in (-0.2, -0.1, 0.0, 0.1, 0.2):
         s = np.linspace(0, 1, 61 + round(50 * bend))
@@ -22,7 +22,7 @@ def reaches() -> list[pdmp.Demonstration]:
 
 
 def loops() -> list[pdmp.Demonstration]:
-    """Return three planar loops from a circle to a figure of eight, one cycle of 2 s each."""
+    """Returns three planar loops from a circle to a figure of eight, one cycle of 2 s each."""
     phi = np.linspace(0, 2 * np.pi, 100, endpoint=False)
     return [
         pdmp.Demonstration(

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 import pdmp
-from pdmp import demos
 from pdmp.cli import main
 from pdmp.evaluation import PDMP, baselines
 from synthetic import DT, loops, reaches
 
-COMMANDS = ["fit", "rollout", "evaluate", "info", "plot", "demo", "reproduce"]
+COMMANDS = ["fit", "rollout", "evaluate", "info", "plot"]
 
 
 @pytest.fixture
@@ -49,7 +48,7 @@ def test_fit_learns_what_the_library_learns(folder: Path, tmp_path: Path) -> Non
     path = tmp_path / "model.safetensors"
     assert run("fit", folder, "--context", "bend", "--styles", 2, "-o", path) == 0
     model = pdmp.load(path)
-    expected = pdmp.fit(demos.read([folder], context=["bend"]), n_styles=2)
+    expected = pdmp.fit(pdmp.io.read([folder], context=["bend"]), n_styles=2)
     np.testing.assert_array_equal(model.styles, expected.styles)
     np.testing.assert_array_equal(model.contexts, expected.contexts)
 
@@ -113,7 +112,7 @@ def test_rollout_writes_the_movement(model_file: Path, tmp_path: Path) -> None:
     assert code == 0
     model = pdmp.load(model_file)
     expected = model.rollout([0.1, -0.2], goal=[1, 0.5])
-    made = demos.read_csv(path, columns=model.names)
+    made = pdmp.io.read_csv(path, columns=model.names)
     np.testing.assert_array_equal(made.position, expected.position)
 
 
@@ -121,7 +120,7 @@ def test_rollout_repeats_a_demonstration(model_file: Path, tmp_path: Path) -> No
     """With --demo, style, place and duration are those of the demonstration."""
     path = tmp_path / "out.csv"
     assert run("rollout", model_file, "--demo", 4, "--dt", DT, "-o", path) == 0
-    made = demos.read_csv(path, columns=["x", "y"])
+    made = pdmp.io.read_csv(path, columns=["x", "y"])
     np.testing.assert_allclose(made.position[-1], reaches()[4].position[-1], atol=0.02)
     assert made.n_samples == reaches()[4].n_samples
 
@@ -131,7 +130,7 @@ def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
     path = tmp_path / "out.csv"
     assert run("rollout", model_file, "--context", 0.15, "-o", path) == 0
     expected = pdmp.load(model_file).rollout(context=[0.15])
-    made = demos.read_csv(path, columns=["x", "y"])
+    made = pdmp.io.read_csv(path, columns=["x", "y"])
     np.testing.assert_array_equal(made.position, expected.position)
 
 
@@ -142,21 +141,21 @@ def test_warped_models_are_told_and_repeat_demonstrations(
     path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"
     options = ("--context", "bend", "--alignment", "warp", "--styles", "auto")
     assert run("fit", folder, *options, "-o", path) == 0
-    recordings = demos.read([folder], context=["bend"])
+    recordings = pdmp.io.read([folder], context=["bend"])
     expected = pdmp.fit(recordings, alignment="warp", n_styles="auto")
     np.testing.assert_array_equal(pdmp.load(path).styles, expected.styles)
     # Without contexts nothing speaks against a warp.
     assert run("fit", folder, "--alignment", "warp", "-o", path) == 0
-    expected = pdmp.fit(demos.read([folder]), alignment="warp")
+    expected = pdmp.fit(pdmp.io.read([folder]), alignment="warp")
     model = pdmp.load(path)
     np.testing.assert_array_equal(model.styles, expected.styles)
     assert run("info", path) == 0
     assert re.search(r"timing +8 segments", capsys.readouterr().out)
     assert run("rollout", path, "--demo", 2, "-o", out) == 0
     made = model.rollout(**pdmp.as_demonstrated(model, 2))
-    np.testing.assert_array_equal(demos.read_csv(out, columns=["x", "y"]).position, made.position)
+    np.testing.assert_array_equal(pdmp.io.read_csv(out, columns=["x", "y"]).position, made.position)
     assert run("rollout", path, "--demo", 2, "--tau", 2 * model.tau, "-o", out) == 0
-    assert demos.read_csv(out).time[-1] == pytest.approx(2 * model.durations[model.nominal], 0.02)
+    assert pdmp.io.read_csv(out).time[-1] == pytest.approx(2 * model.durations[model.nominal], 0.02)
 
 
 def test_evaluate_fills_gaps_when_told(folder: Path) -> None:
@@ -178,7 +177,7 @@ def test_evaluate_tells_what_the_library_finds(
     assert run("evaluate", folder, "--context", "bend", "--styles", 2, "-o", out) == 0
     written = {path.name for path in out.iterdir()}
     assert written == {"evaluation.md", "held_out.png", "prediction_error.png"}
-    recordings = demos.read([folder], context=["bend"])
+    recordings = pdmp.io.read([folder], context=["bend"])
     predictors = baselines() | {"PDMP": PDMP(n_styles=2)}
     assert repr(pdmp.evaluate(recordings, predictors=predictors)) in capsys.readouterr().out
 
@@ -212,19 +211,6 @@ def test_plot_draws_the_phase_portrait_of_a_rhythmic_model(tmp_path: Path) -> No
     pdmp.fit(loops(), kind="rhythmic").save(path)
     assert run("plot", path, "-o", tmp_path) == 0
     assert (tmp_path / "phase_portrait.png").exists()
-
-
-def test_demo_writes_model_report_and_the_figures_it_shows(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Every figure that the report shows is there, and the tables are printed."""
-    assert run("demo", "-o", tmp_path) == 0
-    report = (tmp_path / "report.md").read_text(encoding="utf-8")
-    figures = re.findall(r"\((\w+\.png)\)", report)
-    assert len(figures) == 5
-    for name in [*figures, "model.safetensors"]:
-        assert (tmp_path / name).stat().st_size > 0
-    assert capsys.readouterr().out.strip() in report
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -305,7 +291,7 @@ def test_negative_exponents_are_numbers(model_file: Path, tmp_path: Path) -> Non
     """-1e-3 is a number, as models print it, and no option."""
     out = tmp_path / "out.csv"
     assert run("rollout", model_file, "--goal", "-1e-3", "2", "-o", out) == 0
-    end = demos.read_csv(out, columns=["x", "y"]).position[-1]
+    end = pdmp.io.read_csv(out, columns=["x", "y"]).position[-1]
     np.testing.assert_allclose(end, [-1e-3, 2], atol=0.2)
 
 

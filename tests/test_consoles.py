@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pdmp
-from pdmp import Demonstration, demos
+from pdmp import Demonstration
 from pdmp.cli import main
 
 # Clears the screen, reverses the direction of writing, breaks the line.
@@ -74,11 +74,11 @@ def test_errors_are_harmless(tmp_path: Path) -> None:
 
     def table(text: str, **options: object) -> None:
         path.write_text(text, encoding="utf-8")
-        demos.read_csv(path, **options)
+        pdmp.io.read_csv(path, **options)
 
     def folder(text: str) -> None:
         index.write_text(text, encoding="utf-8")
-        demos.read_folder(tmp_path)
+        pdmp.io.read_folder(tmp_path)
 
     rows = "".join(f"{k / 10},{k}\n" for k in range(9))
     calls = (
@@ -89,13 +89,13 @@ def test_errors_are_harmless(tmp_path: Path) -> None:
         lambda: Demonstration(np.array([["a" + HOSTILE, 1.0]] * 9, object), dt=0.1),
         lambda: pdmp.evaluate([k * S for k in (1, 2, 3)], dt=0.1, contexts=labelled),
         lambda: pdmp.blend({"a" + HOSTILE: 1.0}, {}, 0.5),
-        lambda: demos.write_csv(path, model.rollout(), ["1", "a" + HOSTILE]),
+        lambda: pdmp.io.write_csv(path, model.rollout(), ["1", "a" + HOSTILE]),
         lambda: table("t,x\n0,\x1b[2J\n" + rows),
         lambda: table('t,"x\x1b[2J\n\u202e"\n0,z\n' + rows),
         lambda: table("t,x\n" + rows, columns=["y" + HOSTILE]),
         lambda: table("t [\x1b[2J],x\n" + rows),
         lambda: folder("id\n../\x1b[2J\n"),
-        lambda: demos.read(tmp_path / HOSTILE),
+        lambda: pdmp.io.read(tmp_path / HOSTILE),
     )
     for call in calls:
         with pytest.raises((ValueError, OSError)) as raised:
@@ -158,8 +158,6 @@ def test_info_tells_names_and_labels_in_their_lines(
         ["info", "-"],
         ["plot", "-", "-o", "figures"],
         ["plot", "m", "-", "-o", "figures"],
-        ["demo", "-o", "-"],
-        ["reproduce", "fig3", "-o", "-"],
     ],
 )
 def test_a_dash_is_no_file(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import pdmp
-from pdmp import Status, pacing
+from pdmp import Status, realtime
 
 NAN, INF = float("nan"), float("inf")
 
@@ -176,8 +176,8 @@ class Clock:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Put paced loops on a clock of their own."""
     clock = Clock()
-    monkeypatch.setattr(pacing, "perf_counter", lambda: clock.now)
-    monkeypatch.setattr(pacing, "sleep", clock.sleep)
+    monkeypatch.setattr(realtime, "perf_counter", lambda: clock.now)
+    monkeypatch.setattr(realtime, "sleep", clock.sleep)
     return clock
 
 
@@ -275,12 +275,12 @@ def test_a_controller_runs_in_one_loop_at_a_time(reach: pdmp.Model, clock: Clock
             async for _ in controller.run(rate_hz=500, duration=60):
                 break
 
-    monkeypatched = pacing.perf_counter
-    pacing.perf_counter = time.perf_counter
+    monkeypatched = realtime.perf_counter
+    realtime.perf_counter = time.perf_counter
     try:
         asyncio.run(twice())
     finally:
-        pacing.perf_counter = monkeypatched
+        realtime.perf_counter = monkeypatched
 
 
 def test_status_is_true_while_the_movement_goes_on(reach: pdmp.Model) -> None:
@@ -455,7 +455,7 @@ def test_interrupted_loops_leave_the_controller_between_two_ticks(
         guard("sleep")
         clock.sleep(seconds)
 
-    monkeypatch.setattr(pacing, "sleep", asleep)
+    monkeypatch.setattr(realtime, "sleep", asleep)
     run = controller.run(measured=lambda: guard("measured"))
     with pytest.raises(error):
         for tick in run:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import pdmp
-from pdmp import demos
 
 TIME = 0.01 * np.arange(20)
 POSITION = np.column_stack([np.arange(20) / 7, 1e3 * np.sin(np.arange(20.0))])
@@ -25,7 +24,7 @@ def read(tmp_path: Path, lines: list[str], **options: object) -> pdmp.Demonstrat
     """Return what is read from lines of text."""
     path = tmp_path / "table.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return demos.read_csv(path, **options)
+    return pdmp.io.read_csv(path, **options)
 
 
 def assert_read(demo: pdmp.Demonstration, names: list[str] | None = None) -> None:
@@ -108,22 +107,22 @@ def test_writers_of_others_are_read(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     table = np.column_stack([TIME, POSITION])
     np.savetxt(path, table, "%.17g", header="t x y")
-    assert_read(demos.read_csv(path))
+    assert_read(pdmp.io.read_csv(path))
     np.savetxt(path, table, "%.17g", delimiter=",", header="t,x,y")
-    assert_read(demos.read_csv(path))
+    assert_read(pdmp.io.read_csv(path))
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame(table, columns=["t", "x", "y"])
     frame.to_csv(path)
-    assert_read(demos.read_csv(path))
+    assert_read(pdmp.io.read_csv(path))
     frame.set_index("t").to_csv(path, sep=";", decimal=",")
-    assert_read(demos.read_csv(path))
+    assert_read(pdmp.io.read_csv(path))
 
 
 def test_unicode_text_of_spreadsheets_is_read(tmp_path: Path) -> None:
     """UTF-16 with its mark, separated by tabs, is what Excel calls Unicode text."""
     path = tmp_path / "table.csv"
     path.write_text("\n".join(["t\tx\ty", *rows("\t", ",")]), encoding="utf-16")
-    assert_read(demos.read_csv(path))
+    assert_read(pdmp.io.read_csv(path))
 
 
 def test_time_is_no_degree_of_freedom_beside_dt(tmp_path: Path) -> None:
@@ -220,7 +219,7 @@ def test_tables_may_have_thousands_of_columns(tmp_path: Path) -> None:
         lines = [",".join(["t", *(f"c{k}" for k in range(n))])]
         path.write_text("\n".join([*lines, *(f"{k / 10},{row}" for k in range(4))]))
         begin = clock.process_time()
-        assert demos.read_csv(path).n_dofs == n
+        assert pdmp.io.read_csv(path).n_dofs == n
         elapsed.append(clock.process_time() - begin)
     # Eight times as much work; 64 times as much if quadratic.
     assert elapsed[1] < 25 * elapsed[0] + 0.05

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pdmp import demos
+import pdmp
 
 CASES = 250  # of each kind
 RNG = np.random.default_rng(7)
@@ -172,18 +172,18 @@ def readers(kind: str, folder: Path) -> Iterator[tuple[Path, Callable[[], object
     """Yield where to write a file of a kind, and how it is read then."""
     path = folder / f"damaged{'.npz' if kind == 'npy' else kind}"
     if kind == ".csv":
-        yield path, lambda: [demos.read_csv(path, max_gap=1.0)]
-        yield path, lambda: [demos.read_csv(path, dt=0.1)]
+        yield path, lambda: [pdmp.io.read_csv(path, max_gap=1.0)]
+        yield path, lambda: [pdmp.io.read_csv(path, dt=0.1)]
     elif kind in (".npz", "npy"):
-        yield path, lambda: demos.read_npz(path).values()
-        yield path, lambda: demos.read_npz(path, dt=0.1, max_gap=1.0).values()
+        yield path, lambda: pdmp.io.read_npz(path).values()
+        yield path, lambda: pdmp.io.read_npz(path, dt=0.1, max_gap=1.0).values()
     elif kind == ".bvh":
-        yield path, lambda: [demos.read_bvh(path)]
+        yield path, lambda: [pdmp.io.read_bvh(path)]
     else:
         (folder / "demos").mkdir(exist_ok=True)
         for name in "ab":
             (folder / "demos" / f"{name}.csv").write_text(TABLE)
-        yield folder / "index.csv", lambda: demos.read_folder(folder, context=["height"]).values()
+        yield folder / "index.csv", lambda: pdmp.io.read_folder(folder, context=["height"]).values()
 
 
 def attempt(read: Callable[[], object]) -> str:
@@ -230,7 +230,7 @@ def test_forged_archives_are_refused(tmp_path: Path, raw: bytes) -> None:
     tracemalloc.start()
     try:
         for dt in (None, 0.1):
-            assert attempt(lambda dt=dt: demos.read_npz(path, dt=dt).values()) == "refused"
+            assert attempt(lambda dt=dt: pdmp.io.read_npz(path, dt=dt).values()) == "refused"
         assert tracemalloc.get_traced_memory()[1] < 50e6
     finally:
         tracemalloc.stop()
@@ -254,7 +254,7 @@ def test_deep_hierarchies_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "deep.bvh"
     joint = "JOINT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n"
     path.write_text(BVH.replace("JOINT Leg", joint * 10_000 + "JOINT Leg"))
-    assert attempt(lambda: [demos.read_bvh(path)]) == "refused"
+    assert attempt(lambda: [pdmp.io.read_bvh(path)]) == "refused"
 
 
 if __name__ == "__main__":

@@ -1,13 +1,19 @@
-"""Handwriting comes from an installed package that is never imported."""
+"""Handwriting comes from an installed package, other recordings from a folder; all have sources."""
 
 import importlib.util
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pdmp.datasets import handwriting
+import pdmp
+import recordings
+from pdmp.datasets import REGISTRY, folder, handwriting
+from report.sets import ASKED
+
+ROOT = Path(__file__).parents[1]
 
 
 def test_shapes_have_seven_demonstrations_that_end_at_the_origin() -> None:
@@ -34,12 +40,14 @@ def test_unknown_shape_is_refused_with_those_there_are() -> None:
 
 def test_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the recordings, the error says what to install."""
-    monkeypatch.setattr("pdmp.datasets.find_spec", lambda _: None)
-    with pytest.raises(ImportError, match=r"pip install 'pdmp\[demo\]'"):
+    monkeypatch.setattr("pdmp.datasets._lasa.find_spec", lambda _: None)
+    with pytest.raises(ImportError, match=r"pip install 'pdmp\[datasets\]'"):
         handwriting()
 
 
-@pytest.mark.parametrize("module", ["pdmp", "pdmp.demos", "pdmp.datasets", "pdmp.plot", "pdmp.cli"])
+@pytest.mark.parametrize(
+    "module", ["pdmp", "pdmp.io", "pdmp.preprocessing", "pdmp.datasets", "pdmp.plot", "pdmp.cli"]
+)
 def test_importing_needs_numpy_alone(module: str) -> None:
     """No module of the package pulls in an extra when it is imported."""
     code = f"import sys, {module}; print(*sys.modules)"
@@ -50,3 +58,73 @@ def test_importing_needs_numpy_alone(module: str) -> None:
 def test_extras_are_installed_for_these_tests() -> None:
     """The claims above are not vacuous: the extras could have been imported."""
     assert all(importlib.util.find_spec(name) for name in ("matplotlib", "scipy"))
+
+
+def test_folder_is_found_by_the_environment_variable_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the variable, or without the set, the error names variable, source and licence."""
+    monkeypatch.delenv("PDMP_DATA", raising=False)
+    with pytest.raises(FileNotFoundError, match=r"PDMP_DATA is not set.*cran/fda.*GPL"):
+        folder("gait_boys")
+    monkeypatch.setenv("PDMP_DATA", str(tmp_path))
+    with pytest.raises(FileNotFoundError, match=r"gait_boys is not a folder.*cran/fda.*GPL"):
+        folder("gait_boys")
+    (tmp_path / "gait_boys").mkdir()
+    assert folder("gait_boys") == tmp_path / "gait_boys"
+
+
+def test_unknown_set_is_refused_with_those_there_are() -> None:
+    """A misspelt name is not taken for a set that is missing."""
+    with pytest.raises(ValueError, match="no 'gait' among arm3_pushing, "):
+        folder("gait")
+
+
+def test_registry_is_complete() -> None:
+    """Every set has a source, licence, contents and units, and an address to get it from."""
+    for name, dataset in REGISTRY.items():
+        assert dataset.name == name
+        assert dataset.url.startswith("https://")
+        assert dataset.kind in ("discrete", "rhythmic")
+        for text in (dataset.contents, dataset.varies, dataset.units, dataset.source):
+            assert text and "|" not in text
+        assert dataset.licence
+
+
+@pytest.mark.parametrize("name", sorted(REGISTRY.keys() - {"handwriting"}))
+def test_registry_counts_the_recordings(name: str) -> None:
+    """The number of recordings is that of the set."""
+    try:
+        path = folder(name)
+    except FileNotFoundError as reason:
+        pytest.skip(str(reason))
+    index = (path / "index.csv").read_text(encoding="utf-8").splitlines()
+    assert REGISTRY[name].n_recordings == len(index) - 1
+
+
+@pytest.mark.parametrize(
+    ("document", "names"),
+    [
+        ("report.md", list(ASKED)),
+        (
+            "bases.md",
+            [
+                "handwriting",
+                *recordings.DISCRETE,
+                "gait_boys",
+                "running_strides",
+                "walk_styles_bandai",
+            ],
+        ),
+    ],
+)
+def test_reports_name_the_sources_of_their_recordings(document: str, names: list[str]) -> None:
+    """The table of sources in a report is that of the registry."""
+    text = (ROOT / "docs" / document).read_text(encoding="utf-8")
+    assert recordings.sources(names) in text
+
+
+def test_all_recordings_of_handwriting_are_counted() -> None:
+    """Thirty shapes of seven demonstrations."""
+    n_demos = sum(map(len, pdmp.datasets.handwriting().values()))
+    assert n_demos == REGISTRY["handwriting"].n_recordings

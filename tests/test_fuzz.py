@@ -83,7 +83,7 @@ def attempt(function: Any, *args: Any, **kwargs: Any) -> Any:
 @QUICK
 @given(st.none() | ODD | st.lists(ODD, min_size=1, max_size=3), FIT)
 def test_fit_of_odd_demonstrations_is_orderly(demos: Any, options: dict[str, Any]) -> None:
-    """Whatever is passed for demonstrations, a model or an orderly refusal comes out."""
+    """Whatever is passed for demonstrations, a model or an orderly value_error comes out."""
     attempt(pdmp.fit, demos, **options)
 
 
@@ -104,7 +104,7 @@ def test_fit_with_odd_options_is_orderly(options: dict[str, Any]) -> None:
 @QUICK
 @given(some(style=ODD, duration=SPANS, context=ODD, **MOVE))
 def test_rollout_with_odd_arguments_is_orderly(kind: str, arguments: dict[str, Any]) -> None:
-    """Whatever the arguments, finite positions or an orderly refusal come out."""
+    """Whatever the arguments, finite positions or an orderly value_error come out."""
     trajectory = attempt(MODELS[kind].rollout, **arguments)
     if trajectory is not None:
         assert np.isfinite(trajectory.position).all()
@@ -128,7 +128,7 @@ def test_rollout_with_odd_arguments_is_orderly(kind: str, arguments: dict[str, A
 def test_batch_with_odd_arguments_is_orderly(
     kind: str, styles: Any, arguments: dict[str, Any]
 ) -> None:
-    """Whatever the arguments, finite numbers or an orderly refusal come out."""
+    """Whatever the arguments, finite numbers or an orderly value_error come out."""
     for values in attempt(MODELS[kind].rollouts, styles, **arguments) or ():
         assert np.isfinite(values).all()
 

@@ -109,7 +109,7 @@ def test_gaps_across_a_wrap_need_the_unit(tmp_path: Path) -> None:
             with pytest.raises(
                 ValueError, match=r"column 'q': changes by -5.\d+ in the gap.*\[rad\]"
             ):
-                pdmp.demos.read_csv(path, max_gap=0.5)
+                pdmp.io.read_csv(path, max_gap=0.5)
         else:
-            whole = pdmp.demos.unwrap(pdmp.demos.read_csv(path, max_gap=0.5))
+            whole = pdmp.preprocessing.unwrap(pdmp.io.read_csv(path, max_gap=0.5))
             np.testing.assert_allclose(whole.position[:, 0], angle, atol=1e-6)

@@ -208,7 +208,7 @@ def test_styles_end_at_noise_that_was_resampled(noise: float) -> None:
     clean = [_reach(*bends) for bends in random.uniform(-0.3, 0.3, (40, 3))]
     recorded = [x + noise * np.ptp(clean[0]) * random.normal(size=x.shape) for x in clean]
     for dt in (0.005, 0.002):
-        demos = [pdmp.demos.resample(pdmp.Demonstration(x, dt=0.01), dt) for x in recorded]
+        demos = [pdmp.preprocessing.resample(pdmp.Demonstration(x, dt=0.01), dt) for x in recorded]
         assert pdmp.fit(demos, basis="ngnet").n_styles == 4
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pdmp
-from pdmp import Demonstration, demos
+from pdmp import Demonstration
 from synthetic import DT, loops, reaches
 
 S = np.linspace(0, 1, 81)
@@ -270,10 +270,10 @@ def test_trajectories_are_demonstrations(trajectory: pdmp.Trajectory) -> None:
 def test_trajectories_come_back_from_files(trajectory: pdmp.Trajectory, tmp_path: Path) -> None:
     """CSV and NPZ keep every bit, names and units."""
     trajectory.to_csv(tmp_path / "a.csv")
-    assert_back(demos.read_csv(tmp_path / "a.csv"), trajectory)
-    assert_back(demos.read_csv(tmp_path / "a.csv", columns=trajectory.names), trajectory)
+    assert_back(pdmp.io.read_csv(tmp_path / "a.csv"), trajectory)
+    assert_back(pdmp.io.read_csv(tmp_path / "a.csv", columns=trajectory.names), trajectory)
     np.savez(tmp_path / "a.npz", **trajectory.to_dict())
-    (demo,) = demos.read_npz(tmp_path / "a.npz").values()
+    (demo,) = pdmp.io.read_npz(tmp_path / "a.npz").values()
     assert_back(demo, trajectory)
 
 
@@ -296,7 +296,7 @@ def test_trajectories_are_data_frames(
     np.testing.assert_array_equal(frame["y_velocity"], trajectory.velocity[:, 1])
     assert_back(Demonstration(frame[trajectory.names], time=frame.index), trajectory)
     frame.to_csv(tmp_path / "a.csv")
-    demo = demos.read_csv(tmp_path / "a.csv", columns=trajectory.names)
+    demo = pdmp.io.read_csv(tmp_path / "a.csv", columns=trajectory.names)
     np.testing.assert_array_equal(demo.position, trajectory.position)
     assert isinstance(frame, pandas.DataFrame)
     monkeypatch.setitem(sys.modules, "pandas", None)
@@ -313,10 +313,10 @@ def test_readers_mappings_go_everywhere(tmp_path: Path) -> None:
     found = pdmp.evaluate(named, predictors={})
     assert [demo.n_samples for demo in found.recordings.demos] == [d.n_samples for d in listed]
     for function, arguments in (
-        (demos.lowpass, (5.0,)),
-        (demos.resample, (0.03,)),
-        (demos.trim, ()),
-        (demos.unwrap, ()),
+        (pdmp.preprocessing.lowpass, (5.0,)),
+        (pdmp.preprocessing.resample, (0.03,)),
+        (pdmp.preprocessing.trim, ()),
+        (pdmp.preprocessing.unwrap, ()),
     ):
         of_named, of_listed = function(named, *arguments), function(listed, *arguments)
         assert list(of_named) == list(named)
@@ -324,10 +324,10 @@ def test_readers_mappings_go_everywhere(tmp_path: Path) -> None:
             expected = function(demo, *arguments).position
             np.testing.assert_array_equal(one.position, expected)
             np.testing.assert_array_equal(other.position, expected)
-    parts = demos.cut(named, [0.1, 0.5, 0.9])
+    parts = pdmp.preprocessing.cut(named, [0.1, 0.5, 0.9])
     assert [len(part) for part in parts.values()] == [2] * len(named)
     with pytest.raises(ValueError, match="^d0: cut_off = -1"):
-        demos.lowpass(named, -1.0)
+        pdmp.preprocessing.lowpass(named, -1.0)
 
 
 def test_cycles_take_mappings() -> None:
@@ -336,11 +336,11 @@ def test_cycles_take_mappings() -> None:
     wave = Demonstration(np.tile(loop.position, (4, 1)), dt=loop.dt)
     period = loop.dt * loop.n_samples
     events = [0.0, period, 2 * period, 3 * period]
-    listed = demos.cycles([wave, wave], events=[events, events])
-    named = demos.cycles({"a": wave, "b": wave}, events={"b": events, "a": events})
+    listed = pdmp.preprocessing.cycles([wave, wave], events=[events, events])
+    named = pdmp.preprocessing.cycles({"a": wave, "b": wave}, events={"b": events, "a": events})
     assert named.recordings == listed.recordings == [0] * 3 + [1] * 3
     for one, other in zip(named, listed, strict=True):
         np.testing.assert_array_equal(one.position, other.position)
-    assert len(demos.cycles({"a": wave})) >= 3
+    assert len(pdmp.preprocessing.cycles({"a": wave})) >= 3
     with pytest.raises(ValueError, match="events: 'c' is among"):
-        demos.cycles({"a": wave}, events={"a": events, "c": events})
+        pdmp.preprocessing.cycles({"a": wave}, events={"a": events, "c": events})

@@ -208,7 +208,7 @@ def test_cut_off_is_where_as_much_is_taken_off_as_there_is_noise() -> None:
         assert level == pytest.approx(0.01, rel=0.15)
         assert 2 < frequency < 20
         assert axes.get_title() == f"{name}: {frequency:.2g} Hz"
-    smooth = pdmp.demos.lowpass(demo, frequency).position - position + noise
+    smooth = pdmp.preprocessing.lowpass(demo, frequency).position - position + noise
     assert np.std(smooth) < 0.5 * np.std(noise)
 
 

@@ -9,17 +9,20 @@ import pytest
 
 import pdmp
 from pdmp import Demonstration
-from pdmp.demos import read_folder
+from pdmp.io import read_folder
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+def folder(name: str) -> Path:
+    """Returns the folder of a set of recordings, or skips the test without it."""
+    try:
+        return pdmp.datasets.folder(name)
+    except FileNotFoundError as reason:
+        pytest.skip(str(reason))
 
 
 def recordings(name: str, step: int, **options: Any) -> list[Demonstration]:
-    """Return every `step`-th demonstration of a set, or skip where the data are not at hand."""
-    folder = DATA / name
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there: the recordings' licences forbid copying them here")
-    return list(read_folder(folder, **options).values())[::step]
+    """Returns every `step`-th demonstration of a set."""
+    return list(read_folder(folder(name), **options).values())[::step]
 
 
 def worst_error(model: pdmp.Model, demos: list[Demonstration]) -> float:
@@ -118,9 +121,7 @@ def test_running_strides_are_given_back() -> None:
 
 def strides() -> dict[str, list[float]]:
     """Return the durations [s] of the strides of each walk that has several."""
-    path = DATA / "walk_styles_bandai" / "strides.csv"
-    if not path.is_file():
-        pytest.skip(f"{path} is not there: the recordings' licences forbid copying them here")
+    path = folder("walk_styles_bandai") / "strides.csv"
     durations: dict[str, list[float]] = {}
     with path.open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -137,9 +138,9 @@ def test_cycles_of_walks_last_as_long_as_their_strides() -> None:
     """
     refused, doubled = [], []
     for name, durations in strides().items():
-        recording = pdmp.demos.read_csv(DATA / "walk_styles_bandai" / "demos" / f"{name}.csv")
+        recording = pdmp.io.read_csv(folder("walk_styles_bandai") / "demos" / f"{name}.csv")
         try:
-            cycles = pdmp.demos.cycles(recording)
+            cycles = pdmp.preprocessing.cycles(recording)
         except ValueError as error:
             assert "no period" in str(error)
             refused.append(name)
@@ -157,17 +158,17 @@ def test_bvh_walks_give_the_period_of_their_strides() -> None:
     """Joints with positions, which few parsers read, come in whole."""
     name = "walk_normal_001"
     durations = strides()[name]
-    path = DATA / "walk_styles_bandai" / "raw" / f"dataset-1_{name}.bvh"
-    recording = pdmp.demos.unwrap(pdmp.demos.read_bvh(path))
+    path = folder("walk_styles_bandai") / "raw" / f"dataset-1_{name}.bvh"
+    recording = pdmp.preprocessing.unwrap(pdmp.io.read_bvh(path))
     assert recording.n_dofs == 132
-    assert pdmp.demos.period(recording) == pytest.approx(np.mean(durations), rel=0.03)
+    assert pdmp.preprocessing.period(recording) == pytest.approx(np.mean(durations), rel=0.03)
 
 
 def test_walks_of_two_gaits_become_one_rhythmic_primitive() -> None:
     """Walks and runs of one person, at their own periods, are learnt in one phase, on the spot."""
     demos = recordings("walk_run_cmu35", 1)
     with pytest.warns(UserWarning, match=r"'root_z' gains 2\.\d+ in recording"):
-        cycles = pdmp.demos.cycles(demos)
+        cycles = pdmp.preprocessing.cycles(demos)
     assert set(cycles.recordings) == set(range(len(demos)))
     model = pdmp.fit(cycles, kind="rhythmic", n_styles=3)
     assert (cycles.periods < 0.8).sum() == sum(demo.n_samples < 50 for demo in demos)

@@ -1,6 +1,7 @@
 """The paper's claims, on movements made by their sources and a robot that can knock things over."""
 
 import itertools
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +9,16 @@ import numpy as np
 import pytest
 
 import pdmp
-from pdmp.cli import main
-from pdmp.reproduction import film, heights, one_dof, reproduce, rivals, styles, walking
-from pdmp.reproduction import swing as arms
-from pdmp.reproduction.baxter import mjcf
-from pdmp.reproduction.human import BOX, RESTING, minimum_jerk
-from pdmp.reproduction.loop import NewGoal, from_rest, reach_over
-from pdmp.reproduction.reaching import GOAL, Reaching, demonstrate, height_of
-from pdmp.reproduction.robot import DT, Robot, boxes
+from reproduction import film, heights, one_dof, rivals, styles, walking
+from reproduction import swing as arms
+from reproduction.__main__ import main
+from reproduction.baxter import mjcf
+from reproduction.demo.__main__ import main as demo_main
+from reproduction.human import BOX, RESTING, minimum_jerk
+from reproduction.loop import NewGoal, from_rest, reach_over
+from reproduction.reaching import GOAL, Reaching, demonstrate, height_of
+from reproduction.robot import DT, Robot, boxes
+from reproduction.run import reproduce
 
 CLOSE = 1.0  # mm
 
@@ -232,7 +235,7 @@ def test_command_writes_tables_and_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The first figure needs no robot."""
-    assert main(["reproduce", "fig2", "-o", str(tmp_path)]) == 0
+    assert main(["fig2", "-o", str(tmp_path)]) == 0
     assert {path.name for path in tmp_path.iterdir()} == {"fig2.md", "fig2.png"}
     assert capsys.readouterr().out.strip() in (tmp_path / "fig2.md").read_text(encoding="utf-8")
 
@@ -280,7 +283,7 @@ def test_bad_requests_are_named(arguments: dict[str, Any], message: str, tmp_pat
 
 def test_missing_robot_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """With what installs it."""
-    monkeypatch.setattr("pdmp.reproduction.baxter.find_spec", lambda name: None)
+    monkeypatch.setattr("reproduction.baxter.find_spec", lambda name: None)
     with pytest.raises(ImportError, match="pip install --no-deps robosuite"):
         mjcf()
 
@@ -318,3 +321,40 @@ def test_trials_beyond_reach_are_made_anew() -> None:
     for demo in other.demos:
         assert (demo.position > other.arm.lowest).all()
         assert (demo.position < other.arm.highest).all()
+
+
+def test_demo_writes_model_report_and_the_figures_it_shows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every figure that the report shows is there, and the tables are printed."""
+    assert demo_main(["-o", str(tmp_path)]) == 0
+    report = (tmp_path / "report.md").read_text(encoding="utf-8")
+    figures = re.findall(r"\((\w+\.png)\)", report)
+    assert len(figures) == 5
+    for name in [*figures, "model.safetensors"]:
+        assert (tmp_path / name).stat().st_size > 0
+    assert capsys.readouterr().out.strip() in report
+
+
+@pytest.mark.parametrize(
+    ("command", "module"), [(main, "reproduction"), (demo_main, "reproduction.demo")]
+)
+def test_commands_have_help_and_refuse_a_dash(
+    command: Any, module: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Help ends well and shows an example; "-" is no folder."""
+    with pytest.raises(SystemExit, match="0"):
+        command(["--help"])
+    assert f"example: python -m {module}" in capsys.readouterr().out
+    figure = ["fig2"] if command is main else []
+    with pytest.raises(SystemExit, match="2"):
+        command([*figure, "-o", "-"])
+    assert "- is no file" in capsys.readouterr().err
+
+
+def test_commands_report_errors_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A request that cannot be met ends with exit code 1 and its reason."""
+    assert main(["fig2", "--seed", "-1", "-o", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.strip() == "error: seed = -1: must not be negative"

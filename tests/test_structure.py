@@ -1,43 +1,90 @@
-"""The map of the house in CONTRIBUTING.md is that of the sources."""
+"""The layers of the core in CONTRIBUTING.md are those of its sources."""
 
 import re
+import shutil
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[1]
 SOURCES = ROOT / "crates" / "pdmp-core" / "src"
 
 
-def rooms() -> list[str]:
-    """Return the modules of the core that the map names, from the ground up and left to right."""
+def layers() -> list[str]:
+    """Return the layers of the core, lowest first, as CONTRIBUTING.md lists them."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| [1-5] \| (.*?) \|", text, re.MULTILINE)
-    return [room for row in rows for room in re.findall(r"`(\w+)/?`", row)]
+    return re.findall(r"^\| \d+ \| `(\w+)/?` \|", text, re.MULTILINE)
 
 
-def imports(room: str) -> set[str]:
-    """Return the other modules that a module names, its tests aside."""
-    files = [SOURCES / f"{room}.rs", *(SOURCES / room).rglob("*.rs")]
-    found = set()
-    for file in files:
-        if file.exists() and file.name != "tests.rs":
-            code = file.read_text(encoding="utf-8").partition("mod tests {")[0]
-            found.update(re.findall(r"\bcrate::([a-z_]+)\b", re.sub(r"//.*", "", code)))
-    return found - {room}
+def code_of(sources: Path) -> list[tuple[str, Path, str]]:
+    """Return layer, path and code of each file, without comments, unit tests and literals."""
+    found = []
+    for path in sorted(sources.rglob("*.rs")):
+        layer = path.relative_to(sources).parts[0].removesuffix(".rs")
+        if layer != "lib" and path.name != "tests.rs":
+            code = re.sub(r"//.*", "", path.read_text(encoding="utf-8"))
+            found.append((layer, path, code.partition("mod tests {")[0]))
+    return found
 
 
-def test_map_names_every_module_once() -> None:
-    """No module is missing from the map, and none is on it that is gone."""
-    modules = {path.stem for path in SOURCES.iterdir()} - {"lib"}
-    assert sorted(rooms()) == sorted(modules)
-
-
-def test_modules_import_from_below() -> None:
-    """A module imports none that stands above it, or to its right on the same floor."""
-    order = rooms()
-    wrong = {
-        (room, other)
-        for k, room in enumerate(order)
-        for other in imports(room)
-        if other in order[k + 1 :]
+def upward_imports(sources: Path) -> set[tuple[str, str]]:
+    """Return the files that name a layer above their own, with that layer."""
+    order = layers()
+    return {
+        (str(path.relative_to(sources)), other)
+        for layer, path, code in code_of(sources)
+        for other in re.findall(r"\bcrate::(\w+)", code)
+        if other in order[order.index(layer) + 1 :]
     }
-    assert not wrong
+
+
+def stray_methods(sources: Path) -> set[tuple[str, str]]:
+    """Return the files that add methods to a type of another layer, with that type.
+
+    A method call needs no import: were the method defined above its type, a layer below could
+    call it unseen.
+    """
+    code = code_of(sources)
+    home: dict[str, set[str]] = {}
+    for layer, _, text in code:
+        for name in re.findall(r"\b(?:struct|enum) (\w+)", text):
+            home.setdefault(name, set()).add(layer)
+    return {
+        (str(path.relative_to(sources)), name)
+        for layer, path, text in code
+        for name in re.findall(r"^impl(?:<[^>]*>)? (\w+)(?:<[^>]*>)? \{", text, re.MULTILINE)
+        if layer not in home.get(name, {layer})
+    }
+
+
+def test_every_module_belongs_to_one_layer() -> None:
+    """No layer is missing from the list, and none is on it that is gone."""
+    modules = {path.stem for path in SOURCES.iterdir()} - {"lib"}
+    assert sorted(layers()) == sorted(modules)
+
+
+def test_layers_use_only_lower_layers() -> None:
+    """No module names one of a layer above it."""
+    assert not upward_imports(SOURCES)
+
+
+def test_methods_are_defined_in_the_layer_of_their_type() -> None:
+    """No call reaches a layer above through a method."""
+    assert not stray_methods(SOURCES)
+
+
+@pytest.mark.parametrize(
+    ("where", "line", "check"),
+    [
+        ("motion/rollout.rs", "use crate::learning::fit;", upward_imports),
+        ("dynamics/transport.rs", "fn peek() { crate::model::Model::load(path); }", upward_imports),
+        ("motion/batch.rs", "impl Model {\n    fn batch(&self) {}\n}", stray_methods),
+        ("learning/fit.rs", "impl Controller {\n    fn follow(&self) {}\n}", stray_methods),
+    ],
+)
+def test_a_violation_is_found(tmp_path: Path, where: str, line: str, check) -> None:
+    """A planted import or method of the wrong layer is reported with its file."""
+    sources = shutil.copytree(SOURCES, tmp_path / "src")
+    target = sources / where
+    target.write_text(f"{line}\n{target.read_text(encoding='utf-8')}", encoding="utf-8")
+    assert [file for file, _ in check(sources)] == [where]

@@ -1,4 +1,4 @@
-"""Prints what is compared, and where, then a table for each work, and one of all."""
+"""Prints contestants and machine, a table for each work, and one of all."""
 
 import gc
 import os
@@ -23,7 +23,7 @@ PACKAGES = [
 
 
 def installed(package: str) -> str:
-    """Name a package with its version."""
+    """Returns a package with its version."""
     try:
         return f"{package} {version(package)}"
     except PackageNotFoundError:
@@ -31,7 +31,7 @@ def installed(package: str) -> str:
 
 
 def summary(results: list[tuple[Work, dict[str, float]]]) -> None:
-    """Print every ratio of the run in one table."""
+    """Prints every ratio of the run in one table."""
     print(f"\n| {'work':<84} | {'contestant':<46} |  median |  ratio |")
     print(f"|{'-' * 86}|{'-' * 48}|--------:|-------:|")
     for work, medians in results:
@@ -43,7 +43,7 @@ def summary(results: list[tuple[Work, dict[str, float]]]) -> None:
 
 
 def main() -> None:
-    """Print what is compared, and where, then a table for each work, and one of all."""
+    """Prints contestants and machine, a table for each work, and one of all."""
     print(f"{machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     print(", ".join(installed(package) for package in PACKAGES))
     gc.disable()

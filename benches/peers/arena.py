@@ -31,7 +31,7 @@ class Work:
 
 
 def prepared(contestants: dict[str, Prepare]) -> dict[str, Begin]:
-    """Make the contestants ready, and tell of those that are not installed."""
+    """Prepares the contestants, and prints those that are not installed."""
     ready = {}
     for name, prepare in contestants.items():
         try:
@@ -42,7 +42,7 @@ def prepared(contestants: dict[str, Prepare]) -> dict[str, Begin]:
 
 
 def times(begin: Begin, calls: int, together: int) -> Iterator[float]:
-    """Give the time of one call, in ns, from as many as are timed together, through a bout."""
+    """Yields the time of one call [ns], averaged over calls timed together, throughout a bout."""
     call = begin()
     for _ in range(calls // together):
         start = perf_counter_ns()
@@ -52,7 +52,7 @@ def times(begin: Begin, calls: int, together: int) -> Iterator[float]:
 
 
 def run(work: Work) -> dict[str, float]:
-    """Time a work, print its table, and return the medians [ns] by contestant."""
+    """Times a work, prints its table, and returns the medians [ns] by contestant."""
     print(f"\n{work.title}, at most {work.bouts} bouts of {work.calls}")
     ready = prepared(work.contestants)
     singly: dict[str, list[float]] = {name: [] for name in ready}
@@ -77,19 +77,19 @@ def run(work: Work) -> dict[str, float]:
 
 
 def written(ns: float) -> str:
-    """Write a time with three digits."""
+    """Writes a time with three digits."""
     units = [(1e9, "s"), (1e6, "ms"), (1e3, "µs")]
     size, unit = next((pair for pair in units if ns >= pair[0]), (1, "ns"))
     return f"{ns / size:#.3g}".rstrip(".") + f" {unit}"
 
 
 def ratio(median: float, first: float) -> str:
-    """Write a ratio with three digits, or as a whole number."""
+    """Writes a ratio with three digits, or as a whole number."""
     return f"{median / first:.3g}" if median < 999.5 * first else f"{median / first:.0f}"
 
 
 def machine() -> str:
-    """Name the processor, as far as the system tells."""
+    """Returns the name of the processor, if the system gives it."""
     cpuinfo = Path("/proc/cpuinfo")
     lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]

@@ -13,7 +13,7 @@ N_LEADING = 5
 
 
 def library(n_demos: int, n_values: int) -> np.ndarray:
-    """Return targets (M, C·D) of forty factors that each have half of the one before, and noise."""
+    """Returns noisy targets (M, C·D) of forty factors, each half as strong as the one before."""
     random = np.random.default_rng(0)
     strengths = 0.5 ** np.arange(40)
     left, right = random.normal(size=(n_demos, 40)), random.normal(size=(40, n_values))
@@ -25,24 +25,24 @@ targets = cache(library)
 
 
 def pdmp_factors(shape: tuple[int, int], n_styles: int) -> Begin:
-    """Find the leading factors, as many as are asked for."""
+    """Finds the leading factors, as many as are asked for."""
     return lambda: partial(pdmp.factorise, targets(*shape), n_styles=n_styles)
 
 
 def numpy_factors(shape: tuple[int, int]) -> Begin:
-    """Find all factors, by LAPACK's divide and conquer."""
+    """Finds all factors, by LAPACK's divide and conquer."""
     return lambda: partial(np.linalg.svd, targets(*shape), full_matrices=False)
 
 
 def scipy_factors() -> Begin:
-    """Find the leading factors by Lanczos iteration, to machine precision."""
+    """Finds the leading factors by Lanczos iteration, to machine precision."""
     from scipy.sparse.linalg import svds
 
     return lambda: partial(svds, targets(*LARGE), k=N_LEADING, random_state=0)
 
 
 def scikit_learn_factors() -> Begin:
-    """Find the leading factors by random projection, as precisely as its defaults are."""
+    """Finds the leading factors by random projection, as precisely as its defaults are."""
     from sklearn.utils.extmath import randomized_svd
 
     return lambda: partial(randomized_svd, targets(*LARGE), N_LEADING, random_state=0)

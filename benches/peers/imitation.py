@@ -13,31 +13,31 @@ N_DEMOS = 20
 
 
 def pdmp_imitate(basis: str) -> Begin:
-    """Learn a primitive of one demonstration, with the check that its table is close enough."""
+    """Learns a primitive of one demonstration, with the check that its table is close enough."""
     demonstration = movement(1)
     return lambda: partial(pdmp.fit, [demonstration], dt=DT, basis=basis, threads=1)
 
 
 def movement_primitives_imitate() -> Begin:
-    """Learn one demonstration."""
+    """Learns one demonstration."""
     dmp = movement_primitives_dmp()
     return lambda: partial(dmp.imitate, np.linspace(0, 1, 1001), movement(1))
 
 
 def pydmps_imitate() -> Begin:
-    """Learn one demonstration."""
+    """Learns one demonstration."""
     dmp = pydmps_dmp()
     return lambda: partial(dmp.imitate_path, movement(1).T)
 
 
 def pdmp_fit(basis: str) -> Begin:
-    """Learn one primitive of all demonstrations, with as many styles as reproduce each of them."""
+    """Learns one primitive of all demonstrations, with as many styles as reproduce each of them."""
     settings = {"dt": DT, "n_styles": N_STYLES, "basis": basis, "threads": 1}
     return lambda: partial(pdmp.fit, movements(N_DEMOS), **settings)
 
 
 def movement_primitives_promp() -> Begin:
-    """Learn the distribution of ten weights for each degree of freedom, as many as by default.
+    """Learns the distribution of ten weights for each degree of freedom, as many as by default.
 
     A few rounds of expectation maximisation suffice. What takes the time, and eight gigabytes, are
     matrices of all values by all values of a demonstration, one for each.

@@ -11,7 +11,7 @@ EULER, RK4 = "euler-cython", "rk4-cython"
 
 
 def movement_primitives_dmp() -> Any:
-    """Make a primitive of movement_primitives that has learnt one demonstration."""
+    """Makes a primitive of movement_primitives that has learnt one demonstration."""
     from movement_primitives.dmp import DMP
 
     # An int_dt above dt lets Euler take a tick in one piece, whatever the rounding of the time.
@@ -21,7 +21,7 @@ def movement_primitives_dmp() -> Any:
 
 
 def pydmps_dmp() -> Any:
-    """Make a primitive of pydmps that has learnt one demonstration."""
+    """Makes a primitive of pydmps that has learnt one demonstration."""
     from pydmps.dmp_discrete import DMPs_discrete
 
     dmp = DMPs_discrete(n_dmps=N_DOFS, n_bfs=N_BASIS, dt=DT)

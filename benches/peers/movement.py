@@ -14,7 +14,7 @@ N_BASIS = 50
 
 
 def movement(style: float) -> np.ndarray:
-    """Return a reach of one second (1001, D) whose bends go with the style and with its square."""
+    """Returns a reach of one second (1001, D) whose bends go with the style and with its square."""
     s = np.linspace(0, 1, 1001)[:, None]
     d = np.arange(N_DOFS)
     reach = s**3 * (10 - 15 * s + 6 * s**2) * (1 + d)
@@ -23,16 +23,16 @@ def movement(style: float) -> np.ndarray:
 
 
 def movements(count: int) -> list[np.ndarray]:
-    """Return movements whose styles divide [0, 1] evenly."""
+    """Returns movements whose styles divide [0, 1] evenly."""
     return [movement(style) for style in np.linspace(0, 1, count)]
 
 
 @cache
 def primitive() -> pdmp.Model:
-    """Learn pdmp's primitive from ten movements, which J = 3 reproduces."""
+    """Learns pdmp's primitive from ten movements, which J = 3 reproduces."""
     return pdmp.fit(movements(10), dt=DT, n_styles=N_STYLES)
 
 
 def goals() -> list[np.ndarray]:
-    """Return two goals, to be given in turn."""
+    """Returns two goals, to be given in turn."""
     return [movement(0)[-1], movement(0)[-1] + 0.1]

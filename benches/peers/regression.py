@@ -15,21 +15,21 @@ MANY, SOME = 4000, 1000
 
 
 def samples(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return inputs (C,) and three noisy outputs (C, 3) as wiggly as the weak factors of a set."""
+    """Returns inputs (C,) and three noisy outputs (C, 3) as wiggly as the weak factors of a set."""
     u = np.linspace(0, 1, count)
     clean = np.column_stack([np.sin(3 * u), np.sin(11 * u + 1), np.cos(23 * u)])
     return u, clean + NOISE**0.5 * np.random.default_rng(0).normal(size=clean.shape)
 
 
 def pdmp_conditioned(kernel: str) -> Begin:
-    """Condition on the samples."""
+    """Conditions on the samples."""
     u, f = samples(MANY)
     gp = pdmp.GP(kernel, LENGTH, NOISE)
     return lambda: partial(gp.regress, u, f)
 
 
 def scikit_learn_conditioned(nu: float) -> Begin:
-    """Condition on the samples through the dense covariance matrix, and find their likelihood."""
+    """Conditions on the samples through the dense covariance matrix, and finds their likelihood."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import Matern
 
@@ -39,7 +39,7 @@ def scikit_learn_conditioned(nu: float) -> Begin:
 
 
 def celerite2_conditioned() -> Begin:
-    """Factorise the covariance and solve for the outputs: no variance is found here.
+    """Factorises the covariance and solves for the outputs: no variance is found here.
 
     Its Matérn-3/2 is the limit of two exponentials, taken as close as its default does.
     """
@@ -57,13 +57,13 @@ def celerite2_conditioned() -> Begin:
 
 
 def pdmp_found(kernel: str, count: int) -> Begin:
-    """Find amplitude, length and noise, and condition on the samples."""
+    """Finds amplitude, length and noise, and conditions on the samples."""
     u, f = samples(count)
     return lambda: partial(pdmp.GP(kernel).regress, u, f)
 
 
 def scikit_learn_found() -> Begin:
-    """Find amplitude, length and noise from one start near them, and condition on the samples."""
+    """Finds amplitude, length and noise from one start near them, and conditions on the samples."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 

@@ -12,30 +12,30 @@ N_ROLLOUTS = 1000
 
 
 def pdmp_rollout() -> Begin:
-    """Roll out with velocities and accelerations."""
+    """Rolls out with velocities and accelerations."""
     return lambda: partial(primitive().rollout, dt=DT)
 
 
 def movement_primitives_rollout(method: str) -> Begin:
-    """Roll out positions with the compiled Euler or Runge-Kutta method."""
+    """Rolls out positions with the compiled Euler or Runge-Kutta method."""
     dmp = movement_primitives_dmp()
     return lambda: partial(dmp.open_loop, step_function=method)
 
 
 def pydmps_rollout() -> Begin:
-    """Roll out with velocities and accelerations."""
+    """Rolls out with velocities and accelerations."""
     dmp = pydmps_dmp()
     return lambda: dmp.rollout
 
 
 def pdmp_rollouts() -> Begin:
-    """Roll out many styles, with velocities."""
+    """Rolls out many styles, with velocities."""
     styles = np.random.default_rng(0).normal(size=(N_ROLLOUTS, N_STYLES))
     return lambda: partial(primitive().rollouts, styles, dt=DT, threads=1)
 
 
 def mp_pytorch_rollouts(kind: str) -> Begin:
-    """Roll out many weight vectors, with velocities, in float64 and on one thread.
+    """Rolls out many weight vectors, with velocities, in float64 and on one thread.
 
     What is drawn differs in size: J style parameters there, ten weights for each degree of freedom
     here, and a goal too for ProDMP. ProMP's velocities are differences of its positions.

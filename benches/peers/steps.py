@@ -12,7 +12,7 @@ TICKS = 800  # within the second that the movement lasts: no one finishes early
 
 
 def pdmp_settled() -> Begin:
-    """Step with style, goal and tau at rest."""
+    """Steps with style, goal and tau at rest."""
     controller = primitive().controller(dt=DT)
 
     def begin() -> Call:
@@ -24,7 +24,7 @@ def pdmp_settled() -> Begin:
 
 
 def pdmp_live() -> Begin:
-    """Step with style, goal and tau on their way to others, slowly enough to take all ticks."""
+    """Steps with style, goal and tau on their way to others, slowly enough to take all ticks."""
     model = primitive()
     controller = model.controller(dt=DT, transition=DT * TICKS)
 
@@ -40,7 +40,7 @@ def pdmp_live() -> Begin:
 
 
 def pdmp_new_goal() -> Begin:
-    """Step with a goal set before each; the filter of the goal starts anew."""
+    """Steps with a goal set before each; the filter of the goal starts anew."""
     controller = primitive().controller(dt=DT)
     targets = cycle(goals())
 
@@ -57,7 +57,7 @@ def pdmp_new_goal() -> Begin:
 
 
 def ruckig_start() -> tuple[Any, Any, Any]:
-    """Make generator, input and output for the same way with limits that let it last a second.
+    """Makes generator, input and output for the same way with limits that let it last a second.
 
     The work differs in kind: no shape is learnt or followed. A jerk-limited trajectory is computed
     when the target changes and sampled at every other tick.
@@ -73,14 +73,14 @@ def ruckig_start() -> tuple[Any, Any, Any]:
 
 
 def ruckig_rest(given: Any) -> None:
-    """Put the input at rest at the start of the way."""
+    """Puts the input at rest at the start of the way."""
     given.current_position = movement(0)[0].tolist()
     given.current_velocity = [0.0] * N_DOFS
     given.current_acceleration = [0.0] * N_DOFS
 
 
 def ruckig_sample() -> Begin:
-    """Sample a trajectory: its computation, in the first update, is not timed."""
+    """Samples a trajectory: its computation, in the first update, is not timed."""
     generator, given, output = ruckig_start()
 
     def tick() -> None:
@@ -96,7 +96,7 @@ def ruckig_sample() -> Begin:
 
 
 def ruckig_new_goal() -> Begin:
-    """Compute a trajectory at every tick, to a target set before each."""
+    """Computes a trajectory at every tick, to a target set before each."""
     generator, given, output = ruckig_start()
     targets = cycle([goal.tolist() for goal in goals()])
 
@@ -114,7 +114,7 @@ def ruckig_new_goal() -> Begin:
 
 
 def movement_primitives_step(method: str, new_goal: bool) -> Begin:
-    """Step with the compiled Euler or Runge-Kutta method."""
+    """Steps with the compiled Euler or Runge-Kutta method."""
     dmp = movement_primitives_dmp()
     targets = cycle(goals())
     state = [dmp.start_y, dmp.start_yd]
@@ -136,7 +136,7 @@ def movement_primitives_step(method: str, new_goal: bool) -> Begin:
 
 
 def pydmps_step(new_goal: bool) -> Begin:
-    """Step with its Euler method."""
+    """Steps with its Euler method."""
     dmp = pydmps_dmp()
     targets = cycle(goals())
 

@@ -1,4 +1,8 @@
-"""``make report`` prints the table and draws figures into report/; ``--write`` writes docs too."""
+"""Predicts movements from their context, with the primitive and with simpler predictors.
+
+``make report`` prints the tables and draws figures into out/report/; ``--write`` writes
+docs/report.md too.
+"""
 
 import argparse
 from concurrent.futures import ProcessPoolExecutor
@@ -10,8 +14,8 @@ from report.sets import Question, questions
 from report.text import FORESEEN, PRIMITIVE, WARPED, text
 
 ROOT = Path(__file__).resolve().parents[2]
-FIGURES = ROOT / "report"
-CURVES = {"raise_hand, whole", "walking_force, subject 0"}
+FIGURES = ROOT / "out" / "report"
+CURVES = {"raise_hand_bandai, whole", "walking_force_speed, subject 0"}
 PRIMITIVES = {
     PRIMITIVE: PDMP(),
     "PDMP, full J": PDMP(spectrum=1.0),
@@ -22,7 +26,7 @@ PRIMITIVES = {
 
 
 def main() -> None:
-    """Answer every question at hand."""
+    """Evaluates every question whose recordings are available."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--write", action="store_true", help="write docs/report.md")
     write = arguments.parse_args().write
@@ -39,7 +43,7 @@ def main() -> None:
 
 
 def answer(question: Question) -> Evaluation:
-    """Evaluate all predictors on one question, and draw what they foresee."""
+    """Evaluates all predictors on one question, and draws their predictions."""
     given = {"contexts": question.contexts} | question.options
     found = evaluate(question.demos, predictors=baselines() | PRIMITIVES, **given)
     figure = plot.held_out(found, PRIMITIVE, unit=question.unit)
@@ -52,7 +56,7 @@ def answer(question: Question) -> Evaluation:
 
 
 def slug(name: str) -> str:
-    """Return a name for a file."""
+    """Returns a name for a file."""
     return name.replace(", ", "_").replace(" ", "_")
 
 

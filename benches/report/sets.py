@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from pdmp import Demonstration
-from pdmp.demos import read_csv, read_folder
-from recordings import ARM, DATA, HAND, at_hand, cycle
+from pdmp.datasets import folder
+from pdmp.io import read_csv, read_folder
+from recordings import ARM, HAND, cycle, is_available
 
 LEGS = [f"{side}_{angle}" for side in "rl" for angle in ("hip_flex", "knee_flex", "ank_dorsi")]
 MOST = 120  # demonstrations of a question: Gaussian processes take a second each beyond
@@ -27,28 +28,33 @@ class Question:
     contexts: np.ndarray  # (M, Q)
     options: dict[str, Any] = field(default_factory=dict)  # of `pdmp.evaluate`
 
+    @property
+    def source(self) -> str:
+        """Name of the set of recordings in `pdmp.datasets.REGISTRY`."""
+        return self.name.partition(",")[0]
+
 
 def questions() -> Iterator[Question]:
-    """Give every question whose recordings are at hand."""
+    """Yields every question whose recordings are available."""
     for source, ask in ASKED.items():
-        if at_hand(source):
+        if is_available(source):
             yield from ask()
 
 
 def raised_hands() -> Iterator[Question]:
-    """Raise a hand, hold it, and bring it back; or the rise alone."""
+    """Yields raised hands: up, hold and back, or the rise alone."""
     index = rows("raise_hand_bandai")
-    demos = list(read_folder(DATA / "raise_hand_bandai", columns=ARM).values())
+    demos = list(read_folder(folder("raise_hand_bandai"), columns=ARM).values())
     heights = numbers(index, "hold_height_m")
-    yield Question("raise_hand, whole", "height held", "rad", demos, heights)
+    yield Question("raise_hand_bandai, whole", "height held", "rad", demos, heights)
     rises = cut(demos, numbers(index, "rise_start_s", "rise_end_s"))
-    yield Question("raise_hand, rise", "height held", "rad", rises, heights)
+    yield Question("raise_hand_bandai, rise", "height held", "rad", rises, heights)
 
 
 def high_and_low() -> Iterator[Question]:
-    """Grab something high, or deposit something on the floor: three actors of different size."""
+    """Yields grabs from high up and deposits on the floor, by three actors of different size."""
     index = rows("arms_hdm05")
-    demos = list(read_folder(DATA / "arms_hdm05", columns=ARM).values())
+    demos = list(read_folder(folder("arms_hdm05"), columns=ARM).values())
     columns = {"grabHighR": "peak_height_m", "depositFloorR": "low_height_m"}
     heights, chosen = np.full((len(index), 1), np.nan), {}
     for motion, column in columns.items():
@@ -61,23 +67,25 @@ def high_and_low() -> Iterator[Question]:
 
 
 def walking_forces() -> Iterator[Question]:
-    """Load the ground, as five people do who walk at many speeds."""
+    """Yields ground forces of five people who walk at many speeds."""
     index = rows("walking_force_speed")
-    demos = list(read_folder(DATA / "walking_force_speed").values())
+    demos = list(read_folder(folder("walking_force_speed")).values())
     speeds = numbers(index, "speed_m_s")
     subjects = np.array([row["subject"] for row in index])
     for subject in np.unique(subjects):
         members = np.flatnonzero(subjects == subject)
         some = [demos[k] for k in members]
-        yield Question(f"walking_force, subject {subject}", "speed", "BW", some, speeds[members])
+        yield Question(
+            f"walking_force_speed, subject {subject}", "speed", "BW", some, speeds[members]
+        )
     step = -(-len(demos) // MOST)
-    yield Question("walking_force, all", "speed", "BW", demos[::step], speeds[::step])
+    yield Question("walking_force_speed, all", "speed", "BW", demos[::step], speeds[::step])
 
 
 def doors() -> Iterator[Question]:
-    """Reach for the handle of a door that is somewhere else each time, and open it."""
+    """Yields reaches for the handle of a door at many places, and the opening of the door."""
     index = rows("door_adroit")
-    demos = list(read_folder(DATA / "door_adroit", columns=HAND).values())
+    demos = list(read_folder(folder("door_adroit"), columns=HAND).values())
     places = numbers(index, "door_x", "door_y", "door_z")
     ends = numbers(index, "latch_turns_at_s")
     reaches = cut(demos, np.hstack([0 * ends, ends]))
@@ -86,7 +94,7 @@ def doors() -> Iterator[Question]:
 
 
 def styled_walks() -> Iterator[Question]:
-    """Walk in ten styles, right foot to right foot; a recording has one speed."""
+    """Yields walks in ten styles, right foot to right foot; a recording has one speed."""
     speeds = {row["id"]: float(row["speed_m_s"]) for row in rows("walk_styles_bandai")}
     demos, contexts = [], []
     for stride in rows("walk_styles_bandai", "strides.csv"):
@@ -96,13 +104,13 @@ def styled_walks() -> Iterator[Question]:
             demos.append(cycle(whole.position[start:end], float(stride["duration_s"]), whole.names))
             contexts.append([speeds[stride["id"]]])
     options = {"kind": "rhythmic"}
-    yield Question("walk_styles", "speed", "rad", demos, np.array(contexts), options)
+    yield Question("walk_styles_bandai", "speed", "rad", demos, np.array(contexts), options)
 
 
 def runners() -> Iterator[Question]:
-    """Run, as runners of different age, height and mass do."""
+    """Yields strides of runners of different age, height and mass."""
     index = rows("running_strides")
-    strides = list(read_folder(DATA / "running_strides").values())
+    strides = list(read_folder(folder("running_strides")).values())
     seen: dict[str, int] = {}
     members = []
     for k, row in enumerate(index):
@@ -117,9 +125,9 @@ def runners() -> Iterator[Question]:
 
 
 def pushes() -> Iterator[Question]:
-    """Push an object to a target with a planar arm."""
+    """Yields pushes of an object to a target with a planar arm."""
     index = rows("arm3_pushing")
-    demos = list(read_folder(DATA / "arm3_pushing").values())
+    demos = list(read_folder(folder("arm3_pushing")).values())
     places = numbers(index, "object_x", "object_y", "target_x", "target_y")
     yield Question("arm3_pushing", "object and target", "rad", demos, places)
 
@@ -136,18 +144,18 @@ ASKED = {
 
 
 def rows(source: str, name: str = "index.csv") -> list[dict[str, str]]:
-    """Read a table of a set."""
-    with open(DATA / source / name, newline="", encoding="utf-8") as file:
+    """Reads a table of a set."""
+    with open(folder(source) / name, newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
 def numbers(index: list[dict[str, str]], *columns: str) -> np.ndarray:
-    """Return columns of a table (M, Q)."""
+    """Returns columns of a table (M, Q)."""
     return np.array([[float(row[column]) for column in columns] for row in index])
 
 
 def cut(demos: list[Demonstration], bounds: np.ndarray) -> list[Demonstration]:
-    """Return what lies between two times [s] of each demonstration."""
+    """Returns the part of each demonstration between two times [s]."""
     parts = []
     for demo, (begin, end) in zip(demos, bounds, strict=True):
         kept = (demo.time >= begin - 1e-3) & (demo.time <= end + 1e-3)
@@ -156,6 +164,6 @@ def cut(demos: list[Demonstration], bounds: np.ndarray) -> list[Demonstration]:
 
 
 def walk(name: str) -> Demonstration:
-    """Read one recording of a walk: the right arm and what flexes the legs."""
-    folder = DATA / "walk_styles_bandai" / "demos"
-    return read_csv(folder / f"{name}.csv", columns=[*ARM, *LEGS])
+    """Reads one recording of a walk: the right arm and the flexion of the legs."""
+    path = folder("walk_styles_bandai") / "demos" / f"{name}.csv"
+    return read_csv(path, columns=[*ARM, *LEGS])

@@ -7,6 +7,7 @@ import pdmp
 from pdmp import Warp
 from pdmp.evaluation import Evaluation, baselines
 from pdmp.evaluation.result import REFERENCE
+from recordings import sources
 from report.sets import Question
 
 PRIMITIVE = "PDMP"
@@ -15,7 +16,7 @@ WARPED = "PDMP, warped time"
 INTRODUCTION = """\
 # Movements foreseen from their context
 
-`make report` prints these tables and draws figures into `report/`;
+`make report` prints these tables and draws figures into `out/report/`;
 `PYTHONPATH=benches .venv/bin/python -m report --write` puts them here. Each condition is held out
 in turn, or, where there are more than twelve, each of twelve folds of neighbouring ones; the others
 are learnt from, and the movement is foreseen from the context alone. What lies outside the convex
@@ -58,7 +59,7 @@ where in time they lie: foreseen from the context, movements at their mean momen
 
 
 def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
-    """Write the tables of all answers."""
+    """Writes the tables of all answers."""
     names = [name for name in answers[0][1].predictors if name != REFERENCE]
     errors, itself, time = [], [], []
     for question, found in answers:
@@ -86,12 +87,14 @@ def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
             TIME,
             *table(["recordings", "reach", *spectrum], time),
             "",
+            sources(dict.fromkeys(question.source for question, _ in answers)),
+            "",
         ]
     )
 
 
 def relative(found: Evaluation, name: str, reach: str) -> str:
-    """Write E over that of the mean demonstration."""
+    """Writes E over that of the mean demonstration."""
     if name in found.left_out:
         return "–"
     summary = found.summary(name, reach)
@@ -99,7 +102,7 @@ def relative(found: Evaluation, name: str, reach: str) -> str:
 
 
 def primitive(question: Question, found: Evaluation, reach: str) -> Iterable[str]:
-    """Write what the primitive alone knows."""
+    """Writes what the primitive alone knows."""
     summary = found.summary(PRIMITIVE, reach)
     yield f"{summary.error:.2g} ± {summary.deviation:.1g} {question.unit}²"
     yield f"{summary.coverage:.0%}"
@@ -111,19 +114,19 @@ def primitive(question: Question, found: Evaluation, reach: str) -> Iterable[str
 
 
 def difference(found: Evaluation, one: str, other: str, reach: str) -> str:
-    """Write E of one less that of the other, on the same folds."""
+    """Writes E of one less that of the other, on the same folds."""
     compared = found.compare(one, other, reach)
     return f"{compared.mean:.2g} ± {compared.standard_error:.1g}"
 
 
 def choices(question: Question) -> tuple[str, str, str]:
-    """Write J, J by cross-validation, and the map of a primitive of all demonstrations."""
+    """Writes J, J by cross-validation, and the map of a primitive of all demonstrations."""
     model = learnt(question)
     return str(model.n_styles), str(learnt(question, n_styles="auto").n_styles), model.map.kind
 
 
 def spectra(question: Question) -> tuple[str, str]:
-    """Write the share of the first three singular values, in linear and in warped time."""
+    """Writes the share of the first three singular values, in linear and in warped time."""
     values = [
         learnt(question, alignment=alignment).singular_values for alignment in ("linear", Warp(4))
     ]
@@ -132,11 +135,11 @@ def spectra(question: Question) -> tuple[str, str]:
 
 
 def learnt(question: Question, **settings: Any) -> pdmp.Model:
-    """Learn from all demonstrations."""
+    """Learns from all demonstrations."""
     kind = question.options.get("kind", "discrete")
     return pdmp.fit(question.demos, kind=kind, contexts=question.contexts, **settings)
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Write a table in Markdown."""
+    """Writes a table in Markdown."""
     return [f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *rows)]

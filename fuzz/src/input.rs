@@ -4,10 +4,12 @@ use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 use ndarray::Array2;
-use pdmp_core::basis::{Basis, NGnet};
-use pdmp_core::{
-    ContextValue, Demonstration, FitOptions, Kind, MapChoice, MapKind, Sampling, StyleCount, TimeScaling, Warp, fit,
-};
+use pdmp_core::context::{MapChoice, MapKind};
+use pdmp_core::demonstration::ContextValue;
+use pdmp_core::learning::regression::{Basis, NGnet};
+use pdmp_core::learning::{StyleCount, TimeScaling};
+use pdmp_core::model::Warp;
+use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
 
 /// Numbers at which formulas and checks of ranges tend to fail.
 const ODD: [f64; 32] = [
@@ -104,11 +106,7 @@ pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
         ([0.0, 0.1, 0.25, 0.4].map(cycle).to_vec(), options(Kind::Rhythmic)),
     ];
     // The others first: a new kind of map does not renumber them.
-    others
-        .into_iter()
-        .chain(maps)
-        .map(|(demos, options)| fit(&demos, &options, &mut |_, _| Ok(())).unwrap().to_bytes().unwrap())
-        .collect()
+    others.into_iter().chain(maps).map(|(demos, options)| fit(&demos, &options).unwrap().to_bytes().unwrap()).collect()
 });
 
 fn options(kind: Kind) -> FitOptions {

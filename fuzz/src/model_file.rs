@@ -6,7 +6,14 @@ use std::collections::HashMap;
 use std::sync::{Arc, LazyLock};
 
 use ndarray::Array2;
-use pdmp_core::{BatchConditions, Conditions, Controller, Derivative, Model, Threads, Timing, Variable};
+use pdmp_core::model::Derivative;
+use pdmp_core::motion::jacobian;
+use pdmp_core::motion::prediction_band;
+use pdmp_core::motion::rollouts;
+use pdmp_core::motion::{BatchConditions, Timing, Variable};
+use pdmp_core::numerics::Threads;
+use pdmp_core::rollout;
+use pdmp_core::{Conditions, Controller, Model};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde_json::Value;
 
@@ -254,15 +261,19 @@ fn exercise(model: &Arc<Model>) {
     assert!(again.is_ok(), "a loaded and saved model cannot be loaded: {again:?}");
     let nominal = Conditions::default();
     let timing = Timing { dt: model.duration() / 50.0, duration: None };
-    if let Ok(trajectory) = model.rollout(&nominal, timing) {
+    if let Ok(trajectory) = rollout(model.primitive(), &nominal, timing) {
         finite("rollout", trajectory.position.iter().chain(&trajectory.velocity).chain(&trajectory.acceleration));
     }
-    if let Ok(jacobian) = model.jacobian(Variable::Style, Derivative::Position, &nominal, timing, &mut |_| Ok(())) {
+    if let Ok(jacobian) =
+        jacobian(model.primitive(), Variable::Style, Derivative::Position, &nominal, timing, &mut |_| Ok(()))
+    {
         finite("Jacobian", &jacobian);
     }
     let styles = Array2::zeros((2, model.n_styles()));
     let batch = BatchConditions { styles, ..Default::default() };
-    if let Ok(outputs) = model.rollouts(batch, timing, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(())) {
+    if let Ok(outputs) =
+        rollouts(model.primitive(), batch, timing, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(()))
+    {
         outputs.iter().for_each(|output| finite("batch", output));
     }
     control(model);
@@ -270,13 +281,14 @@ fn exercise(model: &Arc<Model>) {
     let (Some(map), Some(contexts)) = (model.map(), &demonstrated.contexts) else { return };
     for row in contexts.rows().into_iter().take(2) {
         let Ok(prediction) = map.context(&row.to_vec()).and_then(|context| model.predict(&context)) else { continue };
-        finite("prediction", prediction.style.iter().chain(&prediction.timing).chain([&prediction.duration]));
+        let Conditions { style, timing: times, .. } = &prediction.conditions;
+        finite("prediction", style.iter().chain(times).flatten().chain([&prediction.duration]));
         finite("covariance", prediction.covariance.iter().flatten());
         finite("distance", &prediction.outside);
-        if let Ok([lower, upper]) = model.band(&prediction, 0.9, timing) {
+        if let Ok([lower, upper]) = prediction_band(model, &prediction, 0.9, timing) {
             finite("band", lower.iter().chain(&upper));
         }
-        if let Ok(trajectory) = model.rollout(&model.conditions(&prediction), timing) {
+        if let Ok(trajectory) = rollout(model.primitive(), &prediction.conditions, timing) {
             finite("predicted rollout", &trajectory.position);
         }
     }
@@ -284,7 +296,7 @@ fn exercise(model: &Arc<Model>) {
 
 fn control(model: &Arc<Model>) {
     let dt = model.duration() / 40.0;
-    let Ok(mut controller) = Controller::new(Arc::clone(model), dt, &Conditions::default(), None) else { return };
+    let Ok(mut controller) = Controller::new(model.primitive(), dt, &Conditions::default(), None) else { return };
     let demonstrated = model.demonstrated();
     let last = model.n_demos() - 1;
     for tick in 0..60 {

@@ -13,7 +13,7 @@ multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.n
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from pdmp import demos, plot
+from pdmp import io, plot, preprocessing
 from pdmp._native import (
     GP,
     ContextMap,
@@ -37,8 +37,8 @@ from pdmp._native import (
     fit,
     load,
 )
-from pdmp.arguments import as_demonstrated, blend
-from pdmp.pacing import Run, Tick
+from pdmp.conditions import as_demonstrated, blend
+from pdmp.realtime import Run, Tick
 
 if TYPE_CHECKING:
     from pdmp import datasets, evaluation
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 else:
 
     def __getattr__(name):
-        """Import what a control loop has no use for when it is first asked for."""
+        """Imports modules that a control loop does not need at their first use."""
         if name == "evaluate":
             return import_module("pdmp.evaluation").evaluate
         if name in ("datasets", "evaluation"):
@@ -82,11 +82,12 @@ __all__ = [
     "as_demonstrated",
     "blend",
     "datasets",
-    "demos",
     "evaluate",
     "evaluation",
     "factorise",
     "fit",
+    "io",
     "load",
     "plot",
+    "preprocessing",
 ]

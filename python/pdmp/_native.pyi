@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal, TypeAlias, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp.pacing import Run
+from pdmp.realtime import Run
 
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]

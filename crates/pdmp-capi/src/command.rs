@@ -2,7 +2,8 @@
 
 use std::ptr;
 
-use pdmp_core::{Command, Conditions, Controller, Coupling, Model};
+use pdmp_core::motion::Coupling;
+use pdmp_core::{Command, Conditions, Controller, Primitive};
 
 use crate::buffers::{pdmp_buffer, pdmp_vector};
 use crate::status::Fault;
@@ -81,14 +82,14 @@ impl pdmp_conditions {
     ///
     /// # Safety
     /// Every pointer is NULL or valid, each vector's over its length.
-    pub(crate) unsafe fn get(&self, model: &Model) -> Result<Conditions, Fault> {
+    pub(crate) unsafe fn get(&self, primitive: &Primitive) -> Result<Conditions, Fault> {
         // SAFETY: the caller's promise is the same.
         let owned = |name, vector: pdmp_vector, expected, per| unsafe {
             vector.get(name, expected, per).map(|numbers| numbers.map(<[f64]>::to_vec))
         };
-        let per_dof = |name, vector| owned(name, vector, model.n_dofs(), "DoF");
+        let per_dof = |name, vector| owned(name, vector, primitive.n_dofs(), "DoF");
         Ok(Conditions {
-            style: owned("style", self.style, model.n_styles(), "style dimension")?,
+            style: owned("style", self.style, primitive.n_styles(), "style dimension")?,
             goal: per_dof("goal", self.goal)?,
             anchor: per_dof("anchor", self.anchor)?,
             start: per_dof("start", self.start)?,
@@ -136,10 +137,10 @@ impl pdmp_command {
     ///
     /// # Safety
     /// Every pointer is NULL or valid, each vector's over its length, for as long as the command.
-    pub(crate) unsafe fn get(&self, model: &Model) -> Result<Command<'_>, Fault> {
+    pub(crate) unsafe fn get(&self, primitive: &Primitive) -> Result<Command<'_>, Fault> {
         // SAFETY: the caller's promise is the same.
         let vector = |name, vector: pdmp_vector, expected, per| unsafe { vector.get(name, expected, per) };
-        let per_dof = |name, told| vector(name, told, model.n_dofs(), "DoF");
+        let per_dof = |name, told| vector(name, told, primitive.n_dofs(), "DoF");
         let coupling = match (
             per_dof("coupling velocity", self.coupling.velocity)?,
             per_dof("coupling acceleration", self.coupling.acceleration)?,
@@ -154,7 +155,7 @@ impl pdmp_command {
             [self.dt, self.tau, self.amplitude].map(|number| unsafe { number.as_ref() }.copied());
         Ok(Command {
             dt,
-            style: vector("style", self.style, model.n_styles(), "style dimension")?,
+            style: vector("style", self.style, primitive.n_styles(), "style dimension")?,
             goal: per_dof("goal", self.goal)?,
             anchor: per_dof("anchor", self.anchor)?,
             tau,

@@ -2,7 +2,6 @@
 
 use std::mem::{MaybeUninit, align_of, size_of};
 use std::ptr;
-use std::sync::Arc;
 
 use pdmp_core::{Command, Controller};
 
@@ -72,7 +71,7 @@ pub unsafe extern "C" fn pdmp_controller_new(
         let transition = unsafe { transition.as_ref() }.copied();
         // SAFETY: the caller's promise is the same.
         let conditions = conditions.map(|conditions| unsafe { conditions.get(model) }).transpose()?.unwrap_or_default();
-        let inner = Controller::new(Arc::clone(model), dt, &conditions, transition)?;
+        let inner = Controller::new(model.primitive(), dt, &conditions, transition)?;
         // SAFETY: it comes from place_in, and the caller's promise is that nothing else uses it.
         *place = unsafe { put(inner, given) };
         Ok(PDMP_OK)
@@ -173,7 +172,7 @@ pub unsafe extern "C" fn pdmp_controller_reset(
     conditions: Option<&pdmp_conditions>,
 ) -> pdmp_status {
     on(controller, |controller| {
-        let model = controller.inner.model();
+        let model = controller.inner.primitive();
         // SAFETY: the caller's promise is the same.
         let conditions = conditions.map(|conditions| unsafe { conditions.get(model) }).transpose()?.unwrap_or_default();
         controller.inner.reset(&conditions)?;
@@ -192,7 +191,7 @@ pub unsafe extern "C" fn pdmp_controller_set_style(
 ) -> pdmp_status {
     on(controller, |controller| {
         // SAFETY: the caller's promise is the same.
-        let style = unsafe { style.need("style", controller.inner.model().n_styles(), "style dimension") }?;
+        let style = unsafe { style.need("style", controller.inner.primitive().n_styles(), "style dimension") }?;
         controller.inner.set_style(style)?;
         Ok(PDMP_OK)
     })
@@ -209,7 +208,7 @@ pub unsafe extern "C" fn pdmp_controller_set_goal(
 ) -> pdmp_status {
     on(controller, |controller| {
         // SAFETY: the caller's promise is the same.
-        let goal = unsafe { goal.need("goal", controller.inner.model().n_dofs(), "DoF") }?;
+        let goal = unsafe { goal.need("goal", controller.inner.primitive().n_dofs(), "DoF") }?;
         controller.inner.set_goal(goal)?;
         Ok(PDMP_OK)
     })
@@ -226,7 +225,7 @@ pub unsafe extern "C" fn pdmp_controller_set_anchor(
 ) -> pdmp_status {
     on(controller, |controller| {
         // SAFETY: the caller's promise is the same.
-        let anchor = unsafe { anchor.need("anchor", controller.inner.model().n_dofs(), "DoF") }?;
+        let anchor = unsafe { anchor.need("anchor", controller.inner.primitive().n_dofs(), "DoF") }?;
         controller.inner.set_anchor(anchor)?;
         Ok(PDMP_OK)
     })
@@ -306,9 +305,9 @@ pub unsafe extern "C" fn pdmp_controller_update(
 ) -> pdmp_status {
     on(controller, |controller| {
         let inner = &mut controller.inner;
-        motion.map_or(Ok(()), |motion| motion.check(inner.model().n_dofs()))?;
+        motion.map_or(Ok(()), |motion| motion.check(inner.primitive().n_dofs()))?;
         // SAFETY: the caller's promise is the same.
-        let command = command.map_or(Ok(Command::default()), |command| unsafe { command.get(inner.model()) })?;
+        let command = command.map_or(Ok(Command::default()), |command| unsafe { command.get(inner.primitive()) })?;
         let status = inner.step_with(&command)?;
         if let Some(motion) = motion {
             // SAFETY: the caller's promise is the same, and the room was checked. The command, whose vectors may overlap
@@ -330,7 +329,7 @@ pub unsafe extern "C" fn pdmp_controller_read(
 ) -> pdmp_status {
     on(controller, |controller| {
         let motion = motion.ok_or(Fault::Null("motion"))?;
-        motion.check(controller.inner.model().n_dofs())?;
+        motion.check(controller.inner.primitive().n_dofs())?;
         // SAFETY: the caller's promise is the same, and the room was checked.
         unsafe { motion.put(&controller.inner) };
         Ok(controller.inner.status().into())

@@ -7,7 +7,8 @@ use std::path::Path;
 use std::ptr;
 use std::sync::Arc;
 
-use pdmp_core::{Conditions, ContextColumn, ContextMap, Error, Kind, Model, Prediction};
+use pdmp_core::context::{ContextColumn, ContextMap};
+use pdmp_core::{Conditions, Error, Kind, Model};
 
 use crate::buffers::{pdmp_buffer, pdmp_text, pdmp_vector};
 use crate::command::pdmp_conditions;
@@ -190,27 +191,9 @@ pub unsafe extern "C" fn pdmp_model_demonstration(
     numbers: pdmp_buffer,
     error: pdmp_text,
 ) -> pdmp_status {
-    let shown = |model: &Model| {
-        if demonstration >= model.n_demos() {
-            let allowed = "must be below the number of demonstrations";
-            return Err(Error::Range { name: "demonstration", value: demonstration as f64, allowed }.into());
-        }
-        let shown = model.demonstrated();
-        let discrete = model.kind() == Kind::Discrete;
-        Ok(Prediction {
-            style: shown.styles.row(demonstration).to_vec(),
-            goal: discrete.then(|| shown.goals.row(demonstration).to_vec()),
-            start: discrete.then(|| shown.starts.row(demonstration).to_vec()),
-            anchor: (!discrete).then(|| shown.anchors.row(demonstration).to_vec()),
-            timing: shown.timings.row(demonstration).to_vec(),
-            duration: shown.durations[demonstration],
-            covariance: None,
-            freedom: 0,
-            outside: Vec::new(),
-        })
-    };
+    let demonstrated = |model: &Model| Ok(model.conditions(demonstration)?);
     // SAFETY: the caller's promise is the same.
-    unsafe { lay_down(model, conditions, numbers, error, shown) }
+    unsafe { lay_down(model, conditions, numbers, error, demonstrated) }
 }
 
 /// A label that a value of the contexts may be, both counted from 0, in UTF-8. It lives as long as the model, and is NULL
@@ -246,7 +229,8 @@ pub unsafe extern "C" fn pdmp_model_predict(
         Ok(match model.map() {
             Some(map) => model.predict(&map.context(context)?)?,
             None => model.predict(context)?,
-        })
+        }
+        .conditions)
     };
     // SAFETY: the caller's promise is the same.
     unsafe { lay_down(model, conditions, numbers, error, predict) }
@@ -268,7 +252,7 @@ unsafe fn lay_down(
     conditions: Option<&mut MaybeUninit<pdmp_conditions>>,
     numbers: pdmp_buffer,
     error: pdmp_text,
-    predict: impl FnOnce(&Model) -> Result<Prediction, Fault>,
+    select: impl FnOnce(&Model) -> Result<Conditions, Fault>,
 ) -> pdmp_status {
     let call = || {
         let model = &model.ok_or(Fault::Null("model"))?.inner;
@@ -277,11 +261,11 @@ unsafe fn lay_down(
             return Err(Fault::Null("numbers"));
         }
         numbers.check("numbers", n_conditions(model), "style dimension, two per DoF and one for tau")?;
-        let predicted = model.conditions(&predict(model)?);
-        let tau = Some(predicted.time_constant(model)?);
-        let predicted = Conditions { tau, timing: None, ..predicted };
+        let selected = select(model)?;
+        let tau = Some(selected.time_constant(model)?);
+        let selected = Conditions { tau, timing: None, ..selected };
         // SAFETY: style, at most two vectors of the DoFs and tau fit.
-        conditions.write(unsafe { pdmp_conditions::put(&predicted, numbers.data) });
+        conditions.write(unsafe { pdmp_conditions::put(&selected, numbers.data) });
         Ok(PDMP_OK)
     };
     // SAFETY: the caller's promise is the same.

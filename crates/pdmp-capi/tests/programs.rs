@@ -8,11 +8,11 @@ mod common;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Output};
-use std::sync::Arc;
 
 use common::*;
 use ndarray::Array2;
-use pdmp_core::{Command, Conditions, Controller, Coupling, Demonstration, Kind, Model, Sampling, Status};
+use pdmp_core::motion::Coupling;
+use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status};
 use tempfile::TempDir;
 
 const C: [&str; 2] = ["cc", "-std=c11"];
@@ -105,7 +105,7 @@ fn the_c_example_moves_as_rust() {
     let model = learn(&reaches(), &options(Kind::Discrete));
     let conditions = conditions_of(&model, model.n_demos() - 1);
     let goal: Vec<f64> = conditions.goal.as_ref().unwrap().iter().map(|g| g + 0.125).collect();
-    let mut controller = Controller::new(Arc::clone(&model), 1e-3, &conditions, None).unwrap();
+    let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, None).unwrap();
     let (mut expected, mut robot) = (Vec::new(), Vec::new());
     for tick in 0.. {
         let held = (500..700).contains(&tick);
@@ -136,7 +136,7 @@ fn the_cpp_example_moves_as_rust() {
     let model = learn(&cycles(), &options(Kind::Rhythmic));
     let conditions = conditions_of(&model, 0);
     let anchor: Vec<f64> = conditions.anchor.as_ref().unwrap().iter().map(|y_a| y_a + 0.25).collect();
-    let mut controller = Controller::new(Arc::clone(&model), 1e-3, &conditions, None).unwrap();
+    let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, None).unwrap();
     let expected: Vec<_> = (0..3000)
         .map(|tick| {
             let late = tick >= 2000;
@@ -162,7 +162,7 @@ fn the_cpp_example_moves_as_rust() {
 fn the_snippet_of_the_readme_moves_as_rust() {
     let demos: Vec<_> = [0.0, 0.15, 0.3, 0.45, 0.6].map(bend).into();
     let model = learn(&demos, &options(Kind::Discrete));
-    let mut controller = Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).unwrap();
+    let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
     let command = Command { goal: Some(&[1.2, 0.1]), ..Command::default() };
     let mut expected: Vec<Vec<u64>> = Vec::new();
     while common::tick(&mut controller, &command).unwrap() == Status::Working {
@@ -197,9 +197,9 @@ fn bend(h: f64) -> Demonstration {
 #[test]
 fn every_member_of_the_cpp_wrapper_does_as_rust() {
     let model = learn(&reaches(), &options(Kind::Discrete));
-    let mut conditions = model.conditions(&model.predict(&[0.2]).unwrap());
+    let mut conditions = model.predict(&[0.2]).unwrap().conditions;
     conditions.velocity = Some(vec![0.0; 3]);
-    let mut controller = Controller::new(Arc::clone(&model), 2e-3, &conditions, Some(0.0)).unwrap();
+    let mut controller = Controller::new(model.primitive(), 2e-3, &conditions, Some(0.0)).unwrap();
     let (goal, measured) = ([0.75, 0.5, 0.25], [0.5, 0.25, 0.0]);
     let expected: Vec<_> = (0..500)
         .map(|tick| {

@@ -8,12 +8,12 @@ mod counting;
 
 use std::mem::MaybeUninit;
 use std::ptr;
-use std::sync::Arc;
 
 use common::*;
 use counting::{Random, allocations};
 use pdmp::*;
-use pdmp_core::{Command, Conditions, Controller, Coupling, Kind, Motion};
+use pdmp_core::motion::Coupling;
+use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
 fn vector(told: Option<&[f64]>) -> pdmp_vector {
     told.map_or(pdmp_vector { data: ptr::null(), length: 0 }, |v| pdmp_vector { data: v.as_ptr(), length: v.len() })
@@ -49,7 +49,7 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
         let model = learn(&demos, &options(kind));
         let (n_dofs, n_styles, own) = (model.n_dofs(), model.n_styles(), model.tau());
-        let mut rust = Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).unwrap();
+        let mut rust = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
         let none = pdmp_text { data: ptr::null_mut(), size: 0 };
         let bytes = model.to_bytes().unwrap();
         let (mut loaded, mut made) = (MaybeUninit::uninit(), MaybeUninit::uninit());

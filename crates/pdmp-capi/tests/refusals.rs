@@ -421,7 +421,7 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
             match rust.predict(&[0.2]) {
                 Ok(prediction) => {
                     assert_eq!(predicted, PDMP_OK);
-                    assert_eq!(read(told.assume_init()), by_tau(rust.conditions(&prediction)));
+                    assert_eq!(read(told.assume_init()), by_tau(prediction.conditions));
                     let two = vector(&[0.2, 0.2]);
                     assert_eq!(pdmp_model_predict(Some(&model), two, Some(&mut told), room, UNWANTED), PDMP_LENGTH);
                 }
@@ -457,8 +457,8 @@ fn labels_of_contexts_are_told_and_taken_by_index() {
     let mut predict = |context| unsafe { pdmp_model_predict(Some(&model), context, Some(&mut told), room, UNWANTED) };
     assert_eq!(predict(vector(&[3.0, 0.25])), PDMP_RANGE);
     assert_eq!(predict(context), PDMP_OK);
-    let expected = rust.predict(&["tired".into(), pdmp_core::ContextValue::from(0.25)]).unwrap();
-    assert_eq!(numbers[..rust.n_styles()], expected.style[..]);
+    let expected = rust.predict(&["tired".into(), pdmp_core::demonstration::ContextValue::from(0.25)]).unwrap();
+    assert_eq!(numbers[..rust.n_styles()], expected.conditions.style.unwrap()[..]);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::Kind;
+use crate::kind::Kind;
 
 /// What can go wrong, from a bad argument to a damaged file.
 #[derive(Debug, thiserror::Error)]
@@ -346,39 +346,5 @@ impl Error {
     /// Names the demonstration in which this error arose.
     pub fn in_demo(self, demo: usize) -> Self {
         Error::Demo { demo, source: Box::new(self) }
-    }
-}
-
-/// Largest magnitude whose square, summed over a recording, stays finite.
-pub const LARGEST: f64 = 1e150;
-
-/// Checks that `value` has one finite number per `per`.
-pub(crate) fn check_vector(name: &'static str, value: &[f64], expected: usize, per: &'static str) -> Result<()> {
-    if value.len() != expected {
-        return Err(Error::Length { name, expected, found: value.len(), per });
-    }
-    check_finite(name, value)
-}
-
-/// Checks that every element is finite and no larger than [`LARGEST`].
-pub(crate) fn check_finite(name: &'static str, value: &[f64]) -> Result<()> {
-    value.iter().enumerate().try_for_each(|(index, &value)| check_number(name, index, value))
-}
-
-/// Checks that the element `value` at `index` is finite and no larger than [`LARGEST`].
-pub(crate) fn check_number(name: &'static str, index: usize, value: f64) -> Result<()> {
-    match value.abs() {
-        size if size <= LARGEST => Ok(()),
-        size if size.is_finite() => Err(Error::TooLarge { name, index, value, limit: LARGEST }),
-        _ => Err(Error::NotFinite { name, index, value }),
-    }
-}
-
-/// Checks that `value` is positive and finite.
-pub(crate) fn check_positive(name: &'static str, value: f64) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(Error::Range { name, value, allowed: "must be positive and finite" })
     }
 }

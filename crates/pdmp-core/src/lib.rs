@@ -44,9 +44,9 @@
 //!     Demonstration::new(position, Sampling::Uniform { dt: 0.01 })
 //! };
 //! let demos = [bend(0.5)?, bend(1.0)?, bend(2.0)?];
-//! let model = Arc::new(fit(&demos, &FitOptions::new(Kind::Discrete), &mut |_, _| Ok(()))?);
+//! let model = Arc::new(fit(&demos, &FitOptions::new(Kind::Discrete))?);
 //!
-//! let mut controller = Controller::new(model, 1e-3, &Conditions::default(), None)?;
+//! let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
 //! controller.set_goal(&[1.2, 0.1])?;
 //! while controller.step()? == Status::Working {
 //!     let _command = (controller.position(), controller.velocity());
@@ -61,60 +61,27 @@
 //!
 //! [doi:10.1016/j.neunet.2011.02.004]: https://doi.org/10.1016/j.neunet.2011.02.004
 
-mod align;
-mod attractor;
-mod band;
-pub mod basis;
-mod batch;
-mod combine;
-mod command;
-mod conditions;
-mod context;
-mod controller;
-mod demo;
-mod error;
-mod factor;
-mod file;
-mod fit;
-mod follower;
-mod foresight;
-pub mod inspection;
-mod jacobian;
-mod landscape;
-mod lanes;
-mod model;
-mod perturbation;
-mod phase;
-pub mod recording;
-mod responses;
-mod rollout;
-mod sensitivity;
-mod series;
-mod smooth;
-mod spline;
-mod tabulate;
-mod targets;
-mod threads;
-mod transport;
-mod unit_responses;
+// A build without learning keeps the few lines of shared modules that learning alone uses.
+#![cfg_attr(not(feature = "learning"), allow(dead_code, unused_imports))]
 
-pub use align::{Alignment, Template, TimeScaling, Warp};
-pub use attractor::Attractor;
-pub use batch::{Batch, BatchConditions, Chunks, Rows};
-pub use command::{Command, Coupling, Motion};
-pub use conditions::Conditions;
-pub use context::{ContextColumn, ContextMap, Expected, MapChoice, MapKind, Prediction};
-pub use controller::{Controller, Status};
-pub use demo::{ContextValue, Demonstration, LEAST_SAMPLES, Sampling, Trajectory};
-pub use error::{Error, LARGEST, Result};
-pub use factor::{Factors, StyleCount};
-pub use fit::{DofScale, FitOptions, Stage, StyleChoice, fit, style_of};
-pub use jacobian::Variable;
-pub use landscape::Landscape;
-pub use model::{Demonstrated, Learnt, Model};
-pub use phase::{Canonical, Kind};
-pub use responses::Derivative;
-pub use rollout::Timing;
-pub use smooth::{Noise, Smoothing};
-pub use threads::Threads;
-pub use transport::TransportChoice;
+pub mod context;
+pub mod demonstration;
+pub mod dynamics;
+mod error;
+mod kind;
+#[cfg(feature = "learning")]
+pub mod learning;
+pub mod model;
+pub mod motion;
+pub mod numerics;
+#[cfg(feature = "learning")]
+pub mod preprocessing;
+mod validate;
+
+pub use demonstration::{Demonstration, Sampling};
+pub use error::{Error, Result};
+pub use kind::Kind;
+#[cfg(feature = "learning")]
+pub use learning::{FitOptions, fit};
+pub use model::{Conditions, Model, Primitive};
+pub use motion::{Command, Controller, Motion, Status, rollout};

@@ -7,19 +7,22 @@ use std::sync::Arc;
 
 use common::*;
 use ndarray::{Array2, Array3, Axis, array, s};
-use pdmp_core::{
-    BatchConditions, Conditions, Controller, Derivative, Error, Kind, Model, Rows, Threads, Timing, Trajectory,
-    Variable,
-};
+use pdmp_core::model::Derivative;
+use pdmp_core::motion::batch;
+use pdmp_core::motion::rollouts;
+use pdmp_core::motion::{self, BatchConditions, Rows, Timing, Trajectory, Variable};
+use pdmp_core::numerics::Threads;
+use pdmp_core::rollout;
+use pdmp_core::{Conditions, Controller, Error, Kind, Model};
 use proptest::prelude::*;
 
 fn all(conditions: &BatchConditions, model: &Arc<Model>, timing: Timing) -> Vec<Array3<f64>> {
     let (highest, threads) = (Derivative::Acceleration, Threads::ONE);
-    model.rollouts(conditions.clone(), timing, highest, threads, &mut |_| Ok(())).unwrap()
+    rollouts(model.primitive(), conditions.clone(), timing, highest, threads, &mut |_| Ok(())).unwrap()
 }
 
 fn jacobian(variable: Variable, order: Derivative, model: &Arc<Model>, conditions: &Conditions) -> Array3<f64> {
-    model.jacobian(variable, order, conditions, timing(0.01, 1.5), &mut |_| Ok(())).unwrap()
+    motion::jacobian(model.primitive(), variable, order, conditions, timing(0.01, 1.5), &mut |_| Ok(())).unwrap()
 }
 
 fn of(trajectory: &Trajectory, order: Derivative) -> &Array2<f64> {
@@ -100,7 +103,7 @@ proptest! {
                     timing: None,
                     phase: None,
                 };
-                let mut controller = Controller::new(Arc::clone(model), dt, &one, Some(0.0)).unwrap();
+                let mut controller = Controller::new(model.primitive(), dt, &one, Some(0.0)).unwrap();
                 let mut stepped = [(); 3].map(|()| Array2::zeros((made[0].len_of(Axis(1)), n)));
                 for k in 0..stepped[0].nrows() {
                     if k > 0 {
@@ -127,7 +130,7 @@ proptest! {
         let conditions = BatchConditions { styles, velocities, ..BatchConditions::default() };
         let timing = timing(1e-3, (samples - 1) as f64 * 1e-3);
         let expected = all(&conditions, &REACH, timing);
-        let batch = REACH.batch(conditions, timing, &mut |_| Ok(())).unwrap();
+        let batch = batch(REACH.primitive(), conditions, timing, &mut |_| Ok(())).unwrap();
         let mut ends = vec![0];
         for chunk in batch.chunks(size).unwrap() {
             prop_assert_eq!(chunk.start, *ends.last().unwrap());
@@ -149,7 +152,8 @@ proptest! {
 fn large_batches_are_the_same_on_several_threads() {
     let styles = Array2::from_shape_fn((2000, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
     let batch =
-        REACH.batch(BatchConditions { styles, ..Default::default() }, timing(1e-3, 0.4), &mut |_| Ok(())).unwrap();
+        batch(REACH.primitive(), BatchConditions { styles, ..Default::default() }, timing(1e-3, 0.4), &mut |_| Ok(()))
+            .unwrap();
     let expected = batch.rollouts(0..2000, Derivative::Position, Threads::ONE, &mut |_| Ok(())).unwrap();
     let mut shares = Vec::new();
     let threads = Threads::new(3).unwrap();
@@ -169,16 +173,23 @@ fn large_batches_are_the_same_on_several_threads() {
 #[test]
 fn batches_can_be_interrupted() {
     let styles = Array2::zeros((3000, 2));
-    let batch =
-        REACH.batch(BatchConditions { styles, ..Default::default() }, timing(1e-3, 1.0), &mut |_| Ok(())).unwrap();
+    let batch = motion::batch(
+        REACH.primitive(),
+        BatchConditions { styles, ..Default::default() },
+        timing(1e-3, 1.0),
+        &mut |_| Ok(()),
+    )
+    .unwrap();
     let mut stop_later = |share: f64| if share < 0.3 { Ok(()) } else { Err(Error::Interrupted) };
     let stopped = batch.rollouts(0..3000, Derivative::Position, Threads::ONE, &mut stop_later);
     assert!(matches!(stopped, Err(Error::Interrupted)));
-    let new = Arc::new(Model::clone(&REACH));
-    let stopped =
-        new.batch(BatchConditions { styles: array![[0.0, 0.0]], ..Default::default() }, timing(1e-3, 1.0), &mut |_| {
-            Err(Error::Interrupted)
-        });
+    let new = Model::from_bytes(&REACH.to_bytes().unwrap()).unwrap();
+    let stopped = motion::batch(
+        new.primitive(),
+        BatchConditions { styles: array![[0.0, 0.0]], ..Default::default() },
+        timing(1e-3, 1.0),
+        &mut |_| Err(Error::Interrupted),
+    );
     assert!(matches!(stopped, Err(Error::Interrupted)));
 }
 
@@ -218,7 +229,7 @@ fn jacobians_are_differences_of_rollouts() {
                 timing: None,
                 phase: None,
             };
-            let rollout = |conditions: &Conditions| model.rollout(conditions, timing(0.01, 1.5)).unwrap();
+            let rollout = |conditions: &Conditions| rollout(model.primitive(), conditions, timing(0.01, 1.5)).unwrap();
             let centre = if discrete { Variable::Goal } else { Variable::Anchor };
             for variable in [Variable::Style, centre, Variable::Start] {
                 if variable == Variable::Start && base.start.is_none() && !discrete {
@@ -252,7 +263,14 @@ fn jacobians_are_differences_of_rollouts() {
 #[test]
 fn variables_of_the_other_kind_are_refused() {
     let ask = |model: &Arc<Model>, variable| {
-        model.jacobian(variable, Derivative::Position, &Conditions::default(), timing(0.1, 1.0), &mut |_| Ok(()))
+        motion::jacobian(
+            model.primitive(),
+            variable,
+            Derivative::Position,
+            &Conditions::default(),
+            timing(0.1, 1.0),
+            &mut |_| Ok(()),
+        )
     };
     assert!(matches!(ask(&REACH, Variable::Anchor), Err(Error::Kind { name: "anchor", .. })));
     assert!(matches!(ask(&CYCLE, Variable::Goal), Err(Error::Kind { name: "goal", .. })));
@@ -264,7 +282,7 @@ fn variables_of_the_other_kind_are_refused() {
 fn bad_batches_are_refused() {
     let good = || BatchConditions { styles: Array2::zeros((4, 2)), ..Default::default() };
     let refused = |model: &Arc<Model>, conditions| {
-        model.batch(conditions, timing(0.1, 1.0), &mut |_| Ok(())).unwrap_err().to_string()
+        batch(model.primitive(), conditions, timing(0.1, 1.0), &mut |_| Ok(())).unwrap_err().to_string()
     };
     let mut nan = Array2::zeros((4, 3));
     nan[[2, 1]] = f64::NAN;
@@ -293,7 +311,7 @@ fn bad_batches_are_refused() {
     }
     let goals = Some(Rows::All(vec![0.0; 2]));
     assert!(refused(&CYCLE, BatchConditions { goals, ..good() }).ends_with("they move about anchors; set anchors"));
-    let batch = REACH.batch(good(), timing(0.1, 1.0), &mut |_| Ok(())).unwrap();
+    let batch = batch(REACH.primitive(), good(), timing(0.1, 1.0), &mut |_| Ok(())).unwrap();
     assert!(matches!(batch.chunks(0), Err(Error::Range { name: "size", .. })));
     let (mut narrow, mut good) = (Array3::zeros((4, 11, 2)), Array3::zeros((4, 11, 3)));
     for (movements, output) in [(0..4, narrow.view_mut()), (1..5, good.view_mut())] {

@@ -8,10 +8,9 @@ use std::sync::Arc;
 
 use common::*;
 use ndarray::Array2;
-use pdmp_core::{
-    Canonical, Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Sampling, StyleCount,
-    TransportChoice,
-};
+use pdmp_core::dynamics::Canonical;
+use pdmp_core::learning::{StyleCount, TransportChoice};
+use pdmp_core::{Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Sampling};
 
 /// ω of a filter that has gone 99 % of its way after `transition` seconds: (1 + s)exp(−s) = 0.01.
 fn omega(transition: f64) -> f64 {
@@ -34,7 +33,7 @@ struct Reference<'a> {
 impl Reference<'_> {
     fn slope(&self, state: &[f64]) -> Vec<f64> {
         let (n, n_styles) = (self.model.n_dofs(), self.model.n_styles());
-        let pdmp_core::Attractor { alpha_z, beta_z } = self.model.attractor();
+        let pdmp_core::dynamics::Attractor { alpha_z, beta_z } = self.model.attractor();
         let (y, rest) = state.split_at(n);
         let (z, rest) = rest.split_at(n);
         let (u, r, filters) = (rest[0], rest[1], &rest[2..]);
@@ -95,7 +94,7 @@ fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
     };
     // As for a model of a movement of this duration.
     let transition = if discrete { 0.1 } else { 0.25 } * model.duration() * tau / model.tau();
-    let mut controller = Controller::new(Arc::clone(model), dt, &conditions, Some(transition)).unwrap();
+    let mut controller = Controller::new(model.primitive(), dt, &conditions, Some(transition)).unwrap();
     let target: Vec<f64> = style.iter().copied().chain([1.0 / tau]).chain(centre.clone()).chain([1.0]).collect();
     // ẏ = ρ(z + w): at rest, or with z = 0.
     let z = controller.velocity().iter().map(|v| v * tau);
@@ -187,7 +186,7 @@ fn a_hundred_million_ticks_do_not_drift() {
     let model = learn(&cycles(), &options(Kind::Rhythmic));
     let (ticks, dt, tau) = (100_000_000u32, 1.1e-3, 0.37 * model.tau());
     let conditions = Conditions { tau: Some(tau), ..Conditions::default() };
-    let mut controller = Controller::new(model, dt, &conditions, None).unwrap();
+    let mut controller = Controller::new(model.primitive(), dt, &conditions, None).unwrap();
     for _ in 0..ticks {
         controller.step().unwrap();
     }
@@ -202,7 +201,7 @@ fn a_hundred_million_ticks_do_not_drift() {
 fn tick_length_may_change_at_every_tick() {
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
         let model = learn(&demos, &options(kind));
-        let make = || Controller::new(Arc::clone(&model), 1e-3, &Conditions::default(), None).unwrap();
+        let make = || Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
         let (mut even, mut uneven) = (make(), make());
         for _ in 0..100 {
             (0..20).for_each(|_| _ = even.step().unwrap());

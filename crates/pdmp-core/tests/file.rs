@@ -6,7 +6,9 @@ mod common;
 use std::sync::{Arc, LazyLock};
 
 use common::*;
-use pdmp_core::{Conditions, Error, Kind, Model, Timing};
+use pdmp_core::motion::Timing;
+use pdmp_core::rollout;
+use pdmp_core::{Conditions, Error, Kind, Model};
 use proptest::prelude::*;
 
 static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| learn(&reaches(), &options(Kind::Discrete)).to_bytes().unwrap());
@@ -24,11 +26,14 @@ fn a_saved_model_moves_alike() {
         let conditions = match model.predict(&[0.2]) {
             Ok(prediction) => {
                 assert_eq!(prediction, loaded.predict(&[0.2]).unwrap());
-                model.conditions(&prediction)
+                prediction.conditions
             }
             Err(_) => Conditions::default(),
         };
-        assert_eq!(model.rollout(&conditions, timing).unwrap(), loaded.rollout(&conditions, timing).unwrap());
+        assert_eq!(
+            rollout(model.primitive(), &conditions, timing).unwrap(),
+            rollout(loaded.primitive(), &conditions, timing).unwrap()
+        );
         assert_eq!(model.demonstrated(), loaded.demonstrated());
         assert_eq!(model.learnt(), loaded.learnt());
         assert_eq!(model.to_bytes().unwrap(), loaded.to_bytes().unwrap());

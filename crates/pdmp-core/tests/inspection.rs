@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use ndarray::{Array2, s};
-use pdmp_core::inspection::{Finding, Padding, inspect, unwound};
-use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, TransportChoice, fit};
+use pdmp_core::learning::TransportChoice;
+use pdmp_core::preprocessing::inspection::{Finding, Padding, inspect, unwound};
+use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
 
 /// Five reaches over bumps of different height, in two degrees of freedom away from zero.
 fn reaches() -> Vec<Array2<f64>> {
@@ -175,7 +176,7 @@ fn angles_whole_turns_apart_are_brought_together_where_units_say_that_they_are_a
         for (demo, together) in unwound(&apart).iter().zip(angles([0.0; 5])) {
             assert!((&demo.position() - &together.position()).iter().all(|y| y.abs() < 1e-12 * turn));
         }
-        let model = fit(&apart, &FitOptions::new(Kind::Discrete), &mut |_, _| Ok(())).unwrap();
+        let model = fit(&apart, &FitOptions::new(Kind::Discrete)).unwrap();
         assert!(model.demonstrated().goals.column(0).iter().all(|goal| (goal - 1.5 * turn / TAU).abs() < 1e-9 * turn));
         assert_eq!(model.learnt().findings, found);
         // Without units they are reported, and learnt as they are; in metres they are what they are.
@@ -225,7 +226,7 @@ fn gains_whose_transients_the_samples_do_not_resolve_are_found() {
         let transport = TransportChoice::Immediate;
         let mut options = FitOptions { alpha_z, transport, ..FitOptions::new(Kind::Discrete) };
         options.alignment.n_samples = n_samples;
-        fit(&demos(reaches()), &options, &mut |_, _| Ok(())).unwrap().learnt().findings.clone()
+        fit(&demos(reaches()), &options).unwrap().learnt().findings.clone()
     };
     assert_eq!(found(25.0, None), []);
     assert_eq!(found(100.0, Some(4001)), []);

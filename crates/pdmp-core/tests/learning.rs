@@ -5,7 +5,12 @@ mod common;
 
 use common::*;
 use ndarray::Array2;
-use pdmp_core::{Canonical, DofScale, Error, Kind, Sampling, StyleCount, Timing, fit, style_of};
+use pdmp_core::dynamics::Canonical;
+use pdmp_core::learning::fit_with;
+use pdmp_core::learning::{DofScale, StyleCount, style_of};
+use pdmp_core::motion::Timing;
+use pdmp_core::rollout;
+use pdmp_core::{Error, Kind, Sampling, fit};
 
 /// Targets followed by generation give every demonstration back, at its own duration, J = M.
 #[test]
@@ -93,8 +98,10 @@ fn own_time_stamps_are_respected() {
     let model = learn(&even, &options(Kind::Discrete));
     let other = learn(&[stamped], &options(Kind::Discrete));
     let timing = Timing { dt: 0.01, duration: Some(1.0) };
-    let (a, b) =
-        (model.rollout(&Default::default(), timing).unwrap(), other.rollout(&Default::default(), timing).unwrap());
+    let (a, b) = (
+        rollout(model.primitive(), &Default::default(), timing).unwrap(),
+        rollout(other.primitive(), &Default::default(), timing).unwrap(),
+    );
     assert!((a.position - b.position).iter().all(|d| d.abs() < 1e-5));
 }
 
@@ -181,15 +188,15 @@ fn fits_are_reproducible() {
 /// The interruption that a caller asks for reaches it, from every stage.
 #[test]
 fn a_fit_can_be_interrupted() {
-    use pdmp_core::Stage;
+    use pdmp_core::learning::Stage;
 
     for stop in [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile] {
         let mut proceed = |stage, _| if stage == stop { Err(Error::Interrupted) } else { Ok(()) };
         let mut options = pdmp_core::FitOptions { basis: gp(), ..options(Kind::Discrete) };
         if stop == Stage::Align {
-            options.alignment.time_scaling = pdmp_core::TimeScaling::Warp(pdmp_core::Warp::default());
+            options.alignment.time_scaling = pdmp_core::learning::TimeScaling::Warp(pdmp_core::model::Warp::default());
         }
-        assert!(matches!(fit(&reaches(), &options, &mut proceed), Err(Error::Interrupted)));
+        assert!(matches!(fit_with(&reaches(), &options, &mut proceed), Err(Error::Interrupted)));
     }
 }
 
@@ -217,7 +224,7 @@ fn degenerate_demonstrations_are_learnt() {
             let model = learn(demos, &options);
             for (m, demo) in demos.iter().enumerate() {
                 let timing = Timing { dt: 0.01, duration: None };
-                let found = model.rollout(&conditions_of(&model, m), timing).unwrap().position;
+                let found = rollout(model.primitive(), &conditions_of(&model, m), timing).unwrap().position;
                 let shown = demo.position();
                 let size = shown.iter().fold(0.0f64, |a, b| a.max(b.abs()));
                 for d in 0..found.ncols() {
@@ -229,7 +236,7 @@ fn degenerate_demonstrations_are_learnt() {
         }
     }
     let model = learn(&[still(0.7)], &options(Kind::Discrete));
-    let found = model.rollout(&Default::default(), Timing { dt: 0.01, duration: Some(3.0) }).unwrap();
+    let found = rollout(model.primitive(), &Default::default(), Timing { dt: 0.01, duration: Some(3.0) }).unwrap();
     assert!(found.position.rows().into_iter().all(|y| y.to_vec() == [0.7, 1.7]), "the model holds still");
 }
 
@@ -252,7 +259,7 @@ fn dof_scale_weighs_units_and_keeps_the_movement() {
     let model = learn(&demos, &scaled);
     for (m, demo) in demos.iter().enumerate() {
         let timing = Timing { dt: 0.01, duration: None };
-        let found = model.rollout(&conditions_of(&model, m), timing).unwrap().position;
+        let found = rollout(model.primitive(), &conditions_of(&model, m), timing).unwrap().position;
         let last = found.nrows() - 1;
         for c in 0..=last {
             assert!((found[[c, 2]] - demo.position()[[c, 2]]).abs() < 1e-4);
@@ -267,7 +274,7 @@ fn bad_demonstrations_are_refused_by_name() {
         reach(0.0, 1.0, 0.01),
         pdmp_core::Demonstration::new(ndarray::Array2::zeros((9, 2)), Sampling::Unknown).unwrap(),
     ];
-    let message = |demos: &[_], options: &_| fit(demos, options, &mut |_, _| Ok(())).unwrap_err().to_string();
+    let message = |demos: &[_], options: &_| fit(demos, options).unwrap_err().to_string();
     let options = options(Kind::Discrete);
     assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
     assert!(message(&[], &options).contains("at least one demonstration"));

@@ -6,11 +6,14 @@ mod common;
 use std::sync::Arc;
 
 use common::*;
-use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status, Timing};
+use pdmp_core::motion::Timing;
+use pdmp_core::motion::rollout_with;
+use pdmp_core::rollout;
+use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
 use proptest::prelude::*;
 
 fn controller(model: &Arc<Model>, dt: f64) -> Controller {
-    Controller::new(Arc::clone(model), dt, &Conditions::default(), None).unwrap()
+    Controller::new(model.primitive(), dt, &Conditions::default(), None).unwrap()
 }
 
 fn run(controller: &mut Controller, ticks: usize) {
@@ -33,7 +36,7 @@ proptest! {
     ) {
         let conditions =
             Conditions { style: Some(style), goal: Some(goal.clone()), start: Some(start), ..Default::default() };
-        let end = REACH.rollout(&conditions, timing(0.01, 6.0)).unwrap();
+        let end = rollout(REACH.primitive(), &conditions, timing(0.01, 6.0)).unwrap();
         prop_assert!(distance(end.position.row(600).as_slice().unwrap(), &goal) < 1e-6);
         prop_assert!(end.velocity.row(600).iter().all(|v| v.abs() < 1e-6));
     }
@@ -43,8 +46,8 @@ proptest! {
     fn tau_leaves_the_path(factor in 0.2..5.0f64) {
         for model in [&*REACH, &*CYCLE] {
             let slow = Conditions { tau: Some(factor * model.tau()), ..Default::default() };
-            let a = model.rollout(&Conditions::default(), timing(0.01, 1.5)).unwrap();
-            let b = model.rollout(&slow, timing(0.01 * factor, 1.5 * factor)).unwrap();
+            let a = rollout(model.primitive(), &Conditions::default(), timing(0.01, 1.5)).unwrap();
+            let b = rollout(model.primitive(), &slow, timing(0.01 * factor, 1.5 * factor)).unwrap();
             prop_assert!((&a.position - &b.position).iter().all(|d| d.abs() < 1e-9));
             prop_assert!((&a.velocity - &b.velocity * factor).iter().all(|d| d.abs() < 1e-8));
         }
@@ -54,9 +57,9 @@ proptest! {
     #[test]
     fn amplitude_scales_the_oscillation(amplitude in 0.0..3.0f64, anchor in prop::collection::vec(-5.0..5.0f64, 2)) {
         let conditions = Conditions { anchor: Some(anchor.clone()), ..Default::default() };
-        let one = CYCLE.rollout(&conditions, timing(0.01, 2.0)).unwrap().position;
+        let one = rollout(CYCLE.primitive(), &conditions, timing(0.01, 2.0)).unwrap().position;
         let conditions = Conditions { amplitude: Some(amplitude), ..conditions };
-        let scaled = CYCLE.rollout(&conditions, timing(0.01, 2.0)).unwrap().position;
+        let scaled = rollout(CYCLE.primitive(), &conditions, timing(0.01, 2.0)).unwrap().position;
         for (one, scaled) in one.rows().into_iter().zip(scaled.rows()) {
             for d in 0..2 {
                 prop_assert!((scaled[d] - anchor[d] - amplitude * (one[d] - anchor[d])).abs() < 1e-12);
@@ -92,7 +95,7 @@ proptest! {
 #[test]
 fn rollout_is_the_repeated_step() {
     for model in [&*REACH, &*CYCLE] {
-        let rollout = model.rollout(&Conditions::default(), timing(0.004, 2.0)).unwrap();
+        let rollout = rollout(model.primitive(), &Conditions::default(), timing(0.004, 2.0)).unwrap();
         assert_eq!(rollout.time.len(), 501);
         let mut controller = controller(model, 0.004);
         for k in 0..=500 {
@@ -109,9 +112,9 @@ fn tick_length_hardly_matters() {
     for model in [&*REACH, &*CYCLE] {
         for tau in [model.tau(), 0.3 * model.tau()] {
             let conditions = Conditions { tau: Some(tau), ..Default::default() };
-            let fine = model.rollout(&conditions, timing(1e-4, 2.0)).unwrap().position;
+            let fine = rollout(model.primitive(), &conditions, timing(1e-4, 2.0)).unwrap().position;
             for (dt, every, bound) in [(1e-3, 10, 1e-8), (1e-2, 100, 1e-6)] {
-                let coarse = model.rollout(&conditions, timing(dt, 2.0)).unwrap().position;
+                let coarse = rollout(model.primitive(), &conditions, timing(dt, 2.0)).unwrap().position;
                 for (k, row) in coarse.rows().into_iter().enumerate() {
                     let error = distance(row.as_slice().unwrap(), fine.row(k * every).as_slice().unwrap());
                     assert!(error <= bound, "dt {dt}, sample {k}: {error:e}");
@@ -158,7 +161,7 @@ fn velocity_and_acceleration_are_derivatives() {
 #[test]
 fn switches_are_continuous_unless_immediate() {
     let jump = |transition| {
-        let mut controller = Controller::new(Arc::clone(&REACH), 1e-3, &Conditions::default(), transition).unwrap();
+        let mut controller = Controller::new(REACH.primitive(), 1e-3, &Conditions::default(), transition).unwrap();
         run(&mut controller, 400);
         let before = (controller.position().to_vec(), controller.velocity().to_vec());
         controller.set_style(&[-0.9, 0.9]).unwrap();
@@ -207,7 +210,7 @@ fn online_changes_converge_to_the_new_cycle() {
     controller.set_tau(1.3 * CYCLE.tau()).unwrap();
     run(&mut controller, 20_000);
     let at = controller.phase() * 1.3 * CYCLE.tau();
-    let cycle = CYCLE.rollout(&target, timing(at, at)).unwrap();
+    let cycle = rollout(CYCLE.primitive(), &target, timing(at, at)).unwrap();
     assert!(distance(controller.position(), cycle.position.row(1).as_slice().unwrap()) < 1e-8);
 }
 
@@ -216,8 +219,8 @@ fn online_changes_converge_to_the_new_cycle() {
 fn limit_cycle_attracts() {
     let off = Conditions { start: Some(vec![40.0, -30.0]), ..Default::default() };
     let (a, b) = (
-        CYCLE.rollout(&off, timing(0.01, 4.0)).unwrap(),
-        CYCLE.rollout(&Conditions::default(), timing(0.01, 4.0)).unwrap(),
+        rollout(CYCLE.primitive(), &off, timing(0.01, 4.0)).unwrap(),
+        rollout(CYCLE.primitive(), &Conditions::default(), timing(0.01, 4.0)).unwrap(),
     );
     assert_eq!(a.position.row(0).to_vec(), [40.0, -30.0]);
     assert!((&a.position - &b.position).row(400).iter().all(|d| d.abs() < 1e-8));
@@ -229,7 +232,7 @@ fn start_velocity_is_respected() {
     for model in [&*REACH, &*CYCLE] {
         let velocity: Vec<f64> = (0..model.n_dofs()).map(|d| d as f64 - 0.7).collect();
         let conditions = Conditions { velocity: Some(velocity.clone()), ..Default::default() };
-        let rollout = model.rollout(&conditions, timing(0.01, 0.1)).unwrap();
+        let rollout = rollout(model.primitive(), &conditions, timing(0.01, 0.1)).unwrap();
         assert!(distance(rollout.velocity.row(0).as_slice().unwrap(), &velocity) < 1e-12);
     }
 }
@@ -243,7 +246,7 @@ fn commands_before_the_first_step_apply_at_once() {
         tau: Some(0.7),
         ..Default::default()
     };
-    let rollout = REACH.rollout(&conditions, timing(1e-3, 0.5)).unwrap();
+    let rollout = rollout(REACH.primitive(), &conditions, timing(1e-3, 0.5)).unwrap();
     let mut controller = controller(&REACH, 1e-3);
     controller.set_style(&[0.3, 0.2]).unwrap();
     controller.set_goal(&[1.0, 2.0, 3.0]).unwrap();
@@ -301,7 +304,7 @@ fn finishes_in_the_style_in_force() {
     for size in [1.0, 30.0, 1000.0] {
         let conditions =
             Conditions { style: Some(vec![0.0; 2]), start: Some(nominal.clone()), ..Conditions::default() };
-        let mut late = Controller::new(Arc::clone(&REACH), 1e-3, &conditions, None).unwrap();
+        let mut late = Controller::new(REACH.primitive(), 1e-3, &conditions, None).unwrap();
         while late.time() < 1.001 * REACH.duration() {
             late.step().unwrap();
         }
@@ -323,7 +326,7 @@ fn ticks_beyond_all_measure_are_refused() {
         let mut controller = controller(&REACH, dt);
         assert!(matches!(controller.step(), Err(Error::Range { name: "dt", .. })));
         let timing = Timing { dt, duration: Some(f64::MAX) };
-        let _ = REACH.rollout(&Conditions::default(), timing);
+        let _ = rollout(REACH.primitive(), &Conditions::default(), timing);
     }
 }
 
@@ -334,7 +337,7 @@ fn extremes_together_leave_the_motion_finite() {
         for transition in [0.0, 1e-307, 1e-3, 1e6 * model.duration()] {
             for (size, tau, dt) in [(1e100, 1e-6, 1e-4), (1e100, 1e6, 1e4), (-1e50, 1e6, 1e8), (0.0, 1e-6, 1e-9)] {
                 let conditions = Conditions::default();
-                let mut controller = Controller::new(Arc::clone(model), 1e-3, &conditions, Some(transition)).unwrap();
+                let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, Some(transition)).unwrap();
                 controller.step().unwrap();
                 let (style, centre) = ([size; 2], vec![size; model.n_dofs()]);
                 let discrete = model.kind() == Kind::Discrete;
@@ -383,7 +386,7 @@ fn refused_commands_leave_the_last_good_value() {
 fn rollouts_have_the_stated_number_of_samples() {
     for (dt, duration, samples) in [(0.1, 0.3, 4), (0.1, 0.35, 4), (0.01, 1.0, 101), (0.001, 2.0, 2001), (0.7, 0.0, 1)]
     {
-        let rollout = REACH.rollout(&Conditions::default(), timing(dt, duration)).unwrap();
+        let rollout = rollout(REACH.primitive(), &Conditions::default(), timing(dt, duration)).unwrap();
         assert_eq!(rollout.time.len(), samples);
     }
 }
@@ -394,9 +397,9 @@ fn context_predicts_what_was_shown() {
     // Heights alone are not linear in h² and ln T: only nearly.
     let prediction = REACH.predict(&[0.3]).unwrap();
     let goals = &REACH.demonstrated().goals;
-    assert!(distance(prediction.goal.as_ref().unwrap(), goals.row(2).as_slice().unwrap()) < 1e-9);
+    assert!(distance(prediction.conditions.goal.as_ref().unwrap(), goals.row(2).as_slice().unwrap()) < 1e-9);
     assert!((prediction.duration - REACH.demonstrated().durations[2]).abs() < 0.01);
-    let conditions = REACH.conditions(&prediction);
+    let conditions = prediction.conditions;
     assert!((conditions.time_constant(&REACH).unwrap() - prediction.duration).abs() < 1e-12);
     assert!(matches!(CYCLE.predict(&[0.3]), Err(Error::Arguments(_))));
     assert!(REACH.predict(&[0.3, 0.1]).is_err() && REACH.predict(&[f64::NAN]).is_err());
@@ -410,7 +413,7 @@ fn rollouts_can_be_interrupted() {
         asked += 1;
         if share < 0.5 { Ok(()) } else { Err(Error::Interrupted) }
     };
-    let stopped = REACH.rollout_with(&Conditions::default(), timing(1e-5, 1.0), &mut stop_later);
+    let stopped = rollout_with(REACH.primitive(), &Conditions::default(), timing(1e-5, 1.0), &mut stop_later);
     assert!(matches!(stopped, Err(Error::Interrupted)));
     assert!(asked > 10);
 }
@@ -423,10 +426,10 @@ proptest! {
     fn path_does_not_depend_on_the_rate(speeds in prop::collection::vec((0..4u8, 0.2..1.5f64), 6)) {
         for model in [&*REACH, &*CYCLE] {
             let dt = 2e-4;
-            let make = || Controller::new(Arc::clone(model), dt, &Conditions::default(), None).unwrap();
+            let make = || Controller::new(model.primitive(), dt, &Conditions::default(), None).unwrap();
             let clock = |controller: &Controller| match model.canonical() {
-                pdmp_core::Canonical::Discrete { alpha_x, .. } => -controller.phase().ln() / alpha_x,
-                pdmp_core::Canonical::Rhythmic { .. } => controller.phase(),
+                pdmp_core::dynamics::Canonical::Discrete { alpha_x, .. } => -controller.phase().ln() / alpha_x,
+                pdmp_core::dynamics::Canonical::Rhythmic { .. } => controller.phase(),
             };
             // Goes on to a place on the clock, the last tick as long as is left.
             let go = |controller: &mut Controller, to: f64, speeds: &[(u8, f64)]| {

@@ -6,11 +6,12 @@ mod common;
 use std::sync::Arc;
 
 use common::*;
-use pdmp_core::{Command, Conditions, Controller, Coupling, Error, Kind, Model, Status};
+use pdmp_core::motion::Coupling;
+use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
 use proptest::prelude::*;
 
 fn controller(model: &Arc<Model>) -> Controller {
-    Controller::new(Arc::clone(model), 1e-3, &Conditions::default(), None).unwrap()
+    Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap()
 }
 
 fn measured(position: &[f64]) -> Command<'_> {
@@ -56,7 +57,7 @@ fn slopes(model: &Model, (y, z, u): &Plain, velocity: &[f64], acceleration: &[f6
     let (mut outputs, mut rises) = (vec![0.0; style.len() * n], vec![0.0; style.len() * n]);
     model.landscape().evaluate(*u, &mut outputs, &mut rises);
     let w = |d: usize| style.iter().enumerate().map(|(j, s)| s * outputs[j * n + d]).sum::<f64>();
-    let pdmp_core::Attractor { alpha_z, beta_z } = model.attractor();
+    let pdmp_core::dynamics::Attractor { alpha_z, beta_z } = model.attractor();
     (
         (0..n).map(|d| (z[d] + w(d)) / tau + velocity[d]).collect(),
         (0..n).map(|d| (alpha_z * (beta_z * (centre[d] - y[d]) - z[d]) + tau * tau * acceleration[d]) / tau).collect(),
@@ -203,8 +204,10 @@ fn held_and_let_go_it_continues() {
         }
         // Free, the phase would have gone through the whole movement.
         let gone = match model.canonical() {
-            pdmp_core::Canonical::Discrete { alpha_x, u_end } => (phase / held.phase()).ln() / alpha_x / u_end,
-            pdmp_core::Canonical::Rhythmic { .. } => (held.phase() - phase) / std::f64::consts::TAU,
+            pdmp_core::dynamics::Canonical::Discrete { alpha_x, u_end } => {
+                (phase / held.phase()).ln() / alpha_x / u_end
+            }
+            pdmp_core::dynamics::Canonical::Rhythmic { .. } => (held.phase() - phase) / std::f64::consts::TAU,
         };
         assert!((0.0..0.12).contains(&gone), "{gone}");
         held.release();

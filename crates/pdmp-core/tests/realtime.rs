@@ -14,7 +14,8 @@ use std::hint::black_box;
 
 use common::*;
 use counting::{Random, allocations};
-use pdmp_core::{Command, Conditions, Controller, Coupling, Kind, Motion};
+use pdmp_core::motion::Coupling;
+use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
 /// A controller and all that its caller owns.
 struct Loop {
@@ -37,7 +38,7 @@ impl Loop {
             position: vec![0.0; n_dofs],
             velocity: vec![0.0; n_dofs],
             acceleration: vec![0.0; n_dofs],
-            controller: Controller::new(model, 1e-3, &Conditions::default(), None).unwrap(),
+            controller: Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap(),
         }
     }
 
@@ -45,8 +46,8 @@ impl Loop {
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     fn tick(&mut self) {
         let Self { controller, random, values, position, velocity, acceleration } = self;
-        let (n_dofs, n_styles) = (controller.model().n_dofs(), controller.model().n_styles());
-        let (kind, own) = (controller.model().kind(), controller.model().tau());
+        let (n_dofs, n_styles) = (controller.primitive().n_dofs(), controller.primitive().n_styles());
+        let (kind, own) = (controller.primitive().kind(), controller.primitive().tau());
         values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
         // Refused commands are part of a loop too.
         let refused = random.next() < 0.01;
@@ -105,7 +106,7 @@ fn numbers_at_the_edge_are_refused_or_bounded() {
         for (what, &edge) in (0..8).flat_map(|what| EDGES.iter().map(move |edge| (what, edge))) {
             let mut controller = fresh.clone();
             let values = [edge; 8];
-            let (given, style) = (&values[..fresh.model().n_dofs()], &values[..fresh.model().n_styles()]);
+            let (given, style) = (&values[..fresh.primitive().n_dofs()], &values[..fresh.primitive().n_styles()]);
             let none = Command::default();
             let command = match what {
                 0 => Command { dt: Some(edge), ..none },

@@ -4,8 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use ndarray::{Array1, Array2, Axis, concatenate, s};
-use pdmp_core::recording::{self, Cycles, Keep, Reason};
-use pdmp_core::{Demonstration, FitOptions, Kind, Result, Sampling, Smoothing};
+use pdmp_core::numerics::Smoothing;
+use pdmp_core::preprocessing::{self, Cycles, Keep, Reason};
+use pdmp_core::{Demonstration, FitOptions, Kind, Result, Sampling};
 use proptest::prelude::*;
 
 const DT: f64 = 0.01;
@@ -44,7 +45,7 @@ fn roughness(column: &[f64]) -> f64 {
 fn n_styles(kind: Kind, demos: &[Demonstration]) -> usize {
     let mut options = FitOptions::new(kind);
     options.alignment.smoothing = Smoothing::Auto;
-    pdmp_core::fit(demos, &options, &mut |_, _| Ok(())).unwrap().n_styles()
+    pdmp_core::fit(demos, &options).unwrap().n_styles()
 }
 
 /// Both hips, a knee and the pelvis' height at a phase of a walk, in rad and m.
@@ -67,7 +68,7 @@ fn recorded(position: Array2<f64>) -> Demonstration {
 }
 
 fn one(recording: Demonstration) -> Result<Cycles> {
-    recording::cycles(&[recording], None, Keep::Each)
+    preprocessing::cycles(&[recording], None, Keep::Each)
 }
 
 /// Largest jump from the last sample of a cycle to the first, over the largest between neighbours.
@@ -83,7 +84,7 @@ fn seam(cycle: &Demonstration) -> f64 {
 fn the_period_of_a_walk_is_a_stride_and_no_step() {
     for period in [0.713, 1.0, 1.377] {
         let recording = recorded(walk(&even(400), |t| TAU * t / period + 1.0));
-        assert_relative_eq!(recording::period(&recording).unwrap(), period, max_relative = 1e-3);
+        assert_relative_eq!(preprocessing::period(&recording).unwrap(), period, max_relative = 1e-3);
     }
 }
 
@@ -93,7 +94,7 @@ fn the_period_is_not_that_of_a_harmonic() {
     for harmonic in [2.0, 3.0, 5.0] {
         let y = |t: f64| 0.3 * (TAU * t).sin() + (TAU * harmonic * t).sin();
         let recording = recorded(Array1::from_iter(even(450).into_iter().map(y)).insert_axis(Axis(1)));
-        assert_relative_eq!(recording::period(&recording).unwrap(), 1.0, max_relative = 1e-3);
+        assert_relative_eq!(preprocessing::period(&recording).unwrap(), 1.0, max_relative = 1e-3);
     }
 }
 
@@ -107,7 +108,7 @@ fn the_period_is_found_through_noise_drift_and_irregular_stamps() {
         row.iter_mut().for_each(|y| *y += 0.03 * random() + 0.5 * t);
     }
     let recording = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
-    assert_relative_eq!(recording::period(&recording).unwrap(), 1.1, max_relative = 5e-3);
+    assert_relative_eq!(preprocessing::period(&recording).unwrap(), 1.1, max_relative = 5e-3);
 }
 
 /// A reach repeats nothing, and the error tells how little.
@@ -121,7 +122,7 @@ fn what_has_no_period_is_refused_with_the_figure() {
         let message = one(recorded(position)).unwrap_err().to_string();
         assert!(message.starts_with("demo 0: no period") && message.contains(", below 0."), "{message}");
     }
-    let message = recording::period(&recorded(Array2::ones((50, 2)))).unwrap_err().to_string();
+    let message = preprocessing::period(&recorded(Array2::ones((50, 2)))).unwrap_err().to_string();
     assert!(message.contains("stands still"), "{message}");
 }
 
@@ -143,7 +144,7 @@ fn noise_has_no_period() {
                     });
                 }
             }
-            recording::period(&recorded(position)).is_ok()
+            preprocessing::period(&recorded(position)).is_ok()
         });
         let found = found.count();
         assert!(found <= 2, "filter {keep}, {n_sums} sums: {found} of 50");
@@ -156,7 +157,7 @@ fn short_and_noisy_recordings_have_their_period() {
     for (n, share) in [(200, 0.0), (200, 0.02), (200, 0.05), (250, 0.1), (300, 0.2), (3000, 0.4)] {
         for seed in 1..6 {
             let position = noisy(walk(&even(n), |t| TAU * t + seed as f64), share, seed);
-            let period = recording::period(&recorded(position)).unwrap();
+            let period = preprocessing::period(&recorded(position)).unwrap();
             assert_relative_eq!(period, 1.0, max_relative = 0.05);
         }
     }
@@ -211,7 +212,7 @@ fn cycles_of_all_recordings_begin_in_one_phase() {
     let recordings: Vec<_> = [(1.0, 0.4), (1.2, 3.0), (0.9, 5.5)]
         .map(|(period, phase)| recorded(walk(&even(450), |t| TAU * t / period + phase)))
         .into();
-    let found = recording::cycles(&recordings, None, Keep::Mean).unwrap();
+    let found = preprocessing::cycles(&recordings, None, Keep::Mean).unwrap();
     assert_eq!(found.kept.len(), 3);
     for cycle in &found.kept {
         for (d, y) in pose(0.4).into_iter().enumerate() {
@@ -240,7 +241,7 @@ fn cycles_are_no_denser_than_their_recording() {
     let fast = recorded(walk(&even(450), |t| TAU * t));
     let time: Vec<f64> = (0..150).map(|c| f64::from(c) * 0.03).collect();
     let slow = Demonstration::new(walk(&time, |t| TAU * t), Sampling::Uniform { dt: 0.03 }).unwrap();
-    let found = recording::cycles(&[fast, slow], None, Keep::Each).unwrap();
+    let found = preprocessing::cycles(&[fast, slow], None, Keep::Each).unwrap();
     for cycle in &found.kept {
         assert_eq!(cycle.demo.n_samples(), [100, 33][cycle.recording]);
     }
@@ -254,13 +255,15 @@ fn recordings_without_a_period_are_rejected_among_others() {
     let reaching = recorded(Array2::from_shape_fn((200, 4), |(c, d)| reach(c as f64 / 199.0) * (d as f64 - 1.5)));
     let still = recorded(Array2::ones((80, 4)));
     let walking = recorded(walk(&even(500), |t| TAU * t));
-    let found = recording::cycles(&[reaching.clone(), walking, still.clone()], None, Keep::Each).unwrap();
+    let found = preprocessing::cycles(&[reaching.clone(), walking, still.clone()], None, Keep::Each).unwrap();
     assert!(found.kept.len() >= 4 && found.kept.iter().all(|cycle| cycle.recording == 1));
     let [first, second] = &found.rejected[..] else { panic!("{:?}", found.rejected) };
     assert!(matches!(first.reason, Reason::Aperiodic { .. }) && first.reason.to_string().contains("no period"));
     assert_eq!((first.recording, first.start, first.period), (0, 0.0, 1.99));
     assert_eq!((second.recording, second.reason), (2, Reason::Still));
-    assert!(recording::cycles(&[still, reaching], None, Keep::Each).unwrap_err().to_string().contains("stands still"));
+    assert!(
+        preprocessing::cycles(&[still, reaching], None, Keep::Each).unwrap_err().to_string().contains("stands still")
+    );
 }
 
 /// A crank turns on by a turn per cycle: all its closed cycles are about one mean, and the turns are reported.
@@ -330,13 +333,14 @@ fn odd_cycles_are_rejected_with_a_reason() {
 fn events_tell_when_cycles_begin() {
     let events = vec![0.25, 1.26, 2.24, 3.25];
     let recording = recorded(walk(&even(400), |t| TAU * t));
-    let found = recording::cycles(std::slice::from_ref(&recording), Some(&[events]), Keep::Each).unwrap();
+    let found = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[events]), Keep::Each).unwrap();
     let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
     assert_abs_diff_eq!(&periods[..], &[1.01, 0.98, 1.01][..], epsilon = 1e-12);
 
     for (events, wrong) in [(vec![0.5], "at least"), (vec![1.0, 0.5], "must increase"), (vec![1.0, 9.0], "within")] {
-        let message =
-            recording::cycles(std::slice::from_ref(&recording), Some(&[events]), Keep::Each).unwrap_err().to_string();
+        let message = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[events]), Keep::Each)
+            .unwrap_err()
+            .to_string();
         assert!(message.starts_with("demo 0: events") && message.contains(wrong), "{message}");
     }
 }
@@ -352,7 +356,7 @@ fn a_rhythmic_primitive_is_learnt_from_a_raw_recording() {
         .and_then(|demo| demo.with_goal(vec![0.0; 4]))
         .unwrap();
     let demos: Vec<_> = one(recording).unwrap().kept.into_iter().map(|cycle| cycle.demo).collect();
-    let model = pdmp_core::fit(&demos, &FitOptions::new(Kind::Rhythmic), &mut |_, _| Ok(())).unwrap();
+    let model = pdmp_core::fit(&demos, &FitOptions::new(Kind::Rhythmic)).unwrap();
     assert_relative_eq!(model.duration(), 1.3, max_relative = 1e-2);
     assert_eq!(model.units(), ["rad", "rad", "rad", "m"]);
     assert_eq!(demos[0].context(), Some(&[1.4.into()][..]));
@@ -368,13 +372,13 @@ fn resampling_is_exact_for_cubics_at_irregular_stamps() {
     let cubic = |t: f64| t * t * t - 3.0 * t;
     let position = Array1::from_iter(time.iter().map(|&t| cubic(t))).insert_axis(Axis(1));
     let recording = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
-    let even = recording::resample(&recording, 0.02).unwrap();
+    let even = preprocessing::resample(&recording, 0.02).unwrap();
     assert_eq!((even.n_samples(), even.sampling()), (101, &Sampling::Uniform { dt: 0.02 }));
     for (c, y) in even.position().column(0).iter().enumerate() {
         assert_abs_diff_eq!(*y, cubic(2.0 + c as f64 * 0.02), epsilon = 1e-9);
     }
     for (dt, wrong) in [(0.0, "positive"), (1.0, "fewer than 4"), (1e-300, "memory")] {
-        let message = recording::resample(&recording, dt).unwrap_err().to_string();
+        let message = preprocessing::resample(&recording, dt).unwrap_err().to_string();
         assert!(message.contains(wrong), "{message}");
     }
 }
@@ -392,10 +396,10 @@ fn reaches_sampled_anew_are_learnt_as_easily_as_recorded() {
             .collect();
         let anew = |f: &dyn Fn(&Demonstration) -> Demonstration| demos.iter().map(f).collect::<Vec<_>>();
         for demos in [
-            anew(&|demo| recording::resample(demo, 0.5 * DT).unwrap()),
-            anew(&|demo| recording::resample(demo, 0.3 * DT).unwrap()),
-            anew(&|demo| recording::resample(demo, 2.0 * DT).unwrap()),
-            anew(&|demo| recording::cut(demo, &[0.0037, 0.9962]).unwrap().remove(0)),
+            anew(&|demo| preprocessing::resample(demo, 0.5 * DT).unwrap()),
+            anew(&|demo| preprocessing::resample(demo, 0.3 * DT).unwrap()),
+            anew(&|demo| preprocessing::resample(demo, 2.0 * DT).unwrap()),
+            anew(&|demo| preprocessing::cut(demo, &[0.0037, 0.9962]).unwrap().remove(0)),
         ] {
             assert_eq!(n_styles(Kind::Discrete, &demos), 1, "noise {share}, {} samples", demos[0].n_samples());
         }
@@ -407,8 +411,8 @@ fn reaches_sampled_anew_are_learnt_as_easily_as_recorded() {
 fn resampling_keeps_what_was_recorded() {
     let clean = walk(&even(301), |t| TAU * t / 1.3);
     let rough = noisy(clean.clone(), 0.02, 3);
-    let same = recording::resample(&recorded(rough.clone()), DT).unwrap();
-    let every = recording::resample(&recorded(clean), 0.5 * DT).unwrap();
+    let same = preprocessing::resample(&recorded(rough.clone()), DT).unwrap();
+    let every = preprocessing::resample(&recorded(clean), 0.5 * DT).unwrap();
     let finer: Vec<f64> = (0..601).map(|c| 0.5 * DT * f64::from(c)).collect();
     for (made, meant, tolerance) in [(same, rough, 1e-12), (every, walk(&finer, |t| TAU * t / 1.3), 1e-6)] {
         assert_eq!(made.n_samples(), meant.nrows());
@@ -422,12 +426,12 @@ fn resampling_keeps_what_was_recorded() {
 #[test]
 fn parts_meet_at_the_times_that_cut_them() {
     let recording = recorded(walk(&even(300), |t| TAU * t)).with_goal(vec![0.0; 4]).unwrap();
-    let parts = recording::cut(&recording, &[0.333, 1.0, 2.7]).unwrap();
+    let parts = preprocessing::cut(&recording, &[0.333, 1.0, 2.7]).unwrap();
     let [first, second] = &parts[..] else { panic!("{} parts", parts.len()) };
     assert_abs_diff_eq!(first.position().row(0)[0], 0.4 * (TAU * 0.333).sin(), epsilon = 1e-6);
     assert_eq!(first.position().row(first.n_samples() - 1), second.position().row(0));
     assert_eq!(first.goal(), None);
-    let message = recording::cut(&recording, &[0.5, 0.51]).unwrap_err().to_string();
+    let message = preprocessing::cut(&recording, &[0.5, 0.51]).unwrap_err().to_string();
     assert!(message.contains("times = 0.51: a part must last"), "{message}");
 }
 
@@ -438,16 +442,18 @@ fn trimming_leaves_the_movement() {
     let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
     // Both DoFs move alike: the threshold is that of each, whatever their units.
     let position = Array2::from_shape_fn((400, 2), |(c, d)| [1.0, 1e-3][d] * reach(share(c as f64 * DT)));
-    let trimmed = recording::trim(&recorded(position.clone()), 0.05).unwrap();
+    let trimmed = preprocessing::trim(&recorded(position.clone()), 0.05).unwrap();
     // Speed 30 s²(1 − s)² is at 5 % of its peak 1.875 where s(1 − s) = √0.003125.
     let edge = 0.5 - (0.25 - 0.003125f64.sqrt()).sqrt();
     let expected = 1.5 * (1.0 - 2.0 * edge) / DT;
     assert_abs_diff_eq!(trimmed.n_samples() as f64, expected, epsilon = 2.0);
-    assert!(recording::trim(&recorded(position), 1.0).unwrap_err().to_string().contains("threshold = 1"));
+    assert!(preprocessing::trim(&recorded(position), 1.0).unwrap_err().to_string().contains("threshold = 1"));
     let step = Array2::from_shape_fn((30, 1), |(c, _)| f64::from(u8::from(c > 15)));
-    let message = recording::trim(&recorded(step), 0.9).unwrap_err().to_string();
+    let message = preprocessing::trim(&recorded(step), 0.9).unwrap_err().to_string();
     assert!(message.contains("threshold = 0.9: leaves fewer than 4 samples"), "{message}");
-    assert!(recording::trim(&recorded(Array2::zeros((9, 2))), 0.05).unwrap_err().to_string().contains("stands still"));
+    assert!(
+        preprocessing::trim(&recorded(Array2::zeros((9, 2))), 0.05).unwrap_err().to_string().contains("stands still")
+    );
 }
 
 /// Noise of up to 2 % of the range takes no rest for movement and no movement for rest, nor does a jump.
@@ -458,7 +464,7 @@ fn trimming_is_not_misled_by_noise_or_a_jump() {
     let clean = Array2::from_shape_fn((261, 2), |(c, d)| [1.0, -0.4][d] * reach(share(c as f64 * DT)));
     let stamped = |position| Demonstration::new(position, Sampling::Stamped { time: even(261) }).unwrap();
     let ends = |position: Array2<f64>| {
-        let trimmed = recording::trim(&stamped(position), 0.05).unwrap();
+        let trimmed = preprocessing::trim(&stamped(position), 0.05).unwrap();
         let Sampling::Stamped { time } = trimmed.sampling() else { panic!("no stamps") };
         [time[0], time[time.len() - 1]]
     };
@@ -479,15 +485,15 @@ fn trimming_is_not_misled_by_noise_or_a_jump() {
 fn the_low_pass_halves_a_sine_at_the_cut_off_without_lag() {
     let sine = |t: f64| (TAU * 5.0 * t).sin();
     let position = Array1::from_iter(even(1001).into_iter().map(sine)).insert_axis(Axis(1));
-    let filtered = recording::lowpass(&recorded(position.clone()), 5.0).unwrap();
+    let filtered = preprocessing::lowpass(&recorded(position.clone()), 5.0).unwrap();
     for c in 100..900 {
         assert_abs_diff_eq!(filtered.position()[[c, 0]], 0.5 * sine(c as f64 * DT), epsilon = 1e-3);
     }
-    let residuals = recording::residuals(&recorded(position.clone()), &[0.5, 5.0, 45.0]).unwrap();
+    let residuals = preprocessing::residuals(&recorded(position.clone()), &[0.5, 5.0, 45.0]).unwrap();
     assert_relative_eq!(residuals[[0, 0]], 0.5f64.sqrt(), max_relative = 1e-2);
     assert_relative_eq!(residuals[[1, 0]], 0.5 * 0.5f64.sqrt(), max_relative = 2e-2);
     assert!(residuals[[2, 0]] < 1e-3);
-    let message = recording::lowpass(&recorded(position), 80.0).unwrap_err().to_string();
+    let message = preprocessing::lowpass(&recorded(position), 80.0).unwrap_err().to_string();
     assert_eq!(message, "cut_off = 80: must lie below half the sampling rate");
 }
 
@@ -500,12 +506,12 @@ fn short_gaps_are_interpolated_and_nothing_else_changes() {
     holed.slice_mut(s![40..44, 0]).fill(f64::NAN);
     holed[[70, 2]] = f64::NAN;
     let names = ["a", "b", "c", "d"].map(String::from);
-    let filled = recording::fill(holed.clone(), &time, &names, &[0.0; 4], 0.05).unwrap();
+    let filled = preprocessing::fill(holed.clone(), &time, &names, &[0.0; 4], 0.05).unwrap();
     for (place, y) in filled.indexed_iter() {
         let tolerance = if holed[place].is_nan() { 1e-4 } else { 0.0 };
         assert_abs_diff_eq!(*y, whole[place], epsilon = tolerance);
     }
-    let message = recording::fill(holed, &time, &names, &[0.0; 4], 0.04).unwrap_err().to_string();
+    let message = preprocessing::fill(holed, &time, &names, &[0.0; 4], 0.04).unwrap_err().to_string();
     assert!(message.contains("column 'a': no sample between t = 0.39 s and t = 0.44 s"), "{message}");
 }
 
@@ -516,7 +522,7 @@ fn gaps_that_cannot_be_filled_are_refused() {
     let refusal = |gap: std::ops::Range<usize>, max_gap: f64| {
         let mut position = Array2::zeros((10, 1));
         position.slice_mut(s![gap, 0]).fill(f64::NAN);
-        recording::fill(position, &time, &names, &[0.0], max_gap).unwrap_err().to_string()
+        preprocessing::fill(position, &time, &names, &[0.0], max_gap).unwrap_err().to_string()
     };
     assert!(refusal(0..2, 1.0).contains("'knee': no sample before t = 0.02 s"));
     assert!(refusal(7..10, 1.0).contains("'knee': no sample after t = 0.06 s"));
@@ -533,7 +539,7 @@ fn angles_are_filled_across_the_wrap() {
     let wrapped = |c: usize| (angle(c) + PI).rem_euclid(TAU) - PI;
     let mut position = Array2::from_shape_fn((60, 1), |(c, _)| wrapped(c));
     position.slice_mut(s![29..34, 0]).fill(f64::NAN);
-    let filled = recording::fill(position, &time, &[String::from("yaw")], &[TAU], 0.1).unwrap();
+    let filled = preprocessing::fill(position, &time, &[String::from("yaw")], &[TAU], 0.1).unwrap();
     for c in 29..34 {
         let turns = (filled[[c, 0]] - angle(c)) / TAU;
         assert_abs_diff_eq!(turns, turns.round(), epsilon = 1e-9);
@@ -575,10 +581,10 @@ proptest! {
         let position = Array2::from_shape_fn((time.len(), 2), |_| scale * random());
         let (first, last) = (time[0], time[time.len() - 1]);
         let recording = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
-        let mut made = vec![recording::resample(&recording, (last - first) / 20.0).unwrap()];
-        made.extend(recording::trim(&recording, 0.05));
-        made.extend(recording::cut(&recording, &[first, last]).unwrap());
-        made.extend(recording::lowpass(&recording, 0.3 / ((last - first) / steps.len() as f64)));
+        let mut made = vec![preprocessing::resample(&recording, (last - first) / 20.0).unwrap()];
+        made.extend(preprocessing::trim(&recording, 0.05));
+        made.extend(preprocessing::cut(&recording, &[first, last]).unwrap());
+        made.extend(preprocessing::lowpass(&recording, 0.3 / ((last - first) / steps.len() as f64)));
         for demo in made {
             prop_assert!(demo.position().iter().all(|y| y.is_finite()));
         }
@@ -591,5 +597,5 @@ fn columns_at_rest_have_no_say() {
     let moving = walk(&even(400), |t| TAU * t / 1.3);
     let resting = Array2::from_elem((400, 3), 7.25);
     let position = concatenate![Axis(1), moving, resting];
-    assert_relative_eq!(recording::period(&recorded(position)).unwrap(), 1.3, max_relative = 1e-3);
+    assert_relative_eq!(preprocessing::period(&recorded(position)).unwrap(), 1.3, max_relative = 1e-3);
 }

@@ -8,10 +8,13 @@ use std::sync::Arc;
 
 use common::*;
 use ndarray::{Array2, array};
-use pdmp_core::{
-    Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Sampling, Status, StyleCount, Threads,
-    TimeScaling, Timing, Warp, fit, style_of,
-};
+use pdmp_core::learning::{StyleCount, TimeScaling, style_of};
+use pdmp_core::model::Warp;
+use pdmp_core::motion::Timing;
+use pdmp_core::motion::jacobian;
+use pdmp_core::numerics::Threads;
+use pdmp_core::rollout;
+use pdmp_core::{Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Sampling, Status, fit};
 use proptest::prelude::*;
 
 /// A movement with much to tell its phase by, of amplitude `a`, at the phase `p`; it closes where it is a cycle.
@@ -90,7 +93,10 @@ fn demonstrations_that_are_alike_are_not_warped() {
         }
         assert_eq!(model.demonstrated().styles, linear.demonstrated().styles);
         let (timing, nominal) = (Timing { dt: 0.01, duration: None }, Conditions::default());
-        assert_eq!(model.rollout(&nominal, timing).unwrap(), linear.rollout(&nominal, timing).unwrap());
+        assert_eq!(
+            rollout(model.primitive(), &nominal, timing).unwrap(),
+            rollout(linear.primitive(), &nominal, timing).unwrap()
+        );
     }
 }
 
@@ -103,12 +109,18 @@ fn one_segment_is_linear() {
         assert_eq!(one.demonstrated(), linear.demonstrated());
         let timing = Timing { dt: 0.01, duration: None };
         let nominal = Conditions::default();
-        assert_eq!(one.rollout(&nominal, timing).unwrap(), linear.rollout(&nominal, timing).unwrap());
-        assert_eq!(linear.demonstrated().breaks, [0.0, 1.0]);
+        assert_eq!(
+            rollout(one.primitive(), &nominal, timing).unwrap(),
+            rollout(linear.primitive(), &nominal, timing).unwrap()
+        );
+        assert_eq!(linear.breaks(), [0.0, 1.0]);
         assert_eq!(linear.demonstrated().timings.column(0).to_vec(), linear.demonstrated().durations);
         let timed = Conditions { timing: Some(vec![1.7]), ..Default::default() };
         let scaled = Conditions { tau: Some(linear.tau() * 1.7 / linear.duration()), ..Default::default() };
-        assert_eq!(linear.rollout(&timed, timing).unwrap(), linear.rollout(&scaled, timing).unwrap());
+        assert_eq!(
+            rollout(linear.primitive(), &timed, timing).unwrap(),
+            rollout(linear.primitive(), &scaled, timing).unwrap()
+        );
     }
 }
 
@@ -151,19 +163,26 @@ fn events_fall_on_their_breaks() {
             durations[m] * [0.25 + 0.03 * m as f64, 0.6 + 0.02 * m as f64][e]
         });
         let model = learn(&demos, &with(kind, TimeScaling::Events(events.clone())));
-        let shown = model.demonstrated();
-        assert!((shown.breaks[1] - 0.25).abs() < 1e-14 && (shown.breaks[2] - 0.6).abs() < 1e-14);
+        let breaks = model.breaks();
+        assert!((breaks[1] - 0.25).abs() < 1e-14 && (breaks[2] - 0.6).abs() < 1e-14);
         for m in 0..demos.len() {
-            assert!((shown.timings[[m, 0]] - events[[m, 0]]).abs() < 1e-14);
-            assert!((shown.timings[[m, 0]] + shown.timings[[m, 1]] - events[[m, 1]]).abs() < 1e-14);
-            assert!((shown.durations[m] - durations[m]).abs() < 1e-14);
+            assert!((model.demonstrated().timings[[m, 0]] - events[[m, 0]]).abs() < 1e-14);
+            assert!(
+                (model.demonstrated().timings[[m, 0]] + model.demonstrated().timings[[m, 1]] - events[[m, 1]]).abs()
+                    < 1e-14
+            );
+            assert!((model.demonstrated().durations[m] - durations[m]).abs() < 1e-14);
             // The event is an instant of the recording and a phase of the movement, where all demonstrations have theirs.
             let at = Timing { dt: events[[m, 0]], duration: Some(events[[m, 0]]) };
             let conditions = conditions_of(&model, m);
-            let there = model.rollout(&conditions, at).unwrap().position.row(1).to_vec();
+            let there = rollout(model.primitive(), &conditions, at).unwrap().position.row(1).to_vec();
             let still = Conditions { timing: None, ..conditions };
             let at = 0.25 * model.duration();
-            let same = model.rollout(&still, Timing { dt: at, duration: Some(at) }).unwrap().position.row(1).to_vec();
+            let same = rollout(model.primitive(), &still, Timing { dt: at, duration: Some(at) })
+                .unwrap()
+                .position
+                .row(1)
+                .to_vec();
             assert!(there.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-9));
         }
     }
@@ -181,7 +200,7 @@ fn a_timed_rollout_is_the_movement_along_its_timing() {
             let timed = Conditions { timing: Some(timing.clone()), velocity, start, ..Default::default() };
             // Past the end, too, but for the instants at which acceleration jumps: it is smooth in between.
             let dt = 1e-3;
-            let made = model.rollout(&timed, Timing { dt, duration: Some(1.9) }).unwrap();
+            let made = rollout(model.primitive(), &timed, Timing { dt, duration: Some(1.9) }).unwrap();
             let scale = made.acceleration.iter().fold(0.0f64, |most, a| most.max(a.abs()));
             let mut worst = 0.0f64;
             for k in 1..made.time.len() - 1 {
@@ -207,7 +226,7 @@ fn a_timed_rollout_is_the_movement_along_its_timing() {
         }
         // As long as the timing, unless told otherwise.
         let timed = Conditions { timing: Some(timing.clone()), ..Default::default() };
-        assert_eq!(model.rollout(&timed, Timing { dt: 0.01, duration: None }).unwrap().time.len(), 161);
+        assert_eq!(rollout(model.primitive(), &timed, Timing { dt: 0.01, duration: None }).unwrap().time.len(), 161);
     }
 }
 
@@ -219,8 +238,8 @@ fn a_nominal_timing_is_linear_time() {
         let model = learn(&demos, &by_warp(kind));
         let timed = Conditions { timing: Some(vec![0.2; 8]), ..Default::default() };
         let scaled = Conditions { tau: Some(1.6 * model.tau()), ..Default::default() };
-        let [timed, scaled] =
-            [timed, scaled].map(|conditions| model.rollout(&conditions, Timing { dt: 0.01, duration: None }).unwrap());
+        let [timed, scaled] = [timed, scaled]
+            .map(|conditions| rollout(model.primitive(), &conditions, Timing { dt: 0.01, duration: None }).unwrap());
         for (a, b) in [(timed.position, scaled.position), (timed.velocity, scaled.velocity)] {
             assert!((a - b).iter().all(|difference| difference.abs() < 1e-9));
         }
@@ -235,11 +254,11 @@ fn a_loop_follows_a_timing_by_its_tau() {
         let model = learn(&demos, &by_warp(kind));
         let conditions = conditions_of(&model, 1);
         let timing = conditions.timing.clone().unwrap();
-        let made = model.rollout(&conditions, Timing { dt: 1e-3, duration: None }).unwrap().position;
+        let made = rollout(model.primitive(), &conditions, Timing { dt: 1e-3, duration: None }).unwrap().position;
         let at = |phase: f64| model.tau_at(phase, &timing).unwrap();
         let tau = Some(at(if kind == Kind::Discrete { 1.0 } else { 0.0 }));
         let conditions = Conditions { tau, timing: None, ..conditions };
-        let mut controller = Controller::new(Arc::clone(&model), 1e-3, &conditions, Some(0.0)).unwrap();
+        let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, Some(0.0)).unwrap();
         for k in 1..made.nrows() {
             assert!(controller.step().unwrap() == Status::Working || k + 100 > made.nrows());
             controller.set_tau(at(controller.phase())).unwrap();
@@ -259,15 +278,14 @@ fn timings_are_predicted_from_contexts() {
     let contexts = Some(heights.iter().map(|&h| vec![h.into()]).collect());
     let model = learn(&demos, &FitOptions { contexts, ..by_warp(kind) });
     let found = model.predict(&[0.25]).unwrap();
-    let first: f64 = found.timing[..4].iter().sum();
+    let timing = found.conditions.timing.as_ref().unwrap();
+    let first: f64 = timing[..4].iter().sum();
     assert!((first - 1.25 * 1.25 / 2.0).abs() < 0.02, "{first}");
     assert!((found.duration - 1.25).abs() < 0.02);
-    assert!((found.duration - found.timing.iter().sum::<f64>()).abs() < 1e-14);
+    assert!((found.duration - timing.iter().sum::<f64>()).abs() < 1e-14);
     let size = model.n_styles() + 2 * model.n_dofs() + 8;
     assert_eq!(found.covariance.as_ref().unwrap().dim(), (size, size));
-    let conditions = model.conditions(&found);
-    assert_eq!(conditions.timing.as_ref(), Some(&found.timing));
-    let controller = Controller::new(Arc::clone(&model), 1e-3, &conditions, None).unwrap();
+    let controller = Controller::new(model.primitive(), 1e-3, &found.conditions, None).unwrap();
     assert!((controller.tau() / model.tau() - found.duration / model.duration()).abs() < 1e-12);
 }
 
@@ -312,7 +330,7 @@ fn a_warped_model_is_saved_and_does_not_depend_on_threads() {
         assert!([2, 3, 8].iter().all(|&n| bytes(n) == one));
         let model = Arc::new(Model::from_bytes(&one).unwrap());
         assert_eq!(model.to_bytes().unwrap(), one);
-        assert_eq!(model.demonstrated().breaks.len(), 9);
+        assert_eq!(model.breaks().len(), 9);
         assert!(model.learnt().template.is_some());
         assert!(style_of(&model, &demos[3], None, None, None).is_ok());
     }
@@ -344,7 +362,7 @@ proptest! {
                 prop_assert!((1.0 / slope - 1e-9..=slope + 1e-9).contains(&(seconds / linear)), "{}", seconds / linear);
             }
         }
-        let made = model.rollout(&conditions_of(&model, 2), Timing { dt: 0.01, duration: None }).unwrap();
+        let made = rollout(model.primitive(), &conditions_of(&model, 2), Timing { dt: 0.01, duration: None }).unwrap();
         prop_assert!(made.position.iter().chain(&made.velocity).chain(&made.acceleration).all(|x| x.is_finite()));
     }
 }
@@ -354,21 +372,24 @@ proptest! {
 #[test]
 fn jacobian_of_a_timing_is_refused() {
     let demos = [EVEN, UNEVEN].map(|slopes| warped(Kind::Discrete, 1.0, &slopes, 2.0));
-    let model = Arc::new(fit(&demos, &by_warp(Kind::Discrete), &mut |_, _| Ok(())).unwrap());
+    let model = Arc::new(fit(&demos, &by_warp(Kind::Discrete)).unwrap());
     let conditions = Conditions { timing: Some(model.demonstrated().timings.row(1).to_vec()), ..Conditions::default() };
     let timing = Timing { dt: 0.01, duration: None };
-    let found =
-        model.jacobian(pdmp_core::Variable::Style, pdmp_core::Derivative::Position, &conditions, timing, &mut |_| {
-            Ok(())
-        });
+    let found = jacobian(
+        model.primitive(),
+        pdmp_core::motion::Variable::Style,
+        pdmp_core::model::Derivative::Position,
+        &conditions,
+        timing,
+        &mut |_| Ok(()),
+    );
     assert!(matches!(found, Err(Error::Arguments(_))));
 }
 
 #[test]
 fn bad_timings_are_refused() {
     let demos = reaches();
-    let refused =
-        |time_scaling| fit(&demos, &with(Kind::Discrete, time_scaling), &mut |_, _| Ok(())).unwrap_err().to_string();
+    let refused = |time_scaling| fit(&demos, &with(Kind::Discrete, time_scaling)).unwrap_err().to_string();
     for (segments, slope, message) in [
         (0, 2.5, "segments = 0: must be at least 1, which is linear"),
         (46, 2.5, "segments = 46: must lie between 1 and 45, half the fewest samples of a demonstration or 1000"),
@@ -392,7 +413,7 @@ fn bad_timings_are_refused() {
 
     let model = learn(&demos, &by_warp(Kind::Discrete));
     let refused = |conditions: Conditions| {
-        let error: Error = model.rollout(&conditions, Timing { dt: 0.01, duration: None }).unwrap_err();
+        let error: Error = rollout(model.primitive(), &conditions, Timing { dt: 0.01, duration: None }).unwrap_err();
         error.to_string()
     };
     let timed = |timing: &[f64]| refused(Conditions { timing: Some(timing.to_vec()), ..Default::default() });

@@ -1,7 +1,7 @@
 //! The regressors of the landscape: choices for a fit, and functions to try by themselves.
 
 use numpy::IntoPyArray;
-use pdmp_core::basis::{self, Domain, GpPosterior, Kernel, Regression};
+use pdmp_core::learning::regression::{self, Domain, GpPosterior, Kernel, Regression};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -30,7 +30,7 @@ use crate::error::{ascii, raise};
 ///     An unknown kernel, or a number out of range.
 #[pyclass(frozen, name = "GP", module = "pdmp", from_py_object)]
 #[derive(Clone)]
-pub(crate) struct Gp(pub(crate) basis::Gp);
+pub(crate) struct Gp(pub(crate) regression::Gp);
 
 #[pymethods]
 impl Gp {
@@ -42,7 +42,7 @@ impl Gp {
                 "kernel = {kernel:?}: must be \"matern32\", \"matern52\" or \"squared_exponential\""
             ))
         })?;
-        basis::Gp::new(kernel, length, noise).map(Self).map_err(raise)
+        regression::Gp::new(kernel, length, noise).map(Self).map_err(raise)
     }
 
     /// Name of the covariance function.
@@ -179,17 +179,17 @@ impl GpRegression {
 /// Ijspeert, Nakanishi, Hoffmann, Pastor, Schaal, Neural Computation 25 (2013), https://doi.org/10.1162/NECO_a_00393
 #[pyclass(frozen, module = "pdmp", from_py_object)]
 #[derive(Clone)]
-pub(crate) struct NGnet(pub(crate) basis::NGnet);
+pub(crate) struct NGnet(pub(crate) regression::NGnet);
 
 #[pymethods]
 impl NGnet {
     #[new]
     #[pyo3(
-        signature = (n_basis=basis::NGnet::default().n_basis as isize, overlap=basis::NGnet::default().overlap),
+        signature = (n_basis=regression::NGnet::default().n_basis as isize, overlap=regression::NGnet::default().overlap),
         text_signature = "(n_basis=50, overlap=1.2)"
     )]
     fn new(n_basis: isize, overlap: f64) -> PyResult<Self> {
-        basis::NGnet::new(count("n_basis", n_basis)?, overlap).map(Self).map_err(raise)
+        regression::NGnet::new(count("n_basis", n_basis)?, overlap).map(Self).map_err(raise)
     }
 
     /// Number of functions N.
@@ -225,7 +225,7 @@ impl NGnet {
 /// A normalised Gaussian network given data.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct NGnetRegression {
-    regression: basis::NGnetRegression,
+    regression: regression::NGnetRegression,
     n_outputs: usize,
 }
 

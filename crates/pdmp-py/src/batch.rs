@@ -5,7 +5,10 @@ use std::sync::{Mutex, PoisonError};
 
 use ndarray::{Ix1, Ix2};
 use numpy::PyArrayMethods;
-use pdmp_core::{Batch, BatchConditions, Chunks, Derivative, Error, Rows, Threads, Timing};
+use pdmp_core::Error;
+use pdmp_core::model::Derivative;
+use pdmp_core::motion::{Batch, BatchConditions, Chunks, Rows, Timing, batch};
+use pdmp_core::numerics::Threads;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -179,7 +182,7 @@ impl Work {
     ) -> PyResult<Self> {
         let highest = Derivative::of_order("derivatives", count("derivatives", derivatives)?).map_err(raise)?;
         let (threads, conditions) = (threads(n_threads)?, arguments.conditions()?);
-        let batch = interruptible(py, |proceed| model.0.batch(conditions, timing, proceed))?;
+        let batch = interruptible(py, |proceed| batch(model.0.primitive(), conditions, timing, proceed))?;
         Ok(Self { batch, highest, threads })
     }
 

@@ -47,7 +47,7 @@ impl Arguments<'_, '_> {
         if given.style.is_some() {
             return Err(PyValueError::new_err("pass style or context, not both: the context predicts the style"));
         }
-        let predicted = model.conditions(&model.predict(&context).map_err(raise)?);
+        let predicted = model.predict(&context).map_err(raise)?.conditions;
         Ok(Conditions {
             style: predicted.style,
             goal: given.goal.or(predicted.goal),

@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, Array3, Axis};
 use numpy::IntoPyArray;
-use pdmp_core::MapChoice;
+use pdmp_core::context::MapChoice;
 use pyo3::prelude::*;
 
 use crate::convert::{Cube, Matrix, matrix};
@@ -38,7 +38,7 @@ use crate::fit::map_of;
 /// ----------
 /// Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), Section 2.7
 #[pyclass(frozen, module = "pdmp")]
-pub(crate) struct ContextMap(pub(crate) pdmp_core::ContextMap);
+pub(crate) struct ContextMap(pub(crate) pdmp_core::context::ContextMap);
 
 #[pymethods]
 impl ContextMap {
@@ -47,7 +47,7 @@ impl ContextMap {
     fn new(contexts: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>, map: &str) -> PyResult<Self> {
         let (rows, outputs) = (crate::convert::contexts(contexts)?, matrix("outputs", "(M, P)", outputs)?);
         let choice: MapChoice = map_of(map)?;
-        pdmp_core::ContextMap::fit(&rows, outputs.view(), choice).map(Self).map_err(raise)
+        pdmp_core::context::ContextMap::fit(&rows, outputs.view(), choice).map(Self).map_err(raise)
     }
 
     /// Which kind of map it is.

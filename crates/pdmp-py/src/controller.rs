@@ -1,11 +1,13 @@
 //! The real-time loop in Python.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use ndarray::ArrayView1;
 use numpy::PyArray1;
 use numpy::npyffi::{_PyArray_GET_ITEM_DATA, NPY_ARRAY_WRITEABLE};
-use pdmp_core::{Command, Coupling, Kind};
+use pdmp_core::motion::Coupling;
+use pdmp_core::{Command, Kind};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyFloat;
@@ -93,6 +95,8 @@ struct Given {
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,
+    /// Predicts conditions from contexts.
+    model: Arc<pdmp_core::Model>,
     given: Given,
     position: Output,
     velocity: Output,
@@ -102,7 +106,7 @@ pub(crate) struct Controller {
 }
 
 impl Controller {
-    pub(crate) fn new(py: Python<'_>, inner: pdmp_core::Controller) -> PyResult<Self> {
+    pub(crate) fn new(py: Python<'_>, model: Arc<pdmp_core::Model>, inner: pdmp_core::Controller) -> PyResult<Self> {
         let length = inner.position().len();
         let status = py.get_type::<Status>();
         let controller = Self {
@@ -113,6 +117,7 @@ impl Controller {
             finished: status.getattr("FINISHED")?.unbind(),
             given: Given::default(),
             inner,
+            model,
         };
         controller.publish();
         Ok(controller)
@@ -255,7 +260,7 @@ impl Controller {
             Some(rate_hz) => rate_hz,
             None => PyFloat::new(py, 1.0 / slf.try_borrow()?.inner.dt()).into_any(),
         };
-        py.import("pdmp.pacing")?.call_method1("Run", (slf, rate_hz, duration, measured, coupling, late))
+        py.import("pdmp.realtime")?.call_method1("Run", (slf, rate_hz, duration, measured, coupling, late))
     }
 
     /// Start again.
@@ -288,7 +293,7 @@ impl Controller {
         phase: Option<f64>,
     ) -> PyResult<()> {
         let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
-        let conditions = arguments.in_context(self.inner.model(), context)?;
+        let conditions = arguments.in_context(&self.model, context)?;
         let result = self.inner.reset(&conditions);
         self.command(result)
     }
@@ -422,7 +427,7 @@ impl Controller {
 
     /// A controller of its own that goes on bit for bit as this one would; the model is shared.
     fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
-        Self::new(py, self.inner.clone())
+        Self::new(py, Arc::clone(&self.model), self.inner.clone())
     }
 
     fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> PyResult<Self> {
@@ -436,14 +441,14 @@ impl Controller {
     }
 
     fn __repr__(&self) -> String {
-        let model = self.inner.model();
+        let model = &self.model;
         format!("<pdmp.Controller: {}, {} DoFs, t = {:.4} s>", model.kind(), model.n_dofs(), self.inner.time())
     }
 }
 
 impl Controller {
     fn centre<'py>(&self, py: Python<'py>, kind: Kind, other: &'static str) -> PyResult<Vector<'py>> {
-        if self.inner.model().kind() != kind {
+        if self.model.kind() != kind {
             return Err(PyValueError::new_err(other));
         }
         read_only(py, self.inner.centre())

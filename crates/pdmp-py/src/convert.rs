@@ -5,7 +5,8 @@ use numpy::{
     AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayLikeDyn,
     PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
-use pdmp_core::{ContextValue, Threads};
+use pdmp_core::demonstration::ContextValue;
+use pdmp_core::numerics::Threads;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
 use pyo3::intern;

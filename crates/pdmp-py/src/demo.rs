@@ -221,7 +221,7 @@ impl Source {
         let bare = value.is_instance_of::<PyUntypedArray>() || value.is_instance_of::<PyList>();
         let (names, units) = match bare {
             true => (None, None),
-            false => py.import("pdmp._described")?.call_method1("described", (value,))?.extract()?,
+            false => py.import("pdmp._labels")?.call_method1("names_and_units", (value,))?.extract()?,
         };
         Ok(Self { position: array(name, value)?, time: None, names, units })
     }
@@ -261,7 +261,12 @@ pub(crate) struct Trajectory {
 }
 
 impl Trajectory {
-    pub(crate) fn new(py: Python<'_>, trajectory: pdmp_core::Trajectory, names: &[String], units: &[String]) -> Self {
+    pub(crate) fn new(
+        py: Python<'_>,
+        trajectory: pdmp_core::motion::Trajectory,
+        names: &[String],
+        units: &[String],
+    ) -> Self {
         let convert = |matrix: Array2<f64>| matrix.into_pyarray(py).unbind();
         Self {
             time: to_numpy(py, &trajectory.time).unbind(),
@@ -296,7 +301,7 @@ impl Trajectory {
     }
 
     /// Returns arrays, names and units by their names; `numpy.savez(path, **trajectory.to_dict())` writes what
-    /// `demos.read_npz` reads.
+    /// `io.read_npz` reads.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
         values.set_item("time", &self.time)?;
@@ -319,10 +324,10 @@ impl Trajectory {
     /// ImportError
     ///     pandas is not installed.
     fn to_dataframe<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        slf.py().import("pdmp._described")?.call_method1("dataframe", (slf,))
+        slf.py().import("pdmp._labels")?.call_method1("to_dataframe", (slf,))
     }
 
-    /// Writes a CSV file, whose positions `demos.read_csv` reads back: `demos.write_csv` describes it.
+    /// Writes a CSV file, whose positions `io.read_csv` reads back: `io.write_csv` describes it.
     ///
     /// Parameters
     /// ----------
@@ -336,7 +341,7 @@ impl Trajectory {
     /// ValueError
     ///     Names that would not be read back.
     fn to_csv(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
-        slf.py().import("pdmp.demos")?.call_method1("write_csv", (path, slf)).map(drop)
+        slf.py().import("pdmp.io")?.call_method1("write_csv", (path, slf)).map(drop)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

@@ -67,7 +67,7 @@ pub(crate) fn factorise(
 ) -> PyResult<Factors> {
     let styles = style_count(n_styles, spectrum)?;
     let targets = matrix("targets", "(M, C·D)", targets)?;
-    let factors = interruptible(py, |proceed| pdmp_core::Factors::of(targets.view(), styles, proceed))?;
+    let factors = interruptible(py, |proceed| pdmp_core::learning::Factors::of(targets.view(), styles, proceed))?;
     let left_out = factors.left_out();
     Ok(Factors {
         styles: factors.styles.into_pyarray(py).unbind(),

@@ -4,11 +4,13 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use ndarray::Array2;
-use pdmp_core::basis::Basis;
-use pdmp_core::{
-    Alignment, DofScale, FitOptions, Kind, MapChoice, MapKind, Smoothing, Stage, StyleChoice, StyleCount, TimeScaling,
-    TransportChoice,
+use pdmp_core::context::{MapChoice, MapKind};
+use pdmp_core::learning::regression::Basis;
+use pdmp_core::learning::{
+    Alignment, DofScale, Stage, StyleChoice, StyleCount, TimeScaling, TransportChoice, fit_with,
 };
+use pdmp_core::numerics::Smoothing;
+use pdmp_core::{FitOptions, Kind};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyList, PyMapping};
@@ -178,7 +180,7 @@ pub(crate) fn fit(
         Some(progress) => progress.call1(py, (stage.name(), share)).map(drop),
         None => Ok(()),
     };
-    let model = detached(py, show, |proceed| pdmp_core::fit(&demos, &options, proceed))?;
+    let model = detached(py, show, |proceed| fit_with(&demos, &options, proceed))?;
     crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
 }

@@ -2,7 +2,7 @@
 
 use std::ffi::CString;
 
-use pdmp_core::inspection::{Finding, inspect, unwound};
+use pdmp_core::preprocessing::inspection::{Finding, inspect, unwound};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 

@@ -1,7 +1,8 @@
 //! Jacobians of a movement in Python.
 
 use numpy::IntoPyArray;
-use pdmp_core::{Derivative, Timing, Variable};
+use pdmp_core::model::Derivative;
+use pdmp_core::motion::{Timing, Variable};
 use pyo3::prelude::*;
 
 use crate::conditions::Arguments;
@@ -146,8 +147,9 @@ impl Model {
     ) -> PyResult<Cube<'py>> {
         let derivative = Derivative::of_order("derivative", count("derivative", derivative)?).map_err(raise)?;
         let conditions = arguments.conditions()?;
-        let jacobian =
-            interruptible(py, |proceed| self.0.jacobian(variable, derivative, &conditions, timing, proceed))?;
+        let jacobian = interruptible(py, |proceed| {
+            pdmp_core::motion::jacobian(self.0.primitive(), variable, derivative, &conditions, timing, proceed)
+        })?;
         Ok(jacobian.into_pyarray(py))
     }
 }

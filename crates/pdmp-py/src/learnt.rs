@@ -1,7 +1,8 @@
 //! What a model in Python tells of what was learnt.
 
 use numpy::ToPyArray;
-use pdmp_core::{Canonical, ContextColumn};
+use pdmp_core::context::ContextColumn;
+use pdmp_core::dynamics::Canonical;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
@@ -158,7 +159,7 @@ impl Model {
     /// Phases (K+1,) from 0 to 1 that divide the movement into segments; K = 1 where time is scaled linearly.
     #[getter]
     fn breaks<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        to_numpy(py, &self.0.demonstrated().breaks)
+        to_numpy(py, self.0.breaks())
     }
 
     /// Timings of the demonstrations (M, K): the time in s that each spends in each segment.

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use ndarray::Array3;
 use numpy::IntoPyArray;
-use pdmp_core::{Timing, style_of};
+use pdmp_core::learning::style_of;
+use pdmp_core::motion::{Timing, prediction_band, rollout_with};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -114,8 +115,9 @@ impl Model {
     ) -> PyResult<Trajectory> {
         let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
         let conditions = arguments.in_context(&self.0, context)?;
-        let trajectory =
-            interruptible(py, |proceed| self.0.rollout_with(&conditions, Timing { dt, duration }, proceed))?;
+        let trajectory = interruptible(py, |proceed| {
+            rollout_with(self.0.primitive(), &conditions, Timing { dt, duration }, proceed)
+        })?;
         Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
     }
 
@@ -154,7 +156,10 @@ impl Model {
         events: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
         let events = optional("events", events)?;
-        crate::inspection::warn(py, &pdmp_core::inspection::inspect(std::slice::from_ref(&demonstration.0), dt))?;
+        crate::inspection::warn(
+            py,
+            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(&demonstration.0), dt),
+        )?;
         let style = py.detach(|| style_of(&self.0, &demonstration.0, dt, period, events.as_deref())).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
@@ -280,7 +285,7 @@ impl Model {
     ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
         let timing = Timing { dt, duration: None };
-        let [lower, upper] = py.detach(|| self.0.band(&prediction, level, timing)).map_err(raise)?;
+        let [lower, upper] = py.detach(|| prediction_band(&self.0, &prediction, level, timing)).map_err(raise)?;
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 
@@ -339,8 +344,8 @@ impl Model {
     ) -> PyResult<Controller> {
         let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, timing, phase };
         let conditions = arguments.in_context(&self.0, context)?;
-        let controller = pdmp_core::Controller::new(Arc::clone(&self.0), dt, &conditions, transition).map_err(raise)?;
-        Controller::new(py, controller)
+        let controller = pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
+        Controller::new(py, Arc::clone(&self.0), controller)
     }
 
     /// The bytes of a model file.

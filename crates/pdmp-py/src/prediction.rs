@@ -31,14 +31,15 @@ pub(crate) struct Prediction {
 }
 
 impl Prediction {
-    pub(crate) fn new(py: Python<'_>, prediction: pdmp_core::Prediction) -> Self {
+    pub(crate) fn new(py: Python<'_>, prediction: pdmp_core::model::Prediction) -> Self {
         let optional = |values: Option<Vec<f64>>| values.map(|values| to_numpy(py, &values).unbind());
+        let conditions = prediction.conditions;
         Self {
-            style: to_numpy(py, &prediction.style).unbind(),
-            goal: optional(prediction.goal),
-            start: optional(prediction.start),
-            anchor: optional(prediction.anchor),
-            timing: to_numpy(py, &prediction.timing).unbind(),
+            style: to_numpy(py, &conditions.style.unwrap_or_default()).unbind(),
+            goal: optional(conditions.goal),
+            start: optional(conditions.start),
+            anchor: optional(conditions.anchor),
+            timing: to_numpy(py, &conditions.timing.unwrap_or_default()).unbind(),
             duration: prediction.duration,
             covariance: prediction.covariance.map(|covariance| covariance.into_pyarray(py).unbind()),
             freedom: prediction.freedom,

@@ -1,8 +1,8 @@
 //! From recordings to demonstrations.
 
 use numpy::IntoPyArray;
-use pdmp_core::recording;
-use pdmp_core::recording::{Keep, Reason};
+use pdmp_core::preprocessing;
+use pdmp_core::preprocessing::{Keep, Reason};
 use pyo3::prelude::*;
 
 use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
@@ -36,7 +36,7 @@ use crate::fit::demonstrations;
 ///     An interval that is not positive or leaves fewer than four samples, or a recording without times.
 #[pyfunction]
 pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: f64) -> PyResult<Demonstration> {
-    py.detach(|| recording::resample(&demo.0, dt)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::resample(&demo.0, dt)).map(Demonstration).map_err(raise)
 }
 
 /// Keep the part of a recording in which there is movement.
@@ -66,7 +66,7 @@ pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: f64) -> PyResul
 #[pyfunction]
 #[pyo3(signature = (demo, threshold=0.05))]
 pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: f64) -> PyResult<Demonstration> {
-    py.detach(|| recording::trim(&demo.0, threshold)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::trim(&demo.0, threshold)).map(Demonstration).map_err(raise)
 }
 
 /// Cut a recording at given times into one movement from each to the next.
@@ -94,7 +94,7 @@ pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: f64) -> PyRe
 #[pyfunction]
 pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>) -> PyResult<Vec<Demonstration>> {
     let times = vector("times", times)?;
-    let parts = py.detach(|| recording::cut(&demo.0, &times)).map_err(raise)?;
+    let parts = py.detach(|| preprocessing::cut(&demo.0, &times)).map_err(raise)?;
     Ok(parts.into_iter().map(Demonstration).collect())
 }
 
@@ -126,7 +126,7 @@ pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>
 /// C. H. Reinsch, Smoothing by spline functions, Numerische Mathematik 10 (1967), https://doi.org/10.1007/BF02162161
 #[pyfunction]
 pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: f64) -> PyResult<Demonstration> {
-    py.detach(|| recording::lowpass(&demo.0, cut_off)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::lowpass(&demo.0, cut_off)).map(Demonstration).map_err(raise)
 }
 
 /// What `lowpass` takes off at each of K cut-offs [Hz]: root mean squares (K, D), in the unit of each degree of freedom.
@@ -137,7 +137,7 @@ pub(crate) fn residuals<'py>(
     cut_offs: &Bound<'py, PyAny>,
 ) -> PyResult<Matrix<'py>> {
     let cut_offs = vector("cut_offs", cut_offs)?;
-    let residuals = py.detach(|| recording::residuals(&demo.0, &cut_offs)).map_err(raise)?;
+    let residuals = py.detach(|| preprocessing::residuals(&demo.0, &cut_offs)).map_err(raise)?;
     Ok(residuals.into_pyarray(py))
 }
 
@@ -169,7 +169,7 @@ pub(crate) fn residuals<'py>(
 /// P. McLeod, G. Wyvill, A smarter way to find pitch, International Computer Music Conference 2005
 #[pyfunction]
 pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
-    py.detach(|| recording::period(&demo.0)).map_err(raise)
+    py.detach(|| preprocessing::period(&demo.0)).map_err(raise)
 }
 
 /// Positions (T, D) with NaN interpolated in gaps up to `max_gap` seconds; `turns` (D,) of angles, 0 of others, NaN where it is
@@ -185,7 +185,7 @@ pub(crate) fn fill<'py>(
 ) -> PyResult<Matrix<'py>> {
     let (position, time) = (matrix("position", "(T, D)", position)?, vector("time", time)?);
     let (names, turns) = (texts("names", names)?, vector("turns", turns)?);
-    let filled = recording::fill(position, &time, &names, &turns, max_gap).map_err(raise)?;
+    let filled = preprocessing::fill(position, &time, &names, &turns, max_gap).map_err(raise)?;
     Ok(filled.into_pyarray(py))
 }
 
@@ -197,7 +197,7 @@ type Growth = (usize, usize, f64, i32);
 /// Cycles, their periods (K,) in s, their gains (K, D), the indices of their recordings, the rejected, and what grows.
 type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, Vec<Rejected>, Vec<Growth>);
 
-/// Cuts recordings into cycles: what `pdmp.demos.cycles` calls.
+/// Cuts recordings into cycles: what `pdmp.preprocessing.cycles` calls.
 #[pyfunction]
 pub(crate) fn cycles<'py>(
     py: Python<'py>,
@@ -208,7 +208,7 @@ pub(crate) fn cycles<'py>(
     let recordings = demonstrations("recordings", recordings)?;
     let events = events.map(|events| items("events", events, vector)).transpose()?;
     let keep = if average { Keep::Mean } else { Keep::Each };
-    let found = py.detach(|| recording::cycles(&recordings, events.as_deref(), keep)).map_err(raise)?;
+    let found = py.detach(|| preprocessing::cycles(&recordings, events.as_deref(), keep)).map_err(raise)?;
     let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
     let of = found.kept.iter().map(|cycle| cycle.recording).collect();
     let rejected = found.rejected.iter().map(|cycle| {

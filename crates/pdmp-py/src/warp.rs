@@ -28,17 +28,17 @@ use crate::error::raise;
 /// Smedsgaard, J. Chromatography A 805 (1998), https://doi.org/10.1016/S0021-9673(98)00021-1
 #[pyclass(frozen, module = "pdmp", from_py_object)]
 #[derive(Clone)]
-pub(crate) struct Warp(pub(crate) pdmp_core::Warp);
+pub(crate) struct Warp(pub(crate) pdmp_core::model::Warp);
 
 #[pymethods]
 impl Warp {
     #[new]
     #[pyo3(
-        signature = (segments=pdmp_core::Warp::default().segments as isize, slope=pdmp_core::Warp::default().slope),
+        signature = (segments=pdmp_core::model::Warp::default().segments as isize, slope=pdmp_core::model::Warp::default().slope),
         text_signature = "(segments=8, slope=2.5)"
     )]
     fn new(segments: isize, slope: f64) -> PyResult<Self> {
-        pdmp_core::Warp::new(count("segments", segments)?, slope).map(Self).map_err(raise)
+        pdmp_core::model::Warp::new(count("segments", segments)?, slope).map(Self).map_err(raise)
     }
 
     /// Number K of segments.

@@ -6,22 +6,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from pdmp._shown import printable
+from pdmp._messages import printable
 
 
 def say(text: object, *, file: TextIO | None = None) -> None:
-    """Write a line, with control characters escaped."""
+    """Writes a line, with control characters escaped."""
     print(printable(text), file=file)
 
 
 def report(text: str) -> None:
-    """Write several lines, with control characters escaped."""
+    """Writes several lines, with control characters escaped."""
     print(printable(text, keep="\n"))
 
 
 @contextmanager
 def console() -> Iterator[None]:
-    """Write warnings in one line, and ? in place of characters that the console does not have."""
+    """Writes warnings in one line, and ? in place of characters that the console lacks."""
     with warnings.catch_warnings():
         warnings.showwarning = _warning
         changed = []

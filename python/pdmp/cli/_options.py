@@ -6,14 +6,14 @@ from typing import Any
 
 
 def path(text: str) -> str:
-    """Return the name of a file or folder, which must not stand for a stream."""
+    """Returns the name of a file or folder, which must not stand for a stream."""
     if text == "-":
         raise ArgumentTypeError("- is no file: name one, or ./- where it is called so")
     return text
 
 
 def add_reading(parser: ArgumentParser) -> None:
-    """Add the options that tell how demonstrations are read."""
+    """Adds the options of the readers."""
     parser.add_argument(
         "--columns", nargs="+", metavar="NAME", help="degrees of freedom to keep; default: all"
     )
@@ -37,12 +37,12 @@ def add_reading(parser: ArgumentParser) -> None:
 
 
 def reading(options: Namespace) -> dict[str, Any]:
-    """Return the arguments of `pdmp.demos.read` that these options are."""
+    """Returns the arguments of `pdmp.io.read` that these options are."""
     return {name: getattr(options, name) for name in ("columns", "time", "dt", "max_gap")}
 
 
 def add_learning(parser: ArgumentParser) -> None:
-    """Add the options that tell how a primitive is learnt."""
+    """Adds the options of a fit."""
     parser.add_argument(
         "--context", nargs="+", metavar="NAME", help="columns of index.csv that make the context"
     )
@@ -100,7 +100,7 @@ def add_learning(parser: ArgumentParser) -> None:
 
 
 def settings(options: Namespace) -> dict[str, Any]:
-    """Return what `pdmp.fit` is told beside kind and period."""
+    """Returns the arguments of `pdmp.fit` other than kind and period."""
     return {
         "map": options.map,
         "alignment": options.alignment,
@@ -113,7 +113,7 @@ def settings(options: Namespace) -> dict[str, Any]:
 
 
 def _or_named(read: Callable[[str], Any], wanted: str, **named: str | None) -> Callable[[str], Any]:
-    """Return a reader of an argument that may be one of some names instead."""
+    """Returns a reader of an argument that may be one of some names instead."""
 
     def value(text: str) -> Any:
         try:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, float], None]]:
-    """Give a function that shows the stage of a fit and the share of it that is done.
+    """Yields a function that shows the stage of a fit and its completed fraction.
 
     A terminal shows both in place, for as long as the fit lasts; elsewhere each stage is a line.
     """

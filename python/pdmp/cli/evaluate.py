@@ -8,17 +8,17 @@ example: pdmp evaluate recordings/ --columns q1 q2 q3 --context height_m -o eval
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from pdmp import demos
-from pdmp._files import replacing
+from pdmp._atomic_write import atomic_write
 from pdmp.cli import _options
 from pdmp.cli._console import report, say
 from pdmp.cli._progress import progress
+from pdmp.io import read
 
 MOST_STYLES = 8  # of the figure of E over J
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Declares the arguments of the command."""
     parser.add_argument(
         "paths", nargs="+", type=_options.path, metavar="PATH", help="folder with an index.csv"
     )
@@ -35,13 +35,13 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Read, evaluate, tell, draw."""
+    """Reads recordings, evaluates predictors, prints and draws the result."""
     from pdmp.evaluation import PDMP, baselines, evaluate, over_styles
 
     folder = options.output and Path(options.output)
     if folder:
         folder.mkdir(parents=True, exist_ok=True)
-    recordings = demos.read(options.paths, context=options.context, **_options.reading(options))
+    recordings = read(options.paths, context=options.context, **_options.reading(options))
     settings = _options.settings(options)
     tried = {"kind": options.kind, "period": options.period}
     with progress() as show:
@@ -62,7 +62,7 @@ def run(options: Namespace) -> None:
         "prediction_error": plot.prediction_error(curve, unit=options.unit),
     }
     table = folder / "evaluation.md"
-    with replacing(table) as draft:
+    with atomic_write(table) as draft:
         draft.write_text(found.markdown(), encoding="utf-8")
     say(table)
     for name, figure in figures.items():

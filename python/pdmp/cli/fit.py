@@ -7,14 +7,14 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import pdmp
-from pdmp import demos
 from pdmp.cli import _options
 from pdmp.cli._console import say
 from pdmp.cli._progress import progress
+from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Declares the arguments of the command."""
     parser.add_argument(
         "paths",
         type=_options.path,
@@ -30,13 +30,13 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Read, learn, write."""
+    """Reads demonstrations, fits a model and writes it."""
     output = Path(options.output).absolute()
     if not output.parent.is_dir():
         raise FileNotFoundError(f"{output.parent}: no such folder; make it first")
     if output.is_dir():
         raise IsADirectoryError(f"{output}: a folder; name a file in it")
-    recordings = demos.read(options.paths, context=options.context, **_options.reading(options))
+    recordings = read(options.paths, context=options.context, **_options.reading(options))
     with progress() as show:
         model = pdmp.fit(
             recordings,

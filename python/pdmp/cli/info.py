@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import pdmp
-from pdmp._shown import printable
+from pdmp._messages import printable
 from pdmp.cli._console import say
 from pdmp.cli._options import path
 
@@ -17,12 +17,12 @@ MOST = 40  # singular values that are printed
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Declares the arguments of the command."""
     parser.add_argument("model", type=path, metavar="MODEL", help="model file")
 
 
 def run(options: Namespace) -> None:
-    """Load and print."""
+    """Loads a model and prints its description."""
     model = pdmp.load(options.model)
     constants = f"alpha_z {model.alpha_z:g}, beta_z {model.beta_z:g}"
     if model.alpha_x is not None:
@@ -52,7 +52,7 @@ def run(options: Namespace) -> None:
 
 
 def _labels(model: pdmp.Model) -> list[str]:
-    """Return the names of the degrees of freedom, with the unit where it is known."""
+    """Returns the names of the degrees of freedom, with the unit where it is known."""
     return [
         f"{name} [{unit}]" if unit else name
         for name, unit in zip(model.names, model.units, strict=True)
@@ -60,7 +60,7 @@ def _labels(model: pdmp.Model) -> list[str]:
 
 
 def _noise(model: pdmp.Model) -> str:
-    """Write the standard deviation of the measurement noise, and the cut-off that takes it off."""
+    """Returns the standard deviation of the measurement noise and the cut-off that removes it."""
     labels = _labels(model)
     noisy = zip(labels, model.noise, model.cut_offs, strict=True)
     found = [
@@ -70,14 +70,14 @@ def _noise(model: pdmp.Model) -> str:
 
 
 def _extent(values: Sequence[float | str]) -> str:
-    """Write the labels, or the range of the numbers, that a value of the contexts has."""
+    """Returns the labels, or the range of the numbers, of a value of the contexts."""
     labels = sorted({value for value in values if isinstance(value, str)})
     numbers = [value for value in values if not isinstance(value, str)]
     return " ".join(labels) or f"{min(numbers):g} to {max(numbers):g}"
 
 
 def _several(values: np.ndarray) -> str:
-    """Write the first numbers of a list that may be long."""
+    """Returns the first numbers of a long list as text."""
     left = len(values) - MOST
     more = f" and {left} more" if left > 0 else ""
     return " ".join(f"{value:.4g}" for value in values[:MOST]) + more

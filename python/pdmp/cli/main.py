@@ -6,9 +6,9 @@ import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
+from pdmp._messages import printable
 from pdmp._native import PdmpError, __version__
-from pdmp._shown import printable
-from pdmp.cli import demo, evaluate, fit, info, plot, reproduce, rollout
+from pdmp.cli import evaluate, fit, info, plot, rollout
 from pdmp.cli._console import console
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
@@ -25,13 +25,11 @@ COMMANDS = {
     "evaluate": evaluate,
     "info": info,
     "plot": plot,
-    "demo": demo,
-    "reproduce": reproduce,
 }
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Runs the command line.
 
     Parameters
     ----------
@@ -54,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(options: Namespace) -> int:
-    """Run a command and return the exit code."""
+    """Runs a command and returns the exit code."""
     try:
         options.run(options)
         sys.stdout.flush()
@@ -91,7 +89,7 @@ def _parser() -> ArgumentParser:
 
 
 def _in_one_line(error: Exception) -> str:
-    """Return what an error says, with options in place of the arguments that they are in Python."""
+    """Returns the text of an error, with options in place of the arguments of Python."""
     if isinstance(error, OSError) and error.filename is not None:
         return printable(f"{error.filename}: {error.strerror}")
     text = printable(" ".join(str(error).split()))

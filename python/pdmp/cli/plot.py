@@ -9,13 +9,14 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import pdmp
-from pdmp import demos, plot
+from pdmp import plot
 from pdmp.cli import _options
 from pdmp.cli._console import say
+from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Declares the arguments of the command."""
     parser.add_argument("model", type=_options.path, metavar="MODEL", help="model file")
     parser.add_argument(
         "paths",
@@ -36,7 +37,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Load, draw, write."""
+    """Loads a model, draws it and writes the figures."""
     model = pdmp.load(options.model)
     first = model.styles[:, 0]
     ends = [int(first.argmin()), int(first.argmax())]
@@ -52,7 +53,7 @@ def run(options: Namespace) -> None:
     if model.kind == "rhythmic":
         figures["phase_portrait"] = plot.phase_portrait(model)
     if options.paths:
-        recordings = demos.read(options.paths, **_options.reading(options))
+        recordings = read(options.paths, **_options.reading(options))
         figures["demonstrations"] = plot.demonstrations(model, recordings)
     for name, figure in figures.items():
         path = Path(options.output, f"{name}.png")

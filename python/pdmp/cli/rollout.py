@@ -14,7 +14,7 @@ from pdmp.cli._options import path
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Declares the arguments of the command."""
     parser.add_argument("model", type=path, metavar="MODEL", help="model file")
     parser.add_argument(
         "-o", "--output", type=path, required=True, metavar="FILE", help="CSV to write"
@@ -39,7 +39,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Load, roll out, write."""
+    """Loads a model, rolls it out and writes the movement."""
     model = pdmp.load(options.model)
     given = pdmp.as_demonstrated(model, options.demo) if options.demo is not None else {}
     if options.tau is not None:
@@ -54,7 +54,7 @@ def run(options: Namespace) -> None:
 
 
 def _value(text: str) -> float | str:
-    """Return a number, or a label."""
+    """Returns a number, or a label."""
     try:
         return float(text)
     except ValueError:

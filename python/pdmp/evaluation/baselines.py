@@ -17,7 +17,7 @@ class MeanDemonstration:
     """The mean of the demonstrations, whatever the context."""
 
     def fit(self, recordings: Recordings) -> Foresee:
-        """Average them, and their durations by logarithm."""
+        """Averages them, and their durations by logarithm."""
         mean, m = recordings.sampled.mean(axis=0), recordings.n_demos
         variance = recordings.sampled.var(axis=0, ddof=1) * (1 + 1 / m) if m > 1 else None
         duration = float(np.exp(np.log(recordings.durations).mean()))
@@ -28,7 +28,7 @@ class NearestDemonstration:
     """The demonstration of the nearest context, over the contexts' deviations."""
 
     def fit(self, recordings: Recordings) -> Foresee:
-        """Keep them all."""
+        """Keeps them all."""
         shown = recordings.numbers(recordings.contexts)
         deviation = shown.std(axis=0)
         unit = np.where(deviation > 0, deviation, 1)
@@ -45,7 +45,7 @@ class MovedGoal:
     """A primitive of the nominal demonstration alone; a linear map moves its ends or centre."""
 
     def fit(self, recordings: Recordings) -> Foresee:
-        """Learn from the demonstration of median duration."""
+        """Learns from the demonstration of median duration."""
         nominal = np.argsort(recordings.durations, kind="stable")[recordings.n_demos // 2]
         alone = recordings[np.array([nominal])]
         model = fit(alone.demos, kind=alone.kind, period=alone.periods)
@@ -73,7 +73,7 @@ class Encoding(Protocol):
     """A way to write movements as weights."""
 
     def __call__(self, recordings: Recordings) -> tuple[Array, Array, Array]:
-        """Return weights (M, K), and offset (C·D,) and basis (K, C·D) that give movements back."""
+        """Returns weights (M, K), and offset (C·D,) and basis (K, C·D) that give movements back."""
 
 
 class Components:
@@ -83,7 +83,7 @@ class Components:
         self.spectrum = spectrum
 
     def __call__(self, recordings: Recordings) -> tuple[Array, Array, Array]:
-        """Factorise what differs from the mean."""
+        """Factorises what differs from the mean."""
         joint = recordings.sampled.reshape(recordings.n_demos, -1)
         mean = joint.mean(axis=0)
         factors = factorise(joint - mean, spectrum=self.spectrum)
@@ -98,7 +98,7 @@ class RadialWeights:
         self.ridge = ridge
 
     def __call__(self, recordings: Recordings) -> tuple[Array, Array, Array]:
-        """Regress each movement; of a cycle, the functions are periodic."""
+        """Regresses each movement; of a cycle, the functions are periodic."""
         discrete, n = recordings.kind == "discrete", recordings.n_samples
         phase = np.linspace(0, 1, n, endpoint=discrete)
         centres = np.linspace(0, 1, self.n_weights, endpoint=discrete)
@@ -122,7 +122,7 @@ class PeerWeights:
         self.n_weights = n_weights
 
     def __call__(self, recordings: Recordings) -> tuple[Array, Array, Array]:
-        """Regress each movement, and ask for that of each weight."""
+        """Regresses each movement, and predicts each weight."""
         try:
             from movement_primitives.promp import ProMP
         except ImportError:
@@ -143,7 +143,7 @@ class LinearWeights:
         self.encoding = encoding
 
     def fit(self, recordings: Recordings) -> Foresee:
-        """Encode and regress; the variance is that of the weights."""
+        """Encodes and regresses; the variance is that of the weights."""
         weights, offset, basis = self.encoding(recordings)
         chosen = ContextMap(recordings.contexts.tolist(), weights, "linear")
         duration_of = _lasting(recordings)
@@ -167,7 +167,7 @@ class ProcessWeights:
         self.encoding = encoding
 
     def fit(self, recordings: Recordings) -> Foresee:
-        """Encode, and learn one process per weight and one for the duration's logarithm."""
+        """Encodes, and learns one process per weight and one for the duration's logarithm."""
         try:
             from sklearn.gaussian_process import GaussianProcessRegressor
             from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
@@ -203,7 +203,7 @@ class ProcessWeights:
 
 
 def _lasting(recordings: Recordings) -> Callable[[Array], float]:
-    """Return what foresees the duration [s] from a context; its logarithm is linear in that."""
+    """Returns a map from context to duration [s], whose logarithm is linear in the context."""
     logarithms = np.log(recordings.durations)[:, None]
     chosen = ContextMap(recordings.contexts.tolist(), logarithms, "linear")
     return lambda context: float(np.exp(chosen.predict([context.tolist()])[0][0, 0]))

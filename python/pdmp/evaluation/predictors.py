@@ -46,7 +46,7 @@ class Predictor(Protocol):
     """
 
     def fit(self, recordings: Recordings) -> Foresee:
-        """Learn from recordings, and return what foresees a movement from a context (Q,)."""
+        """Learns from recordings, and returns a map from a context (Q,) to a movement."""
 
 
 class PDMP:
@@ -62,7 +62,7 @@ class PDMP:
         self.settings = settings
 
     def fit(self, recordings: Recordings) -> Foresee:
-        """Learn a model, whose band tells the variance."""
+        """Learns a model, whose band gives the variance."""
         model = fit(
             recordings.demos,
             kind=recordings.kind,

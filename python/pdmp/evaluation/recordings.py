@@ -9,8 +9,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pdmp._messages import value_error, warn
 from pdmp._native import Demonstration, Trajectory, inspected
-from pdmp._shown import refusal, warn
 
 Array: TypeAlias = NDArray[Any]  # of float64
 Demos: TypeAlias = (
@@ -49,7 +49,7 @@ class Recordings:
     sampled: Array
 
     def numbers(self, contexts: Array) -> Array:
-        """Return contexts (B, Q) as numbers (B, F): each label has a column, 1 where it is."""
+        """Returns contexts (B, Q) as numbers (B, F): each label has a column, 1 where it is."""
         columns = []
         for values, labels in zip(contexts.T, self.labels, strict=True):
             if labels is None:
@@ -74,7 +74,7 @@ class Recordings:
         return self.durations if self.kind == "rhythmic" else None
 
     def interval(self, duration: float) -> float:
-        """Return the time [s] between two of C samples of a movement."""
+        """Returns the time [s] between two of C samples of a movement."""
         return duration / (self.n_samples - (self.kind == "discrete"))
 
     @property
@@ -88,7 +88,7 @@ class Recordings:
         return self.demos[0].units or [""] * self.sampled.shape[2]
 
     def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
-        """Return some of them."""
+        """Returns some of them."""
         demos = tuple(self.demos[row] for row in rows)
         chosen = (array[rows] for array in (self.contexts, self.durations, self.sampled))
         contexts, durations, sampled = chosen
@@ -104,11 +104,11 @@ def recordings(
     period: ArrayLike | None,
     n_samples: int,
 ) -> Recordings:
-    """Check demonstrations and contexts, and read each demonstration over its own duration."""
+    """Checks demonstrations and contexts, and reads each demonstration over its own duration."""
     if kind not in ("discrete", "rhythmic"):
-        raise refusal(f'kind = "{kind}": must be "discrete" or "rhythmic"')
+        raise value_error(f'kind = "{kind}": must be "discrete" or "rhythmic"')
     if n_samples < 4:
-        raise refusal(f"n_samples = {n_samples}: must be at least 4")
+        raise value_error(f"n_samples = {n_samples}: must be at least 4")
     if isinstance(demos, (Demonstration, Trajectory)):
         raise ValueError("demos is a single demonstration: put it into a list")
     values = demos.values() if isinstance(demos, Mapping) else demos
@@ -117,7 +117,7 @@ def recordings(
         raise ValueError("demos is empty: pass at least two demonstrations")
     for m, demo in enumerate(given):
         if demo.n_dofs != given[0].n_dofs:
-            raise refusal(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
+            raise value_error(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
     whole, findings = inspected(list(given), dt=dt)
     for finding in findings:
         warn(finding)
@@ -128,7 +128,7 @@ def recordings(
     if periods.dtype.kind not in "iuf" or periods.ndim > 1:
         raise ValueError("period must be a number of seconds, or one for each demonstration")
     if periods.ndim and len(periods) != len(given):
-        raise refusal(
+        raise value_error(
             f"period has length {len(periods)}, expected {len(given)}: one value per demonstration"
         )
     periods = np.broadcast_to(periods, len(given))
@@ -140,7 +140,7 @@ def recordings(
 
 
 def _rated(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> Demonstration:
-    """Return a demonstration, with the rate that is given for those without."""
+    """Returns a demonstration, with the rate that is given for those without."""
     if isinstance(demo, Trajectory):
         return Demonstration(demo)
     if not isinstance(demo, Demonstration):
@@ -154,17 +154,17 @@ def _rated(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> De
 def _read(
     demo: Demonstration, m: int, kind: Kind, period: float, n_samples: int
 ) -> tuple[float, Array]:
-    """Return the duration [s] and the positions (C, D), linear between the samples."""
+    """Returns the duration [s] and the positions (C, D), linear between the samples."""
     if demo.time is None:
-        raise refusal(f"demo {m}: no sampling interval: pass dt= in seconds")
+        raise value_error(f"demo {m}: no sampling interval: pass dt= in seconds")
     time = demo.time - demo.time[0]
     duration, wrap = float(time[-1]), None
     if kind == "rhythmic":
         if np.isnan(period) and demo.dt is None:
-            raise refusal(f"demo {m}: a time-stamped cycle: pass period= in seconds")
+            raise value_error(f"demo {m}: a time-stamped cycle: pass period= in seconds")
         wrap = float((demo.dt or 0) * demo.n_samples if np.isnan(period) else period)
         if wrap <= duration:
-            raise refusal(
+            raise value_error(
                 f"demo {m}: period = {wrap:g}: must exceed the last time stamp, {duration:g} s"
             )
         duration = wrap
@@ -174,15 +174,15 @@ def _read(
 
 
 def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
-    """Return the checked contexts (M, Q)."""
+    """Returns the checked contexts (M, Q)."""
     values: Any = contexts
     if contexts is None:
         values = [demo.context for demo in demos]
         for m, context in enumerate(values):
             if context is None:
-                raise refusal(f"demo {m} has no context: pass contexts=")
+                raise value_error(f"demo {m} has no context: pass contexts=")
             if len(context) != len(values[0]):
-                raise refusal(
+                raise value_error(
                     f"demo {m}: context has length {len(context)}, expected {len(values[0])}"
                 )
     # Beside a label, numpy would make labels of the numbers.
@@ -192,24 +192,24 @@ def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
         raise ValueError("contexts hold bytes: decode them to labels, or pass numbers")
     array = given if str in kinds else given.astype(float)
     if array.ndim != 2:
-        raise refusal(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
+        raise value_error(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
     if len(array) != len(demos):
-        raise refusal(
+        raise value_error(
             f"contexts has length {len(array)}, expected {len(demos)}: one value per demonstration"
         )
     finite = [[isinstance(value, str) or np.isfinite(value) for value in row] for row in array]
     for m, q in np.argwhere(~np.array(finite))[:1]:
-        raise refusal(f"contexts[{m}, {q}] = {array[m, q]}: must be finite: leave the demo out")
+        raise value_error(f"contexts[{m}, {q}] = {array[m, q]}: must be finite: leave the demo out")
     return array
 
 
 def _labels(q: int, values: Array) -> list[str] | None:
-    """Return the labels of one context value of all demonstrations, or None for a number."""
+    """Returns the labels of one context value of all demonstrations, or None for a number."""
     labels = sorted({value for value in values if isinstance(value, str)})
     if not labels:
         return None
     if numbers := sum(not isinstance(value, str) for value in values):
-        raise refusal(
+        raise value_error(
             f"contexts[:, {q}] holds {len(values) - numbers} labels and {numbers} numbers: "
             "write all of them as labels, or all as numbers"
         )

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pdmp._shown import printable, refusal
-from pdmp._tables import table
+from pdmp._markdown import markdown_table
+from pdmp._messages import printable, value_error
 from pdmp.evaluation.predictors import BAND, WIDTH, Forecast, Predictor
 from pdmp.evaluation.recordings import Array, Recordings
 from pdmp.evaluation.splits import Reach, Split
@@ -101,13 +101,13 @@ class Evaluation:
     left_out: dict[str, str]
 
     def score(self, predictor: str) -> Scores:
-        """Return the figures of one predictor, split by split."""
+        """Returns the figures of one predictor, split by split."""
         if predictor not in self.scores:
-            raise refusal(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
+            raise value_error(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
         return self.scores[predictor]
 
     def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
-        """Return the means of one predictor over the splits of one reach, or all."""
+        """Returns the means of one predictor over the splits of one reach, or all."""
         rows = self._rows(reach)
         error, duration, coverage = (values[rows] for values in self.score(predictor))
         reference = self.scores[REFERENCE].error[rows]
@@ -126,18 +126,18 @@ class Evaluation:
         )
 
     def compare(self, a: str, b: str, reach: Reach | None = None) -> Comparison:
-        """Return E of `a` less E of `b`, split by split; negative where `a` is better."""
+        """Returns E of `a` less E of `b`, split by split; negative where `a` is better."""
         rows = self._rows(reach)
         differences = (self.score(a).error - self.score(b).error)[rows]
         return Comparison(differences, float(differences.mean()), _standard_error(differences))
 
     def reaches(self) -> list[Reach]:
-        """Return the sorts of splits that there are."""
+        """Returns the sorts of splits that there are."""
         present = {split.reach for split in self.splits}
         return [reach for reach in ("interpolation", "extrapolation") if reach in present]
 
     def table(self, reach: Reach) -> list[list[str]]:
-        """Return the rows of a table over the splits of one reach, below `HEADER`."""
+        """Returns the rows of a table over the splits of one reach, below `HEADER`."""
         rows = []
         for name in self.scores:
             found = self.summary(name, reach)
@@ -147,14 +147,19 @@ class Evaluation:
         return rows
 
     def markdown(self) -> str:
-        """Return the tables in Markdown."""
+        """Returns the tables in Markdown."""
         lines = []
         for reach in self.reaches():
-            lines += [f"**{self._title(reach)}**", "", table(HEADER, self.table(reach)), ""]
+            lines += [
+                f"**{self._title(reach)}**",
+                "",
+                markdown_table(HEADER, self.table(reach)),
+                "",
+            ]
         return "\n".join([*lines, *self._notes()])
 
     def __repr__(self) -> str:
-        """Return the tables as text."""
+        """Returns the tables as text."""
         lines = []
         for reach in self.reaches():
             cells = [list(map(_plain, row)) for row in (HEADER, *self.table(reach))]
@@ -180,14 +185,14 @@ class Evaluation:
     def _rows(self, reach: Reach | None) -> list[int]:
         rows = [k for k, split in enumerate(self.splits) if reach in (None, split.reach)]
         if not rows:
-            raise refusal(f'reach = "{reach}": no split is of this sort')
+            raise value_error(f'reach = "{reach}": no split is of this sort')
         return rows
 
 
 def score(
     recordings: Recordings, splits: Sequence[Split], forecasts: Sequence[Sequence[Forecast]]
 ) -> Scores:
-    """Compare forecasts with the demonstrations held out."""
+    """Compares forecasts with the demonstrations held out."""
     rows = []
     for split, made in zip(splits, forecasts, strict=True):
         each = []
@@ -211,7 +216,7 @@ def _standard_error(values: Array) -> float:
 
 
 def _plain(cell: str) -> str:
-    """Return a cell without what not every console has."""
+    """Returns a cell without what not every console has."""
     return cell.replace("±", "+-").replace("–", "-")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pdmp._shown import refusal
+from pdmp._messages import value_error
 from pdmp.evaluation.baselines import (
     Components,
     LinearWeights,
@@ -26,7 +26,7 @@ from pdmp.evaluation.splits import Split, checked, held_out
 
 
 def baselines() -> dict[str, Predictor]:
-    """Return what a primitive is measured against, by name.
+    """Returns the predictors that a primitive is compared with, by name.
 
     All maps from contexts are linear least squares but those of the Gaussian processes, for which
     scikit-learn must be installed, as must movement_primitives for its ProMP; `Evaluation.left_out`
@@ -44,7 +44,7 @@ def baselines() -> dict[str, Predictor]:
 
 
 def over_styles(most: int, **settings: Any) -> dict[str, Predictor]:
-    """Return primitives with J = 1 … `most` style parameters, by name.
+    """Returns primitives with J = 1 … `most` style parameters, by name.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def evaluate(
     max_folds: int = 12,
     progress: Callable[[str, float], None] | None = None,
 ) -> Evaluation:
-    """Learn from some demonstrations, and measure how well the others are foreseen.
+    """Learns from some demonstrations, and measures the errors of predictions of the others.
 
     The error of a movement ŷ foreseen for the context of a demonstration y is, over C samples of
     normalised time (of phase, if rhythmic) and all degrees of freedom together,
@@ -141,7 +141,7 @@ def evaluate(
     _check_labels(read, folds)
     chosen = baselines() | {"PDMP": PDMP()} if predictors is None else dict(predictors)
     if not isinstance(chosen.get(REFERENCE, MeanDemonstration()), MeanDemonstration):
-        raise refusal(f"predictors: '{REFERENCE}' is always tried: give yours another name")
+        raise value_error(f"predictors: '{REFERENCE}' is always tried: give yours another name")
     tried = {REFERENCE: MeanDemonstration()} | chosen
     forecasts, left_out = {}, {}
     for k, (name, predictor) in enumerate(tried.items()):
@@ -165,7 +165,7 @@ def _foreseen(
     splits: Sequence[Split],
     tell: Callable[[float], None],
 ) -> list[list[Forecast]]:
-    """Return what a predictor foresees, split by split; it learns once from the same rows."""
+    """Returns the predictions of a predictor, split by split; it learns once from the same rows."""
     learnt: dict[bytes, Foresee] = {}
     forecasts = []
     for k, split in enumerate(splits):
@@ -181,7 +181,7 @@ def _foreseen(
 
 def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> None:
     if not isinstance(forecast, Forecast):
-        raise refusal(
+        raise value_error(
             f"predictors: '{name}' foresees a {type(forecast).__name__}, expected an "
             "evaluation.Forecast"
         )
@@ -190,21 +190,21 @@ def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> No
         if kind == "variance" and values is None:
             continue
         if np.shape(values) != shape:
-            raise refusal(
+            raise value_error(
                 f"predictors: '{name}' foresees {kind}s of shape {np.shape(values)}, "
                 f"expected (C, D) = {shape}"
             )
         if not np.isfinite(values).all():
-            raise refusal(f"predictors: '{name}' foresees a {kind} that is not finite")
+            raise value_error(f"predictors: '{name}' foresees a {kind} that is not finite")
 
 
 def _check_labels(read: Recordings, splits: Sequence[Split]) -> None:
-    """Refuse to foresee what nothing tells of: a label that is nowhere learnt from."""
+    """Raises an error for a held-out label that no training condition has."""
     for q in (q for q, labels in enumerate(read.labels) if labels):
         for split in splits:
             column = read.contexts[:, q]
             if unseen := sorted(set(column[split.test]) - set(column[split.train])):
-                raise refusal(
+                raise value_error(
                     f'contexts[:, {q}]: "{unseen[0]}" is held out altogether, and nothing tells of '
                     "it: show it in several conditions, or pass splits= that leave some of it"
                 )

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._shown import refusal
+from pdmp._messages import value_error
 from pdmp.evaluation.recordings import Array
 
 Reach: TypeAlias = Literal["interpolation", "extrapolation"]
@@ -34,7 +34,7 @@ class Split(NamedTuple):
 
 
 def held_out(contexts: Array, max_folds: int) -> list[Split]:
-    """Hold out each condition in turn, or, where they are many, each fold of neighbours.
+    """Holds out each condition in turn, or, where they are many, each fold of neighbours.
 
     What lies outside the convex hull of the contexts learnt from is extrapolation. A fold with
     conditions of both sorts gives two splits.
@@ -42,12 +42,12 @@ def held_out(contexts: Array, max_folds: int) -> list[Split]:
     conditions, member = np.unique(contexts, axis=0, return_inverse=True)
     member = member.reshape(-1)
     if len(conditions) < 2:
-        raise refusal(
+        raise value_error(
             f"contexts: one condition in {len(contexts)} demonstrations: "
             "at least 2 are needed to hold one out"
         )
     if max_folds < 2:
-        raise refusal(f"max_folds = {max_folds}: must be at least 2")
+        raise value_error(f"max_folds = {max_folds}: must be at least 2")
     splits = []
     for fold in neighbours(conditions, max_folds):
         learnt = np.delete(conditions, fold, axis=0)
@@ -60,7 +60,7 @@ def held_out(contexts: Array, max_folds: int) -> list[Split]:
 
 
 def neighbours(conditions: Array, max_folds: int) -> list[Rows]:
-    """Part conditions (K, Q) into at most so many folds of neighbours.
+    """Parts conditions (K, Q) into at most so many folds of neighbours.
 
     The fold of most conditions is halved along its longest side, until there are enough.
     """
@@ -76,7 +76,7 @@ def neighbours(conditions: Array, max_folds: int) -> list[Rows]:
 
 
 def within_hull(point: Array, points: Array) -> bool:
-    """Say whether a point (Q,) is a convex combination of others (K, Q).
+    """Returns whether a point (Q,) is a convex combination of others (K, Q).
 
     Weight moves between two points at a time, from the one farthest against the way to the one
     farthest along it, until the combination is there or a plane parts it from the point. One so
@@ -102,23 +102,25 @@ def within_hull(point: Array, points: Array) -> bool:
 
 
 def checked(splits: Iterable[Sequence[object]], n_demos: int) -> list[Split]:
-    """Return a user's splits, each (train, test, "interpolation" or "extrapolation")."""
+    """Returns a user's splits, each (train, test, "interpolation" or "extrapolation")."""
     found = []
     for k, split in enumerate(splits):
         if len(split) != 3 or split[2] not in ("interpolation", "extrapolation"):
-            raise refusal(f'splits[{k}]: must be (train, test, "interpolation" or "extrapolation")')
+            raise value_error(
+                f'splits[{k}]: must be (train, test, "interpolation" or "extrapolation")'
+            )
         rows = []
         for name, given in zip(("train", "test"), split, strict=False):
             indices = np.asarray(given)
             if indices.ndim != 1 or indices.size == 0 or indices.dtype.kind not in "iu":
-                raise refusal(f"splits[{k}]: {name} must be one or more indices")
+                raise value_error(f"splits[{k}]: {name} must be one or more indices")
             for index in indices[(indices < 0) | (indices >= n_demos)]:
-                raise refusal(
+                raise value_error(
                     f"splits[{k}]: {name} index {index} must lie between 0 and {n_demos - 1}"
                 )
             rows.append(indices.astype(np.intp))
         if both := sorted(set(rows[0].tolist()) & set(rows[1].tolist())):
-            raise refusal(f"splits[{k}]: demonstration {both[0]} is in train and in test")
+            raise value_error(f"splits[{k}]: demonstration {both[0]} is in train and in test")
         found.append(Split(rows[0], rows[1], split[2]))
     if not found:
         raise ValueError("splits is empty: pass at least one")
@@ -126,6 +128,6 @@ def checked(splits: Iterable[Sequence[object]], n_demos: int) -> list[Split]:
 
 
 def _unit(conditions: Array) -> Array:
-    """Return conditions over their ranges."""
+    """Returns conditions over their ranges."""
     spread = np.ptp(conditions, axis=0)
     return conditions / np.where(spread > 0, spread, 1)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from pdmp._files import replacing
+from pdmp._atomic_write import atomic_write
 from pdmp._native import Model
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ BLUE, ORANGE, GREY = PALETTE[0], PALETTE[1], "#B8B8B8"
 
 
 def canvas(figure: Figure | None, width: float, height: float) -> Figure:
-    """Return `figure`, or a new one of this size [inches]."""
+    """Returns `figure`, or a new one of this size [inches]."""
     if figure is not None:
         return figure
     try:
@@ -39,14 +39,14 @@ def canvas(figure: Figure | None, width: float, height: float) -> Figure:
 
 
 def gradient() -> Colormap:
-    """Return colours from blue to orange, none of them too pale on white."""
+    """Returns colours from blue to orange, none of them too pale on white."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("pdmp", [BLUE, PALETTE[3], ORANGE])
 
 
 def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
-    """Label the axes, and leave out the ink that says nothing."""
+    """Labels the axes, and removes lines without information."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title)
@@ -56,7 +56,7 @@ def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
 
 
 def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Return the names of the degrees of freedom, with the unit where it is known.
+    """Returns the names of the degrees of freedom, with the unit where it is known.
 
     Long ones take two lines.
     """
@@ -67,7 +67,7 @@ def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
 def movement_panels(
     model: Model, titles: Sequence[str], figure: Figure | None
 ) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure and, per title, a column of panels for `draw_movement`.
+    """Returns a figure and, per title, a column of panels for `draw_movement`.
 
     The path comes first where there are two degrees of freedom; then each of them over time, in a
     grid where they are many.
@@ -93,7 +93,7 @@ def movement_panels(
 
 
 def grid_panels(labels: Sequence[str], x: str, figure: Figure | None) -> tuple[Figure, list[Axes]]:
-    """Return a figure and a panel per degree of freedom over `x`, laid out as a grid."""
+    """Returns a figure and a panel per degree of freedom over `x`, laid out as a grid."""
     n_columns = min(len(labels), 3 if len(labels) < 13 else 5)
     n_rows = ceil(len(labels) / n_columns)
     figure = canvas(figure, max(3.2 * n_columns, 5.5), 1.9 * n_rows + 0.5)
@@ -111,7 +111,7 @@ def grid_panels(labels: Sequence[str], x: str, figure: Figure | None) -> tuple[F
 def draw_movement(
     panels: Sequence[Axes], time: NDArray[Any], position: NDArray[Any], **look: Any
 ) -> None:
-    """Draw positions (T, D) in a column of `movement_panels`."""
+    """Draws positions (T, D) in a column of `movement_panels`."""
     n_dofs = position.shape[1]
     if len(panels) > n_dofs:
         panels[0].plot(*position.T, **look)
@@ -120,7 +120,7 @@ def draw_movement(
 
 
 def legend(figure: Figure, axes: Axes) -> None:
-    """Put one entry per label of `axes` below the figure."""
+    """Puts one entry per label of `axes` below the figure."""
     handles, labels = axes.get_legend_handles_labels()
     entries = dict(zip(labels, handles, strict=True))
     figure.legend(
@@ -133,7 +133,7 @@ def legend(figure: Figure, axes: Axes) -> None:
 
 
 def save(figure: Figure, path: str | PathLike[str]) -> None:
-    """Write a figure in the format of the suffix, PNG without one.
+    """Writes a figure in the format of the suffix, PNG without one.
 
     The file appears when it is complete.
 
@@ -144,5 +144,5 @@ def save(figure: Figure, path: str | PathLike[str]) -> None:
     OSError
         A file that cannot be written.
     """
-    with replacing(path) as draft:
+    with atomic_write(path) as draft:
         figure.savefig(draft, format=Path(path).suffix[1:] or "png")

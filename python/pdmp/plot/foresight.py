@@ -20,7 +20,7 @@ MOST_DOFS = 6
 def prediction_error(
     evaluation: Evaluation, *, unit: str = "", figure: Figure | None = None
 ) -> Figure:
-    """Draw E over the number of style parameters J, interpolation and extrapolation apart.
+    """Draws E over the number of style parameters J, interpolation and extrapolation apart.
 
     Every `PDMP` with `n_styles` among the predictors is a point: mean and standard deviation over
     the folds, as in Fig. 4a of the paper. Other predictors are levels.
@@ -86,7 +86,7 @@ def prediction_error(
 def held_out(
     evaluation: Evaluation, predictor: str, *, unit: str = "", figure: Figure | None = None
 ) -> Figure:
-    """Draw what was foreseen with its 90 % band, and the demonstrations held out.
+    """Draws predictions with their 90 % band, and the demonstrations held out.
 
     One column for interpolation and one for extrapolation, each with the first condition of the
     fold of median E; one row per degree of freedom, of more than six those that vary most.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pdmp._native import Demonstration, Model
-from pdmp.arguments import as_demonstrated, blend
+from pdmp.conditions import as_demonstrated, blend
 from pdmp.plot._canvas import BLUE, GREY, draw_movement, gradient, legend, movement_panels
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def demonstrations(
     labels: Sequence[str] | None = None,
     figure: Figure | None = None,
 ) -> Figure:
-    """Draw the demonstrations and what the model makes of them, one column per label.
+    """Draws the demonstrations and what the model makes of them, one column per label.
 
     Rows are the degrees of freedom over time, below the path itself where there are two.
 
@@ -77,7 +77,7 @@ def demonstrations(
 
 
 def _check(model: Model, m: int, demo: Demonstration) -> None:
-    """Check that a demonstration has the degrees of freedom of the model."""
+    """Checks that a demonstration has the degrees of freedom of the model."""
     if not isinstance(demo, Demonstration):
         raise ValueError(f"demo {m}: expected a pdmp.Demonstration, got {type(demo).__name__}")
     if demo.n_dofs != model.n_dofs:
@@ -99,7 +99,7 @@ def fan(
     ends: tuple[str, str] = ("a", "b"),
     figure: Figure | None = None,
 ) -> Figure:
-    """Draw the movements from one style to another.
+    """Draws the movements from one style to another.
 
     Parameters
     ----------

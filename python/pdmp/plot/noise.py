@@ -21,7 +21,7 @@ TOP = 5.0
 
 
 def cut_off(demo: Demonstration, *, figure: Figure | None = None) -> Figure:
-    """Draw what `pdmp.demos.lowpass` takes off a recording, by its cut-off (residual analysis).
+    """Draws the residuals of `pdmp.preprocessing.lowpass` over its cut-off (residual analysis).
 
     Each panel has the root mean square R of what is taken off one degree of freedom. Of white
     noise alone R would fall along a straight line; that line, fitted at high cut-offs and followed

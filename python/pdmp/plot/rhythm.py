@@ -6,7 +6,7 @@ from math import ceil, pi
 from typing import TYPE_CHECKING
 
 from pdmp._native import Model
-from pdmp.arguments import as_demonstrated
+from pdmp.conditions import as_demonstrated
 from pdmp.plot._canvas import BLUE, GREY, canvas, dof_labels, dress, legend
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ PERIODS = 4
 
 
 def phase_portrait(model: Model, *, figure: Figure | None = None) -> Figure:
-    """Draw velocity over position: the limit cycles, and how a movement from rest joins one.
+    """Draws velocity over position: the limit cycles, and how a movement from rest joins one.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def spectrum(model: Model, *, figure: Figure | None = None) -> Figure:
-    """Draw the share of each singular value in their sum, and how many were kept.
+    """Draws the share of each singular value in their sum, and how many were kept.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def spectrum(model: Model, *, figure: Figure | None = None) -> Figure:
 def styles(
     model: Model, labels: Sequence[str] | None = None, *, figure: Figure | None = None
 ) -> Figure:
-    """Draw the style of each demonstration, in the planes of the first three style parameters.
+    """Draws the style of each demonstration, in the planes of the first three style parameters.
 
     Without labels, the context serves where that is a single one, or the colour tells it where
     it is a single number.

@@ -6,12 +6,11 @@
 //! rest of the space, BᵀKB = diag(λ), all that depends on the ratio ρ is diagonal: any number of outputs, each with a
 //! ratio of its own, costs one eigendecomposition. Without a kernel this is least squares.
 
-use faer::linalg::solvers::Svd;
-use faer::{Mat, Side};
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 
 use super::kernel::Kernel;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::numerics::linear_algebra::{symmetric_eigen, thin_svd};
 
 /// The places of a prediction, and the coordinates in which it is diagonal.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,7 +68,7 @@ impl Kriging {
             (Array2::zeros((n, 0)), Array2::zeros((n_features, 0)))
         };
         let mut flat = Array2::from_elem((n, 1 + left.ncols()), 1.0 / (n as f64).sqrt());
-        flat.slice_mut(ndarray::s![.., 1..]).assign(&left);
+        flat.slice_mut(s![.., 1..]).assign(&left);
         let smooth = kernel.map(|kernel| Smooth::new(kernel, inputs, n_inputs, &flat)).transpose()?;
         Ok(Self { inputs: inputs.to_owned(), n_inputs, centre, directions, flat, smooth })
     }
@@ -134,7 +133,7 @@ impl Kriging {
         let (n, n_flat) = self.flat.dim();
         let offset = Array1::from_vec(features.to_vec()) - &self.centre;
         let mut flat = Array1::from_elem(n_flat, 1.0 / (n as f64).sqrt());
-        flat.slice_mut(ndarray::s![1..]).assign(&self.directions.t().dot(&offset));
+        flat.slice_mut(s![1..]).assign(&self.directions.t().dot(&offset));
         let Some(smooth) = &self.smooth else { return Place { flat, rest: Array1::zeros(0), prior: 0.0 } };
         let k = |other: &[f64]| smooth.kernel.of(features, other, self.n_inputs);
         let covariance: Array1<f64> = self.inputs.rows().into_iter().map(|row| k(&row.to_vec())).collect();
@@ -163,12 +162,10 @@ impl Smooth {
         // With P = I − UUᵀ: PKP − UUᵀ has U for the eigenvalue −1, below all others.
         let half = &covariance_flat - &(flat.dot(&flat_flat) * 0.5) + &(flat * 0.5);
         let cross = half.dot(&flat.t());
-        let projected = Mat::from_fn(n, n, |i, j| covariance[[i, j]] - cross[[i, j]] - cross[[j, i]]);
-        let eigen = projected
-            .self_adjoint_eigen(Side::Lower)
-            .map_err(|_| Error::Fit(format!("the eigenvalues of the covariance of {n} contexts did not converge")))?;
-        let basis = Array2::from_shape_fn((n, n - n_flat), |(i, k)| eigen.U()[(i, n_flat + k)]);
-        let eigenvalues = (n_flat..n).map(|k| eigen.S().column_vector()[k].max(0.0)).collect();
+        let projected = covariance - &cross - cross.t();
+        let (eigenvalues, vectors) = symmetric_eigen(projected.view(), "covariance of the contexts")?;
+        let basis = vectors.slice(s![.., n_flat..]).as_standard_layout().into_owned();
+        let eigenvalues = eigenvalues.iter().skip(n_flat).map(|lambda| lambda.max(0.0)).collect();
         let basis_flat = basis.t().dot(&covariance_flat);
         Ok(Self { kernel, basis, eigenvalues, flat_flat, basis_flat })
     }
@@ -184,12 +181,10 @@ impl Smooth {
 /// An orthonormal basis (n, k) of the columns, and the directions V/σ (F, k) that lead there from a row.
 fn span(rows: ArrayView2<f64>) -> Result<(Array2<f64>, Array2<f64>)> {
     let (n, n_features) = rows.dim();
-    let svd = Svd::new_thin(Mat::from_fn(n, n_features, |i, f| rows[[i, f]]).as_ref())
-        .map_err(|_| Error::Fit(format!("the SVD of {n} contexts did not converge")))?;
-    let sigma: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let (u, sigma, v) = thin_svd(rows, "features of the contexts")?;
     let floor = sigma.first().copied().unwrap_or(0.0) * f64::EPSILON * n.max(n_features) as f64;
     let rank = sigma.iter().filter(|&&s| s > floor).count();
-    let left = Array2::from_shape_fn((n, rank), |(i, k)| svd.U()[(i, k)]);
-    let directions = Array2::from_shape_fn((n_features, rank), |(f, k)| svd.V()[(f, k)] / sigma[k]);
+    let left = u.slice(s![.., ..rank]).as_standard_layout().into_owned();
+    let directions = Array2::from_shape_fn((n_features, rank), |(f, k)| v[[f, k]] / sigma[k]);
     Ok((left, directions))
 }

@@ -5,36 +5,36 @@
 //! one context are averaged, and every context counts once: what they share beyond their context must not weigh by
 //! how often it was shown.
 
-mod axes;
-mod choice;
-mod data;
+mod encoding;
 mod kernel;
 mod kriging;
-mod prediction;
-mod space;
-mod stack;
+mod model_selection;
+mod outputs;
+mod principal_axes;
+mod stacking;
 #[cfg(test)]
 mod tests;
+mod training_data;
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 
-pub use choice::{MapChoice, MapKind};
+pub use encoding::ContextColumn;
+pub(crate) use encoding::tabulate;
 pub(crate) use kernel::Kernel;
-pub use prediction::Prediction;
-pub(crate) use prediction::{outputs, relative_changes};
-pub use space::ContextColumn;
-pub(crate) use space::tabulate;
+pub use model_selection::{MapChoice, MapKind};
+pub(crate) use outputs::{outputs, relative_changes};
 
-use axes::Axes;
-use choice::{Candidate, Choice, choose};
-use data::Data;
-pub(crate) use data::alike;
+use encoding::{Scale, numbers};
 use kriging::Kriging;
-use space::{Scale, numbers};
-pub(crate) use stack::Stack;
+use model_selection::{Candidate, Choice, choose};
+use principal_axes::Axes;
+pub(crate) use stacking::Stack;
+use training_data::Data;
+pub(crate) use training_data::alike;
 
-use crate::demo::{ContextValue, check_matrix};
+use crate::demonstration::ContextValue;
 use crate::error::{Error, Result};
+use crate::validate::check_matrix;
 
 /// A map from contexts of Q values to P outputs, with the covariance of what it predicts.
 #[derive(Clone, Debug, PartialEq)]
@@ -152,7 +152,7 @@ impl ContextMap {
         data.check_count(kernel.is_some() || kind != MapKind::Linear)?;
         let data = data.along(&axes);
         let candidate = Candidate::with(kind, kernel, &data.shown(), |_, _| ratios)?;
-        let trend = trend.map(|(ratios, stack)| choice::trend(&data.shown(), ratios, stack)).transpose()?;
+        let trend = trend.map(|(ratios, stack)| model_selection::trend(&data.shown(), ratios, stack)).transpose()?;
         Ok(data.map(axes, Choice { candidate, trend, errors }))
     }
 

@@ -1,7 +1,7 @@
 use approx::assert_relative_eq;
 use ndarray::{Array2, Axis, array};
 
-use super::choice::Shown;
+use super::model_selection::Shown;
 use super::*;
 
 fn contexts(numbers: &[f64]) -> Vec<Vec<ContextValue>> {

@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use std::sync::{Arc, LazyLock};
 
 use ndarray::{Array1, Array2};
-use pdmp_core::basis::{Basis, Gp, NGnet};
-use pdmp_core::{
-    Command, Controller, Demonstration, FitOptions, Kind, Model, Motion, Result, Sampling, Status, StyleCount, Timing,
-    fit,
-};
+use pdmp_core::learning::StyleCount;
+use pdmp_core::learning::regression::{Basis, Gp, NGnet};
+use pdmp_core::motion::Timing;
+use pdmp_core::rollout;
+use pdmp_core::{Command, Controller, Demonstration, FitOptions, Kind, Model, Motion, Result, Sampling, Status, fit};
 
 /// Minimum jerk from 0 to 1 (Flash and Hogan 1985), s in [0, 1].
 pub(crate) fn minimum_jerk(s: f64) -> f64 {
@@ -66,7 +66,7 @@ pub(crate) fn gp() -> Basis {
 }
 
 pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model> {
-    Arc::new(fit(demos, options, &mut |_, _| Ok(())).unwrap())
+    Arc::new(fit(demos, options).unwrap())
 }
 
 /// Reaches and cycles learnt with two styles.
@@ -81,7 +81,7 @@ pub(crate) fn timing(dt: f64, duration: f64) -> Timing {
 
 /// One tick under a command; the motion is then read from the controller.
 pub(crate) fn tick(controller: &mut Controller, command: &Command) -> Result<Status> {
-    let n = controller.model().n_dofs();
+    let n = controller.primitive().n_dofs();
     let (mut position, mut velocity, mut acceleration) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     let mut motion = Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
     let status = controller.update(command, &mut motion)?;
@@ -112,7 +112,7 @@ pub(crate) fn reproduction_error(model: &Arc<Model>, demos: &[Demonstration], m:
     let steps = if model.kind() == Kind::Discrete { n - 1 } else { n };
     let duration = model.demonstrated().durations[m];
     let timing = Timing { dt: duration / steps as f64, duration: Some(duration) };
-    let found = model.rollout(&conditions_of(model, m), timing).unwrap().position;
+    let found = rollout(model.primitive(), &conditions_of(model, m), timing).unwrap().position;
     let shown = demos[m].position();
     let error = (&found.slice(ndarray::s![..n, ..]) - &shown).mapv(|e| e * e).mean().unwrap().sqrt();
     let range = shown.columns().into_iter().map(|y| max(&y.to_owned()) + max(&-y.to_owned())).fold(0.0, f64::max);

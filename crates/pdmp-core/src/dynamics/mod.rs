@@ -1,0 +1,14 @@
+//! The dynamical systems: canonical system, output system, forcing term, transport and command filters.
+
+pub(crate) mod canonical;
+pub(crate) mod command_filter;
+pub(crate) mod forcing_table;
+pub(crate) mod hermite_table;
+pub(crate) mod output_system;
+pub(crate) mod propagator_series;
+pub(crate) mod time_warp;
+pub(crate) mod transport;
+
+pub use canonical::Canonical;
+pub use forcing_table::Landscape;
+pub use output_system::Attractor;

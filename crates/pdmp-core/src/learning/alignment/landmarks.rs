@@ -1,0 +1,79 @@
+//! Landmark registration: time between events that the user has marked is scaled to that of the nominal demonstration.
+//!
+//! J. O. Ramsay, B. W. Silverman, Functional Data Analysis, Springer 2005, section 7.3.
+
+use ndarray::{Array2, ArrayView1, ArrayView2};
+
+use super::sample_times::Ticks;
+use super::{Aligned, WarpingFunction};
+use crate::error::{Error, Result};
+use crate::validate::check_vector;
+
+/// Shortest segment, as a share of the duration.
+const SHORTEST: f64 = 1e-6;
+
+impl Aligned<'_> {
+    /// Divides the phase axis where the nominal demonstration has its events (M, E), and times all by theirs.
+    ///
+    /// # Errors
+    /// Another number of rows than there are demonstrations, no column, events out of order or outside a demonstration.
+    pub(super) fn register(&mut self, events: ArrayView2<f64>) -> Result<()> {
+        let (found, expected) = (events.nrows(), self.n_demos());
+        if found != expected {
+            return Err(Error::Length { name: "events", expected, found, per: "demonstration" });
+        }
+        if events.ncols() == 0 {
+            return Err(Error::Arguments(
+                "events have no times: pass an array of shape (M, E) with E of at least 1, in seconds",
+            ));
+        }
+        let mut timings = Array2::zeros((expected, events.ncols() + 1));
+        for (m, (row, mut timing)) in events.rows().into_iter().zip(timings.rows_mut()).enumerate() {
+            timing.assign(&ArrayView1::from(&self.timing(m, &row.to_vec()).map_err(|error| error.in_demo(m))?));
+        }
+        let nominal = timings.row(self.nominal);
+        let total = nominal.sum();
+        self.breaks = nominal.iter().scan(0.0, |t, seconds| Some(std::mem::replace(t, *t + seconds) / total)).collect();
+        self.breaks.push(1.0);
+        for (m, timing) in timings.rows().into_iter().enumerate() {
+            let warp = || WarpingFunction::new(self.kind, &self.breaks, &timing.to_vec());
+            self.warps[m] = (m != self.nominal).then(warp);
+        }
+        self.timings = timings;
+        Ok(())
+    }
+
+    /// Times the one demonstration by its events (E,) between the given breaks (E+2,).
+    ///
+    /// # Errors
+    /// Another number of events than there are breaks between segments, or as for a fit.
+    pub(crate) fn register_to(&mut self, breaks: &[f64], events: &[f64]) -> Result<()> {
+        check_vector("events", events, breaks.len() - 2, "break between segments")?;
+        let timing = self.timing(0, events)?;
+        self.warps[0] = Some(WarpingFunction::new(self.kind, breaks, &timing));
+        Ok(())
+    }
+
+    /// The seconds (E+1,) before, between and after the events of demonstration `m`.
+    fn timing(&self, m: usize, events: &[f64]) -> Result<Vec<f64>> {
+        let clock = self.clocks[m];
+        let start = match clock.ticks {
+            Ticks::Even { .. } => 0.0,
+            Ticks::Stamps(time) => time[0],
+        };
+        let end = start + clock.duration;
+        let mut before = start;
+        let mut timing = Vec::with_capacity(events.len() + 1);
+        for (index, &time) in events.iter().enumerate() {
+            // Not a number is out of order too.
+            let in_order = time - before > SHORTEST * clock.duration && end - time > SHORTEST * clock.duration;
+            if !in_order {
+                return Err(Error::Event { index, time, before, end });
+            }
+            timing.push(time - before);
+            before = time;
+        }
+        timing.push(end - before);
+        Ok(timing)
+    }
+}

@@ -1,0 +1,257 @@
+//! Alignment of demonstrations (step 1 of Section 3.2): time scaling to a nominal one, resampled to C samples.
+//!
+//! The paper scales time linearly. Repetitions with pauses need more: the phase axis is divided into segments, and each
+//! demonstration has its own time for each, its *timing*, found by a warp or told by events.
+
+mod elastic_warp;
+mod landmarks;
+mod sample_times;
+
+use std::borrow::Cow;
+
+use ndarray::{Array2, Axis};
+
+use crate::demonstration::{Demonstration, LEAST_SAMPLES};
+use crate::dynamics::time_warp::WarpingFunction;
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::model::template::{Template, Warp};
+use crate::numerics::smoothing_spline::{MIN_THINNED, Noise, Samples, Smoothing, pool};
+use crate::numerics::spline::{Knots, Splines};
+use crate::numerics::threads::Threads;
+use sample_times::{Clock, Ticks};
+
+/// Fewest steps of the aligned demonstrations, unless their number is given: each step of the nominal one is divided into
+/// as many as it takes. The target between a few samples, where a movement turns sharply, is more than they show.
+const FINE: usize = 150;
+/// Most samples after alignment.
+const MOST_SAMPLES: usize = 1_000_000;
+
+/// How demonstrations are read as samples of one movement.
+#[derive(Clone, Debug)]
+pub struct Alignment {
+    /// From start to goal, or one cycle.
+    pub kind: Kind,
+    /// Sampling interval in seconds of demonstrations that carry none.
+    pub dt: Option<f64>,
+    /// Periods in seconds of time-stamped cycles: one for all, or one each; empty where the intervals give them.
+    pub period: Vec<f64>,
+    /// What is done about measurement noise.
+    pub smoothing: Smoothing,
+    /// Index of the nominal demonstration; otherwise the one of median duration.
+    pub nominal: Option<usize>,
+    /// Samples C; otherwise as many as the nominal demonstration has, and the same with equal parts of its steps where
+    /// these are fewer than 150.
+    pub n_samples: Option<usize>,
+    /// How time is scaled to that of the nominal demonstration.
+    pub time_scaling: TimeScaling,
+}
+
+/// How the time of a demonstration is scaled to that of the nominal one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum TimeScaling {
+    /// By Tⁿ/Tᵐ throughout, as the paper does.
+    #[default]
+    Linear,
+    /// By the monotone warp that brings the demonstrations closest to each other.
+    Warp(Warp),
+    /// By the default warp, in fewer segments where a demonstration has fewer than 16 samples; in a fit with at least three
+    /// different contexts only if movements at contexts held out are foreseen better so, by more than the standard error,
+    /// and linearly otherwise.
+    WarpIfBetter,
+    /// So that landmarks fall on those of the nominal demonstration: their times (M, E) in seconds, from the first sample
+    /// or of the time stamps.
+    Events(Array2<f64>),
+}
+
+/// Demonstrations that can be read as samples of one phase, each when it is asked for.
+#[derive(Clone, Debug)]
+pub(crate) struct Aligned<'a> {
+    demos: &'a [Demonstration],
+    clocks: Vec<Clock<'a>>,
+    kind: Kind,
+    /// Measurement noise, which is smoothed away.
+    pub(crate) noise: Noise,
+    /// Where time is not linear.
+    warps: Vec<Option<WarpingFunction>>,
+    /// Phases (K+1,) that divide the movement into segments.
+    pub(crate) breaks: Vec<f64>,
+    /// Times (M, K) that the demonstrations spend in each segment, in seconds.
+    pub(crate) timings: Array2<f64>,
+    /// Index of the nominal demonstration.
+    pub(crate) nominal: usize,
+    /// Samples C of each after alignment.
+    pub(crate) n_samples: usize,
+}
+
+impl Alignment {
+    /// Reads the clocks of all demonstrations, whose time is linear until it is warped, and estimates their noise.
+    ///
+    /// # Errors
+    /// No demonstration, different DoFs, a missing rate or period, a bad nominal index or number of samples, a bad
+    /// cut-off.
+    pub(crate) fn align<'a>(&self, demos: &'a [Demonstration], threads: Threads) -> Result<Aligned<'a>> {
+        let n_dofs = demos.first().ok_or(Error::NoDemonstrations)?.n_dofs();
+        if !(self.period.len() <= 1 || self.period.len() == demos.len()) {
+            let (expected, found) = (demos.len(), self.period.len());
+            return Err(Error::Length { name: "period", expected, found, per: "demonstration" });
+        }
+        let mut clocks = Vec::with_capacity(demos.len());
+        for (m, demo) in demos.iter().enumerate() {
+            if demo.n_dofs() != n_dofs {
+                return Err(Error::Dofs { expected: n_dofs, found: demo.n_dofs() }.in_demo(m));
+            }
+            if self.kind == Kind::Rhythmic && demo.goal().is_some() {
+                let (kind, instead) = (self.kind, ": it moves about the mean of its cycle");
+                return Err(Error::Kind { name: "goal", kind, instead }.in_demo(m));
+            }
+            let period = self.period.get(if self.period.len() == 1 { 0 } else { m }).copied();
+            clocks.push(Clock::of(demo, self, period).map_err(|error| error.in_demo(m))?);
+        }
+        let durations: Vec<f64> = clocks.iter().map(|clock| clock.duration).collect();
+        let nominal = self.nominal_of(&durations)?;
+        let steps = self.kind.steps(demos[nominal].n_samples());
+        let n_samples = self.n_samples.unwrap_or(self.kind.samples(steps * FINE.div_ceil(steps)));
+        if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&n_samples) {
+            let value = n_samples as f64;
+            return Err(Error::Range { name: "n_samples", value, allowed: "must lie between 4 and 1e6" });
+        }
+        let (kind, noise) = (self.kind, Noise::none(n_dofs));
+        let (warps, breaks) = (vec![None; demos.len()], vec![0.0, 1.0]);
+        let timings = ndarray::Array1::from_vec(durations).insert_axis(Axis(1));
+        let mut aligned = Aligned { demos, clocks, kind, noise, warps, breaks, timings, nominal, n_samples };
+        aligned.noise = self.noise(&aligned, threads)?;
+        Ok(aligned)
+    }
+
+    /// Estimates the measurement noise of demonstrations, in a pool of them.
+    fn noise(&self, aligned: &Aligned, threads: Threads) -> Result<Noise> {
+        if let Smoothing::CutOff { .. } = self.smoothing {
+            for m in 0..aligned.n_demos() {
+                self.smoothing.check(&aligned.samples(m, &aligned.seconds(m))).map_err(|error| error.in_demo(m))?;
+            }
+        }
+        let pool: Vec<(usize, Vec<f64>)> = pool(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
+        let samples: Vec<Samples> = pool.iter().map(|(m, time)| aligned.samples(*m, time)).collect();
+        Noise::of(self.smoothing, &samples, MIN_THINNED, threads)
+    }
+
+    /// The demonstration of median duration: the lower one of two, the earlier one of equals.
+    fn nominal_of(&self, durations: &[f64]) -> Result<usize> {
+        match self.nominal {
+            Some(nominal) if nominal < durations.len() => Ok(nominal),
+            Some(nominal) => {
+                let value = nominal as f64;
+                Err(Error::Range { name: "nominal", value, allowed: "must be the index of a demonstration, from 0" })
+            }
+            None => {
+                let mut order: Vec<usize> = (0..durations.len()).collect();
+                order.sort_by(|&a, &b| durations[a].total_cmp(&durations[b]));
+                Ok(order[(durations.len() - 1) / 2])
+            }
+        }
+    }
+}
+
+impl TimeScaling {
+    /// Scales time as it says; `unit` (D,) is what each DoF weighs, otherwise its range.
+    ///
+    /// What the demonstrations were warped to is returned, so that others can be.
+    ///
+    /// # Errors
+    /// Settings out of range, events out of order, no memory, or whatever `proceed` returns.
+    pub(crate) fn apply(
+        &self,
+        aligned: &mut Aligned,
+        unit: Option<&[f64]>,
+        threads: Threads,
+        proceed: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Option<Template>> {
+        match self {
+            Self::Linear => Ok(None),
+            Self::Warp(warp) => aligned.warp(warp, unit, threads, proceed).map(Some),
+            Self::WarpIfBetter => {
+                let warp = Warp::default();
+                let segments = warp.segments.min(aligned.most_segments());
+                aligned.warp(&Warp { segments, ..warp }, unit, threads, proceed).map(Some)
+            }
+            Self::Events(events) => aligned.register(events.view()).map(|()| None),
+        }
+    }
+}
+
+impl Aligned<'_> {
+    /// The same, read at another number of samples.
+    pub(crate) fn resampled(self, n_samples: usize) -> Self {
+        Self { n_samples, ..self }
+    }
+
+    /// Demonstration `m` as it was given.
+    pub(crate) fn demo(&self, m: usize) -> &Demonstration {
+        &self.demos[m]
+    }
+
+    /// Number of demonstrations M.
+    pub(crate) fn n_demos(&self) -> usize {
+        self.demos.len()
+    }
+
+    /// Durations or periods (M,), in seconds.
+    pub(crate) fn durations(&self) -> Vec<f64> {
+        self.timings.sum_axis(Axis(1)).to_vec()
+    }
+
+    /// Writes the positions of demonstration `m` (C·D, by rows), absolute.
+    ///
+    /// Time scaling by Tⁿ/Tᵐ puts sample c at the share c/(C−1) of the duration, or c/C of the period; what is warped is
+    /// read where its warping function is at that phase.
+    pub(crate) fn sample(&self, m: usize, position: &mut [f64]) {
+        let Clock { ticks, extent, .. } = self.clocks[m];
+        let steps = self.kind.steps(self.n_samples) as f64;
+        let phases = (0..self.n_samples).map(|c| c as f64);
+        match &self.warps[m] {
+            Some(warp) => self.read(m, phases.map(|c| extent * warp.share(c / steps)), position),
+            None if matches!(ticks, Ticks::Even { .. })
+                && self.demos[m].n_samples() == self.n_samples
+                && extent == steps =>
+            {
+                position.copy_from_slice(&self.smoothed(m));
+            }
+            None => self.read(m, phases.map(|c| c * extent / steps), position),
+        }
+    }
+
+    /// Writes the positions of demonstration `m` at times in its ticks, which do not decrease.
+    fn read(&self, m: usize, times: impl Iterator<Item = f64> + Clone, position: &mut [f64]) {
+        let Clock { ticks, extent, .. } = self.clocks[m];
+        let values = self.smoothed(m);
+        let own = (0..self.demos[m].n_samples()).map(|c| ticks.at(c)).collect();
+        let knots = match self.kind {
+            Kind::Discrete => Knots::not_a_knot(own),
+            Kind::Rhythmic => Knots::periodic(own, extent),
+        };
+        Splines::through(knots, &values, self.demos[m].n_dofs()).sample(times, position);
+    }
+
+    /// Samples of demonstration `m`, at the times of [`Aligned::seconds`].
+    fn samples<'a>(&'a self, m: usize, time: &'a [f64]) -> Samples<'a> {
+        let period = (self.kind == Kind::Rhythmic).then_some(self.clocks[m].duration);
+        Samples { time, period, values: self.demos[m].position() }
+    }
+
+    /// Times of the samples of demonstration `m` (n,), in seconds from the first.
+    fn seconds(&self, m: usize) -> Vec<f64> {
+        let ticks = self.clocks[m].ticks;
+        (0..self.demos[m].n_samples()).map(|c| ticks.at(c) * ticks.unit()).collect()
+    }
+
+    /// The samples of demonstration `m` (n·D), smoothed where they are noisy.
+    fn smoothed(&self, m: usize) -> Cow<'_, [f64]> {
+        let own = self.demos[m].position();
+        if self.noise.cut_offs().iter().all(Option::is_none) {
+            return own.to_slice().map_or_else(|| Cow::Owned(own.iter().copied().collect()), Cow::Borrowed);
+        }
+        let smoothed = self.samples(m, &self.seconds(m)).smoothed(self.noise.cut_offs());
+        Cow::Owned(smoothed.into_raw_vec_and_offset().0)
+    }
+}

@@ -1,0 +1,417 @@
+use ndarray::{Array1, Axis};
+use proptest::prelude::*;
+
+use super::*;
+use crate::learning::factorization::gram::Gram;
+use crate::learning::factorization::small_svd::Svd;
+
+fn go(_: f64) -> Result<()> {
+    Ok(())
+}
+
+fn of(targets: &Array2<f64>, styles: StyleCount) -> Factors {
+    Factors::of(targets.view(), styles, &mut go).unwrap()
+}
+
+/// Every factor, by the way that cannot fail.
+fn exact(targets: &Array2<f64>) -> Factors {
+    let library = Library::of(targets.view()).unwrap().unwrap();
+    library.exact(StyleCount::Given(targets.nrows().min(targets.ncols())), &mut go).unwrap()
+}
+
+fn norm(a: &Array2<f64>) -> f64 {
+    let largest = a.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    if largest == 0.0 { 0.0 } else { largest * a.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt() }
+}
+
+/// Columns as orthonormal as rounding allows, by modified Gram-Schmidt, twice.
+fn orthonormal(rows: usize, columns: usize, seed: f64) -> Array2<f64> {
+    let mut q = Array2::from_shape_fn((rows, columns), |(i, j)| {
+        ((i as f64 + seed) * 12.9898 + (j as f64 + 1.0) * 78.233).sin() * 43758.5453 % 1.0
+    });
+    for _ in 0..2 {
+        for j in 0..columns {
+            for i in 0..j {
+                let other = q.column(i).to_owned();
+                let share = other.dot(&q.column(j));
+                q.column_mut(j).scaled_add(-share, &other);
+            }
+            let length = q.column(j).dot(&q.column(j)).sqrt();
+            q.column_mut(j).mapv_inplace(|x| x / length);
+        }
+    }
+    q
+}
+
+/// Q₁·diag(σ)·Q₂ᵀ.
+fn matrix(rows: usize, columns: usize, sigma: &[f64]) -> Array2<f64> {
+    let right = orthonormal(columns, sigma.len(), 0.7);
+    (orthonormal(rows, sigma.len(), 0.3) * Array1::from_vec(sigma.to_vec())).dot(&right.t())
+}
+
+fn decaying(n: usize, ratio: f64) -> Vec<f64> {
+    (0..n).map(|k| ratio.powi(k as i32)).collect()
+}
+
+/// What is claimed of all factors: S orthonormal, signs fixed, F_basis = SᵀF with orthogonal rows as long as the
+/// singular values, and the error no smaller than it is, nor much larger.
+fn check(targets: &Array2<f64>, factors: &Factors) {
+    let Factors { styles, basis, singular_values, error } = factors;
+    let n_styles = styles.ncols();
+    assert_eq!((styles.nrows(), basis.dim()), (targets.nrows(), (n_styles, targets.ncols())));
+    assert!(singular_values.windows(2).all(|pair| pair[0] >= pair[1]));
+    let gram = styles.t().dot(styles);
+    assert!(norm(&(gram - Array2::<f64>::eye(n_styles))) < 1e-12 * n_styles as f64);
+    let first = singular_values[0];
+    if first == 0.0 {
+        assert!(*error == 0.0 && basis.iter().all(|&x| x == 0.0));
+        return;
+    }
+    let scaled = basis / first;
+    let products = scaled.dot(&scaled.t());
+    for (i, j) in (0..n_styles).flat_map(|j| (0..=j).map(move |i| (i, j))) {
+        let expected = if i == j { (singular_values[i] / first).powi(2) } else { 0.0 };
+        assert!((products[[i, j]] - expected).abs() < 2e-11, "{i} {j} {} {expected}", products[[i, j]]);
+    }
+    for column in styles.columns() {
+        assert!(column.iter().fold(0.0f64, |p, &x| if x.abs() > p.abs() { x } else { p }) > 0.0);
+    }
+    let left = norm(&(&(targets / first) - &styles.dot(&scaled))) * first;
+    let size = norm(targets);
+    assert!(left <= error + 1e-13 * size && *error <= left + 1e-6 * size, "{left:e} {error:e}");
+}
+
+/// The singular values are those that the matrix was made of, by each way, whatever its shape and scale, also where
+/// they fall over sixteen decades, vanish or coincide.
+#[test]
+fn singular_values_are_those_of_the_construction() {
+    let cases =
+        [vec![1.0; 6], decaying(6, 0.5), decaying(6, 1e-3), decaying(3, 0.1), vec![2.0, 1.0, 1e-8, 1e-12], vec![1.0]];
+    for (rows, columns) in [(6, 300), (300, 6), (7, 7), (6, 6), (8, 9), (20, 3000)] {
+        for sigma in &cases {
+            for scale in [1e-150, 1e-30, 1.0, 1e30, 1e149] {
+                let targets = matrix(rows, columns, sigma) * scale;
+                let (default, exact) = (of(&targets, StyleCount::Given(sigma.len())), exact(&targets));
+                for (factors, digits) in [(default, 1e-11f64), (exact, 1e-14)] {
+                    check(&targets, &factors);
+                    for (k, found) in factors.singular_values.iter().enumerate() {
+                        let expected = sigma.get(k).copied().unwrap_or(0.0);
+                        // Beyond J the Gram matrix knows half the digits.
+                        let digits = if k < sigma.len() { digits } else { digits.max(1e-8) };
+                        assert!(
+                            (found / scale - expected).abs() < digits * sigma[0] * 4.0,
+                            "{rows} {columns} {sigma:?} {k} {found:e}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Every size of work meets the same claims: few long rows, many short ones, one row, one column.
+#[test]
+fn all_shapes_are_factorised() {
+    for (rows, columns) in [(1, 1), (1, 9), (9, 1), (2, 1), (5, 4000), (4000, 5), (70, 80), (80, 70), (130, 900)] {
+        let k = rows.min(columns);
+        let targets = Array2::from_shape_fn((rows, columns), |(i, j)| ((i * i * 7 + j * 3 + i * j + 1) as f64).sin());
+        check(&targets, &exact(&targets));
+        for styles in [StyleCount::Given(1), StyleCount::Given(k), StyleCount::Spectrum(0.9), StyleCount::Spectrum(1.0)]
+        {
+            check(&targets, &of(&targets, styles));
+        }
+    }
+}
+
+/// Repeated demonstrations have one style; DoFs at rest keep targets of exactly zero; all at rest, all is zero.
+#[test]
+fn degenerate_libraries_are_factorised() {
+    let row = Array1::from_shape_fn(500, |j| if j % 7 == 3 { 0.0 } else { (j as f64).sin() });
+    for rows in [1, 2, 30, 600] {
+        let targets = row.broadcast((rows, 500)).unwrap().to_owned();
+        for factors in
+            [of(&targets, StyleCount::Spectrum(0.9)), of(&targets, StyleCount::Given(rows.min(500))), exact(&targets)]
+        {
+            check(&targets, &factors);
+            let rounding = (factors.singular_values.len() as f64 * f64::EPSILON).sqrt();
+            assert!(factors.singular_values.iter().skip(1).all(|&s| s < rounding * factors.singular_values[0]));
+            assert!(factors.basis.axis_iter(Axis(1)).skip(3).step_by(7).all(|column| column.iter().all(|&x| x == 0.0)));
+        }
+        assert_eq!(of(&targets, StyleCount::Spectrum(1.0)).styles.ncols(), 1);
+        let still = of(&Array2::zeros((rows, 500)), StyleCount::Spectrum(0.9));
+        check(&Array2::zeros((rows, 500)), &still);
+        assert_eq!(still.styles.ncols(), 1);
+    }
+}
+
+/// The few styles of a large library, from products with it alone, are those of the full decomposition.
+#[test]
+fn few_leading_factors_are_those_of_all() {
+    for (rows, columns) in [(300, 500), (500, 300), (260, 2000)] {
+        for sigma in [decaying(260, 0.8), decaying(260, 0.2), vec![3.0, 2.0, 1.0, 0.5, 0.2], decaying(12, 1e-3)] {
+            let targets = matrix(rows, columns, &sigma);
+            let (few, all) = (of(&targets, StyleCount::Given(5)), exact(&targets));
+            assert_eq!(few.singular_values.len(), 5, "not by the leading way");
+            check(&targets, &few);
+            for j in 0..5 {
+                assert!((few.singular_values[j] - all.singular_values[j]).abs() < 1e-10 * sigma[0]);
+                assert!((few.singular_values[j] - sigma[j]).abs() < 1e-10 * sigma[0]);
+                let gap = if j == 0 { 1.0 } else { sigma[j - 1] - sigma[j] }
+                    .min(sigma[j] - sigma[j + 1..].first().copied().unwrap_or(0.0));
+                let aligned = few.styles.column(j).dot(&all.styles.column(j)).abs();
+                let sine = (1.0 - aligned * aligned).max(0.0).sqrt();
+                assert!(sine < 1e-7 + 1e-10 * sigma[0] / gap, "{j} {sine:e}");
+                // Residuals as claimed, with F itself: F·f_j = σ_j²·s_j.
+                let row = few.basis.row(j);
+                let residual = targets.dot(&row) - &few.styles.column(j) * row.dot(&row);
+                let length = residual.dot(&residual).sqrt();
+                assert!(length <= 1e-11 * sigma[0] * sigma[0], "{length:e}");
+            }
+        }
+    }
+}
+
+/// Where the spectrum hardly falls or has no gap after J, the work goes to a slower way and the error is still right.
+#[test]
+fn slow_and_clustered_spectra_end_well() {
+    let (rows, columns) = (300, 400);
+    let slow: Vec<f64> = (0..300).map(|k| 1.0 - k as f64 * 1e-3).collect();
+    let flat = vec![1.0; 300];
+    let pair: Vec<f64> = (0..300)
+        .map(|k| {
+            if k < 5 {
+                1.0
+            } else if k < 40 {
+                0.5
+            } else {
+                0.01
+            }
+        })
+        .collect();
+    let near: Vec<f64> = (0..300)
+        .map(|k| {
+            if k < 4 {
+                1.0
+            } else if k < 30 {
+                0.5 + 1e-9 * k as f64
+            } else {
+                0.3
+            }
+        })
+        .collect();
+    for sigma in [slow, flat, pair, near] {
+        let targets = matrix(rows, columns, &sigma);
+        let mut sorted = sigma.clone();
+        sorted.sort_by(|a, b| b.total_cmp(a));
+        for n_styles in [1, 4, 6] {
+            let factors = of(&targets, StyleCount::Given(n_styles));
+            check(&targets, &factors);
+            let least = sorted[n_styles..].iter().map(|s| s * s).sum::<f64>().sqrt();
+            assert!((factors.error - least).abs() < 1e-6 * norm(&targets));
+            for (found, expected) in factors.singular_values.iter().zip(&sorted) {
+                assert!((found - expected).abs() < 1e-8, "{found} {expected}");
+            }
+        }
+    }
+}
+
+/// By the share of the spectrum as many are kept as the exact singular values ask for, and they are accurate.
+#[test]
+fn the_share_of_the_spectrum_decides() {
+    for (rows, columns) in [(100, 700), (400, 90)] {
+        for ratio in [0.1, 0.5, 0.9, 0.99] {
+            let sigma = decaying(90, ratio);
+            let targets = matrix(rows, columns, &sigma);
+            for share in [0.5, 0.9, 0.999] {
+                let factors = of(&targets, StyleCount::Spectrum(share));
+                check(&targets, &factors);
+                assert_eq!(factors.styles.ncols(), leading(&sigma, share));
+                assert_eq!(factors.singular_values.len(), rows.min(columns));
+                for (found, expected) in factors.singular_values.iter().zip(&sigma) {
+                    assert!((found - expected).abs() < 2e-8);
+                }
+            }
+        }
+    }
+}
+
+/// Each way to the decomposition of a small matrix holds by itself.
+#[test]
+fn every_fallback_decomposes() {
+    for k in [1, 2, 3, 17, 60] {
+        for sigma in [vec![1.0; k], decaying(k, 0.3), decaying(k.div_ceil(2), 1e-2), vec![0.0; k]] {
+            let square = matrix(k, k, &sigma);
+            let a = Mat::from_fn(k, k, |i, j| square[[i, j]]);
+            for found in [
+                Some(Svd::of(a.as_ref())),
+                Some(Svd::rotated(a.clone())),
+                Svd::bidiagonal(a.transpose()).map(|Svd { u, sigma, v }| Svd { u: v, sigma, v: u }),
+            ] {
+                let Svd { u, sigma: values, v } = found.unwrap();
+                let close = |a: &Mat<f64>, b: &Mat<f64>| (a - b).norm_l2() < 1e-13 * k as f64;
+                let eye = Mat::<f64>::identity(k, k);
+                assert!(close(&(u.transpose() * &u), &eye) && close(&(v.transpose() * &v), &eye));
+                let product = Mat::from_fn(k, k, |i, j| (0..k).map(|m| u[(i, m)] * values[m] * v[(j, m)]).sum::<f64>());
+                assert!(close(&product, &a));
+                assert!(values.windows(2).all(|pair| pair[0] >= pair[1]));
+            }
+        }
+    }
+}
+
+/// A triangle R of many columns' blocks has RᵀR = A·Aᵀ, and Q·R is the matrix.
+#[test]
+fn reflections_keep_the_products() {
+    for (k, length) in [(1, 1), (1, 5000), (3, 3), (20, 7000), (33, 2049), (64, 64)] {
+        let a = Mat::from_fn(k, length, |i, j| ((i * i * 7 + j * 3 + i * j + 1) as f64).sin());
+        let r = householder::triangle(a.as_ref(), &mut go).unwrap();
+        assert!((r.transpose() * &r - &a * a.transpose()).norm_l2() < 1e-13 * a.norm_l2().powi(2));
+        let (q, r) = householder::orthonormal(a.transpose().to_owned());
+        assert!((&q * &r - a.transpose()).norm_l2() < 1e-13 * a.norm_l2());
+        assert!((q.transpose() * &q - Mat::<f64>::identity(k, k)).norm_l2() < 1e-13 * k as f64);
+    }
+}
+
+/// The Gram matrix is not trusted with what it cannot resolve.
+#[test]
+fn small_singular_values_are_not_taken_from_the_gram_matrix() {
+    let a = matrix(10, 200, &decaying(10, 0.1));
+    let a = Mat::from_fn(10, 200, |i, j| a[[i, j]]);
+    let gram = Gram::of(a.as_ref(), &mut go).unwrap().unwrap();
+    assert!(gram.leading(3, 10).is_some() && gram.leading(5, 10).is_none());
+}
+
+/// Whoever is asked may end every way, between any two passes.
+#[test]
+fn factorising_can_be_interrupted() {
+    let targets = matrix(300, 400, &decaying(300, 0.99));
+    for styles in [StyleCount::Given(5), StyleCount::Given(300), StyleCount::Spectrum(0.9)] {
+        let mut asked = 0;
+        Factors::of(targets.view(), styles, &mut |share| {
+            assert!((0.0..=1.0).contains(&share));
+            asked += 1;
+            Ok(())
+        })
+        .unwrap();
+        assert!(asked > 0);
+        for last in 0..asked {
+            let mut count = 0;
+            let mut stop = |_| {
+                count += 1;
+                if count > last { Err(Error::Interrupted) } else { Ok(()) }
+            };
+            assert!(matches!(Factors::of(targets.view(), styles, &mut stop), Err(Error::Interrupted)));
+        }
+    }
+}
+
+/// The same bits every time, and for a matrix whatever the order of its elements in memory.
+#[test]
+fn the_answer_is_always_the_same() {
+    for sigma in [decaying(300, 0.7), decaying(300, 0.99)] {
+        let targets = matrix(300, 400, &sigma);
+        let turned = targets.t().as_standard_layout().into_owned();
+        for styles in [StyleCount::Given(5), StyleCount::Spectrum(0.9)] {
+            let first = of(&targets, styles);
+            for again in [of(&targets, styles), Factors::of(turned.t(), styles, &mut go).unwrap()] {
+                assert_eq!(
+                    (&first.styles, &first.basis, &first.singular_values),
+                    (&again.styles, &again.basis, &again.singular_values)
+                );
+            }
+        }
+    }
+}
+
+/// J is the smallest number of singular values above the share, and 1 where all targets vanish.
+#[test]
+fn spectrum_rule_is_the_papers() {
+    assert_eq!(leading(&[8.0, 1.5, 0.5], 0.9), 2);
+    assert_eq!(leading(&[9.0, 1.0], 0.9), 2);
+    assert_eq!(leading(&[9.1, 0.9], 0.9), 1);
+    assert_eq!(leading(&[3.0, 2.0, 0.0], 1.0), 2);
+    assert_eq!(leading(&[0.0, 0.0], 0.9), 1);
+}
+
+#[test]
+fn style_counts_outside_the_data_are_refused() {
+    let targets = matrix(5, 40, &decaying(5, 0.5));
+    for count in [StyleCount::Given(0), StyleCount::Given(6), StyleCount::Spectrum(0.0), StyleCount::Spectrum(f64::NAN)]
+    {
+        assert!(Factors::of(targets.view(), count, &mut go).is_err());
+    }
+}
+
+#[test]
+fn targets_that_are_not_numbers_are_refused() {
+    for value in [f64::NAN, f64::INFINITY, -1e151] {
+        let mut targets = Array2::ones((5, 40));
+        targets[[3, 7]] = value;
+        let error = Factors::of(targets.view(), StyleCount::Given(1), &mut go).unwrap_err().to_string();
+        assert!(error.contains("targets[3, 7]"), "{error}");
+    }
+    assert!(Factors::of(Array2::zeros((0, 4)).view(), StyleCount::Spectrum(0.9), &mut go).is_err());
+}
+
+proptest! {
+    /// The claims hold for any shape, rank, decay and scale.
+    #[test]
+    fn factors_of_any_matrix_are_sound(
+        rows in 1usize..40, columns in 1usize..60, rank in 1usize..20, decay in 0.0f64..4.0,
+        exponent in -150i32..148, values in prop::collection::vec(-1.0f64..1.0, 2048), share in 0.01f64..1.0,
+    ) {
+        let pick = |i: usize| values[i % values.len()];
+        let left = Array2::from_shape_fn((rows, rank), |(i, r)| pick(i * rank + r) * 10f64.powf(-decay * r as f64));
+        let right = Array2::from_shape_fn((rank, columns), |(r, j)| pick(1021 + r * columns + j));
+        let targets = left.dot(&right) * 10f64.powi(exponent);
+        let k = rows.min(columns);
+        for styles in [StyleCount::Given(1 + rank % k), StyleCount::Given(k), StyleCount::Spectrum(share)] {
+            check(&targets, &of(&targets, styles));
+        }
+        if targets.iter().any(|&x| x != 0.0) {
+            check(&targets, &exact(&targets));
+        }
+    }
+}
+
+/// The triangle from the Gram matrix has the singular values of the construction as reflections do, and the factors are
+/// as exact; where they fall too far there may be none.
+#[test]
+fn graded_libraries_have_a_triangle_of_products() {
+    let cases = [
+        vec![1.0; 6],
+        decaying(6, 0.1),
+        decaying(12, 0.3),
+        decaying(20, 0.5),
+        decaying(6, 1e-3),
+        vec![1.0, 0.5, 0.25, 0.0, 0.0, 0.0],
+    ];
+    for sigma in cases {
+        let targets = matrix(sigma.len(), 3000, &sigma);
+        let library = Library::of(targets.view()).unwrap().unwrap();
+        let gram = Gram::of(library.wide(), &mut go).unwrap().unwrap();
+        let Some(triangle) = gram.triangle(library.wide(), &mut go).unwrap() else {
+            assert!(sigma[sigma.len() - 1] < 1e-8, "{sigma:?}");
+            continue;
+        };
+        let n_styles = StyleCount::Given(sigma.len());
+        let factors = library.of_triangle(n_styles, triangle.as_ref(), Some(gram.vectors.as_ref())).unwrap();
+        check(&targets, &factors);
+        for (j, sigma) in sigma.iter().enumerate() {
+            assert!((factors.singular_values[j] - sigma).abs() < 1e-14);
+            let residual = targets.dot(&factors.basis.row(j)) - &factors.styles.column(j) * (sigma * sigma);
+            assert!(residual.dot(&residual).sqrt() < 1e-14);
+        }
+    }
+}
+
+/// Where a demonstration stands still, its direction has no image whose length could be divided by.
+#[test]
+fn vanishing_rows_have_no_triangle_of_products() {
+    let mut targets = matrix(6, 3000, &[1.0; 6]);
+    targets.row_mut(2).fill(0.0);
+    let library = Library::of(targets.view()).unwrap().unwrap();
+    let gram = Gram::of(library.wide(), &mut go).unwrap().unwrap();
+    assert!(gram.triangle(library.wide(), &mut go).unwrap().is_none());
+    check(&targets, &of(&targets, StyleCount::Given(6)));
+}

@@ -1,0 +1,24 @@
+//! Learning of a model from demonstrations.
+
+pub(crate) mod alignment;
+mod constants;
+mod cycle_phase;
+pub(crate) mod factorization;
+mod fit;
+mod movement_metric;
+mod noise_findings;
+pub(crate) mod options;
+pub mod regression;
+mod stiffness;
+mod style_inference;
+pub(crate) mod style_selection;
+mod tabulation;
+mod targets;
+mod time_scaling;
+mod transport_profile;
+
+pub use alignment::{Alignment, TimeScaling};
+pub use factorization::{Factors, StyleCount};
+pub use fit::{fit, fit_with};
+pub use options::{DofScale, FitOptions, Stage, StyleChoice, TransportChoice};
+pub use style_inference::style_of;

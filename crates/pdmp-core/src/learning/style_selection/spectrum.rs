@@ -1,0 +1,194 @@
+//! The number of styles that are systematic: above the measurement noise, and enough for what contexts explain.
+//!
+//! Noise adds singular values to those of the movements. Parallel analysis (Horn, Psychometrika 30, 1965,
+//! doi:10.1007/BF02289447) compares them with those of noise alone: white noise of the size that was found, on the time
+//! stamps of the demonstrations, through the same smoothing and the same targets.
+
+use std::cmp::Ordering;
+
+use ndarray::{Array2, ArrayView1, ArrayView2};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use crate::context::ContextColumn;
+use crate::demonstration::{Demonstration, Sampling};
+use crate::dynamics::transport::Transport;
+use crate::error::Result;
+use crate::learning::alignment::{Aligned, Alignment, TimeScaling};
+use crate::learning::constants::Constants;
+use crate::learning::factorization::{Factors, StyleCount};
+use crate::learning::targets::Targets;
+use crate::numerics::smoothing_spline::Smoothing;
+use crate::numerics::threads::Threads;
+
+/// Share of the sum of the singular values that the styles carry, as in the paper.
+const SHARE: f64 = 0.9;
+
+/// Margin over the largest singular value of simulated noise. In simulations of 20 to 200 demonstrations with 51 to 1001
+/// samples the largest of the noise in the data was at most 1.23 times that of noise alone.
+const MARGIN: f64 = 1.5;
+
+/// Most demonstrations of noise: the largest singular value of more follows from theirs.
+const MAX_ROWS: usize = 64;
+
+/// Fewest samples of a demonstration of noise, unless the recording has fewer, and samples per period of the highest
+/// cut-off: smoothed noise needs no more.
+const MIN_SAMPLES: usize = 64;
+const SAMPLES_PER_PERIOD: f64 = 5.0;
+
+/// Chance, over all styles together, at which one that a context does not explain seems to be explained.
+const SIGNIFICANCE: f64 = 0.01;
+
+/// Contexts per coefficient from which on squares of numbers are among what may explain a style.
+const CONTEXTS_PER_SQUARE: usize = 4;
+
+/// Returns the largest singular value that measurement noise gives the targets, with a margin; 0 without noise.
+///
+/// Of P rows of noise with the largest singular value ν and the root mean square row norm t, M rows of the same
+/// distribution have t + (ν − t)√(M/P) at most, on average (Gordon's inequality, as an equation).
+pub(crate) fn noise_limit(
+    aligned: &Aligned,
+    constants: &Constants,
+    transport: &Transport,
+    dof_scale: &[f64],
+    threads: Threads,
+) -> Result<f64> {
+    let Some(highest) = aligned.noise.cut_offs().iter().flatten().copied().reduce(f64::max) else { return Ok(0.0) };
+    let (n_demos, durations) = (aligned.n_demos(), aligned.durations());
+    let kind = constants.canonical.kind();
+    let n_rows = n_demos.min(MAX_ROWS);
+    let mut signs = Signs(0);
+    let noise = |row: usize| {
+        let m = row * n_demos / n_rows;
+        let recorded = aligned.demo(m).n_samples();
+        let enough = (SAMPLES_PER_PERIOD * highest * durations[m]).ceil() as usize;
+        let n = enough.max(MIN_SAMPLES).min(recorded);
+        // Fewer samples of the same noise per second.
+        let share = (n as f64 / recorded as f64).sqrt();
+        let size: Vec<f64> = aligned.noise.levels().iter().map(|level| level * share).collect();
+        let position = Array2::from_shape_fn((n, size.len()), |(_, d)| signs.next() * size[d]);
+        Demonstration::new(position, Sampling::Uniform { dt: durations[m] / kind.steps(n) as f64 })
+    };
+    let noise = (0..n_rows).map(noise).collect::<Result<Vec<_>>>()?;
+    let n_samples = noise.iter().map(Demonstration::n_samples).max();
+    let alignment = Alignment {
+        kind,
+        dt: None,
+        period: Vec::new(),
+        smoothing: Smoothing::Interpolate,
+        nominal: None,
+        n_samples,
+        time_scaling: TimeScaling::Linear,
+    };
+    let mut rows = alignment.align(&noise, threads)?;
+    rows.noise = aligned.noise.clone();
+    let mut targets = Targets::of(&rows, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
+    targets.carry(transport, constants.attractor, constants.canonical);
+    targets.scale(dof_scale);
+    let squares: f64 = targets.forcing.iter().map(|f| f * f).sum();
+    let factors = Factors::of(targets.forcing.view(), StyleCount::Given(1), &mut |_| Ok(()))?;
+    let norm = (squares / n_rows as f64).sqrt();
+    let growth = (n_demos as f64 / n_rows as f64).sqrt();
+    let largest = norm + (factors.singular_values[0] - norm) * growth;
+    let density = aligned.n_samples as f64 / rows.n_samples as f64;
+    Ok(MARGIN * largest * density.sqrt())
+}
+
+/// Returns the systematic factors of targets, of which `contexts` may explain more than the first.
+pub(crate) fn systematic(
+    targets: ArrayView2<f64>,
+    noise: f64,
+    contexts: Option<&(Vec<ContextColumn>, Array2<f64>)>,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Factors> {
+    let count = StyleCount::AboveNoise { noise, share: SHARE };
+    let Some((columns, numbers)) = contexts else { return Factors::of(targets, count, progress) };
+    let all = Factors::of(targets, StyleCount::AboveNoise { noise, share: 1.0 }, progress)?;
+    let explained = explained(columns, numbers, &all.styles);
+    let n_styles = count.among(&all.singular_values, targets.nrows()).max(explained);
+    Ok(all.leading(n_styles))
+}
+
+/// Returns the number of leading styles (M, J) up to the last that contexts explain: by an F-test of a regression on
+/// their numbers, the squares of these where there are enough contexts, and their labels.
+fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<f64>) -> usize {
+    let (n_demos, n_styles) = styles.dim();
+    let numbers = || columns.iter().zip(contexts.columns()).filter(|(column, _)| **column == ContextColumn::Number);
+    let mut span = Span::default();
+    span.add(ArrayView1::from(&vec![1.0; n_demos]));
+    for (column, values) in columns.iter().zip(contexts.columns()) {
+        match column {
+            ContextColumn::Number => span.add(values),
+            ContextColumn::Label(labels) => {
+                (0..labels.len()).for_each(|k| span.add(values.map(|&v| f64::from(u8::from(v == k as f64))).view()));
+            }
+        }
+    }
+    if crate::context::alike(contexts).len() >= CONTEXTS_PER_SQUARE * (2 * numbers().count() + 1) {
+        for (_, values) in numbers() {
+            let centre = values.mean().unwrap_or(0.0);
+            span.add(values.map(|value| (value - centre).powi(2)).view());
+        }
+    }
+    let explaining = span.0.len() - 1;
+    let free = n_demos.saturating_sub(explaining + 1);
+    let Ok(distribution) = FisherSnedecor::new(explaining as f64, free as f64) else { return 1 };
+    let is_explained = |j: &usize| {
+        let [whole, rest] = span.squares(styles.column(*j));
+        let ratio = (whole - rest).max(0.0) / explaining as f64 / (rest / free as f64);
+        match rest.partial_cmp(&(1e-12 * whole)) {
+            Some(Ordering::Less | Ordering::Equal) => whole > 0.0,
+            _ => distribution.sf(ratio) * (n_styles as f64) < SIGNIFICANCE,
+        }
+    };
+    (0..n_styles).rev().find(is_explained).map_or(1, |j| j + 1)
+}
+
+/// An orthonormal basis of some columns, the first of which is constant.
+#[derive(Default)]
+struct Span(Vec<ndarray::Array1<f64>>);
+
+impl Span {
+    /// Adds a column, unless it depends on those before.
+    fn add(&mut self, column: ArrayView1<f64>) {
+        let scale = column.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        if scale == 0.0 {
+            return;
+        }
+        let rest = self.rest((&column / scale).view());
+        let size = rest.dot(&rest).sqrt();
+        if size > 1e-9 {
+            self.0.push(rest / size);
+        }
+    }
+
+    /// The part of a column that is orthogonal to the basis; twice, which takes rounding errors off.
+    fn rest(&self, column: ArrayView1<f64>) -> ndarray::Array1<f64> {
+        let mut rest = column.to_owned();
+        for unit in self.0.iter().chain(&self.0) {
+            let share = unit.dot(&rest);
+            rest.scaled_add(-share, unit);
+        }
+        rest
+    }
+
+    /// Squared size of a column less its mean, and of what the whole basis leaves of it.
+    fn squares(&self, column: ArrayView1<f64>) -> [f64; 2] {
+        let mean = Span(self.0[..1].to_vec()).rest(column);
+        let rest = self.rest(column);
+        [mean.dot(&mean), rest.dot(&rest)]
+    }
+}
+
+/// Random signs, the same in every run (SplitMix64; Steele, Lea, Flood, OOPSLA 2014, doi:10.1145/2660193.2660195): sums
+/// of many are normal.
+struct Signs(u64);
+
+impl Signs {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        1.0f64.copysign((bits ^ (bits >> 31)) as i64 as f64)
+    }
+}

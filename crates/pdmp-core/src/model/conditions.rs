@@ -1,0 +1,154 @@
+//! What a movement starts with, checked against its primitive.
+
+use crate::dynamics::canonical::turn;
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::model::primitive::Primitive;
+use crate::validate::{check_positive, check_vector};
+
+/// What a movement starts with; what is `None` is that of the nominal demonstration.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Conditions {
+    /// Style s (J,).
+    pub style: Option<Vec<f64>>,
+    /// Goal g (D,), discrete.
+    pub goal: Option<Vec<f64>>,
+    /// Anchor y_a (D,), rhythmic.
+    pub anchor: Option<Vec<f64>>,
+    /// Start position (D,); a rhythmic movement otherwise starts on its cycle.
+    pub start: Option<Vec<f64>>,
+    /// Start velocity (D,), per second; otherwise that of the demonstrations.
+    pub velocity: Option<Vec<f64>>,
+    /// Amplitude r₀, rhythmic; otherwise 1, which is what a discrete movement has.
+    pub amplitude: Option<f64>,
+    /// Time constant τ, in seconds.
+    pub tau: Option<f64>,
+    /// Time in each segment of the movement (K,), in seconds, in place of τ. A rollout follows it; a controller, whose τ
+    /// can be set at any tick, takes its sum: see [`Primitive::tau_at`].
+    pub timing: Option<Vec<f64>>,
+    /// Phase φ at which a rhythmic movement starts, in rad: on its limit cycle, with nothing to die away; otherwise 0.
+    pub phase: Option<f64>,
+}
+
+impl Conditions {
+    /// Checks every number against the model, and fills in the nominal demonstration's where none is given.
+    ///
+    /// # Errors
+    /// A wrong length, a number that is not finite, τ that is not positive, or a condition of the other kind.
+    pub(crate) fn complete(&self, primitive: &Primitive) -> Result<Complete> {
+        let nominal = &primitive.nominal;
+        let centre = |name, given: &Option<Vec<f64>>| match given {
+            Some(value) => check_vector(name, value, nominal.centre.len(), "DoF").map(|()| value.clone()),
+            None => Ok(nominal.centre.clone()),
+        };
+        let kind = primitive.kind();
+        let centre = match kind {
+            Kind::Discrete => {
+                refuse(kind, "anchor", self.anchor.is_some())?;
+                refuse(kind, "amplitude", self.amplitude.is_some_and(|amplitude| amplitude != 1.0))?;
+                centre("goal", &self.goal)?
+            }
+            Kind::Rhythmic => {
+                refuse(kind, "goal", self.goal.is_some())?;
+                centre("anchor", &self.anchor)?
+            }
+        };
+        for (name, value) in [("start", &self.start), ("velocity", &self.velocity)] {
+            if let Some(value) = value {
+                check_vector(name, value, primitive.n_dofs(), "DoF")?;
+            }
+        }
+        let tau = self.time_constant(primitive)?;
+        let amplitude = self.amplitude.unwrap_or(1.0);
+        check_amplitude(amplitude)?;
+        let start = match (&self.start, kind) {
+            (None, Kind::Discrete) => Some(nominal.start.clone()),
+            (start, _) => start.clone(),
+        };
+        let style = match &self.style {
+            Some(style) => check_style(style, primitive.n_styles()).map(|()| style.clone())?,
+            None => nominal.style.clone(),
+        };
+        refuse(kind, "phase", kind == Kind::Discrete && self.phase.is_some())?;
+        let phase = self.phase.unwrap_or(0.0);
+        if !phase.is_finite() {
+            return Err(Error::Range { name: "phase", value: phase, allowed: "must be a finite angle in rad" });
+        }
+        Ok(Complete { style, centre, start, velocity: self.velocity.clone(), amplitude, tau, phase: turn(phase) })
+    }
+
+    /// τ in seconds: as given, that of a movement as long as the timing, or the nominal demonstration's.
+    ///
+    /// # Errors
+    /// Both of them, a τ that is not positive, or a timing that does not fit the primitive.
+    pub fn time_constant(&self, primitive: &Primitive) -> Result<f64> {
+        let tau = match (self.tau, &self.timing) {
+            (Some(_), Some(_)) => {
+                return Err(Error::Arguments("pass tau or timing, not both: a timing tells the duration"));
+            }
+            (None, Some(timing)) => {
+                primitive.check_timing(timing)?;
+                primitive.tau * timing.iter().sum::<f64>() / primitive.duration()
+            }
+            (tau, None) => tau.unwrap_or(primitive.tau),
+        };
+        check_tau(tau, primitive.tau).map(|()| tau)
+    }
+}
+
+/// Conditions with nothing left open but a start on the cycle and a demonstrated start velocity.
+#[derive(Clone, Debug)]
+pub(crate) struct Complete {
+    pub(crate) style: Vec<f64>,
+    /// Goal or anchor.
+    pub(crate) centre: Vec<f64>,
+    pub(crate) start: Option<Vec<f64>>,
+    pub(crate) velocity: Option<Vec<f64>>,
+    pub(crate) amplitude: f64,
+    pub(crate) tau: f64,
+    /// φ in [0, 2π); 0 where discrete.
+    pub(crate) phase: f64,
+}
+
+/// Refuses an argument that this kind of primitive does not have.
+pub(crate) fn refuse(kind: Kind, name: &'static str, given: bool) -> Result<()> {
+    let instead = match (kind, name) {
+        (Kind::Discrete, "anchor") => ": it moves to a goal; set goal",
+        (Kind::Discrete, "phase") => ": what it does later depends on where it started; it starts at its start",
+        (Kind::Rhythmic, "goal") => ": it moves about an anchor; set anchor",
+        _ => "",
+    };
+    if given { Err(Error::Kind { name, kind, instead }) } else { Ok(()) }
+}
+
+/// Largest magnitude of a style. Demonstrated ones are at most 1: the bound only keeps products finite.
+pub(crate) const LARGEST_STYLE: f64 = 1e100;
+
+/// Checks a style (J,).
+pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
+    check_vector("style", style, n_styles, "style dimension")?;
+    match style.iter().position(|s| s.abs() > LARGEST_STYLE) {
+        Some(index) => Err(Error::TooLarge { name: "style", index, value: style[index], limit: LARGEST_STYLE }),
+        None => Ok(()),
+    }
+}
+
+/// Checks a time constant against the model's own, in seconds.
+pub(crate) fn check_tau(tau: f64, own: f64) -> Result<()> {
+    check_positive("tau", tau)?;
+    if (1e-6..=1e6).contains(&(tau / own)) {
+        Ok(())
+    } else {
+        let allowed = "must lie within a millionfold of the model's tau";
+        Err(Error::Range { name: "tau", value: tau, allowed })
+    }
+}
+
+/// Checks an amplitude: zero is rest.
+pub(crate) fn check_amplitude(value: f64) -> Result<()> {
+    if (0.0..=crate::validate::LARGEST).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::Range { name: "amplitude", value, allowed: "must lie between 0, which is rest, and 1e150" })
+    }
+}

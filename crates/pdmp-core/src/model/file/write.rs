@@ -1,0 +1,114 @@
+//! A model into the bytes of its file.
+
+use std::collections::HashMap;
+
+use ndarray::Array2;
+use safetensors::tensor::{Dtype, TensorView, serialize};
+
+use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header};
+use crate::context::{ContextMap, Recipe, Stack};
+use crate::dynamics::hermite_table::Jets;
+use crate::error::{Error, Result};
+use crate::model::Model;
+
+/// An array by name: shape and elements by rows.
+type Array = (&'static str, Vec<usize>, Vec<f64>);
+
+fn matrix(name: &'static str, matrix: &Array2<f64>) -> Array {
+    (name, matrix.shape().to_vec(), matrix.iter().copied().collect())
+}
+
+fn vector(name: &'static str, vector: &[f64]) -> Array {
+    (name, vec![vector.len()], vector.to_vec())
+}
+
+impl Model {
+    /// The model as the bytes of a file.
+    ///
+    /// # Errors
+    /// A model that the format cannot hold.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let constants = Constants {
+            canonical: self.canonical(),
+            tau: self.tau,
+            alpha_z: self.attractor.alpha_z,
+            beta_z: self.attractor.beta_z,
+            braking: self.braking,
+            names: self.names.clone(),
+            units: self.units.clone(),
+            nominal: self.demonstrated.nominal,
+            n_samples: self.learnt.n_samples,
+            slope: self.learnt.template.as_ref().map(|template| template.slope),
+            left_out: self.learnt.left_out,
+            basis: self.learnt.basis.clone(),
+            table_error: self.landscape.error(),
+            map: self.map.as_ref().map(Map::of),
+        };
+        let arrays: Vec<(&str, Vec<usize>, Vec<u8>)> = self
+            .arrays()
+            .into_iter()
+            .map(|(name, shape, data)| (name, shape, data.iter().flat_map(|x| x.to_le_bytes()).collect()))
+            .collect();
+        let crc32 = checksum(&constants, arrays.iter().map(|(name, _, bytes)| (*name, bytes.as_slice())))?;
+        let sealed = Sealed { schema: SCHEMA, crc32, model: constants };
+        let json = serde_json::to_string(&sealed).map_err(|error| Error::File(error.to_string()))?;
+        let views = arrays
+            .iter()
+            .map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F64, shape.clone(), bytes)?)))
+            .collect::<std::result::Result<Vec<_>, safetensors::SafeTensorError>>()
+            .map_err(|error| Error::File(error.to_string()))?;
+        let metadata = HashMap::from([(KEY.to_string(), json)]);
+        let bytes = serialize(views, Some(metadata)).map_err(|error| Error::File(error.to_string()))?;
+        header::constants(&bytes)?;
+        Ok(bytes)
+    }
+
+    pub(super) fn arrays(&self) -> Vec<Array> {
+        let demonstrated = &self.demonstrated;
+        let Jets { values, slopes, .. } = self.landscape.knots();
+        let knots = vec![self.landscape.cells() + 1, self.n_styles(), self.n_dofs()];
+        // 0 where every sample is met.
+        let cut_offs: Vec<f64> = self.learnt.noise.cut_offs().iter().map(|hz| hz.unwrap_or(0.0)).collect();
+        let mut arrays = vec![
+            matrix("styles", &demonstrated.styles),
+            matrix("goals", &demonstrated.goals),
+            matrix("starts", &demonstrated.starts),
+            matrix("anchors", &demonstrated.anchors),
+            vector("breaks", &self.breaks),
+            matrix("timings", &demonstrated.timings),
+            vector("singular_values", &self.learnt.singular_values),
+            vector("dof_scale", &self.learnt.dof_scale),
+            vector("ranges", &self.ranges),
+            vector("noise.levels", self.learnt.noise.levels()),
+            vector("noise.cut_offs", &cut_offs),
+            vector("transport", self.transport.coefficients()),
+            ("landscape.values", knots.clone(), values),
+            ("landscape.slopes", knots, slopes),
+        ];
+        if let Some(template) = &self.learnt.template {
+            arrays.push(vector("template.unit", &template.unit));
+            arrays.push(matrix("template.shape", &template.shape));
+        }
+        if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
+            arrays.push(matrix("contexts", contexts));
+            let recipe = map.recipe();
+            arrays.push(matrix("map.directions", &recipe.directions));
+            arrays.push(vector("map.ratios", &recipe.ratios));
+            if let Some((slopes, Stack { inside, outside })) = &recipe.trend {
+                arrays.push(vector("map.slopes", slopes));
+                arrays.push(("map.weights", vec![2, 2], [*inside, *outside].concat()));
+            }
+            arrays.extend(self.learnt.left_over.as_ref().map(|left_over| matrix("left_over", left_over)));
+        }
+        arrays
+    }
+}
+
+impl Map {
+    fn of(map: &ContextMap) -> Self {
+        let Recipe { kind, kernel, errors, .. } = map.recipe();
+        // Infinite where the others say nothing: JSON has no such number.
+        let errors = errors.into_iter().map(|(kind, error)| (kind, error.is_finite().then_some(error))).collect();
+        Self { columns: map.columns().to_vec(), kind, kernel, errors }
+    }
+}

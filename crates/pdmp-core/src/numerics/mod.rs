@@ -1,0 +1,10 @@
+//! Numerical methods that know no movement.
+
+pub(crate) mod linear_algebra;
+pub(crate) mod simd;
+pub(crate) mod smoothing_spline;
+pub(crate) mod spline;
+pub(crate) mod threads;
+
+pub use smoothing_spline::{Noise, Smoothing};
+pub use threads::Threads;

@@ -1,0 +1,39 @@
+"""Folders of recordings, below the one that an environment variable names."""
+
+import os
+from pathlib import Path
+
+from pdmp._messages import value_error
+from pdmp.datasets._registry import REGISTRY
+
+VARIABLE = "PDMP_DATA"
+"""Environment variable with the path of the folder that holds a folder of each set."""
+
+
+def folder(name: str) -> Path:
+    """Returns the folder of a set of recordings, for `pdmp.io.read_folder`.
+
+    Parameters
+    ----------
+    name : str
+        Name of a set in `REGISTRY`.
+
+    Raises
+    ------
+    ValueError
+        A name that the registry does not have.
+    FileNotFoundError
+        The environment variable `PDMP_DATA` is not set, or its folder does not have the set.
+    """
+    if name not in REGISTRY:
+        raise value_error(f"name: no '{name}' among {', '.join(REGISTRY)}")
+    root = os.environ.get(VARIABLE)
+    path = Path(root or "", name)
+    if root and path.is_dir():
+        return path
+    found = f"{path} is not a folder" if root else f"{VARIABLE} is not set"
+    recordings = REGISTRY[name]
+    raise FileNotFoundError(
+        f"{name}: {found}: set the environment variable {VARIABLE} to a folder with {name}/; the "
+        f"recordings are at {recordings.url} ({recordings.licence})"
+    )

@@ -1,0 +1,210 @@
+"""The form of a CSV file: separator, lines before the header, header, units, and rows."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+from pdmp._labels import split_label
+from pdmp._messages import value_error
+from pdmp.io import _fields
+
+SAMPLE = 200
+"""Rows from which the form of a file is found; a preamble must end among them."""
+MAX_UNIT = 40
+"""Characters of a unit; patterns take too long for texts of any length."""
+UNIT = re.compile(
+    r"[munµμkMG]?(s|m|rad|N|Nm|g|V|A|Hz|W|J|Pa|T)|deg|°|°C|sec|min|h|cm|dm|deg|turns?|rev|px|%|1|"
+    r"counts?|quat"
+)
+"""Units, with their prefixes, as they stand alone or in products and quotients."""
+Row = tuple[int, list[str]]
+
+
+@dataclass
+class CsvTable:
+    """Header of a CSV file, and what is needed to go through its rows."""
+
+    path: Path
+    line: int  # of the header
+    fields: list[str]  # of the header
+    units: list[str] | None = None  # of a row below it
+    first: int = 0  # line before the first sample
+    separator: str = ","
+    text: str = field(default="", repr=False)
+
+    def rows(self, *, blank: bool = False) -> Iterator[Row]:
+        """Yields line number and fields of each sample; with `blank`, those that have none too.
+
+        Rows without any field, and empty rows at the end, are left out.
+        """
+        skipped: list[Row] = []
+        for line, fields in _parse(self.path, self.text, self.separator):
+            if line <= self.first:
+                continue
+            if len(fields) != len(self.fields) and any(fields):
+                hint = ""
+                if len(fields) > len(self.fields) and self.separator == ",":
+                    hint = "; where commas are decimal, separate fields by semicolons"
+                raise value_error(
+                    f"{self.path}, line {line}: {len(fields)} fields, "
+                    f"expected {len(self.fields)} as in the header{hint}"
+                )
+            if not any(fields):
+                if blank and len(fields) == len(self.fields) > 1:
+                    skipped.append((line, fields))
+                continue
+            yield from skipped
+            skipped.clear()
+            yield line, fields
+
+
+def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False) -> CsvTable:
+    """Finds separator, header and units of a CSV file.
+
+    Comments, which begin with #, a line such as `sep=;` and other lines before the header are
+    passed over. The header is the row with as many fields as the samples have that names the
+    columns; if there is a choice, the one with a name among `times`. It may stand in a comment.
+    Below it, a row of units is taken for one. The header of an index, whose rows may be words, is
+    its first row.
+    """
+    raw = path.read_bytes()
+    try:
+        # Spreadsheets write UTF-16 with a mark, and call it Unicode.
+        text = raw.decode("utf-16" if raw[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8-sig")
+    except UnicodeDecodeError:
+        raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
+    separator = _separator(path, text)
+    sample = [row for row in islice(_parse(path, text, separator), SAMPLE) if any(row[1])]
+    sample = [row for row in sample if not _separating(separator.join(row[1]))]
+    if not sample:
+        raise value_error(f"{path}: empty: expected a header row with names, then one sample a row")
+    width = _width([fields for _, fields in sample])
+    line, fields = sample[0]
+    if not index:
+        line, fields = _header(path, text, separator, sample, width, times)
+    below = next((row for row in sample if row[0] > line), None)
+    units, first = None, line
+    if not index and below is not None and len(below[1]) == width and _are_units(below[1]):
+        units, first = [unit.strip("[]()-") for unit in below[1]], below[0]
+    fields = [re.sub(r"^%\s+", "", fields[0]), *fields[1:]]
+    return CsvTable(path, line, fields, units, first, separator, text)
+
+
+def _parse(path: Path, text: str, separator: str) -> Iterator[Row]:
+    """Yields line number and fields of each row; comments are blank ones."""
+    lines = ("\n" if _is_comment(line) else line for line in io.StringIO(text, newline=""))
+    if separator == " ":
+        lines = (line.strip() + "\n" for line in lines)
+    reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    try:
+        for row in reader:
+            yield reader.line_num, [cell.strip() for cell in row]
+    except csv.Error as error:
+        raise value_error(f"{path}, line {reader.line_num}: {error}") from None
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip(" ").startswith("#")
+
+
+def _separator(path: Path, text: str) -> str:
+    """Returns the separator that gives most of the first rows the same number of fields."""
+    head = "".join(islice(io.StringIO(text, newline=""), SAMPLE))
+    for line in head.splitlines():
+        if separator := _separating(line):
+            return separator
+        if line.strip():
+            break
+    alike = {",": 1}  # rows with as many fields; of equals, the first separator is taken
+    for separator in ",;\t ":
+        rows = [fields for _, fields in _parse(path, head, separator) if len(fields) > 1]
+        counts = Counter(len(fields) for fields in rows if any(fields))
+        alike[separator] = max(alike.get(separator, 0), *counts.values(), 0)
+    return max(alike, key=lambda separator: alike[separator])
+
+
+def _separating(line: str) -> str:
+    """Returns the separator that a line such as `sep=;` names, or none."""
+    found = re.fullmatch(r'"?sep=(.|\\t)"?', line.strip("\r\n"), re.IGNORECASE)
+    return found[1].replace("\\t", "\t") if found else ""
+
+
+def _width(rows: list[list[str]]) -> int:
+    """Returns the number of fields that most rows have; words before the header have one."""
+    counts = Counter(len(fields) for fields in rows)
+    wide = {n: count for n, count in counts.items() if n > 1} or counts
+    return max(wide, key=lambda n: (wide[n], n))
+
+
+def _header(
+    path: Path, text: str, separator: str, sample: list[Row], width: int, times: Collection[str]
+) -> Row:
+    """Returns the row that names the columns; the first one if there is none."""
+    named: list[Row] = []
+    before: list[str] = []
+    for line, fields in sample:
+        if len(fields) == width and _are_numbers(fields):
+            break
+        units = named and before is named[-1][1] and _are_units(fields)
+        if len(fields) == width and not units and _are_names(fields):
+            named.append((line, fields))
+        before = fields
+    timed = [row for row in named if any(split_label(cell)[0] in times for cell in row[1])]
+    if len(timed or named) > 1 and not timed:
+        raise value_error(
+            f"{path}: lines {named[0][0]} and {named[1][0]} may both name the columns: delete what "
+            "stands before the header"
+        )
+    if named:
+        return (timed or named)[0]
+    found = sample[0]
+    for number, comment in enumerate(io.StringIO(text), 1):
+        if number >= sample[0][0]:
+            break
+        if _is_comment(comment):
+            for _, fields in _parse(path, comment.lstrip(" #%"), separator):
+                if len(fields) == width and _are_names(fields):
+                    found = number, fields
+    return found
+
+
+def _are_names(fields: list[str]) -> bool:
+    """Returns whether a row may name the columns; the first may have no name, nor the last."""
+    inner = fields[1:-1] if len(fields) > 2 else [cell for cell in fields if cell]
+    return (
+        any(fields)
+        and all(map(_fields.is_name, inner))
+        and not any(_fields.is_number(fields[k]) for k in (0, -1))
+    )
+
+
+def _are_numbers(fields: list[str]) -> bool:
+    """Returns whether a row is a sample."""
+    values = [cell for cell in fields if not _fields.is_gap(cell)]
+    return bool(values) and all(_fields.is_number(cell.replace(",", ".", 1)) for cell in values)
+
+
+def _are_units(fields: list[str]) -> bool:
+    """Returns whether a row gives units: each in brackets, or one that is known."""
+    said = [cell for cell in fields if cell.strip("-") and not _fields.is_number(cell)]
+    # By itself, a word above the samples is rather a name.
+    lone = len(fields) == 1 and not fields[0].startswith(("[", "("))
+    return bool(said) and not lone and all(map(_is_unit, fields))
+
+
+def _is_unit(cell: str) -> bool:
+    if len(cell) > MAX_UNIT:
+        return False
+    if re.fullmatch(r"-?|\[[^][]*\]|\([^()]*\)", cell):
+        return True
+    parts = re.split(r"[/*·⋅ ]", re.sub(r"(\^?[-+]?[1-4]|[²³⁴⁻¹])+$", "", cell))
+    parts = [re.sub(r"(\^?[-+]?[1-4]|[²³⁴⁻¹])+$", "", part) for part in parts]
+    return all(map(UNIT.fullmatch, parts))

@@ -1,0 +1,35 @@
+"""A demonstration from what a file holds, with errors that name the file."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdmp._labels import FULL_TURN
+from pdmp._messages import value_error
+from pdmp._native import Demonstration, fill
+
+
+def make_demonstration(
+    source: Path | str,
+    position: NDArray[Any],
+    *,
+    dt: float | None,
+    time: NDArray[Any] | None,
+    names: Sequence[str] | None,
+    units: Sequence[str] | None,
+    max_gap: float,
+    context: Sequence[float | str] | None = None,
+) -> Demonstration:
+    """Returns a demonstration with its gaps filled, and `source` before the text of its errors."""
+    n_samples, n_dofs = position.shape
+    columns = [f"y{d}" for d in range(n_dofs)] if names is None else names
+    turns = [FULL_TURN.get(unit, 0.0) if unit else np.nan for unit in units or [""] * n_dofs]
+    clock = np.arange(n_samples) * (dt or 1.0) if time is None else time
+    try:
+        whole = fill(position, clock, columns, turns, max_gap)
+        return Demonstration(whole, dt=dt, time=time, context=context, names=names, units=units)
+    except ValueError as error:
+        raise value_error(f"{source}: {error}") from None

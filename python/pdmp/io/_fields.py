@@ -1,0 +1,116 @@
+"""Names and numbers of a CSV file, with the place of whatever is wrong in them."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from pdmp._messages import value_error
+
+MAX_SHOWN = 80
+"""Characters of a field that an error quotes."""
+GAPS = frozenset(
+    [
+        "na",
+        "n/a",
+        "#n/a",
+        "#na",
+        "<na>",
+        "nan",
+        "+nan",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "1.#qnan",
+        "-1.#qnan",
+        "1.#ind",
+        "-1.#ind",
+        "null",
+        "none",
+    ]
+)
+"""Texts that mark a missing number, beside the empty one."""
+
+
+def listed(argument: str, names: Sequence[str]) -> list[str]:
+    """Returns several names as a list; a text would be taken apart letter by letter."""
+    if isinstance(names, str):
+        raise value_error(f"{argument} = '{names}': pass a list of names, ['{names}']")
+    return list(names)
+
+
+def check_names(path: Path, line: int, names: Sequence[str]) -> None:
+    """Checks that the first row names the columns, each by a name of its own."""
+    seen: set[str] = set()
+    for name in names:
+        if not is_name(name):
+            raise value_error(
+                f"{path}, line {line}: '{short(name)}' is not a name: the first row must name the "
+                "columns"
+            )
+        if name in seen:
+            raise value_error(
+                f"{path}, line {line}: two columns are called '{short(name)}': rename one"
+            )
+        seen.add(name)
+
+
+def is_name(field: str) -> bool:
+    """Returns whether a field may head a column."""
+    return bool(field.strip()) and parsed(field.replace(",", ".", 1)) is None
+
+
+def places(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]:
+    """Returns the index of the column of each name."""
+    where = {name: k for k, name in enumerate(header)}
+    for name in names:
+        if name not in where:
+            known = ", ".join(header) if len(header) <= 40 else f"{len(header)} columns"
+            raise value_error(f"{path}: no column '{name}' among {known}")
+    return [where[name] for name in names]
+
+
+def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) -> float:
+    """Returns the finite number in a field of the column called `name`, or NaN for a gap."""
+    value = parsed(field)
+    field = short(field)
+    place = f"{path}, line {line}, column '{name}'"
+    if is_gap(field):
+        if gaps:
+            return math.nan
+        found = f"{field} is not finite" if value is not None else f"'{field}' marks a gap"
+        raise value_error(
+            f"{place}: {found if field else 'empty'}: pass max_gap= to interpolate what is "
+            "missing, or cut the row out"
+        )
+    if value is None:
+        hint = ""
+        if parsed(field.replace(",", ".")) is not None:
+            hint = ": decimal commas are read where semicolons or tabs separate the fields"
+        raise value_error(f"{place}: '{field}' is not a number{hint}")
+    if not math.isfinite(value):
+        raise value_error(f"{place}: {field} is not finite: cut the row out")
+    return value
+
+
+def short(field: str) -> str:
+    """Returns a field, or its beginning where it is long."""
+    return field if len(field) <= MAX_SHOWN else field[:MAX_SHOWN] + "..."
+
+
+def is_gap(field: str) -> bool:
+    """Returns whether a field marks a missing number."""
+    return not field or field.lower() in GAPS
+
+
+def is_number(field: str) -> bool:
+    """Returns whether a field holds a number, finite or not."""
+    return parsed(field) is not None
+
+
+def parsed(field: str) -> float | None:
+    """Returns the number in a field, if it is one."""
+    try:
+        # Python takes 1_000 for a thousand.
+        return None if "_" in field else float(field)
+    except ValueError:
+        return None

@@ -1,0 +1,121 @@
+"""BVH files: the channels of a skeleton, as motion capture exports them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pdmp._messages import value_error
+from pdmp._native import Demonstration
+from pdmp.io import _fields
+from pdmp.io._demonstration import make_demonstration
+
+if TYPE_CHECKING:
+    from bvh import Bvh
+
+
+def read_bvh(
+    path: str | PathLike[str],
+    *,
+    columns: Sequence[str] | None = None,
+    dt: float | None = None,
+    max_gap: float = 0.0,
+    context: Sequence[float | str] | None = None,
+) -> Demonstration:
+    """Reads one demonstration from a BVH file; needs the extra `bvh`.
+
+    Each channel is a degree of freedom, called after joint and channel, such as
+    `LeftLeg.Xrotation`. Rotations, in degrees in the file, come in rad; positions keep the unit of
+    the file, which the format does not tell.
+
+    Parameters
+    ----------
+    path : path
+        A BVH file. Its joints may have any channels in any order.
+    columns : sequence of str, optional
+        Names of the degrees of freedom to keep, in this order; all by default.
+    dt : float, optional
+        Sampling interval [s], in place of the file's frame time.
+    max_gap : float
+        Longest gap [s], of NaN, that is interpolated; by default none is.
+    context : sequence of float or str, optional
+        Context (Q,) of the demonstration.
+
+    Raises
+    ------
+    ImportError
+        The package bvh is not installed.
+    ValueError
+        A file that is not BVH, or not whole, a channel that is missing, or what `Demonstration`
+        refuses.
+    OSError
+        A file that cannot be read.
+    """
+    path = Path(path)
+    motion = _parsed(path)
+    try:
+        found = [
+            f"{' '.join(joint.value[1:])}.{channel}"
+            for joint in motion.get_joints()
+            for channel in joint["CHANNELS"][1:]
+        ]
+        n_frames, interval = motion.nframes, motion.frame_time
+    except Exception:
+        # The parser has no errors of its own.
+        raise value_error(
+            f"{path}: not a whole BVH file: joints, channels or frames lack"
+        ) from None
+    if len(motion.frames) != n_frames:
+        raise value_error(
+            f"{path}: holds {len(motion.frames)} frames, but announces {n_frames}: export it anew"
+        )
+    names = found if columns is None else _fields.listed("columns", columns)
+    where = _fields.places(path, found, names)
+    position = np.array([_frame(path, k, row, found) for k, row in enumerate(motion.frames)])
+    position = position.reshape(n_frames, len(found))[:, where]
+    turning = [name.endswith("rotation") for name in names]
+    position[:, turning] = np.deg2rad(position[:, turning])
+    return make_demonstration(
+        path,
+        position,
+        dt=interval if dt is None else dt,
+        time=None,
+        names=names,
+        units=["rad" if turns else "" for turns in turning],
+        max_gap=max_gap,
+        context=context,
+    )
+
+
+def _parsed(path: Path) -> Bvh:
+    try:
+        from bvh import Bvh
+    except ImportError:
+        raise ImportError("BVH files need the package bvh: pip install 'pdmp[bvh]'") from None
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
+    try:
+        # The parser takes a blank line for a joint, and the last line only with its end.
+        return Bvh("\n".join(line for line in lines if line.strip()) + "\n")
+    except Exception:
+        raise value_error(f"{path}: not a BVH file: its braces do not match") from None
+
+
+def _frame(path: Path, frame: int, row: Sequence[str], names: Sequence[str]) -> list[float]:
+    if len(row) != len(names):
+        raise value_error(f"{path}, frame {frame}: {len(row)} numbers, expected {len(names)}")
+    numbers = []
+    for name, field in zip(names, row, strict=True):
+        try:
+            numbers.append(float(field))
+        except ValueError:
+            raise value_error(
+                f"{path}, frame {frame}, '{name}': '{field}' is not a number"
+            ) from None
+    return numbers

@@ -1,0 +1,237 @@
+"""CSV files: one demonstration in, one trajectory out."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdmp._atomic_write import atomic_write
+from pdmp._labels import DERIVATIVES, split_label
+from pdmp._messages import value_error
+from pdmp._native import Demonstration, Trajectory
+from pdmp.io import _fields, _time_units
+from pdmp.io._csv_layout import CsvTable, parse_layout
+from pdmp.io._demonstration import make_demonstration
+
+THOUSANDS = re.compile(r"[^,]*|[-+]?[1-9]\d{0,2}(,\d{3})+")
+CLOCKS = ("t", "time", "Time", "TIME")
+"""Names of a column of time stamps, if none is given; the first is the default."""
+
+
+def read_csv(
+    path: str | PathLike[str],
+    *,
+    columns: Sequence[str] | None = None,
+    time: str = "t",
+    dt: float | None = None,
+    max_gap: float = 0.0,
+    context: Sequence[float | str] | None = None,
+) -> Demonstration:
+    """Reads one demonstration from a CSV file.
+
+    A column headed `knee [rad]` is called `knee`, and its unit is rad; units may stand in a row of
+    their own below the header too. Fields are separated by commas, semicolons, tabs or spaces;
+    where not by commas, these may be decimal. Lines before the header, comments, which begin with
+    #, and the unnamed index column that pandas writes are passed over.
+
+    Parameters
+    ----------
+    path : path
+        UTF-8 text with a row of names, then one sample a row.
+    columns : sequence of str, optional
+        Names of the degrees of freedom to keep, in this order; by default all but `time`, and but
+        `<name>_velocity` and `<name>_acceleration` of a column `<name>`, as `write_csv` writes.
+    time : str
+        Column of the time stamps, by default `t` or `time`, in s unless its header, or this name,
+        has ms, µs or ns in brackets. Stamps in ms, µs or ns since 1970 are recognised, with a
+        warning, and count from the first.
+    dt : float, optional
+        Sampling interval [s], in place of time stamps.
+    max_gap : float
+        Longest gap [s] that is interpolated, from the sample before to the one after; by default
+        none is. A gap is an empty field, NaN, NA or null; rows that are missing altogether are
+        none.
+    context : sequence of float or str, optional
+        Context (Q,) of the demonstration.
+
+    Raises
+    ------
+    ValueError
+        A field that is not a finite number, a gap that is longer than `max_gap` or at an end, a
+        column that is missing, time stamps in an unknown unit, or what `Demonstration` refuses;
+        names file, column, and line or time.
+    OSError
+        A file that cannot be read.
+    """
+    path = Path(path)
+    times = CLOCKS if time == CLOCKS[0] else (time, split_label(time)[0])
+    found = parse_layout(path, times if dt is None else ())
+    header, units = _labels(found)
+    names = [name for name in header if name]
+    _fields.check_names(path, found.line, names)
+    stamped = next((name for name in times if name in header), None)
+    if dt is None and stamped is None:
+        raise value_error(
+            f"{path}: no column '{time}' with the time among {', '.join(names)}: "
+            "name it with time=, or pass dt="
+        )
+    if columns is None:
+        derived = {f"{name}{suffix}" for name in names for suffix, _ in DERIVATIVES[1:]}
+        names = [name for name in names if name != stamped and name not in derived]
+    else:
+        names = _fields.listed("columns", columns)
+    where = _fields.places(path, header, names)
+    clock = header.index(stamped) if dt is None and stamped is not None else None
+    position, stamps = _numbers(found, header, where, clock, gaps=max_gap > 0)
+    if clock is not None and stamps is not None:
+        name = header[clock]
+        given = units[clock] or ("" if name == time else split_label(time)[1])
+        remedy = f"write '{name} [{{unit}}]' in the header or as time="
+        unit = _time_units.unit_of(path, name, given)
+        stamps = _time_units.seconds(f"{path}, column '{name}'", stamps, unit, remedy)
+    return make_demonstration(
+        path,
+        position,
+        dt=dt,
+        time=stamps,
+        names=names,
+        units=[units[k] for k in where] if any(units[k] for k in where) else None,
+        max_gap=max_gap,
+        context=context,
+    )
+
+
+def _labels(found: CsvTable) -> tuple[list[str], list[str]]:
+    """Returns names and units of the columns; those of the header go before those below it."""
+    header, units = map(list, zip(*map(split_label, found.fields), strict=True))
+    if found.units is not None:
+        units = [unit or below for unit, below in zip(units, found.units, strict=True)]
+    return header, units
+
+
+def _numbers(
+    found: CsvTable, header: list[str], where: list[int], clock: int | None, *, gaps: bool
+) -> tuple[NDArray[Any], NDArray[Any] | None]:
+    """Returns positions (T, D), NaN in gaps, and time stamps (T,) as they are written."""
+    path = found.path
+    numbers: list[list[float]] = []
+    stamps: list[float] = []
+    names = [header[k] for k in where]
+    unnamed = [k for k, name in enumerate(header) if not name]
+    decimal = {True: 0, False: 0}  # line where a number has a decimal comma, or a point
+    thousands = True  # whether the commas may separate thousands
+    for line, row in found.rows(blank=clock is None):
+        _check_unnamed(path, line, row, unnamed, len(numbers))
+        kept = [row[k] for k in where]
+        stamp = "0" if clock is None else row[clock]
+        text = "".join((*kept, stamp))
+        if found.separator != "," and "," in text:
+            decimal[True] = line
+            thousands = thousands and all(map(THOUSANDS.fullmatch, (*kept, stamp)))
+            kept, stamp = [cell.replace(",", ".") for cell in kept], stamp.replace(",", ".")
+        if "." in text:
+            decimal[False] = line
+        if found.separator != "," and all(decimal.values()):
+            raise value_error(
+                f"{path}, line {line}: numbers have decimal commas and decimal points: write all "
+                "of them with one of the two, and no separators of thousands"
+            )
+        if clock is not None:
+            value = _fields.number(path, line, header[clock], stamp)
+            # ns since 1970 have more digits than a double, and fewer than an integer.
+            stamps.append(int(stamp) if stamp.isdecimal() and value < 2**63 else value)
+        numbers.append(_row(path, line, kept, names, gaps=gaps))
+    if decimal[True] and thousands:
+        raise value_error(
+            f"{path}, line {decimal[True]}: commas may be decimal or separate thousands: write "
+            "decimal points"
+        )
+    positions = np.array(numbers, float).reshape(len(numbers), len(where))
+    return positions, None if clock is None else np.array(stamps)
+
+
+def _row(path: Path, line: int, cells: list[str], names: list[str], *, gaps: bool) -> list[float]:
+    """Returns the numbers of a row."""
+    try:
+        values = list(map(float, cells))
+        if all(map(math.isfinite, values)) and "_" not in "".join(cells):
+            return values
+    except ValueError:
+        pass
+    return [
+        _fields.number(path, line, name, cell, gaps=gaps)
+        for name, cell in zip(names, cells, strict=True)
+    ]
+
+
+def _check_unnamed(path: Path, line: int, row: list[str], unnamed: list[int], sample: int) -> None:
+    """Checks that a column without a name is empty or the index that pandas writes."""
+    for k in unnamed:
+        if row[k] and not (k == 0 and row[k] == str(sample)):
+            raise value_error(
+                f"{path}, line {line}: '{row[k]}' stands in column {k + 1}, which has no name: "
+                "the first row must name the columns"
+            )
+
+
+def write_csv(
+    path: str | PathLike[str],
+    trajectory: Trajectory,
+    names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
+) -> None:
+    """Writes a trajectory as CSV; `read_csv` reads its positions back.
+
+    The columns are `t` [s], then the position of each degree of freedom under its name, then
+    velocities under `<name>_velocity` and accelerations under `<name>_acceleration`, with the units
+    that are known in brackets. Numbers keep every bit. The file appears when it is complete.
+
+    Parameters
+    ----------
+    path : path
+        Where to write.
+    trajectory : Trajectory
+        A rollout.
+    names : sequence of str, optional
+        Names of the D degrees of freedom, in place of the trajectory's.
+    units : sequence of str, optional
+        Their units, in place of the trajectory's; "" where one is not known.
+
+    Raises
+    ------
+    ValueError
+        A number of names or units other than D, or names that would not be read back.
+    OSError
+        A file that cannot be written.
+    """
+    path = Path(path)
+    names = trajectory.names if names is None else _fields.listed("names", names)
+    units = trajectory.units if units is None else _fields.listed("units", units)
+    n_dofs = trajectory.position.shape[1]
+    for kind, given in (("name", names), ("unit", units)):
+        if len(given) != n_dofs:
+            raise ValueError(
+                f"{kind}s has length {len(given)}, expected {n_dofs}: one {kind} per DoF"
+            )
+    header = [f"{name}{suffix}" for suffix, _ in DERIVATIVES for name in names]
+    _fields.check_names(path, 1, ["t", *header])
+    units = [unit and f"{unit}{per}" for _, per in DERIVATIVES for unit in units]
+    fields = [
+        f"{name} [{unit}]" if unit else name for name, unit in zip(header, units, strict=True)
+    ]
+    for name, unit, field in zip(header, units, fields, strict=True):
+        if split_label(field) != (name, unit):
+            raise value_error(f"{path}: '{field}' would not be read back as '{name}' in '{unit}'")
+    columns = (trajectory.time, trajectory.position, trajectory.velocity, trajectory.acceleration)
+    with atomic_write(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["t", *fields])
+        writer.writerows(np.column_stack(columns).tolist())

@@ -1,0 +1,212 @@
+"""Folders with an index, and several files and folders at once."""
+
+import re
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pdmp._labels import split_label
+from pdmp._messages import value_error
+from pdmp._native import Demonstration
+from pdmp.io import _fields
+from pdmp.io._csv_layout import parse_layout
+from pdmp.io._demonstration import make_demonstration
+from pdmp.io.bvh import read_bvh
+from pdmp.io.csv import read_csv
+from pdmp.io.npz import read_npz, recordings
+
+SINGLE = (".csv", ".bvh")
+"""Formats with one demonstration a file."""
+FORMAT = (
+    "expected an index.csv with a row per demonstration, its name under 'id', beside "
+    "demos/<id>.csv or demos/<id>.bvh files or a demos.npz"
+)
+
+
+def read(
+    paths: str | PathLike[str] | Iterable[str | PathLike[str]],
+    *,
+    columns: Sequence[str] | None = None,
+    time: str = "t",
+    dt: float | None = None,
+    max_gap: float = 0.0,
+    context: Sequence[str] | None = None,
+) -> list[Demonstration]:
+    """Reads every demonstration in CSV, BVH and NPZ files and folders, in the order given.
+
+    Parameters
+    ----------
+    paths : path or iterable of path
+        Files and folders.
+    columns : sequence of str, optional
+        Names of the degrees of freedom to keep, in this order; all by default.
+    time : str
+        Column of the time stamps in CSV files.
+    dt : float, optional
+        Sampling interval [s], in place of time stamps.
+    max_gap : float
+        Longest gap [s] that is interpolated; by default none is.
+    context : sequence of str, optional
+        Columns of the folders' index whose numbers or labels make the context (Q,).
+
+    Raises
+    ------
+    ValueError
+        A file of another format, or what the readers of each format refuse.
+    OSError
+        A file that cannot be read.
+    """
+    demos: list[Demonstration] = []
+    paths = [paths] if isinstance(paths, (str, PathLike)) else paths
+    options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
+    for path in map(Path, paths):
+        if path.is_dir():
+            demos += read_folder(path, time=time, context=context, **options).values()
+        elif context is not None:
+            raise value_error(f"{path}: a context is read from the index.csv of a folder: pass one")
+        elif path.suffix.lower() in SINGLE:
+            demos.append(_read_single(path, time, **options))
+        elif path.suffix.lower() == ".npz":
+            demos += read_npz(path, **options).values()
+        else:
+            raise value_error(f"{path}: expected a .csv, .bvh or .npz file or a folder")
+    return demos
+
+
+def read_folder(
+    path: str | PathLike[str],
+    *,
+    columns: Sequence[str] | None = None,
+    time: str = "t",
+    dt: float | None = None,
+    max_gap: float = 0.0,
+    context: Sequence[str] | None = None,
+) -> dict[str, Demonstration]:
+    """Reads the demonstrations that a folder's `index.csv` lists, by their ids.
+
+    Of a folder without an index, all CSV and BVH files are read, or all in its folder `demos`, or
+    its `demos.npz`, by their names in natural order; they have no context.
+
+    Parameters
+    ----------
+    path : path
+        A folder as `pdmp.io` describes.
+    columns : sequence of str, optional
+        Names of the degrees of freedom to keep, in this order; all by default.
+    time : str
+        Column of the time stamps in CSV files.
+    dt : float, optional
+        Sampling interval [s], in place of time stamps.
+    max_gap : float
+        Longest gap [s] that is interpolated; by default none is.
+    context : sequence of str, optional
+        Columns of the index whose numbers or labels make the context (Q,) of each demonstration.
+
+    Raises
+    ------
+    ValueError
+        A folder with nothing to read, an index without `id`, or with one twice, an id that is no
+        name of a file, a context that is not a finite number, or what `read_csv`, `read_bvh` and
+        `read_npz` refuse.
+    OSError
+        A file that cannot be read.
+    """
+    path = Path(path)
+    options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
+    index, archive = path / "index.csv", path / "demos.npz"
+    if path.is_dir() and not index.exists():
+        return _read_unlisted(path, time, context, **options)
+    contexts = _contexts(index, context or [])
+    if not archive.exists():
+        files = {name: _file(path, name) for name in contexts}
+        return {
+            name: _read_single(file, time, context=contexts[name], **options)
+            for name, file in files.items()
+        }
+    found = list(recordings(archive, columns, dt))
+    if len(found) != len(contexts):
+        raise value_error(
+            f"{archive}: holds {len(found)} demonstrations, but index.csv lists {len(contexts)}"
+        )
+    return {
+        name: make_demonstration(
+            f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **given
+        )
+        for (name, values), (_, position, given) in zip(contexts.items(), found, strict=True)
+    }
+
+
+def _read_unlisted(
+    path: Path, time: str, context: Sequence[str] | None, **options: Any
+) -> dict[str, Demonstration]:
+    """Reads all files of a folder without an index."""
+    if context is None and (path / "demos.npz").exists():
+        return read_npz(path / "demos.npz", **options)
+    for folder in (path, path / "demos"):
+        files = [file for suffix in SINGLE for file in folder.glob(f"*{suffix}")]
+        if files and context is None:
+            files.sort(key=lambda file: _natural(file.name))
+            return {file.stem: _read_single(file, time, **options) for file in files}
+    raise value_error(f"{path}: no index.csv{'' if context else ', and no files'}: {FORMAT}")
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Returns a sort key in natural order, "2" before "10"."""
+    return [(int(part) if part.isdecimal() else -1, part) for part in re.split(r"(\d+)", name)]
+
+
+def _file(path: Path, name: str) -> Path:
+    """Returns the one file of that name, a CSV file where there is none."""
+    if not name or re.search(r"[/\\:\x00-\x1f]", name) or name in (".", ".."):
+        raise value_error(f"{path / 'index.csv'}: id '{name}' is no name of a file: {FORMAT}")
+    folder = path / "demos"
+    paths = [folder / f"{name}{suffix}" for suffix in SINGLE]
+    if name.lower().endswith(SINGLE):
+        paths.append(folder / name)
+    return next((path for path in paths if path.exists()), paths[0])
+
+
+def _read_single(path: Path, time: str, **options: Any) -> Demonstration:
+    """Reads a file of one demonstration; BVH files hold their interval and need no column."""
+    if path.suffix.lower() == ".bvh":
+        return read_bvh(path, **options)
+    return read_csv(path, time=time, **options)
+
+
+def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str] | None]:
+    """Reads the ids in an index, each with its context.
+
+    A column without any number holds labels.
+    """
+    found = parse_layout(path, index=True)
+    header, lines = [split_label(field)[0] for field in found.fields], list(found.rows())
+    if found.separator != ",":
+        lines = [(line, list(map(_pointed, fields))) for line, fields in lines]
+    _fields.check_names(path, found.line, header if header[0] else header[1:])
+    name, *where = _fields.places(path, header, ["id", *_fields.listed("context", columns)])
+    if not lines:
+        raise value_error(f"{path}: lists no demonstrations: {FORMAT}")
+    labels = {k for k in where if not any(_fields.is_number(fields[k]) for _, fields in lines)}
+    contexts: dict[str, list[float | str] | None] = {}
+    for line, fields in lines:
+        if fields[name] in contexts:
+            raise value_error(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
+        for k in where:
+            if not fields[k] or (k not in labels and _fields.is_gap(fields[k])):
+                kind = "label" if k in labels else "number"
+                raise value_error(
+                    f"{path}, line {line}, column '{header[k]}': no {kind}: fill it in"
+                )
+        values = [
+            fields[k] if k in labels else _fields.number(path, line, header[k], fields[k])
+            for k in where
+        ]
+        contexts[fields[name]] = values or None
+    return contexts
+
+
+def _pointed(field: str) -> str:
+    """Returns a number with a decimal point, in place of a comma, and texts as they are."""
+    pointed = field.replace(",", ".")
+    return pointed if _fields.is_number(pointed) else field

@@ -1,0 +1,35 @@
+"""Preparation of raw recordings for `pdmp.fit`.
+
+`unwrap` removes jumps of angles, `lowpass` noise, `trim` the rests at both ends; `resample` gives a
+constant interval, `cut` the parts between given times. Each takes one demonstration, a sequence or
+a mapping as a reader returns it, and returns as many results. `cycles` turns cyclic recordings into
+demonstrations of a rhythmic primitive::
+
+    cycles = pdmp.preprocessing.cycles(pdmp.io.read_csv("walk.csv"))
+    model = pdmp.fit(cycles, kind="rhythmic")
+"""
+
+from pdmp import _native
+from pdmp.preprocessing import angles
+from pdmp.preprocessing._vectorized import vectorized
+from pdmp.preprocessing.cyclic import Cycles, Growth, Rejected, cycles
+
+cut = vectorized(_native.cut)
+lowpass = vectorized(_native.lowpass)
+period = vectorized(_native.period)
+resample = vectorized(_native.resample)
+trim = vectorized(_native.trim)
+unwrap = vectorized(angles.unwrap)
+
+__all__ = [
+    "Cycles",
+    "Growth",
+    "Rejected",
+    "cut",
+    "cycles",
+    "lowpass",
+    "period",
+    "resample",
+    "trim",
+    "unwrap",
+]

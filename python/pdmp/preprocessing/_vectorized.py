@@ -1,0 +1,47 @@
+"""Functions of one demonstration, applied to each of several."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
+
+from pdmp._messages import value_error
+from pdmp._native import Demonstration
+
+P = ParamSpec("P")
+R = TypeVar("R")
+Name = TypeVar("Name")
+
+
+class Vectorized(Protocol[P, R]):
+    """A function of one demonstration, or of each of several, which gives as many results."""
+
+    @overload
+    def __call__(self, demo: Demonstration, *args: P.args, **kwargs: P.kwargs) -> R: ...
+    @overload
+    def __call__(
+        self, demo: Mapping[Name, Demonstration], *args: P.args, **kwargs: P.kwargs
+    ) -> dict[Name, R]: ...
+    @overload
+    def __call__(
+        self, demo: Sequence[Demonstration], *args: P.args, **kwargs: P.kwargs
+    ) -> list[R]: ...
+
+
+def vectorized(function: Callable[Concatenate[Demonstration, P], R]) -> Vectorized[P, R]:
+    """Returns a function that takes a list or a mapping of demonstrations too."""
+
+    @wraps(function)
+    def for_each(demo: Any, *args: Any, **kwargs: Any) -> Any:
+        if isinstance(demo, Mapping):
+            return {name: _named(name, one, args, kwargs) for name, one in demo.items()}
+        if isinstance(demo, Sequence) and not isinstance(demo, str):
+            return [_named(f"demo {m}", one, args, kwargs) for m, one in enumerate(demo)]
+        return function(demo, *args, **kwargs)
+
+    def _named(name: object, demo: Demonstration, args: Any, kwargs: Any) -> Any:
+        try:
+            return function(demo, *args, **kwargs)
+        except ValueError as error:
+            raise value_error(f"{name}: {error}") from None
+
+    return for_each

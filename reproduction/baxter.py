@@ -1,0 +1,186 @@
+"""The arm of Baxter, a robot with two arms of seven joints, of which the paper's four are used.
+
+The model is that of robosuite 1.5.2 (MIT licence), read as it lies in its wheel: nothing of
+robosuite is imported, and what it depends on need not be installed.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from ctypes.util import find_library
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+JOINTS = ("s0", "s1", "e0", "e1")
+"""Three joints of the shoulder and one of the elbow, the paper's q1 to q4."""
+DIRECTIONS = {"right": np.array([1.0, -1.0, 1.0, -1.0]), "left": np.array([-1.0, -1.0, -1.0, -1.0])}
+"""q = direction · angle, so that the same q of both arms are mirror images.
+
+Baxter counts the pitch of the shoulder and the bending of the elbow the other way than the paper
+prints them. So read, the goal that it prints is a hand on a table before the body, with the elbow
+as far out as people hold it, give or take 15°; with no other signs is it that and within the limits
+of the joints.
+"""
+MOUTH = np.array([0.20, 0.0, 0.55])
+"""Where a mouth would be, below Baxter's screen [m]."""
+
+
+def mjcf() -> Path:
+    """Returns the file of the model.
+
+    Raises
+    ------
+    ImportError
+        The wheel of robosuite is not installed.
+    """
+    package = find_spec("robosuite")
+    if package is None or package.origin is None:
+        raise ImportError(
+            "the model of the robot is not installed: pip install --no-deps robosuite==1.5.2"
+        )
+    return Path(package.origin).parent / "models" / "assets" / "robots" / "baxter" / "robot.xml"
+
+
+def engine() -> Any:
+    """Returns the module of MuJoCo.
+
+    Raises
+    ------
+    ImportError
+        It is not installed, or asked by `MUJOCO_GL` to draw with what is not there.
+    """
+    # It settles what it draws with when it is imported, and on a window if not told otherwise.
+    if sys.platform == "linux" and "DISPLAY" not in os.environ:
+        os.environ.setdefault("MUJOCO_GL", _windowless())
+    try:
+        import mujoco
+        import scipy  # noqa: F401
+    except ModuleNotFoundError as missing:
+        raise ImportError(
+            f"the robot needs {missing.name}: pip install --group reproduction"
+        ) from None
+    except (AttributeError, ImportError, OSError, RuntimeError) as error:
+        asked = os.environ.get("MUJOCO_GL", "")
+        raise ImportError(
+            f'MuJoCo cannot start with MUJOCO_GL="{asked}" ({error}): leave it unset'
+        ) from None
+    return mujoco
+
+
+def specification() -> Any:
+    """Returns the model, a `mujoco.MjSpec` to be added to.
+
+    Raises
+    ------
+    ImportError
+        MuJoCo or the model is not installed.
+    """
+    return engine().MjSpec.from_file(str(mjcf()))
+
+
+class OutOfReach(ValueError):
+    """A place that the arm does not reach within its joint limits."""
+
+
+class Arm:
+    """Kinematics of one arm, the wrist straight.
+
+    Parameters
+    ----------
+    side : {"right", "left"}
+        Which arm.
+    """
+
+    def __init__(self, side: str = "right") -> None:
+        mujoco = engine()
+        self._model = specification().compile()
+        self._data: Any = mujoco.MjData(self._model)
+        joints = [self._model.joint(f"{side}_{joint}") for joint in JOINTS]
+        self._directions = DIRECTIONS[side]
+        self._addresses = [joint.qposadr[0] for joint in joints]
+        limits = self._directions * np.array([joint.range for joint in joints]).T
+        self.lowest, self.highest = limits.min(axis=0), limits.max(axis=0)
+        bodies = ("lower_shoulder", "lower_elbow", "hand")
+        self._bodies = [self._model.body(f"{side}_{body}").id for body in bodies]
+        self._kinematics = mujoco.mj_kinematics
+
+    def places(self, q: ArrayLike) -> Array:
+        """Returns the positions (3, 3) [m] of shoulder, elbow and hand at angles q (4,) [rad]."""
+        self._data.qpos[self._addresses] = self._directions * q
+        self._kinematics(self._model, self._data)
+        return np.array(self._data.xpos[self._bodies])
+
+    def hands(self, path: ArrayLike) -> Array:
+        """Returns the positions of the hand (T, 3) [m] along joint angles (T, 4) [rad]."""
+        return np.array([self.places(q)[2] for q in np.asarray(path)])
+
+    def swivel(self, q: ArrayLike) -> float:
+        """Returns the angle [rad] of the elbow about the line from shoulder to hand.
+
+        It is zero where the plane of the arm holds the mouth, on the other side of that line: a
+        hand so held would be brought to the mouth by bending the elbow alone. People reach within
+        some 5° of that (Kim, Miller, Byl, Abrams, Rosen, IEEE Transactions on Biomedical
+        Engineering 59, 2012, 1770-1779, doi:10.1109/TBME.2012.2194489).
+        """
+        return _swivel(self.places(q))
+
+    def reach(self, hands: Array, swivels: Array, near: ArrayLike) -> Array:
+        """Returns joint angles (T, 4) [rad] that bring hand and elbow along a path.
+
+        Least squares of the hand's distance [m] and of 0.1 m times the sine of half the swivel's
+        error, twice: from each solution to the next, the first from `near`.
+
+        Parameters
+        ----------
+        hands : (T, 3) array
+            Path of the hand [m].
+        swivels : (T,) array
+            Angles of the elbow [rad], as `swivel` counts them.
+        near : (4,) array_like
+            Joint angles near those of the first place.
+
+        Raises
+        ------
+        OutOfReach
+            A place that the arm does not reach within its joint limits.
+        """
+        from scipy.optimize import least_squares
+
+        def gaps(q: Array, hand: Array, swivel: float) -> Array:
+            places = self.places(q)
+            return np.append(places[2] - hand, 0.2 * np.sin(0.5 * (_swivel(places) - swivel)))
+
+        q, path = np.asarray(near, dtype=float), []
+        for hand, swivel in zip(hands, swivels, strict=True):
+            solution = least_squares(gaps, q, method="lm", xtol=1e-12, args=(hand, swivel))
+            q = solution.x
+            inside = np.all((self.lowest <= q) & (q <= self.highest))
+            if not inside or np.linalg.norm(solution.fun) > 1e-6:
+                place = np.round(hand, 3)
+                raise OutOfReach(
+                    f"hands: {place} m is out of reach with the elbow at {swivel:.2f} rad"
+                )
+            path.append(q)
+        return np.array(path)
+
+
+def _windowless() -> str:
+    """Returns the available renderer: with a missing one, MuJoCo cannot be imported at all."""
+    if find_library("EGL") and (find_library("OpenGL") or find_library("GL")):
+        return "egl"
+    return "osmesa" if find_library("OSMesa") else "disable"
+
+
+def _swivel(places: Array) -> float:
+    shoulder, elbow, hand = places
+    axis = (hand - shoulder) / np.linalg.norm(hand - shoulder)
+    away, out = shoulder - MOUTH, elbow - shoulder
+    away, out = away - axis * (axis @ away), out - axis * (axis @ out)
+    return float(np.arctan2(np.cross(away, out) @ axis, away @ out))

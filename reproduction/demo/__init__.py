@@ -1,0 +1,1 @@
+"""A demonstration on human handwriting: five shapes in one primitive."""

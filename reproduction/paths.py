@@ -1,0 +1,67 @@
+"""Drawing what hands and joints did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pdmp.plot._canvas import GREY, PALETTE, canvas, dress, legend
+from reproduction.human import BOX
+from reproduction.reaching import NAMES, Reaching
+from reproduction.robot import DT, SHADES, Robot, boxes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+def draw_boxes(axes: Axes, reaching: Reaching, height: float, **look: Any) -> None:
+    """Draws a pile of boxes from the side."""
+    from matplotlib.patches import Rectangle
+
+    middle = 0.5 * np.linalg.norm(reaching.task.goal - reaching.task.start)
+    for k in range(boxes(height)):
+        corner = (middle - 0.5 * BOX[0], k * BOX[2])
+        box = Rectangle(corner, BOX[0], BOX[2], **{"color": SHADES[k % 2], "alpha": 0.35, **look})
+        axes.add_patch(box)
+
+
+def draw_hand(axes: Axes, reaching: Reaching, hands: Array, **look: Any) -> None:
+    """Draws the path of a hand (T, 3) from the side."""
+    axes.plot(*reaching.side_view(hands), **look)
+
+
+def dress_side(axes: Axes, title: str) -> None:
+    """Labels a view from the side."""
+    dress(axes, "way from start to goal [m]", "height over the table [m]", title)
+
+
+def joints(robots: Mapping[str, Robot], until: float) -> Figure:
+    """Draws commanded and measured joint angles, and the distance between them.
+
+    Parameters
+    ----------
+    robots : mapping of str to Robot
+        By their name in the legend.
+    until : float
+        How much of their time to draw [s].
+    """
+    figure = canvas(None, 7.5, 8.5)
+    panels = figure.subplots(len(NAMES) + 1, 1, sharex=True)
+    for axes, name in zip(panels, NAMES, strict=False):
+        dress(axes, "", f"{name} [rad]")
+    dress(panels[-1], "time [s]", "off by [mrad]")
+    for (name, robot), color in zip(robots.items(), PALETTE, strict=False):
+        told, done = (rows[: round(until / DT)] for rows in robot.log.rows())
+        time = DT * np.arange(1, len(told) + 1)
+        for axes, command, angle in zip(panels, told.T, done.T, strict=False):
+            axes.plot(time, command, color=GREY, linewidth=3, label="commanded")
+            axes.plot(time, angle, color=color, linewidth=1.2, label=name)
+        panels[-1].plot(time, 1e3 * np.abs(done - told).max(axis=1), color=color, linewidth=1)
+    legend(figure, panels[0])
+    return figure

@@ -1,0 +1,258 @@
+"""What the paper argues with: other ways to learn the same reaches, on the same robot.
+
+- a DMP of one demonstration, whose goal and pace can be changed, and nothing else;
+- principal components of the joint trajectories themselves, about their mean, as many as there are
+  styles, played back in time: it stands for the models of trajectories that the paper names;
+- a library of movements from which a new DMP is learnt for every height, by locally weighted
+  regression (Gams, Ude, IEEE-RAS International Conference on Humanoid Robots, 2009, 28-33).
+
+All learn from the nine reaches over none, two and three boxes, and meet one box and four.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pdmp
+from pdmp._markdown import markdown_table
+from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, legend
+from reproduction.heights import N_SAMPLES, TESTED, aligned, lasting, learn, new_goal
+from reproduction.loop import PACE, Held, Movement, NewGoal, drive, from_rest
+from reproduction.reaching import (
+    CONSTANTS,
+    TRAINED,
+    Reaching,
+    demonstrate,
+    duration_of,
+    height_of,
+)
+from reproduction.robot import DT, Robot, boxes, pile
+from reproduction.section import SEED, Section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[Any]  # of float64
+Rival: TypeAlias = Callable[[Reaching], Callable[[float], Movement]]
+"""A way to learn: from reaches to what makes a movement for a height [m]."""
+
+N_STYLES = 3
+WIDTH = 0.45  # m, of the library's kernel: the range of heights shown
+HELD_JOINT, HELD_FOR = 3, 0.5  # the elbow; s
+HELD_AT = 0.3  # of the demonstrated duration
+
+
+def styles(reaching: Reaching) -> Callable[[float], Movement]:
+    """Learns one primitive with three styles, predicted from the height."""
+    model = learn(reaching, N_STYLES)
+    return lambda height: from_rest(model, reaching, model.predict([height]).style)
+
+
+def one_demonstration(reaching: Reaching) -> Callable[[float], Movement]:
+    """Learns a DMP from the demonstration of median duration."""
+    nominal = learn(reaching, N_STYLES).nominal
+    model = pdmp.fit([reaching.of(TRAINED)[nominal]], n_styles=1, **CONSTANTS)
+    return lambda height: from_rest(model, reaching, model.styles[0])
+
+
+def library(reaching: Reaching) -> Callable[[float], Movement]:
+    """Keeps all demonstrations, and learns a DMP for each height from those of similar heights.
+
+    The target is linear in the trajectory, so that the weighted regression of all targets is the
+    regression of the weighted mean; the kernel is (1 − (|h − hᵐ|/width)³)³.
+    """
+    paths, heights, duration = _shown(reaching)
+
+    def synthesise(height: float) -> Movement:
+        near = np.clip(1 - (np.abs(heights - height) / WIDTH) ** 3, 0, None) ** 3
+        mean = np.tensordot(near / near.sum(), paths, axes=1)
+        model = pdmp.fit([mean], dt=duration / (N_SAMPLES - 1), n_styles=1, **CONSTANTS)
+        return from_rest(model, reaching, model.styles[0])
+
+    return synthesise
+
+
+@dataclass
+class Recording:
+    """A trajectory that is played back in time, whatever happens; `goal` changes nothing."""
+
+    trajectory: tuple[Array, Array, Array]
+    goal: Array
+    tick: int = 0
+
+    def step(self, *, measured: Array | None = None) -> pdmp.Status:
+        """Goes on to the next sample, or stays at the last."""
+        self.tick = min(self.tick + 1, len(self.trajectory[0]) - 1)
+        ended = self.tick == len(self.trajectory[0]) - 1
+        return pdmp.Status.FINISHED if ended else pdmp.Status.WORKING
+
+    @property
+    def position(self) -> Array:
+        """Joint angles (4,) [rad]."""
+        return self._row(0)
+
+    @property
+    def velocity(self) -> Array:
+        """Joint velocities (4,) [rad/s]."""
+        return self._row(1)
+
+    @property
+    def acceleration(self) -> Array:
+        """Joint accelerations (4,) [rad/s²]."""
+        return self._row(2)
+
+    def _row(self, derivative: int) -> Array:
+        return np.asarray(self.trajectory[derivative][self.tick])
+
+
+def components(reaching: Reaching) -> Callable[[float], Movement]:
+    """Learns principal components of the trajectories, and their weights from the height."""
+    from scipy.interpolate import CubicSpline
+
+    paths, heights, duration = _shown(reaching)
+    duration *= PACE / CONSTANTS["tau"]
+    flat = paths.reshape(len(paths), -1)
+    mean = flat.mean(axis=0)
+    factors = pdmp.factorise(flat - mean, n_styles=N_STYLES)
+    chosen = pdmp.ContextMap(heights[:, None], factors.styles, "linear")
+
+    def play(height: float) -> Movement:
+        weights = chosen.predict([[height]])[0][0]
+        path = (mean + weights @ factors.basis).reshape(N_SAMPLES, -1)
+        spline = CubicSpline(np.linspace(0, duration, N_SAMPLES), path, bc_type="clamped")
+        # A recording cannot wait for the robot to come to rest; it stays where it ends.
+        times = np.minimum(np.arange(0, duration + 1.0, DT), duration)
+        moving = (times < duration)[:, None]
+        rows = (spline(times), moving * spline(times, 1), moving * spline(times, 2))
+        return Recording(rows, reaching.goal)
+
+    return play
+
+
+RIVALS: dict[str, Rival] = {
+    "PDMP, J = 3": styles,
+    "DMP of one demonstration": one_demonstration,
+    "principal components, 3": components,
+    "library of DMPs": library,
+}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What became of one rival at one height: left alone, to a goal that moves, and held."""
+
+    alone: Robot
+    moved: Robot
+    held: Robot
+    grip: Held
+    new_style: float
+    """Median time to have the movement for a height, ready for its first tick [ms]."""
+
+    def speed_ratio(self) -> float:
+        """Returns the largest joint speed once let go, over the largest when left alone."""
+        return _fastest(self.held, after=self.grip.end) / _fastest(self.alone)
+
+
+def disturbances(reaching: Reaching) -> tuple[NewGoal, Held]:
+    """Returns the disturbances, timed by the clock of the primitive: goal moved, elbow held."""
+    model = learn(reaching, N_STYLES)
+    start = HELD_AT * lasting(model)
+    return new_goal(model, reaching), Held(HELD_JOINT, start, start + HELD_FOR)
+
+
+def attempt(rival: Rival, reaching: Reaching, height: float, command: NewGoal, grip: Held) -> Trial:
+    """Lets one rival reach over a height [m]."""
+    movement_for = rival(reaching)
+    times = []
+    for _ in range(21):
+        began = perf_counter()
+        movement_for(height)
+        times.append(1e3 * (perf_counter() - began))
+
+    def run(*events: NewGoal | Held, feedback: bool = False) -> Robot:
+        movement = movement_for(height)
+        robot = Robot(movement.position, reaching.task, boxes(height))
+        return drive(robot, movement, events, feedback=feedback)
+
+    return Trial(run(), run(command), run(grip, feedback=True), grip, float(np.median(times)))
+
+
+def comparison(seed: int = SEED) -> Section:
+    """Compares the methods that the paper compares in words."""
+    reaching = demonstrate(seed)
+    command, grip = disturbances(reaching)
+    trials = {
+        (name, height): attempt(rival, reaching, height, command, grip)
+        for name, rival in RIVALS.items()
+        for height in TESTED
+    }
+    rows = [
+        [
+            name,
+            pile(height),
+            f"{trial.alone.log.contact():.3f} s",
+            f"{reaching.miss(trial.alone.log.hands[-1]):.1f} mm",
+            f"{reaching.miss(trial.moved.log.hands[-1], command.goal):.1f} mm",
+            f"{trial.speed_ratio():.1f}",
+            f"{trial.held.log.contact():.3f} s",
+            f"{trial.new_style:.2f} ms",
+        ]
+        for (name, height), trial in trials.items()
+    ]
+    header = [
+        "",
+        "over",
+        "touches a box for",
+        "left to the goal",
+        "left to a goal moved on the way",
+        "speed once let go",
+        "touches when held",
+        "time to a new style",
+    ]
+    text = [
+        "All learn from the reaches over none, two and three boxes. Held: the elbow, for half a "
+        "second on its way; speed once let go is the largest of any joint, over the largest of the "
+        "same movement undisturbed. Primitives are told where the robot is, and wait; components "
+        "have no way to. A run ends after 30 s.",
+        markdown_table(header, rows),
+    ]
+    held = {name: trials[name, TESTED[0]] for name in ("PDMP, J = 3", "principal components, 3")}
+    return Section("What the paper argues with", text, {"held": draw_held(held)})
+
+
+def draw_held(trials: dict[str, Trial]) -> Figure:
+    """Draws commanded and measured elbow angle while it was held and after."""
+    figure = canvas(None, 9.5, 3.8)
+    panels = figure.subplots(1, len(trials), sharey=True)
+    for axes, (name, trial) in zip(panels, trials.items(), strict=True):
+        told, done = (rows[:, HELD_JOINT] for rows in trial.held.log.rows())
+        time = DT * np.arange(1, len(told) + 1)
+        within = time < trial.grip.end + 3.0
+        axes.axvspan(trial.grip.start, trial.grip.end, color=ORANGE, alpha=0.2, label="held")
+        undisturbed = trial.alone.log.rows()[0][: within.sum(), HELD_JOINT]
+        axes.plot(time[: len(undisturbed)], undisturbed, "k:", linewidth=1, label="undisturbed")
+        axes.plot(time[within], told[within], color=GREY, linewidth=3, label="commanded")
+        axes.plot(time[within], done[within], color=BLUE, label="measured")
+        dress(axes, "time [s]", "q4 [rad]", name)
+    legend(figure, panels[0])
+    return figure
+
+
+def _fastest(robot: Robot, after: float = 0.0) -> float:
+    """Returns the largest speed of a joint from some time on [rad/s]."""
+    _, done = robot.log.rows()
+    return float(np.abs(np.diff(done[round(after / DT) :], axis=0)).max() / DT)
+
+
+def _shown(reaching: Reaching) -> tuple[Array, Array, float]:
+    """Returns the training reaches (M, N, D), their heights (M,) [m], and their median duration."""
+    shown = reaching.of(TRAINED)
+    paths = np.array([aligned(demo) for demo in shown])
+    heights = np.array([height_of(demo) for demo in shown])
+    return paths, heights, float(np.median([duration_of(demo) for demo in shown]))

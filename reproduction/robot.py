@@ -1,0 +1,196 @@
+"""Baxter in MuJoCo: a table, boxes that can be knocked over, and torques at 1 kHz."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from reproduction.baxter import DIRECTIONS, JOINTS, engine, specification
+from reproduction.human import BOX, RESTING, Task
+
+Array = NDArray[np.float64]
+
+DT = 0.001  # s
+STIFFNESS, DAMPING = 900.0, 60.0  # per s², per s: errors vanish in 0.2 s, critically damped
+GRIP, GRIP_DAMPING = 4000.0, 100.0  # N m/rad, N m s/rad: a hand that holds a joint fast
+BOX_MASS = 0.5  # kg
+TABLE = np.array([0.80, 1.10, 0.04])  # m
+RESTING_ARM = {"s0": 0.0, "s1": 0.9, "e0": 0.0, "e1": 0.6}  # rad, as Baxter counts
+WOOD, SHADES = (0.72, 0.62, 0.48, 1), ((0.95, 0.60, 0.25, 1), (0.84, 0.37, 0.0, 1))
+
+
+@dataclass
+class Log:
+    """What happened, a row per tick."""
+
+    commanded: list[Array] = field(default_factory=list)  # rad
+    measured: list[Array] = field(default_factory=list)  # rad
+    hands: list[Array] = field(default_factory=list)  # m
+    touching: list[bool] = field(default_factory=list)
+    states: list[Array] = field(default_factory=list)  # of MuJoCo, for pictures
+
+    def rows(self) -> tuple[Array, Array]:
+        """Returns commanded and measured joint angles, (T, D) each [rad]."""
+        return np.array(self.commanded), np.array(self.measured)
+
+    def tracking_error(self) -> float:
+        """Returns the largest distance of a joint from its command [rad]."""
+        told, done = self.rows()
+        return float(np.abs(told - done).max())
+
+    def contact(self) -> float:
+        """Returns the time during which the robot touched a box [s]."""
+        return DT * sum(self.touching)
+
+
+class Robot:
+    """Baxter, some arms of which are moved and the rest held still.
+
+    Torques are those that the model asks for, by computed torque control::
+
+        τ = M (q̈_d + 60 (q̇_d − q̇) + 900 (q_d − q)) + h(q, q̇)
+
+    within the limits of the motors.
+
+    Parameters
+    ----------
+    start : (4,) or (8,) array_like
+        Joint angles q1 to q4 [rad] to start from; of the right arm, or of the right and the left.
+    task : Task, optional
+        Where table and boxes stand; without, there are none.
+    n_boxes : int
+        How many boxes are piled up.
+    """
+
+    def __init__(self, start: ArrayLike, task: Task | None = None, n_boxes: int = 0) -> None:
+        mujoco = engine()
+        q = np.array(start, dtype=float)
+        sides = ("right", "left")[: len(q) // len(JOINTS)]
+        names = [f"{side}_{joint}" for side in sides for joint in JOINTS]
+        specified = specification()
+        specified.option.timestep = DT
+        _light(specified)
+        _free_the_arms(specified)
+        if task is not None:
+            _furnish(specified, task, n_boxes)
+        self._mujoco = mujoco
+        self.model = model = specified.compile()
+        self.data: Any = mujoco.MjData(model)
+        moved = [model.joint(name) for name in names]
+        self._moved = np.array([joint.qposadr[0] for joint in moved])
+        self._motors = model.actuator_trnid[:, 0]
+        # The motors' joints come before the boxes, with one degree of freedom and one coordinate
+        # each, in the order of the motors: one index serves for all.
+        self._driven = model.jnt_dofadr[self._motors]
+        self._signs = np.concatenate([DIRECTIONS[side] for side in sides])
+        self._is_box = np.array([_root(model, g).startswith("box") for g in range(model.ngeom)])
+        self._is_robot = np.array([_root(model, g) == "base" for g in range(model.ngeom)])
+        self._hand = model.body("right_hand").id
+        self._grip: tuple[int, float] | None = None
+        for side, joint in product(("right", "left"), JOINTS):
+            self.data.joint(f"{side}_{joint}").qpos = RESTING_ARM[joint]
+        self.data.qpos[self._moved] = self._signs * q
+        self._target = self.data.qpos[self._driven].copy()
+        self.log = Log()
+        mujoco.mj_step1(model, self.data)
+
+    @property
+    def position(self) -> Array:
+        """Joint angles (D,) [rad]."""
+        return np.array(self._signs * self.data.qpos[self._moved])
+
+    def hold(self, joint: int | None) -> None:
+        """Grips the joint of this index at its position, or releases it."""
+        if joint is None:
+            self._grip = None
+            self.data.qfrc_applied[:] = 0
+        else:
+            at = int(self._moved[joint])
+            self._grip = (at, float(self.data.qpos[at]))
+
+    def move(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> None:
+        """Drives the arms towards a state for one tick: (D,) [rad, rad/s, rad/s²]."""
+        model, data, mujoco = self.model, self.data, self._mujoco
+        wanted, rate, asked = self._target, np.zeros(model.nv), np.zeros(model.nv)
+        wanted[self._moved] = self._signs * position
+        rate[self._moved] = self._signs * velocity
+        asked[self._moved] = self._signs * acceleration
+        driven = self._driven
+        asked[driven] += STIFFNESS * (wanted - data.qpos[driven])
+        asked[driven] += DAMPING * (rate[driven] - data.qvel[driven])
+        torque = np.zeros(model.nv)
+        mujoco.mj_mulM(model, data, torque, asked)
+        data.ctrl[:] = np.clip((torque + data.qfrc_bias)[driven], *model.actuator_ctrlrange.T)
+        if self._grip is not None:
+            at, place = self._grip
+            pull = GRIP * (place - data.qpos[at]) - GRIP_DAMPING * data.qvel[at]
+            data.qfrc_applied[at] = pull
+        mujoco.mj_step2(model, data)
+        # Where all is now, and what the next torques are made from.
+        mujoco.mj_step1(model, data)
+        self._write(position)
+
+    def _write(self, position: ArrayLike) -> None:
+        pairs = self.data.contact.geom[self.data.contact.dist < 0]
+        first, second = pairs.T
+        box, robot = self._is_box, self._is_robot
+        touching = (box[first] & robot[second]) | (box[second] & robot[first])
+        self.log.commanded.append(np.array(position))
+        self.log.measured.append(self.position)
+        self.log.hands.append(self.data.xpos[self._hand].copy())
+        self.log.touching.append(bool(touching.any()))
+        self.log.states.append(self.data.qpos.copy())
+
+
+def _furnish(specified: Any, task: Task, n_boxes: int) -> None:
+    """Puts a table below start and goal, and a pile of boxes half way."""
+    box = engine().mjtGeom.mjGEOM_BOX
+    forward = task.forward
+    turned = [0, 0, float(np.arctan2(forward[1], forward[0]))]
+    top = task.middle - [0, 0, RESTING]
+    specified.compiler.degree = False
+    # Pictures show group 1, where the robot's meshes are; what they collide as is group 0.
+    table = specified.worldbody.add_geom(type=box, size=0.5 * TABLE, rgba=WOOD, group=1)
+    table.pos = top + [0.05, 0, -0.5 * TABLE[2]]
+    for k in range(n_boxes):
+        body = specified.worldbody.add_body(name=f"box_{k}", euler=turned)
+        body.pos = top + [0, 0, (k + 0.5) * BOX[2]]
+        body.add_freejoint()
+        body.add_geom(type=box, size=0.5 * BOX, mass=BOX_MASS, rgba=SHADES[k % 2], group=1)
+
+
+def _free_the_arms(specified: Any) -> None:
+    """Lets the upper arms pass through the convex hull that stands for the torso.
+
+    Lowered arms are inside of it while their shells are five centimetres from the robot's own.
+    """
+    for side, part in product(("right", "left"), ("upper_elbow", "lower_elbow")):
+        specified.add_exclude(bodyname1="torso", bodyname2=f"{side}_{part}")
+
+
+def _light(specified: Any) -> None:
+    """Adds two lamps, and a white background."""
+    mujoco = engine()
+    sky = specified.add_texture(type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=16, height=96)
+    sky.builtin, sky.rgb1, sky.rgb2 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, [1, 1, 1], [1, 1, 1]
+    specified.worldbody.add_light(pos=[1.5, -1.5, 2.5], dir=[-0.5, 0.5, -1.0])
+    specified.worldbody.add_light(pos=[1.5, 1.5, 2.5], dir=[-0.5, -0.5, -1.0])
+
+
+def _root(model: Any, geom: int) -> str:
+    """Returns the name of the body below the world that a shape belongs to."""
+    return str(model.body(model.body_rootid[model.geom_bodyid[geom]]).name)
+
+
+def boxes(height: float) -> int:
+    """Returns the number of boxes in a pile of this height [m]."""
+    return round(height / float(BOX[2]))
+
+
+def pile(height: float) -> str:
+    """Returns the description of a pile of this height [m]."""
+    return {0: "no box", 1: "1 box"}.get(boxes(height), f"{boxes(height)} boxes")

@@ -1,0 +1,103 @@
+"""Making the figures, and the files they go to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import TypeAlias
+
+from pdmp import plot
+from pdmp._atomic_write import atomic_write
+from pdmp.plot._canvas import canvas
+from reproduction.section import SEED, Section
+
+Folder: TypeAlias = str | PathLike[str]
+FIGURES = ("fig2", "fig3", "fig4", "fig5", "comparison")
+
+
+def reproduce(
+    figure: str,
+    folder: Folder,
+    recordings: Folder | None = None,
+    seed: int = SEED,
+    progress: Callable[[str], object] | None = None,
+) -> str:
+    """Makes a figure of Matsubara, Hyon and Morimoto (2011), or all of them, and their numbers.
+
+    Parameters
+    ----------
+    figure : {"fig2", "fig3", "fig4", "fig5", "comparison", "all"}
+        Which one; the comparison is with what the paper argues with.
+    folder : path
+        Where its pictures go, and its tables: `fig3.md` for "fig3".
+    recordings : path, optional
+        Folder of CSV files, one person walking in each, with a column `t` [s] and columns
+        `r_sh1, r_sh2, r_sh3, r_elb, l_sh1, …` [rad]; "fig5" then learns from them as well.
+    seed : int
+        Of the noise in the demonstrations: another person, as it were.
+    progress : callable, optional
+        Called with the name of each figure that is begun.
+
+    Returns
+    -------
+    str
+        The tables, in Markdown.
+
+    Raises
+    ------
+    ValueError
+        A figure that there is not; a negative seed; recordings in which too few arms swing.
+    ImportError
+        The dependency group `reproduction` or the model of the robot is not installed.
+    OSError
+        A file that cannot be read or written.
+    """
+    if figure != "all" and figure not in FIGURES:
+        raise ValueError(f'figure = "{figure}": must be one of {", ".join(FIGURES)}, all')
+    if seed < 0:
+        raise ValueError(f"seed = {seed}: must not be negative")
+    if recordings is not None and figure not in ("fig5", "all"):
+        raise ValueError(f'recordings: only "fig5" learns from them, not "{figure}"')
+    if recordings is not None and not Path(recordings).is_dir():
+        raise ValueError(f"recordings: {recordings} is not a folder")
+    canvas(None, 1, 1)  # tells at once where there is nothing to draw figures with
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    reports = []
+    for name in FIGURES if figure == "all" else [figure]:
+        if progress is not None:
+            progress(name)
+        section = _make(name, seed, recordings)
+        reports.append("\n\n".join([f"# {section.title}", *section.text]))
+        for file, picture in section.figures.items():
+            plot.save(picture, folder / f"{file}.png")
+        images = "\n\n".join(f"![{file}]({file}.png)" for file in section.figures)
+        with atomic_write(folder / f"{name}.md") as draft:
+            draft.write_text(f"{reports[-1]}\n\n{images}\n", encoding="utf-8")
+    return "\n\n".join(reports)
+
+
+def _make(figure: str, seed: int, recordings: Folder | None) -> Section:
+    """Makes one of `FIGURES`; imports its module here, so that others do not wait for it."""
+    match figure:
+        case "fig2":
+            from reproduction.one_dof import figure_2
+
+            return figure_2(seed)
+        case "fig3":
+            from reproduction.styles import figure_3
+
+            return figure_3(seed)
+        case "fig4":
+            from reproduction.heights import figure_4
+
+            return figure_4(seed)
+        case "fig5":
+            from reproduction.walking import figure_5
+
+            return figure_5(recordings, seed)
+        case _:
+            from reproduction.rivals import comparison
+
+            return comparison(seed)

@@ -1,0 +1,135 @@
+"""Fig. 3: reaching over boxes in several styles, to several goals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pdmp
+from pdmp._markdown import markdown_table
+from pdmp.plot._canvas import GREY, PALETTE, canvas
+from reproduction import film, paths
+from reproduction.loop import reach_over
+from reproduction.reaching import CONSTANTS, HEIGHTS, Reaching, demonstrate, height_of
+from reproduction.robot import Robot, pile
+from reproduction.section import SEED, Section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+N_STYLES = 3
+SHOWN = (1, 7, 13)  # the second trial over none, two and four boxes
+FRAMES = (0.0, 0.7, 1.2, 1.7, 2.3, 4.0)  # s
+ASIDE = np.array([[0.12, 0.0, 0.0], [0.05, 0.05, 0.12]])  # m, of the hand, from the goal as printed
+
+
+def learn(reaching: Reaching, n_styles: int = N_STYLES) -> pdmp.Model:
+    """Learns from all fifteen reaches, with the constants as printed."""
+    return pdmp.fit(reaching.demos, n_styles=n_styles, **CONSTANTS)
+
+
+def goals(reaching: Reaching) -> list[Array]:
+    """Returns the goal as printed and two beside it [rad]."""
+    usual = reaching.arm.swivel(reaching.goal)
+    aside = reaching.arm.reach(
+        reaching.task.goal + ASIDE, np.full(len(ASIDE), usual), reaching.goal
+    )
+    return [reaching.goal, *aside]
+
+
+def touched(model: pdmp.Model, reaching: Reaching) -> list[float]:
+    """Returns how long the style of each demonstration touches its own boxes [s].
+
+    The movements are as fast as the demonstrations.
+    """
+    return [
+        reach_over(model, reaching, height_of(demo), style, tau=model.tau).log.contact()
+        for demo, style in zip(reaching.demos, model.styles, strict=True)
+    ]
+
+
+def figure_3(seed: int = SEED) -> Section:
+    """Reproduces Fig. 3."""
+    reaching = demonstrate(seed)
+    model = learn(reaching)
+    shares = model.singular_values / model.singular_values.sum()
+    robots = {
+        pile(height_of(reaching.demos[m])): reach_over(
+            model, reaching, height_of(reaching.demos[m]), model.styles[m]
+        )
+        for m in SHOWN
+    }
+    lines = [
+        [
+            name,
+            ", ".join(f"{s:.2f}" for s in model.styles[m]),
+            f"{robot.log.contact():.3f} s",
+            f"{reaching.miss(robot.log.hands[-1]):.2f} mm",
+            f"{1e3 * robot.log.tracking_error():.1f} mrad",
+        ]
+        for m, (name, robot) in zip(SHOWN, robots.items(), strict=True)
+    ]
+    by_styles = []
+    for n_styles in range(1, 5):
+        contacts = np.reshape(touched(learn(reaching, n_styles), reaching), (len(HEIGHTS), -1))
+        clear = (contacts == 0).sum(axis=1)
+        by_styles.append([n_styles, *(f"{n} of {contacts.shape[1]}" for n in clear)])
+    text = [
+        f"Fifteen reaches, {model.n_dofs} joints; the first three singular values make "
+        f"{shares[:3].sum():.1%} of the sum, the first four {shares[:4].sum():.1%}. On the robot, "
+        "tau = 0.6 s, to the goal as printed:",
+        markdown_table(
+            ["", "style", "touches a box for", "left to the goal", "largest tracking error"], lines
+        ),
+        "How many of the three styles shown over each pile clear it, at the pace of the "
+        "demonstrations:",
+        markdown_table(["J", *map(pile, HEIGHTS)], by_styles),
+    ]
+    section = Section(
+        "Fig. 3: reaching over boxes",
+        text,
+        {
+            "fig3_paths": draw_paths(model, reaching, robots),
+            "fig3_joints": paths.joints(robots, until=6.0),
+        },
+    )
+    rows = {name: (robot, FRAMES) for name, robot in robots.items()}
+    return film.attach(section, "fig3_robot", rows, film.REACHING)
+
+
+def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) -> Figure:
+    """Draws the hand from the side: over several styles, and to several goals."""
+    figure = canvas(None, 9.5, 4.2)
+    styles, places = figure.subplots(1, 2, sharey=True)
+    tallest = max(HEIGHTS)
+    for axes in (styles, places):
+        paths.draw_boxes(axes, reaching, tallest, alpha=0.12)
+    for demo in reaching.demos:
+        hands = reaching.arm.hands(demo.position)
+        paths.draw_hand(styles, reaching, hands, color=GREY, linewidth=0.8)
+    for (name, robot), color in zip(robots.items(), PALETTE, strict=False):
+        hands = np.array(robot.log.hands)
+        paths.draw_hand(styles, reaching, hands, color=color, label=name)
+    styles.plot([], [], color=GREY, linewidth=0.8, label="demonstrations")
+    for goal, color in zip(goals(reaching), PALETTE[3:], strict=False):
+        for m in SHOWN:
+            moved = model.rollout(
+                model.styles[m],
+                goal=goal,
+                start=reaching.start,
+                velocity=np.zeros(model.n_dofs),
+                duration=4.0,
+            )
+            hands = reaching.arm.hands(moved.position)
+            paths.draw_hand(places, reaching, hands, color=color, linewidth=1.2)
+        way, height = reaching.side_view(reaching.arm.hands([goal]))
+        places.plot(way, height, "*", color=color, markersize=11)
+    paths.dress_side(styles, "styles, on the robot")
+    paths.dress_side(places, "goals (stars), each in these styles")
+    styles.set_ylim(bottom=0)
+    styles.legend(frameon=False, fontsize=8)
+    return figure

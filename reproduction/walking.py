@@ -1,0 +1,245 @@
+"""Fig. 5: swinging the arms in several styles, switched while they swing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pdmp
+from pdmp._markdown import markdown_table
+from pdmp.io import read_csv
+from pdmp.plot._canvas import BLUE, ORANGE, canvas, dress
+from pdmp.preprocessing import cycles
+from reproduction import film
+from reproduction.robot import DT, Robot
+from reproduction.section import SEED, Section
+from reproduction.swing import NAMES, STYLES, demonstrate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+CONSTANTS: dict[str, Any] = {
+    **{"alpha_z": 0.5, "beta_z": 0.5, "mu": 0.1},
+    **{"spectrum": 0.9, "smoothing": None},
+}
+"""The line that prints them lacks a comma, or means β_z = 1: it is read as α_z = 0.5, β_z = 0.5."""
+LASTING = 20.0  # s, between switches
+SETTLED = 5  # periods after which a new cycle should be reached
+RECORDED = [f"{side}_{angle}" for side in "rl" for angle in ("sh1", "sh2", "sh3", "elb")]
+FASTEST = 1.95  # Hz, of strides: people run no faster unless asked to (see `swing`)
+
+
+@dataclass(frozen=True)
+class Switch:
+    """What is commanded, and how it is called."""
+
+    name: str
+    command: dict[str, Any]
+
+
+@dataclass
+class Swinging:
+    """What the arms were told."""
+
+    position: list[Array] = field(default_factory=list)
+    """Joint angles, a row per tick [rad]."""
+    off: list[float] = field(default_factory=list)
+    """Share of the new cycle's range by which it is missed in the sixth period after a switch.
+
+    Not a number where the next switch comes before that.
+    """
+
+
+def learn(demos: Sequence[pdmp.Demonstration]) -> pdmp.Model:
+    """Learns as many styles as the spectrum asks for, with the constants as printed."""
+    return pdmp.fit(demos, kind="rhythmic", **CONSTANTS)
+
+
+def switches(model: pdmp.Model, styles: Sequence[int], names: Sequence[str]) -> list[Switch]:
+    """Returns a style to begin with; then a new style, amplitude, frequency, and style again.
+
+    A style goes with its anchor. The frequency stays that of the first until it is switched.
+    """
+    first, second, third = (_style(model, m) for m in styles)
+    tau = float(pdmp.as_demonstrated(model, styles[0])["tau"])
+    return [
+        Switch(names[styles[0]], {**first, "tau": tau}),
+        Switch(f"style: {names[styles[1]]}", second),
+        Switch("amplitude × 0.6", {"amplitude": 0.6}),
+        Switch("frequency × 1.2", {"tau": tau / 1.2}),
+        Switch(f"style: {names[styles[2]]}", {**third, "amplitude": 1.0, "tau": tau}),
+    ]
+
+
+def swing(
+    model: pdmp.Model,
+    switches: Sequence[Switch],
+    robot: Robot | None = None,
+    lasting: float = LASTING,
+) -> Swinging:
+    """Swings the arms, with a command every `lasting` seconds; a robot, if given, follows."""
+    controller = model.controller(dt=DT, **switches[0].command)
+    done = Swinging()
+    for switch in switches:
+        for name, value in switch.command.items():
+            setattr(controller, name, value)
+        cycle = _Cycle(model, controller)
+        since, worst = 0.0, np.nan
+        for _ in range(round(lasting / DT)):
+            controller.step()
+            if robot is not None:
+                robot.move(controller.position, controller.velocity, controller.acceleration)
+            done.position.append(controller.position.copy())
+            since += DT / cycle.period
+            if SETTLED <= since < SETTLED + 1:
+                worst = float(np.fmax(worst, cycle.off(controller)))
+        done.off.append(worst)
+    return done
+
+
+class _Cycle:
+    """The limit cycle that a controller's commands lead to."""
+
+    def __init__(self, model: pdmp.Model, controller: pdmp.Controller) -> None:
+        self.period = 2 * np.pi * float(controller.tau)
+        n_steps = 2000
+        made = model.rollout(
+            controller.style,
+            anchor=controller.anchor,
+            amplitude=controller.amplitude,
+            tau=controller.tau,
+            dt=self.period / n_steps,
+        )
+        self._phases = 2 * np.pi * np.arange(n_steps + 1) / n_steps
+        self._position = made.position[: n_steps + 1]
+        self._range = np.ptp(self._position, axis=0).max()
+
+    def off(self, controller: pdmp.Controller) -> float:
+        """Returns the distance from the cycle at the phase of a controller, over its range."""
+        here = [np.interp(controller.phase, self._phases, joint) for joint in self._position.T]
+        return float(np.abs(controller.position - here).max() / self._range)
+
+
+def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) -> Section:
+    """Reproduces Fig. 5, with generated cycles on the robot, and with recordings if there are."""
+    walks = None if recordings is None else recorded(Path(recordings))
+    names = list(STYLES)
+    model = learn(demonstrate(seed))
+    chosen = [names.index(name) for name in ("normal", "marching", "girly")]
+    commands = switches(model, chosen, names)
+    robot = Robot(model.rollout(**commands[0].command).position[0])
+    done = swing(model, commands, robot)
+    text = [
+        f"{len(names)} styles of both arms, {model.n_dofs} joints. {_spectrum(model)} The largest "
+        f"tracking error on the robot is {1e3 * robot.log.tracking_error():.1f} mrad.",
+        _settling(commands, done),
+    ]
+    section = Section(
+        "Fig. 5: stylised arm swing",
+        text,
+        {"fig5_joints": draw(model, commands, done, NAMES[:4])},
+    )
+    film.attach(section, "fig5_robot", _instants(model, robot, chosen, names), film.SWINGING)
+    if walks is not None:
+        told, section.figures["fig5_recorded"] = walks
+        section.text += told
+    return section
+
+
+def draw(
+    model: pdmp.Model, commands: Sequence[Switch], done: Swinging, names: Sequence[str]
+) -> Figure:
+    """Draws the joints of one arm about each switch."""
+    position = np.array(done.position)
+    lasting = len(position) * DT / len(commands)
+    figure = canvas(None, 11.0, 7.0)
+    panels = figure.subplots(len(names), len(commands) - 1, sharey="row", sharex="col")
+    for column, switch in enumerate(commands[1:], start=1):
+        at = column * lasting
+        rows = slice(round((at - 4) / DT), round((at + 8) / DT))
+        time = DT * np.arange(rows.start, rows.stop)
+        for joint, name in enumerate(names):
+            axes = panels[joint, column - 1]
+            axes.axvline(at, color=ORANGE, linewidth=1)
+            axes.plot(time, position[rows, joint], color=BLUE, linewidth=1.1)
+            dress(axes, "", f"{name} [rad]" if column == 1 else "")
+        panels[0, column - 1].set_title(switch.name, fontsize=9)
+        panels[-1, column - 1].set_xlabel("time [s]")
+    return figure
+
+
+def _style(model: pdmp.Model, m: int) -> dict[str, Any]:
+    arguments = pdmp.as_demonstrated(model, m)
+    return {"style": arguments["style"], "anchor": arguments["anchor"]}
+
+
+def _instants(
+    model: pdmp.Model, robot: Robot, chosen: Sequence[int], names: Sequence[str]
+) -> dict[str, tuple[Robot, list[float]]]:
+    """Returns six moments of a stride in each style, late in the first, second and last spell."""
+    normal, marching, girly = (names[m] for m in chosen)
+    stride = np.arange(6) / 6 * model.durations[chosen[0]]
+    spells = {normal: 1, marching: 2, girly: 5}
+    return {name: (robot, list(n * LASTING - 4 + stride)) for name, n in spells.items()}
+
+
+def recorded(folder: Path) -> tuple[list[str], Figure]:
+    """Learns from recordings of people who walk, one mean stride of each."""
+    files = sorted(folder.glob("*.csv"))
+    if not files:
+        raise ValueError(f"recordings: {folder} has no CSV file; each is one person walking")
+    kept, names, odd = [], [], []
+    for file in files:
+        recording = read_csv(file, columns=RECORDED)
+        try:
+            period = float(cycles(recording, average=True).periods[0])
+        except ValueError:
+            odd.append(file.stem)
+            continue
+        if period * FASTEST < 1:
+            odd.append(file.stem)
+            continue
+        kept.append(recording)
+        names.append(file.stem)
+    if len(kept) < 4:
+        raise ValueError(
+            f"recordings: {folder} has {len(kept)} in which strides repeat: pass at least 4"
+        )
+    strides = cycles(kept, average=True)
+    model = learn(list(strides))
+    by_range = np.argsort([np.ptp(stride.position, axis=0).max() for stride in strides])
+    # The median, one of the wider and the widest: no style is switched to itself.
+    chosen = [int(by_range[share * (len(kept) - 1) // 4]) for share in (2, 3, 4)]
+    commands = switches(model, chosen, names)
+    done = swing(model, commands)
+    without = f", without {', '.join(odd)}, in which no stride repeats" if odd else ""
+    told = [
+        f"Recordings of {len(kept)} walks{without}. {_spectrum(model)}",
+        _settling(commands, done),
+    ]
+    return told, draw(model, commands, done, RECORDED[:4])
+
+
+def _spectrum(model: pdmp.Model) -> str:
+    """Returns a sentence on the number of styles, and the share of the paper's four."""
+    share = model.singular_values[:4].sum() / model.singular_values.sum()
+    return (
+        f"To exceed 90 % of the sum, the spectrum asks for J = {model.n_styles}; "
+        f"four make {share:.1%}."
+    )
+
+
+def _settling(commands: Sequence[Switch], done: Swinging) -> str:
+    rows = zip(commands, done.off, strict=True)
+    header = ["switch", "off the new cycle in the sixth period"]
+    return markdown_table(
+        header, ([switch.name, f"{off:.2%} of its range"] for switch, off in rows)
+    )
