@@ -15,7 +15,7 @@ process = pytest.importorskip("sklearn.gaussian_process")
 kernels = process.kernels
 
 TINYGP = Path(__file__).parent / "data" / "tinygp.npz"
-MANY = settings(max_examples=200, deadline=None, derandomize=True, database=None)
+MANY = settings(max_examples=200)
 THEIRS = {
     "matern32": lambda length, **bounds: kernels.Matern(length, nu=1.5, **bounds),
     "matern52": lambda length, **bounds: kernels.Matern(length, nu=2.5, **bounds),
