@@ -17,7 +17,6 @@ from pdmp.evaluation import (
     LinearWeights,
     MovedGoal,
     NearestDemonstration,
-    PeerWeights,
     Recordings,
     baselines,
 )
@@ -380,11 +379,3 @@ def test_labels_held_out_altogether_are_refused() -> None:
     mixed = [[0.1], *manners[1:]]
     with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 numbers"):
         pdmp.evaluate(movements, contexts=mixed, dt=0.01)
-
-
-def test_weights_of_the_peer_give_movements_back() -> None:
-    """A ProMP of movement_primitives with a linear map foresees what is linear in its context."""
-    pytest.importorskip("movement_primitives")
-    found = evaluated({"peer": LinearWeights(PeerWeights())})
-    assert found.summary("peer", "interpolation").relative < 1e-3
-    assert found.summary("peer", "extrapolation").relative < 1e-3

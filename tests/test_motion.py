@@ -12,20 +12,9 @@ import pytest
 
 import pdmp
 from pdmp import Demonstration, Status
-from synthetic import loops, reaches
+from synthetic import reaches
 
 FIELDS = ("time", "position", "velocity", "acceleration")
-MODELS = {
-    "discrete": pdmp.fit(reaches(), n_styles=2),
-    "rhythmic": pdmp.fit(loops(), kind="rhythmic", n_styles=2, mu=3.0),
-}
-KINDS = sorted(MODELS)
-
-
-@pytest.fixture(params=KINDS)
-def model(request: pytest.FixtureRequest) -> pdmp.Model:
-    """Return a model with two styles of either kind."""
-    return MODELS[request.param]
 
 
 def assert_same_motion(model: pdmp.Model, other: pdmp.Model) -> None:
@@ -88,9 +77,9 @@ def test_models_cannot_be_changed_through_their_arrays(model: pdmp.Model, name: 
     np.testing.assert_array_equal(getattr(model, name), expected)
 
 
-def test_status_is_one_of_two_objects() -> None:
+def test_status_is_one_of_two_objects(reach: pdmp.Model) -> None:
     """A step returns the very members, so that `is`, `==` and a dictionary tell them apart."""
-    controller = MODELS["discrete"].controller(0.01)
+    controller = reach.controller(0.01)
     assert controller.step() is Status.WORKING
     while controller.time < 5:
         status = controller.step()
@@ -99,9 +88,9 @@ def test_status_is_one_of_two_objects() -> None:
     assert {Status.WORKING: 1, Status.FINISHED: 2}[status] == 2
 
 
-def test_finished_movements_stay_finished() -> None:
+def test_finished_movements_stay_finished(reach: pdmp.Model) -> None:
     """After the first FINISHED no WORKING follows, as nothing was commanded."""
-    controller = MODELS["discrete"].controller(0.01)
+    controller = reach.controller(0.01)
     statuses = [controller.step() for _ in range(400)]
     first = statuses.index(Status.FINISHED)
     assert set(statuses[first:]) == {Status.FINISHED}
@@ -161,10 +150,12 @@ def test_saved_models_move_alike(model: pdmp.Model, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"{}", b"not a model" * 99, b"\xff" * 64, None])
-def test_damaged_files_are_told_from_other_errors(tmp_path: Path, content: bytes | None) -> None:
+def test_damaged_files_are_told_from_other_errors(
+    reach: pdmp.Model, tmp_path: Path, content: bytes | None
+) -> None:
     """Garbage and truncated files raise ModelFileError, a PdmpError, with the path."""
     path = tmp_path / "model.safetensors"
-    path.write_bytes(MODELS["discrete"].to_bytes()[:-7] if content is None else content)
+    path.write_bytes(reach.to_bytes()[:-7] if content is None else content)
     with pytest.raises(pdmp.ModelFileError, match="model.safetensors") as error:
         pdmp.load(path)
     assert isinstance(error.value, pdmp.PdmpError)
