@@ -61,7 +61,7 @@ def reproduce(
         raise ValueError(f'recordings: only "fig5" learns from them, not "{figure}"')
     if recordings is not None and not Path(recordings).is_dir():
         raise ValueError(f"recordings: {recordings} is not a folder")
-    canvas(None, 1, 1)  # tells at once where there is nothing to draw figures with
+    canvas(None, 1, 1)  # raises an error at once without matplotlib
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     reports = []

@@ -69,7 +69,7 @@ def add_learning(parser: ArgumentParser) -> None:
         "--styles",
         type=_or_named(int, "whole number", auto="auto"),
         metavar="J",
-        help="number of style parameters, or auto: as few as foresee movements in other contexts",
+        help="number of style parameters, or auto: by cross-validation over contexts",
     )
     parser.add_argument(
         "--spectrum",

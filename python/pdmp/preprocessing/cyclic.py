@@ -110,7 +110,7 @@ def cycles(
         y_c = y(c T / C) - (c / C - 1/2) (f(T) - f(0))
 
     The angle of a wheel or a crank gains full turns per cycle; they are taken off each cycle and
-    all that follow. Units of angle tell what turns; without units, a gain of one turn in radians
+    all that follow. A unit of angle marks what turns; without units, a gain of one turn in radians
     or degrees to a hundredth does. Of anything else that gains more per cycle than it moves within
     it, such as the way walked, a warning gives the gain: a model of closed cycles stays in place.
 
