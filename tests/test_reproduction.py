@@ -358,3 +358,12 @@ def test_commands_report_errors_in_one_line(
     """A request that cannot be met ends with exit code 1 and its reason."""
     assert main(["fig2", "--seed", "-1", "-o", str(tmp_path)]) == 1
     assert capsys.readouterr().err.strip() == "error: seed = -1: must not be negative"
+
+
+def test_package_has_no_part_of_the_reproduction() -> None:
+    """No module of the package names the robot, its physics engine or the reproduction."""
+    root = Path(pdmp.__file__).parent
+    modules = list(root.rglob("*.py"))
+    assert len(modules) > 30
+    named = re.compile("mujoco|robosuite|baxter|reproduction[./]", re.IGNORECASE)
+    assert not [path for path in modules if named.search(path.read_text(encoding="utf-8"))]

@@ -8,26 +8,10 @@ from pdmp._messages import value_error
 
 MAX_QUOTED = 80
 """Characters of a field that an error quotes."""
-GAPS = frozenset(
-    [
-        "na",
-        "n/a",
-        "#n/a",
-        "#na",
-        "<na>",
-        "nan",
-        "+nan",
-        "-nan",
-        "nan(ind)",
-        "-nan(ind)",
-        "1.#qnan",
-        "-1.#qnan",
-        "1.#ind",
-        "-1.#ind",
-        "null",
-        "none",
-    ]
-)
+GAPS = frozenset([
+    "na", "n/a", "#n/a", "#na", "<na>", "null", "none", "nan", "+nan", "-nan", "nan(ind)",
+    "-nan(ind)", "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind",
+])  # fmt: skip
 """Texts that mark a missing number, besides the empty one."""
 
 
