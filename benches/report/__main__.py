@@ -31,6 +31,8 @@ def main() -> None:
     arguments.add_argument("--write", action="store_true", help="write docs/report.md")
     write = arguments.parse_args().write
     asked = list(questions())
+    if not asked:
+        raise SystemExit("no recordings: set PDMP_DATA to a folder with sets of them")
     answers: list[tuple[Question, Evaluation]] = []
     with ProcessPoolExecutor() as pool:
         for question, found in zip(asked, pool.map(answer, asked), strict=True):

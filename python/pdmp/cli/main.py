@@ -1,4 +1,4 @@
-"""Parametric dynamic movement primitives: learn one from demonstrations, run it, look at it."""
+"""Parametric dynamic movement primitives: fits, rollouts, evaluations and figures."""
 
 import os
 import re
