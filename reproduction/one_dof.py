@@ -37,7 +37,7 @@ class Example:
     moved: Callable[[dict[str, Any]], dict[str, Any]]
     """Goal or anchor elsewhere."""
 
-    def shown(self, m: int) -> tuple[Array, Array]:
+    def demonstrated(self, m: int) -> tuple[Array, Array]:
         """Returns time [s] and position of a demonstration."""
         span = self.model.durations[m]
         ends = self.model.kind == "discrete"
@@ -124,9 +124,9 @@ def draw(examples: Sequence[Example]) -> Figure:
     grid = figure.subplots(len(examples), 3)
     for row, example in zip(grid, examples, strict=True):
         model = example.model
-        shown, made, between = row
+        demonstrated, made, between = row
         for m in range(N_DEMOS):
-            shown.plot(*example.shown(m), color=GREY, linewidth=0.9)
+            demonstrated.plot(*example.demonstrated(m), color=GREY, linewidth=0.9)
         for m, color, name in zip(extremes(model), (BLUE, ORANGE), ("s1", "s2"), strict=True):
             _variants(made, example, m, color, name)
         made.plot([], [], color="black", linestyle=":", label="demonstrated")
@@ -158,7 +158,7 @@ def _variants(axes: Axes, example: Example, m: int, color: str, name: str) -> No
         axes.plot(
             path.time, path.position, color=color, linewidth=width, linestyle=line, label=label
         )
-    time, position = example.shown(m)
+    time, position = example.demonstrated(m)
     for period in range(_n_periods(model)):
         shifted = time + period * model.durations[m]
         axes.plot(shifted, position, color="black", linestyle=":", linewidth=1.3, zorder=3)

@@ -47,7 +47,7 @@ class Switch:
 
 @dataclass
 class Swinging:
-    """What the arms were told."""
+    """Commanded movement of the arms."""
 
     position: list[Array] = field(default_factory=list)
     """Joint angles, a row per tick [rad]."""
@@ -149,8 +149,8 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
     )
     film.attach(section, "fig5_robot", _instants(model, robot, chosen, names), film.SWINGING)
     if walks is not None:
-        told, section.figures["fig5_recorded"] = walks
-        section.text += told
+        paragraphs, section.figures["fig5_recorded"] = walks
+        section.text += paragraphs
     return section
 
 
@@ -221,11 +221,11 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
     commands = switches(model, chosen, names)
     done = swing(model, commands)
     without = f", without {', '.join(odd)}, in which no stride repeats" if odd else ""
-    told = [
+    paragraphs = [
         f"Recordings of {len(kept)} walks{without}. {_spectrum(model)}",
         _settling(commands, done),
     ]
-    return told, draw(model, commands, done, RECORDED[:4])
+    return paragraphs, draw(model, commands, done, RECORDED[:4])
 
 
 def _spectrum(model: pdmp.Model) -> str:

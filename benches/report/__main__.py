@@ -11,7 +11,7 @@ from pathlib import Path
 from pdmp import Warp, plot
 from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
 from report.sets import Question, questions
-from report.text import FORESEEN, PRIMITIVE, WARPED, text
+from report.text import PRIMITIVE, SELECTED, WARPED, text
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "out" / "report"
@@ -20,7 +20,7 @@ PRIMITIVES = {
     PRIMITIVE: PDMP(),
     "PDMP, full J": PDMP(spectrum=1.0),
     "PDMP, linear map": PDMP(map="linear"),
-    FORESEEN: PDMP(n_styles="auto"),
+    SELECTED: PDMP(n_styles="auto"),
     WARPED: PDMP(alignment=Warp(4)),
 }
 
@@ -31,6 +31,8 @@ def main() -> None:
     arguments.add_argument("--write", action="store_true", help="write docs/report.md")
     write = arguments.parse_args().write
     asked = list(questions())
+    if not asked:
+        raise SystemExit("no recordings: set PDMP_DATA to a folder with sets of them")
     answers: list[tuple[Question, Evaluation]] = []
     with ProcessPoolExecutor() as pool:
         for question, found in zip(asked, pool.map(answer, asked), strict=True):

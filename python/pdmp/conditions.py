@@ -1,4 +1,4 @@
-"""Style, place and pace of a movement, as rollouts and controllers take them."""
+"""Conditions of a movement, as keyword arguments of rollouts and controllers."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

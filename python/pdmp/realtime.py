@@ -1,4 +1,4 @@
-"""A control loop on the clock: a tick each period, and what was late."""
+"""A control loop paced by the clock, with its lateness and missed deadlines."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ class Run:
         late: str = "wait",
     ) -> None:
         self._controller = controller
-        self._rate = _countable("rate_hz", rate_hz)
-        self._last = None if duration is None else _periods(duration, self._rate)
+        self._rate = _checked_number("rate_hz", rate_hz)
+        self._last = None if duration is None else _n_periods(duration, self._rate)
         self._measured = _function("measured", measured)
         self._coupling = _function("coupling", coupling)
         if late not in ("wait", "catch up"):
@@ -76,7 +76,7 @@ class Run:
 
     def __iter__(self) -> Iterator[Tick]:
         """Begins a loop that sleeps between its ticks."""
-        with _alone(self._controller):
+        with _exclusive(self._controller):
             self._begin()
             while not self._over():
                 sleep(self._wait())
@@ -89,7 +89,7 @@ class Run:
         for _ in range(3):  # a loop that was left is closed by the event loop
             if id(self._controller) in _running:
                 await sleep(0)
-        with _alone(self._controller):
+        with _exclusive(self._controller):
             self._begin()
             while not self._over():
                 await sleep(self._wait())
@@ -139,7 +139,7 @@ _lock = Lock()
 
 
 @contextmanager
-def _alone(controller: Controller) -> Iterator[None]:
+def _exclusive(controller: Controller) -> Iterator[None]:
     """Reserves a controller for one loop, which ends with its iterator."""
     key = id(controller)
     with _lock:
@@ -156,16 +156,16 @@ def _alone(controller: Controller) -> Iterator[None]:
             _running.discard(key)
 
 
-def _countable(name: str, value: float) -> float:
+def _checked_number(name: str, value: float) -> float:
     """Returns a number that clocks can count with."""
     if not (isinstance(value, Real) and 1e-9 <= value <= 1e9):
         raise ValueError(f"{name} = {value!r}: must be a number between 1e-9 and 1e9")
     return float(value)
 
 
-def _periods(duration: float, rate: float) -> int:
+def _n_periods(duration: float, rate: float) -> int:
     """Returns the number of whole periods in a duration."""
-    periods = round(_countable("duration", duration) * rate)
+    periods = round(_checked_number("duration", duration) * rate)
     if periods < 1:
         raise ValueError(f"duration = {duration}: must be at least one period, {1 / rate} s")
     return periods

@@ -1,4 +1,4 @@
-"""Learning the shapes, and the report on it."""
+"""A fit of the shapes, and a report on it."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,9 +29,9 @@ def run_demo(
     Parameters
     ----------
     folder : path
-        Where `model.safetensors`, `report.md` and the figures go.
+        Folder of `model.safetensors`, `report.md` and the figures.
     progress : callable, optional
-        Called with the stage of the fit and the share of it that is done.
+        Called with the stage of the fit and its completed fraction.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Tell what a model file holds.
+"""Prints the contents of a model file.
 
 example: pdmp info reach.safetensors
 """

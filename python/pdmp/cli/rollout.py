@@ -1,4 +1,4 @@
-"""Write a movement as CSV.
+"""Writes a movement as CSV.
 
 The style is that of the nominal demonstration unless one of --style, --context and --demo is given.
 
