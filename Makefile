@@ -47,6 +47,7 @@ check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, 
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/stubtest pdmp._native
+	$(BIN)/python .ci/stubs.py
 	$(PYTHON) .ci/licences.py
 	$(PYTHON) .ci/runtime.py
 

@@ -89,7 +89,7 @@ def reproduction(model: pdmp.Model, group: Group) -> list[float]:
     """Returns the RMSE over range of every demonstration, rolled out in its own conditions."""
     errors = []
     for m, demo in enumerate(group.demos):
-        made = model.rollout(**pdmp.as_demonstrated(model, m), dt=model.durations[m] / FINE)
+        made = model.rollout(model.conditions(m), dt=model.durations[m] / FINE)
         # Recordings that lost a sample here and there have their own clock.
         sampled = [np.interp(demo.time, made.time, column) for column in made.position.T]
         difference = np.transpose(sampled) - demo.position

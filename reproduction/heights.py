@@ -52,7 +52,7 @@ def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
     """Returns the movement in this style at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
     duration = float(model.durations[model.nominal])
     made = model.rollout(
-        style,
+        style=style,
         goal=reaching.goal,
         start=reaching.start,
         dt=duration / (N_SAMPLES - 1),
@@ -61,11 +61,16 @@ def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
     return made.position
 
 
+def predicted_style(model: pdmp.Model, height: float) -> Array:
+    """Returns the style (J,) that U predicts for a height [m]."""
+    return np.asarray(model.predict([height]).conditions.style)
+
+
 def best_style(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration) -> Array:
     """Returns the style of least E for a demonstration: movements are linear in it."""
     plain = movement(model, reaching, np.zeros(model.n_styles))
     duration = float(model.durations[model.nominal])
-    added = model.style_jacobian(duration / (N_SAMPLES - 1), duration=duration)
+    added = model.jacobian("style", dt=duration / (N_SAMPLES - 1), duration=duration)
     columns = added.reshape(-1, model.n_styles)
     return np.asarray(np.linalg.lstsq(columns, (aligned(demo) - plain).ravel())[0], dtype=float)
 
@@ -91,7 +96,7 @@ def errors(reaching: Reaching, most: int = 9) -> Errors:
     predicted, best = [], []
     for n_styles in range(1, most + 1):
         model = learn(reaching, n_styles)
-        styles = [model.predict([height_of(demo)]).style for demo in tests]
+        styles = [predicted_style(model, height_of(demo)) for demo in tests]
         predicted.append(
             [error(model, reaching, *pair) for pair in zip(tests, styles, strict=True)]
         )
@@ -104,7 +109,7 @@ def reach_predicted(
     model: pdmp.Model, reaching: Reaching, height: float, *events: NewGoal
 ) -> Robot:
     """Reaches over a height [m] in the style predicted for it."""
-    style = model.predict([height]).style
+    style = predicted_style(model, height)
     return reach_over(model, reaching, height, style, *events)
 
 

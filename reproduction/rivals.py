@@ -22,7 +22,15 @@ from numpy.typing import NDArray
 import pdmp
 from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, legend
-from reproduction.heights import N_SAMPLES, TESTED, aligned, lasting, learn, new_goal
+from reproduction.heights import (
+    N_SAMPLES,
+    TESTED,
+    aligned,
+    lasting,
+    learn,
+    new_goal,
+    predicted_style,
+)
 from reproduction.loop import PACE, Held, Movement, NewGoal, drive, from_rest
 from reproduction.reaching import (
     CONSTANTS,
@@ -51,7 +59,7 @@ HELD_AT = 0.3  # of the demonstrated duration
 def styles(reaching: Reaching) -> Callable[[float], Movement]:
     """Learns one primitive with three styles, predicted from the height."""
     model = learn(reaching, N_STYLES)
-    return lambda height: from_rest(model, reaching, model.predict([height]).style)
+    return lambda height: from_rest(model, reaching, predicted_style(model, height))
 
 
 def one_demonstration(reaching: Reaching) -> Callable[[float], Movement]:

@@ -40,7 +40,7 @@ def test_each_movement_has_its_own_conditions(
     made = model.rollouts(STYLES, dt=dt, tau=0.8 * model.tau, derivatives=2, **given)
     for b in (0, 7, 22):
         own = {SINGULAR[n]: rows[b] if one_each else rows for n, rows in given.items()}
-        single = model.rollout(STYLES[b], dt=dt, tau=0.8 * model.tau, **own)
+        single = model.rollout(style=STYLES[b], dt=dt, tau=0.8 * model.tau, **own)
         for values, name in zip(made, FIELDS, strict=True):
             expected = getattr(single, name)
             np.testing.assert_allclose(values[b], expected, atol=1e-12 * abs(expected).max())
@@ -51,7 +51,7 @@ def test_amplitude_is_that_of_all(cycle: pdmp.Model, amplitude: float) -> None:
     """A rhythmic batch swings as widely as the rollout does; not at all at zero."""
     model = cycle
     positions, _ = model.rollouts(STYLES, amplitude=amplitude)
-    expected = model.rollout(STYLES[3], amplitude=amplitude).position
+    expected = model.rollout(style=STYLES[3], amplitude=amplitude).position
     np.testing.assert_allclose(positions[3], expected, atol=1e-12)
     assert (np.ptp(positions, axis=1) == 0).all() == (amplitude == 0)
 
@@ -152,30 +152,32 @@ def test_movement_is_its_jacobians_times_the_changes(
     start = {"start": given["start"]} if "start" in given else {}
 
     def motion(style: np.ndarray, at: np.ndarray, **given: Any) -> np.ndarray:
-        values: np.ndarray = getattr(model.rollout(style, **{centre: at}, **given, **shared), name)
+        values: np.ndarray = getattr(
+            model.rollout(style=style, **{centre: at}, **given, **shared), name
+        )
         return values
 
     base = motion(style, shift, **given)
-    expected = base + model.style_jacobian(derivative=derivative, **given, **shared) @ step
+    expected = base + model.jacobian("style", derivative=derivative, **given, **shared) @ step
     tolerance = 1e-11 * abs(expected).max()
     np.testing.assert_allclose(motion(style + step, shift, **given), expected, atol=tolerance)
     if model.kind == "discrete":
-        jacobian = model.goal_jacobian(derivative=derivative, **shared)
+        jacobian = model.jacobian("goal", derivative=derivative, **shared)
     else:
-        jacobian = model.anchor_jacobian(derivative=derivative, **start, **shared)
+        jacobian = model.jacobian("anchor", derivative=derivative, **start, **shared)
     expected = base + jacobian @ push
     np.testing.assert_allclose(motion(style, shift + push, **given), expected, atol=tolerance)
     if start:
         moved = {**given, "start": given["start"] + push}
-        expected = base + model.start_jacobian(derivative=derivative, **shared) @ push
+        expected = base + model.jacobian("start", derivative=derivative, **shared) @ push
         np.testing.assert_allclose(motion(style, shift, **moved), expected, atol=tolerance)
 
 
 def test_jacobian_follows_the_amplitude(cycle: pdmp.Model) -> None:
     """A style counts as much as the amplitude lets it."""
     model = cycle
-    half = model.style_jacobian(amplitude=0.5, velocity=[0, 0])
-    np.testing.assert_array_equal(half, model.style_jacobian(velocity=[0, 0]) / 2)
+    half = model.jacobian("style", amplitude=0.5, velocity=[0, 0])
+    np.testing.assert_array_equal(half, model.jacobian("style", velocity=[0, 0]) / 2)
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [
@@ -217,12 +219,16 @@ def test_pieces_have_a_size(reach: pdmp.Model, size: int) -> None:
 def test_jacobians_belong_to_a_kind(reach: pdmp.Model, cycle: pdmp.Model) -> None:
     """A discrete primitive has no anchor, a rhythmic one no goal; there is no third derivative."""
     with pytest.raises(ValueError, match="goal does not apply to a rhythmic primitive"):
-        cycle.goal_jacobian()
+        cycle.jacobian("goal")
     with pytest.raises(ValueError, match="anchor does not apply to a discrete primitive"):
-        reach.anchor_jacobian()
-    for name in ("style_jacobian", "start_jacobian", "goal_jacobian"):
+        reach.jacobian("anchor")
+    for wrt in ("style", "start", "goal"):
         with pytest.raises(ValueError, match="derivative = 3: must be 0"):
-            getattr(reach, name)(derivative=3)
+            reach.jacobian(wrt, derivative=3)
+    with pytest.raises(
+        ValueError, match="wrt = 'tau': must be 'style', 'goal', 'anchor' or 'start'"
+    ):
+        reach.jacobian("tau")
 
 
 def arrays(n: int = 2) -> list[np.ndarray]:

@@ -105,7 +105,9 @@ def test_full_primitive_is_principal_components() -> None:
     What is left is how closely the landscape is interpolated: 3e-6 by a smooth process.
     """
     contexts = [[height**2] for height in HEIGHTS]
-    smooth = PDMP(map="linear", spectrum=1.0, basis=pdmp.GP("squared_exponential", noise=1e-10))
+    smooth = PDMP(
+        map="linear", singular_value_share=1.0, basis=pdmp.GP("squared_exponential", noise=1e-10)
+    )
     pair = {"PDMP": smooth, "PCA": LinearWeights(Components(1.0))}
     found = pdmp.evaluate(arches(HEIGHTS), dt=0.01, contexts=contexts, predictors=pair)
     for ours, theirs in zip(*(found.forecasts[name] for name in pair), strict=True):
@@ -360,7 +362,7 @@ def mannered() -> tuple[list[np.ndarray], list[list[float | str]]]:
 def test_labels_are_conditions_too() -> None:
     """A label tells of a condition beside numbers, to primitives and all others alike."""
     movements, contexts = mannered()
-    predictors = baselines() | {"PDMP": PDMP(map="linear", spectrum=0.999)}
+    predictors = baselines() | {"PDMP": PDMP(map="linear", singular_value_share=0.999)}
     found = pdmp.evaluate(movements, contexts=contexts, dt=0.01, predictors=predictors)
     assert {split.reach for split in found.splits} == {"interpolation", "extrapolation"}
     assert sum(len(split.test) for split in found.splits) == len(movements)

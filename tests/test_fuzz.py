@@ -114,7 +114,7 @@ FIT: dict[str, tuple[Strategy | None, Strategy]] = {
     "alpha_z": (st.floats(5, 50), ODD),
     "beta_z": (st.floats(2, 10), SCALARS),
     "kind": (None, st.sampled_from(["discrete", "rhythmic", "x", None, 3])),
-    "spectrum": (None, ODD),
+    "singular_value_share": (None, ODD),
     "period": (None, ODD),
     "alpha_x": (None, SCALARS),
     "mu": (None, SCALARS),

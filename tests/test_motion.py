@@ -20,7 +20,7 @@ FIELDS = ("time", "position", "velocity", "acceleration")
 def assert_same_motion(model: pdmp.Model, other: pdmp.Model) -> None:
     """Assert that two models move alike to the last bit."""
     for name in FIELDS:
-        made, expected = (getattr(m.rollout([0.3, -0.2]), name) for m in (model, other))
+        made, expected = (getattr(m.rollout(style=[0.3, -0.2]), name) for m in (model, other))
         np.testing.assert_array_equal(made, expected)
 
 
@@ -110,7 +110,8 @@ def test_results_can_leave_a_process(again: Callable[[Any], Any]) -> None:
     model = pdmp.fit(reaches())
     results = {
         "time position velocity acceleration": model.rollout(),
-        "style goal start timing duration covariance freedom outside": model.predict([0.3]),
+        "duration covariance degrees_of_freedom extrapolation": model.predict([0.3]),
+        "style goal start segment_durations": model.predict([0.3]).conditions,
     }
     for names, result in results.items():
         for name in names.split():
@@ -182,7 +183,7 @@ def test_batch_is_the_rollouts_one_by_one(model: pdmp.Model) -> None:
     """Row b of a batch is the rollout of style b."""
     positions, velocities = model.rollouts(model.styles, dt=0.05, tau=1.5 * model.tau)
     for style, position, velocity in zip(model.styles, positions, velocities, strict=True):
-        single = model.rollout(style, dt=0.05, tau=1.5 * model.tau)
+        single = model.rollout(style=style, dt=0.05, tau=1.5 * model.tau)
         np.testing.assert_allclose(position, single.position, atol=1e-12)
         np.testing.assert_allclose(velocity, single.velocity, atol=1e-10)
 
@@ -190,10 +191,10 @@ def test_batch_is_the_rollouts_one_by_one(model: pdmp.Model) -> None:
 @pytest.mark.parametrize("given", [{}, {"start": [0.1, 0.2]}, {"velocity": [0.5, -0.5]}], ids=str)
 def test_jacobian_is_the_difference_of_rollouts(model: pdmp.Model, given: dict[str, Any]) -> None:
     """Finite differences of rollouts agree with it for every way to start."""
-    jacobian = model.style_jacobian(0.05, **given)
+    jacobian = model.jacobian("style", dt=0.05, **given)
     style, h = np.array([0.3, -0.4]), 1e-3
     for j, step in enumerate(h * np.eye(2)):
-        ahead, behind = (model.rollout(style + e, dt=0.05, **given) for e in (step, -step))
+        ahead, behind = (model.rollout(style=style + e, dt=0.05, **given) for e in (step, -step))
         difference = (ahead.position - behind.position) / (2 * h)
         np.testing.assert_allclose(jacobian[:, :, j], difference, atol=1e-9)
 
@@ -201,9 +202,9 @@ def test_jacobian_is_the_difference_of_rollouts(model: pdmp.Model, given: dict[s
 def test_threads_share_a_model(model: pdmp.Model) -> None:
     """Rollouts from several threads at once are those of one."""
     styles = np.random.default_rng(0).normal(size=(40, 2))
-    expected = [model.rollout(style).position for style in styles]
+    expected = [model.rollout(style=style).position for style in styles]
     with ThreadPoolExecutor(8) as pool:
-        made = list(pool.map(lambda style: model.rollout(style).position, styles))
+        made = list(pool.map(lambda style: model.rollout(style=style).position, styles))
     np.testing.assert_array_equal(made, expected)
 
 

@@ -154,7 +154,9 @@ def test_every_style_reaches_every_goal(reaching: Reaching, learnt: pdmp.Model) 
         added = []
         for style in learnt.styles:
             there, here = (
-                learnt.rollout(style, goal=g, start=reaching.start, duration=8.0, dt=0.02).position
+                learnt.rollout(
+                    style=style, goal=g, start=reaching.start, duration=8.0, dt=0.02
+                ).position
                 for g in (goal, near)
             )
             np.testing.assert_allclose(there[-1], goal, atol=1e-3)

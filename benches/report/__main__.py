@@ -8,7 +8,7 @@ import argparse
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from pdmp import Warp, plot
+from pdmp import TimeWarp, plot
 from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
 from report.sets import Question, questions
 from report.text import PRIMITIVE, SELECTED, WARPED, text
@@ -18,10 +18,10 @@ FIGURES = ROOT / "out" / "report"
 CURVES = {"raise_hand_bandai, whole", "walking_force_speed, subject 0"}
 PRIMITIVES = {
     PRIMITIVE: PDMP(),
-    "PDMP, full J": PDMP(spectrum=1.0),
+    "PDMP, full J": PDMP(singular_value_share=1.0),
     "PDMP, linear map": PDMP(map="linear"),
     SELECTED: PDMP(n_styles="auto"),
-    WARPED: PDMP(alignment=Warp(4)),
+    WARPED: PDMP(alignment=TimeWarp(4)),
 }
 
 

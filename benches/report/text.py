@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import pdmp
-from pdmp import Warp
+from pdmp import TimeWarp
 from pdmp.evaluation import Evaluation, baselines
 from pdmp.evaluation.result import REFERENCE
 from recordings import sources
@@ -128,7 +128,8 @@ def choices(question: Question) -> tuple[str, str, str]:
 def spectra(question: Question) -> tuple[str, str]:
     """Writes the share of the first three singular values, in linear and in warped time."""
     values = [
-        learnt(question, alignment=alignment).singular_values for alignment in ("linear", Warp(4))
+        learnt(question, alignment=alignment).singular_values
+        for alignment in ("linear", TimeWarp(4))
     ]
     linear, warped = (f"{found[:3].sum() / found.sum():.1%}" for found in values)
     return linear, warped

@@ -284,7 +284,7 @@ fn exercise(model: &Arc<Model>) {
         let Conditions { style, segment_durations: times, .. } = &prediction.conditions;
         finite("prediction", style.iter().chain(times).flatten().chain([&prediction.duration]));
         finite("covariance", prediction.covariance.iter().flatten());
-        finite("distance", &prediction.outside);
+        finite("distance", &prediction.extrapolation);
         if let Ok([lower, upper]) = prediction_band(model, &prediction, 0.9, grid) {
             finite("band", lower.iter().chain(&upper));
         }

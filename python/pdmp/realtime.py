@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from numbers import Real
 from threading import Lock
 from time import perf_counter, sleep
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -18,54 +19,89 @@ _Measured: TypeAlias = Callable[[], ArrayLike | None] | None
 _Coupling: TypeAlias = Callable[[], tuple[ArrayLike, ArrayLike] | None] | None
 
 
-class Tick(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Tick:
     """One tick of a paced loop.
 
     Attributes
     ----------
     time : float
         Time of the movement since the loop began in s: whole periods.
-    late : float
-        How long after its deadline it began in s, the first of them if it missed some.
+    lateness : float
+        Time in s from its deadline to its start; from the first deadline if it missed some.
     missed : int
-        How many deadlines it missed; where it catches up it moved by as many periods more, where it
-        waits the deadlines to come are later by as many.
+        Number of deadlines it missed. A loop that catches up moves by as many periods more; one
+        that waits moves the remaining deadlines back by as many.
     """
 
     time: float
-    late: float
+    lateness: float
     missed: int
 
 
-class Run:
-    """A paced loop, made by `Controller.run`: iterable with `for` and with `async for`.
+class PacedLoop:
+    """A control loop that makes one tick of a controller each period, on the wall clock.
 
-    Each iteration begins anew, at the time it begins. Its deadlines are start + k / rate_hz for
-    k = 1, 2, …, so that no delay adds up; where the movement waits, whole periods that were missed
-    are added to start. Before each the loop sleeps, without holding the interpreter; then it steps,
-    and hands out the tick. A controller runs in one loop at a time: a second one is refused.
+    The first tick comes one period after the loop begins, and commands of the body act on the next.
+    Deadlines are start + k / rate_hz for k = 1, 2, …, so that delays do not add up. Before each
+    deadline the loop sleeps without holding the interpreter; `async for` lets other tasks run
+    instead (event loops wake to the millisecond, so deadlines closer than some 5 ms need threads).
+    `break` or an exception, Ctrl-C included, ends the loop between two ticks. A controller runs in
+    one loop at a time.
+
+    Parameters
+    ----------
+    controller : Controller
+        The running movement.
+    rate_hz : float, optional
+        Ticks per second; 1 / dt of the controller otherwise.
+    duration : float, optional
+        Length in s, rounded to whole periods. By default a discrete movement runs until its
+        `status` is `FINISHED` and the body has commanded nothing more, a rhythmic one until the
+        loop is left.
+    measured, coupling : callable, optional
+        Called without arguments before each tick; its result, which may be None, is the argument
+        of `Controller.step` of this name.
+    late : {"wait", "catch up"}
+        Behaviour after n missed deadlines. "wait": the tick has the usual length, and the remaining
+        deadlines move back by n periods, so that the position never jumps. "catch up": one step of
+        n + 1 periods follows the wall clock, and the position jumps as far.
 
     Attributes
     ----------
     ticks : int
-        Ticks made.
+        Number of ticks made.
     missed : int
-        Deadlines missed: a whole period went by between them and the next tick.
-    worst : float
+        Number of deadlines missed.
+    max_lateness : float
         Largest lateness of a tick in s.
+
+    Raises
+    ------
+    ValueError
+        A rate or duration that is not a number between 1e-9 and 1e9, a duration below one period,
+        `measured` or `coupling` that cannot be called, or another name for `late`.
+    RuntimeError
+        On the first tick, if the controller runs in another loop.
+
+    Examples
+    --------
+    >>> for tick in pdmp.PacedLoop(model.controller(dt=0.001)):
+    ...     robot.move(controller.position, controller.velocity)
     """
 
     def __init__(
         self,
         controller: Controller,
-        rate_hz: float,
-        duration: float | None,
-        measured: _Measured,
-        coupling: _Coupling,
-        late: str = "wait",
+        rate_hz: float | None = None,
+        *,
+        duration: float | None = None,
+        measured: _Measured = None,
+        coupling: _Coupling = None,
+        late: Literal["wait", "catch up"] = "wait",
     ) -> None:
         self._controller = controller
-        self._rate = _checked_number("rate_hz", rate_hz)
+        self._rate = _checked_number("rate_hz", 1 / controller.dt if rate_hz is None else rate_hz)
         self._last = None if duration is None else _n_periods(duration, self._rate)
         self._measured = _function("measured", measured)
         self._coupling = _function("coupling", coupling)
@@ -99,7 +135,7 @@ class Run:
 
     def _begin(self) -> None:
         self.ticks = self.missed = 0
-        self.worst = 0.0
+        self.max_lateness = 0.0
         self._periods = 0  # that the movement has made
         self._start = perf_counter()
 
@@ -130,7 +166,7 @@ class Run:
         self._periods += periods
         self.ticks += 1
         self.missed += missed
-        self.worst = max(self.worst, late)
+        self.max_lateness = max(self.max_lateness, late)
         return Tick(self._periods / self._rate, late, missed)
 
 

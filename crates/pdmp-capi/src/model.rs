@@ -191,7 +191,7 @@ pub unsafe extern "C" fn pdmp_model_demonstration(
     numbers: pdmp_buffer,
     error: pdmp_text,
 ) -> pdmp_status {
-    let demonstrated = |model: &Model| Ok(model.conditions(demonstration)?);
+    let demonstrated = |model: &Model| Ok(model.conditions(&[demonstration])?);
     // SAFETY: the caller's promise is the same.
     unsafe { lay_down(model, conditions, numbers, error, demonstrated) }
 }

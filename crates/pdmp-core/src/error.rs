@@ -64,6 +64,12 @@ pub enum Error {
         /// The number of rows.
         found: usize,
     },
+    /// A condition of only one of two conditions that are blended.
+    #[error("{name}: given for one of the two only; give it for both")]
+    Single {
+        /// The condition.
+        name: &'static str,
+    },
     /// A number outside its range.
     #[error("{name} = {}: {allowed}", Number(*value))]
     Range {

@@ -72,7 +72,7 @@ def add_learning(parser: ArgumentParser) -> None:
         help="number of style parameters, or auto: by cross-validation over contexts",
     )
     parser.add_argument(
-        "--spectrum",
+        "--singular-value-share",
         type=float,
         metavar="SHARE",
         help="without --styles: keep this share of the singular-value sum, such as the paper's 0.9;"
@@ -105,7 +105,7 @@ def settings(options: Namespace) -> dict[str, Any]:
         "map": options.map,
         "alignment": options.alignment,
         "n_styles": options.styles,
-        "spectrum": options.spectrum,
+        "singular_value_share": options.singular_value_share,
         "basis": options.basis,
         "smoothing": options.smoothing,
         "transport": options.transport,

@@ -46,7 +46,7 @@ def run(options: Namespace) -> None:
         "styles": plot.styles(model),
         "fan": plot.fan(
             model,
-            *(pdmp.as_demonstrated(model, end) for end in ends),
+            *(model.conditions(end) for end in ends),
             ends=(f"demo {ends[0]}", f"demo {ends[1]}"),
         ),
     }

@@ -71,7 +71,7 @@ fn unvaried_contexts_predict_the_mean() {
     assert_relative_eq!(found.mean[0], 2.0, epsilon = 1e-12);
     // The mean of two, and a third one: 1/2 + 1 of their variance, 2.
     assert_relative_eq!(found.covariance.unwrap()[[0, 0]], 3.0, epsilon = 1e-12);
-    assert_eq!(found.outside, [f64::INFINITY]);
+    assert_eq!(found.extrapolation, [f64::INFINITY]);
     let found = linear(&[0.5], &outputs.select(Axis(0), &[0])).predict(&[9.0]).unwrap();
     assert_relative_eq!(found.mean[0], 1.0, epsilon = 1e-12);
     assert!(found.covariance.is_none());

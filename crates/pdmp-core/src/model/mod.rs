@@ -12,7 +12,7 @@ pub(crate) mod template;
 use std::ops::Deref;
 use std::sync::Arc;
 
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 
 use crate::context::{ContextMap, outputs};
 use crate::demonstration::ContextValue;
@@ -116,29 +116,30 @@ impl Model {
         &self.learnt
     }
 
-    /// Conditions of demonstration `m`: style, goal and start or anchor, and timing.
+    /// Returns the conditions of one demonstration, or the mean of several: style, goal and start or anchor, and segment
+    /// durations.
     ///
     /// # Errors
-    /// `m` that is not below the number of demonstrations.
-    pub fn conditions(&self, m: usize) -> Result<Conditions> {
-        if m >= self.n_demos() {
-            let allowed = "must be below the number of demonstrations";
+    /// No demonstration, or an index that is not below their number.
+    pub fn conditions(&self, demonstrations: &[usize]) -> Result<Conditions> {
+        let allowed = "must be below the number of demonstrations";
+        if let Some(&m) = demonstrations.iter().find(|m| **m >= self.n_demos()) {
             return Err(Error::Range { name: "demonstration", value: m as f64, allowed });
         }
-        let of = |matrix: &Array2<f64>| Some(matrix.row(m).to_vec());
+        if demonstrations.is_empty() {
+            return Err(Error::Arguments("demonstrations is empty: pass at least one index"));
+        }
+        let mean = |matrix: &Array2<f64>| {
+            let rows = matrix.select(Axis(0), demonstrations);
+            rows.mean_axis(Axis(0)).map(|mean| mean.to_vec())
+        };
         let DemonstrationParameters { styles, goals, starts, anchors, segment_durations, .. } = &self.demonstrated;
         let (goal, start, anchor) = match self.kind() {
-            Kind::Discrete => (of(goals), of(starts), None),
-            Kind::Rhythmic => (None, None, of(anchors)),
+            Kind::Discrete => (mean(goals), mean(starts), None),
+            Kind::Rhythmic => (None, None, mean(anchors)),
         };
-        Ok(Conditions {
-            style: of(styles),
-            goal,
-            start,
-            anchor,
-            segment_durations: of(segment_durations),
-            ..Conditions::default()
-        })
+        let (style, segment_durations) = (mean(styles), mean(segment_durations));
+        Ok(Conditions { style, goal, start, anchor, segment_durations, ..Conditions::default() })
     }
 
     /// The map from contexts to style, goal and start or anchor, and logarithm of the duration, where contexts are

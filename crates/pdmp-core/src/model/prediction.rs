@@ -23,7 +23,7 @@ pub struct Prediction {
     pub degrees_of_freedom: usize,
     /// How far each value of the context lies outside of those demonstrated, in their range (Q,): 0 inside, infinite
     /// where a value that was never varied differs.
-    pub outside: Vec<f64>,
+    pub extrapolation: Vec<f64>,
 }
 
 impl Prediction {
@@ -39,7 +39,7 @@ impl Prediction {
         n_dofs: usize,
         durations: RangeInclusive<f64>,
     ) -> Result<Self> {
-        let ContextPrediction { mean, mut covariance, outside } = expected;
+        let ContextPrediction { mean, mut covariance, extrapolation } = expected;
         let first = n_styles + n_dofs * if kind == Kind::Discrete { 2 } else { 1 };
         let duration = mean[first].exp().clamp(*durations.start(), *durations.end());
         let weights: Vec<f64> = mean[first + 1..].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
@@ -71,6 +71,6 @@ impl Prediction {
             segment_durations: Some(segment_durations),
             ..Conditions::default()
         };
-        Ok(Self { conditions, duration, covariance, degrees_of_freedom, outside })
+        Ok(Self { conditions, duration, covariance, degrees_of_freedom, extrapolation })
     }
 }
