@@ -49,7 +49,7 @@ pub(crate) struct Fade {
     pub(crate) value: f64,
     /// r′.
     pub(crate) growth: f64,
-    /// p, and r·p′.
+    /// p and p′.
     share: f64,
     pub(crate) along: f64,
     braked: bool,
@@ -99,10 +99,9 @@ impl Cubic {
 /// A cubic of given coefficients.
 #[inline(always)]
 fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> Jet<T> {
-    Jet {
-        value: value + slope * t + (square + cube * t) * (t * t),
-        slope: slope + (square * (2.0 * t) + cube * (3.0 * t * t)),
-    }
+    let rest = cube * t;
+    let bend = square + rest;
+    Jet { value: value + (slope + bend * t) * t, slope: slope + (bend + bend + rest) * t }
 }
 
 impl Landscape {
@@ -228,8 +227,10 @@ impl Landscape {
         let jet = |group: usize, j: usize| self.cubics(place.first, group)[j].at(place.t);
         match self.fading(u) {
             Some(Fade { value: r, growth, along, .. }) => {
-                let faded =
-                    |Jet { value, slope }: Jet<Lanes>| Jet { value: value * r, slope: value * growth + slope * along };
+                let faded = |Jet { value, slope }: Jet<Lanes>| Jet {
+                    value: value * r,
+                    slope: value * growth + slope * (r * along),
+                };
                 self.scatter(|group, j| faded(jet(group, j)), value, slope);
             }
             None => self.scatter(jet, value, slope),
@@ -252,7 +253,7 @@ impl Landscape {
                     Ending::Braked { alpha_z, braking } => (alpha_z, braking - alpha_z, true),
                 };
                 let [value, share] = [rate, beyond].map(|rate| faded((-rate * (u - u_end)).exp()));
-                Some(Fade { value, growth: -rate * value, share, along: -beyond * share * value, braked })
+                Some(Fade { value, growth: -rate * value, share, along: -beyond * share, braked })
             }
             _ => None,
         }

@@ -15,22 +15,23 @@
 #[cfg(target_arch = "x86_64")]
 mod avx;
 mod commands;
+mod group;
 mod tick;
 
 use std::sync::Arc;
 
-use crate::attractor::{Jet, Propagator, State};
+use crate::attractor::{Propagator, State};
 use crate::command::{Command, Motion};
 use crate::conditions::{Complete, Conditions};
 use crate::error::{Error, Result, check_positive};
 use crate::follower::{Filter, Follower, Glide};
-use crate::lanes::{Lanes, copy, groups, repack, unpack};
+use crate::lanes::{Lanes, WIDTH, copy, padded, repack, unpack};
 use crate::model::Model;
-use crate::perturbation::{Held, STILL, widest};
-use crate::phase::{Canonical, CompensatedSum, Kind};
+use crate::perturbation::{Held, widest};
+use crate::phase::{CompensatedSum, Kind};
 use crate::series::Series;
 use crate::transport::Stretch;
-use tick::Forcing;
+use group::Group;
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
 const FINEST: f64 = 1.0 / 500.0;
@@ -62,37 +63,32 @@ pub struct Controller {
     clock: CompensatedSum,
     /// Amplitude r; 1 where discrete.
     r: f64,
+    /// How style and amplitude are followed, on the clock.
     filter: Filter,
-    /// Seconds to 99 % of a changed command.
-    transition: f64,
     style: Follower,
+    /// How ρ is followed, in seconds.
+    rate_filter: Filter,
     /// ρ = 1/τ.
     rate: Follower,
     /// Goal or anchor.
     centre: Follower,
-    /// How a commanded goal is followed: [`Controller::centre_filter`].
+    /// How a commanded goal is followed, on the clock: [`Controller::centre_filter`].
     centre_filter: Filter,
     /// r₀.
     amplitude: Follower,
     /// Share of the rate 1/τ at which the path is followed.
     speed: f64,
-    /// By groups of DoFs, as all that follows.
-    forcing: Vec<Forcing>,
-    /// Forcing at the start of the stretch at work, taken before anything moves: kept as numbers for the loop over the
-    /// groups, it would not stay in registers.
-    from: Vec<Jet<Lanes>>,
-    /// The way g − y₀ at the start, which the frame covers; zero where rhythmic.
-    way: Vec<Lanes>,
-    /// The share m − 1 of it by which the frame is off the goal at the clock.
+    groups: Vec<Group>,
+    /// Pace of the phase for which the groups' w holds.
+    paced: f64,
+    /// The share m − 1 of the way by which the frame is off the goal at the clock.
     lag: f64,
     /// Where it is read.
     stretch: Stretch,
-    z: Vec<Lanes>,
+    /// By groups of DoFs.
     position: Vec<Lanes>,
     velocity: Vec<Lanes>,
     acceleration: Vec<Lanes>,
-    /// Distance from the goal at which each DoF has settled.
-    tolerance: Vec<Lanes>,
     /// Far below the last digit of every movement.
     rest: f64,
     held: Held,
@@ -129,7 +125,10 @@ impl Controller {
             return Err(Error::Range { name: "transition", value: transition, allowed });
         }
         let conditions = conditions.complete(&model)?;
-        let (filter, zeros) = (Filter::new(transition), vec![Lanes::ZERO; groups(model.n_dofs())]);
+        let rate_filter = Filter::new(transition);
+        let filter = rate_filter.on_clock(model.tau());
+        let groups = Group::all(model.ranges());
+        let zeros = vec![Lanes::ZERO; groups.len()];
         // A tick of just this length is not divided for a rounding error.
         let finest = FINEST * model.canonical().extent() * (1.0 + 1e-9);
         let series = Series::new(model.attractor(), finest);
@@ -141,27 +140,24 @@ impl Controller {
             clock: CompensatedSum::default(),
             r: 1.0,
             filter,
-            transition,
             style: Follower::new(&conditions.style),
+            rate_filter,
             rate: Follower::new(&[1.0 / conditions.tau]),
             centre: Follower::new(&conditions.centre),
             centre_filter: filter,
             amplitude: Follower::new(&[conditions.amplitude]),
             speed: 1.0,
-            forcing: vec![Forcing::default(); zeros.len()],
-            from: vec![Jet::default(); zeros.len()],
-            way: zeros.clone(),
+            groups,
+            paced: 1.0,
             lag: 0.0,
             stretch: model.transport.stretch(0.0),
-            z: zeros.clone(),
             position: zeros.clone(),
             velocity: zeros.clone(),
-            acceleration: zeros.clone(),
-            tolerance: zeros,
+            acceleration: zeros,
             rest: REST * widest(model.ranges()),
             held: Held::new(model.ranges(), model.units(), model.canonical().extent()),
             finest,
-            glide: filter.glide(dt),
+            glide: rate_filter.glide(dt),
             course: Glide::START,
             centre_course: Glide::START,
             propagator: series.propagator::<Lanes>(0.0),
@@ -201,8 +197,9 @@ impl Controller {
         self.amplitude.jump(&[conditions.amplitude]);
         self.centre.jump(&conditions.centre);
         if let (Kind::Discrete, Some(start)) = (self.model.kind(), &conditions.start) {
-            repack(&mut self.way, start);
-            self.way.iter_mut().zip(self.centre.value()).for_each(|(way, goal)| *way = *goal - *way);
+            for ((group, goal), start) in self.groups.iter_mut().zip(self.centre.value()).zip(start.chunks(WIDTH)) {
+                group.way = *goal - padded(start);
+            }
         }
         self.read_frame();
         self.read_forcing();
@@ -214,13 +211,13 @@ impl Controller {
     /// Puts position and z where the movement starts: at rest in z, or on the limit cycle of this style.
     fn place(&mut self) {
         let Self { model, conditions, r, .. } = self;
-        for (group, (position, z)) in self.position.iter_mut().zip(&mut self.z).enumerate() {
-            let cycle = &model.cycle[group * model.n_styles()..];
+        for (index, (position, group)) in self.position.iter_mut().zip(&mut self.groups).enumerate() {
+            let cycle = &model.cycle[index * model.n_styles()..];
             let on_cycle = conditions.style.iter().zip(cycle).fold(State::<Lanes>::default(), |sum, (s, cycle)| {
                 State { e: sum.e + cycle.e * (*r * s), z: sum.z + cycle.z * (*r * s) }
             });
-            *position = self.centre.value()[group] + on_cycle.e;
-            *z = on_cycle.z;
+            *position = self.centre.value()[index] + on_cycle.e;
+            group.z = on_cycle.z;
         }
         let phase = conditions.phase;
         if phase > 0.0 {
@@ -235,40 +232,9 @@ impl Controller {
             repack(&mut self.position, start);
         }
         if let Some(velocity) = &conditions.velocity {
-            repack(&mut self.z, velocity);
-            for (z, forcing) in self.z.iter_mut().zip(&self.forcing) {
-                *z = *z * conditions.tau - forcing.shape * *r;
+            for (group, velocity) in self.groups.iter_mut().zip(velocity.chunks(WIDTH)) {
+                group.z = padded(velocity) * conditions.tau - group.forcing.shape * *r;
             }
-        }
-    }
-
-    /// The filter of a goal commanded now, on the clock.
-    ///
-    /// Such a goal enters Eq. (1) alone, as in the paper, but over what remains of the movement: the filter takes so long,
-    /// less the time 1/β_z by which the output system lags behind, and never less than a transition. A goal at once is
-    /// what immediate transport has, an anchor, and any goal from shortly before the end on.
-    pub(super) fn centre_filter(&self) -> Filter {
-        match self.model.canonical() {
-            Canonical::Discrete { u_end, .. } if !self.model.transport.is_immediate() => {
-                let remaining = u_end - self.clock.value() - 1.0 / self.model.attractor().beta_z;
-                Filter::new(self.transition.max(remaining * self.model.tau()))
-            }
-            _ => self.filter,
-        }
-    }
-
-    /// Sets the distances at which the way from here to the goal counts as gone, not below what rounding leaves of it.
-    pub(super) fn set_tolerance(&mut self) {
-        let ranges = self.model.ranges();
-        let least = Lanes::splat(STILL * widest(ranges));
-        repack(&mut self.tolerance, ranges);
-        for tolerance in &mut self.tolerance {
-            *tolerance = tolerance.max(least) * SETTLED;
-        }
-        let ends = self.centre.target().iter().zip(&self.position);
-        for (tolerance, (&centre, &position)) in self.tolerance.iter_mut().zip(ends) {
-            let rounding = centre.abs().max(position.abs()) * (8.0 * f64::EPSILON);
-            *tolerance = tolerance.max(((centre - position).abs() * SETTLED).max(rounding));
         }
     }
 
@@ -304,9 +270,9 @@ impl Controller {
     /// now: e − o where o is of the sign of e and smaller, 0 where it is larger, e where it is of the other sign. A robot
     /// that always lags or sags by the same so neither holds the movement up nor keeps it from its goal. The error of a
     /// DoF whose unit is rad, deg or ° is taken the short way round. A measurement stays in force, as the distance e, until
-    /// the next one or [`Controller::release`], so that a sensor may be slower than the loop. `coupling` adds c_v to the velocity and c_a to the acceleration. Over the tick the
-    /// pull is the velocity (1 − exp(−k_t h))/dt of d at its start, h being the tick on the clock: however long
-    /// the tick, it pulls no further than ỹ.
+    /// the next one or [`Controller::release`], so that a sensor may be slower than the loop. `coupling` adds c_v to the
+    /// velocity and c_a to the acceleration. Over the tick the pull is the velocity (1 − exp(−k_t h))/dt of d at its
+    /// start, h being the tick on the clock: however long the tick, it pulls no further than ỹ.
     ///
     /// Phase stopping and the pull: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
     /// Mohajerian and Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9. Terms in ż:

@@ -1,10 +1,11 @@
 //! One tick.
 
+use super::group::{Forcing, Gate, Group, carried};
 use super::{Controller, Status};
 use crate::attractor::{Attractor, Jet, State};
 use crate::error::{Error, Result};
-use crate::landscape::{Fade, Landscape, Place};
-use crate::lanes::{Lanes, Real, Register, flush, unpack};
+use crate::landscape::Fade;
+use crate::lanes::{Lanes, Register, flush, unpack};
 use crate::perturbation::Push;
 use crate::phase::{Canonical, CompensatedSum, amplitude, faded};
 use crate::transport::Lag;
@@ -15,63 +16,6 @@ const MOST_PIECES: f64 = 1000.0;
 const LEAST_RATE: f64 = 1e-6;
 /// Longest tick, in units of τ.
 const LONGEST_TICK: f64 = 1000.0;
-
-/// What the landscape gives a group of DoFs at the clock.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Forcing {
-    /// sᵀb.
-    pub(super) shape: Lanes,
-    /// Its derivative with respect to the phase's clock.
-    slope: Lanes,
-    /// ṡᵀb, per second at the nominal rate.
-    swing: Lanes,
-}
-
-impl Forcing {
-    /// Reads a group at a place, for a style s and, while it is on its way, ṡ.
-    #[inline(always)]
-    fn read<T: Register>(landscape: &Landscape, place: Place, group: usize, s: &[f64], rate: Option<&[f64]>) -> Self {
-        let [along, swing] = match rate {
-            Some(rate) => landscape.blend_both::<T>(place, group, [s, rate]),
-            None => [landscape.blend(place, group, s), Jet::default()],
-        };
-        Self { shape: along.value.store(), slope: along.slope.store(), swing: swing.value.store() }
-    }
-}
-
-/// What turns a [`Forcing`] into w = r·sᵀb and its slope along the motion, w′ = rκ·sᵀb′ + rτ_n·ṡᵀb + r′·sᵀb. Past the
-/// end of a discrete movement r stands for the fading phase, and b for what is faded.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Gate {
-    pub(super) r: f64,
-    /// The landscape is read at the phase's pace κ; style and amplitude keep the output system's clock.
-    along: f64,
-    swing: f64,
-    growth: f64,
-    /// ρ and ρ̇.
-    rate: [f64; 2],
-}
-
-impl Gate {
-    #[inline(always)]
-    fn jet<T: Register>(&self, forcing: &Forcing) -> Jet<T> {
-        let [shape, slope, swing] = [&forcing.shape, &forcing.slope, &forcing.swing].map(T::load);
-        Jet { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
-    }
-
-    /// ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w, where w has the motion c′ of the frame in it.
-    #[inline(always)]
-    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: Jet<T>) -> [T; 2] {
-        let ([rate, change], flow) = (self.rate, state.z + w.value);
-        [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
-    }
-}
-
-/// Adds the motion of a frame that covers a `way` to the forcing, for m with respect to the output system's clock.
-#[inline(always)]
-fn carried<T: Real>(w: Jet<T>, way: T, [slope, bend]: [f64; 2]) -> Jet<T> {
-    Jet { value: w.value + way * slope, slope: w.slope + way * bend }
-}
 
 impl Controller {
     /// Checks that a tick is not too long for the rates at which it starts and to which it goes.
@@ -90,13 +34,13 @@ impl Controller {
         self.started = true;
         let mut parts = h / self.finest;
         if !(self.style.settled() && self.amplitude.settled()) {
-            parts = parts.max(self.filter.parts(h * self.model.tau()));
+            parts = parts.max(self.filter.parts(h));
         }
         if !self.centre.settled() {
-            parts = parts.max(self.centre_filter.parts(h * self.model.tau()));
+            parts = parts.max(self.centre_filter.parts(h));
         }
         if !self.rate.settled() {
-            parts = parts.max(self.filter.parts(dt));
+            parts = parts.max(self.rate_filter.parts(dt));
         }
         if parts <= 1.0 {
             self.piece(dt, h);
@@ -117,6 +61,7 @@ impl Controller {
     }
 
     /// The stretch of the clock that `dt` seconds from now on cover.
+    #[inline(always)]
     pub(super) fn stretch(&mut self, dt: f64) -> f64 {
         if self.rate.settled() {
             return first(self.rate.value()) * dt;
@@ -128,23 +73,23 @@ impl Controller {
     /// Gets the filter of the rate ready for `dt` seconds.
     fn measure(&mut self, dt: f64) {
         if dt != self.glide.dt() {
-            self.glide = self.filter.glide(dt);
+            self.glide = self.rate_filter.glide(dt);
         }
     }
 
     /// Gets the filters on the clock that are at work ready for a stretch `h` of it.
     #[inline(always)]
     fn measure_clock(&mut self, h: f64) {
-        let seconds = h * self.model.tau();
-        if seconds != self.course.dt() && !(self.style.settled() && self.amplitude.settled()) {
-            self.course = self.filter.pass(seconds);
+        if !(self.style.settled() && self.amplitude.settled()) && h != self.course.dt() {
+            self.course = self.filter.pass(h);
         }
-        if seconds != self.centre_course.dt() && !self.centre.settled() {
-            self.centre_course = self.centre_filter.pass(seconds);
+        if !self.centre.settled() && h != self.centre_course.dt() {
+            self.centre_course = self.centre_filter.pass(h);
         }
     }
 
     /// Moves on by `dt` seconds, `h` on the clock, stopping at the demonstrated end, where the forcing has a kink.
+    #[inline(always)]
     fn piece(&mut self, dt: f64, h: f64) {
         let Canonical::Discrete { u_end, .. } = self.model.canonical() else {
             return self.advance(dt, h);
@@ -154,7 +99,7 @@ impl Controller {
         if left <= 0.0 || left > way * (1.0 + 1e-9) {
             return self.advance(dt, h);
         }
-        let before = self.rate.time_to(left / self.held.pace(), dt, &self.filter);
+        let before = self.rate.time_to(left / self.held.pace(), dt, &self.rate_filter);
         // What rounding left of a tick that should have ended here is not worth a piece of its own.
         if left > 1e-9 * way {
             let h = self.stretch(before);
@@ -168,18 +113,29 @@ impl Controller {
     }
 
     /// Moves on by `dt` seconds, `h` on the clock.
+    #[inline(always)]
     pub(super) fn advance(&mut self, dt: f64, h: f64) {
         if h <= 0.0 {
-            // A pause: nothing moves but the rate.
-            self.measure(dt);
-            self.rate.advance::<Lanes>(&self.glide);
-            self.held.rest();
-            return self.read_out();
+            return self.pause(dt);
         }
         #[cfg(target_arch = "x86_64")]
         if super::avx::advance(self, dt, h) {
             return;
         }
+        self.advance_anywhere(dt, h);
+    }
+
+    /// A pause: nothing moves but the rate.
+    fn pause(&mut self, dt: f64) {
+        self.measure(dt);
+        self.rate.advance::<Lanes>(&self.glide);
+        self.held.rest();
+        self.read_out();
+    }
+
+    /// Moves on as any processor can. A call of its own, so that [`Controller::advance`] stays small.
+    #[inline(never)]
+    fn advance_anywhere(&mut self, dt: f64, h: f64) {
         self.advance_in::<Lanes>(dt, h);
     }
 
@@ -193,10 +149,8 @@ impl Controller {
         }
         let demonstrated = !self.model.landscape().is_past(self.clock.value());
         let levers = self.held.push().map(|_| self.levers());
-        let before = if demonstrated { self.gate_within() } else { self.gate() };
-        for (from, forcing) in self.from.iter_mut().zip(&self.forcing) {
-            let Jet { value, slope } = before.jet::<T>(forcing);
-            *from = Jet { value: value.store(), slope: slope.store() };
+        if self.held.pace() != self.paced {
+            self.open_gate();
         }
         self.style.advance::<T>(&self.course);
         self.rate.advance::<T>(&self.glide);
@@ -207,8 +161,7 @@ impl Controller {
             self.r = if self.amplitude.settled() {
                 amplitude(mu, self.r, self.conditions.amplitude, h)
             } else {
-                let (tau, dt) = (self.model.tau(), self.course.dt());
-                let r = faded(self.filter.lag(&self.amplitude, self.r, mu / tau, dt));
+                let r = faded(self.filter.lag(&self.amplitude, self.r, mu, h));
                 self.amplitude.advance::<T>(&self.course);
                 r
             };
@@ -227,35 +180,32 @@ impl Controller {
         let place = if demonstrated { landscape.place_within(clock) } else { landscape.place(clock) };
         let style = unpack(self.style.value(), model.n_styles());
         let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
-        let (n, rest, nominal) = (self.forcing.len(), T::splat(self.rest), model.tau());
-        let (forcing, centre) = (&mut self.forcing[..n], &mut self.centre);
-        let (starts, way) = (&self.from[..n], &self.way[..n]);
-        let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
-        let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
-        for group in 0..n {
-            let from = Jet { value: T::load(&starts[group].value), slope: T::load(&starts[group].slope) };
-            forcing[group] = Forcing::read::<T>(landscape, place, group, style, swing);
-            let to = after.jet(&forcing[group]);
+        let (n, rest, centre) = (self.groups.len(), T::splat(self.rest), &mut self.centre);
+        let (position, velocity, acceleration) =
+            (&mut self.position[..n], &mut self.velocity[..n], &mut self.acceleration[..n]);
+        for (index, group) in self.groups.iter_mut().enumerate() {
+            let from = Jet { value: T::load(&group.w.value), slope: T::load(&group.w.slope) };
+            group.forcing = Forcing::read::<T>(landscape, place, index, style, swing);
+            let to = after.jet::<T>(&group.forcing);
+            group.w = Jet { value: to.value.store(), slope: to.slope.store() };
 
-            let (goal, way) = (T::load(&centre.value()[group]), T::load(&way[group]));
+            let (goal, way) = (T::load(&centre.value()[index]), T::load(&group.way));
             let [start, mut origin] = lags.map(|lag| goal + way * lag);
-            let state = State { e: T::load(&position[group]) - start, z: T::load(&z[group]) };
+            let state = State { e: T::load(&position[index]) - start, z: T::load(&group.z) };
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
-                let set_out = Jet { value: T::default(), slope: T::load(&centre.rate()[group]) * nominal };
-                centre.advance_group::<T>(group, &self.centre_course);
-                let arrived = T::load(&centre.value()[group]);
-                let slope = T::load(&centre.rate()[group]) * nominal;
+                let set_out = Jet { value: T::default(), slope: T::load(&centre.rate()[index]) };
+                let [arrived, slope] = centre.advance_group::<T>(index, &self.centre_course);
                 let moved = propagator.follow([set_out, Jet { value: arrived - goal, slope }]);
                 y = y + moved.e;
                 origin = arrived + way * lags[1];
                 next.z = next.z + moved.z;
             }
-            let (y, z_next) = (flush(y, rest), flush(next.z, rest));
-            (position[group], z[group]) = (y.store(), z_next.store());
-            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, carried(to, way, carry));
-            (velocity[group], acceleration[group]) = (speed.store(), change.store());
+            let (y, z) = (flush(y, rest), flush(next.z, rest));
+            (position[index], group.z) = (y.store(), z.store());
+            let [speed, change] = after.motion(attractor, State { e: y - origin, z }, carried(to, way, carry));
+            (velocity[index], acceleration[index]) = (speed.store(), change.store());
         }
         landscape.prefetch(clock + self.lead * self.held.pace() * h);
         if let Some(before) = levers {
@@ -270,10 +220,10 @@ impl Controller {
         let by_velocity = self.propagator.advance(State::default(), [before[0], after[0]]);
         let by_acceleration = self.propagator.follow([before[1], after[1]]);
         let Some(Push { velocity, acceleration }) = self.held.push() else { return };
-        for group in 0..self.z.len() {
-            let (v, a) = (velocity[group], acceleration[group]);
-            self.position[group] += v * by_velocity.e + a * by_acceleration.e;
-            self.z[group] += v * by_velocity.z + a * by_acceleration.z;
+        for (index, group) in self.groups.iter_mut().enumerate() {
+            let (v, a) = (velocity[index], acceleration[index]);
+            self.position[index] += v * by_velocity.e + a * by_acceleration.e;
+            group.z += v * by_velocity.z + a * by_acceleration.z;
         }
     }
 
@@ -297,8 +247,8 @@ impl Controller {
         let within = self.gate_within();
         match self.model.landscape().fading(self.clock.value()) {
             Some(Fade { value, growth, along, .. }) => {
-                let [along, growth] = [along, growth].map(|slope| self.held.pace() * slope);
-                Gate { r: value, along, swing: value * within.swing, growth, ..within }
+                let pace = self.held.pace();
+                Gate { r: value, pace: pace * along, growth: pace * growth, ..within }
             }
             None => within,
         }
@@ -312,7 +262,7 @@ impl Controller {
             Canonical::Discrete { .. } => 0.0,
             Canonical::Rhythmic { mu } => mu * (first(self.amplitude.value()) - r),
         };
-        Gate { r, along: r * self.held.pace(), swing: r * self.model.tau(), growth, rate }
+        Gate { r, pace: self.held.pace(), growth, rate }
     }
 
     /// m′ and m″ with respect to the output system's clock, from those with respect to the phase's.
@@ -328,13 +278,21 @@ impl Controller {
         self.lag = self.stretch.lag(self.clock.value()).value;
     }
 
-    /// Reads the forcing at the clock.
+    /// Reads the forcing at a clock or style that was set.
     pub(super) fn read_forcing(&mut self) {
         let (model, place) = (&self.model, self.model.landscape().place(self.clock.value()));
         let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, model.n_styles()));
-        for (group, forcing) in self.forcing.iter_mut().enumerate() {
-            *forcing = Forcing::read::<Lanes>(model.landscape(), place, group, style, Some(swing));
+        for (index, group) in self.groups.iter_mut().enumerate() {
+            group.forcing = Forcing::read::<Lanes>(model.landscape(), place, index, style, Some(swing));
         }
+        self.open_gate();
+    }
+
+    /// Computes w at the clock for the pace at work. A tick does so for its end, where the next one starts.
+    fn open_gate(&mut self) {
+        self.paced = self.held.pace();
+        let gate = self.gate();
+        self.groups.iter_mut().for_each(|group| group.w = gate.jet(&group.forcing));
     }
 
     /// Velocity and acceleration of the present state.
@@ -342,15 +300,13 @@ impl Controller {
         let (gate, attractor) = (self.gate(), self.model.attractor());
         let Lag { value, slope, bend } = self.model.transport.lag(self.clock.value());
         let carry = self.carry(slope, bend);
-        for group in 0..self.z.len() {
-            let way = self.way[group];
-            let w = carried(gate.jet(&self.forcing[group]), way, carry);
-            let e = self.position[group] - (self.centre.value()[group] + way * value);
-            let state = State { e, z: self.z[group] };
-            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, state, w);
+        for (index, &Group { forcing, way, z, .. }) in self.groups.iter().enumerate() {
+            let w = carried(gate.jet(&forcing), way, carry);
+            let e = self.position[index] - (self.centre.value()[index] + way * value);
+            [self.velocity[index], self.acceleration[index]] = gate.motion(attractor, State { e, z }, w);
         }
         if let Some(Push { velocity, acceleration }) = self.held.push() {
-            for group in 0..self.z.len() {
+            for group in 0..self.groups.len() {
                 self.velocity[group] += velocity[group];
                 self.acceleration[group] += acceleration[group];
             }
@@ -367,17 +323,17 @@ impl Controller {
         let Attractor { alpha_z, beta_z } = self.model.attractor();
         let (landscape, target) = (self.model.landscape(), unpack(self.style.target(), self.model.n_styles()));
         let place = landscape.place(self.clock.value());
-        let over = (0..self.z.len()).all(|group| {
-            let way = (self.position[group] - self.centre.target()[group]).abs();
-            let Forcing { shape, slope, .. } = self.forcing[group];
+        let over = self.groups.iter().enumerate().all(|(index, group)| {
+            let way = (self.position[index] - self.centre.target()[index]).abs();
+            let Forcing { shape, slope, .. } = group.forcing;
             let forcing = shape * fade.value;
-            let flow = (self.z[group] + forcing).abs() * (2.0 / alpha_z);
+            let flow = (group.z + forcing).abs() * (2.0 / alpha_z);
             let mut push = fade.push(Jet { value: shape, slope });
             if !self.style.settled() {
-                push = push.max(fade.push(landscape.blend(place, group, target)));
+                push = push.max(fade.push(landscape.blend(place, index, target)));
             }
-            let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, group);
-            left.simd_le(self.tolerance[group]).all()
+            let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, index);
+            left.simd_le(group.tolerance).all()
         });
         if over { Status::Finished } else { Status::Working }
     }
