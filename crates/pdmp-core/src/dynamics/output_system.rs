@@ -170,7 +170,7 @@ impl Propagator {
 }
 
 /// 1/k!.
-const INVERSE_FACTORIAL: [f64; 19] = {
+pub(crate) const INVERSE_FACTORIAL: [f64; 19] = {
     let mut inverse = [1.0; 19];
     let mut k = 1;
     while k < 19 {
