@@ -164,7 +164,7 @@ def test_bytes_that_are_cut_are_refused(model: pdmp.Model) -> None:
 
 
 @pytest.mark.parametrize("basis", ["gp", "ngnet"])
-def test_table_error_is_that_of_cubics_between_its_knots(basis: Any) -> None:
+def test_table_error_is_stated_and_kept(basis: Any) -> None:
     """It is at most 1e-9 of the largest forcing where the table is fine enough, and is kept."""
     model = pdmp.fit(reaches(), n_styles=2, basis=basis)
     assert 0 < model.table_error < 1e-9
