@@ -162,18 +162,15 @@ mod tests {
         }
     }
 
-    /// A table has as many cells as its error needs, four times as many where the curvature is some hundredfold.
+    /// Cubics of values and slopes are off by (ωh)⁴/384: four times the frequency takes four times the cells.
     #[test]
     fn cells_are_as_many_as_the_error_needs() {
         let canonical = Canonical::Rhythmic { mu: 1.0 };
-        let cells = [5.0, 20.0].map(|omega| {
-            let table = compile(canonical, (1, 1), 1, &Waves(omega), Threads::ONE, &mut |_| Ok(())).unwrap();
-            assert!(table.error() <= TOLERANCE);
-            table.cells()
-        });
-        println!("{cells:?}");
-        // Cubics of values and slopes are off by (ωh)⁴/384.
-        assert!(cells[1] >= 2 * cells[0] && cells[1] <= 8 * cells[0], "{cells:?}");
+        let [slow, fast] = [5.0, 20.0]
+            .map(|omega| compile(canonical, (1, 1), 1, &Waves(omega), Threads::ONE, &mut |_| Ok(())).unwrap().cells());
+        assert_eq!(fast, 4 * slow);
+        let width = canonical.extent() / slow as f64;
+        assert!((5.0 * width).powi(4) / 384.0 < TOLERANCE);
     }
 
     #[derive(Debug)]
