@@ -150,6 +150,28 @@ def test_saved_models_move_alike(model: pdmp.Model, tmp_path: Path) -> None:
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
+def test_bytes_of_a_model_are_its_file(model: pdmp.Model, tmp_path: Path) -> None:
+    """Bytes in memory and a file on disk are the same, and either gives the model back."""
+    model.save(tmp_path / "model")
+    assert model.to_bytes() == (tmp_path / "model").read_bytes()
+    assert_same_motion(pdmp.Model.from_bytes(model.to_bytes()), model)
+
+
+def test_bytes_that_are_cut_are_refused(model: pdmp.Model) -> None:
+    """A part of a model is a ModelFileError, as a damaged file is."""
+    for end in (0, 8, 100, -1):
+        with pytest.raises(pdmp.ModelFileError):
+            pdmp.Model.from_bytes(model.to_bytes()[:end])
+
+
+@pytest.mark.parametrize("basis", ["gp", "ngnet"])
+def test_table_error_is_stated_and_kept(basis: Any) -> None:
+    """It is at most 1e-9 of the largest forcing where the table is fine enough, and is kept."""
+    model = pdmp.fit(reaches(), n_styles=2, basis=basis)
+    assert 0 < model.table_error < 1e-9
+    assert pdmp.Model.from_bytes(model.to_bytes()).table_error == model.table_error
+
+
 @pytest.mark.parametrize("content", [b"", b"{}", b"not a model" * 99, b"\xff" * 64, None])
 def test_damaged_files_are_told_from_other_errors(
     reach: pdmp.Model, tmp_path: Path, content: bytes | None

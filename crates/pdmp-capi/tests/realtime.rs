@@ -71,7 +71,7 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
         let places = ours.each_mut().map(|place| pdmp_buffer { data: place.as_mut_ptr(), length: n_dofs });
         let out = pdmp_motion { position: places[0], velocity: places[1], acceleration: places[2] };
         let mut reason = [0; 256];
-        let before = allocations();
+        let (mut accepted, before) = (0, allocations());
         for _ in 0..200_000 {
             values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
             // Refused commands are part of a loop too.
@@ -94,6 +94,7 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
             let expected = rust.update(&command, &mut motion);
             // SAFETY: the controller is alive, and the command and the motion are valid.
             let status = unsafe { pdmp_controller_update(c.as_mut(), Some(&in_c(&command)), Some(&out)) };
+            let updated = expected.is_ok();
             assert_eq!(status, expected.map_or(pdmp_status::PDMP_RANGE, pdmp_status::from));
             let (style, tau) = (&values[..n_styles], own * (0.5 + random.next()));
             // SAFETY: the controller is alive, and vectors and text are valid.
@@ -109,6 +110,7 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
                 }
             };
             assert_eq!(expected.is_ok(), status == pdmp_status::PDMP_OK);
+            accepted += usize::from(updated && expected.is_ok());
             if expected.is_err() {
                 let text = pdmp_text { data: reason.as_mut_ptr(), size: reason.len() };
                 // SAFETY: the text has the room that it tells.
@@ -118,6 +120,8 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
             assert!(pairs.into_iter().all(|(rust, c)| bits(rust).eq(bits(c))));
         }
         assert_eq!(allocations() - before, 0);
+        println!("{kind}: {accepted} of 200000 commands accepted");
+        assert!(accepted >= 100_000, "{kind}: {accepted} of 200000 commands accepted");
         // SAFETY: it is not used again.
         unsafe { pdmp_controller_free(c) };
     }

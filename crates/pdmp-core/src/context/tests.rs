@@ -31,6 +31,19 @@ fn linear_data_are_predicted_exactly() {
     assert!(maps[0].predict(&[2.0]).unwrap().covariance.unwrap().iter().all(|c| c.abs() < 1e-20));
 }
 
+/// A context has as many values as each context of the demonstrations, labels and numbers alike, be they constant.
+#[test]
+fn inputs_are_the_values_of_a_context() {
+    let outputs = array![[0.0], [1.0], [2.0], [3.5]];
+    assert_eq!(linear(&[0.0, 0.1, 0.2, 0.3], &outputs).n_inputs(), 1);
+    let row = |height: f64, name: &str| vec![height.into(), name.into(), 7.0.into()];
+    let rows = [row(0.0, "a"), row(0.1, "b"), row(0.2, "c"), row(0.3, "a")];
+    let map = ContextMap::fit(&rows, outputs.view(), Default::default()).unwrap();
+    assert_eq!((map.n_inputs(), map.columns().len()), (3, 3));
+    assert!(map.predict(&row(0.1, "b")).is_ok());
+    assert!(map.predict(&row(0.1, "b")[..2]).is_err());
+}
+
 /// What no map can be learnt from is refused with its place, whatever the map.
 #[test]
 fn contexts_that_are_none_are_refused() {

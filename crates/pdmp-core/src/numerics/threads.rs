@@ -156,6 +156,13 @@ mod tests {
         for n in [0, 1025, usize::MAX] {
             assert!(matches!(Threads::new(n), Err(Error::Range { name: "threads", .. })));
         }
-        assert!(Threads::available().get() >= 1);
+    }
+
+    /// All that the system lets this process run at once, so that these too can be asked for.
+    #[test]
+    fn available_threads_are_those_of_the_system() {
+        let n = Threads::available().get();
+        assert_eq!(n, thread::available_parallelism().map_or(1, |n| n.get().min(1024)));
+        assert_eq!(Threads::new(n).unwrap().get(), n);
     }
 }
