@@ -14,7 +14,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import Matern
 
 import pdmp
-from pdmp.plot._canvas import MARKERS, PALETTE, canvas, dress
+from pdmp.plot.canvas import MARKERS, PALETTE, ensure_figure, label_axes
 from peers.factors import library
 from peers.regression import LENGTH, NOISE, samples
 
@@ -76,7 +76,7 @@ def panel(
     axes: Axes, title: str, works: dict[str, Callable[[int], Call]], sizes: list[int], over: str
 ) -> None:
     """Draws the times of several works over the size of the problem, and prints them."""
-    dress(axes, over, "time [s]")
+    label_axes(axes, over, "time [s]")
     print(title)
     for look, (name, work) in enumerate(works.items()):
         found = times(work, sizes)
@@ -99,7 +99,7 @@ def main() -> None:
         "pdmp, all factors": every,
         "numpy, all factors": lapack,
     }
-    figure = canvas(None, 9, 4.2)
+    figure = ensure_figure(None, 9, 4.2)
     left, right = figure.subplots(1, 2)
     title = "Gaussian process, Matérn-5/2, three outputs"
     panel(left, title, processes, SIZES, "samples C")

@@ -7,7 +7,7 @@ import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
-from pdmp.cli._options import path
+from pdmp.cli.options import file_path
 from reproduction import command
 from reproduction.run import FIGURES, reproduce
 from reproduction.section import SEED
@@ -42,7 +42,7 @@ def _parser() -> ArgumentParser:
         "-o",
         "--output",
         default="out/reproduction",
-        type=path,
+        type=file_path,
         metavar="FOLDER",
         help="folder of the pictures and tables; default: %(default)s",
     )
@@ -55,7 +55,7 @@ def _parser() -> ArgumentParser:
     )
     parser.add_argument(
         "--recordings",
-        type=path,
+        type=file_path,
         metavar="FOLDER",
         help="for fig5, CSV files of people walking: t [s]; r_sh1, r_sh2, r_sh3, r_elb, l_sh1, … "
         "[rad]",

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, legend
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, PALETTE, ensure_figure, label_axes, legend
 from pdmp.preprocessing import resample
 from reproduction import paths
 from reproduction.loop import PACE, NewGoal, reach_over
@@ -192,7 +192,7 @@ def figure_4(seed: int = SEED) -> Section:
 
 def draw_errors(found: Errors) -> Figure:
     """Draws E over J."""
-    figure = canvas(None, 5.2, 3.8)
+    figure = ensure_figure(None, 5.2, 3.8)
     axes = figure.subplots()
     n_styles = np.arange(1, len(found.predicted) + 1)
     for rows, color, label in (
@@ -201,7 +201,7 @@ def draw_errors(found: Errors) -> Figure:
     ):
         mean, spread = rows.mean(axis=1), rows.std(axis=1)
         axes.errorbar(n_styles, mean, spread, color=color, marker="o", capsize=3, label=label)
-    dress(axes, "number of styles J", "E [rad²]", "prediction error on new heights")
+    label_axes(axes, "number of styles J", "E [rad²]", "prediction error on new heights")
     axes.set_ylim(bottom=0)
     legend(figure, axes)
     return figure
@@ -211,7 +211,7 @@ def draw_paths(
     reaching: Reaching, robots: dict[float, Robot], moved: dict[float, Robot], command: NewGoal
 ) -> Figure:
     """Draws the predicted and the demonstrated path of the hand from the side."""
-    figure = canvas(None, 9.5, 4.6)
+    figure = ensure_figure(None, 9.5, 4.6)
     panels = figure.subplots(1, len(robots), sharey=True)
     for axes, height in zip(panels, robots, strict=True):
         paths.draw_boxes(axes, reaching, height)

@@ -11,8 +11,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, gradient, legend
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, colormap, ensure_figure, label_axes, legend
 from reproduction.metrics import reproduction_error
 from reproduction.section import SEED, Section
 
@@ -118,7 +118,7 @@ def figure_2(seed: int = SEED) -> Section:
 
 def draw(examples: Sequence[Example]) -> Figure:
     """Draws demonstrations, reproductions under other goals and paces, and styles in between."""
-    figure = canvas(None, 12.0, 6.8)
+    figure = ensure_figure(None, 12.0, 6.8)
     grid = figure.subplots(len(examples), 3)
     for row, example in zip(grid, examples, strict=True):
         model = example.model
@@ -133,10 +133,10 @@ def draw(examples: Sequence[Example]) -> Figure:
         first, second = (model.conditions(m) for m in extremes(model))
         for share in SHARES:
             path = _path(model, pdmp.blend(first, second, float(share)), model.nominal)
-            between.plot(path.time, path.position, color=gradient()(share), linewidth=1.3)
+            between.plot(path.time, path.position, color=colormap()(share), linewidth=1.3)
         titles = ("demonstrations", "two styles, goals, time constants", "from s1 to s2")
         for axes, title in zip(row, titles, strict=True):
-            dress(axes, "time [s]", "position [–]", f"{example.title}: {title}")
+            label_axes(axes, "time [s]", "position [–]", f"{example.title}: {title}")
     legend(figure, grid[0, 1])
     return figure
 

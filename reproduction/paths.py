@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp.plot._canvas import GREY, PALETTE, canvas, dress, legend
+from pdmp.plot.canvas import GREY, PALETTE, ensure_figure, label_axes, legend
 from reproduction.human import BOX
 from reproduction.reaching import NAMES, Reaching
 from reproduction.robot import DT, SHADES, Robot, boxes
@@ -38,7 +38,7 @@ def draw_hand(axes: Axes, reaching: Reaching, hands: Array, **look: Any) -> None
 
 def dress_side(axes: Axes, title: str) -> None:
     """Labels a view from the side."""
-    dress(axes, "way from start to goal [m]", "height over the table [m]", title)
+    label_axes(axes, "way from start to goal [m]", "height over the table [m]", title)
 
 
 def joints(robots: Mapping[str, Robot], until: float) -> Figure:
@@ -51,11 +51,11 @@ def joints(robots: Mapping[str, Robot], until: float) -> Figure:
     until : float
         How much of their time to draw [s].
     """
-    figure = canvas(None, 7.5, 8.5)
+    figure = ensure_figure(None, 7.5, 8.5)
     panels = figure.subplots(len(NAMES) + 1, 1, sharex=True)
     for axes, name in zip(panels, NAMES, strict=False):
-        dress(axes, "", f"{name} [rad]")
-    dress(panels[-1], "time [s]", "off by [mrad]")
+        label_axes(axes, "", f"{name} [rad]")
+    label_axes(panels[-1], "time [s]", "off by [mrad]")
     for (name, robot), color in zip(robots.items(), PALETTE, strict=False):
         commanded, done = (rows[: round(until / DT)] for rows in robot.log.rows())
         time = DT * np.arange(1, len(commanded) + 1)

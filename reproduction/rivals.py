@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, legend
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, ensure_figure, label_axes, legend
 from reproduction.heights import (
     N_SAMPLES,
     TESTED,
@@ -236,7 +236,7 @@ def comparison(seed: int = SEED) -> Section:
 
 def draw_held(trials: dict[str, Trial]) -> Figure:
     """Draws commanded and measured elbow angle while it was held and after."""
-    figure = canvas(None, 9.5, 3.8)
+    figure = ensure_figure(None, 9.5, 3.8)
     panels = figure.subplots(1, len(trials), sharey=True)
     for axes, (name, trial) in zip(panels, trials.items(), strict=True):
         commanded, done = (rows[:, HELD_JOINT] for rows in trial.held.log.rows())
@@ -247,7 +247,7 @@ def draw_held(trials: dict[str, Trial]) -> Figure:
         axes.plot(time[: len(undisturbed)], undisturbed, "k:", linewidth=1, label="undisturbed")
         axes.plot(time[within], commanded[within], color=GREY, linewidth=3, label="commanded")
         axes.plot(time[within], done[within], color=BLUE, label="measured")
-        dress(axes, "time [s]", "q4 [rad]", name)
+        label_axes(axes, "time [s]", "q4 [rad]", name)
     legend(figure, panels[0])
     return figure
 

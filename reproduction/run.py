@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from pdmp import plot
-from pdmp._atomic_write import atomic_write
-from pdmp.plot._canvas import canvas
+from pdmp.files import atomic_write
+from pdmp.plot.canvas import ensure_figure
 from reproduction.section import SEED, Section
 
 Folder: TypeAlias = str | PathLike[str]
@@ -61,7 +61,7 @@ def reproduce(
         raise ValueError(f'recordings: only "fig5" learns from them, not "{figure}"')
     if recordings is not None and not Path(recordings).is_dir():
         raise ValueError(f"recordings: {recordings} is not a folder")
-    canvas(None, 1, 1)  # raises an error at once without matplotlib
+    ensure_figure(None, 1, 1)  # raises an error at once without matplotlib
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     reports = []

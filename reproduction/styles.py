@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
-from pdmp.plot._canvas import GREY, PALETTE, canvas
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import GREY, PALETTE, ensure_figure
 from reproduction import film, paths
 from reproduction.loop import reach_over
 from reproduction.reaching import CONSTANTS, HEIGHTS, Reaching, demonstrate, height_of
@@ -103,7 +103,7 @@ def figure_3(seed: int = SEED) -> Section:
 
 def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) -> Figure:
     """Draws the hand from the side: over several styles, and to several goals."""
-    figure = canvas(None, 9.5, 4.2)
+    figure = ensure_figure(None, 9.5, 4.2)
     styles, places = figure.subplots(1, 2, sharey=True)
     tallest = max(HEIGHTS)
     for axes in (styles, places):

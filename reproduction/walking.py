@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
 from pdmp.io import read_csv
-from pdmp.plot._canvas import BLUE, ORANGE, canvas, dress
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import BLUE, ORANGE, ensure_figure, label_axes
 from pdmp.preprocessing import cycles
 from reproduction import film
 from reproduction.robot import DT, Robot
@@ -160,7 +160,7 @@ def draw(
     """Draws the joints of one arm about each switch."""
     position = np.array(done.position)
     lasting = len(position) * DT / len(commands)
-    figure = canvas(None, 11.0, 7.0)
+    figure = ensure_figure(None, 11.0, 7.0)
     panels = figure.subplots(len(names), len(commands) - 1, sharey="row", sharex="col")
     for column, switch in enumerate(commands[1:], start=1):
         at = column * lasting
@@ -170,7 +170,7 @@ def draw(
             axes = panels[joint, column - 1]
             axes.axvline(at, color=ORANGE, linewidth=1)
             axes.plot(time, position[rows, joint], color=BLUE, linewidth=1.1)
-            dress(axes, "", f"{name} [rad]" if column == 1 else "")
+            label_axes(axes, "", f"{name} [rad]" if column == 1 else "")
         panels[0, column - 1].set_title(switch.name, fontsize=9)
         panels[-1, column - 1].set_xlabel("time [s]")
     return figure

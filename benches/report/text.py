@@ -8,6 +8,7 @@ from pdmp import TimeWarp
 from pdmp.evaluation import Evaluation, baselines
 from pdmp.evaluation.result import REFERENCE
 from recordings import sources
+from report.baselines import library_baselines
 from report.sets import Question
 
 PRIMITIVE = "PDMP"
@@ -107,7 +108,7 @@ def primitive(question: Question, found: Evaluation, reach: str) -> Iterable[str
     yield f"{summary.error:.2g} ± {summary.deviation:.1g} {question.unit}²"
     yield f"{summary.coverage:.0%}"
     yield f"{summary.duration:.0%}"
-    others = [name for name in baselines() if name not in found.left_out]
+    others = [name for name in baselines() | library_baselines() if name not in found.left_out]
     best = min(others, key=lambda name: found.summary(name, reach).error)
     yield best
     yield difference(found, PRIMITIVE, best, reach)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, draw_movement, legend, movement_panels
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, draw_movement, legend, movement_panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
