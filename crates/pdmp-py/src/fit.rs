@@ -15,11 +15,11 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyList, PyMapping};
 
-use crate::basis::{Gp, NGnet};
 use crate::convert::{count, items, matrix, numbers};
-use crate::demo::{Demonstration, Source, Trajectory};
+use crate::demonstration::{Demonstration, Source, Trajectory};
 use crate::error::detached;
 use crate::model::Model;
+use crate::regression::{Gp, NGnet};
 use crate::warp::TimeWarp;
 
 /// Learn one movement primitive from several demonstrations.

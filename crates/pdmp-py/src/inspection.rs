@@ -6,7 +6,7 @@ use pdmp_core::preprocessing::inspection::{Finding, inspect, unwound};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
-use crate::demo::Demonstration;
+use crate::demonstration::Demonstration;
 
 /// Warns of every finding, at the line that called the library.
 pub(crate) fn warn(py: Python<'_>, findings: &[Finding]) -> PyResult<()> {

@@ -14,7 +14,7 @@ use pyo3::types::{PyBytes, PyDict, PyString};
 use crate::conditions::{Conditions, conditions_of};
 use crate::controller::Controller;
 use crate::convert::{Cube, Matrix, Reduced, Vector, optional, to_numpy, vector};
-use crate::demo::{Demonstration, Trajectory};
+use crate::demonstration::{Demonstration, Trajectory};
 use crate::error::{ascii, interruptible, raise};
 use crate::prediction::Prediction;
 

@@ -6,7 +6,7 @@ use pdmp_core::preprocessing::{CycleOutput, RejectionReason};
 use pyo3::prelude::*;
 
 use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
-use crate::demo::Demonstration;
+use crate::demonstration::Demonstration;
 use crate::error::raise;
 use crate::fit::demonstrations;
 
