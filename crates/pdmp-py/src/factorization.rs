@@ -1,22 +1,23 @@
-//! The factorisation of targets by itself, in Python.
+//! Stand-alone factorisation of targets.
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyUntypedArrayMethods};
+use pdmp_core::learning::Truncation;
 use pyo3::prelude::*;
 
 use crate::convert::{matrix, to_numpy};
 use crate::error::interruptible;
-use crate::fit::style_count;
+use crate::scalar::{Scalar, optional_count};
 
-/// The leading factors of targets F ≈ S·F_basis (Eq. 7), as `pdmp.factorise` finds them.
+/// Leading factors of targets F ≈ S·F_basis (Eq. 7), returned by `factorise`.
 #[pyclass(frozen, get_all, module = "pdmp")]
 pub(crate) struct Factors {
-    /// Styles S (M, J) with orthonormal columns, in each of which the entry of largest magnitude is positive.
+    /// Styles S (M, J) with orthonormal columns. The entry of largest magnitude in each column is positive.
     styles: Py<PyArray2<f64>>,
-    /// Basis targets F_basis (J, C·D) = SᵀF, whose rows are orthogonal and as long as the singular values.
+    /// Basis targets F_basis = SᵀF (J, C·D). Their rows are orthogonal with the singular values as norms.
     basis: Py<PyArray2<f64>>,
-    /// Singular values in decreasing order: all min(M, C·D), or the first J alone, where the others were not computed.
+    /// Singular values in decreasing order: all min(M, C·D), or the first J if the others were not computed.
     singular_values: Py<PyArray1<f64>>,
-    /// Share of the targets, by root mean square, that the factors leave out: ‖F − S·F_basis‖/‖F‖.
+    /// Truncation error ‖F − S·F_basis‖/‖F‖ in the Frobenius norm.
     truncation_error: f64,
 }
 
@@ -26,26 +27,26 @@ impl Factors {
         let (styles, basis) = (self.styles.bind(py), self.basis.bind(py));
         let (rows, n_styles, columns) = (styles.shape()[0], styles.shape()[1], basis.shape()[1]);
         Ok(format!(
-            "<pdmp.Factors: J = {n_styles} of targets ({rows}, {columns}), {:.1e} left out>",
+            "<pdmp.Factors: J = {n_styles} of targets ({rows}, {columns}), truncation error {:.1e}>",
             self.truncation_error
         ))
     }
 }
 
-/// Factorise stacked targets: the truncated singular value decomposition of step 3 of Section 3.2.
+/// Factorise stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
 ///
-/// F = UΣVᵀ, S = the first J columns of U, F_basis = the first J rows of ΣVᵀ: of all products of this shape the one
-/// nearest to F. `fit` does this to its targets. Few factors of many demonstrations are found from products with F
-/// alone, the others from its Gram matrix or by reflections; which, depends on J, the shape and the singular values.
+/// F = UΣVᵀ; S is the first J columns of U and F_basis the first J rows of ΣVᵀ, the best approximation of F of rank J.
+/// `fit` factorises its targets so. A few factors of many demonstrations are computed by Krylov iteration, others from
+/// the Gram matrix or by Householder reflections, depending on J, the shape and the singular values.
 ///
 /// Parameters
 /// ----------
-/// targets : (M, C·D) array_like
-///     One row per demonstration.
+/// targets : array_like, (M, C·D)
+///     Targets F, one row per demonstration, in any unit.
 /// n_styles : int, optional
-///     Number of factors J, at most min(M, C·D); otherwise from `singular_value_share`.
+///     Number J of factors, at most min(M, C·D). By default `singular_value_share` decides.
 /// singular_value_share : float
-///     Keep the fewest singular values whose sum exceeds this share of the sum of all.
+///     Share in (0, 1]: J is the smallest number of singular values whose sum exceeds this share of the sum of all.
 ///
 /// Returns
 /// -------
@@ -55,20 +56,24 @@ impl Factors {
 /// Raises
 /// ------
 /// ValueError
-///     A J or share out of range; targets that are empty, or not finite.
+///     `n_styles` or `singular_value_share` is out of range, or `targets` is empty or not finite.
 ///
 /// References
 /// ----------
 /// Eckart and Young, Psychometrika 1 (1936), https://doi.org/10.1007/BF02288367
 #[pyfunction]
-#[pyo3(signature = (targets, *, n_styles=None, singular_value_share=0.9))]
+#[pyo3(
+    signature = (targets, *, n_styles=None, singular_value_share=Scalar::Number(0.9)),
+    text_signature = "(targets, *, n_styles=None, singular_value_share=0.9)"
+)]
 pub(crate) fn factorise(
     py: Python<'_>,
     targets: &Bound<'_, PyAny>,
-    n_styles: Option<isize>,
-    singular_value_share: f64,
+    n_styles: Option<Scalar<'_>>,
+    singular_value_share: Scalar<'_>,
 ) -> PyResult<Factors> {
-    let styles = style_count(n_styles, singular_value_share)?;
+    let share = singular_value_share.number("singular_value_share")?;
+    let styles = optional_count("n_styles", n_styles)?.map_or(Truncation::Share(share), Truncation::Rank);
     let targets = matrix("targets", "(M, C·D)", targets)?;
     let factors = interruptible(py, |progress| pdmp_core::learning::Factors::of(targets.view(), styles, progress))?;
     let truncation_error = factors.truncation_error();

@@ -1,4 +1,5 @@
-//! Python bindings: every function converts, detaches where it is long, calls the core, and converts back.
+//! Python bindings of pdmp-core. Each function converts its arguments, releases the interpreter if the call is long, calls
+//! the core and converts the result. Summaries of docstrings are in the imperative mood, as numpydoc asks.
 
 mod batch;
 mod conditions;
@@ -6,6 +7,7 @@ mod context;
 mod controller;
 mod convert;
 mod demonstration;
+mod display;
 mod error;
 mod factorization;
 mod fit;
@@ -16,11 +18,12 @@ mod model_getters;
 mod prediction;
 mod preprocessing;
 mod regression;
+mod scalar;
 mod warp;
 
 use pyo3::prelude::*;
 
-/// The compiled half of pdmp.
+/// Compiled part of pdmp.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();

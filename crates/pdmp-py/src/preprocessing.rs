@@ -1,4 +1,4 @@
-//! From recordings to demonstrations.
+//! Preprocessing of recordings to demonstrations.
 
 use numpy::IntoPyArray;
 use pdmp_core::preprocessing;
@@ -9,14 +9,14 @@ use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
 use crate::demonstration::Demonstration;
 use crate::error::raise;
 use crate::fit::demonstrations;
+use crate::scalar::Scalar;
 
-/// Sample a recording anew, at even intervals.
+/// Resample a recording at even intervals.
 ///
-/// Samples at t₀, t₀ + dt, … as far as the recording goes; the clock of what is returned starts at 0. Of irregular time
-/// stamps it makes even ones. They are those of the cubic smoothing spline that generalised cross-validation chooses,
-/// which meets clean samples. No denser than the recording, they also carry what smoothing takes off the nearest recorded
-/// ones: noise stays white, and a fit can still smooth it. A denser grid is that of the spline through all samples. Frequencies above 1/(2 dt) are to be
-/// taken off first, by `lowpass`.
+/// The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no denser
+/// than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the residuals
+/// of the nearest recorded samples: noise stays white, so that a fit can still smooth it. A denser grid samples the spline
+/// through all samples. Remove frequencies above 1/(2 dt) with `lowpass` first.
 ///
 /// Parameters
 /// ----------
@@ -28,69 +28,69 @@ use crate::fit::demonstrations;
 /// Returns
 /// -------
 /// Demonstration
-///     With its names, units, context and goal.
+///     Recording with the same names, units, context and goal.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     An interval that is not positive or leaves fewer than four samples, or a recording without times.
+///     `dt` is not positive or leaves fewer than four samples, or the recording has no times.
 #[pyfunction]
-pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: f64) -> PyResult<Demonstration> {
+pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: Scalar<'_>) -> PyResult<Demonstration> {
+    let dt = dt.number("dt")?;
     py.detach(|| preprocessing::resample(&demo.0, dt)).map(Demonstration).map_err(raise)
 }
 
-/// Keep the part of a recording in which there is movement.
+/// Trim the rests before and after the movement of a recording.
 ///
-/// That is from the first to the last sample whose speed is at least the share `threshold` of the largest, with the
-/// speed of all degrees of freedom together, v² = Σ_d (ẏ_d / (max y_d − min y_d))², of the recording as generalised
-/// cross-validation smooths it. Where noise is faster than the threshold, a movement counts that surpasses noise
-/// somewhere, from where the threshold is passed. The samples stay as they were recorded.
+/// The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed, where
+/// v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise exceeds the
+/// threshold, only stretches above the threshold that also exceed the noise count. The samples remain as recorded.
 ///
 /// Parameters
 /// ----------
 /// demo : Demonstration
 ///     A recording with `dt` or `time`.
 /// threshold : float
-///     Share of the peak speed, between 0 and 1.
+///     Share of the peak speed, in (0, 1).
 ///
 /// Returns
 /// -------
 /// Demonstration
-///     With its names, units, context and goal. Time stamps stay as they are.
+///     Recording with the same names, units, context, goal and time stamps.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A threshold that is no share, or a recording that stands still, moves for fewer than four samples, or has no
-///     times.
+///     `threshold` is out of range, or the recording has no movement, fewer than four samples of it, or no times.
 #[pyfunction]
-#[pyo3(signature = (demo, threshold=0.05))]
-pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: f64) -> PyResult<Demonstration> {
+#[pyo3(signature = (demo, threshold=Scalar::Number(0.05)), text_signature = "(demo, threshold=0.05)")]
+pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) -> PyResult<Demonstration> {
+    let threshold = threshold.number("threshold")?;
     py.detach(|| preprocessing::trim(&demo.0, threshold)).map(Demonstration).map_err(raise)
 }
 
-/// Cut a recording at given times into one movement from each to the next.
+/// Cut a recording at given times.
 ///
-/// Each is sampled evenly, as densely as the recording at most, with both ends: it begins and ends at the very times that
-/// are given. As with `resample`, noise stays white.
+/// Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the recording.
+/// As with `resample`, noise stays white.
 ///
 /// Parameters
 /// ----------
 /// demo : Demonstration
 ///     A recording with `dt` or `time`.
-/// times : (K,) array_like
-///     At least two times in s of the recording's clock, increasing.
+/// times : array_like, (K,)
+///     Two or more increasing times in s on the clock of the recording.
 ///
 /// Returns
 /// -------
 /// list of Demonstration
-///     K − 1 of them, with the names, units and context.
+///     K − 1 parts with the same names, units and context.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Times that do not increase or lie outside, a part shorter than three sampling intervals, or a recording without
-///     times.
+///     `times` do not increase or lie outside the recording, a part is shorter than three sampling intervals, or the
+///     recording has no times.
 #[pyfunction]
 pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>) -> PyResult<Vec<Demonstration>> {
     let times = vector("times", times)?;
@@ -98,10 +98,10 @@ pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>
     Ok(parts.into_iter().map(Demonstration).collect())
 }
 
-/// Filter a recording by a low-pass without phase lag.
+/// Filter a recording with a low-pass of zero phase.
 ///
-/// It is the cubic smoothing spline: of a sine of frequency f the share 1/(1 + (f/f_c)⁴) is left, half at the cut-off
-/// f_c. `pdmp.plot.cut_off` draws what helps to choose that.
+/// The filter is the cubic smoothing spline, with gain 1/(1 + (f/f_c)⁴) at frequency f: one half at the cut-off f_c.
+/// `pdmp.plot.cut_off` plots residuals over the cut-off.
 ///
 /// Parameters
 /// ----------
@@ -113,23 +113,40 @@ pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>
 /// Returns
 /// -------
 /// Demonstration
-///     At the same times, with its names, units, context and goal.
+///     Recording at the same times, with the same names, units, context and goal.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A cut-off that is not positive, not below half the sampling rate or below a ten-thousandth of it, or a recording
-///     without times.
+///     `cut_off` is not between a ten-thousandth and half of the sampling rate, or the recording has no times.
 ///
 /// References
 /// ----------
 /// C. H. Reinsch, Smoothing by spline functions, Numerische Mathematik 10 (1967), https://doi.org/10.1007/BF02162161
 #[pyfunction]
-pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: f64) -> PyResult<Demonstration> {
+pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: Scalar<'_>) -> PyResult<Demonstration> {
+    let cut_off = cut_off.number("cut_off")?;
     py.detach(|| preprocessing::lowpass(&demo.0, cut_off)).map(Demonstration).map_err(raise)
 }
 
-/// What `lowpass` takes off at each of K cut-offs [Hz]: root mean squares (K, D), in the unit of each degree of freedom.
+/// Compute the residuals of `lowpass` over its cut-off.
+///
+/// Parameters
+/// ----------
+/// demo : Demonstration
+///     A recording with `dt` or `time`.
+/// cut_offs : array_like, (K,)
+///     Cut-off frequencies in Hz.
+///
+/// Returns
+/// -------
+/// ndarray, (K, D)
+///     Root mean square of the residual, in the unit of each degree of freedom.
+///
+/// Raises
+/// ------
+/// ValueError
+///     A cut-off that `lowpass` rejects, or a recording without times.
 #[pyfunction]
 pub(crate) fn residuals<'py>(
     py: Python<'py>,
@@ -141,28 +158,28 @@ pub(crate) fn residuals<'py>(
     Ok(residuals.into_pyarray(py))
 }
 
-/// Find the period of a cyclic recording.
+/// Estimate the period of a cyclic recording by autocorrelation.
 ///
-/// Positions and velocities of all degrees of freedom, each less its linear trend, are correlated with themselves k
-/// samples later; A(k) is the mean of these correlations. The period is the first peak of A that is as high as the
-/// highest, but for what varies from cycle to cycle; half a cycle, and the period of a harmonic, make lower ones, and
-/// an odd cycle is no matter. A parabola finds it to a part of a sample. Peaks that noise of the same memory makes by
-/// chance are none: the fewer independent samples overlap, the higher a peak must be.
+/// A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal of
+/// linear trends. The period is the first peak of A that equals the highest peak within the variation between cycles, at
+/// the vertex of the parabola through three samples; peaks at half a cycle and at periods of harmonics are lower. A peak
+/// must exceed the significance level for noise of the same autocorrelation, which rises as fewer independent samples
+/// overlap.
 ///
 /// Parameters
 /// ----------
 /// demo : Demonstration
-///     A recording of at least one cycle and a half, with `dt` or `time`.
+///     A recording of one and a half cycles or more, with `dt` or `time`.
 ///
 /// Returns
 /// -------
 /// float
-///     The period in s.
+///     Period in s.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A recording whose peaks are all below 0.35 or by chance, that stands still, or has no times.
+///     All peaks are below 0.35 or not significant, or the recording has no movement or no times.
 ///
 /// References
 /// ----------
@@ -172,8 +189,30 @@ pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
     py.detach(|| preprocessing::period(&demo.0)).map_err(raise)
 }
 
-/// Positions (T, D) with NaN interpolated in gaps up to `max_gap` seconds; `turns` (D,) of angles, 0 of others, NaN where it is
-/// not known.
+/// Interpolate missing samples.
+///
+/// Parameters
+/// ----------
+/// position : array_like, (T, D)
+///     Positions in the unit of each degree of freedom, NaN where missing.
+/// time : array_like, (T,)
+///     Time stamps in s.
+/// names : sequence of str, (D,)
+///     Names of the degrees of freedom.
+/// turns : array_like, (D,)
+///     Full turn of each angle in its unit, 0 for other units, NaN if the unit is unknown.
+/// max_gap : float
+///     Longest gap in s that is interpolated.
+///
+/// Returns
+/// -------
+/// ndarray, (T, D)
+///     Positions without missing samples.
+///
+/// Raises
+/// ------
+/// ValueError
+///     A gap is longer than `max_gap`, or lies at an end.
 #[pyfunction]
 pub(crate) fn fill<'py>(
     py: Python<'py>,
@@ -181,44 +220,65 @@ pub(crate) fn fill<'py>(
     time: &Bound<'py, PyAny>,
     names: &Bound<'py, PyAny>,
     turns: &Bound<'py, PyAny>,
-    max_gap: f64,
+    max_gap: Scalar<'py>,
 ) -> PyResult<Matrix<'py>> {
     let (position, time) = (matrix("position", "(T, D)", position)?, vector("time", time)?);
     let (names, turns) = (texts("names", names)?, vector("turns", turns)?);
+    let max_gap = max_gap.number("max_gap")?;
     let filled = preprocessing::fill(position, &time, &names, &turns, max_gap).map_err(raise)?;
     Ok(filled.into_pyarray(py))
 }
 
-/// A cycle or a recording that was left out: index of the recording, start and period in s, the reason, and whether it is
-/// the whole recording.
+/// Rejected cycle or recording: index of the recording, start and period in s, the reason, and whether it is the whole
+/// recording.
 type Rejected = (usize, f64, f64, String, bool);
-/// Index of a recording and of a degree of freedom, its gain per cycle, and how many of its turns were taken off.
+/// Indices of a recording and of a degree of freedom, its gain per cycle, and the number of full turns subtracted from it.
 type Growth = (usize, usize, f64, i32);
-/// Cycles, their periods (K,) in s, their gains (K, D), the indices of their recordings, the rejected, and what grows.
-type Found<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, Vec<Rejected>, Vec<Growth>);
+/// Cycles, their periods (K,) in s, their gains (K, D), the indices of their recordings, rejections and growths.
+type CutCycles<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, Vec<Rejected>, Vec<Growth>);
 
-/// Cuts recordings into cycles: what `pdmp.preprocessing.cycles` calls.
+/// Cut recordings into cycles, for `pdmp.preprocessing.cycles`.
+///
+/// Parameters
+/// ----------
+/// recordings : sequence of Demonstration
+///     Recordings with `dt` or `time`.
+/// onsets : list of array_like, (K,), or None
+///     Times in s at which the cycles of each recording begin; the last ends the last cycle.
+/// average : bool
+///     Return one mean cycle of each recording.
+///
+/// Returns
+/// -------
+/// tuple
+///     Cycles, their periods (K,) in s, their gains (K, D) in the unit of each degree of freedom, the indices of their
+///     recordings, the rejected cycles and the growths.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Recordings without a period or without times, or invalid onsets.
 #[pyfunction]
 pub(crate) fn cycles<'py>(
     py: Python<'py>,
     recordings: &Bound<'py, PyAny>,
-    events: Option<&Bound<'py, PyAny>>,
+    onsets: Option<&Bound<'py, PyAny>>,
     average: bool,
-) -> PyResult<Found<'py>> {
+) -> PyResult<CutCycles<'py>> {
     let recordings = demonstrations("recordings", recordings)?;
-    let events = events.map(|events| items("events", events, vector)).transpose()?;
-    let keep = if average { CycleOutput::Mean } else { CycleOutput::Each };
-    let found = py.detach(|| preprocessing::cycles(&recordings, events.as_deref(), keep)).map_err(raise)?;
-    let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
-    let of = found.kept.iter().map(|cycle| cycle.recording).collect();
-    let rejected = found.rejected.iter().map(|cycle| {
+    let onsets = onsets.map(|onsets| items("onsets", onsets, vector)).transpose()?;
+    let output = if average { CycleOutput::Mean } else { CycleOutput::Each };
+    let cycles = py.detach(|| preprocessing::cycles(&recordings, onsets.as_deref(), output)).map_err(raise)?;
+    let periods: Vec<f64> = cycles.kept.iter().map(|cycle| cycle.period).collect();
+    let indices = cycles.kept.iter().map(|cycle| cycle.recording).collect();
+    let rejected = cycles.rejected.iter().map(|cycle| {
         let whole = matches!(cycle.reason, RejectionReason::Aperiodic { .. } | RejectionReason::Still);
         (cycle.recording, cycle.start, cycle.period, cycle.reason.to_string(), whole)
     });
     let rejected = rejected.collect();
     let growths =
-        found.growths.iter().map(|growth| (growth.recording, growth.dof, growth.gain, growth.turns)).collect();
-    let gains = found.kept.iter().map(|cycle| cycle.gain.clone()).collect();
-    let demos = found.kept.into_iter().map(|cycle| Demonstration(cycle.demo)).collect();
-    Ok((demos, to_numpy(py, &periods), gains, of, rejected, growths))
+        cycles.growths.iter().map(|growth| (growth.recording, growth.dof, growth.gain, growth.turns)).collect();
+    let gains = cycles.kept.iter().map(|cycle| cycle.gain.clone()).collect();
+    let demos = cycles.kept.into_iter().map(|cycle| Demonstration(cycle.demo)).collect();
+    Ok((demos, to_numpy(py, &periods), gains, indices, rejected, growths))
 }
