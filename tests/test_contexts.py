@@ -136,8 +136,8 @@ def test_labels_come_back_as_they_were() -> None:
 @pytest.mark.parametrize(
     ("context", "message"),
     [
-        (["shy", 0.1], r'context\[0\] = "shy": never shown; the labels are proud, tired'),
-        ([1.0, 0.1], r"context\[0\] = 1: never shown"),
+        (["shy", 0.1], r'context\[0\] = "shy": not demonstrated; the labels are proud, tired'),
+        ([1.0, 0.1], r"context\[0\] = 1: not demonstrated"),
         (["proud", "high"], r'context\[1\] = "high": a number is expected'),
         (["proud"], "context has length 1, expected 2"),
         (["proud", np.nan], r"context\[1\] = NaN"),

@@ -213,7 +213,7 @@ const char *pdmp_model_name(const pdmp_model *model, size_t dof);
 
 /// Conditions that repeat a demonstration, counted from 0: its style, goal and start or anchor, and tau.
 ///
-/// Of a model whose time was warped or has events, tau is that of the whole duration: within it the movement hurries and
+/// Of a model whose time was warped or has landmarks, tau is that of the whole duration: within it the movement hurries and
 /// pauses as the nominal one does.
 ///
 /// They are written to `numbers`, which has room for pdmp_info.n_conditions of them, and `conditions` points there.

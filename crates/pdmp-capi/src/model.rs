@@ -176,7 +176,7 @@ pub extern "C" fn pdmp_model_name(model: Option<&pdmp_model>, dof: usize) -> *co
 
 /// Conditions that repeat a demonstration, counted from 0: its style, goal and start or anchor, and tau.
 ///
-/// Of a model whose time was warped or has events, tau is that of the whole duration: within it the movement hurries and
+/// Of a model whose time was warped or has landmarks, tau is that of the whole duration: within it the movement hurries and
 /// pauses as the nominal one does.
 ///
 /// They are written to `numbers`, which has room for pdmp_info.n_conditions of them, and `conditions` points there.

@@ -173,7 +173,7 @@ def _resample(
 
 
 def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
-    """Returns the valid contexts (M, Q)."""
+    """Returns the checked contexts (M, Q)."""
     values: Any = contexts
     if contexts is None:
         values = [demo.context for demo in demos]

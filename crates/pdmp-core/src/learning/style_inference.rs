@@ -31,16 +31,16 @@ const MAX_LEFT_OUT: f64 = 3.0;
 /// closest to what the model makes.
 ///
 /// `dt` in seconds and `period` serve as in a fit. Its time is scaled as that of the others was: where theirs was warped
-/// so is this one's, and where they had events it needs its own (E,), in seconds.
+/// so is this one's, and where they had landmarks it needs its own (E,), in seconds.
 ///
 /// # Errors
-/// A demonstration that does not fit the model or that no style of it describes, or events where the others had none.
+/// A demonstration that does not fit the model or that no style of it describes, or landmarks where the others had none.
 pub fn style_of(
     model: &Model,
     demo: &Demonstration,
     dt: Option<f64>,
     period: Option<f64>,
-    events: Option<&[f64]>,
+    landmarks: Option<&[f64]>,
 ) -> Result<Vec<f64>> {
     let n_dofs = model.n_dofs();
     if demo.n_dofs() != n_dofs {
@@ -66,14 +66,16 @@ pub fn style_of(
     };
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
-    let by_events = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
-    match (&model.learnt.template, events) {
-        (None, Some(events)) if by_events => aligned.register_to(model.breaks(), events)?,
-        (None, None) if by_events => {
-            return Err(Error::Arguments("the model was fitted with events: pass events= of this demonstration too"));
+    let by_landmarks = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
+    match (&model.learnt.template, landmarks) {
+        (None, Some(landmarks)) if by_landmarks => aligned.register_to(model.breaks(), landmarks)?,
+        (None, None) if by_landmarks => {
+            return Err(Error::Arguments(
+                "the model was fitted with landmarks: pass the landmarks of this demonstration too",
+            ));
         }
         (_, Some(_)) => {
-            return Err(Error::Arguments("the model was fitted without events: leave out events="));
+            return Err(Error::Arguments("the model was fitted without landmarks: leave out the landmarks"));
         }
         (Some(template), None) => aligned.warp_to(template)?,
         (None, None) => {}

@@ -59,8 +59,8 @@ pub struct Rejected {
 
 /// Cuts cyclic recordings into cycles.
 ///
-/// Without `events`, the period of each recording is found by [`super::period`], and its cycles by a template. They
-/// begin in the phase of the first recording's first sample. With `events`, one list for each recording, they begin at
+/// Without `onsets`, the period of each recording is found by [`super::period`], and its cycles by a template. They
+/// begin in the phase of the first recording's first sample. With `onsets`, one list for each recording, they begin at
 /// the times [s] that are given, and end where the next begins.
 ///
 /// A cycle is C samples of the recording, as many as that has in a period, with the noise of the nearest recorded
@@ -79,11 +79,11 @@ pub struct Rejected {
 /// repeat themselves, unless none does. Names, units and context go along.
 ///
 /// # Errors
-/// No recording, none that repeats itself, one without times, events that do not increase or lie outside.
-pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: CycleOutput) -> Result<Cycles> {
+/// No recording, none that repeats itself, one without times, onsets that do not increase or lie outside.
+pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: CycleOutput) -> Result<Cycles> {
     let n_dofs = recordings.first().ok_or(Error::NoDemonstrations)?.n_dofs();
-    if let Some(found) = events.map(<[_]>::len).filter(|&found| found != recordings.len()) {
-        return Err(Error::Length { name: "events", expected: recordings.len(), found, per: "recording" });
+    if let Some(found) = onsets.map(<[_]>::len).filter(|&found| found != recordings.len()) {
+        return Err(Error::Length { name: "onsets", expected: recordings.len(), found, per: "recording" });
     }
     let mut cycles = Cycles { kept: Vec::new(), rejected: Vec::new(), growths: Vec::new() };
     let (mut nominal, mut refusals) = (None, Vec::new());
@@ -93,8 +93,8 @@ pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: C
                 return Err(Error::Dofs { expected: n_dofs, found: demo.n_dofs() });
             }
             let curve = Curve::of(demo)?;
-            let found = match events {
-                Some(events) => given(&curve, &events[recording]),
+            let found = match onsets {
+                Some(onsets) => given(&curve, &onsets[recording]),
                 None => found(&curve, &mut nominal),
             };
             match found {
@@ -113,10 +113,10 @@ pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: C
     if refusals.len() == recordings.len() { Err(refusals.swap_remove(0)) } else { Ok(cycles) }
 }
 
-/// Median period and bounds of the cycles between given events, in seconds.
-fn given(curve: &Curve, events: &[f64]) -> Result<(f64, Vec<f64>)> {
-    check_times("events", events, curve)?;
-    Ok((median(&intervals(events)), events.to_vec()))
+/// Median period and bounds of the cycles between given onsets, in seconds.
+fn given(curve: &Curve, onsets: &[f64]) -> Result<(f64, Vec<f64>)> {
+    check_times("onsets", onsets, curve)?;
+    Ok((median(&intervals(onsets)), onsets.to_vec()))
 }
 
 /// Period and bounds of the cycles that are found in the phase of the `nominal` mean cycle, in seconds.

@@ -20,11 +20,11 @@ impl Aligned<'_> {
     pub(super) fn register(&mut self, events: ArrayView2<f64>) -> Result<()> {
         let (found, expected) = (events.nrows(), self.n_demos());
         if found != expected {
-            return Err(Error::Length { name: "events", expected, found, per: "demonstration" });
+            return Err(Error::Length { name: "landmarks", expected, found, per: "demonstration" });
         }
         if events.ncols() == 0 {
             return Err(Error::Arguments(
-                "events have no times: pass an array of shape (M, E) with E of at least 1, in seconds",
+                "landmarks has no columns: pass their times (M, E) in seconds, with E of at least 1",
             ));
         }
         let mut segment_durations = Array2::zeros((expected, events.ncols() + 1));
@@ -51,7 +51,7 @@ impl Aligned<'_> {
     /// # Errors
     /// Another number of events than there are breaks between segments, or as for a fit.
     pub(crate) fn register_to(&mut self, breaks: &[f64], events: &[f64]) -> Result<()> {
-        check_vector("events", events, breaks.len() - 2, "break between segments")?;
+        check_vector("landmarks", events, breaks.len() - 2, "break between segments")?;
         let segment_durations = self.segment_durations(0, events)?;
         self.warps[0] = Some(WarpingFunction::new(self.kind, breaks, &segment_durations));
         Ok(())
@@ -71,7 +71,7 @@ impl Aligned<'_> {
             // Not a number is out of order too.
             let in_order = time - before > SHORTEST * clock.duration && end - time > SHORTEST * clock.duration;
             if !in_order {
-                return Err(Error::Event { index, time, before, end });
+                return Err(Error::Landmark { index, time, before, end });
             }
             segment_durations.push(time - before);
             before = time;

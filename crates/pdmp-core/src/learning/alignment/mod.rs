@@ -1,7 +1,7 @@
 //! Alignment of demonstrations (step 1 of Section 3.2): time scaling to a nominal one, resampled to C samples.
 //!
 //! The paper scales time linearly. Repetitions with pauses need more: the phase axis is divided into segments, and each
-//! demonstration has its own time for each, its *timing*, found by a warp or told by events.
+//! demonstration has its own time for each, its *timing*, found by a warp or given by landmarks.
 
 mod elastic_warp;
 mod landmarks;
@@ -61,7 +61,7 @@ pub enum TimeScaling {
     WarpIfBetter,
     /// So that landmarks fall on those of the nominal demonstration: their times (M, E) in seconds, from the first sample
     /// or of the time stamps.
-    Events(Array2<f64>),
+    Landmarks(Array2<f64>),
 }
 
 /// Demonstrations that can be read as samples of one phase, each when it is asked for.
@@ -159,7 +159,7 @@ impl TimeScaling {
     /// What the demonstrations were warped to is returned, so that others can be.
     ///
     /// # Errors
-    /// Settings out of range, events out of order, no memory, or whatever `progress` returns.
+    /// Settings out of range, landmarks out of order, no memory, or whatever `progress` returns.
     pub(crate) fn apply(
         &self,
         aligned: &mut Aligned,
@@ -175,7 +175,7 @@ impl TimeScaling {
                 let segments = warp.n_segments.min(aligned.most_segments());
                 aligned.warp(&TimeWarp { n_segments: segments, ..warp }, unit, threads, progress).map(Some)
             }
-            Self::Events(events) => aligned.register(events.view()).map(|()| None),
+            Self::Landmarks(times) => aligned.register(times.view()).map(|()| None),
         }
     }
 }
