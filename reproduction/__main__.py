@@ -1,4 +1,4 @@
-"""Makes the figures and tables of the paper, on a simulated robot.
+"""Reproduces the figures and tables of the paper on a simulated robot.
 
 example: python -m reproduction fig3 -o out/reproduction
 """
@@ -22,7 +22,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             options.output,
             options.recordings,
             options.seed,
-            progress=lambda name: print(f"making {name}", file=sys.stderr),
+            progress=lambda name: print(f"reproducing {name}", file=sys.stderr),
         )
     )
 
@@ -44,7 +44,7 @@ def _parser() -> ArgumentParser:
         default="out/reproduction",
         type=file_path,
         metavar="FOLDER",
-        help="folder of the pictures and tables; default: %(default)s",
+        help="folder for figures and tables; default: %(default)s",
     )
     parser.add_argument(
         "--seed",

@@ -1,4 +1,4 @@
-"""Drawings of paths of hands and joints."""
+"""Figures of paths of hands and joints."""
 
 from __future__ import annotations
 
@@ -20,24 +20,26 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def draw_boxes(axes: Axes, reaching: Reaching, height: float, **look: Any) -> None:
+def draw_boxes(axes: Axes, reaching: Reaching, height: float, **style_kwargs: Any) -> None:
     """Draws a pile of boxes from the side."""
     from matplotlib.patches import Rectangle
 
     middle = 0.5 * np.linalg.norm(reaching.task.goal - reaching.task.start)
     for k in range(boxes(height)):
         corner = (middle - 0.5 * BOX[0], k * BOX[2])
-        box = Rectangle(corner, BOX[0], BOX[2], **{"color": SHADES[k % 2], "alpha": 0.35, **look})
+        box = Rectangle(
+            corner, BOX[0], BOX[2], **{"color": SHADES[k % 2], "alpha": 0.35, **style_kwargs}
+        )
         axes.add_patch(box)
 
 
-def draw_hand(axes: Axes, reaching: Reaching, hands: Array, **look: Any) -> None:
+def draw_hand(axes: Axes, reaching: Reaching, hands: Array, **style_kwargs: Any) -> None:
     """Draws the path of a hand (T, 3) from the side."""
-    axes.plot(*reaching.side_view(hands), **look)
+    axes.plot(*reaching.side_view(hands), **style_kwargs)
 
 
-def dress_side(axes: Axes, title: str) -> None:
-    """Labels a view from the side."""
+def label_side_view(axes: Axes, title: str) -> None:
+    """Labels the axes of a side view."""
     label_axes(axes, "way from start to goal [m]", "height over the table [m]", title)
 
 
@@ -47,9 +49,9 @@ def joints(robots: Mapping[str, Robot], until: float) -> Figure:
     Parameters
     ----------
     robots : mapping of str to Robot
-        By their name in the legend.
+        Robots by their name in the legend.
     until : float
-        How much of their time to draw [s].
+        End of the drawn time [s].
     """
     figure = ensure_figure(None, 7.5, 8.5)
     panels = figure.subplots(len(NAMES) + 1, 1, sharex=True)

@@ -1,4 +1,4 @@
-"""The figures of the paper and their files."""
+"""Reproduction of the figures of the paper, and their files."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ def reproduce(
     seed: int = SEED,
     progress: Callable[[str], object] | None = None,
 ) -> str:
-    """Makes a figure of Matsubara, Hyon and Morimoto (2011), or all of them, and their numbers.
+    """Reproduces one or all figures of Matsubara, Hyon and Morimoto (2011), and their numbers.
 
     Parameters
     ----------
     figure : {"fig2", "fig3", "fig4", "fig5", "comparison", "all"}
-        Figure; the comparison is with the methods that the paper argues with.
+        Figure; the comparison is with the methods that the paper discusses.
     folder : path
-        Folder of its pictures and tables: `fig3.md` for "fig3".
+        Folder for figures and tables: `fig3.md` for "fig3".
     recordings : path, optional
-        Folder of CSV files, one person walking in each, with a column `t` [s] and columns
-        `r_sh1, r_sh2, r_sh3, r_elb, l_sh1, …` [rad]; "fig5" then learns from them as well.
+        Folder of CSV files, each of one walking person, with a column `t` [s] and columns
+        `r_sh1, r_sh2, r_sh3, r_elb, l_sh1, …` [rad]; "fig5" then uses them too.
     seed : int
-        Seed of the noise in the demonstrations, which stands for a person.
+        Seed of the noise in the demonstrations.
     progress : callable, optional
-        Called with the name of each figure when it begins.
+        Called with the name of each figure before it is reproduced.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def reproduce(
 
 
 def _make(figure: str, seed: int, recordings: Folder | None) -> Section:
-    """Makes one of `FIGURES`; imports its module here, so that others do not wait for it."""
+    """Reproduces one of `FIGURES`; only its module is imported."""
     match figure:
         case "fig2":
             from reproduction.one_dof import figure_2

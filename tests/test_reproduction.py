@@ -14,7 +14,7 @@ from reproduction import swing as arms
 from reproduction.__main__ import main
 from reproduction.baxter import mjcf
 from reproduction.demo.__main__ import main as demo_main
-from reproduction.human import BOX, RESTING, minimum_jerk
+from reproduction.human import BOX, HAND_HEIGHT, minimum_jerk
 from reproduction.loop import NewGoal, from_rest, reach_over
 from reproduction.reaching import GOAL, Reaching, demonstrate, height_of
 from reproduction.robot import DT, Robot, boxes
@@ -84,7 +84,7 @@ def test_boxes_in_the_way_are_hit(reaching: Reaching, learnt: pdmp.Model) -> Non
     """A movement shown without boxes touches two of them, and throws the upper one down."""
     robot = reach_over(learnt, reaching, 0.30, learnt.styles[0])
     assert robot.log.contact() > 0.01
-    height = robot.data.body("box_1").xpos[2] - (reaching.task.goal[2] - RESTING)
+    height = robot.data.body("box_1").xpos[2] - (reaching.task.goal[2] - HAND_HEIGHT)
     assert height < 1.5 * BOX[2] - 0.01
 
 

@@ -1,4 +1,4 @@
-"""Learns five handwritten shapes in one primitive; writes model, figures and a report.
+"""Fits one primitive to five handwritten shapes; writes model, figures and a report.
 
 example: python -m reproduction.demo -o out/demo
 """

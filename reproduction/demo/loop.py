@@ -1,4 +1,4 @@
-"""A primitive inside a control loop at 1 kHz, with a command half way."""
+"""Control loop at 1 kHz with a command half way."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DT = 0.001  # s
 
 @dataclass
 class Run:
-    """What a control loop did: samples, durations of its ticks [µs], the sample of the command."""
+    """Record of a control loop: samples, durations of its ticks [µs], index of the command."""
 
     position: NDArray[np.float64]
     ticks: NDArray[np.float64]
@@ -35,7 +35,7 @@ class Run:
 
 
 def control(model: pdmp.Model, conditions: pdmp.Conditions, command: Mapping[str, Any]) -> Run:
-    """Runs a movement at 1 kHz and gives it a command half way."""
+    """Runs a movement at 1 kHz, with a command half way."""
     controller = model.controller(DT, conditions)
     duration = model.durations[model.nominal] * controller.tau / model.tau
     switch = round(0.5 * duration / DT)
