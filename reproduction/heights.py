@@ -129,7 +129,7 @@ def robot_duration(model: pdmp.Model) -> float:
 def figure_4(seed: int = SEED) -> Section:
     """Reproduces Fig. 4."""
     reaching = demonstrate(seed)
-    by_styles = errors(reaching)
+    test_errors = errors(reaching)
     models = {n_styles: learn(reaching, n_styles) for n_styles in range(1, 5)}
     tried = {
         n_styles: {height: reach_predicted(model, reaching, height) for height in TESTED}
@@ -154,7 +154,7 @@ def figure_4(seed: int = SEED) -> Section:
             ["J", "E predicted", "E at best"],
             (
                 [n + 1, *(f"{1e3 * row.mean():.1f} ± {1e3 * row.std():.1f}" for row in rows)]
-                for n, rows in enumerate(zip(by_styles.predicted, by_styles.best, strict=True))
+                for n, rows in enumerate(zip(test_errors.predicted, test_errors.best, strict=True))
             ),
         ),
         "Time for which the predicted movement touches a box, on the robot, and how far a joint is "
@@ -184,7 +184,7 @@ def figure_4(seed: int = SEED) -> Section:
         "Fig. 4: heights without a demonstration",
         text,
         {
-            "fig4_errors": draw_errors(by_styles),
+            "fig4_errors": draw_errors(test_errors),
             "fig4_paths": draw_paths(reaching, robots, moved, command),
         },
     )

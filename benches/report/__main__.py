@@ -1,4 +1,4 @@
-"""Predicts movements from their context, with the primitive and with simpler predictors.
+"""Predicts movements from their contexts with primitives and with simpler predictors.
 
 ``make report`` prints the tables and draws figures into out/report/; ``--write`` writes
 docs/report.md too.
@@ -60,7 +60,7 @@ def answer(question: Question) -> Evaluation:
 
 
 def slug(name: str) -> str:
-    """Returns a name for a file."""
+    """Returns the name of a question as a file name."""
     return name.replace(", ", "_").replace(" ", "_")
 
 
