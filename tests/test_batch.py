@@ -180,7 +180,7 @@ def test_jacobian_follows_the_amplitude(cycle: pdmp.Model) -> None:
     np.testing.assert_array_equal(half, model.jacobian("style", velocity=[0, 0]) / 2)
 
 
-REFUSED: list[tuple[dict[str, Any], str]] = [
+REJECTED: list[tuple[dict[str, Any], str]] = [
     ({"goals": np.zeros((3, 2))}, "goals has 3 rows, but there are 23 styles: pass one row for ea"),
     ({"starts": np.zeros((23, 3))}, "starts has length 3, expected 2: one value per DoF"),
     ({"velocities": [0.0]}, "velocities has length 1, expected 2: one value per DoF"),
@@ -201,7 +201,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("given", "message"), REFUSED, ids=str)
+@pytest.mark.parametrize(("given", "message"), REJECTED, ids=str)
 def test_invalid_batches_are_rejected(
     reach: pdmp.Model, given: dict[str, Any], message: str
 ) -> None:
