@@ -86,7 +86,7 @@ def score(group: Group, basis: Basis) -> Score:
 
 
 def reproduction(model: pdmp.Model, group: Group) -> list[float]:
-    """Returns the RMSE over range of every demonstration, rolled out under its own conditions."""
+    """Returns the RMSE over range of every demonstration, rolled out under the conditions of the fit."""
     errors = []
     for m, demo in enumerate(group.demos):
         made = model.rollout(model.conditions(m), dt=model.durations[m] / N_SAMPLES)

@@ -68,7 +68,7 @@ def test_number_of_arrays_follows_derivatives(model: pdmp.Model, derivatives: in
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_chunks_and_threads_are_bitwise_equal(model: pdmp.Model, threads: int) -> None:
-    """All chunks together equal the batch bit for bit, for any number of threads."""
+    """The chunks together equal the batch bit for bit, for any number of threads."""
     styles, velocities = np.tile(STYLES, (20, 1)), np.tile(STYLES, (20, 1)) / 3
     expected = model.rollouts(styles, dt=0.005, velocities=velocities, threads=1)
     whole = model.rollouts(styles, dt=0.005, velocities=velocities, threads=threads)

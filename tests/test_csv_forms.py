@@ -62,7 +62,7 @@ FORMS = {
 
 @pytest.mark.parametrize("lines", FORMS.values(), ids=FORMS)
 def test_form_of_the_table_does_not_matter(tmp_path: Path, lines: list[str]) -> None:
-    """The same samples are read bit for bit from every form."""
+    """Samples are read bit for bit from every form."""
     assert_read(read(tmp_path, lines))
 
 

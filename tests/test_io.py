@@ -223,7 +223,7 @@ def test_npz_and_index_must_agree(folder: Path) -> None:
 
 @pytest.mark.parametrize("place", [".", "demos"])
 def test_folder_without_an_index_is_read_by_its_files(tmp_path: Path, place: str) -> None:
-    """All files are read in natural order of their names; a context needs an index."""
+    """Files are read in natural order of their names; a context needs an index."""
     (tmp_path / place).mkdir(exist_ok=True)
     for name in ("take 10", "take 9", "b"):
         (tmp_path / place / f"{name}.csv").write_text(TABLE)
