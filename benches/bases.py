@@ -45,23 +45,23 @@ BASES = named(
 FIGURES = ["reproduction, median", "worst", "held out", "log density", "fit [ms]"]
 CAPTION = """\
 Measured on {machine} by `make bench-bases`: {sets} sets of recordings, {groups} groups of
-repetitions, {demos} demonstrations; at most ten a group, of at most 400 samples. Defaults are bold.
+repetitions, {demos} demonstrations, at most ten per group and 400 samples each. Defaults are bold.
 
-- *Reproduction*: a primitive is learnt from a group with J = M, and each demonstration is rolled
-  out with its own style, place and duration. RMSE at its samples over the largest range of a degree
-  of freedom: median over sets of the median over a set's demonstrations, and worst demonstration.
+- *Reproduction*: a primitive is fitted to a group with J = M, and each demonstration is reproduced
+  by a rollout of its conditions. RMSE at its samples over the largest range of a degree of freedom:
+  median over sets of the median over the demonstrations of a set, and maximum.
 - *Held out*: the basis targets of the group are regressed on every second sample and compared at
   the others. RMSE over the largest range of the targets, and log density of a value in units of the
-  targets' RMS: medians over sets of the medians over a set's groups. The Gaussian process has a
-  variance and noise of its own; a network has the mean square of its leave-one-out residuals at
-  the samples learnt from.
+  RMS of the targets: medians over sets of the medians over the groups of a set. The variance and
+  noise of a Gaussian process are its own; the variance of a network is the mean square of its
+  leave-one-out residuals at the training samples.
 - *Fit*: time of `pdmp.fit`, all four steps: median over groups.
 
-The defaults follow from it. The Gaussian process reproduces best and needs no N. Matérn-5/2
-reproduces closer than 3/2 on 12 of the 15 sets, by up to a half, and is smoother; 3/2 predicts as
-well, with a higher log density. The squared exponential is overconfident, and dense. Of a network,
-75 to 100 functions reproduce closer, but they predict cycles of twenty samples worse: 50, 1.2 wide,
-serve both.
+The defaults follow from these results. The Gaussian process has the smallest reproduction error and
+needs no N. Matérn-5/2 has smaller errors than 3/2 on 12 of the 15 sets, by up to a half, and is
+smoother; 3/2 predicts as well, with a higher log density. The squared exponential is overconfident,
+and dense. Networks of 75 to 100 functions have smaller reproduction errors, but predict cycles of
+twenty samples worse; 50 functions of width 1.2 are a compromise.
 """
 
 

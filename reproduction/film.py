@@ -46,7 +46,7 @@ def attach(
     try:
         section.figures[name] = strip(rows, shot)
     except RendererError as reason:
-        section.text.append(f"No pictures of the robot: {reason}.")
+        section.text.append(f"No images of the robot: {reason}.")
     return section
 
 
@@ -74,7 +74,7 @@ def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: CameraView) -
 def _pictures(robot: Robot, times: Sequence[float], shot: CameraView) -> list[Any]:
     mujoco = engine()
     if reason := _missing():
-        raise RendererError(f"MuJoCo cannot draw here ({reason}): install EGL or OSMesa")
+        raise RendererError(f"MuJoCo cannot render ({reason}): install EGL or OSMesa")
     renderer = mujoco.Renderer(robot.model, HEIGHT, WIDTH)
     camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
     camera.lookat[:] = shot.centre

@@ -147,27 +147,27 @@ def figure_4(seed: int = SEED) -> Section:
         for n_styles, reached in robots_by_styles.items()
     ]
     text = [
-        "Learnt from nine reaches over none, two and three boxes; six over one box and over four "
+        "Fitted to nine reaches over zero, two and three boxes; six over one and four boxes "
         "are predicted by U(h) = β[h, 1]. E in 10⁻³ rad², mean ± standard deviation over the six; "
-        "at best is in the style for which E is least.",
+        "the best style minimises E.",
         markdown_table(
-            ["J", "E predicted", "E at best"],
+            ["J", "E predicted", "E of the best style"],
             (
                 [n + 1, *(f"{1e3 * row.mean():.1f} ± {1e3 * row.std():.1f}" for row in rows)]
                 for n, rows in enumerate(zip(test_errors.predicted, test_errors.best, strict=True))
             ),
         ),
-        "Time for which the predicted movement touches a box, on the robot, and how far a joint is "
-        "off its command at most, which is far where the command is beyond the joint's limit:",
+        "Duration of contact of the predicted movement with a box, on the robot, and largest "
+        "tracking error, which is large where the command exceeds a joint limit:",
         markdown_table(
             [
                 "J",
-                *(f"touches {pile(height)}" for height in TESTED),
-                *(f"off, over {pile(height)}" for height in TESTED),
+                *(f"contact, {pile(height)}" for height in TESTED),
+                *(f"tracking error, {pile(height)}" for height in TESTED),
             ],
             by_styles,
         ),
-        "With J = 3, what is left to the goal, as printed or moved in mid-movement:",
+        "Final distance to the goal with J = 3, as printed or moved during the movement:",
         markdown_table(
             ["", "as printed", "moved"],
             (
@@ -181,7 +181,7 @@ def figure_4(seed: int = SEED) -> Section:
         ),
     ]
     return Section(
-        "Fig. 4: heights without a demonstration",
+        "Fig. 4: heights that were not demonstrated",
         text,
         {
             "fig4_errors": draw_errors(test_errors),
@@ -197,7 +197,7 @@ def draw_errors(errors: Errors) -> Figure:
     n_styles = np.arange(1, len(errors.predicted) + 1)
     for rows, color, label in (
         (errors.predicted, BLUE, "predicted from the height"),
-        (errors.best, ORANGE, "at best"),
+        (errors.best, ORANGE, "best style"),
     ):
         mean, spread = rows.mean(axis=1), rows.std(axis=1)
         axes.errorbar(n_styles, mean, spread, color=color, marker="o", capsize=3, label=label)

@@ -108,7 +108,7 @@ def figure_2(seed: int = SEED) -> Section:
                 "error s1",
                 "error s2",
                 "worst of all",
-                "left after 5 s to a goal 0.4 farther",
+                "distance after 5 s to a goal 0.4 farther",
             ],
             rows,
         ),

@@ -218,22 +218,22 @@ def comparison(seed: int = SEED) -> Section:
     header = [
         "",
         "over",
-        "touches a box for",
-        "left to the goal",
-        "left to a goal moved on the way",
-        "speed once let go",
-        "touches when held",
-        "time to a new style",
+        "contact with boxes",
+        "distance to the goal",
+        "distance to a moved goal",
+        "speed after the release",
+        "contact with the lock",
+        "time for a new style",
     ]
     text = [
-        "All learn from the reaches over none, two and three boxes. Held: the elbow, for half a "
-        "second on its way; speed once let go is the largest of any joint, over the largest of the "
-        "same movement undisturbed. Primitives receive the measured position, and wait; components "
-        "have no way to. A run ends after 30 s.",
+        "All methods learn from reaches over zero, two and three boxes. The elbow is locked for "
+        "half a second during the movement; the speed after the release is the maximum of all "
+        "joints over that of the undisturbed movement. Primitives receive the measured position "
+        "and slow down; components cannot. A run ends after 30 s.",
         markdown_table(header, rows),
     ]
     locked = {name: trials[name, TESTED[0]] for name in ("PDMP, J = 3", "principal components, 3")}
-    return Section("What the paper argues with", text, {"held": draw_locked(locked)})
+    return Section("Comparison with other methods", text, {"held": draw_locked(locked)})
 
 
 def draw_locked(trials: dict[str, TrialResult]) -> Figure:
@@ -244,7 +244,7 @@ def draw_locked(trials: dict[str, TrialResult]) -> Figure:
         commanded, done = (rows[:, LOCKED_JOINT] for rows in trial.locked.log.rows())
         time = DT * np.arange(1, len(commanded) + 1)
         within = time < trial.lock.end + 3.0
-        axes.axvspan(trial.lock.start, trial.lock.end, color=ORANGE, alpha=0.2, label="held")
+        axes.axvspan(trial.lock.start, trial.lock.end, color=ORANGE, alpha=0.2, label="locked")
         undisturbed = trial.alone.log.rows()[0][: within.sum(), LOCKED_JOINT]
         axes.plot(time[: len(undisturbed)], undisturbed, "k:", linewidth=1, label="undisturbed")
         axes.plot(time[within], commanded[within], color=GREY, linewidth=3, label="commanded")

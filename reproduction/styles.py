@@ -80,14 +80,15 @@ def figure_3(seed: int = SEED) -> Section:
         clear = (contacts == 0).sum(axis=1)
         by_styles.append([n_styles, *(f"{n} of {contacts.shape[1]}" for n in clear)])
     text = [
-        f"Fifteen reaches, {model.n_dofs} joints; the first three singular values make "
+        f"Fifteen reaches, {model.n_dofs} joints; the first three singular values have "
         f"{shares[:3].sum():.1%} of the sum, the first four {shares[:4].sum():.1%}. On the robot, "
         "tau = 0.6 s, to the goal as printed:",
         markdown_table(
-            ["", "style", "touches a box for", "left to the goal", "largest tracking error"], lines
+            ["", "style", "contact with boxes", "distance to the goal", "largest tracking error"],
+            lines,
         ),
-        "Number of the three styles demonstrated over each pile that clear it, at the pace of the "
-        "demonstrations:",
+        "Number of the three styles demonstrated over each pile that clear it, at demonstrated "
+        "speed:",
         markdown_table(["J", *map(pile, HEIGHTS)], by_styles),
     ]
     section = Section(
@@ -130,7 +131,7 @@ def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) 
         distance, height = reaching.side_view(reaching.arm.hands([goal]))
         goal_panel.plot(distance, height, "*", color=color, markersize=11)
     paths.label_side_view(styles, "styles, on the robot")
-    paths.label_side_view(goal_panel, "goals (stars), each in these styles")
+    paths.label_side_view(goal_panel, "goals (stars), each with these styles")
     styles.set_ylim(bottom=0)
     styles.legend(frameon=False, fontsize=8)
     return figure

@@ -195,7 +195,7 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
     """Fits recordings of walking people, one mean stride each."""
     files = sorted(folder.glob("*.csv"))
     if not files:
-        raise ValueError(f"recordings: {folder} has no CSV file; each is one person walking")
+        raise ValueError(f"recordings: {folder} has no CSV file, each of one walking person")
     demos, names, aperiodic = [], [], []
     for file in files:
         recording = read_csv(file, columns=RECORDED)
@@ -211,7 +211,7 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
         names.append(file.stem)
     if len(demos) < 4:
         raise ValueError(
-            f"recordings: {folder} has {len(demos)} in which strides repeat: pass at least 4"
+            f"recordings: {folder} has {len(demos)} periodic recordings: pass at least 4"
         )
     strides = cycles(demos, average=True)
     model = learn(list(strides))
@@ -220,7 +220,7 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
     chosen = [int(by_range[share * (len(demos) - 1) // 4]) for share in (2, 3, 4)]
     commands = switches(model, chosen, names)
     result = swing(model, commands)
-    without = f", without {', '.join(aperiodic)}, in which no stride repeats" if aperiodic else ""
+    without = f", without {', '.join(aperiodic)}, which are not periodic" if aperiodic else ""
     paragraphs = [
         f"Recordings of {len(demos)} walks{without}. {_spectrum(model)}",
         _settling(commands, result),
@@ -232,14 +232,14 @@ def _spectrum(model: pdmp.Model) -> str:
     """Returns a sentence on the number of styles and the share of four, the number in the paper."""
     share = model.singular_values[:4].sum() / model.singular_values.sum()
     return (
-        f"To exceed 90 % of the sum, the spectrum asks for J = {model.n_styles}; "
-        f"four make {share:.1%}."
+        f"J = {model.n_styles} is the smallest number above 90 % of the sum of singular values; "
+        f"four have {share:.1%}."
     )
 
 
 def _settling(commands: Sequence[Switch], result: SwingResult) -> str:
     rows = zip(commands, result.distances, strict=True)
-    header = ["switch", "off the new cycle in the sixth period"]
+    header = ["switch", "distance from the new cycle in the sixth period"]
     return markdown_table(
         header, ([switch.name, f"{distance:.2%} of its range"] for switch, distance in rows)
     )

@@ -18,44 +18,44 @@ INTRODUCTION = """\
 # Movements predicted from their context
 
 `make report` prints these tables and draws figures into `out/report/`;
-`PYTHONPATH=benches .venv/bin/python -m report --write` puts them here. Each condition is held out
-in turn, or, where there are more than twelve, each of twelve folds of neighbouring ones; the others
-are learnt from, and the movement is predicted from the context alone. Contexts outside the convex
-hull of those learnt from are extrapolation.
+`PYTHONPATH=benches .venv/bin/python -m report --write` writes them here. Each condition is held out
+in turn, or, with more than twelve conditions, each of twelve folds of neighbours; the others are
+the training set, and the movement is predicted from the context alone. Contexts outside the convex
+hull of the training contexts are extrapolation.
 
 The primitive has its defaults: linear time scaling, automatic smoothing, the systematic J, and a
 map from context to style, goal, start or anchor, and duration that stacks a Gaussian process and a
-line. Beside it stand four that differ in one of these: all J, the linear map, J by cross-validation
-(`n_styles="auto"`), and a time warp of four segments. The ProMP of movement_primitives takes part
+line. Four variants differ in one of these: all J, the linear map, J by cross-validation
+(`n_styles="auto"`), and a time warp of four segments. The ProMP of movement_primitives is included
 where that is installed.
 
-## Error beside simpler predictors
+## Errors of primitives and simpler predictors
 
-E = (1/T) Σ‖ŷ(t) − y(t)‖² over normalised time, as a share of what the mean demonstration leaves, ±
+E = (1/T) Σ‖ŷ(t) − y(t)‖² over normalised time, relative to that of the mean demonstration, ±
 standard error over folds: 1 is no information from the context, 0 a perfect prediction.
 """
 PRIMITIVE_ITSELF = """\
-## The primitive itself
+## Properties of the primitive
 
-J and map of all demonstrations together, and J by cross-validation; E with the primitive's own J, ±
-standard deviation over folds; share of the positions inside its 90 % band; how far off the duration
-is; and E less that of the best of the simpler predictors, on the same folds, ± standard error:
-negative where the primitive is better.
+J and map of a fit to all demonstrations, and J by cross-validation; E with the default J, ±
+standard deviation over folds; share of the positions inside the 90 % band; relative error of the
+duration; and difference of E from the best of the simpler predictors, on the same folds, ± standard
+error: negative where the primitive is better.
 
-Where another is ahead, contexts determine little of the movement. Walks of ten styles differ by
-more than their speed, and the slowest and the fastest are predicted best by the mean; so are the
-highest grabs of other actors. The three doors within the hull of the other twelve are nearer to a
-plane than to what a process and a line together make of three coordinates.
+Where another predictor is better, contexts determine little of the movement. Walks of ten styles
+differ by more than their speed, and the slowest and the fastest are predicted best by the mean; so
+are the highest grabs of other actors. For the three doors within the hull of the other twelve, a
+linear map of three coordinates is closer than a stack of a process and a line.
 """
 TIME = """\
 ## Linear and warped time
 
-What a time warp makes of the spectrum of all demonstrations: the share of the sum of the singular
-values that the first three have, with time scaled linearly and with time warped; and E of the
-primitive with warped time less that with linear time, on the same folds, ± standard error. Both
-errors are over normalised time, in which a warped movement must meet the moments too. A warp brings
-pauses and hurry of a raised hand together and leaves less to vary, but the height held hardly
-determines their times: predicted from the context, movements with their mean times are nearer.
+Effect of a time warp: share of the first three singular values in the sum over all demonstrations,
+with linear and with warped time; and E of the primitive with warped time less that with linear
+time, on the same folds, ± standard error. Both errors are over normalised time, and so include
+errors of timing. A warp aligns pauses and fast parts of a raised hand, which reduces the variation,
+but the height of the hand hardly determines their times: movements predicted with mean times have
+smaller errors.
 """
 
 
