@@ -110,7 +110,7 @@ class Arm:
         self._bodies = [self._model.body(f"{side}_{body}").id for body in bodies]
         self._kinematics = mujoco.mj_kinematics
 
-    def places(self, q: ArrayLike) -> Array:
+    def positions(self, q: ArrayLike) -> Array:
         """Returns the positions (3, 3) [m] of shoulder, elbow and hand at angles q (4,) [rad]."""
         self._data.qpos[self._addresses] = self._directions * q
         self._kinematics(self._model, self._data)
@@ -118,7 +118,7 @@ class Arm:
 
     def hands(self, path: ArrayLike) -> Array:
         """Returns the positions of the hand (T, 3) [m] along joint angles (T, 4) [rad]."""
-        return np.array([self.places(q)[2] for q in np.asarray(path)])
+        return np.array([self.positions(q)[2] for q in np.asarray(path)])
 
     def swivel(self, q: ArrayLike) -> float:
         """Returns the angle [rad] of the elbow about the line from shoulder to hand.
@@ -128,12 +128,12 @@ class Arm:
         angle (Kim, Miller, Byl, Abrams, Rosen, IEEE Transactions on Biomedical
         Engineering 59, 2012, 1770-1779, doi:10.1109/TBME.2012.2194489).
         """
-        return _swivel(self.places(q))
+        return _swivel(self.positions(q))
 
     def reach(self, hands: Array, swivels: Array, near: ArrayLike) -> Array:
         """Returns joint angles (T, 4) [rad] for paths of hand and elbow (inverse kinematics).
 
-        They minimise the squares of the hand's distance [m] and of 0.1 m times the sine of half the
+        They minimise the squares of the hand's distance [m] and of 0.2 m times the sine of half the
         swivel's error. Each optimisation starts from the previous solution, the first from `near`.
 
         Parameters
@@ -153,8 +153,8 @@ class Arm:
         from scipy.optimize import least_squares
 
         def residuals(q: Array, hand: Array, swivel: float) -> Array:
-            places = self.places(q)
-            return np.append(places[2] - hand, 0.2 * np.sin(0.5 * (_swivel(places) - swivel)))
+            positions = self.positions(q)
+            return np.append(positions[2] - hand, 0.2 * np.sin(0.5 * (_swivel(positions) - swivel)))
 
         q, path = np.asarray(near, dtype=float), []
         for hand, swivel in zip(hands, swivels, strict=True):
@@ -177,8 +177,8 @@ def _windowless() -> str:
     return "osmesa" if find_library("OSMesa") else "disable"
 
 
-def _swivel(places: Array) -> float:
-    shoulder, elbow, hand = places
+def _swivel(positions: Array) -> float:
+    shoulder, elbow, hand = positions
     axis = (hand - shoulder) / np.linalg.norm(hand - shoulder)
     away, out = shoulder - MOUTH, elbow - shoulder
     away, out = away - axis * (axis @ away), out - axis * (axis @ out)

@@ -94,11 +94,11 @@ def _pictures(robot: Robot, times: Sequence[float], shot: CameraView) -> list[An
     return pictures
 
 
-def _trail(scene: Any, places: Sequence[Any]) -> None:
+def _trail(scene: Any, positions: Sequence[Any]) -> None:
     """Adds a line through positions to a scene, up to its capacity."""
     mujoco = engine()
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
-    for start, end in itertools.pairwise(places[: scene.maxgeom - scene.ngeom]):
+    for start, end in itertools.pairwise(positions[: scene.maxgeom - scene.ngeom]):
         geom = scene.geoms[scene.ngeom]
         mujoco.mjv_initGeom(
             geom,

@@ -86,7 +86,7 @@ def reach(task: Task, height: float, noise: Generator) -> Reach:
     spread = np.hypot(VIA_NOISE, [0, 0, LIFT_NOISE * lift])
     deviation = np.array([0, 0, lift]) + noise.normal(0, spread) @ task.axes
     edge = (0.5 * BOX[0] + clear) * task.forward
-    start, goal = (place + noise.normal(0, END_NOISE, 3) for place in (task.start, task.goal))
+    start, goal = (position + noise.normal(0, END_NOISE, 3) for position in (task.start, task.goal))
     points = np.array([start, task.middle - edge + deviation, task.middle + edge + deviation, goal])
     path = minimum_jerk(points, delay=noise.normal(0, PASSING_NOISE))
     length = np.linalg.norm(np.diff(path(np.linspace(0, 1, 400)), axis=0), axis=1).sum()

@@ -44,7 +44,7 @@ class Reaching:
 
     def miss(self, hand: Array, goal: Array | None = None) -> float:
         """Returns the distance [mm] of a hand (3,) [m] from its position at a goal [rad]."""
-        goal_hand = self.arm.places(self.goal if goal is None else goal)[2]
+        goal_hand = self.arm.positions(self.goal if goal is None else goal)[2]
         return 1e3 * float(np.linalg.norm(hand - goal_hand))
 
     def side_view(self, hands: Array) -> tuple[Array, Array]:
@@ -69,7 +69,7 @@ def demonstrate(seed: int = SEED) -> Reaching:
         Seed of the noise.
     """
     arm = Arm()
-    usual, end = arm.swivel(GOAL), arm.places(GOAL)[2]
+    usual, end = arm.swivel(GOAL), arm.positions(GOAL)[2]
     task = Task(end + START, end)
     back = np.linspace(task.goal, task.start, 12)
     start = arm.reach(back, np.full(len(back), usual), GOAL)[-1]

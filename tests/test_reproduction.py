@@ -168,7 +168,7 @@ def test_goal_moved_during_the_movement_is_reached(reaching: Reaching) -> None:
     """A goal moved during the movement is reached on the robot, at any height and as smoothly."""
     model = heights.learn(reaching, 3)
     command = heights.new_goal(model, reaching)
-    assert reaching.miss(reaching.arm.places(command.goal)[2]) > 100
+    assert reaching.miss(reaching.arm.positions(command.goal)[2]) > 100
     robot = heights.reach_predicted(model, reaching, 0.15, command)
     assert reaching.miss(robot.log.hands[-1], command.goal) < CLOSE
     assert robot.log.contact() == 0
@@ -294,7 +294,7 @@ def test_missing_robot_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_printed_goal_is_a_hand_on_a_table(reaching: Reaching) -> None:
     """The printed goal is in front of the body, below the elbow, with a natural swivel angle."""
-    shoulder, elbow, hand = reaching.arm.places(GOAL)
+    shoulder, elbow, hand = reaching.arm.positions(GOAL)
     assert hand[0] > 0.3 and abs(hand[1]) < 0.1
     assert hand[2] < elbow[2] < shoulder[2]
     assert abs(np.degrees(reaching.arm.swivel(GOAL))) < 20
