@@ -224,7 +224,7 @@ fn jacobians_are_differences_of_rollouts() {
                 anchor: given(0.1).filter(|_| !discrete),
                 start,
                 velocity,
-                amplitude: Some(if discrete { 1.0 } else { 0.7 }),
+                amplitude: (!discrete).then_some(0.7),
                 tau: Some(1.4 * model.tau()),
                 segment_durations: None,
                 phase: None,
@@ -331,7 +331,7 @@ fn extreme_batches_are_finite() {
             styles: array![[1e100, -1e100], [0.0, 0.0]],
             starts: huge.clone(),
             velocities: huge,
-            amplitude: Some(if model.kind() == Kind::Discrete { 1.0 } else { 1e150 }),
+            amplitude: (model.kind() == Kind::Rhythmic).then_some(1e150),
             ..Default::default()
         };
         assert!(all(&conditions, model, grid(0.01, 2.0)).iter().flatten().all(|x| x.is_finite()));
