@@ -13,10 +13,10 @@ use crate::error::{Error, Result};
 /// Most multiplications n·f² that a linear map of n contexts with f inputs may take: a second or two.
 const MAX_WORK: f64 = 4e9;
 
-/// Degrees of freedom that the ratio of signal to noise, which the evidence has chosen, does not go below. In simulations
-/// of noisy lines, curves and constants, bands of 90 % inside of 5 to 12 contexts hold 81 to 90 % of new values where none
-/// is taken for the ratio, 85 to 94 % with one and 88 to 97 % with two; of 3 contexts 82 to 97 % without, 97 to 100 % with
-/// one, of three times the width.
+/// Degrees of freedom below which none is taken for the ratio of signal to noise, which the evidence has chosen. In
+/// simulations of lines, curves and constants with much noise, bands of 90 % inside of 5 to 12 contexts hold 81 to 89 % of
+/// new values where none is taken, 85 to 93 % with one and 88 to 97 % with two; of 3 contexts 82 to 96 % without, and 97 to
+/// 99 % with one, three times as wide.
 const MIN_FREEDOM: usize = 2;
 
 /// Contexts that differ, what was shown in each on average, and how much that scattered.
