@@ -404,7 +404,7 @@ fn reaches_sampled_anew_are_learnt_as_easily_as_recorded() {
             anew(&|demo| preprocessing::resample(demo, 0.5 * DT).unwrap()),
             anew(&|demo| preprocessing::resample(demo, 0.3 * DT).unwrap()),
             anew(&|demo| preprocessing::resample(demo, 2.0 * DT).unwrap()),
-            anew(&|demo| preprocessing::cut(demo, &[0.0037, 0.9962]).unwrap().remove(0)),
+            anew(&|demo| preprocessing::split_at(demo, &[0.0037, 0.9962]).unwrap().remove(0)),
         ] {
             assert_eq!(n_styles(Kind::Discrete, &demos), 1, "noise {share}, {} samples", demos[0].n_samples());
         }
@@ -431,12 +431,12 @@ fn resampling_keeps_what_was_recorded() {
 #[test]
 fn parts_meet_at_the_times_that_cut_them() {
     let recording = recorded(walk(&even(300), |t| TAU * t)).with_goal(vec![0.0; 4]).unwrap();
-    let parts = preprocessing::cut(&recording, &[0.333, 1.0, 2.7]).unwrap();
+    let parts = preprocessing::split_at(&recording, &[0.333, 1.0, 2.7]).unwrap();
     let [first, second] = &parts[..] else { panic!("{} parts", parts.len()) };
     assert_abs_diff_eq!(first.position().row(0)[0], 0.4 * (TAU * 0.333).sin(), epsilon = 1e-6);
     assert_eq!(first.position().row(first.n_samples() - 1), second.position().row(0));
     assert_eq!(first.goal(), None);
-    let message = preprocessing::cut(&recording, &[0.5, 0.51]).unwrap_err().to_string();
+    let message = preprocessing::split_at(&recording, &[0.5, 0.51]).unwrap_err().to_string();
     assert!(message.contains("times = 0.51: a part must last"), "{message}");
 }
 
@@ -511,12 +511,12 @@ fn short_gaps_are_interpolated_and_nothing_else_changes() {
     holed.slice_mut(s![40..44, 0]).fill(f64::NAN);
     holed[[70, 2]] = f64::NAN;
     let names = ["a", "b", "c", "d"].map(String::from);
-    let filled = preprocessing::fill(holed.clone(), &time, &names, &[0.0; 4], 0.05).unwrap();
+    let filled = preprocessing::fill_gaps(holed.clone(), &time, &names, &[0.0; 4], 0.05).unwrap();
     for (place, y) in filled.indexed_iter() {
         let tolerance = if holed[place].is_nan() { 1e-4 } else { 0.0 };
         assert_abs_diff_eq!(*y, whole[place], epsilon = tolerance);
     }
-    let message = preprocessing::fill(holed, &time, &names, &[0.0; 4], 0.04).unwrap_err().to_string();
+    let message = preprocessing::fill_gaps(holed, &time, &names, &[0.0; 4], 0.04).unwrap_err().to_string();
     assert!(message.contains("column 'a': no sample between t = 0.39 s and t = 0.44 s"), "{message}");
 }
 
@@ -527,7 +527,7 @@ fn gaps_that_cannot_be_filled_are_refused() {
     let refusal = |gap: std::ops::Range<usize>, max_gap: f64| {
         let mut position = Array2::zeros((10, 1));
         position.slice_mut(s![gap, 0]).fill(f64::NAN);
-        preprocessing::fill(position, &time, &names, &[0.0], max_gap).unwrap_err().to_string()
+        preprocessing::fill_gaps(position, &time, &names, &[0.0], max_gap).unwrap_err().to_string()
     };
     assert!(refusal(0..2, 1.0).contains("'knee': no sample before t = 0.02 s"));
     assert!(refusal(7..10, 1.0).contains("'knee': no sample after t = 0.06 s"));
@@ -544,7 +544,7 @@ fn angles_are_filled_across_the_wrap() {
     let wrapped = |c: usize| (angle(c) + PI).rem_euclid(TAU) - PI;
     let mut position = Array2::from_shape_fn((60, 1), |(c, _)| wrapped(c));
     position.slice_mut(s![29..34, 0]).fill(f64::NAN);
-    let filled = preprocessing::fill(position, &time, &[String::from("yaw")], &[TAU], 0.1).unwrap();
+    let filled = preprocessing::fill_gaps(position, &time, &[String::from("yaw")], &[TAU], 0.1).unwrap();
     for c in 29..34 {
         let turns = (filled[[c, 0]] - angle(c)) / TAU;
         assert_abs_diff_eq!(turns, turns.round(), epsilon = 1e-9);
@@ -588,7 +588,7 @@ proptest! {
         let recording = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
         let mut made = vec![preprocessing::resample(&recording, (last - first) / 20.0).unwrap()];
         made.extend(preprocessing::trim(&recording, 0.05));
-        made.extend(preprocessing::cut(&recording, &[first, last]).unwrap());
+        made.extend(preprocessing::split_at(&recording, &[first, last]).unwrap());
         made.extend(preprocessing::lowpass(&recording, 0.3 / ((last - first) / steps.len() as f64)));
         for demo in made {
             prop_assert!(demo.position().iter().all(|y| y.is_finite()));
