@@ -139,7 +139,7 @@ impl Reader<'_> {
         let transport = Transport::from_coefficients(transport, constants.canonical)
             .map_err(|error| Error::File(error.to_string()))?;
         let braking = constants.braking;
-        // With κ < α_z the forcing past the end would outlast z, which it is to cancel.
+        // The forcing past the end is exp(−α_z v)(a + b·exp(−(κ − α_z)v)): for κ < α_z the second exponential overflows.
         let valid = braking.is_none_or(|braking| (constants.alpha_z..=1e12).contains(&braking));
         if braking.is_none() != transport.is_immediate() || !valid {
             return Err(bad("braking does not fit the rest"));
