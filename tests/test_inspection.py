@@ -87,7 +87,7 @@ def test_turns_between_recordings_of_an_angle_are_taken_off() -> None:
         )
         for k, h in enumerate(HEIGHTS)
     ]
-    with pytest.warns(UserWarning, match="they were taken off"):
+    with pytest.warns(UserWarning, match="the turns were subtracted"):
         model = pdmp.fit(demos)
     np.testing.assert_allclose(model.goals[:, 0], 1.5, atol=1e-9)
     with pytest.warns(UserWarning):

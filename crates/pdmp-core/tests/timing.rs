@@ -403,10 +403,10 @@ fn bad_timings_are_refused() {
     let demos = reaches();
     let refused = |time_scaling| fit(&demos, &with(Kind::Discrete, time_scaling)).unwrap_err().to_string();
     for (segments, slope, message) in [
-        (0, 2.5, "segments = 0: must be at least 1, which is linear"),
-        (46, 2.5, "segments = 46: must lie between 1 and 45, half the fewest samples of a demonstration or 1000"),
-        (8, 0.9, "slope = 0.9: must lie between 1, which is linear, and 10"),
-        (8, f64::NAN, "slope = NaN: must lie between 1, which is linear, and 10"),
+        (0, 2.5, "n_segments = 0: must be at least 1, which is linear"),
+        (46, 2.5, "n_segments = 46: must lie between 1 and 45, half the fewest samples of a demonstration or 1000"),
+        (8, 0.9, "max_slope = 0.9: must lie between 1, which is linear, and 10"),
+        (8, f64::NAN, "max_slope = NaN: must lie between 1, which is linear, and 10"),
     ] {
         assert_eq!(refused(TimeScaling::Warp(TimeWarp { n_segments: segments, max_slope: slope })), message);
     }

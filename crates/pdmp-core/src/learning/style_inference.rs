@@ -82,14 +82,14 @@ pub fn style_of(
     targets.carry(&model.transport, model.attractor, model.canonical());
     targets.scale(&model.learnt.dof_scale);
     let mut position = Array2::zeros((model.learnt.n_samples, n_dofs));
-    aligned.sample(0, position.as_slice_mut().unwrap_or_default());
+    aligned.sample(0, crate::validate::row_major_mut(&mut position));
 
     let design = design(model);
     let mut target = targets.forcing.row(0).to_vec();
     if model.kind() == Kind::Rhythmic {
         let samples = cycle_phase::lead(&design, &target, model.demonstrated.styles.view(), n_dofs);
         target.rotate_left(samples * n_dofs);
-        position.as_slice_mut().unwrap_or_default().rotate_left(samples * n_dofs);
+        crate::validate::row_major_mut(&mut position).rotate_left(samples * n_dofs);
     }
     let (style, truncation_error) = likeliest(&design, &target, &model.demonstrated.styles);
     check_size(&style, model)?;

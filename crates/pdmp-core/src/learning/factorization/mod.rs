@@ -209,13 +209,13 @@ impl<'a> Library<'a> {
         let scale = if (1e-20..1e20).contains(&largest) { 1.0 } else { largest.log2().floor().exp2() };
         let mut scaled = zeros("targets", targets.dim())?;
         scaled.zip_mut_with(&targets, |to, from| *to = from / scale);
-        let squares = self::squares(scaled.as_slice().unwrap_or_default());
+        let squares = self::squares(crate::validate::row_major(&scaled));
         Ok(Some(Self { targets: scaled.into(), scale, squares }))
     }
 
     fn matrix(&self) -> MatRef<'_, f64> {
         let (rows, columns) = self.targets.dim();
-        MatRef::from_row_major_slice(self.targets.as_slice().unwrap_or_default(), rows, columns)
+        MatRef::from_row_major_slice(crate::validate::row_major(&self.targets), rows, columns)
     }
 
     /// F or Fᵀ, (K, L) with K ≤ L.
@@ -306,7 +306,7 @@ impl<'a> Library<'a> {
             let part = &mut part[..found * width];
             // A target that is zero throughout stays so: a DoF at rest is not moved by what rounding leaves of it.
             look(turned(part, styles.as_ref(), targets.subcols(start, width)));
-            let whole = basis.as_slice_mut().unwrap_or_default().chunks_exact_mut(columns);
+            let whole = crate::validate::row_major_mut(&mut basis).chunks_exact_mut(columns);
             whole.zip(part.chunks_exact(width)).for_each(|(row, part)| row[start..start + width].copy_from_slice(part));
         }
         Ok(Projection { styles, basis })

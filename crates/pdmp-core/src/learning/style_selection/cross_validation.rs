@@ -61,7 +61,7 @@ impl<'a> StyleSelection<'a> {
         let sampled = aligned.clone().resampled(n_samples);
         let mut moved = Array3::zeros((shown.starts.nrows(), n_samples, shown.starts.ncols()));
         for (m, mut moved) in moved.outer_iter_mut().enumerate() {
-            sampled.sample(m, moved.as_slice_mut().unwrap_or_default());
+            sampled.sample(m, crate::validate::row_major_mut(&mut moved));
         }
         let mut foresight =
             Self { kind, shown, factors, segment_durations: aligned.segment_durations.view(), start, moved };
