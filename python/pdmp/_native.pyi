@@ -18,7 +18,7 @@ _Context: TypeAlias = ArrayLike | Sequence[float | str]
 _Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
 _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
-_Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
+_Kernel: TypeAlias = Literal["matern32", "matern52"]
 
 __all__ = [
     "Conditions",

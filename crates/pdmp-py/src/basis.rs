@@ -17,7 +17,7 @@ use crate::error::{ascii, raise};
 ///
 /// Parameters
 /// ----------
-/// kernel : {"matern52", "matern32", "squared_exponential"}
+/// kernel : {"matern52", "matern32"}
 ///     Covariance function of the clock; wrapped around the circle where the movement is rhythmic.
 /// length : float, optional
 ///     Length scale, in units of the clock u = t / tau.
@@ -38,9 +38,7 @@ impl Gp {
     #[pyo3(signature = (kernel="matern52", length=None, noise=None))]
     fn new(kernel: &str, length: Option<f64>, noise: Option<f64>) -> PyResult<Self> {
         let kernel = Kernel::from_name(kernel).ok_or_else(|| {
-            PyValueError::new_err(format!(
-                "kernel = {kernel:?}: must be \"matern32\", \"matern52\" or \"squared_exponential\""
-            ))
+            PyValueError::new_err(format!("kernel = {kernel:?}: must be \"matern32\" or \"matern52\""))
         })?;
         regression::Gp::new(kernel, length, noise).map(Self).map_err(raise)
     }
