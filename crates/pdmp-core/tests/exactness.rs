@@ -162,10 +162,10 @@ fn ticks_solve_the_equations() {
     };
     let seven = reaches().iter().map(wide).collect();
     let cases = [
-        (Kind::Discrete, reaches(), TransportSelection::FitSummary),
+        (Kind::Discrete, reaches(), TransportSelection::Learnt),
         (Kind::Discrete, reaches(), TransportSelection::Immediate),
-        (Kind::Discrete, seven, TransportSelection::FitSummary),
-        (Kind::Rhythmic, cycles(), TransportSelection::FitSummary),
+        (Kind::Discrete, seven, TransportSelection::Learnt),
+        (Kind::Rhythmic, cycles(), TransportSelection::Learnt),
     ];
     for (kind, demos, transport) in cases {
         let styles = Truncation::Rank(2).into();

@@ -333,7 +333,7 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
 
 fn transport_of(transport: &str) -> PyResult<TransportSelection> {
     match transport {
-        "learnt" => Ok(TransportSelection::FitSummary),
+        "learnt" => Ok(TransportSelection::Learnt),
         "immediate" => Ok(TransportSelection::Immediate),
         _ => Err(PyValueError::new_err(format!("transport = {transport:?}: must be \"learnt\" or \"immediate\""))),
     }

@@ -1,4 +1,6 @@
 //! Learning of a model from demonstrations.
+//!
+//! [`fit`] composes the four steps of Section 3.2: alignment, targets, factorisation, regression.
 
 pub(crate) mod alignment;
 mod constants;

@@ -1,4 +1,4 @@
-//! What can be chosen about a fit, and what a fit tells on its way.
+//! Options and progress stages of a fit.
 
 use crate::context::MapSelection;
 use crate::demonstration::ContextValue;
@@ -11,23 +11,26 @@ use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
 use crate::validate::check_vector;
 
-/// The unit of each degree of freedom in the factorisation.
+/// Scale of each degree of freedom in the factorisation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum DofScaling {
-    /// As recorded where all DoFs have one unit, or none is known. Of DoFs in different units, those in one unit are
-    /// scaled together, by the largest range among them: what hardly moves, or not at all, stays small.
+    /// 1 where all DoFs have the same unit, or none is known. Otherwise DoFs with the same unit share one scale, the
+    /// largest range among them, so that a DoF that hardly moves stays small.
     #[default]
     Auto,
-    /// As recorded.
+    /// 1: values as recorded.
     Unit,
-    /// The range of each DoF, so that all weigh alike.
+    /// Range of each DoF, which gives all DoFs equal weight.
     Range,
-    /// Given (D,), in the unit of each DoF.
+    /// Given scales (D,), in the unit of each DoF, from 1e-100 to 1e100.
     Given(Vec<f64>),
 }
 
 impl DofScaling {
-    /// The units (D,) that were given, if any were.
+    /// Returns the given scales (D,), or `None`.
+    ///
+    /// # Errors
+    /// Another number of scales than DoFs, or a scale out of range.
     pub(super) fn given(&self, n_dofs: usize) -> Result<Option<&[f64]>> {
         let Self::Given(scale) = self else { return Ok(None) };
         check_vector("dof_scale", scale, n_dofs, "DoF")?;
@@ -39,9 +42,9 @@ impl DofScaling {
         }
     }
 
-    /// The scales (D,) of DoFs with these ranges and units.
+    /// Returns the scales (D,) of DoFs with the given ranges and units.
     pub(super) fn of(&self, ranges: &[f64], units: &[String]) -> Vec<f64> {
-        // A DoF at rest has no range; it has no target to be scaled either.
+        // A DoF at rest has a range of zero, and targets of zero.
         let moving = |range: f64| if range > 0.0 { range } else { 1.0 };
         match self {
             Self::Auto if units.iter().any(|unit| *unit != units[0]) => {
@@ -58,40 +61,48 @@ impl DofScaling {
     }
 }
 
-/// Everything that can be chosen about a fit.
+/// Options of a fit.
+///
+/// ```
+/// use pdmp_core::learning::{FitOptions, Truncation};
+/// use pdmp_core::Kind;
+///
+/// let options = FitOptions { n_styles: Truncation::Rank(3).into(), ..FitOptions::new(Kind::Discrete) };
+/// assert_eq!(options.alpha_z, 25.0);
+/// ```
 #[derive(Clone, Debug)]
 pub struct FitOptions {
-    /// How demonstrations are read and aligned.
+    /// Sampling, smoothing and alignment of the demonstrations.
     pub alignment: Alignment,
-    /// Conditions of the demonstrations (M rows of Q); otherwise those that they carry.
+    /// Contexts of the demonstrations (M rows of Q); otherwise those that they carry.
     pub contexts: Option<Vec<Vec<ContextValue>>>,
-    /// What leads from contexts to movements.
+    /// Map from contexts to movements.
     pub map: MapSelection,
     /// Style dimension J.
     pub n_styles: NStyles,
     /// Function approximator of the landscape.
     pub basis: Basis,
-    /// How the way from start to goal is spread over a discrete movement.
+    /// Transport profile of discrete movements.
     pub transport: TransportSelection,
-    /// Unit of each DoF in the factorisation.
+    /// Scale of each DoF in the factorisation.
     pub dof_scale: DofScaling,
-    /// Time constant τ in seconds, discrete; otherwise the nominal duration.
+    /// Time constant τ in seconds of discrete movements; otherwise the nominal duration.
     pub tau: Option<f64>,
-    /// α_z of the output system.
+    /// Gain α_z of the output system, from 1e-6 to 1e6.
     pub alpha_z: f64,
-    /// β_z of the output system; otherwise α_z/4, critical damping.
+    /// Gain β_z of the output system, from 1e-6 to 1e6; otherwise α_z/4, critical damping.
     pub beta_z: Option<f64>,
-    /// α_x of the canonical system, discrete; otherwise x = 0.01 at the end of the nominal demonstration.
+    /// Rate α_x of the discrete canonical system; otherwise such that x = 0.01 at the end of the nominal demonstration.
     pub alpha_x: Option<f64>,
-    /// μ of the canonical system, rhythmic.
+    /// Rate μ of the rhythmic canonical system.
     pub mu: f64,
-    /// How many threads may work on it. The model does not depend on it, to the last bit.
+    /// Largest number of threads. The model does not depend on it, bit for bit.
     pub threads: Threads,
 }
 
 impl FitOptions {
-    /// The defaults: smoothing by cross-validation, the systematic styles, a Gaussian process, a learnt transport, α_z = 25,
-    /// μ = 1, as many threads as the system allows, and all else from the demonstrations.
+    /// Returns the defaults: smoothing by cross-validation, the systematic styles, a Gaussian process, a learnt transport
+    /// profile, α_z = 25, μ = 1, every available thread, and otherwise values from the demonstrations.
     pub fn new(kind: Kind) -> Self {
         Self {
             alignment: Alignment {
@@ -107,7 +118,7 @@ impl FitOptions {
             map: MapSelection::Auto,
             n_styles: NStyles::AboveNoise,
             basis: Basis::Gp(Gp::default()),
-            transport: TransportSelection::FitSummary,
+            transport: TransportSelection::Learnt,
             dof_scale: DofScaling::Auto,
             tau: None,
             alpha_z: 25.0,
@@ -119,17 +130,17 @@ impl FitOptions {
     }
 }
 
-/// The choice of the style dimension J.
+/// Selection of the style dimension J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum NStyles {
-    /// As many as carry nine tenths of the sum of the singular values, at least five, and at least as many as the
-    /// contexts explain; never more than exceed the measurement noise.
+    /// Smallest J that carries nine tenths of the sum of the singular values, but at least five, and at least the number
+    /// of styles that the contexts explain; at most the number of singular values above the measurement noise.
     #[default]
     AboveNoise,
-    /// By number, or by the spectrum.
+    /// Given J, or J by the singular values.
     Truncated(Truncation),
-    /// The fewest that foresee movements, in contexts held out, with an error above the least that any number has by no
-    /// more than the standard error of the difference: cross-validation over the contexts, in at most ten folds.
+    /// Smallest J within one standard error of the lowest cross-validation error (one-standard-error rule), with at most
+    /// ten folds of the contexts.
     CrossValidated,
 }
 
@@ -139,23 +150,27 @@ impl From<Truncation> for NStyles {
     }
 }
 
-/// Where a fit is.
+/// Stage of a fit.
+///
+/// ```
+/// assert_eq!(pdmp_core::learning::Stage::Regress.name(), "regress");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// The warps of step 1, where time is not scaled linearly.
+    /// Time warps of step 1, where time is not scaled linearly.
     Align,
-    /// The rest of step 1, and step 2, demonstration by demonstration.
+    /// Resampling of step 1, and step 2.
     Targets,
-    /// Step 3.
+    /// Step 3: factorisation of the targets.
     Factorise,
-    /// Step 4.
+    /// Step 4: regression of the landscape.
     Regress,
-    /// Compiling the landscape to its table.
+    /// Tabulation of the landscape.
     Compile,
 }
 
 impl Stage {
-    /// The name shown to a user.
+    /// Returns the name for display.
     pub fn name(self) -> &'static str {
         match self {
             Stage::Align => "align",
@@ -167,12 +182,12 @@ impl Stage {
     }
 }
 
-/// How the way from start to goal is spread over a discrete movement.
+/// Transport profile m(u): share of the displacement from start to goal that a discrete movement has covered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TransportSelection {
-    /// By a profile learnt from the demonstrations.
+    /// Profile learnt from the demonstrations.
     #[default]
-    FitSummary,
-    /// At once, as in the paper: m ≡ 1.
+    Learnt,
+    /// m ≡ 1, as in the paper.
     Immediate,
 }
