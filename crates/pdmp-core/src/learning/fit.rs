@@ -20,11 +20,12 @@ use crate::preprocessing::inspection::{inspect, unwound};
 
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
+use super::noise_findings;
 use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
 use super::stiffness::stiffness;
 use super::style_selection::spectrum;
 use super::tabulation::compile;
-use super::{noise_findings, time_scaling};
+use super::warp_selection::WarpSelection;
 
 /// Fits a model to demonstrations.
 ///
@@ -185,7 +186,7 @@ fn scale_time(
         targets.scale(&options.dof_scale.of(&targets.ranges(), units));
         Ok(Factors::of(targets.forcing.view(), count, &mut |_| Ok(()))?.styles.ncols())
     };
-    let selection = time_scaling::WarpSelection { columns, numbers, map: options.map, n_styles: &n_styles };
+    let selection = WarpSelection { columns, numbers, map: options.map, n_styles: &n_styles };
     let mut validating = |share| progress(0.5 + 0.5 * share);
     if selection.favours_warp(aligned, &linear, options.canonical.kind(), &mut validating)? {
         return Ok(template);

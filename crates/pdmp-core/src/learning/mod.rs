@@ -4,6 +4,7 @@
 
 pub(crate) mod alignment;
 mod constants;
+mod context_folds;
 mod cycle_phase;
 pub(crate) mod factorization;
 mod fit;
@@ -16,8 +17,8 @@ mod style_inference;
 pub(crate) mod style_selection;
 mod tabulation;
 mod targets;
-mod time_scaling;
 mod transport_profile;
+mod warp_selection;
 
 pub use alignment::TimeScaling;
 pub use factorization::{Factors, Truncation};

@@ -246,7 +246,7 @@ impl<'a> ScaledTargets<'a> {
             let part = &mut part[..n_vectors * width];
             // A column of zeros stays exactly zero, so that a DoF at rest is not moved by rounding errors.
             visit(projected(part, styles.as_ref(), targets.subcols(start, width)));
-            let whole = basis.as_slice_mut().unwrap_or_default().chunks_exact_mut(columns);
+            let whole = crate::validate::row_major_mut(&mut basis).chunks_exact_mut(columns);
             whole.zip(part.chunks_exact(width)).for_each(|(row, part)| row[start..start + width].copy_from_slice(part));
         }
         Ok(Projection { styles, basis })

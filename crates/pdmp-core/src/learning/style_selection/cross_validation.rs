@@ -8,22 +8,18 @@
 
 use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, Axis, Zip, s};
 
-use crate::context::{ContextColumn, ContextMap, MapSelection, group_equal_contexts, outputs};
+use crate::context::{ContextColumn, ContextMap, MapSelection, outputs};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::output_system::{Attractor, State};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
+use crate::learning::context_folds::{Fold, folds};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::targets::Targets;
 use crate::model::responses::Curves;
 use crate::model::sensitivity::{STEPS, Sensitivity};
-
-/// Largest number of folds.
-const MAX_FOLDS: usize = 10;
-/// Smallest number of different contexts.
-const MIN_CONTEXTS: usize = 3;
 
 /// Demonstrations for the cross-validation of the number of styles.
 pub(crate) struct StyleSelection<'a> {
@@ -87,21 +83,13 @@ impl<'a> StyleSelection<'a> {
         map: MapSelection,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<usize> {
-        let conditions = group_equal_contexts(contexts);
-        if conditions.len() < MIN_CONTEXTS {
-            return Err(Error::Arguments(
-                "cross-validation of the number of styles needs at least three different contexts: pass a number of styles",
-            ));
-        }
-        let n_folds = conditions.len().min(MAX_FOLDS);
+        let folds = folds(contexts).ok_or(Error::Arguments(
+            "cross-validation of the number of styles needs at least three different contexts: pass a number of styles",
+        ))?;
         let mut errors: Vec<Vec<f64>> = Vec::new();
-        for fold in 0..n_folds {
-            progress(fold as f64 / n_folds as f64)?;
-            let of_fold = |(i, group)| if i % n_folds == fold { Some(group) } else { None };
-            let held_out: Vec<&Vec<usize>> = conditions.iter().enumerate().filter_map(of_fold).collect();
-            let training: Vec<usize> =
-                (0..contexts.nrows()).filter(|m| !held_out.iter().any(|group| group.contains(m))).collect();
-            errors.extend(self.errors(&training, &held_out, columns, contexts, map)?);
+        for (k, fold) in folds.iter().enumerate() {
+            progress(k as f64 / folds.len() as f64)?;
+            errors.extend(self.errors(fold, columns, contexts, map)?);
         }
         Ok(one_standard_error_rule(&errors))
     }
@@ -109,17 +97,16 @@ impl<'a> StyleSelection<'a> {
     /// Returns the mean squared errors (J,) of each held-out context, for 1 to J styles.
     fn errors(
         &self,
-        training: &[usize],
-        held_out: &[&Vec<usize>],
+        fold: &Fold,
         columns: &[ContextColumn],
         contexts: &Array2<f64>,
         map: MapSelection,
     ) -> Result<Vec<Vec<f64>>> {
-        let of = |rows: &Array2<f64>| rows.select(Axis(0), training);
+        let of = |rows: &Array2<f64>| rows.select(Axis(0), &fold.training);
         let sizes = ArrayView1::from(&self.factors.singular_values[..self.factors.styles.ncols()]);
         let weights = of(&self.factors.styles) * sizes;
         let styles = Factors::of(weights.view(), Truncation::Share(1.0), &mut |_| Ok(()))?.styles;
-        let residuals = self.residuals.select(Axis(0), training);
+        let residuals = self.residuals.select(Axis(0), &fold.training);
         let response =
             |style: ArrayView1<f64>| Zip::from(residuals.lanes(Axis(0))).map_collect(|lane| lane.dot(&style));
         let (n_samples, n_dofs) = (self.start.len(), self.targets.starts.ncols());
@@ -128,21 +115,21 @@ impl<'a> StyleSelection<'a> {
         let curves = Curves { styles: styles.columns().into_iter().map(response).collect(), start, velocity };
 
         let [goals, starts, anchors] = [&self.targets.goals, &self.targets.starts, &self.targets.anchors].map(of);
-        let segment_durations = self.segment_durations.select(Axis(0), training);
-        let places = [goals.view(), starts.view(), anchors.view()];
-        let outputs = outputs(self.kind, styles.view(), places, segment_durations.view());
+        let segment_durations = self.segment_durations.select(Axis(0), &fold.training);
+        let locations = [goals.view(), starts.view(), anchors.view()];
+        let outputs = outputs(self.kind, styles.view(), locations, segment_durations.view());
         let metric = Sensitivity::new(self.kind, &curves, Vec::new()).metric(outputs.view(), segment_durations.view());
         let map = ContextMap::learn(columns.to_vec(), &of(contexts), outputs.view(), metric.view(), map)?;
 
-        let errors_of = |group: &&Vec<usize>| {
+        let errors_of = |group: &Vec<usize>| {
             let expected = map.expect(&contexts.row(group[0]).to_vec());
-            let (style, places) = expected.split_at(curves.styles.len());
-            let (centre, start) = places.split_at(n_dofs);
+            let (style, locations) = expected.split_at(curves.styles.len());
+            let (centre, start) = locations.split_at(n_dofs);
             // A cycle has no start; its frame depends on the anchor alone.
             let start = if self.kind == Kind::Discrete { &start[..n_dofs] } else { centre };
             let predicted = self.frame(centre.to_vec(), start.to_vec());
             let mut errors = vec![0.0; style.len()];
-            for &m in *group {
+            for &m in group {
                 let own = self.frame(self.centres().row(m).to_vec(), self.targets.starts.row(m).to_vec());
                 let mut error_curve = &self.residuals.index_axis(Axis(0), m) + &own - &predicted;
                 for ((error, s), curve) in errors.iter_mut().zip(style).zip(&curves.styles) {
@@ -152,7 +139,7 @@ impl<'a> StyleSelection<'a> {
             }
             errors
         };
-        Ok(held_out.iter().map(errors_of).collect())
+        Ok(fold.held_out.iter().map(errors_of).collect())
     }
 
     /// Returns the goals, or the anchors.

@@ -15,7 +15,7 @@ use crate::learning::regression::Regression;
 /// # use ndarray::array;
 /// use pdmp_core::learning::regression::{Domain, Gp};
 ///
-/// let gp = Gp { length: Some(0.5), ..Gp::default() };
+/// let gp = Gp { length: Some(0.5), noise: Some(1e-6), ..Gp::default() };
 /// let targets = array![[0.0], [1.0], [0.0]];
 /// let posterior = gp.regress(Domain::Interval { end: 1.0 }, &[0.0, 0.5, 1.0], targets.view(), &mut |_| Ok(()))?;
 /// let (mean, variance) = posterior.predict(&[0.5]);

@@ -7,18 +7,14 @@
 
 use ndarray::{Array2, ArrayView1, Axis, s};
 
-use crate::context::{ContextColumn, ContextMap, MapSelection, group_equal_contexts};
+use crate::context::{ContextColumn, ContextMap, MapSelection};
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
+use crate::learning::context_folds::{Fold, folds};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::model::sensitivity::STEPS;
-
-/// Largest number of folds.
-const MAX_FOLDS: usize = 10;
-/// Smallest number of different contexts.
-const MIN_CONTEXTS: usize = 3;
 
 /// Cross-validation of a time warp.
 pub(super) struct WarpSelection<'a> {
@@ -45,13 +41,11 @@ impl WarpSelection<'_> {
         kind: Kind,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<bool> {
-        if group_equal_contexts(self.numbers).len() < MIN_CONTEXTS {
-            return Ok(true);
-        }
+        let Some(folds) = folds(self.numbers) else { return Ok(true) };
         let recorded = positions(linear, kind)?;
         let mut share = 0.0;
         let mut errors = |aligned: &Aligned| {
-            let errors = self.errors(aligned, &recorded, kind, &mut |done| progress(share + 0.5 * done));
+            let errors = self.errors(&folds, aligned, &recorded, kind, &mut |done| progress(share + 0.5 * done));
             share = 0.5;
             errors
         };
@@ -64,6 +58,7 @@ impl WarpSelection<'_> {
     /// Returns the mean squared error over linear time of each held-out context.
     fn errors(
         &self,
+        folds: &[Fold],
         aligned: &Aligned,
         recorded: &Array2<f64>,
         kind: Kind,
@@ -71,18 +66,13 @@ impl WarpSelection<'_> {
     ) -> Result<Vec<f64>> {
         let positions = positions(aligned, kind)?;
         let n_styles = (self.n_styles)(aligned)?;
-        let conditions = group_equal_contexts(self.numbers);
-        let n_folds = conditions.len().min(MAX_FOLDS);
         let mut errors = Vec::new();
-        for fold in 0..n_folds {
-            progress(fold as f64 / n_folds as f64)?;
-            let held_out: Vec<&Vec<usize>> = conditions.iter().skip(fold).step_by(n_folds).collect();
-            let training: Vec<usize> =
-                (0..positions.nrows()).filter(|m| !held_out.iter().any(|group| group.contains(m))).collect();
-            let rows = positions.select(Axis(0), &training);
+        for (k, Fold { training, held_out }) in folds.iter().enumerate() {
+            progress(k as f64 / folds.len() as f64)?;
+            let rows = positions.select(Axis(0), training);
             let factors = Factors::of(rows.view(), Truncation::Rank(n_styles.min(training.len())), &mut |_| Ok(()))?;
-            let (outputs, metric) = outputs(&factors, &aligned.segment_durations.select(Axis(0), &training));
-            let numbers = self.numbers.select(Axis(0), &training);
+            let (outputs, metric) = outputs(&factors, &aligned.segment_durations.select(Axis(0), training));
+            let numbers = self.numbers.select(Axis(0), training);
             let map = ContextMap::learn(self.columns.to_vec(), &numbers, outputs.view(), metric.view(), self.map)?;
             for group in held_out {
                 let expected = map.expect(&self.numbers.row(group[0]).to_vec());
