@@ -143,6 +143,6 @@ pub(crate) fn primitive(n_dofs: usize, n_styles: usize) -> Arc<Model> {
     };
     let demos: Vec<_> = (0..10).map(demonstration).collect();
     let basis = Basis::NGnet(NGnet::default());
-    let options = FitOptions { n_styles: Truncation::Rank(n_styles).into(), basis, ..FitOptions::new(Kind::Discrete) };
+    let options = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(n_styles)).basis(basis);
     Arc::new(fit(&demos, &options).expect("a fit"))
 }

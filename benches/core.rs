@@ -20,14 +20,14 @@ use pdmp_core::rollout;
 use pdmp_core::{Conditions, FitOptions, Kind, Model, fit};
 
 fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
-    let mut options = FitOptions { n_styles: Truncation::Rank(3).into(), basis, ..FitOptions::new(Kind::Discrete) };
-    options.alignment.smoothing = smoothing;
+    let mut options = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(3)).basis(basis);
+    options.smoothing = smoothing;
     options
 }
 
 fn learn(n_styles: usize) -> Arc<Model> {
     let options = options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate);
-    let options = FitOptions { n_styles: Truncation::Rank(n_styles).into(), ..options };
+    let options = options.n_styles(Truncation::Rank(n_styles));
     Arc::new(fit(&movements(40, 1001), &options).expect("a fit"))
 }
 

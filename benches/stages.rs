@@ -64,16 +64,12 @@ fn main() {
     if !env::args().any(|argument| argument == "--bench") {
         return;
     }
-    let network = FitOptions {
-        n_styles: Truncation::Rank(3).into(),
-        basis: Basis::NGnet(NGnet::default()),
-        ..FitOptions::new(Kind::Discrete)
-    };
+    let network = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(3)).basis(Basis::NGnet(NGnet::default()));
     let mut smoothed = network.clone();
-    smoothed.alignment.smoothing = Smoothing::Auto;
+    smoothed.smoothing = Smoothing::Auto;
     let mut warped = network.clone();
-    warped.alignment.time_scaling = TimeScaling::Warp(TimeWarp::default());
-    let process = FitOptions { n_styles: Truncation::Rank(3).into(), ..FitOptions::new(Kind::Discrete) };
+    warped.time_scaling = TimeScaling::Warp(TimeWarp::default());
+    let process = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(3));
 
     let demos = movements(20, 1001);
     heading("Milliseconds of a fit, M = 20, C = 1001, D = 7, J = 3");
@@ -85,8 +81,8 @@ fn main() {
     let demos = movements(5000, 200);
     let before = most_memory();
     heading("Milliseconds of a fit, M = 5000, C = 200, D = 7");
-    row("NGnet, J = 5", 3, &demos, &FitOptions { n_styles: Truncation::Rank(5).into(), ..network.clone() });
-    row("NGnet, J by spectrum", 3, &demos, &FitOptions { n_styles: Truncation::Share(0.9).into(), ..network });
+    row("NGnet, J = 5", 3, &demos, &network.clone().n_styles(Truncation::Rank(5)));
+    row("NGnet, J by spectrum", 3, &demos, &network.n_styles(Truncation::Share(0.9)));
     if let (Some(before), Some(after)) = (before, most_memory()) {
         println!("\nMost memory: {after}, of which {before} before the first of these fits.");
     }

@@ -38,7 +38,7 @@ fn learn(path: &Path) -> Result<()> {
         });
         Demonstration::new(position, Sampling::Uniform { dt: 0.003 })
     };
-    let options = FitOptions { basis: Basis::NGnet(NGnet::default()), ..FitOptions::new(Kind::Discrete) };
+    let options = FitOptions::new(Kind::Discrete).basis(Basis::NGnet(NGnet::default()));
     fit(&[reach(0.2)?, reach(0.5)?], &options)?.save(path)
 }
 

@@ -97,10 +97,10 @@ pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
         reach(h).with_context(vec![label, ContextValue::Number(h)]).unwrap()
     };
     let mut warped = options(Kind::Discrete);
-    warped.alignment.time_scaling = TimeScaling::Warp(TimeWarp { n_segments: 4, max_slope: 1.5 });
+    warped.time_scaling = TimeScaling::Warp(TimeWarp { n_segments: 4, max_slope: 1.5 });
     let maps = ContextMapKind::ALL
         .into_iter()
-        .map(|kind| (reaches.to_vec(), FitOptions { map: MapSelection::Given(kind), ..options(Kind::Discrete) }));
+        .map(|kind| (reaches.to_vec(), options(Kind::Discrete).map(MapSelection::Given(kind))));
     let others = [
         ([0.1, 0.3, 0.4, 0.6, 0.8, 1.0].map(labelled).to_vec(), warped),
         ([0.0, 0.1, 0.25, 0.4].map(cycle).to_vec(), options(Kind::Rhythmic)),
@@ -110,11 +110,7 @@ pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
 });
 
 fn options(kind: Kind) -> FitOptions {
-    FitOptions {
-        n_styles: Truncation::Rank(2).into(),
-        basis: Basis::NGnet(NGnet { n_basis: 10, ..NGnet::default() }),
-        ..FitOptions::new(kind)
-    }
+    FitOptions::new(kind).n_styles(Truncation::Rank(2)).basis(Basis::NGnet(NGnet { n_basis: 10, ..NGnet::default() }))
 }
 
 /// A reach of D = 2 over an obstacle of height `h`.

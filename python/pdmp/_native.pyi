@@ -146,7 +146,7 @@ def fit(
     smoothing: Literal["auto"] | float | None = "auto",
     nominal: int | None = None,
     n_samples: int | None = None,
-    transport: Literal["learnt", "immediate"] = "learnt",
+    transport: Literal["learnt", "immediate"] | None = None,
     dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
     alignment: Literal["linear", "warp"] | TimeWarp = "linear",
     events: ArrayLike | None = None,  # (M, E)
@@ -154,7 +154,7 @@ def fit(
     alpha_z: float = 25.0,
     beta_z: float | None = None,
     alpha_x: float | None = None,
-    mu: float = 1.0,
+    mu: float | None = None,
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model:
@@ -1420,7 +1420,7 @@ class GP:
 
     Parameters
     ----------
-    kernel : {"matern52", "matern32", "squared_exponential"}
+    kernel : {"matern52", "matern32"}
         Covariance function of the clock; wrapped around the circle where the movement is rhythmic.
     length : float, optional
         Length scale, in units of the clock u = t / tau.

@@ -436,7 +436,7 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
 fn labels_of_contexts_are_told_and_taken_by_index() {
     let manners = ["shy", "proud", "shy", "tired", "proud"];
     let contexts = manners.iter().zip([0.0, 0.1, 0.2, 0.3, 0.4]).map(|(&m, h)| vec![m.into(), h.into()]).collect();
-    let rust = learn(&reaches(), &pdmp_core::FitOptions { contexts: Some(contexts), ..options(Kind::Discrete) });
+    let rust = learn(&reaches(), &options(Kind::Discrete).contexts(contexts));
     let (status, model, _) = load(&rust.to_bytes().unwrap());
     assert_eq!(status, PDMP_OK);
     // SAFETY: it was just made, and `Box` is what `pdmp_model_free` takes.

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use common::*;
 use ndarray::Array2;
 use pdmp_core::dynamics::Canonical;
-use pdmp_core::learning::{TransportSelection, Truncation};
-use pdmp_core::{Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Sampling};
+use pdmp_core::learning::{CanonicalOptions, Truncation};
+use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling};
 
 /// ω of a filter that has settled to 1 % after `transition` seconds: (1 + s)exp(−s) = 0.01.
 fn omega(transition: f64) -> f64 {
@@ -162,14 +162,16 @@ fn ticks_solve_the_equations() {
     };
     let seven = reaches().iter().map(wide).collect();
     let cases = [
-        (Kind::Discrete, reaches(), TransportSelection::Learnt),
-        (Kind::Discrete, reaches(), TransportSelection::Immediate),
-        (Kind::Discrete, seven, TransportSelection::Learnt),
-        (Kind::Rhythmic, cycles(), TransportSelection::Learnt),
+        (Kind::Discrete.into(), reaches()),
+        (immediate(), reaches()),
+        (Kind::Discrete.into(), seven),
+        (Kind::Rhythmic.into(), cycles()),
     ];
-    for (kind, demos, transport) in cases {
-        let styles = Truncation::Rank(2).into();
-        let model = learn(&demos, &FitOptions { n_styles: styles, transport, ..options(kind) });
+    for (canonical, demos) in cases {
+        let kind = CanonicalOptions::kind(&canonical);
+        let mut options = options(kind).n_styles(Truncation::Rank(2));
+        options.canonical = canonical;
+        let model = learn(&demos, &options);
         for tau in [model.tau(), 0.3 / model.duration() * model.tau()] {
             for live in [false, true] {
                 for (dt, bound) in [(1e-3, 1e-8), (1e-2, 1e-6)] {

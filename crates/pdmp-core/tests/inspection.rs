@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use ndarray::{Array2, s};
-use pdmp_core::learning::TransportSelection;
+use pdmp_core::learning::{CanonicalOptions, TransportSelection};
 use pdmp_core::preprocessing::inspection::{Finding, Padding, inspect, unwound};
 use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
 
@@ -224,8 +224,9 @@ fn gains_whose_transients_the_samples_do_not_resolve_are_found() {
     let found = |alpha_z: f64, n_samples: Option<usize>| {
         // With immediate transport a movement starts with a transient at the rate of the gains.
         let transport = TransportSelection::Immediate;
-        let mut options = FitOptions { alpha_z, transport, ..FitOptions::new(Kind::Discrete) };
-        options.alignment.n_samples = n_samples;
+        let canonical = CanonicalOptions::Discrete { tau: None, alpha_x: None, transport };
+        let mut options = FitOptions::new(canonical).alpha_z(alpha_z);
+        options.n_samples = n_samples;
         fit(&demos(reaches()), &options).unwrap().learnt().findings.clone()
     };
     assert_eq!(found(25.0, None), []);

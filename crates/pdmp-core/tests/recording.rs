@@ -44,7 +44,7 @@ fn roughness(column: &[f64]) -> f64 {
 /// Number of styles of a fit with smoothing.
 fn n_styles(kind: Kind, demos: &[Demonstration]) -> usize {
     let mut options = FitOptions::new(kind);
-    options.alignment.smoothing = Smoothing::Auto;
+    options.smoothing = Smoothing::Auto;
     pdmp_core::fit(demos, &options).unwrap().n_styles()
 }
 

@@ -8,7 +8,7 @@ use super::cycle_phase;
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::learning::alignment::{Alignment, TimeScaling};
+use crate::learning::alignment::Alignment;
 use crate::learning::targets::Targets;
 use crate::model::Model;
 use crate::model::conditions::Conditions;
@@ -62,7 +62,6 @@ pub fn style_of(
         smoothing: Smoothing::Interpolate,
         nominal: None,
         n_samples: Some(model.learnt.n_samples),
-        time_scaling: TimeScaling::Linear,
     };
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();

@@ -7,6 +7,7 @@ use std::sync::{Arc, LazyLock};
 use ndarray::{Array1, Array2};
 use pdmp_core::learning::Truncation;
 use pdmp_core::learning::regression::{Basis, Gp, NGnet};
+use pdmp_core::learning::{CanonicalOptions, TransportSelection};
 use pdmp_core::motion::TimeGrid;
 use pdmp_core::rollout;
 use pdmp_core::{Command, Controller, Demonstration, FitOptions, Kind, Model, Motion, Result, Sampling, Status, fit};
@@ -52,13 +53,14 @@ pub(crate) fn cycles() -> Vec<Demonstration> {
     [0.0, 0.1, 0.25, 0.4].iter().map(|&s| cycle(s, 1.0 + 0.2 * s, 120)).collect()
 }
 
+/// Discrete movements with the paper's immediate transport.
+pub(crate) fn immediate() -> CanonicalOptions {
+    CanonicalOptions::Discrete { tau: None, alpha_x: None, transport: TransportSelection::Immediate }
+}
+
 /// Options with a normalised Gaussian network, which is fast to fit, and nearly all of the spectrum.
 pub(crate) fn options(kind: Kind) -> FitOptions {
-    FitOptions {
-        n_styles: Truncation::Share(0.9999).into(),
-        basis: Basis::NGnet(NGnet::default()),
-        ..FitOptions::new(kind)
-    }
+    FitOptions::new(kind).n_styles(Truncation::Share(0.9999)).basis(Basis::NGnet(NGnet::default()))
 }
 
 pub(crate) fn gp() -> Basis {
@@ -70,12 +72,11 @@ pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model>
 }
 
 /// Model of the reaches with two styles.
-pub(crate) static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
-    learn(&reaches(), &FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Discrete) })
-});
+pub(crate) static REACH: LazyLock<Arc<Model>> =
+    LazyLock::new(|| learn(&reaches(), &options(Kind::Discrete).n_styles(Truncation::Rank(2))));
 /// Model of the cycles with two styles.
 pub(crate) static CYCLE: LazyLock<Arc<Model>> =
-    LazyLock::new(|| learn(&cycles(), &FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Rhythmic) }));
+    LazyLock::new(|| learn(&cycles(), &options(Kind::Rhythmic).n_styles(Truncation::Rank(2))));
 
 pub(crate) fn grid(dt: f64, duration: f64) -> TimeGrid {
     TimeGrid { dt, duration: Some(duration) }

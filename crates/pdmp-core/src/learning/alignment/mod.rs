@@ -29,22 +29,20 @@ const MAX_SAMPLES: usize = 1_000_000;
 
 /// How demonstrations are read as samples of one movement.
 #[derive(Clone, Debug)]
-pub struct Alignment {
+pub(crate) struct Alignment {
     /// From start to goal, or one cycle.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// Sampling interval in seconds of demonstrations that carry none.
-    pub dt: Option<f64>,
+    pub(crate) dt: Option<f64>,
     /// Periods in seconds of time-stamped cycles: one for all, or one each; empty where the intervals give them.
-    pub period: Vec<f64>,
+    pub(crate) period: Vec<f64>,
     /// What is done about measurement noise.
-    pub smoothing: Smoothing,
+    pub(crate) smoothing: Smoothing,
     /// Index of the nominal demonstration; otherwise the one of median duration.
-    pub nominal: Option<usize>,
+    pub(crate) nominal: Option<usize>,
     /// Samples C; otherwise as many as the nominal demonstration has, and the same with equal parts of its steps where
     /// these are fewer than 150.
-    pub n_samples: Option<usize>,
-    /// How time is scaled to that of the nominal demonstration.
-    pub time_scaling: TimeScaling,
+    pub(crate) n_samples: Option<usize>,
 }
 
 /// How the time of a demonstration is scaled to that of the nominal one.
