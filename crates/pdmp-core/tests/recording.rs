@@ -178,7 +178,7 @@ fn bounds_of_cycles_follow_a_varying_cadence() {
     }
 }
 
-/// All cycles of a recording that ends with its last cycle are kept.
+/// A recording that ends with its last cycle loses none of its cycles.
 #[test]
 fn a_recording_of_whole_cycles_loses_none() {
     let found = one(recorded(walk(&even(301), |t| TAU * t))).unwrap();

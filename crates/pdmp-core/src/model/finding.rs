@@ -78,7 +78,7 @@ pub enum Finding {
         turns: f64,
         /// Full turn in the unit of the degree of freedom.
         turn: f64,
-        /// Whether the turns were subtracted, because the unit is one of angles.
+        /// True if the turns were subtracted, because the unit is one of angles.
         mended: bool,
     },
     /// Gains so high that the accelerations of the reproduction far exceed those of the demonstration.

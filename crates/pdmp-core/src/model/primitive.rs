@@ -184,6 +184,18 @@ impl Primitive {
     /// A control loop that sets it at every tick reproduces the segment durations. Past the end of a discrete movement it is
     /// constant.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// // One segment of twice the nominal duration.
+    /// let tau = model.tau_at(0.5, &[2.0 * model.duration()])?;
+    /// assert!((tau - 2.0 * model.tau()).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A number of durations other than K, a duration outside of a factor of 1e6 of the nominal one, or a phase outside
     /// [0, 1] (discrete) or [0, 2π) (rhythmic).

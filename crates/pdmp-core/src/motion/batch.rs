@@ -128,6 +128,26 @@ pub fn batch(
 ///
 /// `progress` is called as by [`batch()`] and [`Batch::write`].
 ///
+/// ```
+/// # use ndarray::array;
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+/// # use pdmp_core::model::Derivative;
+/// # use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, rollouts};
+/// # use pdmp_core::numerics::Threads;
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let goals = PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1], [0.8, 0.3]]);
+/// let styles = model.demonstrated().styles.clone();
+/// let conditions = BatchConditions { styles, goals: Some(goals), ..BatchConditions::default() };
+/// let grid = TimeGrid { dt: 0.01, duration: None };
+/// let threads = Threads::available();
+/// let outputs = rollouts(model.primitive(), conditions, grid, Derivative::Position, threads, &mut |_| Ok(()))?;
+/// assert_eq!(outputs[0].dim(), (3, 101, 2));
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// As for [`batch()`], or outputs that do not fit into memory.
 pub fn rollouts(

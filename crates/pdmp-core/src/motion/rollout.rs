@@ -80,6 +80,20 @@ pub fn rollout(primitive: &Arc<Primitive>, conditions: &Conditions, grid: TimeGr
 /// Computes a [`rollout`] and reports progress: `progress` is called periodically with the completed fraction; an error it
 /// returns cancels the call.
 ///
+/// ```
+/// # use pdmp_core::{Conditions, Demonstration, Error, FitOptions, Kind, fit};
+/// # use pdmp_core::motion::{TimeGrid, rollout_with};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let grid = TimeGrid { dt: 1e-4, duration: Some(1.0) };
+/// let mut cancel = |completed: f64| if completed < 0.5 { Ok(()) } else { Err(Error::Interrupted) };
+/// let result = rollout_with(model.primitive(), &Conditions::default(), grid, &mut cancel);
+/// assert!(matches!(result, Err(Error::Interrupted)));
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// As for [`rollout`], or the error of `progress`.
 pub fn rollout_with(

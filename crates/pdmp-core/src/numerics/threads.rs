@@ -170,7 +170,7 @@ mod tests {
         }
     }
 
-    /// All that the system lets this process run at once, so that these too can be asked for.
+    /// The number of available threads is that of the system, up to the maximum, and can be requested.
     #[test]
     fn available_threads_are_those_of_the_system() {
         let n = Threads::available().get();

@@ -36,6 +36,18 @@ pub fn lowpass(demo: &Demonstration, cut_off: f64) -> Result<Demonstration> {
 /// the frequency at which R leaves that line the filter removes movement, too (D. A. Winter, Biomechanics and Motor Control
 /// of Human Movement, Wiley 2009, section 3.4.4).
 ///
+/// ```
+/// # use ndarray::Array2;
+/// # use pdmp_core::{Demonstration, Sampling, preprocessing::residuals};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let position = Array2::from_shape_fn((200, 1), |(c, _)| (0.05 * c as f64).sin() + 0.01 * (3.0 * c as f64).sin());
+/// let recording = Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?;
+/// let r = residuals(&recording, &[2.0, 6.0, 40.0])?;
+/// assert!(r[[0, 0]] > r[[1, 0]] && r[[1, 0]] > r[[2, 0]]);
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// As for [`lowpass`].
 pub fn residuals(demo: &Demonstration, cut_offs: &[f64]) -> Result<Array2<f64>> {

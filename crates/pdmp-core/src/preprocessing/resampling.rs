@@ -40,7 +40,7 @@ pub fn resample(demo: &Demonstration, dt: f64) -> Result<Demonstration> {
             allowed: "leaves fewer than 4 samples; pass a shorter interval",
         });
     }
-    // The bound avoids overflow; the allocation of so many samples fails with an error.
+    // The bound avoids overflow; an allocation of that size fails with an error.
     let n = steps.min(1e18) as usize + 1;
     let (from, to) = (curve.first(), curve.first() + steps * dt);
     let denser = dt < curve.interval() * (1.0 - INTERVAL_TOLERANCE);

@@ -84,6 +84,20 @@ impl Model {
     /// `.pdmp-*.draft` in the same folder, which is then renamed. A process that is killed leaves the draft, which can be
     /// deleted.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, Model, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let folder = tempfile::tempdir().unwrap();
+    /// # let path = folder.path().join("reach.safetensors");
+    /// let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// model.save(&path)?;
+    /// let loaded = Model::load(&path)?;
+    /// assert_eq!(loaded.demonstrated(), model.demonstrated());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A path that cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {

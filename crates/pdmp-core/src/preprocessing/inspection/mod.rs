@@ -69,7 +69,7 @@ struct Survey<'a> {
     n_dofs: usize,
     /// Largest step of any degree of freedom from one sample to the next.
     step: f64,
-    /// Whether any sample is exactly zero.
+    /// True if any sample is exactly zero.
     zero: bool,
 }
 
