@@ -57,7 +57,11 @@ impl Prediction {
         }
         let finite = covariance.iter().flatten().all(|x| x.is_finite());
         if !(finite && duration.is_finite() && segment_durations.iter().all(|&time| time > 0.0)) {
-            return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
+            return Err(Error::Range {
+                name: "distance of context from the demonstrations, in their range",
+                value: outside.iter().copied().fold(0.0, f64::max),
+                allowed: "the prediction overflows; pass a context closer to the demonstrations",
+            });
         }
         let part = |k: usize| Some(mean[n_styles + k * n_dofs..n_styles + (k + 1) * n_dofs].to_vec());
         let (goal, start, anchor) = match kind {
