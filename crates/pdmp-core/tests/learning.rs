@@ -1,4 +1,5 @@
 //! What learning from demonstrations must achieve.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;

@@ -1,5 +1,7 @@
 //! Preprocessing of recordings.
 
+#![cfg(feature = "learning")]
+
 use std::f64::consts::{PI, TAU};
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};

@@ -1,4 +1,5 @@
 //! Time beyond linear scaling: warps and events are found, kept and played back.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;
