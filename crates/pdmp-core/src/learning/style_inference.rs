@@ -41,15 +41,14 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 /// ```
 /// # use ndarray::Array2;
 /// use pdmp_core::learning::{Truncation, style_of};
-/// use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
+/// use pdmp_core::{Demonstration, FitOptions, Sampling, fit};
 ///
 /// # let arch = |h: f64| {
 /// #     let position = Array2::from_shape_fn((101, 1), |(c, _)| h * (0.0314 * c as f64).sin().powi(3));
 /// #     Demonstration::new(position, Sampling::Uniform { dt: 0.01 })
 /// # };
 /// let demonstrations = [arch(1.0)?, arch(2.0)?];
-/// let options = FitOptions { n_styles: Truncation::Rank(1).into(), ..FitOptions::new(Kind::Discrete) };
-/// let model = fit(&demonstrations, &options)?;
+/// let model = fit(&demonstrations, &FitOptions::discrete().n_styles(Truncation::Rank(1)))?;
 /// let style = style_of(&model, &arch(1.5)?, None, None, None)?;
 /// let styles = &model.demonstrated().styles;
 /// assert!(styles[[0, 0]] < style[0] && style[0] < styles[[1, 0]]);
