@@ -2,7 +2,7 @@
 
 use std::ffi::c_char;
 
-use pdmp_core::{Error, Status};
+use pdmp_core::{Error, ErrorKind, Status};
 
 /// Status code that a call returns; negative values are errors.
 #[repr(C)]
@@ -46,41 +46,27 @@ impl From<Status> for pdmp_status {
     }
 }
 
-/// Without a wildcard arm, so that a new error of the core needs a decision here.
+/// The kinds of errors are mapped without a wildcard arm: a new kind needs a decision here.
 impl From<&Error> for pdmp_status {
     fn from(error: &Error) -> Self {
-        match error {
-            Error::Demo { source, .. } => Self::from(&**source),
-            Error::Length { .. }
-            | Error::Rows { .. }
-            | Error::Samples { .. }
-            | Error::NoDemonstrations
-            | Error::Dofs { .. } => PDMP_LENGTH,
-            Error::NotFinite { .. }
-            | Error::NotFiniteAt { .. }
-            | Error::Range { .. }
-            | Error::Magnitude { .. }
-            | Error::TooLarge { .. }
-            | Error::Time { .. }
-            | Error::Gap { .. }
-            | Error::WrapInGap { .. }
-            | Error::Aperiodic { .. }
-            | Error::Event { .. }
-            | Error::Segments { .. }
-            | Error::Styles { .. }
-            | Error::Label { .. }
-            | Error::NoNumber { .. }
-            | Error::Mixed { .. }
-            | Error::Undescribed { .. }
-            | Error::StyleSize { .. }
-            | Error::Arguments(_) => PDMP_RANGE,
-            Error::Kind { .. } => PDMP_ABSENT,
-            Error::Io { .. } => PDMP_IO,
-            Error::File(_) => PDMP_FILE,
-            Error::Memory { .. } => PDMP_MEMORY,
-            Error::Fit(_) => PDMP_NUMERICAL,
+        match (error, error.kind()) {
+            (Error::Demo { source, .. }, _) => Self::from(&**source),
+            (
+                Error::Length { .. }
+                | Error::Rows { .. }
+                | Error::Samples { .. }
+                | Error::NoDemonstrations
+                | Error::Dofs { .. },
+                _,
+            ) => PDMP_LENGTH,
+            (Error::Kind { .. }, _) => PDMP_ABSENT,
+            (_, ErrorKind::Argument | ErrorKind::Data) => PDMP_RANGE,
+            (_, ErrorKind::Numerical) => PDMP_NUMERICAL,
+            (_, ErrorKind::Memory) => PDMP_MEMORY,
+            (_, ErrorKind::ModelFile) => PDMP_FILE,
+            (_, ErrorKind::Io) => PDMP_IO,
             // No call of the C ABI has a callback that could interrupt it.
-            Error::Interrupted => PDMP_INTERNAL,
+            (_, ErrorKind::Interrupted) => PDMP_INTERNAL,
         }
     }
 }

@@ -504,8 +504,9 @@ fn a_model_is_described_and_its_controllers_outlive_it() {
 /// The shares of the segments in the duration are normalised exponentials, which underflow far from the demonstrations.
 #[test]
 fn a_prediction_that_overflows_is_out_of_range() {
-    let mut warped = FitOptions { map: MapSelection::Given(ContextMapKind::Linear), ..options(Kind::Discrete) };
-    warped.alignment.time_scaling = TimeScaling::Warp(TimeWarp { n_segments: 4, max_slope: 1.5 });
+    let warped = options(Kind::Discrete)
+        .map(MapSelection::Given(ContextMapKind::Linear))
+        .time_scaling(TimeScaling::Warp(TimeWarp { n_segments: 4, max_slope: 1.5 }));
     let (status, model, _) = load(&learn(&reaches(), &warped).to_bytes().unwrap());
     assert_eq!(status, PDMP_OK);
     // SAFETY: the model is new, and the library allocates it as a `Box`.

@@ -59,7 +59,7 @@ impl Prediction {
         if !(finite && duration.is_finite() && segment_durations.iter().all(|&time| time > 0.0)) {
             return Err(Error::Range {
                 name: "distance of context from the demonstrations, in their range",
-                value: outside.iter().copied().fold(0.0, f64::max),
+                value: extrapolation.iter().copied().fold(0.0, f64::max),
                 allowed: "the prediction overflows; pass a context closer to the demonstrations",
             });
         }
