@@ -31,8 +31,8 @@ use crate::warp::TimeWarp;
 /// Parameters
 /// ----------
 /// demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D)
-///     Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the readers
-///     return, the values are used. The columns of data frames name the degrees of freedom.
+///     Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
+///     readers return, the values are used. The columns of data frames name the degrees of freedom.
 /// kind : {"discrete", "rhythmic"}
 ///     Movement from a start to a goal, or around an anchor.
 /// dt : float, optional
@@ -42,47 +42,48 @@ use crate::warp::TimeWarp;
 /// contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
 ///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
 /// map : {"auto", "stacked", "gp", "linear", "polynomial"}
-///     Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge regression by
-///     their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the process alone,
-///     "linear" least squares as in the paper, "polynomial" ridge regression of second degree. "auto" is "stacked"; it is
-///     "linear" for labels alone, each of which then has the mean of its demonstrations, for two different contexts and
-///     for more than 1024. The repr of `model.map` states the weights.
+///     Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
+///     regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
+///     process alone, "linear" least squares as in the paper, "polynomial" ridge regression of second degree. "auto" is
+///     "stacked"; it is "linear" for labels alone, each of which then has the mean of its demonstrations, for two
+///     different contexts and for more than 1024. The repr of `model.map` states the weights.
 /// n_styles : int or "auto", optional
-///     Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular values,
-///     at least five (or half of the demonstrations) and those that the contexts explain (F-test), without those that
-///     measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to the error of
-///     cross-validation over contexts, in at most ten folds.
+///     Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular
+///     values, at least five (or half of the demonstrations) and those that the contexts explain (F-test), without
+///     those that measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to
+///     the error of cross-validation over contexts, in at most ten folds.
 /// singular_value_share : float, optional
-///     Share in (0, 1], the paper's rule: J is the smallest number of singular values whose sum exceeds this share of the
-///     sum of all, for example 0.9.
+///     Share in (0, 1], the paper's rule: J is the smallest number of singular values whose sum exceeds this share of
+///     the sum of all, for example 0.9.
 /// basis : {"gp", "ngnet"}, GP or NGnet
 ///     Regression of the landscape.
 /// smoothing : "auto", float or None
-///     Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom, which
-///     leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
+///     Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom,
+///     which leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
 ///     `model.noise` and `model.cut_offs` hold the result.
 /// nominal : int, optional
 ///     Index of the nominal demonstration; by default the one of median duration.
 /// n_samples : int, optional
-///     Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if that
-///     has fewer than 150.
+///     Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
+///     that has fewer than 150.
 /// transport : {"learnt", "immediate"}
 ///     Motion of the frame of a discrete movement from start to goal: along the learnt profile of the demonstrations
-///     (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the movement
-///     brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
+///     (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the
+///     movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
 /// dof_scale : None, "unit", "range" or array_like, (D,)
-///     Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all units are
-///     equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among them.
-///     "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and also apply to
-///     a time warp.
+///     Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
+///     units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
+///     them. "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and
+///     also apply to a time warp.
 /// alignment : {"linear", "warp"} or TimeWarp
-///     Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the demonstrations
-///     closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a demonstration has
-///     fewer than 16 samples; with three or more different contexts it is applied only if it lowers the cross-validation
-///     error over contexts by more than its standard error, and `model.segment_durations` has one column if it is not.
+///     Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the
+///     demonstrations closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a
+///     demonstration has fewer than 16 samples; with three or more different contexts it is applied only if it lowers
+///     the cross-validation error over contexts by more than its standard error, and `model.segment_durations` has one
+///     column if it is not.
 /// landmarks : array_like, (M, E), optional
-///     Times in s of E landmarks in each demonstration, from its first sample or on the clock of its time stamps. They are
-///     aligned to those of the nominal demonstration, in place of a warp.
+///     Times in s of E landmarks in each demonstration, from its first sample or on the clock of its time stamps. They
+///     are aligned to those of the nominal demonstration, in place of a warp.
 /// tau : float, optional
 ///     Time constant τ in s of a discrete primitive; by default the nominal duration.
 /// alpha_z : float
@@ -90,9 +91,9 @@ use crate::warp::TimeWarp;
 /// beta_z : float, optional
 ///     Stiffness β_z of the output system, from 1e-6 to 1e6, without unit; by default `alpha_z / 4` (critical damping).
 /// alpha_x : float, optional
-///     Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With "immediate"
-///     transport the forcing fades with x past the end: if a movement leaves its goal there before it settles,
-///     `alpha_x = alpha_z` reduces the deviation most.
+///     Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With
+///     "immediate" transport the forcing fades with x past the end: if a movement leaves its goal there before it
+///     settles, `alpha_x = alpha_z` reduces the deviation most.
 /// mu : float
 ///     Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit.
 /// threads : int, optional
@@ -109,8 +110,8 @@ use crate::warp::TimeWarp;
 /// -----
 /// UserWarning
 ///     Implausible samples, with their positions: time stamps much closer than the others, dropouts recorded as zeros,
-///     padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole turns
-///     apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
+///     padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole
+///     turns apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
 ///
 /// Raises
 /// ------
@@ -134,14 +135,18 @@ use crate::warp::TimeWarp;
 /// >>> fitted.n_demos, fitted.n_dofs, fitted.n_styles
 /// (3, 2, 1)
 #[pyfunction]
-#[pyo3(signature = (
-    demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, singular_value_share=None, basis=None,
-    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, transport="learnt", dof_scale=None,
-    alignment=None, landmarks=None, tau=None, alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None,
-    mu=Scalar::Number(1.0), threads=None, progress=None
-), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, singular_value_share=None, \
-    basis='gp', smoothing='auto', nominal=None, n_samples=None, transport='learnt', dof_scale=None, \
-    alignment='linear', landmarks=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
+#[pyo3(
+    signature = (
+        demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None,
+        singular_value_share=None, basis=None, smoothing=SmoothingArgument(Smoothing::Auto), nominal=None,
+        n_samples=None, transport="learnt", dof_scale=None, alignment=None, landmarks=None, tau=None,
+        alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None, mu=Scalar::Number(1.0), threads=None, progress=None
+    ),
+    text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, \
+                      singular_value_share=None, basis='gp', smoothing='auto', nominal=None, n_samples=None, \
+                      transport='learnt', dof_scale=None, alignment='linear', landmarks=None, tau=None, alpha_z=25.0, \
+                      beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)"
+)]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
