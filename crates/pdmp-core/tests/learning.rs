@@ -43,8 +43,7 @@ fn every_cycle_is_reproduced_without_a_transient() {
 #[test]
 fn singular_values_vanish_beyond_the_intrinsic_dimension() {
     // y is affine in (h, h²): at most three dimensions.
-    let model =
-        learn(&reaches(), &options(Kind::Discrete).n_styles(Truncation::Rank(5)));
+    let model = learn(&reaches(), &options(Kind::Discrete).n_styles(Truncation::Rank(5)));
     let sigma = &model.learnt().singular_values;
     assert!(sigma[2] > 1e-6 * sigma[0] && sigma[3] < 1e-6 * sigma[0], "{sigma:?}");
 }

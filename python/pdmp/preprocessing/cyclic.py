@@ -92,12 +92,12 @@ class Cycles(Sequence[Demonstration]):
 def cycles(
     recordings: Demonstration | Sequence[Demonstration] | Mapping[str, Demonstration],
     *,
-    events: ArrayLike | Sequence[ArrayLike] | Mapping[str, ArrayLike] | None = None,
+    onsets: ArrayLike | Sequence[ArrayLike] | Mapping[str, ArrayLike] | None = None,
     average: bool = False,
 ) -> Cycles:
     """Cuts cyclic recordings into closed cycles that begin in the same phase.
 
-    Without events, `period` finds the period of each recording, and a template of its mean cycle
+    Without onsets, `period` finds the period of each recording, and a template of its mean cycle
     when each cycle begins: in the phase of the first recording's first sample, to which the others
     are turned by circular cross-correlation with its mean cycle.
 
@@ -123,7 +123,7 @@ def cycles(
     ----------
     recordings : Demonstration, or sequence or mapping of Demonstration
         Recordings of at least one cycle and a half, with `dt` or `time`.
-    events : (K,) array_like, or one for each recording, optional
+    onsets : (K,) array_like, or one for each recording, optional
         Times in s at which cycles begin, such as foot strikes, on the clock of the recording; the
         last ends the last cycle. Of a mapping of recordings, they may be a mapping too.
     average : bool
@@ -138,7 +138,7 @@ def cycles(
     ------
     ValueError
         No recording with a period, with the correlation of the first with itself; a recording
-        without times, or with other degrees of freedom than the first; events that do not increase
+        without times, or with other degrees of freedom than the first; onsets that do not increase
         or lie outside.
 
     Warns
@@ -151,14 +151,14 @@ def cycles(
     ----------
     B. Iglewicz, D. C. Hoaglin, How to detect and handle outliers, ASQC Quality Press 1993
     """
-    if isinstance(recordings, Mapping) and isinstance(events, Mapping):
-        if lone := sorted(map(str, recordings.keys() ^ events.keys())):
-            raise value_error(f"events: '{lone[0]}' is among the recordings or the events alone")
-        events = [events[name] for name in recordings]
-    begins = cast("Sequence[ArrayLike] | None", events)
+    if isinstance(recordings, Mapping) and isinstance(onsets, Mapping):
+        if lone := sorted(map(str, recordings.keys() ^ onsets.keys())):
+            raise value_error(f"onsets: '{lone[0]}' is among the recordings or the onsets alone")
+        onsets = [onsets[name] for name in recordings]
+    begins = cast("Sequence[ArrayLike] | None", onsets)
     if isinstance(recordings, Demonstration):
         recordings = [recordings]
-        begins = None if events is None else [cast(ArrayLike, events)]
+        begins = None if onsets is None else [cast(ArrayLike, onsets)]
     demos, periods, gains, sources, odd, grown = _native.cycles(recordings, begins, average)
     for recording, _, _, reason, whole in odd:
         if whole:
