@@ -28,8 +28,8 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 
 /// Estimates the style (J,) of a demonstration outside the training set.
 ///
-/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals, and a prior as wide as the
-/// styles of the demonstrations. A rhythmic demonstration that begins in another phase than those of the model is first
+/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals and a zero-mean Gaussian prior
+/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that begins in another phase than those of the model is first
 /// shifted to their phase.
 ///
 /// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
@@ -90,12 +90,14 @@ pub fn style_of(
     match (&model.learnt.template, events) {
         (None, Some(events)) if by_events => aligned.register_to(model.breaks(), events)?,
         (None, None) if by_events => {
-            return Err(Error::Arguments("the model was fitted with events: pass events= of this demonstration too"));
+            return Err(Error::Arguments(
+                "the model was fitted with events: pass the events of this demonstration too",
+            ));
         }
         (_, Some(_)) => {
-            return Err(Error::Arguments("the model was fitted without events: leave out events="));
+            return Err(Error::Arguments("the model was fitted without events: pass none"));
         }
-        (Some(template), None) => aligned.warp_to(template)?,
+        (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}
     }
     let mut targets = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;
