@@ -28,8 +28,8 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 
 /// Estimates the style (J,) of a demonstration outside the training set.
 ///
-/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals, and a prior as wide as the
-/// styles of the demonstrations. A rhythmic demonstration that begins in another phase than those of the model is first
+/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals and a zero-mean Gaussian prior
+/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that begins in another phase than those of the model is first
 /// shifted to their phase.
 ///
 /// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
@@ -95,7 +95,7 @@ pub fn style_of(
         (_, Some(_)) => {
             return Err(Error::Arguments("the model was fitted without landmarks: leave out the landmarks"));
         }
-        (Some(template), None) => aligned.warp_to(template)?,
+        (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}
     }
     let mut targets = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;
