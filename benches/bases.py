@@ -1,4 +1,4 @@
-"""Which basis reproduces recordings best, and which foresees what it was not shown.
+"""Comparison of bases: reproduction of recordings, and prediction of held-out samples.
 
 ``make bench-bases`` prints the tables; ``--write`` puts them into docs/bases.md.
 """
@@ -53,14 +53,15 @@ repetitions, {demos} demonstrations; at most ten a group, of at most 400 samples
 - *Held out*: the basis targets of the group are regressed on every second sample and compared at
   the others. RMSE over the largest range of the targets, and log density of a value in units of the
   targets' RMS: medians over sets of the medians over a set's groups. The Gaussian process has a
-  variance and noise of its own; a network is given the mean square of its residuals at the samples
-  shown, each as if that sample had been left out.
+  variance and noise of its own; a network has the mean square of its leave-one-out residuals at
+  the samples learnt from.
 - *Fit*: time of `pdmp.fit`, all four steps: median over groups.
 
 The defaults follow from it. The Gaussian process reproduces best and needs no N. Matérn-5/2
-reproduces closer than 3/2 on 12 of the 15 sets, by up to a half, and is smoother; 3/2 foresees
-as well and knows better how well. Of a network, 75 to 100 functions reproduce closer, but cycles of
-twenty samples they foresee worse: 50, 1.2 wide, serve both.
+reproduces closer than 3/2 on 12 of the 15 sets, by up to a half, and is smoother; 3/2 predicts as
+well, with a higher log density. Of a network,
+75 to 100 functions reproduce closer, but they predict cycles of twenty samples worse: 50, 1.2 wide,
+serve both.
 """
 
 
@@ -81,33 +82,33 @@ def score(group: Group, basis: Basis) -> Score:
         group.demos, kind=group.kind, n_styles=len(group.demos), basis=basis, smoothing=None
     )
     seconds = perf_counter() - begin
-    return Score(reproduction(model, group), *foresight(group, basis), seconds)
+    return Score(reproduction(model, group), *held_out(group, basis), seconds)
 
 
 def reproduction(model: pdmp.Model, group: Group) -> list[float]:
     """Returns the RMSE over range of every demonstration, rolled out in its own conditions."""
     errors = []
     for m, demo in enumerate(group.demos):
-        made = model.rollout(**pdmp.as_demonstrated(model, m), dt=model.durations[m] / FINE)
+        made = model.rollout(model.conditions(m), dt=model.durations[m] / FINE)
         # Recordings that lost a sample here and there have their own clock.
-        shown = [np.interp(demo.time, made.time, column) for column in made.position.T]
-        difference = np.transpose(shown) - demo.position
+        sampled = [np.interp(demo.time, made.time, column) for column in made.position.T]
+        difference = np.transpose(sampled) - demo.position
         errors.append(np.sqrt(np.mean(difference**2)) / np.ptp(demo.position, axis=0).max())
     return errors
 
 
-def foresight(group: Group, basis: Basis) -> tuple[float, float]:
+def held_out(group: Group, basis: Basis) -> tuple[float, float]:
     """Returns RMSE over range and log density of every second sample, given the others."""
     u, factors, extent = targets(group)
     periodic = group.kind == "rhythmic"
-    shown = slice(0, None, 2)
-    # What lies past the last sample shown is another question.
-    hidden = slice(1, None if periodic else len(u[shown]) * 2 - 2, 2)
-    learnt = basis.regress(u[shown], factors[shown], periodic=periodic)
+    given = slice(0, None, 2)
+    # Samples past the last one given would be extrapolation.
+    hidden = slice(1, None if periodic else len(u[given]) * 2 - 2, 2)
+    learnt = basis.regress(u[given], factors[given], periodic=periodic)
     mean, variance = learnt.predict(u[hidden])
     error = factors[hidden] - mean
     if variance is None:
-        variance = np.mean(left_out(basis, u[shown], factors[shown], periodic) ** 2)
+        variance = np.mean(left_out(basis, u[given], factors[given], periodic) ** 2)
     else:
         variance = variance + learnt.noise * learnt.signal_variance
     unit = np.mean(factors**2)

@@ -18,7 +18,7 @@ from pdmp.plot._canvas import MARKERS, PALETTE, canvas, dress
 from peers.factors import library
 from peers.regression import LENGTH, NOISE, samples
 
-LONGEST = 2.0  # s: who takes longer is shown no more
+LONGEST = 2.0  # s: longer times are left out
 REPEATS = 5
 SIZES = [round(10 ** (exponent / 4)) for exponent in range(6, 21)]  # C, 32 to 100 000
 LIBRARIES = [round(10 ** (exponent / 4)) for exponent in range(2, 15)]  # M, 3 to 3162

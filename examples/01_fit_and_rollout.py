@@ -24,7 +24,7 @@ print(model)
 
 # A style is a point in the space that the demonstrations span; half way between two of them:
 style = (model.styles[0] + model.styles[4]) / 2
-trajectory = model.rollout(style, dt=DT)
+trajectory = model.rollout(style=style, dt=DT)
 peak = trajectory.position[:, 1].max()
 print(f"style {np.round(style, 3)}: {len(trajectory.time)} samples, peak {peak:.3f} m")
 

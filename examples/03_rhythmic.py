@@ -19,7 +19,7 @@ model = pdmp.fit(demos, kind="rhythmic", n_styles=2)
 print(model)
 
 for name, style in {"circle": model.styles[0], "eight": model.styles[2]}.items():
-    cycle = model.rollout(style).position
+    cycle = model.rollout(style=style).position
     gap = np.abs(cycle[-1] - cycle[0]).max()
     print(f"{name}: {np.round(np.ptp(cycle, axis=0), 3)} wide and high, closed to {gap:.0e}")
 

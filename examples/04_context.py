@@ -21,7 +21,8 @@ model = pdmp.fit(demos)
 
 unseen = 0.15
 prediction = model.predict([unseen])
-print(f"style {np.round(prediction.style, 3)}, goal {np.round(prediction.goal, 3)} m")
+conditions = prediction.conditions
+print(f"style {np.round(conditions.style, 3)}, goal {np.round(conditions.goal, 3)} m")
 print(f"duration {prediction.duration:.2f} s")
 trajectory = model.rollout(context=[unseen])
 wanted = reach(unseen)[:, 1].max()

@@ -12,12 +12,12 @@ model = pdmp.fit(
 controller = model.controller(style=model.styles[1])
 robot = controller.position.copy()
 
-loop = controller.run(rate_hz=1000, measured=lambda: robot)
+loop = pdmp.PacedLoop(controller, rate_hz=1000, measured=lambda: robot)
 for tick in loop:
     if not 0.2 < tick.time < 0.4:  # held in between: the phase waits
         robot += 0.2 * (controller.position - robot)
     if tick.missed:
-        print(f"at {tick.time:.3f} s: {1000 * tick.late:.1f} ms late, {tick.missed} missed")
+        print(f"at {tick.time:.3f} s: {1000 * tick.lateness:.1f} ms late, {tick.missed} missed")
 
 print(f"{loop.ticks} ticks in {controller.time:.3f} s, robot at {np.round(robot, 3)}")
-print(f"{loop.missed} deadlines missed, at worst {1000 * loop.worst:.1f} ms late")
+print(f"{loop.missed} deadlines missed, at worst {1000 * loop.max_lateness:.1f} ms late")

@@ -15,17 +15,17 @@ model = pdmp.fit([np.column_stack([forward, z]) for z in upward], dt=DT, n_style
 
 nominal = model.styles[model.nominal]
 k = 40  # the sample to pass the point at, 0.4 s
-before = model.rollout(nominal, dt=DT).position[k]
+before = model.rollout(style=nominal, dt=DT).position[k]
 point = np.array([before[0], 0.24])  # m
 
 # A movement is linear in its style: one step of least squares is all it takes. Of the styles that
 # pass the point it finds the one nearest to the nominal demonstration's.
 began = time.perf_counter()
-jacobian = model.style_jacobian(DT)[k]
+jacobian = model.jacobian("style", dt=DT)[k]
 style = nominal + np.linalg.lstsq(jacobian, point - before, rcond=None)[0]
 took = time.perf_counter() - began
 
-made = model.rollout(style, dt=DT).position
+made = model.rollout(style=style, dt=DT).position
 print(f"before: {before.round(3)} m at {k * DT} s, wanted: {point.round(3)}")
 print(f"style {style.round(3)} misses by {np.linalg.norm(made[k] - point):.1e} m")
 print(f"and ends at {made[-1].round(3)} m; found in {1000 * took:.1f} ms")

@@ -56,7 +56,7 @@ def engine() -> Any:
     ImportError
         It is not installed, or asked by `MUJOCO_GL` to draw with what is not there.
     """
-    # It settles what it draws with when it is imported, and on a window if not told otherwise.
+    # It settles what it draws with when it is imported, and on a window by default.
     if sys.platform == "linux" and "DISPLAY" not in os.environ:
         os.environ.setdefault("MUJOCO_GL", _windowless())
     try:

@@ -95,7 +95,7 @@ def _pictures(robot: Robot, times: Sequence[float], shot: Shot) -> list[Any]:
 
 
 def _trail(scene: Any, places: Sequence[Any]) -> None:
-    """Adds a line through some places to a scene, as far as it has room."""
+    """Adds a line through some places to a scene, up to its capacity."""
     mujoco = engine()
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
     for start, end in itertools.pairwise(places[: scene.maxgeom - scene.ngeom]):

@@ -1,4 +1,4 @@
-"""Fig. 4: heights of obstacles that were never shown."""
+"""Fig. 4: heights of obstacles without a demonstration."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
     """Returns the movement in this style at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
     duration = float(model.durations[model.nominal])
     made = model.rollout(
-        style,
+        style=style,
         goal=reaching.goal,
         start=reaching.start,
         dt=duration / (N_SAMPLES - 1),
@@ -61,11 +61,16 @@ def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
     return made.position
 
 
+def predicted_style(model: pdmp.Model, height: float) -> Array:
+    """Returns the style (J,) that U predicts for a height [m]."""
+    return np.asarray(model.predict([height]).conditions.style)
+
+
 def best_style(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration) -> Array:
     """Returns the style of least E for a demonstration: movements are linear in it."""
     plain = movement(model, reaching, np.zeros(model.n_styles))
     duration = float(model.durations[model.nominal])
-    added = model.style_jacobian(duration / (N_SAMPLES - 1), duration=duration)
+    added = model.jacobian("style", dt=duration / (N_SAMPLES - 1), duration=duration)
     columns = added.reshape(-1, model.n_styles)
     return np.asarray(np.linalg.lstsq(columns, (aligned(demo) - plain).ravel())[0], dtype=float)
 
@@ -79,8 +84,8 @@ def aligned(demo: pdmp.Demonstration) -> Array:
 class Errors:
     """E of the test demonstrations by J, (J, 6) each [rad²]."""
 
-    foreseen: Array
-    """In the style that U foresees from the height."""
+    predicted: Array
+    """In the style that U predicts from the height."""
     best: Array
     """In the style that makes it least: what J styles can express."""
 
@@ -88,19 +93,23 @@ class Errors:
 def errors(reaching: Reaching, most: int = 9) -> Errors:
     """Returns the errors of one to `most` styles on the heights that were not trained."""
     tests = reaching.of(TESTED)
-    foreseen, best = [], []
+    predicted, best = [], []
     for n_styles in range(1, most + 1):
         model = learn(reaching, n_styles)
-        styles = [model.predict([height_of(demo)]).style for demo in tests]
-        foreseen.append([error(model, reaching, *pair) for pair in zip(tests, styles, strict=True)])
+        styles = [predicted_style(model, height_of(demo)) for demo in tests]
+        predicted.append(
+            [error(model, reaching, *pair) for pair in zip(tests, styles, strict=True)]
+        )
         styles = [best_style(model, reaching, demo) for demo in tests]
         best.append([error(model, reaching, *pair) for pair in zip(tests, styles, strict=True)])
-    return Errors(np.array(foreseen), np.array(best))
+    return Errors(np.array(predicted), np.array(best))
 
 
-def foresee(model: pdmp.Model, reaching: Reaching, height: float, *events: NewGoal) -> Robot:
+def reach_predicted(
+    model: pdmp.Model, reaching: Reaching, height: float, *events: NewGoal
+) -> Robot:
     """Reaches over a height [m] in the style predicted for it."""
-    style = model.predict([height]).style
+    style = predicted_style(model, height)
     return reach_over(model, reaching, height, style, *events)
 
 
@@ -123,12 +132,12 @@ def figure_4(seed: int = SEED) -> Section:
     found = errors(reaching)
     models = {n_styles: learn(reaching, n_styles) for n_styles in range(1, 5)}
     tried = {
-        n_styles: {height: foresee(model, reaching, height) for height in TESTED}
+        n_styles: {height: reach_predicted(model, reaching, height) for height in TESTED}
         for n_styles, model in models.items()
     }
     command = new_goal(models[3], reaching)
     robots = tried[3]
-    moved = {height: foresee(models[3], reaching, height, command) for height in TESTED}
+    moved = {height: reach_predicted(models[3], reaching, height, command) for height in TESTED}
     by_styles = [
         [
             n_styles,
@@ -139,16 +148,16 @@ def figure_4(seed: int = SEED) -> Section:
     ]
     text = [
         "Learnt from nine reaches over none, two and three boxes; six over one box and over four "
-        "are foreseen by U(h) = β[h, 1]. E in 10⁻³ rad², mean ± standard deviation over the six; "
+        "are predicted by U(h) = β[h, 1]. E in 10⁻³ rad², mean ± standard deviation over the six; "
         "at best is in the style for which E is least.",
         markdown_table(
-            ["J", "E foreseen", "E at best"],
+            ["J", "E predicted", "E at best"],
             (
                 [n + 1, *(f"{1e3 * row.mean():.1f} ± {1e3 * row.std():.1f}" for row in rows)]
-                for n, rows in enumerate(zip(found.foreseen, found.best, strict=True))
+                for n, rows in enumerate(zip(found.predicted, found.best, strict=True))
             ),
         ),
-        "For how long the foreseen movement touches a box, on the robot, and how far a joint is "
+        "Time for which the predicted movement touches a box, on the robot, and how far a joint is "
         "off its command at most, which is far where the command is beyond the joint's limit:",
         markdown_table(
             [
@@ -172,7 +181,7 @@ def figure_4(seed: int = SEED) -> Section:
         ),
     ]
     return Section(
-        "Fig. 4: heights never shown",
+        "Fig. 4: heights without a demonstration",
         text,
         {
             "fig4_errors": draw_errors(found),
@@ -185,14 +194,14 @@ def draw_errors(found: Errors) -> Figure:
     """Draws E over J."""
     figure = canvas(None, 5.2, 3.8)
     axes = figure.subplots()
-    n_styles = np.arange(1, len(found.foreseen) + 1)
+    n_styles = np.arange(1, len(found.predicted) + 1)
     for rows, color, label in (
-        (found.foreseen, BLUE, "foreseen from the height"),
+        (found.predicted, BLUE, "predicted from the height"),
         (found.best, ORANGE, "at best"),
     ):
         mean, spread = rows.mean(axis=1), rows.std(axis=1)
         axes.errorbar(n_styles, mean, spread, color=color, marker="o", capsize=3, label=label)
-    dress(axes, "number of styles J", "E [rad²]", "prediction error on heights never shown")
+    dress(axes, "number of styles J", "E [rad²]", "prediction error on new heights")
     axes.set_ylim(bottom=0)
     legend(figure, axes)
     return figure
@@ -208,9 +217,9 @@ def draw_paths(
         paths.draw_boxes(axes, reaching, height)
         for demo in reaching.of((height,)):
             hands = reaching.arm.hands(demo.position)
-            paths.draw_hand(axes, reaching, hands, color=GREY, linestyle=":", label="shown")
-        foreseen, turned = (np.array(robot[height].log.hands) for robot in (robots, moved))
-        paths.draw_hand(axes, reaching, foreseen, color=BLUE, label="foreseen, J = 3")
+            paths.draw_hand(axes, reaching, hands, color=GREY, linestyle=":", label="demonstrated")
+        predicted, turned = (np.array(robot[height].log.hands) for robot in (robots, moved))
+        paths.draw_hand(axes, reaching, predicted, color=BLUE, label="predicted, J = 3")
         after = turned[round(command.time / DT) :]
         look: dict[str, Any] = {"color": PALETTE[2], "marker": "^", "markevery": 250}
         paths.draw_hand(axes, reaching, after, **look, label="goal moved")

@@ -5,7 +5,7 @@ measured:
 
 - The hand moves with minimum jerk through points on its way, when it is at them included: Flash,
   Hogan, Journal of Neuroscience 5, 1985, 1688-1703. Without an obstacle its path is straight.
-- The points are over the upper edges of the obstacle, as far from them whatever its height: carried
+- The points are over the upper edges of the obstacle, equally far from them at each height: carried
   over from the plane, where people keep a distance to obstacles (Dean, Brüwer, Experimental Brain
   Research 97, 1994, 497-514).
 - Longer paths are made faster, and take little longer: duration grows with the root of the path's

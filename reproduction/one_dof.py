@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.random import Generator
@@ -34,10 +34,10 @@ class Example:
     title: str
     model: pdmp.Model
     demos: list[pdmp.Demonstration]
-    moved: Callable[[dict[str, Any]], dict[str, Any]]
+    moved: Callable[[pdmp.Conditions], pdmp.Conditions]
     """Goal or anchor elsewhere."""
 
-    def shown(self, m: int) -> tuple[Array, Array]:
+    def demonstrated(self, m: int) -> tuple[Array, Array]:
         """Returns time [s] and position of a demonstration."""
         span = self.model.durations[m]
         ends = self.model.kind == "discrete"
@@ -57,7 +57,7 @@ def discrete(noise: Generator) -> Example:
     weights = noise.normal([1.0, 0.0, 0.0], [0.15, 0.35, 0.45], (N_DEMOS, 3))
     demos = _demos(weights @ shapes.T, noise.uniform(0.8, 1.2, N_DEMOS) / (N_SAMPLES - 1))
     model = pdmp.fit(demos, n_styles=N_STYLES, smoothing=None, transport="immediate")
-    return Example("discrete", model, demos, lambda a: {**a, "goal": np.asarray(a["goal"]) + 0.4})
+    return Example("discrete", model, demos, lambda a: a.replace(goal=np.asarray(a.goal) + 0.4))
 
 
 def rhythmic(noise: Generator) -> Example:
@@ -67,9 +67,7 @@ def rhythmic(noise: Generator) -> Example:
     weights = noise.normal([1.0, 0.0, 0.0], [0.3, 0.3, 0.2], (N_DEMOS, 3))
     demos = _demos(weights @ shapes.T, noise.uniform(0.8, 1.2, N_DEMOS) / N_SAMPLES)
     model = pdmp.fit(demos, kind="rhythmic", n_styles=N_STYLES, smoothing=None)
-    return Example(
-        "rhythmic", model, demos, lambda a: {**a, "anchor": np.asarray(a["anchor"]) + 1.0}
-    )
+    return Example("rhythmic", model, demos, lambda a: a.replace(anchor=np.asarray(a.anchor) + 1.0))
 
 
 def extremes(model: pdmp.Model) -> tuple[int, int]:
@@ -87,9 +85,9 @@ def figure_2(seed: int = SEED) -> Section:
     for example in examples:
         model = example.model
         first, second = extremes(model)
-        moved = example.moved(pdmp.as_demonstrated(model, first))
-        end = model.rollout(**moved, dt=0.001, duration=5.0).position
-        missed = abs(end[-1, 0] - moved["goal"][0]) if "goal" in moved else np.nan
+        moved = example.moved(model.conditions(first))
+        end = model.rollout(moved, dt=0.001, duration=5.0).position
+        missed = np.nan if moved.goal is None else abs(end[-1, 0] - moved.goal[0])
         rows.append(
             [
                 example.title,
@@ -124,15 +122,15 @@ def draw(examples: Sequence[Example]) -> Figure:
     grid = figure.subplots(len(examples), 3)
     for row, example in zip(grid, examples, strict=True):
         model = example.model
-        shown, made, between = row
+        demonstrated, made, between = row
         for m in range(N_DEMOS):
-            shown.plot(*example.shown(m), color=GREY, linewidth=0.9)
+            demonstrated.plot(*example.demonstrated(m), color=GREY, linewidth=0.9)
         for m, color, name in zip(extremes(model), (BLUE, ORANGE), ("s1", "s2"), strict=True):
             _variants(made, example, m, color, name)
         made.plot([], [], color="black", linestyle=":", label="demonstrated")
         made.plot([], [], color="black", linewidth=1.0, label="goal moved")
         made.plot([], [], color="black", linewidth=1.0, linestyle="-.", label="1.5 τ")
-        first, second = (pdmp.as_demonstrated(model, m) for m in extremes(model))
+        first, second = (model.conditions(m) for m in extremes(model))
         for share in SHARES:
             path = _path(model, pdmp.blend(first, second, float(share)), model.nominal)
             between.plot(path.time, path.position, color=gradient()(share), linewidth=1.3)
@@ -146,30 +144,30 @@ def draw(examples: Sequence[Example]) -> Figure:
 def _variants(axes: Axes, example: Example, m: int, color: str, name: str) -> None:
     """Draws a demonstration, its reproduction, and that elsewhere and slower."""
     model = example.model
-    own = pdmp.as_demonstrated(model, m)
-    slower = {**own, "tau": 1.5 * own["tau"]}
-    for arguments, width, line in (
-        (own, 3.0, "-"),
-        (example.moved(own), 1.0, "-"),
-        (slower, 1.0, "-."),
+    own = model.conditions(m)
+    tau = model.tau * float(model.durations[m] / model.durations[model.nominal])
+    for conditions, width, line, slower in (
+        (own, 3.0, "-", 1.0),
+        (example.moved(own), 1.0, "-", 1.0),
+        (own.replace(tau=1.5 * tau), 1.0, "-.", 1.5),
     ):
-        path = _path(model, arguments, m, arguments["tau"] / own["tau"])
-        label = name if arguments is own else None
+        path = _path(model, conditions, m, slower)
+        label = name if conditions is own else None
         axes.plot(
             path.time, path.position, color=color, linewidth=width, linestyle=line, label=label
         )
-    time, position = example.shown(m)
+    time, position = example.demonstrated(m)
     for period in range(_n_periods(model)):
         shifted = time + period * model.durations[m]
         axes.plot(shifted, position, color="black", linestyle=":", linewidth=1.3, zorder=3)
 
 
 def _path(
-    model: pdmp.Model, arguments: dict[str, Any], m: int, slower: float = 1.0
+    model: pdmp.Model, conditions: pdmp.Conditions, m: int, slower: float = 1.0
 ) -> pdmp.Trajectory:
     """Rolls out for a little longer than a demonstration takes, or its cycle twice."""
     span = 1.2 * _n_periods(model) * model.durations[m] * slower
-    return model.rollout(**arguments, dt=0.002, duration=span)
+    return model.rollout(conditions, dt=0.002, duration=span)
 
 
 def _n_periods(model: pdmp.Model) -> int:

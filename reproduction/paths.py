@@ -1,4 +1,4 @@
-"""Drawing what hands and joints did."""
+"""Drawings of paths of hands and joints."""
 
 from __future__ import annotations
 
@@ -57,11 +57,11 @@ def joints(robots: Mapping[str, Robot], until: float) -> Figure:
         dress(axes, "", f"{name} [rad]")
     dress(panels[-1], "time [s]", "off by [mrad]")
     for (name, robot), color in zip(robots.items(), PALETTE, strict=False):
-        told, done = (rows[: round(until / DT)] for rows in robot.log.rows())
-        time = DT * np.arange(1, len(told) + 1)
-        for axes, command, angle in zip(panels, told.T, done.T, strict=False):
+        commanded, done = (rows[: round(until / DT)] for rows in robot.log.rows())
+        time = DT * np.arange(1, len(commanded) + 1)
+        for axes, command, angle in zip(panels, commanded.T, done.T, strict=False):
             axes.plot(time, command, color=GREY, linewidth=3, label="commanded")
             axes.plot(time, angle, color=color, linewidth=1.2, label=name)
-        panels[-1].plot(time, 1e3 * np.abs(done - told).max(axis=1), color=color, linewidth=1)
+        panels[-1].plot(time, 1e3 * np.abs(done - commanded).max(axis=1), color=color, linewidth=1)
     legend(figure, panels[0])
     return figure

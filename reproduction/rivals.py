@@ -22,7 +22,15 @@ from numpy.typing import NDArray
 import pdmp
 from pdmp._markdown import markdown_table
 from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, legend
-from reproduction.heights import N_SAMPLES, TESTED, aligned, lasting, learn, new_goal
+from reproduction.heights import (
+    N_SAMPLES,
+    TESTED,
+    aligned,
+    lasting,
+    learn,
+    new_goal,
+    predicted_style,
+)
 from reproduction.loop import PACE, Held, Movement, NewGoal, drive, from_rest
 from reproduction.reaching import (
     CONSTANTS,
@@ -43,7 +51,7 @@ Rival: TypeAlias = Callable[[Reaching], Callable[[float], Movement]]
 """A way to learn: from reaches to what makes a movement for a height [m]."""
 
 N_STYLES = 3
-WIDTH = 0.45  # m, of the library's kernel: the range of heights shown
+WIDTH = 0.45  # m, of the library's kernel: the range of demonstrated heights
 HELD_JOINT, HELD_FOR = 3, 0.5  # the elbow; s
 HELD_AT = 0.3  # of the demonstrated duration
 
@@ -51,7 +59,7 @@ HELD_AT = 0.3  # of the demonstrated duration
 def styles(reaching: Reaching) -> Callable[[float], Movement]:
     """Learns one primitive with three styles, predicted from the height."""
     model = learn(reaching, N_STYLES)
-    return lambda height: from_rest(model, reaching, model.predict([height]).style)
+    return lambda height: from_rest(model, reaching, predicted_style(model, height))
 
 
 def one_demonstration(reaching: Reaching) -> Callable[[float], Movement]:
@@ -80,7 +88,7 @@ def library(reaching: Reaching) -> Callable[[float], Movement]:
 
 @dataclass
 class Recording:
-    """A trajectory that is played back in time, whatever happens; `goal` changes nothing."""
+    """A trajectory that is played back in time, regardless of commands; `goal` changes nothing."""
 
     trajectory: tuple[Array, Array, Array]
     goal: Array
@@ -218,7 +226,7 @@ def comparison(seed: int = SEED) -> Section:
     text = [
         "All learn from the reaches over none, two and three boxes. Held: the elbow, for half a "
         "second on its way; speed once let go is the largest of any joint, over the largest of the "
-        "same movement undisturbed. Primitives are told where the robot is, and wait; components "
+        "same movement undisturbed. Primitives receive the measured position, and wait; components "
         "have no way to. A run ends after 30 s.",
         markdown_table(header, rows),
     ]
@@ -231,13 +239,13 @@ def draw_held(trials: dict[str, Trial]) -> Figure:
     figure = canvas(None, 9.5, 3.8)
     panels = figure.subplots(1, len(trials), sharey=True)
     for axes, (name, trial) in zip(panels, trials.items(), strict=True):
-        told, done = (rows[:, HELD_JOINT] for rows in trial.held.log.rows())
-        time = DT * np.arange(1, len(told) + 1)
+        commanded, done = (rows[:, HELD_JOINT] for rows in trial.held.log.rows())
+        time = DT * np.arange(1, len(commanded) + 1)
         within = time < trial.grip.end + 3.0
         axes.axvspan(trial.grip.start, trial.grip.end, color=ORANGE, alpha=0.2, label="held")
         undisturbed = trial.alone.log.rows()[0][: within.sum(), HELD_JOINT]
         axes.plot(time[: len(undisturbed)], undisturbed, "k:", linewidth=1, label="undisturbed")
-        axes.plot(time[within], told[within], color=GREY, linewidth=3, label="commanded")
+        axes.plot(time[within], commanded[within], color=GREY, linewidth=3, label="commanded")
         axes.plot(time[within], done[within], color=BLUE, label="measured")
         dress(axes, "time [s]", "q4 [rad]", name)
     legend(figure, panels[0])
@@ -252,7 +260,7 @@ def _fastest(robot: Robot, after: float = 0.0) -> float:
 
 def _shown(reaching: Reaching) -> tuple[Array, Array, float]:
     """Returns the training reaches (M, N, D), their heights (M,) [m], and their median duration."""
-    shown = reaching.of(TRAINED)
-    paths = np.array([aligned(demo) for demo in shown])
-    heights = np.array([height_of(demo) for demo in shown])
-    return paths, heights, float(np.median([duration_of(demo) for demo in shown]))
+    demos = reaching.of(TRAINED)
+    paths = np.array([aligned(demo) for demo in demos])
+    heights = np.array([height_of(demo) for demo in demos])
+    return paths, heights, float(np.median([duration_of(demo) for demo in demos]))

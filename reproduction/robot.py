@@ -39,8 +39,8 @@ class Log:
 
     def tracking_error(self) -> float:
         """Returns the largest distance of a joint from its command [rad]."""
-        told, done = self.rows()
-        return float(np.abs(told - done).max())
+        commanded, measured = self.rows()
+        return float(np.abs(commanded - measured).max())
 
     def contact(self) -> float:
         """Returns the time during which the robot touched a box [s]."""

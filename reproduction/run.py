@@ -1,4 +1,4 @@
-"""Making the figures, and the files they go to."""
+"""The figures of the paper and their files."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ def reproduce(
     Parameters
     ----------
     figure : {"fig2", "fig3", "fig4", "fig5", "comparison", "all"}
-        Which one; the comparison is with what the paper argues with.
+        Figure; the comparison is with the methods that the paper argues with.
     folder : path
-        Where its pictures go, and its tables: `fig3.md` for "fig3".
+        Folder of its pictures and tables: `fig3.md` for "fig3".
     recordings : path, optional
         Folder of CSV files, one person walking in each, with a column `t` [s] and columns
         `r_sh1, r_sh2, r_sh3, r_elb, l_sh1, …` [rad]; "fig5" then learns from them as well.
     seed : int
-        Of the noise in the demonstrations: another person, as it were.
+        Seed of the noise in the demonstrations, which stands for a person.
     progress : callable, optional
-        Called with the name of each figure that is begun.
+        Called with the name of each figure when it begins.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def reproduce(
     Raises
     ------
     ValueError
-        A figure that there is not; a negative seed; recordings in which too few arms swing.
+        An unknown figure; a negative seed; recordings in which too few arms swing.
     ImportError
         The dependency group `reproduction` or the model of the robot is not installed.
     OSError
@@ -61,7 +61,7 @@ def reproduce(
         raise ValueError(f'recordings: only "fig5" learns from them, not "{figure}"')
     if recordings is not None and not Path(recordings).is_dir():
         raise ValueError(f"recordings: {recordings} is not a folder")
-    canvas(None, 1, 1)  # tells at once where there is nothing to draw figures with
+    canvas(None, 1, 1)  # raises an error at once without matplotlib
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     reports = []

@@ -1,4 +1,4 @@
-"""A part of the report: what one figure of the paper came to."""
+"""Section of the report on one figure of the paper."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def figure_3(seed: int = SEED) -> Section:
         markdown_table(
             ["", "style", "touches a box for", "left to the goal", "largest tracking error"], lines
         ),
-        "How many of the three styles shown over each pile clear it, at the pace of the "
+        "Number of the three styles demonstrated over each pile that clear it, at the pace of the "
         "demonstrations:",
         markdown_table(["J", *map(pile, HEIGHTS)], by_styles),
     ]

@@ -3,7 +3,7 @@
 The recordings of the paper were never published. What stands in for them is made from figures of
 human gait:
 
-- People walk at two steps, so one swing of an arm, per second, whatever their size (MacDougall,
+- People walk at two steps, so one swing of an arm, per second, at any size (MacDougall,
   Moore, Journal of Applied Physiology 99, 2005, 1164-1173), and make 0.83 to 1.95 strides per
   second between walking at 1 m/s and running at 8 (Nilsson, Thorstensson, Acta Physiologica
   Scandinavica 129, 1987, 107-114); at some 1.2 they begin to run.

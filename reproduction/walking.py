@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 CONSTANTS: dict[str, Any] = {
     **{"alpha_z": 0.5, "beta_z": 0.5, "mu": 0.1},
-    **{"spectrum": 0.9, "smoothing": None},
+    **{"singular_value_share": 0.9, "smoothing": None},
 }
 """The line that prints them lacks a comma, or means β_z = 1: it is read as α_z = 0.5, β_z = 0.5."""
 LASTING = 20.0  # s, between switches
@@ -47,7 +47,7 @@ class Switch:
 
 @dataclass
 class Swinging:
-    """What the arms were told."""
+    """Commanded movement of the arms."""
 
     position: list[Array] = field(default_factory=list)
     """Joint angles, a row per tick [rad]."""
@@ -69,7 +69,7 @@ def switches(model: pdmp.Model, styles: Sequence[int], names: Sequence[str]) -> 
     A style goes with its anchor. The frequency stays that of the first until it is switched.
     """
     first, second, third = (_style(model, m) for m in styles)
-    tau = float(pdmp.as_demonstrated(model, styles[0])["tau"])
+    tau = model.tau * float(model.durations[styles[0]] / model.durations[model.nominal])
     return [
         Switch(names[styles[0]], {**first, "tau": tau}),
         Switch(f"style: {names[styles[1]]}", second),
@@ -112,7 +112,7 @@ class _Cycle:
         self.period = 2 * np.pi * float(controller.tau)
         n_steps = 2000
         made = model.rollout(
-            controller.style,
+            style=controller.style,
             anchor=controller.anchor,
             amplitude=controller.amplitude,
             tau=controller.tau,
@@ -149,8 +149,8 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
     )
     film.attach(section, "fig5_robot", _instants(model, robot, chosen, names), film.SWINGING)
     if walks is not None:
-        told, section.figures["fig5_recorded"] = walks
-        section.text += told
+        paragraphs, section.figures["fig5_recorded"] = walks
+        section.text += paragraphs
     return section
 
 
@@ -177,8 +177,8 @@ def draw(
 
 
 def _style(model: pdmp.Model, m: int) -> dict[str, Any]:
-    arguments = pdmp.as_demonstrated(model, m)
-    return {"style": arguments["style"], "anchor": arguments["anchor"]}
+    conditions = model.conditions(m)
+    return {"style": conditions.style, "anchor": conditions.anchor}
 
 
 def _instants(
@@ -221,11 +221,11 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
     commands = switches(model, chosen, names)
     done = swing(model, commands)
     without = f", without {', '.join(odd)}, in which no stride repeats" if odd else ""
-    told = [
+    paragraphs = [
         f"Recordings of {len(kept)} walks{without}. {_spectrum(model)}",
         _settling(commands, done),
     ]
-    return told, draw(model, commands, done, RECORDED[:4])
+    return paragraphs, draw(model, commands, done, RECORDED[:4])
 
 
 def _spectrum(model: pdmp.Model) -> str:

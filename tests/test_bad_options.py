@@ -25,7 +25,7 @@ def numbers(name: str, allowed: str, *values: float) -> list[tuple[dict[str, Any
 
 OPTIONS: list[tuple[dict[str, Any], str]] = [
     *numbers("dt", "positive and finite", 0, -1, NAN, INF),
-    *numbers("spectrum", r"must lie in \(0, 1\]", 0, -1, NAN, INF),
+    *numbers("singular_value_share", r"must lie in \(0, 1\]", 0, -1, NAN, INF),
     *numbers("tau", "positive and finite", 0, -1, NAN, INF),
     *numbers("alpha_z", "between 1e-6 and 1e6", 0, -1, NAN, INF),
     *numbers("beta_z", "between 1e-6 and 1e6", 0, -1, NAN, INF),
@@ -33,7 +33,7 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     *numbers("smoothing", "positive and finite", 0, -1, NAN, INF),
     *numbers("nominal", "must not be negative", -1),
     *numbers("n_styles", "", 0, -1),
-    ({"spectrum": 2}, "spectrum = 2: must lie in"),
+    ({"singular_value_share": 2}, "singular_value_share = 2: must lie in"),
     ({"n_styles": 6}, "n_styles = 6: must lie between 1 and 5, the number of demonstrations"),
     ({"nominal": 5}, "nominal = 5: must be the index of a demonstration, from 0"),
     ({"n_samples": 3}, "n_samples = 3: must lie between 4 and 1e6"),
@@ -48,7 +48,10 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"dof_scale": [-1, 1]}, "dof_scale = -1: must lie between"),
     ({"dof_scale": [1]}, "dof_scale has length 1, expected 2: one value per DoF"),
     ({"dof_scale": "metre"}, 'dof_scale = "metre": must be None, "unit", "range" or one number'),
-    ({"n_styles": 2, "spectrum": 0.9}, "n_styles and spectrum: pass one of them"),
+    (
+        {"n_styles": 2, "singular_value_share": 0.9},
+        "n_styles and singular_value_share: pass one of them",
+    ),
     ({"contexts": [[1], [2], [3], [4], [NAN]]}, r"demo 4: context\[0\] = NaN"),
     ({"contexts": [[1], [2]]}, "contexts has length 2, expected 5: one value per demonstration"),
     ({"contexts": [1, 2, 3, 4, 5]}, r"contexts\[0\] = 1: expected two axes \(M, Q\)"),

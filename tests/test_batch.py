@@ -13,21 +13,10 @@ import numpy as np
 import pytest
 
 import pdmp
-from synthetic import loops, reaches
 
 NAN = float("nan")
 FIELDS = ("position", "velocity", "acceleration")
 STYLES = np.random.default_rng(0).normal(size=(23, 2))
-MODELS = {
-    "discrete": pdmp.fit(reaches(), n_styles=2, basis="ngnet"),
-    "rhythmic": pdmp.fit(loops(), kind="rhythmic", n_styles=2, basis="ngnet"),
-}
-
-
-@pytest.fixture(params=sorted(MODELS))
-def model(request: pytest.FixtureRequest) -> pdmp.Model:
-    """Return a model with two styles and two degrees of freedom of either kind."""
-    return MODELS[request.param]
 
 
 def centres(model: pdmp.Model) -> str:
@@ -51,18 +40,18 @@ def test_each_movement_has_its_own_conditions(
     made = model.rollouts(STYLES, dt=dt, tau=0.8 * model.tau, derivatives=2, **given)
     for b in (0, 7, 22):
         own = {SINGULAR[n]: rows[b] if one_each else rows for n, rows in given.items()}
-        single = model.rollout(STYLES[b], dt=dt, tau=0.8 * model.tau, **own)
+        single = model.rollout(style=STYLES[b], dt=dt, tau=0.8 * model.tau, **own)
         for values, name in zip(made, FIELDS, strict=True):
             expected = getattr(single, name)
             np.testing.assert_allclose(values[b], expected, atol=1e-12 * abs(expected).max())
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.4, 2.5])
-def test_amplitude_is_that_of_all(amplitude: float) -> None:
+def test_amplitude_is_that_of_all(cycle: pdmp.Model, amplitude: float) -> None:
     """A rhythmic batch swings as widely as the rollout does; not at all at zero."""
-    model = MODELS["rhythmic"]
+    model = cycle
     positions, _ = model.rollouts(STYLES, amplitude=amplitude)
-    expected = model.rollout(STYLES[3], amplitude=amplitude).position
+    expected = model.rollout(style=STYLES[3], amplitude=amplitude).position
     np.testing.assert_allclose(positions[3], expected, atol=1e-12)
     assert (np.ptp(positions, axis=1) == 0).all() == (amplitude == 0)
 
@@ -92,9 +81,9 @@ def test_pieces_and_threads_leave_the_bits(model: pdmp.Model, threads: int) -> N
         np.testing.assert_array_equal(np.concatenate(parts), full)
 
 
-def test_many_movements_take_little_memory() -> None:
+def test_many_movements_take_little_memory(reach: pdmp.Model) -> None:
     """A million movements pass in pieces of a thousand; as one batch they would take 1.4 GB."""
-    model, total = MODELS["discrete"], 0
+    model, total = reach, 0
     styles = np.zeros((10**6, 2))
     tracemalloc.start()
     for (positions,) in model.rollout_chunks(styles, dt=0.02, derivatives=0, duration=1.8):
@@ -163,30 +152,32 @@ def test_movement_is_its_jacobians_times_the_changes(
     start = {"start": given["start"]} if "start" in given else {}
 
     def motion(style: np.ndarray, at: np.ndarray, **given: Any) -> np.ndarray:
-        values: np.ndarray = getattr(model.rollout(style, **{centre: at}, **given, **shared), name)
+        values: np.ndarray = getattr(
+            model.rollout(style=style, **{centre: at}, **given, **shared), name
+        )
         return values
 
     base = motion(style, shift, **given)
-    expected = base + model.style_jacobian(derivative=derivative, **given, **shared) @ step
+    expected = base + model.jacobian("style", derivative=derivative, **given, **shared) @ step
     tolerance = 1e-11 * abs(expected).max()
     np.testing.assert_allclose(motion(style + step, shift, **given), expected, atol=tolerance)
     if model.kind == "discrete":
-        jacobian = model.goal_jacobian(derivative=derivative, **shared)
+        jacobian = model.jacobian("goal", derivative=derivative, **shared)
     else:
-        jacobian = model.anchor_jacobian(derivative=derivative, **start, **shared)
+        jacobian = model.jacobian("anchor", derivative=derivative, **start, **shared)
     expected = base + jacobian @ push
     np.testing.assert_allclose(motion(style, shift + push, **given), expected, atol=tolerance)
     if start:
         moved = {**given, "start": given["start"] + push}
-        expected = base + model.start_jacobian(derivative=derivative, **shared) @ push
+        expected = base + model.jacobian("start", derivative=derivative, **shared) @ push
         np.testing.assert_allclose(motion(style, shift, **moved), expected, atol=tolerance)
 
 
-def test_jacobian_follows_the_amplitude() -> None:
+def test_jacobian_follows_the_amplitude(cycle: pdmp.Model) -> None:
     """A style counts as much as the amplitude lets it."""
-    model = MODELS["rhythmic"]
-    half = model.style_jacobian(amplitude=0.5, velocity=[0, 0])
-    np.testing.assert_array_equal(half, model.style_jacobian(velocity=[0, 0]) / 2)
+    model = cycle
+    half = model.jacobian("style", amplitude=0.5, velocity=[0, 0])
+    np.testing.assert_array_equal(half, model.jacobian("style", velocity=[0, 0]) / 2)
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [
@@ -211,29 +202,33 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("given", "message"), REFUSED, ids=str)
-def test_bad_batches_are_refused(given: dict[str, Any], message: str) -> None:
+def test_bad_batches_are_refused(reach: pdmp.Model, given: dict[str, Any], message: str) -> None:
     """Batches and pieces alike name the argument and the numbers, before anything is done."""
-    for call in (MODELS["discrete"].rollouts, MODELS["discrete"].rollout_chunks):
+    for call in (reach.rollouts, reach.rollout_chunks):
         with pytest.raises(ValueError, match=message):
             call(**{"styles": STYLES, "dt": 0.1, **given})
 
 
 @pytest.mark.parametrize("size", [0, -1])
-def test_pieces_have_a_size(size: int) -> None:
+def test_pieces_have_a_size(reach: pdmp.Model, size: int) -> None:
     """An iterator that would never end is not begun."""
     with pytest.raises(ValueError, match=f"size = {size}: must"):
-        MODELS["discrete"].rollout_chunks(STYLES, size=size)
+        reach.rollout_chunks(STYLES, size=size)
 
 
-def test_jacobians_belong_to_a_kind() -> None:
+def test_jacobians_belong_to_a_kind(reach: pdmp.Model, cycle: pdmp.Model) -> None:
     """A discrete primitive has no anchor, a rhythmic one no goal; there is no third derivative."""
     with pytest.raises(ValueError, match="goal does not apply to a rhythmic primitive"):
-        MODELS["rhythmic"].goal_jacobian()
+        cycle.jacobian("goal")
     with pytest.raises(ValueError, match="anchor does not apply to a discrete primitive"):
-        MODELS["discrete"].anchor_jacobian()
-    for name in ("style_jacobian", "start_jacobian", "goal_jacobian"):
+        reach.jacobian("anchor")
+    for wrt in ("style", "start", "goal"):
         with pytest.raises(ValueError, match="derivative = 3: must be 0"):
-            getattr(MODELS["discrete"], name)(derivative=3)
+            reach.jacobian(wrt, derivative=3)
+    with pytest.raises(
+        ValueError, match="wrt = 'tau': must be 'style', 'goal', 'anchor' or 'start'"
+    ):
+        reach.jacobian("tau")
 
 
 def arrays(n: int = 2) -> list[np.ndarray]:
@@ -241,31 +236,29 @@ def arrays(n: int = 2) -> list[np.ndarray]:
     return [np.zeros((23, 11, 2)) for _ in range(n)]
 
 
-def test_outputs_are_one_for_each_derivative() -> None:
+def test_outputs_are_one_for_each_derivative(reach: pdmp.Model) -> None:
     """Too few and too many arrays are refused with their number."""
-    model, batch = MODELS["discrete"], {"styles": STYLES, "dt": 0.1, "duration": 1.0}
+    model, batch = reach, {"styles": STYLES, "dt": 0.1, "duration": 1.0}
     for n, derivatives in ((1, 1), (2, 0), (2, 2)):
         message = f"out: {n} arrays; expected {derivatives + 1} float64 arrays"
         with pytest.raises(ValueError, match=message):
             model.rollouts(**batch, derivatives=derivatives, out=arrays(n))
 
 
-def test_outputs_that_overlap_are_refused() -> None:
+def test_outputs_that_overlap_are_refused(reach: pdmp.Model) -> None:
     """One memory cannot hold positions and velocities; nothing is written."""
-    model, (one, _) = MODELS["discrete"], arrays()
+    model, (one, _) = reach, arrays()
     for out in ((one, one), (one, one[::-1])):
         with pytest.raises(ValueError, match="out: .*share memory"):
             model.rollouts(STYLES, dt=0.1, duration=1.0, out=out)
     assert not one.any()
 
 
-def test_outputs_off_the_grid_of_numbers_are_refused() -> None:
+def test_outputs_off_the_grid_of_numbers_are_refused(reach: pdmp.Model) -> None:
     """A field of packed records is not written."""
     records = np.zeros((23, 11, 2), [("value", "f8"), ("other", "f4")])
     with pytest.raises(ValueError, match="out: not aligned in memory"):
-        MODELS["discrete"].rollouts(
-            STYLES, dt=0.1, duration=1.0, derivatives=0, out=(records["value"],)
-        )
+        reach.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=0, out=(records["value"],))
     assert not records["other"].any()
 
 
@@ -281,9 +274,9 @@ def test_outputs_may_lie_in_memory_as_they_like(model: pdmp.Model, order: Any) -
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="this system has no limit on memory")
-def test_more_than_memory_holds_is_refused(tmp_path: Path) -> None:
+def test_more_than_memory_holds_is_refused(reach: pdmp.Model, tmp_path: Path) -> None:
     """A batch beyond the memory allowed is a MemoryError that tells its size; pieces of it fit."""
-    MODELS["discrete"].save(tmp_path / "model")
+    reach.save(tmp_path / "model")
     code = f"""
 import resource, numpy as np, pdmp
 model, styles = pdmp.load({str(tmp_path / "model")!r}), np.zeros((10**6, 2))
@@ -301,7 +294,7 @@ print(next(model.rollout_chunks(styles, dt=1e-3, duration=1.0, threads=1))[0].sh
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no timer signals")
-def test_signal_ends_a_long_batch() -> None:
+def test_signal_ends_a_long_batch(reach: pdmp.Model) -> None:
     """An exception of a signal handler comes out of the batch while it is written."""
 
     class Late(Exception):
@@ -310,7 +303,7 @@ def test_signal_ends_a_long_batch() -> None:
     def ring(*_: object) -> None:
         raise Late
 
-    model, styles = MODELS["discrete"], np.zeros((20000, 2))
+    model, styles = reach, np.zeros((20000, 2))
     out = np.empty((20000, 1001, 2))
     model.rollouts(styles[:1], dt=1e-3, duration=1.0)
     before = signal.signal(signal.SIGALRM, ring)

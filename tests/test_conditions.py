@@ -1,5 +1,6 @@
-"""Arguments of a movement: those of demonstrations, and those in between."""
+"""Conditions of a movement: those of demonstrations, and those in between."""
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -10,62 +11,110 @@ from synthetic import loops, reaches
 
 
 @pytest.mark.parametrize("m", range(5))
-def test_rollout_as_demonstrated_gives_the_demonstration_back(m: int) -> None:
+def test_rollout_of_demonstrated_conditions_gives_the_demonstration_back(m: int) -> None:
     """With all styles, style, place and pace of a demonstration repeat it."""
     demos = reaches()
     model = pdmp.fit(demos, n_styles=5)
-    made = model.rollout(**pdmp.as_demonstrated(model, m), dt=0.02)
+    made = model.rollout(model.conditions(m), dt=0.02)
     np.testing.assert_allclose(made.position, demos[m].position, atol=1e-3)
 
 
-def test_rhythmic_movement_as_demonstrated_gives_the_cycle_back() -> None:
+def test_rhythmic_rollout_of_demonstrated_conditions_gives_the_cycle_back() -> None:
     """A rhythmic one repeats its demonstration, from the first tick on."""
     demos = loops()
     model = pdmp.fit(demos, kind="rhythmic", n_styles=2)
-    made = model.rollout(**pdmp.as_demonstrated(model, 1), dt=0.02)
+    made = model.rollout(model.conditions(1), dt=0.02)
     np.testing.assert_allclose(made.position[:-1], demos[1].position, atol=1e-2)
 
 
 def test_several_demonstrations_give_their_mean() -> None:
     """Style, place and duration are averaged."""
     model = pdmp.fit(reaches())
-    mean = pdmp.as_demonstrated(model, [0, 1])
-    np.testing.assert_allclose(mean["goal"], model.goals[:2].mean(axis=0))
-    np.testing.assert_allclose(mean["style"], model.styles[:2].mean(axis=0))
+    mean = model.conditions([0, 1])
+    np.testing.assert_allclose(mean.goal, model.goals[:2].mean(axis=0))
+    np.testing.assert_allclose(mean.style, model.styles[:2].mean(axis=0))
 
 
 def test_blend_ends_at_both() -> None:
     """A share of 0 is the first, 1 the second, a half the mean."""
-    a, b = {"style": [0.0, 1.0], "tau": 1.0}, {"style": [2.0, 1.0], "tau": 3.0}
+    a = pdmp.Conditions(style=[0.0, 1.0], tau=1.0)
+    b = pdmp.Conditions(style=[2.0, 1.0], tau=3.0)
     for share, expected in ((0, [0, 1]), (1, [2, 1]), (0.5, [1, 1])):
-        np.testing.assert_array_equal(pdmp.blend(a, b, share)["style"], expected)
-    assert pdmp.blend(a, b, 0.5)["tau"] == 2.0
+        np.testing.assert_array_equal(pdmp.blend(a, b, share).style, expected)
+    assert pdmp.blend(a, b, 0.5).tau == 2.0
 
 
 @pytest.mark.parametrize("demos", [1.0, None, "1", [[0, 1], [1, 0]]])
 def test_index_is_a_whole_number(demos: Any) -> None:
     """What is no index, or list of them, is told as it was given."""
     with pytest.raises(ValueError, match="demos = .*: pass the index of a demonstration"):
-        pdmp.as_demonstrated(pdmp.fit(reaches()), demos)
+        pdmp.fit(reaches()).conditions(demos)
 
 
 def test_blend_refuses_what_has_no_middle() -> None:
-    """Labels, unequal lengths and a share that is no number are refused by name."""
-    for a, b in (("left", "right"), ([1.0], [1.0, 2.0])):
-        with pytest.raises(ValueError, match="style: .* cannot be blended"):
-            pdmp.blend({"style": a}, {"style": b}, 0.5)
-    with pytest.raises(ValueError, match="share = nan: must be finite"):
-        pdmp.blend({"style": [1.0]}, {"style": [2.0]}, float("nan"))
+    """Unequal lengths and a share that is not finite are refused by name."""
+    one, two = pdmp.Conditions(style=[1.0]), pdmp.Conditions(style=[1.0, 2.0])
+    with pytest.raises(ValueError, match="style has length 2, expected 1"):
+        pdmp.blend(one, two, 0.5)
+    with pytest.raises(ValueError, match="share = NaN: must be finite"):
+        pdmp.blend(one, one, float("nan"))
 
 
 def test_blend_refuses_a_name_that_one_lacks() -> None:
     """What has no counterpart is named."""
     with pytest.raises(ValueError, match="goal: given for one of the two only"):
-        pdmp.blend({"style": [1.0]}, {"style": [1.0], "goal": [0.0]}, 0.5)
+        pdmp.blend(pdmp.Conditions(style=[1.0]), pdmp.Conditions(style=[1.0], goal=[0.0]), 0.5)
 
 
 @pytest.mark.parametrize("demos", [-1, 5, [0, 7], []])
 def test_unknown_demonstration_is_refused(demos: int | list[int]) -> None:
     """An index outside the demonstrations is refused with the range."""
     with pytest.raises(ValueError, match=r"between 0 and 4|empty"):
-        pdmp.as_demonstrated(pdmp.fit(reaches()), demos)
+        pdmp.fit(reaches()).conditions(demos)
+
+
+def test_keywords_take_the_place_of_single_conditions() -> None:
+    """A keyword replaces the condition of its name, and the others stay."""
+    model = pdmp.fit(reaches())
+    conditions = model.conditions(2)
+    moved = model.rollout(conditions, goal=model.goals[0] + 0.1)
+    expected = model.rollout(conditions.replace(goal=model.goals[0] + 0.1))
+    np.testing.assert_array_equal(moved.position, expected.position)
+    slower = conditions.replace(tau=2 * model.tau)
+    assert slower.tau == 2 * model.tau and slower.segment_durations is None
+    assert slower.replace(segment_durations=[1.0]).tau is None
+
+
+@pytest.mark.parametrize("how", ["rollout", "controller", "jacobian"])
+def test_what_is_no_condition_is_refused_by_name(how: str) -> None:
+    """Unknown keywords, values that are not numbers and other objects are named."""
+    model = pdmp.fit(reaches())
+    first = ["style"] if how == "jacobian" else []
+    call = lambda *given, **changes: getattr(model, how)(*first, *given, **changes)  # noqa: E731
+    with pytest.raises(TypeError, match="unexpected keyword argument 'gaol'; conditions are style"):
+        call(gaol=[0.0, 0.0])
+    with pytest.raises(ValueError, match=r"tau = \[1, 2\]: expected one number"):
+        call(tau=[1, 2])
+    with pytest.raises(ValueError, match="tau = 'slow': expected one number"):
+        call(tau="slow")
+    if how != "controller":
+        with pytest.raises(TypeError, match="conditions: expected pdmp.Conditions, found list"):
+            call([0.1, 0.2])
+
+
+def test_conditions_are_values() -> None:
+    """Equal conditions are equal, survive a pickle, and show what is given."""
+    conditions = pdmp.Conditions(goal=np.array([0.5, 1.0]), amplitude=np.float64(0.5))
+    assert pickle.loads(pickle.dumps(conditions)) == conditions
+    assert conditions != conditions.replace(tau=1)
+    assert repr(conditions) == "pdmp.Conditions(goal=[0.5, 1.0], amplitude=0.5)"
+    assert eval(repr(conditions)) == conditions
+
+
+def test_conditions_of_the_other_kind_are_refused_everywhere() -> None:
+    """An amplitude of a discrete movement is refused by rollout, controller and reset alike."""
+    model = pdmp.fit(reaches())
+    controller = model.controller(0.01)
+    for call in (model.rollout, model.controller, controller.reset):
+        with pytest.raises(ValueError, match="amplitude"):
+            call(amplitude=1.0)

@@ -60,7 +60,9 @@ def test_labels_alone_give_the_mean_of_their_demonstrations() -> None:
     for name, bend in bends.items():
         rows = [m for m, label in enumerate(labels) if label == name]
         found = model.predict([name])
-        np.testing.assert_allclose(found.style, model.styles[rows].mean(axis=0), atol=1e-12)
+        np.testing.assert_allclose(
+            found.conditions.style, model.styles[rows].mean(axis=0), atol=1e-12
+        )
         wanted = bent(bend + offsets[rows].mean())
         np.testing.assert_allclose(
             model.rollout(context=[name], dt=0.02).position, wanted, atol=1e-3
@@ -99,7 +101,7 @@ def test_models_with_a_map_survive_a_file(name: str, tmp_path: pytest.TempPathFa
     model.save(tmp_path / "model.safetensors")
     for other in (pdmp.load(tmp_path / "model.safetensors"), pickle.loads(pickle.dumps(model))):
         a, b = model.predict([0.4]), other.predict([0.4])
-        np.testing.assert_array_equal(a.style, b.style)
+        np.testing.assert_array_equal(a.conditions.style, b.conditions.style)
         np.testing.assert_array_equal(a.covariance, b.covariance)
         for bound, same in zip(model.band([0.4]), other.band([0.4]), strict=True):
             np.testing.assert_array_equal(bound, same)
@@ -113,7 +115,7 @@ def labelled() -> pdmp.Model:
         for manner, lean in (("proud", 0.8), ("tired", -0.8))
         for height in (0.1, 0.3, 0.5, 0.7)
     ]
-    return pdmp.fit(demos, map="linear", spectrum=0.999)
+    return pdmp.fit(demos, map="linear", singular_value_share=0.999)
 
 
 def test_labels_stand_beside_numbers() -> None:
@@ -134,8 +136,8 @@ def test_labels_come_back_as_they_were() -> None:
 @pytest.mark.parametrize(
     ("context", "message"),
     [
-        (["shy", 0.1], r'context\[0\] = "shy": never shown; the labels are proud, tired'),
-        ([1.0, 0.1], r"context\[0\] = 1: never shown"),
+        (["shy", 0.1], r'context\[0\] = "shy": not demonstrated; the labels are proud, tired'),
+        ([1.0, 0.1], r"context\[0\] = 1: not demonstrated"),
         (["proud", "high"], r'context\[1\] = "high": a number is expected'),
         (["proud"], "context has length 1, expected 2"),
         (["proud", np.nan], r"context\[1\] = NaN"),
@@ -156,17 +158,19 @@ def test_labels_and_numbers_do_not_mix_in_a_column() -> None:
 def test_contexts_far_away_are_flagged() -> None:
     """How far a context lies outside is told in ranges of those shown."""
     model = curved(np.linspace(0.2, 0.7, 6))
-    np.testing.assert_allclose(model.predict([0.45]).outside, [0.0])
+    np.testing.assert_allclose(model.predict([0.45]).extrapolation, [0.0])
     found = model.predict([1.7])
-    np.testing.assert_allclose(found.outside, [2.0])
-    assert "outside of the demonstrated contexts by 2.00 of their range" in repr(found)
+    np.testing.assert_allclose(found.extrapolation, [2.0])
+    assert "extrapolated by 2.00 of the demonstrated range of contexts" in repr(found)
 
 
 def test_process_does_not_run_away_and_says_so() -> None:
     """Far away the Gaussian process stays where it is, with all the variance there is."""
     model = curved(np.linspace(0, 1, 12), map="gp")
     near, far = model.predict([0.5]), model.predict([100.0])
-    np.testing.assert_allclose(far.style, model.predict([1000.0]).style, rtol=1e-9)
+    np.testing.assert_allclose(
+        far.conditions.style, model.predict([1000.0]).conditions.style, rtol=1e-9
+    )
     assert np.all(np.diag(far.covariance)[:2] > 10 * np.diag(near.covariance)[:2])
 
 
@@ -175,8 +179,8 @@ def test_one_context_value_only_predicts_the_mean() -> None:
     movements = [bent(b) for b in (0.2, 0.3, 0.4)]
     model = pdmp.fit(movements, dt=0.02, contexts=[[1.0]] * 3)
     found = model.predict([2.0])
-    np.testing.assert_allclose(found.style, model.styles.mean(axis=0), atol=1e-12)
-    assert np.isinf(found.outside[0])
+    np.testing.assert_allclose(found.conditions.style, model.styles.mean(axis=0), atol=1e-12)
+    assert np.isinf(found.extrapolation[0])
 
 
 def test_band_holds_what_it_promises() -> None:
@@ -265,7 +269,7 @@ def test_styles_are_as_many_as_contexts_foresee() -> None:
         # those of the heights.
         options = {"dt": 0.02, "contexts": heights, "transport": "immediate"}
         few.append(pdmp.fit(movements, n_styles="auto", **options).n_styles)
-        many.append(pdmp.fit(movements, spectrum=0.99, **options).n_styles)
+        many.append(pdmp.fit(movements, singular_value_share=0.99, **options).n_styles)
     assert np.median(few) < np.median(many)
 
 

@@ -15,20 +15,8 @@ import pytest
 
 import pdmp
 from pdmp import Status, realtime
-from synthetic import loops, reaches
 
 NAN, INF = float("nan"), float("inf")
-MODELS = {
-    "discrete": pdmp.fit(reaches(), n_styles=2, basis="ngnet"),
-    "rhythmic": pdmp.fit(loops(), kind="rhythmic", n_styles=2, basis="ngnet"),
-}
-REACH = MODELS["discrete"]
-
-
-@pytest.fixture(params=sorted(MODELS))
-def model(request: pytest.FixtureRequest) -> pdmp.Model:
-    """Return a model of either kind."""
-    return MODELS[request.param]
 
 
 def blocks(work: Callable[[], object]) -> int:
@@ -133,9 +121,9 @@ def test_a_thread_may_reset_what_another_steps(model: pdmp.Model) -> None:
     np.testing.assert_array_equal(controller.position, alone.position)
 
 
-def test_a_tick_within_a_tick_is_refused() -> None:
+def test_a_tick_within_a_tick_is_refused(reach: pdmp.Model) -> None:
     """An argument that steps the controller it is given to makes one tick, not a torn one."""
-    controller = REACH.controller(0.001)
+    controller = reach.controller(0.001)
 
     class Measured:
         def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
@@ -197,20 +185,20 @@ def test_paced_loop_is_the_repeated_step(model: pdmp.Model, clock: Clock) -> Non
     """On time, tick k comes at start + k / rate without drift, and moves as step does."""
     controller, alone = model.controller(), model.controller()
     start = clock.now
-    for k, tick in enumerate(controller.run(rate_hz=1000, duration=0.7), 1):
+    for k, tick in enumerate(pdmp.PacedLoop(controller, rate_hz=1000, duration=0.7), 1):
         alone.step()
         np.testing.assert_array_equal(controller.position, alone.position)
         assert (tick.time, tick.missed) == (k / 1000, 0)
-        assert clock.now - start == pytest.approx(tick.time + tick.late)
-        assert tick.late == pytest.approx(60e-6)
+        assert clock.now - start == pytest.approx(tick.time + tick.lateness)
+        assert tick.lateness == pytest.approx(60e-6)
         clock.work(0.4e-3)
     assert k == 700
 
 
-def test_discrete_movements_end_as_they_finish(clock: Clock) -> None:
+def test_discrete_movements_end_as_they_finish(reach: pdmp.Model, clock: Clock) -> None:
     """The last tick is the one that is FINISHED; the rate is by default the controller's own."""
-    controller, alone = REACH.controller(0.01), REACH.controller(0.01)
-    ticks = sum(1 for _ in controller.run())
+    controller, alone = reach.controller(0.01), reach.controller(0.01)
+    ticks = sum(1 for _ in pdmp.PacedLoop(controller))
     expected = 1
     while alone.step() == Status.WORKING:
         expected += 1
@@ -218,49 +206,49 @@ def test_discrete_movements_end_as_they_finish(clock: Clock) -> None:
     assert controller.time == pytest.approx(clock.now - 1000, abs=1e-4)
 
 
-def test_a_goal_set_as_it_finishes_is_gone_to(clock: Clock) -> None:
+def test_a_goal_set_as_it_finishes_is_gone_to(reach: pdmp.Model, clock: Clock) -> None:
     """What the body of the last tick commands keeps the loop going."""
-    controller = REACH.controller(0.01)
+    controller = reach.controller(0.01)
     goals = [[2, 1], [0.5, 0]]
-    for _ in controller.run():
+    for _ in pdmp.PacedLoop(controller):
         if controller.status == Status.FINISHED and goals:
             controller.goal = goals.pop()
     assert not goals
     np.testing.assert_allclose(controller.position, [2, 1], atol=5e-3)
 
 
-def test_a_given_duration_outlasts_the_movement(clock: Clock) -> None:
+def test_a_given_duration_outlasts_the_movement(reach: pdmp.Model, clock: Clock) -> None:
     """A loop with a duration holds the goal, and goes to a new one."""
-    controller = REACH.controller(0.01)
-    for tick in controller.run(duration=10):
+    controller = reach.controller(0.01)
+    for tick in pdmp.PacedLoop(controller, duration=10):
         if tick.time > 5:
             controller.goal = [2, 1]
     assert controller.time == pytest.approx(10)
     np.testing.assert_allclose(controller.position, [2, 1], atol=5e-3)
 
 
-def test_late_ticks_keep_the_time_of_the_clock(clock: Clock) -> None:
+def test_late_ticks_keep_the_time_of_the_clock(reach: pdmp.Model, clock: Clock) -> None:
     """Missed deadlines are told, made good in one step, and do not move the later ones."""
-    controller = REACH.controller()
-    run = controller.run(rate_hz=1000, duration=0.5, late="catch up")
+    controller = reach.controller()
+    run = pdmp.PacedLoop(controller, rate_hz=1000, duration=0.5, late="catch up")
     missed, late = [], []
     for k, tick in enumerate(run):
         assert controller.time == pytest.approx(tick.time)
         assert clock.now - 1000 == pytest.approx(tick.time, abs=1e-3)
         missed.append(tick.missed)
-        late.append(tick.late)
+        late.append(tick.lateness)
         clock.work({10: 0.9e-3, 100: 3.5e-3, 200: 42.25e-3}.get(k, 0.1e-3))
     assert {k: n for k, n in enumerate(missed) if n} == {101: 2, 201: 41}
     assert late[101] == pytest.approx(2.62e-3)
     assert late[102] == pytest.approx(60e-6)
-    assert (run.ticks, run.missed, run.worst) == (len(missed), 43, max(late))
+    assert (run.ticks, run.missed, run.max_lateness) == (len(missed), 43, max(late))
     assert run.ticks + run.missed == 500
 
 
-def test_a_movement_waits_for_a_late_tick(clock: Clock) -> None:
+def test_a_movement_waits_for_a_late_tick(reach: pdmp.Model, clock: Clock) -> None:
     """By default every tick moves by one period, and the deadlines to come are later."""
-    controller, alone = REACH.controller(), REACH.controller()
-    run = controller.run(rate_hz=1000, duration=0.5)
+    controller, alone = reach.controller(), reach.controller()
+    run = pdmp.PacedLoop(controller, rate_hz=1000, duration=0.5)
     for k, tick in enumerate(run):
         alone.step()
         np.testing.assert_array_equal(controller.position, alone.position)
@@ -270,21 +258,21 @@ def test_a_movement_waits_for_a_late_tick(clock: Clock) -> None:
     assert clock.now - 1000 == pytest.approx(0.541, abs=1e-3)
 
 
-def test_a_controller_runs_in_one_loop_at_a_time(clock: Clock) -> None:
+def test_a_controller_runs_in_one_loop_at_a_time(reach: pdmp.Model, clock: Clock) -> None:
     """A second loop is refused while the first runs, and no longer."""
-    controller = REACH.controller()
-    first = iter(controller.run(duration=0.1))
+    controller = reach.controller()
+    first = iter(pdmp.PacedLoop(controller, duration=0.1))
     next(first)
     with pytest.raises(RuntimeError, match="runs in another loop"):
-        next(iter(controller.run(duration=0.1)))
-    next(iter(REACH.controller().run(duration=0.1)))
+        next(iter(pdmp.PacedLoop(controller, duration=0.1)))
+    next(iter(pdmp.PacedLoop(reach.controller(), duration=0.1)))
     first.close()  # type: ignore[attr-defined]
-    assert sum(1 for _ in controller.run(duration=0.1)) == 100
+    assert sum(1 for _ in pdmp.PacedLoop(controller, duration=0.1)) == 100
 
     async def twice() -> None:
         """Leave one loop and begin the next at once."""
         for _ in range(2):
-            async for _ in controller.run(rate_hz=500, duration=60):
+            async for _ in pdmp.PacedLoop(controller, rate_hz=500, duration=60):
                 break
 
     monkeypatched = realtime.perf_counter
@@ -295,9 +283,9 @@ def test_a_controller_runs_in_one_loop_at_a_time(clock: Clock) -> None:
         realtime.perf_counter = monkeypatched
 
 
-def test_status_is_true_while_the_movement_goes_on() -> None:
+def test_status_is_true_while_the_movement_goes_on(reach: pdmp.Model) -> None:
     """`while controller.step()` runs to the end; the numbers are those of C."""
-    controller = REACH.controller()
+    controller = reach.controller()
     ticks = 0
     while controller.step():
         ticks += 1
@@ -364,7 +352,7 @@ def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
             paused.speed = bad
 
 
-def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase() -> None:
+def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase(reach: pdmp.Model) -> None:
     """Nothing dies away after a start at a phase."""
     s = np.arange(100) / 100 * 2 * np.pi
     cycles = [np.column_stack([a * np.sin(s), 0.3 * a * np.cos(2 * s)]) for a in (1, 1.2, 1.5)]
@@ -386,7 +374,7 @@ def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase() -> None:
         turn = model.rollout(phase=phase, dt=1 / 1000, duration=1)
         np.testing.assert_allclose(turn.position[0], turn.position[-1], atol=1e-8)
     with pytest.raises(ValueError, match="phase"):
-        REACH.controller(phase=1.0)
+        reach.controller(phase=1.0)
     with pytest.raises(ValueError, match="phase"):
         model.controller(phase=np.nan)
 
@@ -412,9 +400,11 @@ def test_an_amplitude_changes_as_smoothly_as_tau() -> None:
     assert jump(amplitude=0.5) < 2 * jump(tau=model.tau / 2)
 
 
-def test_a_body_that_is_always_late_misses_and_does_not_burst(clock: Clock) -> None:
+def test_a_body_that_is_always_late_misses_and_does_not_burst(
+    reach: pdmp.Model, clock: Clock
+) -> None:
     """At 2.5 periods a tick the loop makes as many ticks as there is time for."""
-    run = REACH.controller().run(rate_hz=1000, duration=1, late="catch up")
+    run = pdmp.PacedLoop(reach.controller(), rate_hz=1000, duration=1, late="catch up")
     for _ in run:
         clock.work(2.5e-3)
     assert run.ticks == pytest.approx(400, abs=20)
@@ -422,24 +412,24 @@ def test_a_body_that_is_always_late_misses_and_does_not_burst(clock: Clock) -> N
     assert min(clock.slept) >= 0
 
 
-def test_commands_of_the_body_act_on_the_next_tick(clock: Clock) -> None:
+def test_commands_of_the_body_act_on_the_next_tick(reach: pdmp.Model, clock: Clock) -> None:
     """A goal set in the body of tick k is that of step k + 1."""
-    controller, alone = REACH.controller(), REACH.controller()
-    for k, _ in enumerate(controller.run(duration=0.3)):
+    controller, alone = reach.controller(), reach.controller()
+    for k, _ in enumerate(pdmp.PacedLoop(controller, duration=0.3)):
         alone.step()
         np.testing.assert_array_equal(controller.position, alone.position)
         if k == 100:
             controller.goal = alone.goal = [0.7, 0.3]
 
 
-def test_perturbations_are_asked_before_each_tick(clock: Clock) -> None:
+def test_perturbations_are_asked_before_each_tick(reach: pdmp.Model, clock: Clock) -> None:
     """What measured and coupling return is what step is given, None included."""
-    controller, alone = REACH.controller(), REACH.controller()
+    controller, alone = reach.controller(), reach.controller()
     places = [None if k % 3 else np.array([0.01 * k, 0.1]) for k in range(50)]
     terms = [None if k % 2 else ([0, 0.1], [0.01 * k, 0]) for k in range(50)]
     places_left, terms_left = iter(places), iter(terms)
     asked = {"measured": lambda: next(places_left), "coupling": lambda: next(terms_left)}
-    for k, _ in enumerate(controller.run(duration=0.05, **asked)):
+    for k, _ in enumerate(pdmp.PacedLoop(controller, duration=0.05, **asked)):
         alone.step(measured=places[k], coupling=terms[k])
         np.testing.assert_array_equal(controller.acceleration, alone.acceleration)
 
@@ -447,10 +437,14 @@ def test_perturbations_are_asked_before_each_tick(clock: Clock) -> None:
 @pytest.mark.parametrize("error", [KeyboardInterrupt, LookupError])
 @pytest.mark.parametrize("place", ["body", "measured", "sleep"])
 def test_interrupted_loops_leave_the_controller_between_two_ticks(
-    clock: Clock, monkeypatch: pytest.MonkeyPatch, error: type[BaseException], place: str
+    reach: pdmp.Model,
+    clock: Clock,
+    monkeypatch: pytest.MonkeyPatch,
+    error: type[BaseException],
+    place: str,
 ) -> None:
     """Wherever an exception comes from, it comes out, and the movement can go on."""
-    controller = REACH.controller()
+    controller = reach.controller()
     trouble = False
 
     def guard(here: str) -> None:
@@ -462,7 +456,7 @@ def test_interrupted_loops_leave_the_controller_between_two_ticks(
         clock.sleep(seconds)
 
     monkeypatch.setattr(realtime, "sleep", asleep)
-    run = controller.run(measured=lambda: guard("measured"))
+    run = pdmp.PacedLoop(controller, measured=lambda: guard("measured"))
     with pytest.raises(error):
         for tick in run:
             trouble = tick.time > 0.0095
@@ -476,19 +470,19 @@ def test_interrupted_loops_leave_the_controller_between_two_ticks(
     assert (run.missed, controller.time) == (0, pytest.approx(0.03))
 
 
-def test_paced_loops_keep_real_time() -> None:
+def test_paced_loops_keep_real_time(reach: pdmp.Model) -> None:
     """On the system's clock no tick comes early, and all of the time is moved through."""
-    controller = REACH.controller()
+    controller = reach.controller()
     begin = time.perf_counter()
-    run = controller.run(rate_hz=1000, duration=0.2, late="catch up")
+    run = pdmp.PacedLoop(controller, rate_hz=1000, duration=0.2, late="catch up")
     for tick in run:
         assert time.perf_counter() - begin >= tick.time
     assert run.ticks + run.missed >= 200
     assert controller.time == pytest.approx(tick.time)
-    assert 0 <= tick.late <= run.worst
+    assert 0 <= tick.lateness <= run.max_lateness
 
 
-def test_other_threads_run_while_a_loop_sleeps() -> None:
+def test_other_threads_run_while_a_loop_sleeps(reach: pdmp.Model) -> None:
     """A paced loop gives the interpreter away between its ticks."""
     waited = threading.Event()
     done = threading.Event()
@@ -499,7 +493,7 @@ def test_other_threads_run_while_a_loop_sleeps() -> None:
 
     thread = threading.Thread(target=other)
     thread.start()
-    run = REACH.controller().run(rate_hz=100, duration=60)
+    run = pdmp.PacedLoop(reach.controller(), rate_hz=100, duration=60)
     for _ in run:
         waited.set()
         if done.is_set():
@@ -508,9 +502,9 @@ def test_other_threads_run_while_a_loop_sleeps() -> None:
     assert run.ticks < 6000
 
 
-def test_tasks_run_beside_an_asynchronous_loop() -> None:
+def test_tasks_run_beside_an_asynchronous_loop(reach: pdmp.Model) -> None:
     """`async for` makes the same ticks, and another task is served between them."""
-    controller, alone = REACH.controller(), REACH.controller()
+    controller, alone = reach.controller(), reach.controller()
     served = 0
 
     async def serve() -> None:
@@ -519,9 +513,9 @@ def test_tasks_run_beside_an_asynchronous_loop() -> None:
             served += 1
             await asyncio.sleep(0)
 
-    async def main() -> pdmp.Run:
+    async def main() -> pdmp.PacedLoop:
         task = asyncio.create_task(serve())
-        run = controller.run(rate_hz=200, duration=0.2)
+        run = pdmp.PacedLoop(controller, rate_hz=200, duration=0.2)
         ticks = 0
         async for _ in run:
             ticks += 1
@@ -536,12 +530,12 @@ def test_tasks_run_beside_an_asynchronous_loop() -> None:
     assert run.ticks + run.missed >= 40
 
 
-def test_a_cancelled_loop_leaves_the_controller_usable() -> None:
+def test_a_cancelled_loop_leaves_the_controller_usable(reach: pdmp.Model) -> None:
     """A task that is cancelled ends between two ticks."""
-    controller = REACH.controller()
+    controller = reach.controller()
 
     async def follow() -> None:
-        async for _ in controller.run(rate_hz=500, duration=60):
+        async for _ in pdmp.PacedLoop(controller, rate_hz=500, duration=60):
             pass
 
     async def main() -> None:
@@ -570,14 +564,16 @@ BAD: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("given", "message"), BAD, ids=str)
-def test_bad_arguments_are_refused_at_the_call(given: dict[str, Any], message: str) -> None:
+def test_bad_arguments_are_refused_at_the_call(
+    reach: pdmp.Model, given: dict[str, Any], message: str
+) -> None:
     """A loop that could not run is not made."""
     with pytest.raises(ValueError) as error:
-        REACH.controller().run(**given)
+        pdmp.PacedLoop(reach.controller(), **given)
     assert message in str(error.value)
 
 
-def test_numbers_of_numpy_are_rates() -> None:
+def test_numbers_of_numpy_are_rates(reach: pdmp.Model) -> None:
     """A rate may come out of an array."""
     for number in (np.int64(100), np.float32(100)):
-        assert next(iter(REACH.controller().run(number))).time > 0
+        assert next(iter(pdmp.PacedLoop(reach.controller(), number))).time > 0

@@ -128,3 +128,14 @@ def test_all_recordings_of_handwriting_are_counted() -> None:
     """Thirty shapes of seven demonstrations."""
     n_demos = sum(map(len, pdmp.datasets.handwriting().values()))
     assert n_demos == REGISTRY["handwriting"].n_recordings
+
+
+def test_recordings_are_named_by_the_variable_alone() -> None:
+    """No test, bench, module or make target has a path to recordings outside the repository."""
+    files = [ROOT / "Makefile"]
+    for folder_name in ("python", "reproduction", "tests", "benches", "fuzz", "crates"):
+        for suffix in ("py", "rs"):
+            files += (ROOT / folder_name).rglob(f"*.{suffix}")
+    assert len(files) > 100
+    outside = "shared" + "/data"
+    assert not [path for path in files if outside in path.read_text(encoding="utf-8")]

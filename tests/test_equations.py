@@ -78,7 +78,7 @@ def test_reaching_solves_the_equations(options: dict[str, Any], basis: Any) -> N
     """
     model = pdmp.fit(reaches(), n_styles=2, basis=basis, **options)
     goal, tau = np.array([1.2, 0.3]), 0.8 * model.tau
-    made = model.rollout(STYLE, goal=goal, start=START, tau=tau, dt=0.01, duration=2 * tau)
+    made = model.rollout(style=STYLE, goal=goal, start=START, tau=tau, dt=0.01, duration=2 * tau)
     moved = made.position - frame(model, goal, made.time / tau)
     end = model.durations[model.nominal] * tau / model.tau
     path, last = solve(model, STYLE, goal, moved[0], np.zeros(2), tau, (0.0, end))
@@ -94,7 +94,7 @@ def test_start_velocity_sets_the_auxiliary_state(transport: Any) -> None:
     """z(0) = tau v - w(0) leads to the same movement as `velocity`."""
     model = pdmp.fit(reaches(), n_styles=2, transport=transport)
     velocity, goal = np.array([0.3, -0.4]), model.goals[2]
-    made = model.rollout(STYLE, start=START, velocity=velocity, dt=0.01)
+    made = model.rollout(style=STYLE, start=START, velocity=velocity, dt=0.01)
     moved = made.position - frame(model, goal, made.time / model.tau)
     z = model.tau * velocity - STYLE @ model.landscape([0.0])[0]
     path, _ = solve(model, STYLE, goal, moved[0], z, model.tau, (0.0, made.time[-1]))
@@ -108,7 +108,7 @@ def test_cycling_solves_the_equations(amplitude: float) -> None:
     model = pdmp.fit(loops(), kind="rhythmic", n_styles=2)
     anchor, velocity, tau = np.array([0.5, 0.2]), np.array([0.2, 1.0]), 1.3 * model.tau
     made = model.rollout(
-        STYLE, anchor=anchor, start=START, velocity=velocity, amplitude=amplitude, tau=tau,
+        style=STYLE, anchor=anchor, start=START, velocity=velocity, amplitude=amplitude, tau=tau,
         dt=0.01, duration=4 * np.pi * tau,
     )  # fmt: skip
     z = tau * velocity - amplitude * (STYLE @ model.landscape([0.0])[0])
@@ -169,8 +169,8 @@ def test_context_predicts_unseen_movements(linear: pdmp.Model, height: float) ->
     """Between and beyond the demonstrations, the movement of the family is made."""
     prediction = linear.predict([height])
     expected = BASE + height * SHAPE
-    np.testing.assert_allclose(prediction.goal, expected[-1], atol=1e-9)
-    np.testing.assert_allclose(prediction.start, expected[0], atol=1e-9)
+    np.testing.assert_allclose(prediction.conditions.goal, expected[-1], atol=1e-9)
+    np.testing.assert_allclose(prediction.conditions.start, expected[0], atol=1e-9)
     assert prediction.duration == pytest.approx(100 * DT)
     made = linear.rollout(context=[height], dt=DT)
     np.testing.assert_allclose(made.position, expected, atol=1e-4)
@@ -181,7 +181,9 @@ def test_rollout_in_context_is_the_rollout_of_its_prediction(linear: pdmp.Model)
     p = linear.predict([0.4])
     tau = linear.tau * p.duration / linear.durations[linear.nominal]
     made = linear.rollout(context=[0.4], goal=[2.0, 2.0])
-    expected = linear.rollout(p.style, goal=[2.0, 2.0], start=p.start, tau=tau)
+    expected = linear.rollout(
+        style=p.conditions.style, goal=[2.0, 2.0], start=p.conditions.start, tau=tau
+    )
     np.testing.assert_array_equal(made.position, expected.position)
 
 

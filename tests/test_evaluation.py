@@ -17,7 +17,6 @@ from pdmp.evaluation import (
     LinearWeights,
     MovedGoal,
     NearestDemonstration,
-    PeerWeights,
     Recordings,
     baselines,
 )
@@ -106,7 +105,7 @@ def test_full_primitive_is_principal_components() -> None:
     The difference is the interpolation error of the landscape.
     """
     contexts = [[height**2] for height in HEIGHTS]
-    full = PDMP(map="linear", spectrum=1.0, basis=pdmp.GP(noise=1e-10))
+    full = PDMP(map="linear", singular_value_share=1.0, basis=pdmp.GP(noise=1e-10))
     pair = {"PDMP": full, "PCA": LinearWeights(Components(1.0))}
     found = pdmp.evaluate(arches(HEIGHTS), dt=0.01, contexts=contexts, predictors=pair)
     for ours, theirs in zip(*(found.forecasts[name] for name in pair), strict=True):
@@ -361,7 +360,7 @@ def mannered() -> tuple[list[np.ndarray], list[list[float | str]]]:
 def test_labels_are_conditions_too() -> None:
     """A label tells of a condition beside numbers, to primitives and all others alike."""
     movements, contexts = mannered()
-    predictors = baselines() | {"PDMP": PDMP(map="linear", spectrum=0.999)}
+    predictors = baselines() | {"PDMP": PDMP(map="linear", singular_value_share=0.999)}
     found = pdmp.evaluate(movements, contexts=contexts, dt=0.01, predictors=predictors)
     assert {split.reach for split in found.splits} == {"interpolation", "extrapolation"}
     assert sum(len(split.test) for split in found.splits) == len(movements)
@@ -380,11 +379,3 @@ def test_labels_held_out_altogether_are_refused() -> None:
     mixed = [[0.1], *manners[1:]]
     with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 numbers"):
         pdmp.evaluate(movements, contexts=mixed, dt=0.01)
-
-
-def test_weights_of_the_peer_give_movements_back() -> None:
-    """A ProMP of movement_primitives with a linear map foresees what is linear in its context."""
-    pytest.importorskip("movement_primitives")
-    found = evaluated({"peer": LinearWeights(PeerWeights())})
-    assert found.summary("peer", "interpolation").relative < 1e-3
-    assert found.summary("peer", "extrapolation").relative < 1e-3

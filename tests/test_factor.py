@@ -36,13 +36,13 @@ def test_product_is_numpys_of_the_same_rank(
         found.singular_values[:n_styles], sigma[:n_styles], atol=1e-10 * sigma[0]
     )
     left = np.sqrt(np.sum(sigma[n_styles:] ** 2) / np.sum(sigma**2))
-    assert abs(found.left_out - left) < 1e-6
+    assert abs(found.truncation_error - left) < 1e-6
     assert np.abs(found.styles.T @ found.styles - np.eye(n_styles)).max() < 1e-12
     gap = sigma[n_styles - 1] - (sigma[n_styles] if n_styles < len(sigma) else 0)
     if gap > 1e-3 * sigma[0]:
         product = (u[:, :n_styles] * sigma[:n_styles]) @ vt[:n_styles]
         np.testing.assert_allclose(found.styles @ found.basis, product, atol=1e-7 * sigma[0])
-    by_share = pdmp.factorise(targets, spectrum=share).styles.shape[1]
+    by_share = pdmp.factorise(targets, singular_value_share=share).styles.shape[1]
     sums = np.cumsum(sigma) / sigma.sum()
     rounding = 1e-6
     assert np.sum(sums <= share - rounding) < by_share <= np.sum(sums <= share + rounding) + 1
@@ -70,7 +70,7 @@ def test_few_styles_of_many_demonstrations_are_the_first_of_more() -> None:
     assert len(few.singular_values) == 3 and len(more.singular_values) > 100
     np.testing.assert_allclose(few.singular_values, more.singular_values[:3], rtol=1e-10)
     np.testing.assert_allclose(few.styles, more.styles[:, :3], atol=1e-8)
-    assert more.left_out < few.left_out < 1
+    assert more.truncation_error < few.truncation_error < 1
 
 
 def test_what_styles_leave_out_is_told_and_kept() -> None:
@@ -80,8 +80,8 @@ def test_what_styles_leave_out_is_told_and_kept() -> None:
     model = pdmp.fit(demos, dt=0.01, n_styles=1)
     sigma = model.singular_values
     expected = np.sqrt(np.sum(sigma[1:] ** 2) / np.sum(sigma**2))
-    assert model.left_out == pytest.approx(expected, abs=1e-6)
-    assert pdmp.fit([demos[0]] * 3, dt=0.01).left_out < 1e-6
+    assert model.truncation_error == pytest.approx(expected, abs=1e-6)
+    assert pdmp.fit([demos[0]] * 3, dt=0.01).truncation_error < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -90,8 +90,8 @@ def test_what_styles_leave_out_is_told_and_kept() -> None:
         ({"n_styles": 0}, "0"),
         ({"n_styles": 4}, "4.*3"),
         ({"n_styles": -1}, "must not be negative"),
-        ({"spectrum": 0.0}, r"spectrum = 0.*\(0, 1\]"),
-        ({"spectrum": float("nan")}, "spectrum"),
+        ({"singular_value_share": 0.0}, r"singular_value_share = 0.*\(0, 1\]"),
+        ({"singular_value_share": float("nan")}, "singular_value_share"),
     ],
 )
 def test_number_of_factors_out_of_range_is_refused(options: dict[str, float], message: str) -> None:

@@ -28,7 +28,7 @@ def reproduction_error(model: pdmp.Model, demos: list[Demonstration], m: int) ->
     demo = demos[m]
     time = demo.time - demo.time[0]
     dt = model.durations[m] / (demo.n_samples - 1)
-    made = model.rollout(**pdmp.as_demonstrated(model, m), dt=dt)
+    made = model.rollout(model.conditions(m), dt=dt)
     shown = interpolate.CubicSpline(time, demo.position)(made.time)
     return float(np.sqrt(np.mean((made.position - shown) ** 2)) / np.ptp(demo.position, 0).max())
 
@@ -97,10 +97,10 @@ def test_sharp_turns_between_few_samples_are_kept() -> None:
     """What jumps within a sample is given back, though its target shows only between samples."""
     u = np.linspace(0, 1, 101)[:, None]
     demos = [size * (u > 0.005) * (1.5 + np.cos(9 * u)) * (1 - u) for size in (1, 2, 3)]
-    model = pdmp.fit(demos, dt=0.01, spectrum=1.0)
-    coarse = pdmp.fit(demos, dt=0.01, spectrum=1.0, n_samples=101)
+    model = pdmp.fit(demos, dt=0.01, singular_value_share=1.0)
+    coarse = pdmp.fit(demos, dt=0.01, singular_value_share=1.0, n_samples=101)
     off = [
-        np.abs(each.rollout(**pdmp.as_demonstrated(each, 2), dt=0.01).position - demos[2]).max()
+        np.abs(each.rollout(each.conditions(2), dt=0.01).position - demos[2]).max()
         for each in (model, coarse)
     ]
     assert off[0] < 0.02 < 0.1 < off[1]
@@ -116,7 +116,7 @@ def test_styles_are_orthonormal(n_styles: int) -> None:
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.99, 0.999999, 1.0])
 def test_spectrum_keeps_the_fewest_that_exceed_its_share(share: float) -> None:
     """J is the smallest for which the sum of the values kept exceeds the share of all."""
-    model = pdmp.fit(reaches(), spectrum=share)
+    model = pdmp.fit(reaches(), singular_value_share=share)
     shares = np.cumsum(model.singular_values) / model.singular_values.sum()
     assert model.n_styles == min(5, 1 + np.sum(shares <= share))
 
@@ -161,7 +161,7 @@ def test_automatic_smoothing_comes_closer_to_what_was_meant() -> None:
 
     def error(smoothing: Any) -> float:
         model = pdmp.fit(recorded, dt=0.01, n_styles=2, smoothing=smoothing)
-        made = [model.rollout(**pdmp.as_demonstrated(model, m)).position for m in range(6)]
+        made = [model.rollout(model.conditions(m)).position for m in range(6)]
         return float(np.sqrt(np.mean(np.square(np.array(made) - clean))))
 
     assert error("auto") < 0.7 * 0.01
@@ -222,7 +222,7 @@ def test_repetitions_of_one_movement_are_one_style(seed: int) -> None:
     assert model.n_styles == 1
     peak = np.abs(pdmp.fit([clean], dt=0.01).rollout().acceleration).max()
     for m in range(0, 100, 20):
-        made = model.rollout(**pdmp.as_demonstrated(model, m))
+        made = model.rollout(model.conditions(m))
         assert np.abs(made.acceleration).max() < 1.3 * peak
 
 
@@ -233,10 +233,10 @@ def test_noise_does_not_kick_a_joint_at_rest() -> None:
     recorded = [clean + 5e-4 * random.normal(size=clean.shape) for _ in range(5)]
     model = pdmp.fit(recorded, dt=0.01)
     for m in range(5):
-        made = model.rollout(**pdmp.as_demonstrated(model, m))
+        made = model.rollout(model.conditions(m))
         assert np.abs(made.acceleration[:, 1]).max() < 1.0
     kicked = pdmp.fit(recorded, dt=0.01, smoothing=None)
-    assert np.abs(kicked.rollout(**pdmp.as_demonstrated(kicked, 0)).acceleration[:, 1]).max() > 10
+    assert np.abs(kicked.rollout(kicked.conditions(0)).acceleration[:, 1]).max() > 10
 
 
 def test_layout_of_noisy_arrays_does_not_matter() -> None:
@@ -278,9 +278,9 @@ def test_degrees_of_freedom_in_different_units_weigh_alike() -> None:
         )
         for turn in turns
     ]
-    model = pdmp.fit(demos, spectrum=0.9)
+    model = pdmp.fit(demos, singular_value_share=0.9)
     assert model.dof_scale == pytest.approx([400, 400, np.ptp(demos[0].position[:, 2])], rel=1e-3)
-    made = model.rollout(**pdmp.as_demonstrated(model, 7))
+    made = model.rollout(model.conditions(7))
     assert made.position[:, 2].max() == pytest.approx(1.0, abs=0.02)
 
 

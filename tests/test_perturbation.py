@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 
 import pdmp
-from synthetic import loops, reaches
-
-MODELS = [pdmp.fit(reaches()), pdmp.fit(loops(), kind="rhythmic", n_styles=2)]
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_zero_perturbation_changes_nothing(model: pdmp.Model) -> None:
     """A robot where it should be and terms of zero leave the movement what it was."""
     plain, perturbed = model.controller(), model.controller()
@@ -20,18 +16,18 @@ def test_zero_perturbation_changes_nothing(model: pdmp.Model) -> None:
     np.testing.assert_array_equal(plain.acceleration, perturbed.acceleration)
 
 
-def test_coupling_adds_to_velocity_and_acceleration() -> None:
+def test_coupling_adds_to_velocity_and_acceleration(reach: pdmp.Model) -> None:
     """Over a short tick the terms are what is added."""
-    plain, coupled = (MODELS[0].controller(dt=1e-7) for _ in range(2))
+    plain, coupled = (reach.controller(dt=1e-7) for _ in range(2))
     plain.step()
     coupled.step(coupling=((0.5, 0), np.float32([0, 3])))
     np.testing.assert_allclose(coupled.velocity - plain.velocity, [0.5, 0], atol=1e-5)
     np.testing.assert_allclose((coupled.acceleration - plain.acceleration)[1], 3, atol=1e-4)
 
 
-def test_held_robot_waits_and_then_arrives() -> None:
+def test_held_robot_waits_and_then_arrives(reach: pdmp.Model) -> None:
     """Held for longer than the movement lasts, it neither finishes nor misses its goal then."""
-    model = MODELS[0]
+    model = reach
     controller = model.controller()
     for _ in range(500):
         controller.step()
@@ -45,9 +41,9 @@ def test_held_robot_waits_and_then_arrives() -> None:
     np.testing.assert_allclose(controller.position, controller.goal, atol=2e-3)
 
 
-def test_robot_that_sags_is_as_far_from_the_goal_as_it_sags() -> None:
+def test_robot_that_sags_is_as_far_from_the_goal_as_it_sags(reach: pdmp.Model) -> None:
     """A constant error keeps the movement neither from its goal nor from its end."""
-    controller = MODELS[0].controller()
+    controller = reach.controller()
     sag = np.array([0.0, 0.02])
     while controller.step(measured=controller.position - sag) == pdmp.Status.WORKING:
         assert controller.time < 6
@@ -57,9 +53,11 @@ def test_robot_that_sags_is_as_far_from_the_goal_as_it_sags() -> None:
 @pytest.mark.parametrize(
     "bad", [[0.0], [0.0] * 3, [0.0, np.nan], [np.inf, 0.0], [[0.0, 0.0]], ["a", "b"]]
 )
-def test_bad_perturbations_are_refused_and_change_nothing(bad: list[object]) -> None:
+def test_bad_perturbations_are_refused_and_change_nothing(
+    reach: pdmp.Model, bad: list[object]
+) -> None:
     """Wrong shapes and numbers that are not finite are named; the state stays as it was."""
-    controller = MODELS[0].controller()
+    controller = reach.controller()
     controller.step()
     before = controller.position.copy()
     for name, arguments in (
@@ -75,9 +73,9 @@ def test_bad_perturbations_are_refused_and_change_nothing(bad: list[object]) -> 
     assert controller.time == 0.001
 
 
-def test_compliance_is_checked_and_survives_a_reset() -> None:
+def test_compliance_is_checked_and_survives_a_reset(reach: pdmp.Model) -> None:
     """Gains have defaults, are refused when negative, and belong to the controller."""
-    controller = MODELS[0].controller()
+    controller = reach.controller()
     assert controller.compliance == (1000, 10)
     controller.compliance = (200, 0)
     for bad in ((-1, 0), (0, np.nan), (np.inf, 0)):

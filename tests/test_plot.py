@@ -109,7 +109,7 @@ def test_styles_of_any_dimension_can_be_drawn(n_styles: int) -> None:
 
 def test_fan_has_a_movement_per_share(model: pdmp.Model) -> None:
     """As many movements as asked for, and a bar that names the two ends."""
-    ends = [{"style": model.styles[m]} for m in (0, 4)]
+    ends = [model.conditions(m) for m in (0, 4)]
     figure = plot.fan(model, *ends, n=6, ends=("left", "right"))
     assert len(figure.axes[0].lines) == 6
     ticks = [text.get_text() for text in figure.axes[-1].get_yticklabels()]
@@ -118,7 +118,7 @@ def test_fan_has_a_movement_per_share(model: pdmp.Model) -> None:
 
 def test_fan_needs_two_ends(model: pdmp.Model) -> None:
     """A single movement is no fan."""
-    style = {"style": model.styles[0]}
+    style = model.conditions(0)
     with pytest.raises(ValueError, match="n = 1"):
         plot.fan(model, style, style, n=1)
 

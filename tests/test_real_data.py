@@ -30,7 +30,7 @@ def worst_error(model: pdmp.Model, demos: list[Demonstration]) -> float:
     errors = []
     for m, demo in enumerate(demos):
         steps = demo.n_samples - (model.kind == "discrete")
-        made = model.rollout(**pdmp.as_demonstrated(model, m), dt=model.durations[m] / steps)
+        made = model.rollout(model.conditions(m), dt=model.durations[m] / steps)
         difference = made.position[: demo.n_samples] - demo.position
         errors.append(np.sqrt(np.mean(difference**2)) / np.ptp(demo.position, axis=0).max())
     return max(errors)
@@ -116,7 +116,7 @@ def test_running_strides_are_given_back() -> None:
     demos = [Demonstration(demo.position[:-1], dt=0.01, names=demo.names) for demo in whole]
     model = pdmp.fit(demos, kind="rhythmic", n_styles=len(demos))
     assert worst_error(model, demos) <= 5e-3
-    assert_finite(model.rollout(model.styles.mean(axis=0), duration=5.0))
+    assert_finite(model.rollout(style=model.styles.mean(axis=0), duration=5.0))
 
 
 def strides() -> dict[str, list[float]]:

@@ -102,9 +102,9 @@ def test_error_saturates_at_three_styles(reaching: Reaching) -> None:
     and 0.012 with three.
     """
     found = heights.errors(reaching, most=6)
-    foreseen, best = found.foreseen.mean(axis=1), found.best.mean(axis=1)
-    np.testing.assert_allclose(foreseen[3:], foreseen[2], rtol=0.02)
-    assert foreseen[0] < foreseen[2] < 0.95 * foreseen[1] < 0.06
+    predicted, best = found.predicted.mean(axis=1), found.best.mean(axis=1)
+    np.testing.assert_allclose(predicted[3:], predicted[2], rtol=0.02)
+    assert predicted[0] < predicted[2] < 0.95 * predicted[1] < 0.06
     assert (np.diff(best) < 0).all()
     assert best[2] < 0.6 * best[1] < 0.02
 
@@ -130,7 +130,7 @@ def test_every_other_style_clears_its_boxes(reaching: Reaching, learnt: pdmp.Mod
 @pytest.mark.parametrize(("n_styles", "height", "touches"), [(1, 0.15, True), (3, 0.15, False)])
 def test_new_heights(reaching: Reaching, n_styles: int, height: float, touches: bool) -> None:
     """What is foreseen for one box clears it with three styles, and not with one."""
-    robot = heights.foresee(heights.learn(reaching, n_styles), reaching, height)
+    robot = heights.reach_predicted(heights.learn(reaching, n_styles), reaching, height)
     assert (robot.log.contact() > 0) == touches
     assert reaching.miss(robot.log.hands[-1]) < CLOSE
 
@@ -140,7 +140,7 @@ def test_four_boxes_are_brushed(reaching: Reaching) -> None:
 
     The paper's movement clears them; ours meets the elbow's limit on the way. It still arrives.
     """
-    robot = heights.foresee(heights.learn(reaching, 3), reaching, 0.60)
+    robot = heights.reach_predicted(heights.learn(reaching, 3), reaching, 0.60)
     assert 0 < robot.log.contact() < 0.05
     assert np.min(robot.log.measured, axis=0)[3] == pytest.approx(reaching.arm.lowest[3], abs=0.01)
     assert np.min(robot.log.commanded, axis=0)[3] < reaching.arm.lowest[3] - 0.1
@@ -154,7 +154,9 @@ def test_every_style_reaches_every_goal(reaching: Reaching, learnt: pdmp.Model) 
         added = []
         for style in learnt.styles:
             there, here = (
-                learnt.rollout(style, goal=g, start=reaching.start, duration=8.0, dt=0.02).position
+                learnt.rollout(
+                    style=style, goal=g, start=reaching.start, duration=8.0, dt=0.02
+                ).position
                 for g in (goal, near)
             )
             np.testing.assert_allclose(there[-1], goal, atol=1e-3)
@@ -167,7 +169,7 @@ def test_goal_moved_on_the_way_is_reached(reaching: Reaching) -> None:
     model = heights.learn(reaching, 3)
     command = heights.new_goal(model, reaching)
     assert reaching.miss(reaching.arm.places(command.goal)[2]) > 100
-    robot = heights.foresee(model, reaching, 0.15, command)
+    robot = heights.reach_predicted(model, reaching, 0.15, command)
     assert reaching.miss(robot.log.hands[-1], command.goal) < CLOSE
     assert robot.log.contact() == 0
     assert robot.log.tracking_error() < 5e-3
@@ -358,3 +360,12 @@ def test_commands_report_errors_in_one_line(
     """A request that cannot be met ends with exit code 1 and its reason."""
     assert main(["fig2", "--seed", "-1", "-o", str(tmp_path)]) == 1
     assert capsys.readouterr().err.strip() == "error: seed = -1: must not be negative"
+
+
+def test_package_has_no_part_of_the_reproduction() -> None:
+    """No module of the package names the robot, its physics engine or the reproduction."""
+    root = Path(pdmp.__file__).parent
+    modules = list(root.rglob("*.py"))
+    assert len(modules) > 30
+    named = re.compile("mujoco|robosuite|baxter|reproduction[./]", re.IGNORECASE)
+    assert not [path for path in modules if named.search(path.read_text(encoding="utf-8"))]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pdmp
-from pdmp import Demonstration, Warp
+from pdmp import Demonstration, TimeWarp
 
 N = 201
 SHARES = np.linspace(0, 1, N)
@@ -41,18 +41,18 @@ def test_what_differs_in_time_alone_has_one_singular_value() -> None:
         return np.linalg.norm(model.singular_values[1:]) / model.singular_values[0]
 
     assert rest(warped) < 0.1 * rest(linear)
-    assert linear.timings.shape == (5, 1) and warped.timings.shape == (5, 8)
-    np.testing.assert_allclose(warped.timings.sum(axis=1), warped.durations)
+    assert linear.segment_durations.shape == (5, 1) and warped.segment_durations.shape == (5, 8)
+    np.testing.assert_allclose(warped.segment_durations.sum(axis=1), warped.durations)
     np.testing.assert_allclose(warped.durations, linear.durations, rtol=1e-12)
 
 
-@pytest.mark.parametrize("alignment", ["warp", Warp(5, slope=3)])
-def test_demonstrations_are_played_back_in_their_own_time(alignment: str | Warp) -> None:
+@pytest.mark.parametrize("alignment", ["warp", TimeWarp(5, max_slope=3)])
+def test_demonstrations_are_played_back_in_their_own_time(alignment: str | TimeWarp) -> None:
     """What `as_demonstrated` gives repeats a demonstration, hurry and all."""
     shown = demos([0.0, 0.4, -0.4], [0.3, 0.2, 0.4])
     model = pdmp.fit(shown, nominal=0, alignment=alignment, n_styles=3)
     for m, demo in enumerate(shown):
-        made = model.rollout(**pdmp.as_demonstrated(model, m), dt=1 / (N - 1))
+        made = model.rollout(model.conditions(m), dt=1 / (N - 1))
         np.testing.assert_allclose(made.position, demo.position, atol=0.01)
         rates = np.gradient(made.position, made.time, axis=0)
         np.testing.assert_allclose(rates[2:-2], made.velocity[2:-2], atol=0.05)
@@ -67,7 +67,7 @@ def test_events_are_met_at_one_phase() -> None:
     events = np.array([np.interp(phases, hurried(bend), SHARES) for bend in (0.0, 0.4, -0.4)])
     model = pdmp.fit(shown, nominal=0, events=events, n_styles=3)
     np.testing.assert_allclose(model.breaks, [0, *phases, 1])
-    np.testing.assert_allclose(np.cumsum(model.timings, axis=1)[:, :2], events)
+    np.testing.assert_allclose(np.cumsum(model.segment_durations, axis=1)[:, :2], events)
     np.testing.assert_allclose(
         model.style_of(shown[2], events=events[2]), model.styles[2], atol=0.01
     )
@@ -77,9 +77,11 @@ def test_events_are_met_at_one_phase() -> None:
 
 def test_timing_is_foreseen_from_the_context() -> None:
     """Where hurry goes with the context, a context never shown has its own, and a band about it."""
-    model = pdmp.fit(demos(list(np.linspace(-0.4, 0.4, 9))), nominal=4, alignment=Warp())
+    model = pdmp.fit(demos(list(np.linspace(-0.4, 0.4, 9))), nominal=4, alignment=TimeWarp())
     found = model.predict([0.15])
-    assert found.timing.shape == (8,) and found.duration == pytest.approx(1, abs=1e-6)
+    assert found.conditions.segment_durations.shape == (8,) and found.duration == pytest.approx(
+        1, abs=1e-6
+    )
     size = model.n_styles + 2 * model.n_dofs + 8
     assert found.covariance.shape == (size, size)
     made = model.rollout(context=[0.15], dt=1 / (N - 1)).position
@@ -94,18 +96,21 @@ def test_warp_by_name_foresees_no_worse_than_linear_scaling() -> None:
     heights = np.linspace(0.2, 0.4, 12)
     shown = demos(list(rng.uniform(-0.5, 0.5, 12)), list(heights))
     contexts = heights[:, None]
-    assert pdmp.fit(shown, contexts=contexts, alignment="warp").timings.shape == (12, 1)
-    assert pdmp.fit(shown, contexts=contexts, alignment=Warp()).timings.shape == (12, 8)
+    assert pdmp.fit(shown, contexts=contexts, alignment="warp").segment_durations.shape == (12, 1)
+    assert pdmp.fit(shown, contexts=contexts, alignment=TimeWarp()).segment_durations.shape == (
+        12,
+        8,
+    )
     bare = [demo.position for demo in shown]
-    assert pdmp.fit(bare, dt=1 / (N - 1), alignment="warp").timings.shape == (12, 8)
+    assert pdmp.fit(bare, dt=1 / (N - 1), alignment="warp").segment_durations.shape == (12, 8)
 
 
 def test_warp_by_name_takes_fewer_segments_on_short_recordings() -> None:
     """Eight segments need 16 samples of each; asked for by number, they are refused with that."""
     short = [demo.position[::20] for demo in demos([0.0, 0.4, -0.4])]  # 11 samples
-    assert pdmp.fit(short, dt=0.1, alignment="warp").timings.shape == (3, 5)
+    assert pdmp.fit(short, dt=0.1, alignment="warp").segment_durations.shape == (3, 5)
     with pytest.raises(ValueError, match="segments = 8: must lie between 1 and 5"):
-        pdmp.fit(short, dt=0.1, alignment=Warp())
+        pdmp.fit(short, dt=0.1, alignment=TimeWarp())
 
 
 def test_a_band_knows_that_timing_is_uncertain() -> None:
@@ -116,7 +121,7 @@ def test_a_band_knows_that_timing_is_uncertain() -> None:
         bends = list(rng.uniform(-0.5, 0.5, 14))
         shown = demos(bends, list(np.linspace(0.2, 0.4, 14)))
         heights = np.linspace(0.2, 0.4, 14)[:, None]
-        model = pdmp.fit(shown, contexts=heights, alignment=Warp())
+        model = pdmp.fit(shown, contexts=heights, alignment=TimeWarp())
         lower, upper = model.band([0.3], dt=1 / (N - 1))
         for bend in rng.uniform(-0.5, 0.5, 10):
             new = reach(hurried(bend))
@@ -127,11 +132,11 @@ def test_a_band_knows_that_timing_is_uncertain() -> None:
 def test_a_loop_follows_a_timing() -> None:
     """A controller whose tau is set at every tick is where the rollout is."""
     model = pdmp.fit(demos([0.0, 0.4, -0.4]), nominal=0, alignment="warp")
-    given = pdmp.as_demonstrated(model, 1)
-    planned = model.rollout(**given, dt=0.001).position
-    controller = model.controller(dt=0.001, **given, transition=0)
+    given = model.conditions(1)
+    planned = model.rollout(given, dt=0.001).position
+    controller = model.controller(0.001, given, transition=0)
     for row in planned[1:]:
-        controller.tau = model.tau_at(controller.phase, given["timing"])
+        controller.tau = model.tau_at(controller.phase, given.segment_durations)
         controller.step()
         np.testing.assert_allclose(controller.position, row, atol=0.01)
 
@@ -141,8 +146,8 @@ def test_timing_survives_a_file() -> None:
     model = pdmp.fit(demos([0.0, 0.4, -0.4]), alignment="warp")
     other = pickle.loads(pickle.dumps(model))
     np.testing.assert_array_equal(other.breaks, model.breaks)
-    np.testing.assert_array_equal(other.timings, model.timings)
-    a, b = (m.rollout(**pdmp.as_demonstrated(m, 1), dt=0.01) for m in (model, other))
+    np.testing.assert_array_equal(other.segment_durations, model.segment_durations)
+    a, b = (m.rollout(m.conditions(1), dt=0.01) for m in (model, other))
     np.testing.assert_array_equal(a.position, b.position)
     np.testing.assert_array_equal(other.style_of(demos([0.3])[0]), model.style_of(demos([0.3])[0]))
 
@@ -152,9 +157,9 @@ def test_timing_survives_a_file() -> None:
     [
         (
             {"alignment": "elastic"},
-            'alignment = \'elastic\': must be "linear", "warp" or pdmp.Warp',
+            'alignment = \'elastic\': must be "linear", "warp" or pdmp.TimeWarp',
         ),
-        ({"alignment": Warp(101)}, "segments = 101: must lie between 1 and 100"),
+        ({"alignment": TimeWarp(101)}, "segments = 101: must lie between 1 and 100"),
         ({"events": [[0.5], [0.5]]}, "events has length 2, expected 3: one value per demo"),
         ({"events": [[0.5, 0.4]] * 3}, r"events\[1\] = 0.4 s must come after 0.5 s"),
         ({"events": [[np.nan]] * 3}, "events"),
@@ -173,15 +178,15 @@ def test_what_cannot_align_is_refused(options: dict[str, object], message: str) 
 def test_warps_out_of_range_are_refused(arguments: tuple[float, ...], message: str) -> None:
     """A warp of no segment, or one that could not even be linear, is none."""
     with pytest.raises(ValueError, match=message):
-        Warp(*arguments)
+        TimeWarp(*arguments)
 
 
 def test_tau_and_timing_exclude_each_other() -> None:
     """A movement has one pace or a pace for each segment."""
     model = pdmp.fit(demos([0.0, 0.4, -0.4]), alignment="warp")
-    with pytest.raises(ValueError, match="pass tau or timing, not both"):
-        model.rollout(tau=1.0, timing=model.timings[0])
-    with pytest.raises(ValueError, match="timing has length 2, expected 8"):
-        model.rollout(timing=[0.5, 0.5])
-    with pytest.raises(ValueError, match="timing"):
-        model.rollout(timing=[-1.0] + [0.1] * 7)
+    with pytest.raises(ValueError, match="pass tau or segment_durations, not both"):
+        model.rollout(tau=1.0, segment_durations=model.segment_durations[0])
+    with pytest.raises(ValueError, match="segment_durations has length 2, expected 8"):
+        model.rollout(segment_durations=[0.5, 0.5])
+    with pytest.raises(ValueError, match="segment_durations"):
+        model.rollout(segment_durations=[-1.0] + [0.1] * 7)

@@ -47,7 +47,9 @@ def test_start_and_goal_of_another_lead_to_its_path() -> None:
     ]
     model = pdmp.fit(paths, dt=0.01, n_styles=1)
     for m in range(6):
-        made = model.rollout(model.styles[0], start=starts[m], goal=goals[m], dt=0.01).position
+        made = model.rollout(
+            style=model.styles[0], start=starts[m], goal=goals[m], dt=0.01
+        ).position
         np.testing.assert_allclose(made, paths[m], atol=0.02 * np.ptp(paths[m]))
 
 
@@ -153,7 +155,7 @@ def test_bad_transport_is_refused() -> None:
 def after(model: pdmp.Model, m: int) -> tuple[np.ndarray, np.ndarray]:
     """Return how far a movement is from its goal past its end, and its accelerations there."""
     duration = model.durations[m]
-    made = model.rollout(**pdmp.as_demonstrated(model, m), dt=0.001, duration=3 * duration)
+    made = model.rollout(model.conditions(m), dt=0.001, duration=3 * duration)
     late = made.time > duration + 1e-9
     return np.abs(made.position[late] - model.goals[m]), np.abs(made.acceleration[late])
 

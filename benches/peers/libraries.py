@@ -14,7 +14,7 @@ def movement_primitives_dmp() -> Any:
     """Makes a primitive of movement_primitives that has learnt one demonstration."""
     from movement_primitives.dmp import DMP
 
-    # An int_dt above dt lets Euler take a tick in one piece, whatever the rounding of the time.
+    # An int_dt above dt lets Euler take a tick in one piece, for any rounding of the time.
     dmp = DMP(N_DOFS, execution_time=1.0, dt=DT, n_weights_per_dim=N_BASIS, int_dt=2 * DT)
     dmp.imitate(np.linspace(0, 1, 1001), movement(0))
     return dmp

@@ -1,1 +1,1 @@
-"""How well movements are foreseen from their context: the primitive beside simpler predictors."""
+"""Prediction of movements from their context: the primitive and simpler predictors."""

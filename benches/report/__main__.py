@@ -8,20 +8,20 @@ import argparse
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from pdmp import Warp, plot
+from pdmp import TimeWarp, plot
 from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
 from report.sets import Question, questions
-from report.text import FORESEEN, PRIMITIVE, WARPED, text
+from report.text import PRIMITIVE, SELECTED, WARPED, text
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "out" / "report"
 CURVES = {"raise_hand_bandai, whole", "walking_force_speed, subject 0"}
 PRIMITIVES = {
     PRIMITIVE: PDMP(),
-    "PDMP, full J": PDMP(spectrum=1.0),
+    "PDMP, full J": PDMP(singular_value_share=1.0),
     "PDMP, linear map": PDMP(map="linear"),
-    FORESEEN: PDMP(n_styles="auto"),
-    WARPED: PDMP(alignment=Warp(4)),
+    SELECTED: PDMP(n_styles="auto"),
+    WARPED: PDMP(alignment=TimeWarp(4)),
 }
 
 
@@ -31,6 +31,8 @@ def main() -> None:
     arguments.add_argument("--write", action="store_true", help="write docs/report.md")
     write = arguments.parse_args().write
     asked = list(questions())
+    if not asked:
+        raise SystemExit("no recordings: set PDMP_DATA to a folder with sets of them")
     answers: list[tuple[Question, Evaluation]] = []
     with ProcessPoolExecutor() as pool:
         for question, found in zip(asked, pool.map(answer, asked), strict=True):

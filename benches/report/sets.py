@@ -19,7 +19,7 @@ STRIDES = 3  # of each runner
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Demonstrations, and what they are to be foreseen from."""
+    """Demonstrations, and the contexts to predict them from."""
 
     name: str
     context: str

@@ -4,23 +4,23 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import pdmp
-from pdmp import Warp
+from pdmp import TimeWarp
 from pdmp.evaluation import Evaluation, baselines
 from pdmp.evaluation.result import REFERENCE
 from recordings import sources
 from report.sets import Question
 
 PRIMITIVE = "PDMP"
-FORESEEN = "PDMP, J foreseen"
+SELECTED = "PDMP, J selected"
 WARPED = "PDMP, warped time"
 INTRODUCTION = """\
-# Movements foreseen from their context
+# Movements predicted from their context
 
 `make report` prints these tables and draws figures into `out/report/`;
 `PYTHONPATH=benches .venv/bin/python -m report --write` puts them here. Each condition is held out
 in turn, or, where there are more than twelve, each of twelve folds of neighbouring ones; the others
-are learnt from, and the movement is foreseen from the context alone. What lies outside the convex
-hull of the contexts learnt from is extrapolation.
+are learnt from, and the movement is predicted from the context alone. Contexts outside the convex
+hull of those learnt from are extrapolation.
 
 The primitive has its defaults: linear time scaling, automatic smoothing, the systematic J, and a
 map from context to style, goal, start or anchor, and duration that stacks a Gaussian process and a
@@ -31,7 +31,7 @@ where that is installed.
 ## Error beside simpler predictors
 
 E = (1/T) Σ‖ŷ(t) − y(t)‖² over normalised time, as a share of what the mean demonstration leaves, ±
-standard error over folds: at 1 the context told nothing, at 0 all.
+standard error over folds: 1 is no information from the context, 0 a perfect prediction.
 """
 PRIMITIVE_ITSELF = """\
 ## The primitive itself
@@ -41,8 +41,8 @@ standard deviation over folds; share of the positions inside its 90 % band; how 
 is; and E less that of the best of the simpler predictors, on the same folds, ± standard error:
 negative where the primitive is better.
 
-Where another is ahead, contexts tell little of the movement. Walks of ten styles differ by what
-their speed does not say, and the slowest and the fastest are foreseen best by the mean; so are the
+Where another is ahead, contexts determine little of the movement. Walks of ten styles differ by
+more than their speed, and the slowest and the fastest are predicted best by the mean; so are the
 highest grabs of other actors. The three doors within the hull of the other twelve are nearer to a
 plane than to what a process and a line together make of three coordinates.
 """
@@ -53,8 +53,8 @@ What a time warp makes of the spectrum of all demonstrations: the share of the s
 values that the first three have, with time scaled linearly and with time warped; and E of the
 primitive with warped time less that with linear time, on the same folds, ± standard error. Both
 errors are over normalised time, in which a warped movement must meet the moments too. A warp brings
-pauses and hurry of a raised hand together and leaves less to vary, but the height held hardly tells
-where in time they lie: foreseen from the context, movements at their mean moments are nearer.
+pauses and hurry of a raised hand together and leaves less to vary, but the height held hardly
+determines their times: predicted from the context, movements with their mean times are nearer.
 """
 
 
@@ -74,7 +74,7 @@ def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
             if question.options.get("kind") != "rhythmic":
                 gained = difference(found, WARPED, PRIMITIVE, reach)
                 time.append([*asked, *shares, f"{gained} {question.unit}²"])
-    primitives = ["J", "J foreseen", "map", "E", "inside", "duration", "best other", "difference"]
+    primitives = ["J", "J selected", "map", "E", "inside", "duration", "best other", "difference"]
     spectrum = ["first three, linear", "first three, warped", "difference"]
     return "\n".join(
         [
@@ -128,7 +128,8 @@ def choices(question: Question) -> tuple[str, str, str]:
 def spectra(question: Question) -> tuple[str, str]:
     """Writes the share of the first three singular values, in linear and in warped time."""
     values = [
-        learnt(question, alignment=alignment).singular_values for alignment in ("linear", Warp(4))
+        learnt(question, alignment=alignment).singular_values
+        for alignment in ("linear", TimeWarp(4))
     ]
     linear, warped = (f"{found[:3].sum() / found.sum():.1%}" for found in values)
     return linear, warped

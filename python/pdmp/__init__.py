@@ -10,12 +10,13 @@ T. Matsubara, S.-H. Hyon, J. Morimoto, "Learning parametric dynamic movement pri
 multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from pdmp import io, plot, preprocessing
 from pdmp._native import (
     GP,
+    Conditions,
     ContextMap,
     Controller,
     Demonstration,
@@ -30,36 +31,37 @@ from pdmp._native import (
     Prediction,
     RolloutChunks,
     Status,
+    TimeWarp,
     Trajectory,
-    Warp,
     __version__,
+    blend,
     factorise,
     fit,
     load,
 )
-from pdmp.conditions import as_demonstrated, blend
-from pdmp.realtime import Run, Tick
+from pdmp.realtime import PacedLoop, Tick
 
-if TYPE_CHECKING:
+if _TYPE_CHECKING:
     from pdmp import datasets, evaluation
     from pdmp.evaluation import evaluate
 else:
 
-    def __getattr__(name):
+    def __getattr__(name: str) -> object:
         """Imports modules that a control loop does not need at their first use."""
         if name == "evaluate":
-            return import_module("pdmp.evaluation").evaluate
+            return _import_module("pdmp.evaluation").evaluate
         if name in ("datasets", "evaluation"):
-            return import_module(f"pdmp.{name}")
+            return _import_module(f"pdmp.{name}")
         raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)
 
 
 __all__ = [
     "GP",
+    "Conditions",
     "ContextMap",
     "Controller",
     "Demonstration",
@@ -70,16 +72,15 @@ __all__ = [
     "ModelFileError",
     "NGnet",
     "NGnetRegression",
+    "PacedLoop",
     "PdmpError",
     "Prediction",
     "RolloutChunks",
-    "Run",
     "Status",
     "Tick",
+    "TimeWarp",
     "Trajectory",
-    "Warp",
     "__version__",
-    "as_demonstrated",
     "blend",
     "datasets",
     "evaluate",

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all."""
+"""Atomic replacement of files."""
 
 import errno
 import os

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+
+from pdmp._messages import value_error
 
 if TYPE_CHECKING:
     from pdmp._native import Trajectory
@@ -20,6 +22,13 @@ def split_label(field: str) -> tuple[str, str]:
     """Returns name and unit of a header field such as `knee [rad]`; the unit is "" without one."""
     found = re.fullmatch(r"(.*\S)\s*\[([^][]*)\]", field.strip(), re.DOTALL)
     return (found[1], found[2].strip()) if found else (field.strip(), "")
+
+
+def name_list(argument: str, names: Sequence[str]) -> list[str]:
+    """Returns names as a list; refuses a text, which would become a list of letters."""
+    if isinstance(names, str):
+        raise value_error(f"{argument} = '{names}': pass a list of names, ['{names}']")
+    return list(names)
 
 
 def names_and_units(value: Any) -> tuple[list[str] | None, list[str] | None]:

@@ -1,4 +1,4 @@
-"""Texts from files, fit for a terminal."""
+"""Texts of errors and warnings without control characters, which files may hold."""
 
 import sys
 import warnings

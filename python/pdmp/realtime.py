@@ -1,13 +1,14 @@
-"""A control loop on the clock: a tick each period, and what was late."""
+"""A control loop paced by the clock, with its lateness and missed deadlines."""
 
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from numbers import Real
 from threading import Lock
 from time import perf_counter, sleep
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -18,55 +19,90 @@ _Measured: TypeAlias = Callable[[], ArrayLike | None] | None
 _Coupling: TypeAlias = Callable[[], tuple[ArrayLike, ArrayLike] | None] | None
 
 
-class Tick(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Tick:
     """One tick of a paced loop.
 
     Attributes
     ----------
     time : float
         Time of the movement since the loop began in s: whole periods.
-    late : float
-        How long after its deadline it began in s, the first of them if it missed some.
+    lateness : float
+        Time in s from its deadline to its start; from the first deadline if it missed some.
     missed : int
-        How many deadlines it missed; where it catches up it moved by as many periods more, where it
-        waits the deadlines to come are later by as many.
+        Number of deadlines it missed. A loop that catches up moves by as many periods more; one
+        that waits moves the remaining deadlines back by as many.
     """
 
     time: float
-    late: float
+    lateness: float
     missed: int
 
 
-class Run:
-    """A paced loop, made by `Controller.run`: iterable with `for` and with `async for`.
+class PacedLoop:
+    """A control loop that makes one tick of a controller each period, on the wall clock.
 
-    Each iteration begins anew, at the time it begins. Its deadlines are start + k / rate_hz for
-    k = 1, 2, …, so that no delay adds up; where the movement waits, whole periods that were missed
-    are added to start. Before each the loop sleeps, without holding the interpreter; then it steps,
-    and hands out the tick. A controller runs in one loop at a time: a second one is refused.
+    The first tick comes one period after the loop begins, and commands of the body act on the next.
+    Deadlines are start + k / rate_hz for k = 1, 2, …, so that delays do not add up. Before each
+    deadline the loop sleeps without holding the interpreter; `async for` lets other tasks run
+    instead (event loops wake to the millisecond, so deadlines closer than some 5 ms need threads).
+    `break` or an exception, Ctrl-C included, ends the loop between two ticks. A controller runs in
+    one loop at a time.
+
+    Parameters
+    ----------
+    controller : Controller
+        The running movement.
+    rate_hz : float, optional
+        Ticks per second; 1 / dt of the controller otherwise.
+    duration : float, optional
+        Length in s, rounded to whole periods. By default a discrete movement runs until its
+        `status` is `FINISHED` and the body has commanded nothing more, a rhythmic one until the
+        loop is left.
+    measured, coupling : callable, optional
+        Called without arguments before each tick; its result, which may be None, is the argument
+        of `Controller.step` of this name.
+    late : {"wait", "catch up"}
+        Behaviour after n missed deadlines. "wait": the tick has the usual length, and the remaining
+        deadlines move back by n periods, so that the position never jumps. "catch up": one step of
+        n + 1 periods follows the wall clock, and the position jumps as far.
 
     Attributes
     ----------
     ticks : int
-        Ticks made.
+        Number of ticks made.
     missed : int
-        Deadlines missed: a whole period went by between them and the next tick.
-    worst : float
+        Number of deadlines missed.
+    max_lateness : float
         Largest lateness of a tick in s.
+
+    Raises
+    ------
+    ValueError
+        A rate or duration that is not a number between 1e-9 and 1e9, a duration below one period,
+        `measured` or `coupling` that cannot be called, or another name for `late`.
+    RuntimeError
+        On the first tick, if the controller runs in another loop.
+
+    Examples
+    --------
+    >>> for tick in pdmp.PacedLoop(model.controller(dt=0.001)):
+    ...     robot.move(controller.position, controller.velocity)
     """
 
     def __init__(
         self,
         controller: Controller,
-        rate_hz: float,
-        duration: float | None,
-        measured: _Measured,
-        coupling: _Coupling,
-        late: str = "wait",
+        rate_hz: float | None = None,
+        *,
+        duration: float | None = None,
+        measured: _Measured = None,
+        coupling: _Coupling = None,
+        late: Literal["wait", "catch up"] = "wait",
     ) -> None:
         self._controller = controller
-        self._rate = _countable("rate_hz", rate_hz)
-        self._last = None if duration is None else _periods(duration, self._rate)
+        self._rate = _checked_number("rate_hz", 1 / controller.dt if rate_hz is None else rate_hz)
+        self._last = None if duration is None else _n_periods(duration, self._rate)
         self._measured = _function("measured", measured)
         self._coupling = _function("coupling", coupling)
         if late not in ("wait", "catch up"):
@@ -76,7 +112,7 @@ class Run:
 
     def __iter__(self) -> Iterator[Tick]:
         """Begins a loop that sleeps between its ticks."""
-        with _alone(self._controller):
+        with _exclusive(self._controller):
             self._begin()
             while not self._over():
                 sleep(self._wait())
@@ -89,7 +125,7 @@ class Run:
         for _ in range(3):  # a loop that was left is closed by the event loop
             if id(self._controller) in _running:
                 await sleep(0)
-        with _alone(self._controller):
+        with _exclusive(self._controller):
             self._begin()
             while not self._over():
                 await sleep(self._wait())
@@ -99,7 +135,7 @@ class Run:
 
     def _begin(self) -> None:
         self.ticks = self.missed = 0
-        self.worst = 0.0
+        self.max_lateness = 0.0
         self._periods = 0  # that the movement has made
         self._start = perf_counter()
 
@@ -130,7 +166,7 @@ class Run:
         self._periods += periods
         self.ticks += 1
         self.missed += missed
-        self.worst = max(self.worst, late)
+        self.max_lateness = max(self.max_lateness, late)
         return Tick(self._periods / self._rate, late, missed)
 
 
@@ -139,7 +175,7 @@ _lock = Lock()
 
 
 @contextmanager
-def _alone(controller: Controller) -> Iterator[None]:
+def _exclusive(controller: Controller) -> Iterator[None]:
     """Reserves a controller for one loop, which ends with its iterator."""
     key = id(controller)
     with _lock:
@@ -156,16 +192,16 @@ def _alone(controller: Controller) -> Iterator[None]:
             _running.discard(key)
 
 
-def _countable(name: str, value: float) -> float:
+def _checked_number(name: str, value: float) -> float:
     """Returns a number that clocks can count with."""
     if not (isinstance(value, Real) and 1e-9 <= value <= 1e9):
         raise ValueError(f"{name} = {value!r}: must be a number between 1e-9 and 1e9")
     return float(value)
 
 
-def _periods(duration: float, rate: float) -> int:
+def _n_periods(duration: float, rate: float) -> int:
     """Returns the number of whole periods in a duration."""
-    periods = round(_countable("duration", duration) * rate)
+    periods = round(_checked_number("duration", duration) * rate)
     if periods < 1:
         raise ValueError(f"duration = {duration}: must be at least one period, {1 / rate} s")
     return periods

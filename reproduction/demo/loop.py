@@ -34,11 +34,11 @@ class Run:
         return float(np.linalg.norm(self.goal - self.position[-1]))
 
 
-def control(model: pdmp.Model, arguments: Mapping[str, Any], command: Mapping[str, Any]) -> Run:
+def control(model: pdmp.Model, conditions: pdmp.Conditions, command: Mapping[str, Any]) -> Run:
     """Runs a movement at 1 kHz and gives it a command half way."""
-    duration = model.durations[model.nominal] * arguments["tau"] / model.tau
+    controller = model.controller(DT, conditions)
+    duration = model.durations[model.nominal] * controller.tau / model.tau
     switch = round(0.5 * duration / DT)
-    controller = model.controller(dt=DT, **arguments)
     positions = [controller.position.copy()]
     ticks: list[float] = []
     status = pdmp.Status.WORKING
@@ -53,13 +53,11 @@ def control(model: pdmp.Model, arguments: Mapping[str, Any], command: Mapping[st
     return Run(np.array(positions), np.array(ticks), switch, np.array(controller.goal))
 
 
-def draw_control(
-    model: pdmp.Model, arguments: Mapping[str, Any], runs: Mapping[str, Run]
-) -> Figure:
+def draw_control(model: pdmp.Model, conditions: pdmp.Conditions, runs: Mapping[str, Run]) -> Figure:
     """Draws the movement under each command."""
     figure, columns = movement_panels(model, list(runs), None)
     longest = DT * max(len(run.ticks) for run in runs.values())
-    plain = model.rollout(**arguments, dt=DT, duration=longest)
+    plain = model.rollout(conditions, dt=DT, duration=longest)
     for panels, run in zip(columns, runs.values(), strict=True):
         time = DT * np.arange(len(run.position))
         at = slice(run.switch, run.switch + 1)

@@ -1,4 +1,4 @@
-"""The tables of the report, in Markdown."""
+"""Tables of the report, in Markdown."""
 
 from collections.abc import Mapping, Sequence
 

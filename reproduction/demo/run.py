@@ -1,4 +1,4 @@
-"""Learning the shapes, and the report on it."""
+"""A fit of the shapes, and a report on it."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,9 +29,9 @@ def run_demo(
     Parameters
     ----------
     folder : path
-        Where `model.safetensors`, `report.md` and the figures go.
+        Folder of `model.safetensors`, `report.md` and the figures.
     progress : callable, optional
-        Called with the stage of the fit and the share of it that is done.
+        Called with the stage of the fit and its completed fraction.
 
     Returns
     -------
@@ -61,13 +61,13 @@ def run_demo(
         model = pdmp.load(folder / "model.safetensors")
 
     members = {shape: [m for m, label in enumerate(labels) if label == shape] for shape in SHAPES}
-    means = {shape: pdmp.as_demonstrated(model, members[shape]) for shape in SHAPES}
+    means = {shape: model.conditions(members[shape]) for shape in SHAPES}
     here, there = (means[shape] for shape in BLENDED)
     with timed(times, "roll out half way, 1 kHz"):
-        model.rollout(**pdmp.blend(here, there, 0.5), dt=DT)
+        model.rollout(pdmp.blend(here, there, 0.5), dt=DT)
     commands = {
-        "goal moved": {"goal": means[RUN]["goal"] + GOAL_SHIFT},
-        f"style switched to {RESTYLED}": {"style": means[RESTYLED]["style"]},
+        "goal moved": {"goal": means[RUN].goal + GOAL_SHIFT},
+        f"style switched to {RESTYLED}": {"style": means[RESTYLED].style},
     }
     with timed(times, "two control loops, 1 kHz"):
         runs = {name: control(model, means[RUN], command) for name, command in commands.items()}

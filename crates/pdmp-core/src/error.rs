@@ -1,20 +1,51 @@
-//! The one error type. Every variant carries the numbers that a user needs to mend the call, and those that can
-//! arise in a control loop hold nothing that allocates.
+//! The error type of the crate.
+//!
+//! Every variant carries the argument, the numbers and the remedy; [`Error::kind`] groups them by the caller's next step.
+//! Texts belong to no programming language: a binding appends its own hints. Errors of the control loop hold nothing that
+//! allocates.
 
 use std::fmt;
 use std::path::PathBuf;
 
 use crate::kind::Kind;
 
-/// What can go wrong, from a bad argument to a damaged file.
+/// The caller's next step after an [`Error`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ErrorKind {
+    /// Pass another argument.
+    Argument,
+    /// Mend the recording, or choose another one.
+    Data,
+    /// Change the problem: it is well-formed, but has no numerical solution.
+    Numerical,
+    /// Ask for less, or provide more memory.
+    Memory,
+    /// Use another model file.
+    ModelFile,
+    /// Check the path, permissions and disk.
+    Io,
+    /// Nothing: the caller cancelled the call.
+    Interrupted,
+}
+
+/// Any error of this crate.
+///
+/// ```
+/// use pdmp_core::{Demonstration, ErrorKind, Sampling};
+///
+/// let error = Demonstration::new(ndarray::Array2::zeros((2, 1)), Sampling::Unknown).unwrap_err();
+/// assert_eq!(error.kind(), ErrorKind::Data);
+/// assert_eq!(error.to_string(), "position has 2 samples: at least 4 are needed; record at a higher rate");
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// An error in one of several demonstrations.
     #[error("demo {demo}: {source}")]
     Demo {
         /// Index of the demonstration, from 0.
         demo: usize,
-        /// What is wrong with it.
+        /// Its error.
         source: Box<Error>,
     },
     /// An element of a vector is NaN or infinite.
@@ -51,10 +82,10 @@ pub enum Error {
         expected: usize,
         /// The length it has.
         found: usize,
-        /// What each element belongs to.
+        /// Owner of one element.
         per: &'static str,
     },
-    /// Another number of vectors than there are movements.
+    /// A number of vectors that differs from the number of movements.
     #[error("{name} has {found} rows, but there are {expected} styles: pass one row for each, or one vector for all")]
     Rows {
         /// The argument.
@@ -64,6 +95,12 @@ pub enum Error {
         /// The number of rows.
         found: usize,
     },
+    /// A condition of only one of two conditions that are blended.
+    #[error("{name}: given for one of the two only; give it for both")]
+    Single {
+        /// The condition.
+        name: &'static str,
+    },
     /// A number outside its range.
     #[error("{name} = {}: {allowed}", Number(*value))]
     Range {
@@ -71,7 +108,7 @@ pub enum Error {
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What is allowed.
+        /// The allowed range, as the end of the sentence.
         allowed: &'static str,
     },
     /// A number so large that its square overflows.
@@ -106,9 +143,9 @@ pub enum Error {
     /// Arrays that do not fit into memory.
     #[error("{name} would take {} numbers: not enough memory; ask for fewer samples", Number(*numbers))]
     Memory {
-        /// What is asked for.
+        /// The requested arrays.
         name: &'static str,
-        /// How many numbers it has.
+        /// Their number of elements.
         numbers: f64,
     },
     /// Time stamps that do not increase.
@@ -140,7 +177,7 @@ pub enum Error {
     /// A gap through which a column of unknown unit changes as a wrapped angle does.
     #[error(
         "column '{column}': changes by {change:.3} in the gap between t = {from} s and t = {to} s, about a full turn: give its \
-         unit, as in \"{column} [rad]\" or units=, so that an angle goes the shorter way round, or unwrap it first"
+         unit, as in \"{column} [rad]\", so that an angle takes the shorter way round, or unwrap it first"
     )]
     WrapInGap {
         /// Name of the column.
@@ -152,15 +189,15 @@ pub enum Error {
         /// The change between them.
         change: f64,
     },
-    /// A recording that does not repeat itself.
+    /// A recording without a period.
     #[error(
         "no period: the recording repeats itself best after {lag:.3} s, with a correlation of {share:.2}, below {least:.2}; \
-         keep the DoFs that repeat, or tell when each cycle begins with events="
+         keep the DoFs that repeat, or give the onset of each cycle"
     )]
     Aperiodic {
-        /// Where the recording resembles itself most, in seconds.
+        /// Lag of the largest correlation, in seconds.
         lag: f64,
-        /// The mean correlation of all DoFs there.
+        /// Mean correlation of all DoFs there.
         share: f64,
         /// The least correlation of a periodic recording.
         least: f64,
@@ -180,14 +217,14 @@ pub enum Error {
         /// The end of the demonstration, in seconds.
         end: f64,
     },
-    /// More segments of a warp than the samples tell apart.
+    /// More segments of a time warp than the samples resolve.
     #[error(
         "n_segments = {n_segments}: must lie between 1 and {most}, half the fewest samples of a demonstration or 1000"
     )]
     Segments {
-        /// The segments asked for.
+        /// Requested segments.
         n_segments: usize,
-        /// The most that are possible.
+        /// Largest possible number.
         most: usize,
     },
     /// Too few samples to carry a cubic.
@@ -212,49 +249,49 @@ pub enum Error {
     /// A style dimension that the data cannot carry.
     #[error("n_styles = {n_styles}: must lie between 1 and {most}, the number of {of}")]
     Styles {
-        /// The dimension asked for.
+        /// Requested dimension.
         n_styles: usize,
-        /// The largest possible.
+        /// Largest possible dimension.
         most: usize,
-        /// What limits it.
+        /// The limiting quantity.
         of: &'static str,
     },
-    /// A context value that stands for no label that was shown.
-    #[error("context[{column}] = {value}: never shown; the labels are {known}")]
+    /// A context value that is none of the demonstrated labels.
+    #[error("context[{column}] = {value}: not demonstrated; the labels are {known}")]
     Label {
-        /// Which value of the context.
+        /// Index of the context value.
         column: usize,
-        /// What it is.
+        /// The value.
         value: String,
-        /// The labels that it may be.
+        /// The demonstrated labels.
         known: String,
     },
-    /// A label where the model knows numbers.
+    /// A label in place of a number.
     #[error("context[{column}] = {label:?}: a number is expected, as in the demonstrations")]
     NoNumber {
-        /// Which value of the context.
+        /// Index of the context value.
         column: usize,
-        /// What it is.
+        /// The label.
         label: String,
     },
     /// A context value that is a label in one demonstration and a number in another.
     #[error("contexts[:, {column}] holds {labels} labels and {numbers} numbers: give one or the other")]
     Mixed {
-        /// Which value of the contexts.
+        /// Index of the context value.
         column: usize,
-        /// How many labels.
+        /// Number of labels.
         labels: usize,
-        /// How many numbers.
+        /// Number of numbers.
         numbers: usize,
     },
-    /// An argument that the other kind of primitive has.
+    /// An argument of the other kind of primitive.
     #[error("{name} does not apply to a {kind} primitive{instead}")]
     Kind {
         /// The argument.
         name: &'static str,
         /// The kind of this primitive.
         kind: Kind,
-        /// What to use, as the end of the sentence.
+        /// The alternative, as the end of the sentence.
         instead: &'static str,
     },
     /// A demonstration that no style of a model describes.
@@ -283,10 +320,10 @@ pub enum Error {
     /// Arguments that are missing or exclude each other.
     #[error("{0}")]
     Arguments(&'static str),
-    /// The demonstrations are well formed, but learning did not succeed.
+    /// A well-formed problem without a numerical solution.
     #[error("{0}")]
     Fit(String),
-    /// The caller stopped a long call.
+    /// A call that its progress callback cancelled.
     #[error("interrupted")]
     Interrupted,
     /// A model file that is damaged, foreign or of another version.
@@ -297,12 +334,12 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
 
-/// How many times as much.
+/// A ratio.
 struct Times(f64);
 
 impl fmt::Display for Times {
@@ -311,7 +348,7 @@ impl fmt::Display for Times {
     }
 }
 
-/// Where samples are missing, and what can be done about it.
+/// A stretch without samples, and its remedy.
 struct Gap(f64, f64, f64);
 
 impl fmt::Display for Gap {
@@ -332,7 +369,7 @@ impl fmt::Display for Gap {
     }
 }
 
-/// A number as a person would write it: whole ones plainly, very large and small ones with an exponent.
+/// A number in its shortest form: integers plainly, very large and small numbers with an exponent.
 struct Number(f64);
 
 impl fmt::Display for Number {
@@ -341,10 +378,47 @@ impl fmt::Display for Number {
     }
 }
 
-/// The result of a call into this crate.
+/// Result of a fallible call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
+    /// Returns the caller's next step; that of the inner error for one of several demonstrations.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Demo { source, .. } => source.kind(),
+            Self::Memory { .. } => ErrorKind::Memory,
+            Self::Fit(_) => ErrorKind::Numerical,
+            Self::File(_) => ErrorKind::ModelFile,
+            Self::Io { .. } => ErrorKind::Io,
+            Self::Interrupted => ErrorKind::Interrupted,
+            Self::NotFiniteAt { .. }
+            | Self::Magnitude { .. }
+            | Self::Time { .. }
+            | Self::Gap { .. }
+            | Self::WrapInGap { .. }
+            | Self::Aperiodic { .. }
+            | Self::Samples { .. }
+            | Self::Dofs { .. }
+            | Self::Mixed { .. }
+            | Self::Undescribed { .. }
+            | Self::StyleSize { .. } => ErrorKind::Data,
+            Self::NotFinite { .. }
+            | Self::Length { .. }
+            | Self::Rows { .. }
+            | Self::Single { .. }
+            | Self::Range { .. }
+            | Self::TooLarge { .. }
+            | Self::Event { .. }
+            | Self::Segments { .. }
+            | Self::NoDemonstrations
+            | Self::Styles { .. }
+            | Self::Label { .. }
+            | Self::NoNumber { .. }
+            | Self::Kind { .. }
+            | Self::Arguments(_) => ErrorKind::Argument,
+        }
+    }
+
     /// Names the demonstration in which this error arose.
     pub fn in_demo(self, demo: usize) -> Self {
         Error::Demo { demo, source: Box::new(self) }

@@ -79,7 +79,7 @@ pub mod preprocessing;
 mod validate;
 
 pub use demonstration::{Demonstration, Sampling};
-pub use error::{Error, Result};
+pub use error::{Error, ErrorKind, Result};
 pub use kind::Kind;
 #[cfg(feature = "learning")]
 pub use learning::{FitOptions, fit};

@@ -1,4 +1,5 @@
 //! Claims about learning from demonstrations: reproduction, defaults, styles of new demonstrations, errors.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;
@@ -17,10 +18,7 @@ use pdmp_core::{Error, Kind, Sampling, fit};
 fn every_reach_is_reproduced() {
     let demos = reaches();
     for basis in [options(Kind::Discrete).basis, gp()] {
-        let model = learn(
-            &demos,
-            &pdmp_core::FitOptions { basis, n_styles: Truncation::Rank(5).into(), ..options(Kind::Discrete) },
-        );
+        let model = learn(&demos, &options(Kind::Discrete).basis(basis).n_styles(Truncation::Rank(5)));
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
             assert!(error <= 1e-4, "{}: {error:e}", model.learnt().regression);
@@ -33,10 +31,7 @@ fn every_reach_is_reproduced() {
 fn every_cycle_is_reproduced_without_a_transient() {
     let demos = cycles();
     for basis in [options(Kind::Rhythmic).basis, gp()] {
-        let model = learn(
-            &demos,
-            &pdmp_core::FitOptions { basis, n_styles: Truncation::Rank(4).into(), ..options(Kind::Rhythmic) },
-        );
+        let model = learn(&demos, &options(Kind::Rhythmic).basis(basis).n_styles(Truncation::Rank(4)));
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
             assert!(error <= 1e-4, "{}: {error:e}", model.learnt().regression);
@@ -48,8 +43,7 @@ fn every_cycle_is_reproduced_without_a_transient() {
 #[test]
 fn singular_values_vanish_beyond_the_intrinsic_dimension() {
     // y is affine in (h, h²): at most three dimensions.
-    let model =
-        learn(&reaches(), &pdmp_core::FitOptions { n_styles: Truncation::Rank(5).into(), ..options(Kind::Discrete) });
+    let model = learn(&reaches(), &options(Kind::Discrete).n_styles(Truncation::Rank(5)));
     let sigma = &model.learnt().singular_values;
     assert!(sigma[2] > 1e-6 * sigma[0] && sigma[3] < 1e-6 * sigma[0], "{sigma:?}");
 }
@@ -109,8 +103,7 @@ fn irregular_time_stamps_yield_the_same_movement() {
 #[test]
 fn style_of_recovers_the_styles_of_demonstrations() {
     let demos = reaches();
-    let model =
-        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(3).into(), ..options(Kind::Discrete) });
+    let model = learn(&demos, &options(Kind::Discrete).n_styles(Truncation::Rank(3)));
     for (m, demo) in demos.iter().enumerate() {
         let style = style_of(&model, demo, None, None, None).unwrap();
         for (j, s) in style.iter().enumerate() {
@@ -123,8 +116,7 @@ fn style_of_recovers_the_styles_of_demonstrations() {
 #[test]
 fn style_of_recovers_the_style_of_a_cycle_in_any_phase() {
     let demos = cycles();
-    let model =
-        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Rhythmic) });
+    let model = learn(&demos, &options(Kind::Rhythmic).n_styles(Truncation::Rank(2)));
     for (m, demo) in demos.iter().enumerate() {
         let expected = style_of(&model, demo, None, None, None).unwrap();
         let n = demo.n_samples();
@@ -144,8 +136,7 @@ fn style_of_recovers_the_style_of_a_cycle_in_any_phase() {
 #[test]
 fn style_of_rejects_demonstrations_that_no_style_describes() {
     let demos = reaches();
-    let model =
-        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Discrete) });
+    let model = learn(&demos, &options(Kind::Discrete).n_styles(Truncation::Rank(2)));
     let changed = |change: &dyn Fn(usize, f64) -> f64| {
         let position =
             Array2::from_shape_fn(demos[1].position().dim(), |(c, d)| change(c, demos[1].position()[[c, d]]));
@@ -158,8 +149,7 @@ fn style_of_rejects_demonstrations_that_no_style_describes() {
     assert!(matches!(other, Err(Error::Undescribed { off, times }) if off > 0.5 && times > 3.0), "{other:?}");
 
     let equal = vec![demos[1].clone(); 4];
-    let model =
-        learn(&equal, &pdmp_core::FitOptions { n_styles: Truncation::Rank(3).into(), ..options(Kind::Discrete) });
+    let model = learn(&equal, &options(Kind::Discrete).n_styles(Truncation::Rank(3)));
     let style = style_of(&model, &equal[0], None, None, None).unwrap();
     assert!(style.iter().all(|s| s.abs() <= 1.0), "{style:?}");
     let style = style_of(&model, &demos[2], None, None, None);
@@ -179,7 +169,7 @@ fn given_goals_are_kept() {
 fn fits_are_reproducible() {
     for kind in [Kind::Discrete, Kind::Rhythmic] {
         let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
-        let bytes = || learn(&demos, &pdmp_core::FitOptions { basis: gp(), ..options(kind) }).to_bytes().unwrap();
+        let bytes = || learn(&demos, &options(kind).basis(gp())).to_bytes().unwrap();
         assert_eq!(bytes(), bytes());
     }
 }
@@ -191,10 +181,9 @@ fn a_fit_can_be_cancelled_in_every_stage() {
 
     for stop in [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile] {
         let mut progress = |stage, _| if stage == stop { Err(Error::Interrupted) } else { Ok(()) };
-        let mut options = pdmp_core::FitOptions { basis: gp(), ..options(Kind::Discrete) };
+        let mut options = options(Kind::Discrete).basis(gp());
         if stop == Stage::Align {
-            options.alignment.time_scaling =
-                pdmp_core::learning::TimeScaling::Warp(pdmp_core::model::TimeWarp::default());
+            options.time_scaling = pdmp_core::learning::TimeScaling::Warp(pdmp_core::model::TimeWarp::default());
         }
         assert!(matches!(fit_with(&reaches(), &options, &mut progress), Err(Error::Interrupted)));
     }
@@ -220,7 +209,7 @@ fn degenerate_demonstrations_are_learnt() {
     ];
     for demos in &sets {
         for basis in [options(Kind::Discrete).basis, gp()] {
-            let options = pdmp_core::FitOptions { basis, ..options(Kind::Discrete) };
+            let options = options(Kind::Discrete).basis(basis);
             let model = learn(demos, &options);
             for (m, demo) in demos.iter().enumerate() {
                 let grid = TimeGrid { dt: 0.01, duration: None };
@@ -251,11 +240,7 @@ fn range_scaling_reproduces_dofs_of_different_units() {
             pdmp_core::Demonstration::new(position, demo.sampling().clone()).unwrap()
         })
         .collect();
-    let scaled = pdmp_core::FitOptions {
-        dof_scale: DofScaling::Range,
-        n_styles: Truncation::Rank(5).into(),
-        ..options(Kind::Discrete)
-    };
+    let scaled = options(Kind::Discrete).dof_scale(DofScaling::Range).n_styles(Truncation::Rank(5));
     let model = learn(&demos, &scaled);
     for (m, demo) in demos.iter().enumerate() {
         let grid = TimeGrid { dt: 0.01, duration: None };
@@ -279,6 +264,6 @@ fn invalid_demonstrations_are_rejected_by_name() {
     assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
     assert!(message(&[], &options).contains("at least one demonstration"));
     assert!(message(&demos[1..], &options).contains("pass dt in seconds"));
-    let options = pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options };
+    let options = options.n_styles(Truncation::Rank(2));
     assert!(message(&demos[..1], &options).contains("n_styles = 2: must lie between 1 and 1"));
 }

@@ -1,10 +1,14 @@
 //! What a running primitive must do.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
+#[path = "common/accepted.rs"]
+mod accepted;
 mod common;
 
 use std::sync::Arc;
 
+use accepted::mostly_accepted;
 use common::*;
 use pdmp_core::motion::TimeGrid;
 use pdmp_core::motion::rollout_with;
@@ -66,29 +70,36 @@ proptest! {
             }
         }
     }
+}
 
-    /// Whatever is commanded at whatever tick of whatever length, the state stays finite.
-    #[test]
-    fn random_commands_leave_the_state_finite(commands in prop::collection::vec((0..6u8, -1e3..1e3f64, 1e-6..3.0f64), 1..60)) {
+/// Commands of the kind of the movement, and others among them, leave the state finite at ticks of any length; a refused
+/// one leaves the position where it was.
+#[test]
+fn random_commands_leave_the_state_finite() {
+    let commands = prop::collection::vec((0..12u8, -1e3..1e3f64, 1e-6..3.0f64), 1..60);
+    mostly_accepted(commands, |commands, tally| {
         for model in [&*REACH, &*CYCLE] {
             let mut controller = controller(model, 0.001);
+            let n = model.n_dofs();
             for &(what, value, dt) in &commands {
-                let n = model.n_dofs();
-                let _ = match what {
-                    0 => controller.set_style(&[value; 2]),
-                    1 => controller.set_goal(&vec![value; n]),
-                    2 => controller.set_anchor(&vec![value; n]),
-                    3 => controller.set_tau(value.abs() + 1e-3),
-                    4 => controller.set_amplitude(value),
-                    _ => controller.set_goal(&vec![f64::NAN; n]),
-                };
-                let _ = tick(&mut controller, &Command { dt: Some(dt), ..Command::default() });
+                let before = controller.position().to_vec();
+                let accepted = tally.count(match (what, model.kind()) {
+                    (0..=2, _) => controller.set_style(&[value; 2]),
+                    (3..=5, Kind::Discrete) | (10, Kind::Rhythmic) => controller.set_goal(&vec![value; n]),
+                    (3..=5, Kind::Rhythmic) | (10, Kind::Discrete) => controller.set_anchor(&vec![value; n]),
+                    (6..=8, _) => controller.set_tau(value.abs() + 1e-3),
+                    (9, _) => controller.set_amplitude(value),
+                    _ => controller.set_style(&[f64::NAN; 2]),
+                });
+                prop_assert!(accepted || controller.position() == before);
+                tally.count(tick(&mut controller, &Command { dt: Some(dt), ..Command::default() }));
                 for values in [controller.position(), controller.velocity(), controller.acceleration()] {
                     prop_assert!(values.iter().all(|x| x.is_finite()));
                 }
             }
         }
-    }
+        Ok(())
+    });
 }
 
 /// Step k of a controller is sample k of the rollout.

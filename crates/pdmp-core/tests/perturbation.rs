@@ -1,10 +1,14 @@
 //! What a running primitive does when its robot is disturbed, or its user adds terms.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
+#[path = "common/accepted.rs"]
+mod accepted;
 mod common;
 
 use std::sync::Arc;
 
+use accepted::mostly_accepted;
 use common::*;
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
@@ -380,29 +384,31 @@ proptest! {
             }
         }
     }
+}
 
-    /// Whatever happens in ticks of whatever length, the state stays finite.
-    #[test]
-    fn any_perturbation_leaves_the_state_finite(
-        ticks in prop::collection::vec((0..4u8, -150.0..150.0f64, 1e-9..100.0f64, 0.0..1e100f64), 1..40),
-    ) {
+/// Perturbations and gains of any size, in ticks of any length, leave the state finite.
+#[test]
+fn any_perturbation_leaves_the_state_finite() {
+    let ticks = prop::collection::vec((0..4u8, -150.0..150.0f64, 1e-9..100.0f64, 0.0..1e100f64), 1..40);
+    mostly_accepted(ticks, |ticks, tally| {
         for model in [&*REACH, &*CYCLE] {
             let mut controller = controller(model);
             for &(what, exponent, dt, gain) in &ticks {
                 let values = vec![10f64.powf(exponent); model.n_dofs()];
                 let terms = coupling(&values, &values);
                 let both = Command { measured: Some(&values), ..terms };
-                let _ = match what {
+                tally.count(match what {
                     0 => tick(&mut controller, &Command { dt: Some(dt), ..measured(&values) }),
                     1 => tick(&mut controller, &Command { dt: Some(dt), ..terms }),
                     2 => tick(&mut controller, &Command { dt: Some(dt), ..both }),
                     _ => controller.set_compliance(gain, gain).and_then(|()| controller.step()),
-                };
+                });
                 for values in [controller.position(), controller.velocity(), controller.acceleration()] {
                     prop_assert!(values.iter().all(|x| x.is_finite()));
                 }
                 prop_assert!(controller.phase().is_finite());
             }
         }
-    }
+        Ok(())
+    });
 }

@@ -1,4 +1,5 @@
 //! Claims about time warps and landmarks: estimation, reproduction in time, prediction, files, errors.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;
@@ -48,8 +49,8 @@ fn warped(kind: Kind, a: f64, slopes: &[f64], duration: f64) -> Demonstration {
 
 fn with(kind: Kind, time_scaling: TimeScaling) -> FitOptions {
     let mut options = options(kind);
-    options.alignment.nominal = Some(0);
-    options.alignment.time_scaling = time_scaling;
+    options.nominal = Some(0);
+    options.time_scaling = time_scaling;
     options
 }
 
@@ -146,7 +147,7 @@ fn every_demonstration_is_reproduced_in_its_own_timing() {
             duration * [0.3 + 0.02 * m as f64, 0.7 - 0.05 * m as f64][e]
         });
         let error = |time_scaling| {
-            let model = learn(&demos, &FitOptions { n_styles: Truncation::Rank(4).into(), ..with(kind, time_scaling) });
+            let model = learn(&demos, &with(kind, time_scaling).n_styles(Truncation::Rank(4)));
             (0..demos.len()).map(|m| reproduction_error(&model, &demos, m)).fold(0.0, f64::max)
         };
         let (linear, warp) = (error(TimeScaling::Linear), error(TimeScaling::Warp(TimeWarp::default())));
@@ -284,8 +285,8 @@ fn segment_durations_are_predicted_from_contexts() {
     let slow = |h: f64| (0..8).map(|k| if k < 4 { 1.0 + h } else { 1.0 - h }).collect::<Vec<f64>>();
     let heights = [0.0, 0.1, 0.2, 0.3, 0.4];
     let demos: Vec<_> = heights.iter().map(|&h| warped(kind, 1.0, &slow(h), 1.0 + h)).collect();
-    let contexts = Some(heights.iter().map(|&h| vec![h.into()]).collect());
-    let model = learn(&demos, &FitOptions { contexts, ..by_warp(kind) });
+    let contexts = heights.iter().map(|&h| vec![h.into()]).collect();
+    let model = learn(&demos, &by_warp(kind).contexts(contexts));
     let found = model.predict(&[0.25]).unwrap();
     let segment_durations = found.conditions.segment_durations.as_ref().unwrap();
     let first: f64 = segment_durations[..4].iter().sum();
@@ -306,7 +307,7 @@ fn style_of_recovers_the_styles_of_warped_demonstrations() {
         let events = array![[0.4], [0.5], [0.3]];
         for time_scaling in [TimeScaling::Warp(TimeWarp::default()), TimeScaling::Events(events.clone())] {
             let by_events = matches!(time_scaling, TimeScaling::Events(_));
-            let model = learn(&demos, &FitOptions { n_styles: Truncation::Rank(3).into(), ..with(kind, time_scaling) });
+            let model = learn(&demos, &with(kind, time_scaling).n_styles(Truncation::Rank(3)));
             for (m, demo) in demos.iter().enumerate() {
                 let own = events.row(m).to_vec();
                 let style = style_of(&model, demo, None, None, by_events.then_some(&own)).unwrap();
@@ -334,7 +335,7 @@ fn a_warped_model_is_saved_and_independent_of_threads() {
             .collect();
         let bytes = |n| {
             let threads = Threads::new(n).unwrap();
-            learn(&demos, &FitOptions { threads, ..by_warp(kind) }).to_bytes().unwrap()
+            learn(&demos, &by_warp(kind).threads(threads)).to_bytes().unwrap()
         };
         let one = bytes(1);
         assert!([2, 3, 8].iter().all(|&n| bytes(n) == one));

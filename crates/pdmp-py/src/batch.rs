@@ -59,7 +59,7 @@ impl Model {
     /// MemoryError
     ///     More numbers than memory holds: see `rollout_chunks`.
     #[pyo3(signature = (
-        styles, *, goals=None, starts=None, velocities=None, anchors=None, amplitude=1.0, tau=None, dt=0.01,
+        styles, *, goals=None, starts=None, velocities=None, anchors=None, amplitude=None, tau=None, dt=0.01,
         duration=None, derivatives=1, out=None, threads=None
     ))]
     #[allow(clippy::too_many_arguments)]
@@ -71,7 +71,7 @@ impl Model {
         starts: Option<&Bound<'py, PyAny>>,
         velocities: Option<&Bound<'py, PyAny>>,
         anchors: Option<&Bound<'py, PyAny>>,
-        amplitude: f64,
+        amplitude: Option<f64>,
         tau: Option<f64>,
         dt: f64,
         duration: Option<f64>,
@@ -115,7 +115,7 @@ impl Model {
     /// >>> for positions, velocities in model.rollout_chunks(styles, size=1000):
     /// ...     cost.append((velocities**2).sum(axis=(1, 2)))
     #[pyo3(signature = (
-        styles, *, size=1000, goals=None, starts=None, velocities=None, anchors=None, amplitude=1.0, tau=None, dt=0.01,
+        styles, *, size=1000, goals=None, starts=None, velocities=None, anchors=None, amplitude=None, tau=None, dt=0.01,
         duration=None, derivatives=1, threads=None
     ))]
     #[allow(clippy::too_many_arguments)]
@@ -128,7 +128,7 @@ impl Model {
         starts: Option<&Bound<'py, PyAny>>,
         velocities: Option<&Bound<'py, PyAny>>,
         anchors: Option<&Bound<'py, PyAny>>,
-        amplitude: f64,
+        amplitude: Option<f64>,
         tau: Option<f64>,
         dt: f64,
         duration: Option<f64>,
@@ -241,7 +241,7 @@ struct Arguments<'a, 'py> {
     starts: Option<&'a Bound<'py, PyAny>>,
     velocities: Option<&'a Bound<'py, PyAny>>,
     anchors: Option<&'a Bound<'py, PyAny>>,
-    amplitude: f64,
+    amplitude: Option<f64>,
     tau: Option<f64>,
 }
 
@@ -253,7 +253,7 @@ impl Arguments<'_, '_> {
             anchors: rows("anchors", self.anchors)?,
             starts: rows("starts", self.starts)?,
             velocities: rows("velocities", self.velocities)?,
-            amplitude: Some(self.amplitude),
+            amplitude: self.amplitude,
             tau: self.tau,
         })
     }

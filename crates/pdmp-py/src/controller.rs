@@ -10,9 +10,9 @@ use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Kind};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyFloat;
+use pyo3::types::PyDict;
 
-use crate::conditions::Arguments;
+use crate::conditions::conditions_of;
 use crate::convert::{Reduced, Vector, read_only, refill};
 use crate::error::raise;
 
@@ -206,94 +206,30 @@ impl Controller {
         Ok(self.status(py))
     }
 
-    /// Run on the clock: a loop that makes one tick each period, and tells what was late.
-    ///
-    ///     for tick in controller.run(rate_hz=1000):
-    ///         robot.move(controller.position, controller.velocity)
-    ///
-    /// The first tick comes one period after the loop begins; what the body commands acts on the next. Nothing runs
-    /// beside the body: a `break` or an exception, Ctrl-C too, ends the loop between two ticks.
-    ///
-    /// Deadlines are start + k / rate_hz; a tick that comes n whole periods late has missed n of them. By default the
-    /// movement then waits: the tick is one period long like any other, and the deadlines to come are n periods later, so
-    /// that the position never jumps ahead. With `late="catch up"` the movement keeps to the clock on the wall: one step of
-    /// n + 1 periods makes good for them, and the position jumps as far. One controller runs in one loop at a time.
-    ///
-    /// In between, the loop sleeps and other threads run. `async for` waits for the other tasks instead; event loops
-    /// wake only to the millisecond, so that deadlines closer than some 5 ms are for threads.
-    ///
-    /// Parameters
-    /// ----------
-    /// rate_hz : float, optional
-    ///     Ticks per second; 1 / dt of the controller otherwise.
-    /// duration : float, optional
-    ///     Length in s, rounded to whole periods. Without it a discrete movement ends once its `status` is `FINISHED` and
-    ///     the body has commanded nothing more, and a rhythmic one when the loop is left; with it, both last as long.
-    /// measured, coupling : callable, optional
-    ///     Asked without arguments before each tick for what `step` takes under this name, or None.
-    /// late : {"wait", "catch up"}
-    ///     What a late tick does.
-    ///
-    /// Returns
-    /// -------
-    /// Run
-    ///     Iterable, once or again, over a `Tick` (time, late, missed) each; `ticks`, `missed` and `worst` sum up.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     A rate or duration that is no number between 1e-9 and 1e9; a duration below one period; `measured` or
-    ///     `coupling` that cannot be called; `late` of another name.
-    /// RuntimeError
-    ///     On the first tick: the controller runs in another loop already.
-    #[pyo3(signature = (rate_hz=None, *, duration=None, measured=None, coupling=None, late="wait"))]
-    fn run<'py>(
-        slf: &Bound<'py, Self>,
-        rate_hz: Option<Bound<'py, PyAny>>,
-        duration: Option<Bound<'py, PyAny>>,
-        measured: Option<Bound<'py, PyAny>>,
-        coupling: Option<Bound<'py, PyAny>>,
-        late: &str,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let py = slf.py();
-        let rate_hz = match rate_hz {
-            Some(rate_hz) => rate_hz,
-            None => PyFloat::new(py, 1.0 / slf.try_borrow()?.inner.dt()).into_any(),
-        };
-        py.import("pdmp.realtime")?.call_method1("Run", (slf, rate_hz, duration, measured, coupling, late))
-    }
-
     /// Start again.
     ///
     /// Parameters
     /// ----------
-    /// style, goal, start, velocity, anchor, amplitude, tau, timing, context, phase
-    ///     As in `Model.controller`: what is not given is that of the nominal demonstration, not what was commanded before.
+    /// conditions : Conditions, optional
+    ///     Conditions at the start. One that is not given is that of the nominal demonstration, not a command of before.
+    /// context, **changes
+    ///     As in `Model.rollout`.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     What `Model.rollout` refuses; the movement then goes on as it was.
-    #[pyo3(signature = (
-        *, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, segment_durations=None,
-        context=None, phase=None
-    ))]
-    #[allow(clippy::too_many_arguments)]
+    ///     Conditions that `Model.rollout` rejects; the movement then continues.
+    #[pyo3(
+        signature = (conditions=None, *, context=None, **changes),
+        text_signature = "($self, conditions=None, *, context=None, **changes)"
+    )]
     fn reset(
         &mut self,
-        style: Option<&Bound<'_, PyAny>>,
-        goal: Option<&Bound<'_, PyAny>>,
-        start: Option<&Bound<'_, PyAny>>,
-        velocity: Option<&Bound<'_, PyAny>>,
-        anchor: Option<&Bound<'_, PyAny>>,
-        amplitude: f64,
-        tau: Option<f64>,
-        segment_durations: Option<&Bound<'_, PyAny>>,
+        conditions: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
-        phase: Option<f64>,
+        changes: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<()> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, segment_durations, phase };
-        let conditions = arguments.in_context(&self.model, context)?;
+        let conditions = conditions_of(&self.model, conditions, context, changes)?;
         let result = self.inner.reset(&conditions);
         self.command(result)
     }
@@ -329,6 +265,12 @@ impl Controller {
             pdmp_core::Status::Working => self.working.clone_ref(py),
             pdmp_core::Status::Finished => self.finished.clone_ref(py),
         }
+    }
+
+    /// Length of a tick in s.
+    #[getter]
+    fn dt(&self) -> f64 {
+        self.inner.dt()
     }
 
     /// Time since the start in s.

@@ -190,6 +190,17 @@ pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>>
     Ok(vector.to_vec())
 }
 
+/// Returns one number: a float, or anything that Python or numpy turns into one.
+pub(crate) fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let single = value.getattr("ndim").is_ok_and(|axes| axes.eq(0).unwrap_or(false));
+    let value = if single { &value.call_method0("item")? } else { value };
+    value.extract().map_err(|_| {
+        let found = value.repr().map_or_else(|_| "a value without repr".to_string(), |text| text.to_string());
+        let found: String = found.chars().take(60).collect();
+        PyValueError::new_err(format!("{name} = {found}: expected one number"))
+    })
+}
+
 /// A vector into a buffer that is kept, without allocation if it comes as an array of doubles.
 #[allow(unsafe_code)]
 pub(crate) fn refill(name: &str, value: &Bound<'_, PyAny>, buffer: &mut Vec<f64>) -> PyResult<()> {

@@ -1,9 +1,9 @@
 //! How errors of the core appear in Python.
 
 use std::cell::Cell;
-use std::io::ErrorKind;
+use std::path::Path;
 
-use pdmp_core::Error;
+use pdmp_core::{Error, ErrorKind};
 use pyo3::create_exception;
 use pyo3::exceptions::{
     PyException, PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyPermissionError,
@@ -17,28 +17,29 @@ create_exception!(pdmp, ModelFileError, PdmpError, "A model file that is damaged
 
 /// The Python exception of a core error: `ValueError` for arguments, `OSError` for the system, ours for the rest.
 pub(crate) fn raise(error: Error) -> PyErr {
-    let mut kind = &error;
-    while let Error::Demo { source, .. } = kind {
-        kind = source;
-    }
     let text = printable(&error.to_string());
-    match kind {
-        Error::Fit(_) => FitError::new_err(text),
-        Error::File(_) => ModelFileError::new_err(text),
-        Error::Interrupted => PyKeyboardInterrupt::new_err(()),
-        Error::Io { path, source } => {
-            let (reason, path) = (source.to_string(), path.display().to_string());
-            match (source.raw_os_error(), source.kind()) {
-                // With an errno Python chooses the subclass.
-                (Some(errno), _) => PyOSError::new_err((errno, reason, path)),
-                (None, ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, "No such file or directory", path)),
-                (None, ErrorKind::PermissionDenied) => PyPermissionError::new_err((13, "Permission denied", path)),
-                // A path that never reached the system: EINVAL.
-                (None, _) => PyOSError::new_err((22, reason, path)),
-            }
-        }
-        Error::Memory { .. } => PyMemoryError::new_err(text),
-        _ => PyValueError::new_err(text),
+    match error.kind() {
+        ErrorKind::Argument | ErrorKind::Data => PyValueError::new_err(text),
+        ErrorKind::Numerical => FitError::new_err(text),
+        ErrorKind::Memory => PyMemoryError::new_err(text),
+        ErrorKind::ModelFile => ModelFileError::new_err(text),
+        ErrorKind::Interrupted => PyKeyboardInterrupt::new_err(()),
+        ErrorKind::Io => match error {
+            Error::Io { path, source } => system_error(&path, &source),
+            _ => PyOSError::new_err(text),
+        },
+    }
+}
+
+fn system_error(path: &Path, source: &std::io::Error) -> PyErr {
+    let (reason, path) = (source.to_string(), path.display().to_string());
+    match (source.raw_os_error(), source.kind()) {
+        // With an errno Python chooses the subclass.
+        (Some(errno), _) => PyOSError::new_err((errno, reason, path)),
+        (None, std::io::ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, "No such file or directory", path)),
+        (None, std::io::ErrorKind::PermissionDenied) => PyPermissionError::new_err((13, "Permission denied", path)),
+        // A path that never reached the system: EINVAL.
+        (None, _) => PyOSError::new_err((22, reason, path)),
     }
 }
 

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::regression::Basis;
 use pdmp_core::learning::{
-    Alignment, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
+    CanonicalOptions, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
 };
 use pdmp_core::numerics::Smoothing;
 use pdmp_core::{FitOptions, Kind};
@@ -18,7 +18,7 @@ use pyo3::types::{PyBool, PyList, PyMapping};
 use crate::basis::{Gp, NGnet};
 use crate::convert::{count, items, matrix, numbers};
 use crate::demo::{Demonstration, Source, Trajectory};
-use crate::error::detached;
+use crate::error::{detached, raise};
 use crate::model::Model;
 use crate::warp::TimeWarp;
 
@@ -120,11 +120,11 @@ use crate::warp::TimeWarp;
 #[pyfunction]
 #[pyo3(signature = (
     demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, singular_value_share=None, basis=None,
-    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, transport="learnt", dof_scale=None,
-    alignment=None, events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None
+    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, transport=None, dof_scale=None,
+    alignment=None, events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=None, threads=None, progress=None
 ), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, singular_value_share=None, \
-    basis='gp', smoothing='auto', nominal=None, n_samples=None, transport='learnt', dof_scale=None, \
-    alignment='linear', events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
+    basis='gp', smoothing='auto', nominal=None, n_samples=None, transport=None, dof_scale=None, \
+    alignment='linear', events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=None, threads=None, progress=None)")]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -140,7 +140,7 @@ pub(crate) fn fit(
     smoothing: SmoothingArgument,
     nominal: Option<isize>,
     n_samples: Option<isize>,
-    transport: &str,
+    transport: Option<&str>,
     dof_scale: Option<&Bound<'_, PyAny>>,
     alignment: Option<&Bound<'_, PyAny>>,
     events: Option<&Bound<'_, PyAny>>,
@@ -148,34 +148,25 @@ pub(crate) fn fit(
     alpha_z: f64,
     beta_z: Option<f64>,
     alpha_x: Option<f64>,
-    mu: f64,
+    mu: Option<f64>,
     threads: Option<isize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
     let demos = demonstrations("demos", demos)?;
-    let options = FitOptions {
-        alignment: Alignment {
-            kind: kind_of(kind)?,
-            dt,
-            period: numbers("period", period)?,
-            smoothing: smoothing.0,
-            nominal: nominal.map(|n| count("nominal", n)).transpose()?,
-            n_samples: n_samples.map(|n| count("n_samples", n)).transpose()?,
-            time_scaling: time_scaling_of(alignment, events)?,
-        },
-        contexts: contexts.map(crate::convert::contexts).transpose()?,
-        map: map_of(map)?,
-        n_styles: style_choice(n_styles, singular_value_share)?,
-        basis: basis_of(basis)?,
-        transport: transport_of(transport)?,
-        dof_scale: dof_scale_of(dof_scale)?,
-        tau,
-        alpha_z,
-        beta_z,
-        alpha_x,
-        mu,
-        threads: crate::convert::threads(threads)?,
-    };
+    let canonical = canonical_of(kind_of(kind)?, (tau, alpha_x, transport), (mu, period))?;
+    let mut options = FitOptions::new(canonical);
+    options.dt = dt;
+    options.smoothing = smoothing.0;
+    options.nominal = nominal.map(|n| count("nominal", n)).transpose()?;
+    options.n_samples = n_samples.map(|n| count("n_samples", n)).transpose()?;
+    options.time_scaling = time_scaling_of(alignment, events)?;
+    options.contexts = contexts.map(crate::convert::contexts).transpose()?;
+    options.map = map_of(map)?;
+    options.n_styles = style_choice(n_styles, singular_value_share)?;
+    options.basis = basis_of(basis)?;
+    options.dof_scale = dof_scale_of(dof_scale)?;
+    (options.alpha_z, options.beta_z) = (alpha_z, beta_z);
+    options.threads = crate::convert::threads(threads)?;
     let show = |py: Python<'_>, stage: Stage, share| match &progress {
         Some(progress) => progress.call1(py, (stage.name(), share)).map(drop),
         None => Ok(()),
@@ -183,6 +174,31 @@ pub(crate) fn fit(
     let model = detached(py, show, |progress| fit_with(&demos, &options, progress))?;
     crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
+}
+
+/// Returns the canonical system, and rejects arguments of the other kind.
+fn canonical_of(
+    kind: Kind,
+    (tau, alpha_x, transport): (Option<f64>, Option<f64>, Option<&str>),
+    (mu, period): (Option<f64>, Option<&Bound<'_, PyAny>>),
+) -> PyResult<CanonicalOptions> {
+    let reject = |name, given: bool| match given {
+        true => Err(raise(pdmp_core::Error::Kind { name, kind, instead: ": leave it out" })),
+        false => Ok(()),
+    };
+    match kind {
+        Kind::Discrete => {
+            reject("mu", mu.is_some())?;
+            reject("period", period.is_some())?;
+            Ok(CanonicalOptions::Discrete { tau, alpha_x, transport: transport_of(transport.unwrap_or("learnt"))? })
+        }
+        Kind::Rhythmic => {
+            reject("tau", tau.is_some())?;
+            reject("alpha_x", alpha_x.is_some())?;
+            reject("transport", transport.is_some())?;
+            Ok(CanonicalOptions::Rhythmic { mu: mu.unwrap_or(1.0), periods: numbers("period", period)? })
+        }
+    }
 }
 
 fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {

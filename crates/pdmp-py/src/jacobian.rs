@@ -2,169 +2,79 @@
 
 use numpy::IntoPyArray;
 use pdmp_core::model::Derivative;
-use pdmp_core::motion::{TimeGrid, WithRespectTo};
+use pdmp_core::motion::{TimeGrid, WithRespectTo, jacobian};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::conditions::Arguments;
+use crate::conditions::conditions_of;
 use crate::convert::{Cube, count};
 use crate::error::{interruptible, raise};
 use crate::model::Model;
 
 #[pymethods]
 impl Model {
-    /// Jacobian ∂y/∂s of a rollout's positions: exact, and the same for every style, goal and anchor.
+    /// Compute the Jacobian ∂y/∂v of a rollout's positions with respect to one of its conditions v.
     ///
-    /// A movement is linear in its style: y(s + Δs) = y(s) + (∂y/∂s)Δs. A given start velocity is the same for all
-    /// styles, which the Jacobian knows.
+    /// A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
+    /// Jacobian for all their values. It depends on which of `start` and `velocity` are given, on amplitude and on tau.
     ///
     /// Parameters
     /// ----------
-    /// dt : float
-    ///     Interval between samples in s.
+    /// wrt : {"style", "goal", "anchor", "start"}
+    ///     Condition with respect to which to differentiate.
+    /// conditions : Conditions, optional
+    ///     Conditions at the start.
     /// derivative : int
     ///     0 for positions, 1 for velocities, 2 for accelerations.
-    /// start, velocity : array_like, (D,), optional
-    ///     As in `rollout`; which of them are given matters, their values do not.
-    /// amplitude, tau, duration
+    /// dt, duration, context, **changes
     ///     As in `rollout`.
     ///
     /// Returns
     /// -------
-    /// ndarray, (T, D, J)
-    #[pyo3(signature = (dt=0.01, *, derivative=0, start=None, velocity=None, amplitude=1.0, tau=None, duration=None))]
+    /// ndarray, (T, D, J) with respect to the style, (T, D, D) otherwise
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Conditions that do not fit, a condition that this kind of primitive does not have, or segment durations of
+    ///     several segments.
+    ///
+    /// Examples
+    /// --------
+    /// >>> model.jacobian("goal", dt=0.001).shape
+    /// (1001, 2, 2)
+    #[pyo3(
+        signature = (wrt, conditions=None, *, derivative=0, dt=0.01, duration=None, context=None, **changes),
+        text_signature = "($self, wrt, conditions=None, *, derivative=0, dt=0.01, duration=None, context=None, **changes)"
+    )]
     #[allow(clippy::too_many_arguments)]
-    fn style_jacobian<'py>(
-        &self,
-        py: Python<'py>,
-        dt: f64,
-        derivative: isize,
-        start: Option<&Bound<'py, PyAny>>,
-        velocity: Option<&Bound<'py, PyAny>>,
-        amplitude: f64,
-        tau: Option<f64>,
-        duration: Option<f64>,
-    ) -> PyResult<Cube<'py>> {
-        let arguments = Arguments {
-            style: None,
-            goal: None,
-            start,
-            velocity,
-            anchor: None,
-            amplitude,
-            tau,
-            segment_durations: None,
-            phase: None,
-        };
-        self.jacobian(py, WithRespectTo::Style, derivative, arguments, TimeGrid { dt, duration })
-    }
-
-    /// Jacobian ∂y/∂g of a discrete rollout's positions: exact, and the same for every style, goal and start.
-    ///
-    /// Parameters
-    /// ----------
-    /// dt, derivative, tau, duration
-    ///     As in `style_jacobian`.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray, (T, D, D)
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     A rhythmic primitive: see `anchor_jacobian`.
-    #[pyo3(signature = (dt=0.01, *, derivative=0, tau=None, duration=None))]
-    fn goal_jacobian<'py>(
-        &self,
-        py: Python<'py>,
-        dt: f64,
-        derivative: isize,
-        tau: Option<f64>,
-        duration: Option<f64>,
-    ) -> PyResult<Cube<'py>> {
-        self.jacobian(py, WithRespectTo::Goal, derivative, from(None, tau), TimeGrid { dt, duration })
-    }
-
-    /// Jacobian ∂y/∂y_a of a rhythmic rollout's positions: exact, and the same for every style, anchor and start.
-    ///
-    /// Parameters
-    /// ----------
-    /// dt, derivative, start, tau, duration
-    ///     As in `style_jacobian`: a given start stays where it is, otherwise all moves with the anchor.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray, (T, D, D)
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     A discrete primitive: see `goal_jacobian`.
-    #[pyo3(signature = (dt=0.01, *, derivative=0, start=None, tau=None, duration=None))]
-    fn anchor_jacobian<'py>(
-        &self,
-        py: Python<'py>,
-        dt: f64,
-        derivative: isize,
-        start: Option<&Bound<'py, PyAny>>,
-        tau: Option<f64>,
-        duration: Option<f64>,
-    ) -> PyResult<Cube<'py>> {
-        self.jacobian(py, WithRespectTo::Anchor, derivative, from(start, tau), TimeGrid { dt, duration })
-    }
-
-    /// Jacobian ∂y/∂y(0) of a rollout's positions with respect to a given start: exact, and the same everywhere.
-    ///
-    /// Parameters
-    /// ----------
-    /// dt, derivative, tau, duration
-    ///     As in `style_jacobian`.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray, (T, D, D)
-    #[pyo3(signature = (dt=0.01, *, derivative=0, tau=None, duration=None))]
-    fn start_jacobian<'py>(
-        &self,
-        py: Python<'py>,
-        dt: f64,
-        derivative: isize,
-        tau: Option<f64>,
-        duration: Option<f64>,
-    ) -> PyResult<Cube<'py>> {
-        self.jacobian(py, WithRespectTo::Start, derivative, from(None, tau), TimeGrid { dt, duration })
-    }
-}
-
-impl Model {
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        variable: WithRespectTo,
+        wrt: &str,
+        conditions: Option<&Bound<'py, PyAny>>,
         derivative: isize,
-        arguments: Arguments<'_, 'py>,
-        grid: TimeGrid,
+        dt: f64,
+        duration: Option<f64>,
+        context: Option<&Bound<'py, PyAny>>,
+        changes: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Cube<'py>> {
+        let wrt = match wrt {
+            "style" => WithRespectTo::Style,
+            "goal" => WithRespectTo::Goal,
+            "anchor" => WithRespectTo::Anchor,
+            "start" => WithRespectTo::Start,
+            _ => {
+                let text = format!("wrt = '{wrt}': must be 'style', 'goal', 'anchor' or 'start'");
+                return Err(PyValueError::new_err(text));
+            }
+        };
         let derivative = Derivative::of_order("derivative", count("derivative", derivative)?).map_err(raise)?;
-        let conditions = arguments.conditions()?;
-        let jacobian = interruptible(py, |progress| {
-            pdmp_core::motion::jacobian(self.0.primitive(), variable, derivative, &conditions, grid, progress)
+        let conditions = conditions_of(&self.0, conditions, context, changes)?;
+        let found = interruptible(py, |progress| {
+            jacobian(self.0.primitive(), wrt, derivative, &conditions, TimeGrid { dt, duration }, progress)
         })?;
-        Ok(jacobian.into_pyarray(py))
-    }
-}
-
-/// Arguments of which only start and time constant matter.
-fn from<'a, 'py>(start: Option<&'a Bound<'py, PyAny>>, tau: Option<f64>) -> Arguments<'a, 'py> {
-    Arguments {
-        style: None,
-        goal: None,
-        start,
-        velocity: None,
-        anchor: None,
-        amplitude: 1.0,
-        tau,
-        segment_durations: None,
-        phase: None,
+        Ok(found.into_pyarray(py))
     }
 }

@@ -196,7 +196,7 @@ impl Model {
 
     /// What was chosen for the basis functions, in one line.
     #[getter]
-    fn basis(&self) -> &str {
+    fn regression(&self) -> &str {
         &self.0.learnt().regression
     }
 

@@ -39,10 +39,12 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<model::Model>()?;
     module.add_class::<batch::RolloutChunks>()?;
     module.add_class::<context::ContextMap>()?;
+    module.add_class::<conditions::Conditions>()?;
     module.add_class::<prediction::Prediction>()?;
     module.add_class::<controller::Status>()?;
     module.add_class::<controller::Controller>()?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
+    module.add_function(wrap_pyfunction!(conditions::blend, module)?)?;
     module.add_function(wrap_pyfunction!(factor::factorise, module)?)?;
     module.add_function(wrap_pyfunction!(inspection::inspected, module)?)?;
     module.add_function(wrap_pyfunction!(model::load, module)?)?;

@@ -7,10 +7,11 @@ use ndarray::Array3;
 use numpy::IntoPyArray;
 use pdmp_core::learning::style_of;
 use pdmp_core::motion::{TimeGrid, prediction_band, rollout_with};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict, PyString};
 
-use crate::conditions::Arguments;
+use crate::conditions::{Conditions, conditions_of};
 use crate::controller::Controller;
 use crate::convert::{Cube, Matrix, Reduced, Vector, optional, to_numpy, vector};
 use crate::demo::{Demonstration, Trajectory};
@@ -49,39 +50,24 @@ pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
 
 #[pymethods]
 impl Model {
-    /// The movement under constant conditions.
+    /// Compute the movement under constant conditions.
     ///
-    /// τż = α_z(β_z(g − y) − z), τẏ = z + w with w = x·sᵀb (discrete) or r·sᵀb (rhythmic), propagated exactly.
-    /// What is not given is that of the nominal demonstration.
+    /// Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c, with w = x·sᵀb (discrete) or r·sᵀb (rhythmic),
+    /// exactly. Conditions that are not given are those of the nominal demonstration.
     ///
     /// Parameters
     /// ----------
-    /// style : array_like, (J,), optional
-    ///     Style parameter s.
-    /// goal : array_like, (D,), optional
-    ///     Goal g, discrete.
-    /// start : array_like, (D,), optional
-    ///     Start position; a rhythmic movement otherwise starts on its cycle.
-    /// velocity : array_like, (D,), optional
-    ///     Start velocity per s; otherwise as in the demonstrations.
-    /// anchor : array_like, (D,), optional
-    ///     Anchor y_a, rhythmic.
-    /// amplitude : float
-    ///     Amplitude r₀, rhythmic; 1 as demonstrated.
-    /// tau : float, optional
-    ///     Time constant in s.
-    /// timing : array_like, (K,), optional
-    ///     Time in s in each segment between `breaks`, in place of `tau`: time over phase is the monotone cubic through
-    ///     them, in place of t = tau u, and y the same function of phase. Past the end the last rate goes on.
+    /// conditions : Conditions, optional
+    ///     Conditions at the start.
     /// dt : float
     ///     Interval between samples in s.
     /// duration : float, optional
     ///     Length in s; otherwise the demonstrated duration scaled by `tau`, or the sum of `segment_durations`; one period if
     ///     rhythmic.
     /// context : array_like, (Q,), optional
-    ///     Predicts style, goal, start or anchor, and timing, where they are not given.
-    /// phase : float, optional
-    ///     Phase φ in rad at which a rhythmic movement starts, on its limit cycle; 0 otherwise.
+    ///     Context whose prediction supplies style, goal, start or anchor, and duration where they are not given.
+    /// **changes
+    ///     Single conditions by name (see `Conditions`), in place of those of `conditions`.
     ///
     /// Returns
     /// -------
@@ -91,34 +77,76 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     A wrong length, a number that is not finite, or an argument of the other kind of primitive.
-    #[pyo3(signature = (
-        style=None, *, goal=None, start=None, velocity=None, anchor=None, amplitude=1.0, tau=None, segment_durations=None,
-        dt=0.01, duration=None, context=None, phase=None
-    ))]
-    #[allow(clippy::too_many_arguments)]
+    ///     A wrong length, a number that is not finite, or a condition that this kind of primitive does not have.
+    /// TypeError
+    ///     An unknown keyword, or conditions of another type.
+    ///
+    /// Examples
+    /// --------
+    /// >>> model.rollout(goal=[0.4, 0.1], tau=2.0, dt=0.001).position.shape
+    /// (2001, 2)
+    #[pyo3(
+        signature = (conditions=None, *, dt=0.01, duration=None, context=None, **changes),
+        text_signature = "($self, conditions=None, *, dt=0.01, duration=None, context=None, **changes)"
+    )]
     fn rollout(
         &self,
         py: Python<'_>,
-        style: Option<&Bound<'_, PyAny>>,
-        goal: Option<&Bound<'_, PyAny>>,
-        start: Option<&Bound<'_, PyAny>>,
-        velocity: Option<&Bound<'_, PyAny>>,
-        anchor: Option<&Bound<'_, PyAny>>,
-        amplitude: f64,
-        tau: Option<f64>,
-        segment_durations: Option<&Bound<'_, PyAny>>,
+        conditions: Option<&Bound<'_, PyAny>>,
         dt: f64,
         duration: Option<f64>,
         context: Option<&Bound<'_, PyAny>>,
-        phase: Option<f64>,
+        changes: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Trajectory> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, segment_durations, phase };
-        let conditions = arguments.in_context(&self.0, context)?;
+        let conditions = conditions_of(&self.0, conditions, context, changes)?;
         let trajectory = interruptible(py, |progress| {
             rollout_with(self.0.primitive(), &conditions, TimeGrid { dt, duration }, progress)
         })?;
         Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
+    }
+
+    /// Return the conditions of one demonstration, or the mean of several.
+    ///
+    /// Parameters
+    /// ----------
+    /// demos : int or sequence of int
+    ///     Indices of demonstrations, from 0 to M - 1.
+    ///
+    /// Returns
+    /// -------
+    /// Conditions
+    ///     Style, goal and start or anchor, and segment durations.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     No index, one that is no whole number, or one outside the demonstrations.
+    ///
+    /// Examples
+    /// --------
+    /// >>> trajectory = model.rollout(model.conditions(3))
+    fn conditions(&self, demos: &Bound<'_, PyAny>) -> PyResult<Conditions> {
+        let whole = |item: &Bound<'_, PyAny>| {
+            item.extract::<isize>()
+                .ok()
+                .filter(|_| item.getattr("ndim").is_err() || item.get_type().name().is_ok_and(|name| name != "ndarray"))
+        };
+        let indices: Option<Vec<isize>> = match whole(demos) {
+            Some(index) => Some(vec![index]),
+            None if demos.is_instance_of::<PyString>() => None,
+            None => demos.try_iter().ok().and_then(|items| items.map(|item| whole(&item.ok()?)).collect()),
+        };
+        let Some(indices) = indices else {
+            let text = format!("demos = {}: pass the index of a demonstration, or a list of them", demos.repr()?);
+            return Err(PyValueError::new_err(text));
+        };
+        let last = self.0.n_demos() - 1;
+        let index = |index: isize| {
+            let text = || format!("demos: {index} must lie between 0 and {last}");
+            usize::try_from(index).ok().filter(|index| *index <= last).ok_or_else(|| PyValueError::new_err(text()))
+        };
+        let indices = indices.into_iter().map(index).collect::<PyResult<Vec<usize>>>()?;
+        self.0.conditions(&indices).map(Conditions).map_err(raise)
     }
 
     /// The style (J,) of a new demonstration: the likeliest given its target.
@@ -247,7 +275,7 @@ impl Model {
     ///     A model fitted without contexts, a wrong length, a label never shown, or a number that is not finite.
     fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
         let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
-        Ok(Prediction::new(py, prediction))
+        Prediction::new(py, prediction)
     }
 
     /// Bounds within which a new movement of a condition lies, for each sample of `rollout(context=context, dt=dt)`.
@@ -311,39 +339,33 @@ impl Model {
     /// ----------
     /// dt : float
     ///     Length of a tick in s.
-    /// style, goal, start, velocity, tau, grid, anchor, amplitude, context, phase
-    ///     As in `rollout`; of a timing the loop takes the sum, and follows it where `tau_at` sets its pace.
+    /// conditions : Conditions, optional
+    ///     Conditions at the start. Of segment durations the loop takes the total, and follows them where `tau_at` sets
+    ///     its τ.
     /// transition : float, optional
-    ///     Time to 99 % in s, at the model's own tau, of a changed style, goal, anchor or amplitude, and of a changed tau
-    ///     or speed; 0 switches at once. A tenth of the nominal duration (discrete) or a quarter of the period (rhythmic)
-    ///     otherwise. A goal takes what remains of the movement if that is longer, unless transport is immediate.
+    ///     Time in s to 99 % of a changed style, goal, anchor, amplitude, tau or speed, at the model's own tau; 0 is the
+    ///     paper's immediate switch. By default a tenth of the nominal duration (discrete) or a quarter of the period
+    ///     (rhythmic). A goal takes the remaining time of the movement if that is longer, unless transport is immediate.
+    /// context, **changes
+    ///     As in `rollout`.
     ///
     /// Returns
     /// -------
     /// Controller
-    #[pyo3(signature = (
-        dt=0.001, style=None, goal=None, start=None, velocity=None, tau=None, transition=None, *, anchor=None,
-        amplitude=1.0, segment_durations=None, context=None, phase=None
-    ))]
-    #[allow(clippy::too_many_arguments)]
+    #[pyo3(
+        signature = (dt=0.001, conditions=None, *, transition=None, context=None, **changes),
+        text_signature = "($self, dt=0.001, conditions=None, *, transition=None, context=None, **changes)"
+    )]
     fn controller(
         &self,
         py: Python<'_>,
         dt: f64,
-        style: Option<&Bound<'_, PyAny>>,
-        goal: Option<&Bound<'_, PyAny>>,
-        start: Option<&Bound<'_, PyAny>>,
-        velocity: Option<&Bound<'_, PyAny>>,
-        tau: Option<f64>,
+        conditions: Option<&Bound<'_, PyAny>>,
         transition: Option<f64>,
-        anchor: Option<&Bound<'_, PyAny>>,
-        amplitude: f64,
-        segment_durations: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
-        phase: Option<f64>,
+        changes: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Controller> {
-        let arguments = Arguments { style, goal, start, velocity, anchor, amplitude, tau, segment_durations, phase };
-        let conditions = arguments.in_context(&self.0, context)?;
+        let conditions = conditions_of(&self.0, conditions, context, changes)?;
         let controller = pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
         Controller::new(py, Arc::clone(&self.0), controller)
     }

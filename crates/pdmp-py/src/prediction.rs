@@ -3,88 +3,66 @@
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
+use crate::conditions::Conditions;
 use crate::convert::{Reduced, to_numpy};
 
-/// The movement predicted for a condition; what the kind of primitive does not have is None.
+/// Movement predicted for a context.
 #[pyclass(frozen, get_all, module = "pdmp")]
 pub(crate) struct Prediction {
-    /// Style (J,).
-    style: Py<PyArray1<f64>>,
-    /// Goal (D,), discrete.
-    goal: Option<Py<PyArray1<f64>>>,
-    /// Start (D,), discrete.
-    start: Option<Py<PyArray1<f64>>>,
-    /// Anchor (D,), rhythmic.
-    anchor: Option<Py<PyArray1<f64>>>,
-    /// Time in each segment of the movement (K,) in s.
-    segment_durations: Py<PyArray1<f64>>,
-    /// Duration or period in s: the sum of the timing.
+    /// Style, goal and start or anchor, and segment durations.
+    conditions: Py<Conditions>,
+    /// Duration or period in s.
     duration: f64,
-    /// Covariance (P, P) of style, goal and start or anchor, and timing, in this order, for a new movement; None where
-    /// the demonstrations leave no degree of freedom to estimate it.
+    /// Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order; None
+    /// where the demonstrations leave no degree of freedom to estimate it.
     covariance: Option<Py<PyArray2<f64>>>,
-    /// Degrees of freedom from which the covariance is known.
+    /// Degrees of freedom of the covariance.
     degrees_of_freedom: usize,
-    /// How far each value of the context lies outside of those demonstrated, in their range (Q,): 0 inside and for
-    /// labels, infinite where a value that was never varied differs.
-    outside: Py<PyArray1<f64>>,
+    /// Distance of each context value from the demonstrated ones, in their range (Q,): 0 inside and for labels, infinite
+    /// where a value that never varied differs.
+    extrapolation: Py<PyArray1<f64>>,
 }
 
 impl Prediction {
-    pub(crate) fn new(py: Python<'_>, prediction: pdmp_core::model::Prediction) -> Self {
-        let optional = |values: Option<Vec<f64>>| values.map(|values| to_numpy(py, &values).unbind());
-        let conditions = prediction.conditions;
-        Self {
-            style: to_numpy(py, &conditions.style.unwrap_or_default()).unbind(),
-            goal: optional(conditions.goal),
-            start: optional(conditions.start),
-            anchor: optional(conditions.anchor),
-            segment_durations: to_numpy(py, &conditions.segment_durations.unwrap_or_default()).unbind(),
+    pub(crate) fn new(py: Python<'_>, prediction: pdmp_core::model::Prediction) -> PyResult<Self> {
+        Ok(Self {
+            conditions: Py::new(py, Conditions(prediction.conditions))?,
             duration: prediction.duration,
             covariance: prediction.covariance.map(|covariance| covariance.into_pyarray(py).unbind()),
             degrees_of_freedom: prediction.degrees_of_freedom,
-            outside: to_numpy(py, &prediction.outside).unbind(),
-        }
+            extrapolation: to_numpy(py, &prediction.extrapolation).unbind(),
+        })
     }
 }
 
 #[pymethods]
 impl Prediction {
-    /// One of what another one told.
+    /// Rebuild a pickled prediction.
     #[staticmethod]
-    #[allow(clippy::too_many_arguments)]
     fn _of(
-        style: Py<PyArray1<f64>>,
-        goal: Option<Py<PyArray1<f64>>>,
-        start: Option<Py<PyArray1<f64>>>,
-        anchor: Option<Py<PyArray1<f64>>>,
-        segment_durations: Py<PyArray1<f64>>,
+        conditions: Py<Conditions>,
         duration: f64,
         covariance: Option<Py<PyArray2<f64>>>,
         degrees_of_freedom: usize,
-        outside: Py<PyArray1<f64>>,
+        extrapolation: Py<PyArray1<f64>>,
     ) -> Self {
-        Self { style, goal, start, anchor, segment_durations, duration, covariance, degrees_of_freedom, outside }
+        Self { conditions, duration, covariance, degrees_of_freedom, extrapolation }
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        let Self { style, goal, start, anchor, segment_durations, duration, covariance, degrees_of_freedom, outside } =
-            self;
-        let told = (style, goal, start, anchor, segment_durations, *duration, covariance, *degrees_of_freedom, outside);
-        Ok((py.get_type::<Self>().getattr("_of")?, told.into_pyobject(py)?))
+        let Self { conditions, duration, covariance, degrees_of_freedom, extrapolation } = self;
+        let parts = (conditions, *duration, covariance, *degrees_of_freedom, extrapolation);
+        Ok((py.get_type::<Self>().getattr("_of")?, parts.into_pyobject(py)?))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let most = self.outside.bind(py).readonly().as_array().fold(0.0f64, |most, outside| most.max(*outside));
-        let warning = match most {
+        let distances = self.extrapolation.bind(py).readonly();
+        let note = match distances.as_array().fold(0.0f64, |most, distance| most.max(*distance)) {
             0.0 => String::new(),
-            most if most.is_finite() => format!("; outside of the demonstrated contexts by {most:.2} of their range"),
-            _ => "; outside of the demonstrated contexts, which do not vary in this".to_string(),
+            most if most.is_finite() => format!("; extrapolated by {most:.2} of the demonstrated range of contexts"),
+            _ => "; extrapolated along a context value that never varied".to_string(),
         };
-        Ok(format!(
-            "<pdmp.Prediction: style {}, duration {:.4} s{warning}>",
-            self.style.bind(py).repr()?,
-            self.duration
-        ))
+        let style = self.conditions.bind(py).getattr("style")?;
+        Ok(format!("<pdmp.Prediction: style {}, duration {:.4} s{note}>", style.repr()?, self.duration))
     }
 }

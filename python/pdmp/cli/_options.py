@@ -6,7 +6,7 @@ from typing import Any
 
 
 def path(text: str) -> str:
-    """Returns the name of a file or folder, which must not stand for a stream."""
+    """Returns the name of a file or folder, which must not be a stream."""
     if text == "-":
         raise ArgumentTypeError("- is no file: name one, or ./- where it is called so")
     return text
@@ -50,7 +50,7 @@ def add_learning(parser: ArgumentParser) -> None:
         "--map",
         choices=["auto", "stacked", "gp", "linear", "polynomial"],
         default="auto",
-        help="what leads from contexts to movements; default: auto",
+        help="map from contexts to movements; default: auto",
     )
     parser.add_argument(
         "--kind",
@@ -63,16 +63,16 @@ def add_learning(parser: ArgumentParser) -> None:
         "--alignment",
         choices=["linear", "warp"],
         default="linear",
-        help="how time is scaled to that of the nominal demonstration; default: linear",
+        help="alignment in time with the nominal demonstration; default: linear",
     )
     parser.add_argument(
         "--styles",
         type=_or_named(int, "whole number", auto="auto"),
         metavar="J",
-        help="number of style parameters, or auto: as few as foresee movements in other contexts",
+        help="number of style parameters, or auto: by cross-validation over contexts",
     )
     parser.add_argument(
-        "--spectrum",
+        "--singular-value-share",
         type=float,
         metavar="SHARE",
         help="without --styles: keep this share of the singular-value sum, such as the paper's 0.9;"
@@ -95,7 +95,7 @@ def add_learning(parser: ArgumentParser) -> None:
         "--transport",
         choices=["learnt", "immediate"],
         default="learnt",
-        help="how a moved start or goal is spread over the movement; default: learnt",
+        help="distribution of a change of start or goal over the movement; default: learnt",
     )
 
 
@@ -105,7 +105,7 @@ def settings(options: Namespace) -> dict[str, Any]:
         "map": options.map,
         "alignment": options.alignment,
         "n_styles": options.styles,
-        "spectrum": options.spectrum,
+        "singular_value_share": options.singular_value_share,
         "basis": options.basis,
         "smoothing": options.smoothing,
         "transport": options.transport,

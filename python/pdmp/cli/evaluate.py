@@ -1,6 +1,6 @@
-"""Foresee demonstrations that are held out, with a primitive and with simpler predictors.
+"""Predicts held-out demonstrations, with a primitive and with simpler predictors.
 
-Prints how large the errors are. With a folder, figures and the tables in Markdown are written too.
+Prints the errors. With a folder, figures and tables in Markdown are written too.
 
 example: pdmp evaluate recordings/ --columns q1 q2 q3 --context height_m -o evaluation
 """

@@ -1,4 +1,4 @@
-"""Learn a primitive from demonstrations.
+"""Fits a primitive to demonstrations.
 
 example: pdmp fit recordings/ --columns q1 q2 q3 --context height_m -o reach.safetensors
 """

@@ -1,4 +1,4 @@
-"""Tell what a model file holds.
+"""Prints the contents of a model file.
 
 example: pdmp info reach.safetensors
 """
@@ -34,10 +34,10 @@ def run(options: Namespace) -> None:
         "demonstrations": f"{model.n_demos}, nominal {model.nominal}",
         "durations": f"{model.durations.min():g} to {model.durations.max():g} s",
         "DoFs": f"{model.n_dofs}: {', '.join(_labels(model))}",
-        "styles": f"{model.n_styles}, which leave out {model.left_out:.1%} of the targets' RMS",
+        "styles": f"{model.n_styles}; truncation error {model.truncation_error:.1%} of the targets",
         "singular values": _several(model.singular_values),
         "noise": _noise(model),
-        "basis": f"{model.basis}; table error {model.table_error:.1e}",
+        "basis": f"{model.regression}; table error {model.table_error:.1e}",
         "tau": f"{model.tau:g} s",
         "constants": constants,
     }

@@ -1,4 +1,4 @@
-"""Parametric dynamic movement primitives: learn one from demonstrations, run it, look at it."""
+"""Parametric dynamic movement primitives: fits, rollouts, evaluations and figures."""
 
 import os
 import re
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 for success, 1 for an error, which is told in one line on standard error, and
+        Exit code: 0 for success, 1 for an error, reported in one line on standard error, and
         130 after an interruption.
 
     Raises

@@ -1,6 +1,6 @@
-"""Draw a model into a folder.
+"""Draws a model into a folder.
 
-With the demonstrations that it learnt from, they are drawn against their reproductions too.
+Given its demonstrations, it draws them beside their reproductions too.
 
 example: pdmp plot reach.safetensors recordings/ --columns q1 q2 q3 -o figures
 """
@@ -46,7 +46,7 @@ def run(options: Namespace) -> None:
         "styles": plot.styles(model),
         "fan": plot.fan(
             model,
-            *(pdmp.as_demonstrated(model, end) for end in ends),
+            *(model.conditions(end) for end in ends),
             ends=(f"demo {ends[0]}", f"demo {ends[1]}"),
         ),
     }

@@ -1,4 +1,4 @@
-"""Write a movement as CSV.
+"""Writes a movement as CSV.
 
 The style is that of the nominal demonstration unless one of --style, --context and --demo is given.
 
@@ -41,13 +41,11 @@ def arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Loads a model, rolls it out and writes the movement."""
     model = pdmp.load(options.model)
-    given = pdmp.as_demonstrated(model, options.demo) if options.demo is not None else {}
-    if options.tau is not None:
-        given.pop("timing", None)
+    conditions = None if options.demo is None else model.conditions(options.demo)
     names = ("style", "context", "goal", "start", "anchor", "amplitude", "tau", "dt", "duration")
-    given |= {name: value for name in names if (value := getattr(options, name)) is not None}
-    trajectory = model.rollout(**given)
-    if options.context is not None and model.predict(options.context).outside.any():
+    given = {name: value for name in names if (value := getattr(options, name)) is not None}
+    trajectory = model.rollout(conditions, **given)
+    if options.context is not None and model.predict(options.context).extrapolation.any():
         print("pdmp: the context lies outside of those demonstrated", file=sys.stderr)
     trajectory.to_csv(options.output)
     say(f"{options.output}: {len(trajectory.time)} samples, {trajectory.time[-1]:g} s")

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
+from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
-from pdmp.io._fields import listed
 
 
 def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstration]]:
@@ -35,7 +35,7 @@ def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstra
     """
     folder = _folder()
     known = sorted(file.stem for file in folder.glob("*.mat"))
-    chosen = listed("shapes", shapes or known)
+    chosen = name_list("shapes", shapes or known)
     for shape in chosen:
         if shape not in known:
             raise value_error(f"shapes: no '{shape}' among {', '.join(known)}")

@@ -86,7 +86,7 @@ class Components:
         """Factorises what differs from the mean."""
         joint = recordings.sampled.reshape(recordings.n_demos, -1)
         mean = joint.mean(axis=0)
-        factors = factorise(joint - mean, spectrum=self.spectrum)
+        factors = factorise(joint - mean, singular_value_share=self.spectrum)
         return factors.styles, mean, factors.basis
 
 

@@ -1,4 +1,4 @@
-"""The form of a CSV file: separator, lines before the header, header, units, and rows."""
+"""Layout of a CSV file: separator, lines before the header, header, units and rows."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from pdmp._labels import split_label
 from pdmp._messages import value_error
 from pdmp.io import _fields
 
-SAMPLE = 200
-"""Rows from which the form of a file is found; a preamble must end among them."""
+MAX_PREAMBLE = 200
+"""Rows from which the layout is found; lines before the header must end among them."""
 MAX_UNIT = 40
-"""Characters of a unit; patterns take too long for texts of any length."""
+"""Characters of a unit; matching takes too long for longer texts."""
 UNIT = re.compile(
     r"[munµμkMG]?(s|m|rad|N|Nm|g|V|A|Hz|W|J|Pa|T)|deg|°|°C|sec|min|h|cm|dm|deg|turns?|rev|px|%|1|"
     r"counts?|quat"
@@ -30,7 +30,7 @@ Row = tuple[int, list[str]]
 
 @dataclass
 class CsvTable:
-    """Header of a CSV file, and what is needed to go through its rows."""
+    """Layout of a CSV file, and iteration over its rows."""
 
     path: Path
     line: int  # of the header
@@ -70,9 +70,9 @@ def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False
     """Finds separator, header and units of a CSV file.
 
     Comments, which begin with #, a line such as `sep=;` and other lines before the header are
-    passed over. The header is the row with as many fields as the samples have that names the
+    skipped. The header is the row with as many fields as the samples have that names the
     columns; if there is a choice, the one with a name among `times`. It may stand in a comment.
-    Below it, a row of units is taken for one. The header of an index, whose rows may be words, is
+    A row of units may follow it. The header of an index, whose rows may be words, is
     its first row.
     """
     raw = path.read_bytes()
@@ -82,7 +82,7 @@ def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False
     except UnicodeDecodeError:
         raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
     separator = _separator(path, text)
-    sample = [row for row in islice(_parse(path, text, separator), SAMPLE) if any(row[1])]
+    sample = [row for row in islice(_parse(path, text, separator), MAX_PREAMBLE) if any(row[1])]
     sample = [row for row in sample if not _separating(separator.join(row[1]))]
     if not sample:
         raise value_error(f"{path}: empty: expected a header row with names, then one sample a row")
@@ -117,7 +117,7 @@ def _is_comment(line: str) -> bool:
 
 def _separator(path: Path, text: str) -> str:
     """Returns the separator that gives most of the first rows the same number of fields."""
-    head = "".join(islice(io.StringIO(text, newline=""), SAMPLE))
+    head = "".join(islice(io.StringIO(text, newline=""), MAX_PREAMBLE))
     for line in head.splitlines():
         if separator := _separating(line):
             return separator

@@ -1,4 +1,4 @@
-"""A demonstration from what a file holds, with errors that name the file."""
+"""Demonstrations from the contents of files, with errors that name the file."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Names and numbers of a CSV file, with the place of whatever is wrong in them."""
+"""Names and numbers of a CSV file, with the place of each error."""
 
 import math
 from collections.abc import Sequence
@@ -6,36 +6,13 @@ from pathlib import Path
 
 from pdmp._messages import value_error
 
-MAX_SHOWN = 80
+MAX_QUOTED = 80
 """Characters of a field that an error quotes."""
-GAPS = frozenset(
-    [
-        "na",
-        "n/a",
-        "#n/a",
-        "#na",
-        "<na>",
-        "nan",
-        "+nan",
-        "-nan",
-        "nan(ind)",
-        "-nan(ind)",
-        "1.#qnan",
-        "-1.#qnan",
-        "1.#ind",
-        "-1.#ind",
-        "null",
-        "none",
-    ]
-)
-"""Texts that mark a missing number, beside the empty one."""
-
-
-def listed(argument: str, names: Sequence[str]) -> list[str]:
-    """Returns several names as a list; a text would be taken apart letter by letter."""
-    if isinstance(names, str):
-        raise value_error(f"{argument} = '{names}': pass a list of names, ['{names}']")
-    return list(names)
+GAPS = frozenset([
+    "na", "n/a", "#n/a", "#na", "<na>", "null", "none", "nan", "+nan", "-nan", "nan(ind)",
+    "-nan(ind)", "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind",
+])  # fmt: skip
+"""Texts that mark a missing number, besides the empty one."""
 
 
 def check_names(path: Path, line: int, names: Sequence[str]) -> None:
@@ -56,10 +33,10 @@ def check_names(path: Path, line: int, names: Sequence[str]) -> None:
 
 def is_name(field: str) -> bool:
     """Returns whether a field may head a column."""
-    return bool(field.strip()) and parsed(field.replace(",", ".", 1)) is None
+    return bool(field.strip()) and parse_number(field.replace(",", ".", 1)) is None
 
 
-def places(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]:
+def column_indices(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]:
     """Returns the index of the column of each name."""
     where = {name: k for k, name in enumerate(header)}
     for name in names:
@@ -69,9 +46,9 @@ def places(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]
     return [where[name] for name in names]
 
 
-def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) -> float:
+def read_number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) -> float:
     """Returns the finite number in a field of the column called `name`, or NaN for a gap."""
-    value = parsed(field)
+    value = parse_number(field)
     field = short(field)
     place = f"{path}, line {line}, column '{name}'"
     if is_gap(field):
@@ -84,7 +61,7 @@ def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) 
         )
     if value is None:
         hint = ""
-        if parsed(field.replace(",", ".")) is not None:
+        if parse_number(field.replace(",", ".")) is not None:
             hint = ": decimal commas are read where semicolons or tabs separate the fields"
         raise value_error(f"{place}: '{field}' is not a number{hint}")
     if not math.isfinite(value):
@@ -94,7 +71,7 @@ def number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) 
 
 def short(field: str) -> str:
     """Returns a field, or its beginning where it is long."""
-    return field if len(field) <= MAX_SHOWN else field[:MAX_SHOWN] + "..."
+    return field if len(field) <= MAX_QUOTED else field[:MAX_QUOTED] + "..."
 
 
 def is_gap(field: str) -> bool:
@@ -104,10 +81,10 @@ def is_gap(field: str) -> bool:
 
 def is_number(field: str) -> bool:
     """Returns whether a field holds a number, finite or not."""
-    return parsed(field) is not None
+    return parse_number(field) is not None
 
 
-def parsed(field: str) -> float | None:
+def parse_number(field: str) -> float | None:
     """Returns the number in a field, if it is one."""
     try:
         # Python takes 1_000 for a thousand.

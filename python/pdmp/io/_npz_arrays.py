@@ -1,4 +1,4 @@
-"""Arrays of an NPZ file, which never take more memory than the file can hold."""
+"""Arrays of an NPZ file, in memory that the size of the file bounds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pdmp._messages import value_error
 
 MAX_DEFLATION = 1100
-"""Bytes that one of a compressed member can stand for; deflate reaches 1032."""
+"""Largest ratio of a member to its compressed size; deflate reaches 1032."""
 MAX_MEMBERS = 1_000_000
 
 

@@ -1,4 +1,4 @@
-"""Time stamps in s, in whichever unit they come."""
+"""Units of time stamps, and their conversion to s."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pdmp._labels import split_label
 from pdmp._messages import value_error, warn
 
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-LONG = {
+ALIASES = {
     "μs": "us", "second": "s", "seconds": "s", "milliseconds": "ms", "msec": "ms",
     "microseconds": "us", "usec": "us", "nanoseconds": "ns", "nsec": "ns",
 }  # fmt: skip
-"""Other ways to write them; the first one has the Greek letter."""
-MAX_STEP = 5.0  # s: no movement is sampled that rarely
+"""Other spellings; the first one has the Greek letter."""
+MAX_STEP = 5.0  # s: no movement is sampled more rarely
 EPOCH = (6e8, 4.2e9)  # s since 1970, from 1989 to 2103
 MAX_STAMP = 1e11  # s, as for Demonstration
 
@@ -25,14 +25,14 @@ MAX_STAMP = 1e11  # s, as for Demonstration
 def unit_of(source: object, name: str, unit: str) -> str:
     """Returns the unit of a time column, which may stand in parentheses too, or be missing."""
     unit = unit or split_label(re.sub(r"\((.*)\)$", r"[\1]", name))[1]
-    unit = LONG.get(unit.lower(), unit)
+    unit = ALIASES.get(unit.lower(), unit)
     if unit not in SECONDS:
         known = ", ".join(filter(None, SECONDS))
         raise value_error(f"{source}, column '{name}': its unit is '{unit}': expected {known}")
     return unit
 
 
-def seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[Any]:
+def to_seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[Any]:
     """Returns time stamps (T,) in s; those since 1970 in ms, µs or ns count from the first.
 
     `remedy` says how a unit, in place of {unit}, is given.

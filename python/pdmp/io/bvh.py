@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields
@@ -30,7 +31,7 @@ def read_bvh(
 
     Each channel is a degree of freedom, called after joint and channel, such as
     `LeftLeg.Xrotation`. Rotations, in degrees in the file, come in rad; positions keep the unit of
-    the file, which the format does not tell.
+    the file, which the format does not give.
 
     Parameters
     ----------
@@ -73,8 +74,8 @@ def read_bvh(
         raise value_error(
             f"{path}: holds {len(motion.frames)} frames, but announces {n_frames}: export it anew"
         )
-    names = found if columns is None else _fields.listed("columns", columns)
-    where = _fields.places(path, found, names)
+    names = found if columns is None else name_list("columns", columns)
+    where = _fields.column_indices(path, found, names)
     position = np.array([_frame(path, k, row, found) for k, row in enumerate(motion.frames)])
     position = position.reshape(n_frames, len(found))[:, where]
     turning = [name.endswith("rotation") for name in names]

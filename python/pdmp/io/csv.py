@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._atomic_write import atomic_write
-from pdmp._labels import DERIVATIVES, split_label
+from pdmp._labels import DERIVATIVES, name_list, split_label
 from pdmp._messages import value_error
 from pdmp._native import Demonstration, Trajectory
 from pdmp.io import _fields, _time_units
@@ -40,7 +40,7 @@ def read_csv(
     A column headed `knee [rad]` is called `knee`, and its unit is rad; units may stand in a row of
     their own below the header too. Fields are separated by commas, semicolons, tabs or spaces;
     where not by commas, these may be decimal. Lines before the header, comments, which begin with
-    #, and the unnamed index column that pandas writes are passed over.
+    #, and the unnamed index column that pandas writes are skipped.
 
     Parameters
     ----------
@@ -73,10 +73,10 @@ def read_csv(
     """
     path = Path(path)
     times = CLOCKS if time == CLOCKS[0] else (time, split_label(time)[0])
-    found = parse_layout(path, times if dt is None else ())
-    header, units = _labels(found)
+    table = parse_layout(path, times if dt is None else ())
+    header, units = _labels(table)
     names = [name for name in header if name]
-    _fields.check_names(path, found.line, names)
+    _fields.check_names(path, table.line, names)
     stamped = next((name for name in times if name in header), None)
     if dt is None and stamped is None:
         raise value_error(
@@ -87,16 +87,16 @@ def read_csv(
         derived = {f"{name}{suffix}" for name in names for suffix, _ in DERIVATIVES[1:]}
         names = [name for name in names if name != stamped and name not in derived]
     else:
-        names = _fields.listed("columns", columns)
-    where = _fields.places(path, header, names)
+        names = name_list("columns", columns)
+    where = _fields.column_indices(path, header, names)
     clock = header.index(stamped) if dt is None and stamped is not None else None
-    position, stamps = _numbers(found, header, where, clock, gaps=max_gap > 0)
+    position, stamps = _numbers(table, header, where, clock, gaps=max_gap > 0)
     if clock is not None and stamps is not None:
         name = header[clock]
         given = units[clock] or ("" if name == time else split_label(time)[1])
         remedy = f"write '{name} [{{unit}}]' in the header or as time="
         unit = _time_units.unit_of(path, name, given)
-        stamps = _time_units.seconds(f"{path}, column '{name}'", stamps, unit, remedy)
+        stamps = _time_units.to_seconds(f"{path}, column '{name}'", stamps, unit, remedy)
     return make_demonstration(
         path,
         position,
@@ -109,43 +109,43 @@ def read_csv(
     )
 
 
-def _labels(found: CsvTable) -> tuple[list[str], list[str]]:
+def _labels(table: CsvTable) -> tuple[list[str], list[str]]:
     """Returns names and units of the columns; those of the header go before those below it."""
-    header, units = map(list, zip(*map(split_label, found.fields), strict=True))
-    if found.units is not None:
-        units = [unit or below for unit, below in zip(units, found.units, strict=True)]
+    header, units = map(list, zip(*map(split_label, table.fields), strict=True))
+    if table.units is not None:
+        units = [unit or below for unit, below in zip(units, table.units, strict=True)]
     return header, units
 
 
 def _numbers(
-    found: CsvTable, header: list[str], where: list[int], clock: int | None, *, gaps: bool
+    table: CsvTable, header: list[str], where: list[int], clock: int | None, *, gaps: bool
 ) -> tuple[NDArray[Any], NDArray[Any] | None]:
     """Returns positions (T, D), NaN in gaps, and time stamps (T,) as they are written."""
-    path = found.path
+    path = table.path
     numbers: list[list[float]] = []
     stamps: list[float] = []
     names = [header[k] for k in where]
     unnamed = [k for k, name in enumerate(header) if not name]
     decimal = {True: 0, False: 0}  # line where a number has a decimal comma, or a point
     thousands = True  # whether the commas may separate thousands
-    for line, row in found.rows(blank=clock is None):
+    for line, row in table.rows(blank=clock is None):
         _check_unnamed(path, line, row, unnamed, len(numbers))
         kept = [row[k] for k in where]
         stamp = "0" if clock is None else row[clock]
         text = "".join((*kept, stamp))
-        if found.separator != "," and "," in text:
+        if table.separator != "," and "," in text:
             decimal[True] = line
             thousands = thousands and all(map(THOUSANDS.fullmatch, (*kept, stamp)))
             kept, stamp = [cell.replace(",", ".") for cell in kept], stamp.replace(",", ".")
         if "." in text:
             decimal[False] = line
-        if found.separator != "," and all(decimal.values()):
+        if table.separator != "," and all(decimal.values()):
             raise value_error(
                 f"{path}, line {line}: numbers have decimal commas and decimal points: write all "
                 "of them with one of the two, and no separators of thousands"
             )
         if clock is not None:
-            value = _fields.number(path, line, header[clock], stamp)
+            value = _fields.read_number(path, line, header[clock], stamp)
             # ns since 1970 have more digits than a double, and fewer than an integer.
             stamps.append(int(stamp) if stamp.isdecimal() and value < 2**63 else value)
         numbers.append(_row(path, line, kept, names, gaps=gaps))
@@ -167,7 +167,7 @@ def _row(path: Path, line: int, cells: list[str], names: list[str], *, gaps: boo
     except ValueError:
         pass
     return [
-        _fields.number(path, line, name, cell, gaps=gaps)
+        _fields.read_number(path, line, name, cell, gaps=gaps)
         for name, cell in zip(names, cells, strict=True)
     ]
 
@@ -213,8 +213,8 @@ def write_csv(
         A file that cannot be written.
     """
     path = Path(path)
-    names = trajectory.names if names is None else _fields.listed("names", names)
-    units = trajectory.units if units is None else _fields.listed("units", units)
+    names = trajectory.names if names is None else name_list("names", names)
+    units = trajectory.units if units is None else name_list("units", units)
     n_dofs = trajectory.position.shape[1]
     for kind, given in (("name", names), ("unit", units)):
         if len(given) != n_dofs:

@@ -1,4 +1,4 @@
-"""Folders with an index, and several files and folders at once."""
+"""Folders with an index, and several files and folders together."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pdmp._labels import split_label
+from pdmp._labels import name_list, split_label
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields
@@ -14,7 +14,7 @@ from pdmp.io._csv_layout import parse_layout
 from pdmp.io._demonstration import make_demonstration
 from pdmp.io.bvh import read_bvh
 from pdmp.io.csv import read_csv
-from pdmp.io.npz import read_npz, recordings
+from pdmp.io.npz import read_npz, read_recordings
 
 SINGLE = (".csv", ".bvh")
 """Formats with one demonstration a file."""
@@ -124,7 +124,7 @@ def read_folder(
             name: _read_single(file, time, context=contexts[name], **options)
             for name, file in files.items()
         }
-    found = list(recordings(archive, columns, dt))
+    found = list(read_recordings(archive, columns, dt))
     if len(found) != len(contexts):
         raise value_error(
             f"{archive}: holds {len(found)} demonstrations, but index.csv lists {len(contexts)}"
@@ -179,12 +179,12 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
 
     A column without any number holds labels.
     """
-    found = parse_layout(path, index=True)
-    header, lines = [split_label(field)[0] for field in found.fields], list(found.rows())
-    if found.separator != ",":
+    table = parse_layout(path, index=True)
+    header, lines = [split_label(field)[0] for field in table.fields], list(table.rows())
+    if table.separator != ",":
         lines = [(line, list(map(_pointed, fields))) for line, fields in lines]
-    _fields.check_names(path, found.line, header if header[0] else header[1:])
-    name, *where = _fields.places(path, header, ["id", *_fields.listed("context", columns)])
+    _fields.check_names(path, table.line, header if header[0] else header[1:])
+    name, *where = _fields.column_indices(path, header, ["id", *name_list("context", columns)])
     if not lines:
         raise value_error(f"{path}: lists no demonstrations: {FORMAT}")
     labels = {k for k in where if not any(_fields.is_number(fields[k]) for _, fields in lines)}
@@ -199,7 +199,7 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
                     f"{path}, line {line}, column '{header[k]}': no {kind}: fill it in"
                 )
         values = [
-            fields[k] if k in labels else _fields.number(path, line, header[k], fields[k])
+            fields[k] if k in labels else _fields.read_number(path, line, header[k], fields[k])
             for k in where
         ]
         contexts[fields[name]] = values or None

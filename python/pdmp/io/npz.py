@@ -1,4 +1,4 @@
-"""NPZ files: several demonstrations in one."""
+"""NPZ files: one demonstration or several."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields, _npz_arrays, _time_units
@@ -48,11 +49,11 @@ def read_npz(
     """
     return {
         name: make_demonstration(f"{path}, '{name}'", position, max_gap=max_gap, **given)
-        for name, position, given in recordings(Path(path), columns, dt)
+        for name, position, given in read_recordings(Path(path), columns, dt)
     }
 
 
-def recordings(
+def read_recordings(
     path: Path, columns: Sequence[str] | None, dt: float | None
 ) -> Iterator[tuple[str, NDArray[Any], dict[str, Any]]]:
     """Yields name, positions (T, D) and the other arguments of each demonstration in the file."""
@@ -60,9 +61,9 @@ def recordings(
     names, units = _labels(path, arrays, "names"), _labels(path, arrays, "units")
     if columns is not None and names is None:
         raise value_error(
-            f"{path}: no array 'names' to tell which columns are {', '.join(columns)}"
+            f"{path}: no array 'names' that would give the columns {', '.join(columns)}"
         )
-    for name, position, time in _parts(path, arrays):
+    for name, position, time in _demonstrations(path, arrays):
         source = f"{path}, '{name}'"
         for labels in (names, units):
             expected = "D" if labels is None else len(labels)
@@ -74,9 +75,9 @@ def recordings(
             raise value_error(f"{source}: no time stamps: pass dt=")
         kept = list(range(position.shape[1]))
         if columns is not None and names is not None:
-            kept = _fields.places(path, names, _fields.listed("columns", columns))
+            kept = _fields.column_indices(path, names, name_list("columns", columns))
         if dt is None and time is not None:
-            time = _time_units.seconds(
+            time = _time_units.to_seconds(
                 source, time, "", "store them in s instead of {unit}, or pass dt="
             )
         given = {
@@ -102,12 +103,12 @@ def _labels(path: Path, arrays: dict[str, NDArray[Any]], kind: str) -> list[str]
     return texts
 
 
-def _parts(
+def _demonstrations(
     path: Path, arrays: dict[str, NDArray[Any]]
 ) -> Iterator[tuple[str, NDArray[Any], NDArray[Any] | None]]:
     """Yields name, positions and time stamps of each demonstration, in any layout."""
     if "y" in arrays and "start" in arrays:
-        yield from _joined(path, arrays["y"], arrays.get("t"), arrays["start"])
+        yield from _concatenated(path, arrays["y"], arrays.get("t"), arrays["start"])
     elif "position" in arrays and "position.t" not in arrays:
         time = arrays.get("time", arrays.get("t"))
         position = arrays["position"]
@@ -124,7 +125,7 @@ def _parts(
                 raise value_error(f"{path}: '{name}' has time stamps of nothing")
 
 
-def _joined(
+def _concatenated(
     path: Path, position: NDArray[Any], time: NDArray[Any] | None, given: NDArray[Any]
 ) -> Iterator[tuple[str, NDArray[Any], NDArray[Any] | None]]:
     """Yields the demonstrations that lie one after another."""

@@ -6,10 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from pdmp._native import Demonstration, Model
-from pdmp.conditions import as_demonstrated, blend
+from pdmp._native import Conditions, Demonstration, Model, blend
 from pdmp.plot._canvas import BLUE, GREY, draw_movement, gradient, legend, movement_panels
 
 if TYPE_CHECKING:
@@ -63,7 +61,7 @@ def demonstrations(
     for m, (demo, label) in enumerate(zip(demos, labels, strict=True)):
         panels = columns[titles.index(label)]
         duration = model.durations[m]
-        made = model.rollout(**as_demonstrated(model, m), dt=duration / SAMPLES)
+        made = model.rollout(model.conditions(m), dt=duration / SAMPLES)
         if demo.time is not None:
             time = demo.time - demo.time[0]
         else:
@@ -92,8 +90,8 @@ def _check(model: Model, m: int, demo: Demonstration) -> None:
 
 def fan(
     model: Model,
-    a: Mapping[str, ArrayLike],
-    b: Mapping[str, ArrayLike],
+    a: Conditions,
+    b: Conditions,
     *,
     n: int = 9,
     ends: tuple[str, str] = ("a", "b"),
@@ -105,9 +103,9 @@ def fan(
     ----------
     model : Model
         The primitive.
-    a, b : mapping of str to array_like
-        Arguments of `Model.rollout` at both ends, such as `{"style": s}` or what `as_demonstrated`
-        returns; those in between are blended.
+    a, b : Conditions
+        Conditions of the first and last movement, such as two of `Model.conditions`; those in
+        between are blended.
     n : int
         Number of movements, at least 2.
     ends : tuple of str
@@ -118,7 +116,7 @@ def fan(
     Raises
     ------
     ValueError
-        Fewer than two movements, or arguments that `blend` or `Model.rollout` refuses.
+        Fewer than two movements, or conditions that `blend` or `Model.rollout` rejects.
     ImportError
         matplotlib is not installed.
     """
@@ -126,7 +124,7 @@ def fan(
         raise ValueError(f"n = {n}: must be at least 2, the two ends")
     shares = np.linspace(0, 1, n)
     dt = model.durations.min() / SAMPLES
-    rollouts = [model.rollout(**blend(a, b, share), dt=dt) for share in shares]
+    rollouts = [model.rollout(blend(a, b, share), dt=dt) for share in shares]
     figure, (panels,) = movement_panels(model, [""], figure)
     from matplotlib.cm import ScalarMappable
 

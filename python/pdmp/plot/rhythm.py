@@ -6,7 +6,6 @@ from math import ceil, pi
 from typing import TYPE_CHECKING
 
 from pdmp._native import Model
-from pdmp.conditions import as_demonstrated
 from pdmp.plot._canvas import BLUE, GREY, canvas, dof_labels, dress, legend
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def phase_portrait(model: Model, *, figure: Figure | None = None) -> Figure:
     figure = canvas(figure, max(3.6 * n_columns, 5.5), 3.4 * n_rows + 0.5)
     panels = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
     cycles = [
-        model.rollout(**as_demonstrated(model, m), dt=model.durations[m] / SAMPLES)
+        model.rollout(model.conditions(m), dt=model.durations[m] / SAMPLES)
         for m in range(model.n_demos)
     ]
     centre = model.anchors[model.nominal]

@@ -44,8 +44,8 @@ def spectrum(model: Model, *, figure: Figure | None = None) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set_xlim(0.4, len(share) + 0.6)
     axes.set_ylim(0, 105)
-    left_out = f"{100 * model.left_out:.2g} % of the targets' RMS left out"
-    title = f"J = {kept} of {model.n_demos}: {left_out}"
+    truncated = f"{100 * model.truncation_error:.2g} % of the targets' RMS left out"
+    title = f"J = {kept} of {model.n_demos}: {truncated}"
     dress(axes, "singular value, of those computed", "share of their sum [%]", title)
     axes.legend(frameon=False, loc="center right")
     return figure

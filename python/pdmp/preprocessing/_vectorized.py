@@ -28,7 +28,7 @@ class Vectorized(Protocol[P, R]):
 
 
 def vectorized(function: Callable[Concatenate[Demonstration, P], R]) -> Vectorized[P, R]:
-    """Returns a function that takes a list or a mapping of demonstrations too."""
+    """Returns a function that also takes a sequence or a mapping of demonstrations."""
 
     @wraps(function)
     def for_each(demo: Any, *args: Any, **kwargs: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Angles that jump by a full turn."""
+"""Removal of jumps by full turns from angles."""
 
 import numpy as np
 

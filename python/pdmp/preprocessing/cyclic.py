@@ -12,20 +12,20 @@ from pdmp._native import Demonstration
 
 
 class Rejected(NamedTuple):
-    """A cycle, or a whole recording, that was left out."""
+    """A rejected cycle or recording."""
 
     recording: int
     """Index of the recording."""
     start: float
-    """When it begins, in s on the recording's clock."""
+    """Start in s on the recording's clock."""
     period: float
-    """How long it lasts, in s."""
+    """Duration in s."""
     reason: str
-    """What is odd about it."""
+    """Reason for the rejection."""
 
 
 class Growth(NamedTuple):
-    """What a degree of freedom gains in each cycle of a recording, which closed cycles lack."""
+    """Gain of a degree of freedom per cycle of a recording, which closed cycles lack."""
 
     recording: int
     """Index of the recording."""
@@ -34,7 +34,7 @@ class Growth(NamedTuple):
     gain: float
     """Gain in a cycle, the median one by size, in the unit of the degree of freedom."""
     turns: int
-    """Full turns of an angle per cycle; 0 of what is no angle."""
+    """Full turns of an angle per cycle; 0 for other quantities."""
 
 
 class Cycles(Sequence[Demonstration]):
@@ -47,10 +47,10 @@ class Cycles(Sequence[Demonstration]):
     recordings : list of int
         Index of the recording that each is from.
     rejected : list of Rejected
-        Cycles that were left out, and recordings that do not repeat themselves, and why.
+        Rejected cycles, and recordings without a period, with the reasons.
     gains : (K, D) array
-        What each degree of freedom gained from the beginning of a cycle to its end, before that
-        was distributed.
+        Gain of each degree of freedom from the beginning to the end of a cycle, before its
+        distribution over the cycle.
     growths : list of Growth
         Degrees of freedom that turn, or gain more per cycle than they move within it.
     """
@@ -110,7 +110,7 @@ def cycles(
         y_c = y(c T / C) - (c / C - 1/2) (f(T) - f(0))
 
     The angle of a wheel or a crank gains full turns per cycle; they are taken off each cycle and
-    all that follow. Units of angle tell what turns; without units, a gain of one turn in radians
+    all that follow. A unit of angle marks what turns; without units, a gain of one turn in radians
     or degrees to a hundredth does. Of anything else that gains more per cycle than it moves within
     it, such as the way walked, a warning gives the gain: a model of closed cycles stays in place.
 
@@ -171,7 +171,7 @@ def cycles(
 
 
 def _gains(growths: list[Growth], demos: list[Demonstration]) -> str:
-    """Returns a warning of what grows from cycle to cycle, with its gains."""
+    """Returns a warning about gains from cycle to cycle."""
     names, units = (demos[0].names, demos[0].units) if demos else (None, None)
     gains = []
     for dof in sorted({growth.dof for growth in growths}):

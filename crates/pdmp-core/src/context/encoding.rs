@@ -225,8 +225,8 @@ mod tests {
     fn strangers_are_refused() {
         let (columns, _) = tabulate(&[&context("old", 1.0), &context("young", 3.0)]).unwrap();
         let refusal = |context: &[ContextValue]| numbers(&columns, context).unwrap_err().to_string();
-        assert!(refusal(&context("proud", 1.0)).contains("\"proud\": never shown; the labels are old, young"));
-        assert!(refusal(&[1.0.into(), 1.0.into()]).contains("context[0] = 1: never shown"));
+        assert!(refusal(&context("proud", 1.0)).contains("\"proud\": not demonstrated; the labels are old, young"));
+        assert!(refusal(&[1.0.into(), 1.0.into()]).contains("context[0] = 1: not demonstrated"));
         assert!(refusal(&["old".into(), "young".into()]).contains("context[1] = \"young\": a number is expected"));
         assert!(refusal(&["old".into()]).contains("length 1, expected 2"));
         let mixed = tabulate(&[&context("old", 1.0), &[1.0.into(), 1.0.into()]]).unwrap_err().to_string();

@@ -102,7 +102,7 @@ pub struct ContextPrediction {
     /// Covariance (P, P) of new outputs; `None` where no context is left over to estimate it.
     pub covariance: Option<Array2<f64>>,
     /// How far each value of the context lies outside of those that were shown, in their range (Q,).
-    pub outside: Vec<f64>,
+    pub extrapolation: Vec<f64>,
 }
 
 impl ContextMap {
@@ -231,7 +231,7 @@ impl ContextMap {
         if mean.iter().chain(covariance.iter().flatten()).any(|x| !x.is_finite()) {
             return Err(too_far(&context, &outside));
         }
-        Ok(ContextPrediction { mean, covariance, outside })
+        Ok(ContextPrediction { mean, covariance, extrapolation: outside })
     }
 }
 

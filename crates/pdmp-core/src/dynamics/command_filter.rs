@@ -1,11 +1,12 @@
 //! Critically damped second-order filters: how commands change without a jump in position or velocity.
 //!
-//! The rate 1/τ passes its filter in seconds. Style, goal, anchor and amplitude pass theirs on the clock, in seconds at the
-//! nominal rate, so that the path does not depend on how fast it is followed.
+//! The rate 1/τ passes its filter in seconds. Style, goal, anchor and amplitude pass theirs on the clock u, so that the path
+//! does not depend on how fast it is followed. `time` stands for either.
 //!
 //! ẍ = −2ωẋ − ω²(x − target), solved in closed form over a tick. Its impulse response is positive, so that a filtered
 //! positive command stays positive, whatever the order and time of its changes.
 
+use crate::dynamics::output_system::INVERSE_FACTORIAL;
 use crate::numerics::simd::{F64x4, Register, pack, repack};
 
 /// Time to 99 % of a step, times ω: the root of (1 + s)exp(−s) = 0.01.
@@ -14,6 +15,8 @@ const SETTLING: f64 = 6.638_352_067_993_813;
 const MAX_CLOCK_STEP: f64 = 0.07;
 /// Most parts of a tick for a transition's sake.
 const MAX_PARTS: f64 = 32.0;
+/// Terms of an exponential of such a part that reach its last digit.
+const TERMS: usize = 10;
 /// Shortest transition, in seconds, that is filtered: a shorter one, whose ω² leaves the range of numbers, is immediate.
 const MIN_TRANSITION: f64 = 1e-15;
 /// After so long, times ω, what is left of a step lies far below rounding.
@@ -21,10 +24,10 @@ const FORGOTTEN: f64 = 45.0;
 
 /// The filter: its constant, common to all commands of a movement.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Filter {
-    /// ω, per second; infinite for an immediate switch.
+pub(crate) struct FilterGains {
+    /// ω; infinite for an immediate switch.
     omega: f64,
-    /// Seconds until what is left of a step lies far below rounding.
+    /// Time until what is left of a step lies far below rounding.
     forgets: f64,
 }
 
@@ -40,11 +43,22 @@ pub(crate) struct FilterStep {
     integral: [f64; 2],
 }
 
-impl Filter {
+impl FilterGains {
     /// `transition` is the time to 99 % in seconds, 0 for an immediate switch.
     pub(crate) fn new(transition: f64) -> Self {
         let transition = if transition < MIN_TRANSITION { 0.0 } else { transition };
         Self { omega: SETTLING / transition, forgets: FORGOTTEN / SETTLING * transition }
+    }
+
+    /// The same on a clock that runs at the rate 1/τ.
+    pub(crate) fn on_clock(&self, tau: f64) -> Self {
+        Self { omega: self.omega * tau, forgets: self.forgets / tau }
+    }
+
+    /// The same with a longer transition, if it is longer.
+    pub(crate) fn lasting(&self, transition: f64) -> Self {
+        let longer = Self::new(transition.max(0.0));
+        if longer.omega < self.omega { longer } else { *self }
     }
 
     /// Whether commands are switched to at once.
@@ -52,7 +66,7 @@ impl Filter {
         self.omega.is_infinite()
     }
 
-    /// Parts in which `dt` seconds of a transition are well described by cubics; what is over within one of many need
+    /// Parts in which a stretch `dt` of a transition is well described by cubics; what is over within one of many need
     /// not be.
     pub(crate) fn parts(&self, dt: f64) -> f64 {
         (self.omega * dt / MAX_CLOCK_STEP).min(MAX_PARTS)
@@ -64,15 +78,15 @@ impl Filter {
         (value[group] - target[group]).abs() + rate[group].abs() * (1.0 / self.omega)
     }
 
-    /// The solution over `dt` seconds without its integral, which only the rate needs.
+    /// The solution over a time `dt` without its integral, which only the rate needs.
     pub(crate) fn pass(&self, dt: f64) -> FilterStep {
         let s = (self.omega * dt).min(1e4);
-        let decay = (-s).exp();
+        let decay = decay(s);
         let (value, rate) = ([(1.0 + s) * decay, dt * decay], [-self.omega * (s * decay), (1.0 - s) * decay]);
         FilterStep { dt, value, rate, integral: [0.0; 2] }
     }
 
-    /// What follows a filtered command x by q̇ = m(x − q), after `dt` seconds: the amplitude r of Eq. (4), or a target of
+    /// What follows a filtered command x by q̇ = m(x − q), after a time `dt`: the amplitude r of Eq. (4), or a target of
     /// its own that is at rest where the filter is immediate.
     pub(crate) fn lag(&self, follower: &CommandFilter, q: f64, m: f64, dt: f64) -> f64 {
         let [x, v, target] = [&follower.value, &follower.rate, &follower.target].map(|lanes| lanes[0].as_array()[0]);
@@ -99,7 +113,7 @@ impl Filter {
         target + (q - target) * decay + m * dt * (d * even + (v * dt + s * d) * linear)
     }
 
-    /// The solution over `dt` seconds.
+    /// The solution over a time `dt`.
     pub(crate) fn glide(&self, dt: f64) -> FilterStep {
         let omega = self.omega;
         // A step that is over is over, however long since.
@@ -117,11 +131,24 @@ impl Filter {
     }
 }
 
+/// exp(−s), by its series over the short times of a loop: a call would take longer than all else that a filter does.
+#[inline(always)]
+fn decay(s: f64) -> f64 {
+    if s > MAX_CLOCK_STEP {
+        return (-s).exp();
+    }
+    let mut sum = INVERSE_FACTORIAL[TERMS - 1];
+    for k in (0..TERMS - 1).rev() {
+        sum = INVERSE_FACTORIAL[k] - s * sum;
+    }
+    sum
+}
+
 impl FilterStep {
     /// Over no time: what is there stays.
     pub(crate) const START: Self = Self { dt: 0.0, value: [1.0, 0.0], rate: [0.0, 1.0], integral: [0.0; 2] };
 
-    /// Length of the tick in seconds.
+    /// Length of the tick.
     pub(crate) fn dt(&self) -> f64 {
         self.dt
     }
@@ -133,7 +160,7 @@ pub(crate) struct CommandFilter {
     value: Vec<F64x4>,
     rate: Vec<F64x4>,
     target: Vec<F64x4>,
-    /// Seconds until the values are their targets.
+    /// Time until the values are their targets.
     remaining: f64,
 }
 
@@ -149,7 +176,7 @@ impl CommandFilter {
         &self.value
     }
 
-    /// Their derivatives with respect to time, per second.
+    /// Their derivatives with respect to time.
     pub(crate) fn rate(&self) -> &[F64x4] {
         &self.rate
     }
@@ -165,7 +192,7 @@ impl CommandFilter {
     }
 
     /// Sets out for as many targets.
-    pub(crate) fn follow(&mut self, target: &[f64], filter: &Filter) {
+    pub(crate) fn follow(&mut self, target: &[f64], filter: &FilterGains) {
         if filter.immediate() {
             return self.jump(target);
         }
@@ -204,17 +231,19 @@ impl CommandFilter {
         moving
     }
 
-    /// Moves one group on by a tick.
+    /// Moves one group on by a tick, and returns its value and rate.
     #[inline(always)]
-    pub(crate) fn advance_group<T: Register>(&mut self, group: usize, glide: &FilterStep) {
-        if self.settled() {
-            (self.value[group], self.rate[group]) = (self.target[group], F64x4::ZERO);
-            return;
-        }
-        let [x, v, target] = [&self.value, &self.rate, &self.target].map(|lanes| T::load(&lanes[group]));
-        let d = x - target;
-        self.value[group] = (target + (d * glide.value[0] + v * glide.value[1])).store();
-        self.rate[group] = (d * glide.rate[0] + v * glide.rate[1]).store();
+    pub(crate) fn advance_group<T: Register>(&mut self, group: usize, glide: &FilterStep) -> [T; 2] {
+        let settled = self.settled();
+        let (value, rate, target) = (&mut self.value[group], &mut self.rate[group], T::load(&self.target[group]));
+        let [x, v] = if settled {
+            [target, T::default()]
+        } else {
+            let (d, v) = (T::load(value) - target, T::load(rate));
+            [target + (d * glide.value[0] + v * glide.value[1]), d * glide.rate[0] + v * glide.rate[1]]
+        };
+        (*value, *rate) = (x.store(), v.store());
+        [x, v]
     }
 
     /// ∫ of the first value over a tick.
@@ -224,7 +253,7 @@ impl CommandFilter {
     }
 
     /// The time in [0, dt] at which the integral of the first, positive value reaches `area`.
-    pub(crate) fn time_to(&self, area: f64, dt: f64, filter: &Filter) -> f64 {
+    pub(crate) fn time_to(&self, area: f64, dt: f64, filter: &FilterGains) -> f64 {
         if self.settled() {
             return (area / self.value[0].as_array()[0]).min(dt);
         }
@@ -249,8 +278,8 @@ mod tests {
     }
 
     /// One command that sets out from 2 for 5, to be there after 0.3 s.
-    fn command() -> (CommandFilter, Filter) {
-        let (mut follower, filter) = (CommandFilter::new(&[2.0]), Filter::new(0.3));
+    fn command() -> (CommandFilter, FilterGains) {
+        let (mut follower, filter) = (CommandFilter::new(&[2.0]), FilterGains::new(0.3));
         follower.follow(&[5.0], &filter);
         (follower, filter)
     }
@@ -325,6 +354,15 @@ mod tests {
                 q += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
             }
             assert_relative_eq!(filter.lag(&start, 1.0, m, 0.1), q, max_relative = 1e-9);
+        }
+    }
+
+    /// The series is the exponential as far as it serves.
+    #[test]
+    fn decay_is_the_exponential() {
+        for k in 0..=2000 {
+            let s = 1e-3 * MAX_CLOCK_STEP * f64::from(k);
+            assert_relative_eq!(decay(s), (-s).exp(), max_relative = 4.0 * f64::EPSILON);
         }
     }
 

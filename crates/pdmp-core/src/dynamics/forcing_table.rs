@@ -46,7 +46,7 @@ pub(crate) struct Fade {
     pub(crate) value: f64,
     /// r′.
     pub(crate) growth: f64,
-    /// p, and r·p′.
+    /// p and p′.
     share: f64,
     pub(crate) along: f64,
     braked: bool,
@@ -96,10 +96,9 @@ impl Cubic {
 /// A cubic of given coefficients.
 #[inline(always)]
 fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> CubicSample<T> {
-    CubicSample {
-        value: value + slope * t + (square + cube * t) * (t * t),
-        slope: slope + (square * (2.0 * t) + cube * (3.0 * t * t)),
-    }
+    let rest = cube * t;
+    let bend = square + rest;
+    CubicSample { value: value + (slope + bend * t) * t, slope: slope + (bend + bend + rest) * t }
 }
 
 impl ForcingTable {
@@ -207,7 +206,7 @@ impl ForcingTable {
             Some(Fade { value: r, growth, along, .. }) => {
                 let faded = |CubicSample { value, slope }: CubicSample<F64x4>| CubicSample {
                     value: value * r,
-                    slope: value * growth + slope * along,
+                    slope: value * growth + slope * (r * along),
                 };
                 self.scatter(|group, j| faded(jet(group, j)), value, slope);
             }
@@ -231,7 +230,7 @@ impl ForcingTable {
                     Ending::Braked { alpha_z, braking } => (alpha_z, braking - alpha_z, true),
                 };
                 let [value, share] = [rate, beyond].map(|rate| faded((-rate * (u - u_end)).exp()));
-                Some(Fade { value, growth: -rate * value, share, along: -beyond * share * value, braked })
+                Some(Fade { value, growth: -rate * value, share, along: -beyond * share, braked })
             }
             _ => None,
         }

@@ -2,11 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use super::FitOptions;
+use super::{CanonicalOptions, FitOptions};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::output_system::Attractor;
 use crate::error::{Error, Result};
-use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
 use crate::learning::regression::Domain;
 use crate::model::primitive::{MAX_RATE, MAX_TAU};
@@ -29,23 +28,16 @@ impl Constants {
         let attractor = Attractor { alpha_z: options.alpha_z, beta_z: options.beta_z.unwrap_or(options.alpha_z / 4.0) };
         check_rate("alpha_z", attractor.alpha_z)?;
         check_rate("beta_z", attractor.beta_z)?;
-        check_rate("mu", options.mu)?;
-        let kind = options.alignment.kind;
-        let reject = |name, value: Option<f64>| match value {
-            Some(_) => Err(Error::Kind { name, kind, instead: ": leave it out" }),
-            None => Ok(()),
-        };
-        let (canonical, tau) = match kind {
-            Kind::Discrete => {
-                reject("mu", Some(options.mu).filter(|mu| *mu != FitOptions::new(kind).mu))?;
-                let tau = options.tau.unwrap_or(duration);
+        let (canonical, tau) = match options.canonical {
+            CanonicalOptions::Discrete { tau, alpha_x, .. } => {
+                let tau = tau.unwrap_or(duration);
                 check_positive("tau", tau)?;
                 let u_end = duration / tau;
                 if !(1e-3..=1e3).contains(&u_end) {
                     let allowed = "must lie within a thousandfold of the nominal duration";
                     return Err(Error::Range { name: "tau", value: tau, allowed });
                 }
-                let alpha_x = options.alpha_x.unwrap_or(100f64.ln() / u_end);
+                let alpha_x = alpha_x.unwrap_or(100f64.ln() / u_end);
                 check_rate("alpha_x", alpha_x)?;
                 if alpha_x * u_end > 300.0 {
                     let allowed = "must not exceed 300 tau / T, or the phase vanishes before the end";
@@ -53,10 +45,9 @@ impl Constants {
                 }
                 (Canonical::Discrete { alpha_x, u_end }, tau)
             }
-            Kind::Rhythmic => {
-                reject("tau", options.tau)?;
-                reject("alpha_x", options.alpha_x)?;
-                (Canonical::Rhythmic { mu: options.mu }, duration / TAU)
+            CanonicalOptions::Rhythmic { mu, .. } => {
+                check_rate("mu", mu)?;
+                (Canonical::Rhythmic { mu }, duration / TAU)
             }
         };
         if !(1.0 / MAX_TAU..=MAX_TAU).contains(&tau) {

@@ -8,7 +8,6 @@ use crate::context::{ContextColumn, ContextMap, tabulate};
 use crate::demonstration::{ContextValue, Demonstration};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
-use crate::kind::Kind;
 use crate::learning::alignment::{Aligned, TimeScaling};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::options::TransportSelection;
@@ -22,7 +21,7 @@ use crate::preprocessing::inspection::{inspect, unwound};
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
 use super::noise_findings;
-use super::options::{FitOptions, NStyles, Stage};
+use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
 use super::stiffness::stiffness;
 use super::style_selection::spectrum;
 use super::tabulation::compile;
@@ -77,10 +76,10 @@ pub fn fit_with(
         count.check(demos.len(), "demonstrations")?;
     }
     let threads = options.threads;
-    let mut findings = inspect(demos, options.alignment.dt);
+    let mut findings = inspect(demos, options.dt);
     let whole = unwound(demos);
     let demos = &*whole;
-    let mut aligned = options.alignment.align(demos, threads)?;
+    let mut aligned = options.alignment().align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
@@ -90,8 +89,10 @@ pub fn fit_with(
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
     let dof_scale = options.dof_scale.of(&ranges, &units);
-    let transport = match (options.transport, constants.canonical.kind()) {
-        (TransportSelection::Learnt, Kind::Discrete) => targets.transport(constants.canonical, &dof_scale)?,
+    let transport = match options.canonical {
+        CanonicalOptions::Discrete { transport: TransportSelection::Learnt, .. } => {
+            targets.transport(constants.canonical, &dof_scale)?
+        }
         _ => Transport::immediate(),
     };
     let braking = (!transport.is_immediate()).then(|| targets.braking(constants.attractor));
@@ -168,7 +169,7 @@ fn scale_time(
     contexts: Option<&Contexts>,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Option<WarpTemplate>> {
-    let (scaling, threads) = (&options.alignment.time_scaling, options.threads);
+    let (scaling, threads) = (&options.time_scaling, options.threads);
     let unit = options.dof_scale.given(aligned.demo(0).n_dofs())?;
     let Some((columns, numbers)) = contexts.filter(|_| *scaling == TimeScaling::WarpIfBetter) else {
         return scaling.apply(aligned, unit, threads, progress);
@@ -187,7 +188,7 @@ fn scale_time(
     };
     let selection = WarpSelection { columns, numbers, map: options.map, n_styles: &n_styles };
     let mut validating = |share| progress(0.5 + 0.5 * share);
-    if selection.favours_warp(aligned, &linear, options.alignment.kind, &mut validating)? {
+    if selection.favours_warp(aligned, &linear, options.canonical.kind(), &mut validating)? {
         return Ok(template);
     }
     *aligned = linear;

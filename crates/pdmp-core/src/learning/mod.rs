@@ -20,8 +20,8 @@ mod targets;
 mod transport_profile;
 mod warp_selection;
 
-pub use alignment::{Alignment, TimeScaling};
+pub use alignment::TimeScaling;
 pub use factorization::{Factors, Truncation};
 pub use fit::{fit, fit_with};
-pub use options::{DofScaling, FitOptions, NStyles, Stage, TransportSelection};
+pub use options::{CanonicalOptions, DofScaling, FitOptions, NStyles, Stage, TransportSelection};
 pub use style_inference::style_of;

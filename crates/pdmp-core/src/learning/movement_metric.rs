@@ -37,7 +37,7 @@ pub(super) fn residual_variance(
     let mut sum = Array2::zeros((n_samples, primitive.n_dofs()));
     let mut position = Array2::zeros(sum.dim());
     for (m, outputs) in outputs.rows().into_iter().enumerate() {
-        aligned.sample(m, position.as_slice_mut().unwrap_or_default());
+        aligned.sample(m, crate::validate::row_major_mut(&mut position));
         let reproduced = sensitivity.positions(outputs);
         sum.zip_mut_with(&(&position - &reproduced.slice(ndarray::s![..n_samples, ..])), |sum, error| {
             *sum += error * error

@@ -61,19 +61,74 @@ impl DofScaling {
     }
 }
 
+/// Canonical system of a movement with its constants.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CanonicalOptions {
+    /// A discrete movement, τẋ = −α_x x.
+    Discrete {
+        /// Time constant τ in seconds; otherwise the nominal duration.
+        tau: Option<f64>,
+        /// Rate α_x, from 1e-6 to 1e6; otherwise such that x = 0.01 at the end of the nominal demonstration.
+        alpha_x: Option<f64>,
+        /// Transport profile.
+        transport: TransportSelection,
+    },
+    /// A rhythmic movement, τφ̇ = 1 and τṙ = μ(r₀ − r).
+    Rhythmic {
+        /// Rate μ, from 1e-6 to 1e6.
+        mu: f64,
+        /// Periods in seconds of cycles with time stamps: one for all, or one each; empty where the sampling intervals
+        /// give them.
+        periods: Vec<f64>,
+    },
+}
+
+impl CanonicalOptions {
+    /// Returns the kind of movement.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Discrete { .. } => Kind::Discrete,
+            Self::Rhythmic { .. } => Kind::Rhythmic,
+        }
+    }
+}
+
+impl From<Kind> for CanonicalOptions {
+    /// Returns the defaults: a learnt transport profile, μ = 1, and otherwise values from the demonstrations.
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Discrete => Self::Discrete { tau: None, alpha_x: None, transport: TransportSelection::Learnt },
+            Kind::Rhythmic => Self::Rhythmic { mu: 1.0, periods: Vec::new() },
+        }
+    }
+}
+
 /// Options of a fit.
 ///
 /// ```
-/// use pdmp_core::learning::{FitOptions, Truncation};
-/// use pdmp_core::Kind;
+/// use pdmp_core::FitOptions;
+/// use pdmp_core::learning::Truncation;
+/// use pdmp_core::numerics::Smoothing;
 ///
-/// let options = FitOptions { n_styles: Truncation::Rank(3).into(), ..FitOptions::new(Kind::Discrete) };
+/// let options = FitOptions::discrete().n_styles(Truncation::Rank(3)).smoothing(Smoothing::CutOff { hz: 6.0 });
 /// assert_eq!(options.alpha_z, 25.0);
 /// ```
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct FitOptions {
-    /// Sampling, smoothing and alignment of the demonstrations.
-    pub alignment: Alignment,
+    /// Canonical system with its constants.
+    pub canonical: CanonicalOptions,
+    /// Sampling interval in seconds of demonstrations that carry none.
+    pub dt: Option<f64>,
+    /// Treatment of measurement noise.
+    pub smoothing: Smoothing,
+    /// Index of the nominal demonstration; otherwise that of median duration.
+    pub nominal: Option<usize>,
+    /// Samples C of aligned demonstrations; otherwise those of the nominal one, with steps divided into equal parts where
+    /// there are fewer than 150.
+    pub n_samples: Option<usize>,
+    /// Scaling of time to that of the nominal demonstration.
+    pub time_scaling: TimeScaling,
     /// Contexts of the demonstrations (M rows of Q); otherwise those that they carry.
     pub contexts: Option<Vec<Vec<ContextValue>>>,
     /// Map from contexts to movements.
@@ -82,50 +137,111 @@ pub struct FitOptions {
     pub n_styles: NStyles,
     /// Function approximator of the landscape.
     pub basis: Basis,
-    /// Transport profile of discrete movements.
-    pub transport: TransportSelection,
     /// Scale of each DoF in the factorisation.
     pub dof_scale: DofScaling,
-    /// Time constant τ in seconds of discrete movements; otherwise the nominal duration.
-    pub tau: Option<f64>,
     /// Gain α_z of the output system, from 1e-6 to 1e6.
     pub alpha_z: f64,
     /// Gain β_z of the output system, from 1e-6 to 1e6; otherwise α_z/4, critical damping.
     pub beta_z: Option<f64>,
-    /// Rate α_x of the discrete canonical system; otherwise such that x = 0.01 at the end of the nominal demonstration.
-    pub alpha_x: Option<f64>,
-    /// Rate μ of the rhythmic canonical system.
-    pub mu: f64,
     /// Largest number of threads. The model does not depend on it, bit for bit.
     pub threads: Threads,
 }
 
 impl FitOptions {
-    /// Returns the defaults: smoothing by cross-validation, the systematic styles, a Gaussian process, a learnt transport
-    /// profile, α_z = 25, μ = 1, every available thread, and otherwise values from the demonstrations.
-    pub fn new(kind: Kind) -> Self {
+    /// Returns the defaults for a kind of movement or a canonical system: smoothing by cross-validation, the styles above
+    /// the noise, a Gaussian process, α_z = 25, every available thread, and otherwise values from the demonstrations.
+    pub fn new(canonical: impl Into<CanonicalOptions>) -> Self {
         Self {
-            alignment: Alignment {
-                kind,
-                dt: None,
-                period: Vec::new(),
-                smoothing: Smoothing::Auto,
-                nominal: None,
-                n_samples: None,
-                time_scaling: TimeScaling::Linear,
-            },
+            canonical: canonical.into(),
+            dt: None,
+            smoothing: Smoothing::Auto,
+            nominal: None,
+            n_samples: None,
+            time_scaling: TimeScaling::Linear,
             contexts: None,
             map: MapSelection::Auto,
             n_styles: NStyles::AboveNoise,
             basis: Basis::Gp(Gp::default()),
-            transport: TransportSelection::Learnt,
             dof_scale: DofScaling::Auto,
-            tau: None,
             alpha_z: 25.0,
             beta_z: None,
-            alpha_x: None,
-            mu: 1.0,
             threads: Threads::available(),
+        }
+    }
+
+    /// Returns the defaults for discrete movements.
+    pub fn discrete() -> Self {
+        Self::new(Kind::Discrete)
+    }
+
+    /// Returns the defaults for rhythmic movements.
+    pub fn rhythmic() -> Self {
+        Self::new(Kind::Rhythmic)
+    }
+
+    /// Sets the sampling interval, in seconds, of demonstrations that carry none.
+    pub fn dt(self, dt: f64) -> Self {
+        Self { dt: Some(dt), ..self }
+    }
+
+    /// Sets the treatment of measurement noise.
+    pub fn smoothing(self, smoothing: Smoothing) -> Self {
+        Self { smoothing, ..self }
+    }
+
+    /// Sets the scaling of time.
+    pub fn time_scaling(self, time_scaling: TimeScaling) -> Self {
+        Self { time_scaling, ..self }
+    }
+
+    /// Sets the contexts of the demonstrations (M rows of Q).
+    pub fn contexts(self, contexts: Vec<Vec<ContextValue>>) -> Self {
+        Self { contexts: Some(contexts), ..self }
+    }
+
+    /// Sets the map from contexts to movements.
+    pub fn map(self, map: MapSelection) -> Self {
+        Self { map, ..self }
+    }
+
+    /// Sets the style dimension J.
+    pub fn n_styles(self, n_styles: impl Into<NStyles>) -> Self {
+        Self { n_styles: n_styles.into(), ..self }
+    }
+
+    /// Sets the function approximator of the landscape.
+    pub fn basis(self, basis: Basis) -> Self {
+        Self { basis, ..self }
+    }
+
+    /// Sets the scale of each DoF in the factorisation.
+    pub fn dof_scale(self, dof_scale: DofScaling) -> Self {
+        Self { dof_scale, ..self }
+    }
+
+    /// Sets the gain α_z of the output system.
+    pub fn alpha_z(self, alpha_z: f64) -> Self {
+        Self { alpha_z, ..self }
+    }
+
+    /// Sets the largest number of threads.
+    pub fn threads(self, threads: Threads) -> Self {
+        Self { threads, ..self }
+    }
+
+    /// Returns the options of the alignment.
+    pub(super) fn alignment(&self) -> Alignment {
+        let periods = match &self.canonical {
+            CanonicalOptions::Rhythmic { periods, .. } => periods.clone(),
+            CanonicalOptions::Discrete { .. } => Vec::new(),
+        };
+        Alignment {
+            kind: self.canonical.kind(),
+            dt: self.dt,
+            period: periods,
+            smoothing: self.smoothing,
+            nominal: self.nominal,
+            n_samples: self.n_samples,
         }
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn stiffness(primitive: &Arc<Primitive>, aligned: &Aligned) -> Result
         return Ok(None);
     }
     let mut position = Array2::zeros((n_samples, n_dofs));
-    aligned.sample(demo, position.as_slice_mut().unwrap_or_default());
+    aligned.sample(demo, crate::validate::row_major_mut(&mut position));
     let dt = primitive.duration() / kind.steps(n_samples) as f64;
     let reproduced = rollout(primitive, &Conditions::default(), TimeGrid { dt, duration: None })?.acceleration;
     let mut worst = None;

@@ -8,7 +8,7 @@ use super::cycle_phase;
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::learning::alignment::{Alignment, TimeScaling};
+use crate::learning::alignment::Alignment;
 use crate::learning::targets::Targets;
 use crate::model::Model;
 use crate::model::conditions::Conditions;
@@ -29,8 +29,8 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 /// Estimates the style (J,) of a demonstration outside the training set.
 ///
 /// The estimate is the maximum a posteriori style given the target, with Gaussian residuals and a zero-mean Gaussian prior
-/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that begins in another phase than those of the model is first
-/// shifted to their phase.
+/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that
+/// begins in another phase than those of the model is first shifted to their phase.
 ///
 /// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
 /// same warp, or by landmarks, for which `events` (E,) are the times in seconds.
@@ -41,15 +41,14 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 /// ```
 /// # use ndarray::Array2;
 /// use pdmp_core::learning::{Truncation, style_of};
-/// use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
+/// use pdmp_core::{Demonstration, FitOptions, Sampling, fit};
 ///
 /// # let arch = |h: f64| {
 /// #     let position = Array2::from_shape_fn((101, 1), |(c, _)| h * (0.0314 * c as f64).sin().powi(3));
 /// #     Demonstration::new(position, Sampling::Uniform { dt: 0.01 })
 /// # };
 /// let demonstrations = [arch(1.0)?, arch(2.0)?];
-/// let options = FitOptions { n_styles: Truncation::Rank(1).into(), ..FitOptions::new(Kind::Discrete) };
-/// let model = fit(&demonstrations, &options)?;
+/// let model = fit(&demonstrations, &FitOptions::discrete().n_styles(Truncation::Rank(1)))?;
 /// let style = style_of(&model, &arch(1.5)?, None, None, None)?;
 /// let styles = &model.demonstrated().styles;
 /// assert!(styles[[0, 0]] < style[0] && style[0] < styles[[1, 0]]);
@@ -82,7 +81,6 @@ pub fn style_of(
         smoothing: Smoothing::Interpolate,
         nominal: None,
         n_samples: Some(model.learnt.n_samples),
-        time_scaling: TimeScaling::Linear,
     };
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
@@ -104,14 +102,14 @@ pub fn style_of(
     targets.carry(&model.transport, model.attractor, model.canonical());
     targets.scale(&model.learnt.dof_scale);
     let mut position = Array2::zeros((model.learnt.n_samples, n_dofs));
-    aligned.sample(0, position.as_slice_mut().unwrap_or_default());
+    aligned.sample(0, crate::validate::row_major_mut(&mut position));
 
     let design = design(model);
     let mut target = targets.forcing.row(0).to_vec();
     if model.kind() == Kind::Rhythmic {
         let samples = cycle_phase::phase_lead(&design, &target, model.demonstrated.styles.view(), n_dofs);
         target.rotate_left(samples * n_dofs);
-        position.as_slice_mut().unwrap_or_default().rotate_left(samples * n_dofs);
+        crate::validate::row_major_mut(&mut position).rotate_left(samples * n_dofs);
     }
     let (style, truncation_error) = maximum_a_posteriori(&design, &target, &model.demonstrated.styles);
     check_size(&style, model)?;

@@ -153,6 +153,7 @@ mod tests {
             let regression = Waves(omega);
             let table = compile(canonical, (1, 3), 2, &regression, Threads::ONE, &mut |_| Ok(())).unwrap();
             assert!(table.error() <= TOLERANCE);
+            assert_eq!(table.n_outputs(), 3);
             let (mut value, mut slope, mut exact, mut rise) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
             for k in 0..10_007 {
                 let u = canonical.extent() * f64::from(k) / 10_007.0;
@@ -164,6 +165,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Cubics of values and slopes are off by (ωh)⁴/384: four times the frequency takes four times the cells.
+    #[test]
+    fn cells_are_as_many_as_the_error_needs() {
+        let canonical = Canonical::Rhythmic { mu: 1.0 };
+        let [slow, fast] = [5.0, 20.0]
+            .map(|omega| compile(canonical, (1, 1), 1, &Waves(omega), Threads::ONE, &mut |_| Ok(())).unwrap().cells());
+        assert_eq!(fast, 4 * slow);
+        let width = canonical.extent() / slow as f64;
+        assert!((5.0 * width).powi(4) / 384.0 < TOLERANCE);
     }
 
     #[derive(Debug)]

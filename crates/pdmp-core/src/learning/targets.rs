@@ -143,7 +143,7 @@ impl Targets {
         let rows = self.forcing.rows_mut().into_iter().zip(self.goals.rows()).zip(self.starts.rows());
         for ((mut row, goal), start) in rows {
             let reach = &goal - &start;
-            let samples = row.as_slice_mut().unwrap_or_default().chunks_exact_mut(n_dofs);
+            let samples = crate::validate::row_major_mut(&mut row).chunks_exact_mut(n_dofs);
             for (forcing, lag) in samples.zip(&lag) {
                 forcing.iter_mut().zip(&reach).for_each(|(f, reach)| *f -= reach * lag);
             }
@@ -161,14 +161,17 @@ impl Targets {
         let n_dofs = self.starts.ncols();
         let n_values = self.forcing.ncols();
         fn chunks(matrix: &mut Array2<f64>, n: usize) -> std::slice::ChunksExactMut<'_, f64> {
-            matrix.as_slice_mut().unwrap_or_default().chunks_exact_mut(n)
+            crate::validate::row_major_mut(matrix).chunks_exact_mut(n)
         }
         let [starts, goals, anchors, ranges] = [&mut self.starts, &mut self.goals, &mut self.anchors, &mut self.ranges]
             .map(|matrix| chunks(matrix, n_dofs));
         let [accelerations, end_speeds] =
             [&mut self.accelerations, &mut self.end_speeds].map(|matrix| chunks(matrix, n_dofs));
         let vectors = starts.zip(goals).zip(anchors.zip(ranges)).zip(accelerations.zip(end_speeds));
-        let displacements = self.displacements.outer_iter_mut().map(|rows| rows.into_slice().unwrap_or_default());
+        let displacements = self
+            .displacements
+            .outer_iter_mut()
+            .map(|rows| rows.into_slice().expect("blocks of a row-major array are contiguous"));
         chunks(&mut self.forcing, n_values).zip(vectors).zip(displacements).map(
             |((forcing, (((start, goal), (anchor, range)), (acceleration, end_speed))), displacement)| Rows {
                 forcing,

@@ -91,7 +91,7 @@ fn positions(aligned: &Aligned, kind: Kind) -> Array2<f64> {
     let sampled = aligned.clone().resampled(n_samples);
     let mut positions = Array2::zeros((aligned.n_demos(), n_samples * aligned.demo(0).n_dofs()));
     for (m, mut row) in positions.rows_mut().into_iter().enumerate() {
-        sampled.sample(m, row.as_slice_mut().unwrap_or_default());
+        sampled.sample(m, crate::validate::row_major_mut(&mut row));
     }
     positions
 }

@@ -1,4 +1,4 @@
-//! What a movement starts with, checked against its primitive.
+//! Conditions under which a movement starts.
 
 use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
@@ -6,7 +6,16 @@ use crate::kind::Kind;
 use crate::model::primitive::Primitive;
 use crate::validate::{check_positive, check_vector};
 
-/// What a movement starts with; what is `None` is that of the nominal demonstration.
+/// Conditions under which a movement starts. A condition that is `None` is that of the nominal demonstration.
+///
+/// ```
+/// use pdmp_core::Conditions;
+///
+/// let near = Conditions { goal: Some(vec![0.2, 0.0]), tau: Some(1.0), ..Conditions::default() };
+/// let far = Conditions { goal: Some(vec![0.4, 0.2]), tau: Some(2.0), ..Conditions::default() };
+/// assert_eq!(near.blend(&far, 0.5)?.tau, Some(1.5));
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conditions {
     /// Style s (J,).
@@ -19,7 +28,7 @@ pub struct Conditions {
     pub start: Option<Vec<f64>>,
     /// Start velocity (D,), per second; otherwise that of the demonstrations.
     pub velocity: Option<Vec<f64>>,
-    /// Amplitude r₀, rhythmic; otherwise 1, which is what a discrete movement has.
+    /// Amplitude r₀, rhythmic; otherwise 1.
     pub amplitude: Option<f64>,
     /// Time constant τ, in seconds.
     pub tau: Option<f64>,
@@ -31,6 +40,60 @@ pub struct Conditions {
 }
 
 impl Conditions {
+    /// Returns these conditions, with those of `other` where one is `None`. A time constant and segment durations stand
+    /// for each other: one of them is taken as given where either is.
+    pub fn or(self, other: Self) -> Self {
+        let paced = self.tau.is_some() || self.segment_durations.is_some();
+        let (tau, segment_durations) =
+            if paced { (self.tau, self.segment_durations) } else { (other.tau, other.segment_durations) };
+        Self {
+            style: self.style.or(other.style),
+            goal: self.goal.or(other.goal),
+            anchor: self.anchor.or(other.anchor),
+            start: self.start.or(other.start),
+            velocity: self.velocity.or(other.velocity),
+            amplitude: self.amplitude.or(other.amplitude),
+            tau,
+            segment_durations,
+            phase: self.phase.or(other.phase),
+        }
+    }
+
+    /// Returns the conditions (1 − share)·self + share·other; a share outside [0, 1] extrapolates.
+    ///
+    /// # Errors
+    /// A condition that one of the two lacks, lengths that differ, or a share that is not finite.
+    pub fn blend(&self, other: &Self, share: f64) -> Result<Self> {
+        if !share.is_finite() {
+            return Err(Error::Range { name: "share", value: share, allowed: "must be finite" });
+        }
+        let mix = |a: f64, b: f64| (1.0 - share) * a + share * b;
+        let number = |name, a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => Ok(Some(mix(a, b))),
+            (None, None) => Ok(None),
+            _ => Err(Error::Single { name }),
+        };
+        let vector = |name, a: &Option<Vec<f64>>, b: &Option<Vec<f64>>| match (a, b) {
+            (Some(a), Some(b)) if a.len() != b.len() => {
+                Err(Error::Length { name, expected: a.len(), found: b.len(), per: "element of the other conditions" })
+            }
+            (Some(a), Some(b)) => Ok(Some(a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect())),
+            (None, None) => Ok(None),
+            _ => Err(Error::Single { name }),
+        };
+        Ok(Self {
+            style: vector("style", &self.style, &other.style)?,
+            goal: vector("goal", &self.goal, &other.goal)?,
+            anchor: vector("anchor", &self.anchor, &other.anchor)?,
+            start: vector("start", &self.start, &other.start)?,
+            velocity: vector("velocity", &self.velocity, &other.velocity)?,
+            amplitude: number("amplitude", self.amplitude, other.amplitude)?,
+            tau: number("tau", self.tau, other.tau)?,
+            segment_durations: vector("segment_durations", &self.segment_durations, &other.segment_durations)?,
+            phase: number("phase", self.phase, other.phase)?,
+        })
+    }
+
     /// Checks every number against the model, and fills in the nominal demonstration's where none is given.
     ///
     /// # Errors
@@ -45,7 +108,7 @@ impl Conditions {
         let centre = match kind {
             Kind::Discrete => {
                 reject_for_kind(kind, "anchor", self.anchor.is_some())?;
-                reject_for_kind(kind, "amplitude", self.amplitude.is_some_and(|amplitude| amplitude != 1.0))?;
+                reject_for_kind(kind, "amplitude", self.amplitude.is_some())?;
                 centre("goal", &self.goal)?
             }
             Kind::Rhythmic => {
@@ -93,7 +156,7 @@ impl Conditions {
         let tau = match (self.tau, &self.segment_durations) {
             (Some(_), Some(_)) => {
                 return Err(Error::Arguments(
-                    "pass tau or segment_durations, not both: a segment_durations tells the duration",
+                    "pass tau or segment_durations, not both: segment durations add up to the duration",
                 ));
             }
             (None, Some(segment_durations)) => {

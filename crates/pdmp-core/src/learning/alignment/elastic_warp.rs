@@ -56,7 +56,7 @@ impl Aligned<'_> {
             shapes.axis_iter_mut(Axis(0)).enumerate().collect(),
             || (),
             |(), (m, mut shape)| {
-                aligned.shape(m, &unit, shape.as_slice_mut().unwrap_or_default());
+                aligned.shape(m, &unit, crate::validate::row_major_mut(&mut shape));
                 Ok(())
             },
             &mut |share| progress(share / 3.0),
@@ -103,7 +103,7 @@ impl Aligned<'_> {
         let search = Search::new(cells / STEPS, template.slope, n_dofs);
         let (mut shape, mut path) = (vec![0.0; cells * n_dofs], vec![STEPS; search.segments]);
         self.shape(0, &template.unit, &mut shape);
-        let onto = template.shape.as_slice().unwrap_or_default();
+        let onto = crate::validate::row_major(&template.shape);
         search.run(onto, &shape, &mut path, &mut Scratch::new(&search));
         let segment_durations: Vec<f64> =
             path.iter().map(|&steps| search.seconds(steps, self.clocks[0].duration)).collect();

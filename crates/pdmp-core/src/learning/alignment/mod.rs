@@ -28,33 +28,21 @@ const MIN_STEPS: usize = 150;
 const MAX_SAMPLES: usize = 1_000_000;
 
 /// Settings of sampling, smoothing and alignment of demonstrations.
-///
-/// ```
-/// use pdmp_core::learning::TimeScaling;
-/// use pdmp_core::model::TimeWarp;
-/// use pdmp_core::{FitOptions, Kind};
-///
-/// let mut options = FitOptions::new(Kind::Discrete);
-/// options.alignment.time_scaling = TimeScaling::Warp(TimeWarp::new(12, 2.5)?);
-/// # Ok::<(), pdmp_core::Error>(())
-/// ```
 #[derive(Clone, Debug)]
-pub struct Alignment {
+pub(crate) struct Alignment {
     /// Discrete movements from start to goal, or cycles.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// Sampling interval in seconds, for demonstrations that carry none.
-    pub dt: Option<f64>,
+    pub(crate) dt: Option<f64>,
     /// Periods in seconds of time-stamped cycles, one for all or one for each; empty where the sampling interval gives them.
-    pub period: Vec<f64>,
+    pub(crate) period: Vec<f64>,
     /// Smoothing of measurement noise.
-    pub smoothing: Smoothing,
+    pub(crate) smoothing: Smoothing,
     /// Index of the nominal demonstration; otherwise that of median duration.
-    pub nominal: Option<usize>,
+    pub(crate) nominal: Option<usize>,
     /// Number of samples C, from 4 to 1e6; otherwise that of the nominal demonstration, whose steps are subdivided equally
     /// if there are fewer than 150.
-    pub n_samples: Option<usize>,
-    /// Time scaling to the nominal demonstration.
-    pub time_scaling: TimeScaling,
+    pub(crate) n_samples: Option<usize>,
 }
 
 /// Scaling of the time of each demonstration to that of the nominal one.

@@ -159,13 +159,13 @@ impl<'a> ScaledTargets<'a> {
         let scale = if (1e-20..1e20).contains(&largest) { 1.0 } else { largest.log2().floor().exp2() };
         let mut scaled = zeros("targets", targets.dim())?;
         scaled.zip_mut_with(&targets, |to, from| *to = from / scale);
-        let squares = self::squares(scaled.as_slice().unwrap_or_default());
+        let squares = self::squares(crate::validate::row_major(&scaled));
         Ok(Some(Self { targets: scaled.into(), scale, squares }))
     }
 
     fn matrix(&self) -> MatRef<'_, f64> {
         let (rows, columns) = self.targets.dim();
-        MatRef::from_row_major_slice(self.targets.as_slice().unwrap_or_default(), rows, columns)
+        MatRef::from_row_major_slice(crate::validate::row_major(&self.targets), rows, columns)
     }
 
     /// Returns F or Fᵀ as (K, L) with K ≤ L.
@@ -246,7 +246,7 @@ impl<'a> ScaledTargets<'a> {
             let part = &mut part[..n_vectors * width];
             // A column of zeros stays exactly zero, so that a DoF at rest is not moved by rounding errors.
             visit(projected(part, styles.as_ref(), targets.subcols(start, width)));
-            let whole = basis.as_slice_mut().unwrap_or_default().chunks_exact_mut(columns);
+            let whole = crate::validate::row_major_mut(&mut basis).chunks_exact_mut(columns);
             whole.zip(part.chunks_exact(width)).for_each(|(row, part)| row[start..start + width].copy_from_slice(part));
         }
         Ok(Projection { styles, basis })

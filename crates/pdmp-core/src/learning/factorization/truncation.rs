@@ -37,7 +37,7 @@ impl Truncation {
             Truncation::Share(value) | Truncation::AboveNoise { share: value, .. }
                 if !(value > 0.0 && value <= 1.0) =>
             {
-                Err(Error::Range { name: "spectrum", value, allowed: "must lie in (0, 1]" })
+                Err(Error::Range { name: "singular_value_share", value, allowed: "must lie in (0, 1]" })
             }
             _ => Ok(()),
         }

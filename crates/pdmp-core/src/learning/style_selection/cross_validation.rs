@@ -60,7 +60,7 @@ impl<'a> StyleSelection<'a> {
         let sampled = aligned.clone().resampled(n_samples);
         let mut residuals = Array3::zeros((targets.starts.nrows(), n_samples, targets.starts.ncols()));
         for (m, mut position) in residuals.outer_iter_mut().enumerate() {
-            sampled.sample(m, position.as_slice_mut().unwrap_or_default());
+            sampled.sample(m, crate::validate::row_major_mut(&mut position));
         }
         let mut selection =
             Self { kind, targets, factors, segment_durations: aligned.segment_durations.view(), start, residuals };

@@ -13,7 +13,7 @@ use crate::context::ContextColumn;
 use crate::demonstration::{Demonstration, Sampling};
 use crate::dynamics::transport::Transport;
 use crate::error::Result;
-use crate::learning::alignment::{Aligned, Alignment, TimeScaling};
+use crate::learning::alignment::{Aligned, Alignment};
 use crate::learning::constants::Constants;
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::targets::Targets;
@@ -70,15 +70,8 @@ pub(crate) fn noise_limit(
     };
     let noise = (0..n_rows).map(noise).collect::<Result<Vec<_>>>()?;
     let n_samples = noise.iter().map(Demonstration::n_samples).max();
-    let alignment = Alignment {
-        kind,
-        dt: None,
-        period: Vec::new(),
-        smoothing: Smoothing::Interpolate,
-        nominal: None,
-        n_samples,
-        time_scaling: TimeScaling::Linear,
-    };
+    let alignment =
+        Alignment { kind, dt: None, period: Vec::new(), smoothing: Smoothing::Interpolate, nominal: None, n_samples };
     let mut rows = alignment.align(&noise, threads)?;
     rows.noise = aligned.noise.clone();
     let mut targets = Targets::of(&rows, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;

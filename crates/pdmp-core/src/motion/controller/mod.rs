@@ -14,14 +14,15 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx;
+mod group;
 mod setters;
 mod step;
 
 use std::sync::Arc;
 
-use crate::dynamics::canonical::{Canonical, CompensatedSum};
-use crate::dynamics::command_filter::{CommandFilter, Filter, FilterStep};
-use crate::dynamics::output_system::{CubicSample, Propagator, State};
+use crate::dynamics::canonical::CompensatedSum;
+use crate::dynamics::command_filter::{CommandFilter, FilterGains, FilterStep};
+use crate::dynamics::output_system::{Propagator, State};
 use crate::dynamics::propagator_series::Series;
 use crate::dynamics::transport::Stretch;
 use crate::error::{Error, Result};
@@ -29,10 +30,10 @@ use crate::kind::Kind;
 use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
-use crate::motion::perturbation::{MIN_RANGE_RATIO, Perturbation, widest};
-use crate::numerics::simd::{F64x4, copy, groups, repack, unpack};
+use crate::motion::perturbation::{Perturbation, widest};
+use crate::numerics::simd::{F64x4, WIDTH, copy, padded, repack, unpack};
 use crate::validate::check_positive;
-use step::Forcing;
+use group::Group;
 
 /// A tick is divided so that the clock moves by no more than this share of the movement at once.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
@@ -54,7 +55,7 @@ pub enum Status {
 /// A running primitive: a model, its commands and its state.
 #[derive(Clone, Debug)]
 pub struct Controller {
-    model: Arc<Primitive>,
+    primitive: Arc<Primitive>,
     dt: f64,
     conditions: ResolvedConditions,
     started: bool,
@@ -64,37 +65,32 @@ pub struct Controller {
     clock: CompensatedSum,
     /// Amplitude r; 1 where discrete.
     r: f64,
-    filter: Filter,
-    /// Seconds to 99 % of a changed command.
-    transition: f64,
+    /// How style and amplitude are followed, on the clock.
+    filter: FilterGains,
     style: CommandFilter,
+    /// How ρ is followed, in seconds.
+    rate_filter: FilterGains,
     /// ρ = 1/τ.
     rate: CommandFilter,
     /// Goal or anchor.
     centre: CommandFilter,
-    /// How a commanded goal is followed: [`Controller::centre_filter`].
-    centre_filter: Filter,
+    /// How a commanded goal is followed, on the clock: [`Controller::centre_filter`].
+    centre_filter: FilterGains,
     /// r₀.
     amplitude: CommandFilter,
     /// Share of the rate 1/τ at which the path is followed.
     speed: f64,
-    /// By groups of DoFs, as all that follows.
-    forcing: Vec<Forcing>,
-    /// Forcing at the start of the stretch at work, taken before anything moves: kept as numbers for the loop over the
-    /// groups, it would not stay in registers.
-    from: Vec<CubicSample<F64x4>>,
-    /// The way g − y₀ at the start, which the frame covers; zero where rhythmic.
-    way: Vec<F64x4>,
-    /// The share m − 1 of it by which the frame is off the goal at the clock.
+    groups: Vec<Group>,
+    /// Pace of the phase for which the groups' w holds.
+    paced: f64,
+    /// The share m − 1 of the way by which the frame is off the goal at the clock.
     lag: f64,
     /// Where it is read.
     stretch: Stretch,
-    z: Vec<F64x4>,
+    /// By groups of DoFs.
     position: Vec<F64x4>,
     velocity: Vec<F64x4>,
     acceleration: Vec<F64x4>,
-    /// Distance from the goal at which each DoF has settled.
-    tolerance: Vec<F64x4>,
     /// Far below the last digit of every movement.
     rest: f64,
     held: Perturbation,
@@ -123,19 +119,21 @@ impl Controller {
     /// # Errors
     /// Conditions that do not fit the model, `dt` that is not positive, or a negative `transition`.
     pub fn new(primitive: &Arc<Primitive>, dt: f64, conditions: &Conditions, transition: Option<f64>) -> Result<Self> {
-        let model = Arc::clone(primitive);
         check_positive("dt", dt)?;
-        let share = if model.kind() == Kind::Discrete { 0.1 } else { 0.25 };
-        let transition = transition.unwrap_or(share * model.duration());
-        if !(0.0..=1e6 * model.duration()).contains(&transition) {
+        let share = if primitive.kind() == Kind::Discrete { 0.1 } else { 0.25 };
+        let transition = transition.unwrap_or(share * primitive.duration());
+        if !(0.0..=1e6 * primitive.duration()).contains(&transition) {
             let allowed = "must lie between 0, an immediate switch, and a million durations";
             return Err(Error::Range { name: "transition", value: transition, allowed });
         }
-        let conditions = conditions.complete(&model)?;
-        let (filter, zeros) = (Filter::new(transition), vec![F64x4::ZERO; groups(model.n_dofs())]);
+        let conditions = conditions.complete(primitive)?;
+        let rate_filter = FilterGains::new(transition);
+        let filter = rate_filter.on_clock(primitive.tau());
+        let groups = Group::all(primitive.ranges());
+        let zeros = vec![F64x4::ZERO; groups.len()];
         // A tick of just this length is not divided for a rounding error.
-        let finest = MAX_CLOCK_STEP * model.canonical().extent() * (1.0 + 1e-9);
-        let series = Series::new(model.attractor(), finest);
+        let finest = MAX_CLOCK_STEP * primitive.canonical().extent() * (1.0 + 1e-9);
+        let series = Series::new(primitive.attractor(), finest);
         let mut controller = Self {
             dt,
             started: false,
@@ -144,34 +142,31 @@ impl Controller {
             clock: CompensatedSum::default(),
             r: 1.0,
             filter,
-            transition,
             style: CommandFilter::new(&conditions.style),
+            rate_filter,
             rate: CommandFilter::new(&[1.0 / conditions.tau]),
             centre: CommandFilter::new(&conditions.centre),
             centre_filter: filter,
             amplitude: CommandFilter::new(&[conditions.amplitude]),
             speed: 1.0,
-            forcing: vec![Forcing::default(); zeros.len()],
-            from: vec![CubicSample::default(); zeros.len()],
-            way: zeros.clone(),
+            groups,
+            paced: 1.0,
             lag: 0.0,
-            stretch: model.transport.stretch(0.0),
-            z: zeros.clone(),
+            stretch: primitive.transport.stretch(0.0),
             position: zeros.clone(),
             velocity: zeros.clone(),
-            acceleration: zeros.clone(),
-            tolerance: zeros,
-            rest: REST * widest(model.ranges()),
-            held: Perturbation::new(model.ranges(), model.units(), model.canonical().extent()),
+            acceleration: zeros,
+            rest: REST * widest(primitive.ranges()),
+            held: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
             finest,
-            glide: filter.glide(dt),
+            glide: rate_filter.glide(dt),
             course: FilterStep::START,
             centre_course: FilterStep::START,
             propagator: series.propagator::<F64x4>(0.0),
             series,
             lead: 1.0,
             conditions,
-            model,
+            primitive: Arc::clone(primitive),
         };
         controller.begin();
         Ok(controller)
@@ -187,7 +182,7 @@ impl Controller {
     /// # Errors
     /// As for [`Controller::new`]; the movement then goes on as it was.
     pub fn reset(&mut self, conditions: &Conditions) -> Result<()> {
-        self.conditions = conditions.complete(&self.model)?;
+        self.conditions = conditions.complete(&self.primitive)?;
         self.begin();
         Ok(())
     }
@@ -203,9 +198,10 @@ impl Controller {
         self.rate.jump(&[self.speed / conditions.tau]);
         self.amplitude.jump(&[conditions.amplitude]);
         self.centre.jump(&conditions.centre);
-        if let (Kind::Discrete, Some(start)) = (self.model.kind(), &conditions.start) {
-            repack(&mut self.way, start);
-            self.way.iter_mut().zip(self.centre.value()).for_each(|(way, goal)| *way = *goal - *way);
+        if let (Kind::Discrete, Some(start)) = (self.primitive.kind(), &conditions.start) {
+            for ((group, goal), start) in self.groups.iter_mut().zip(self.centre.value()).zip(start.chunks(WIDTH)) {
+                group.way = *goal - padded(start);
+            }
         }
         self.read_frame();
         self.read_forcing();
@@ -216,14 +212,14 @@ impl Controller {
 
     /// Puts position and z where the movement starts: at rest in z, or on the limit cycle of this style.
     fn place(&mut self) {
-        let Self { model, conditions, r, .. } = self;
-        for (group, (position, z)) in self.position.iter_mut().zip(&mut self.z).enumerate() {
-            let cycle = &model.cycle[group * model.n_styles()..];
+        let Self { primitive, conditions, r, .. } = self;
+        for (index, (position, group)) in self.position.iter_mut().zip(&mut self.groups).enumerate() {
+            let cycle = &primitive.cycle[index * primitive.n_styles()..];
             let on_cycle = conditions.style.iter().zip(cycle).fold(State::<F64x4>::default(), |sum, (s, cycle)| {
                 State { e: sum.e + cycle.e * (*r * s), z: sum.z + cycle.z * (*r * s) }
             });
-            *position = self.centre.value()[group] + on_cycle.e;
-            *z = on_cycle.z;
+            *position = self.centre.value()[index] + on_cycle.e;
+            group.z = on_cycle.z;
         }
         let phase = conditions.phase;
         if phase > 0.0 {
@@ -238,40 +234,9 @@ impl Controller {
             repack(&mut self.position, start);
         }
         if let Some(velocity) = &conditions.velocity {
-            repack(&mut self.z, velocity);
-            for (z, forcing) in self.z.iter_mut().zip(&self.forcing) {
-                *z = *z * conditions.tau - forcing.shape * *r;
+            for (group, velocity) in self.groups.iter_mut().zip(velocity.chunks(WIDTH)) {
+                group.z = padded(velocity) * conditions.tau - group.forcing.shape * *r;
             }
-        }
-    }
-
-    /// The filter of a goal commanded now, on the clock.
-    ///
-    /// Such a goal enters Eq. (1) alone, as in the paper, but over what remains of the movement: the filter takes so long,
-    /// less the time 1/β_z by which the output system lags behind, and never less than a transition. A goal at once is
-    /// what immediate transport has, an anchor, and any goal from shortly before the end on.
-    pub(super) fn centre_filter(&self) -> Filter {
-        match self.model.canonical() {
-            Canonical::Discrete { u_end, .. } if !self.model.transport.is_immediate() => {
-                let remaining = u_end - self.clock.value() - 1.0 / self.model.attractor().beta_z;
-                Filter::new(self.transition.max(remaining * self.model.tau()))
-            }
-            _ => self.filter,
-        }
-    }
-
-    /// Sets the distances at which the way from here to the goal counts as gone, not below what rounding leaves of it.
-    pub(super) fn set_tolerance(&mut self) {
-        let ranges = self.model.ranges();
-        let least = F64x4::splat(MIN_RANGE_RATIO * widest(ranges));
-        repack(&mut self.tolerance, ranges);
-        for tolerance in &mut self.tolerance {
-            *tolerance = tolerance.max(least) * SETTLED;
-        }
-        let ends = self.centre.target().iter().zip(&self.position);
-        for (tolerance, (&centre, &position)) in self.tolerance.iter_mut().zip(ends) {
-            let rounding = centre.abs().max(position.abs()) * (8.0 * f64::EPSILON);
-            *tolerance = tolerance.max(((centre - position).abs() * SETTLED).max(rounding));
         }
     }
 
@@ -307,9 +272,9 @@ impl Controller {
     /// now: e − o where o is of the sign of e and smaller, 0 where it is larger, e where it is of the other sign. A robot
     /// that always lags or sags by the same so neither holds the movement up nor keeps it from its goal. The error of a
     /// DoF whose unit is rad, deg or ° is taken the short way round. A measurement stays in force, as the distance e, until
-    /// the next one or [`Controller::release`], so that a sensor may be slower than the loop. `coupling` adds c_v to the velocity and c_a to the acceleration. Over the tick the
-    /// pull is the velocity (1 − exp(−k_t h))/dt of d at its start, h being the tick on the clock: however long
-    /// the tick, it pulls no further than ỹ.
+    /// the next one or [`Controller::release`], so that a sensor may be slower than the loop. `coupling` adds c_v to the
+    /// velocity and c_a to the acceleration. Over the tick the pull is the velocity (1 − exp(−k_t h))/dt of d at its
+    /// start, h being the tick on the clock: however long the tick, it pulls no further than ỹ.
     ///
     /// Phase stopping and the pull: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
     /// Mohajerian and Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9. Terms in ż:
@@ -319,7 +284,7 @@ impl Controller {
     /// A vector of a wrong length, a number that is not finite, τ, amplitude or goal that a setter refuses, or a tick
     /// that is negative or longer than 1000 τ.
     pub fn update(&mut self, command: &Command, motion: &mut Motion) -> Result<Status> {
-        motion.check(self.model.n_dofs())?;
+        motion.check(self.primitive.n_dofs())?;
         let status = self.step_with(command)?;
         self.read(motion);
         Ok(status)
@@ -338,7 +303,7 @@ impl Controller {
     /// # Errors
     /// As for [`Controller::update`].
     pub fn step_with(&mut self, command: &Command) -> Result<Status> {
-        command.check(&self.model)?;
+        command.check(&self.primitive)?;
         let dt = command.dt.unwrap_or(self.dt);
         self.check_length(dt, command.tau)?;
         self.apply(command);
@@ -358,7 +323,7 @@ impl Controller {
 
     /// The model that is run.
     pub fn primitive(&self) -> &Arc<Primitive> {
-        &self.model
+        &self.primitive
     }
 
     /// Length of a tick given at the start, in seconds.
@@ -373,22 +338,22 @@ impl Controller {
 
     /// Phase: x in (0, 1] where discrete, φ in [0, 2π) where rhythmic.
     pub fn phase(&self) -> f64 {
-        self.model.canonical().phase(self.clock.value())
+        self.primitive.canonical().phase(self.clock.value())
     }
 
     /// Position y (D,), in the unit of each DoF.
     pub fn position(&self) -> &[f64] {
-        unpack(&self.position, self.model.n_dofs())
+        unpack(&self.position, self.primitive.n_dofs())
     }
 
     /// Velocity ẏ (D,), per second.
     pub fn velocity(&self) -> &[f64] {
-        unpack(&self.velocity, self.model.n_dofs())
+        unpack(&self.velocity, self.primitive.n_dofs())
     }
 
     /// Acceleration ÿ (D,), per second squared.
     pub fn acceleration(&self) -> &[f64] {
-        unpack(&self.acceleration, self.model.n_dofs())
+        unpack(&self.acceleration, self.primitive.n_dofs())
     }
 
     /// Style commanded (J,).

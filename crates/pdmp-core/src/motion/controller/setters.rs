@@ -1,7 +1,8 @@
 //! What can be commanded between ticks. A command that is refused leaves the last good one in force.
 
-use super::{Controller, Status};
-use crate::dynamics::command_filter::FilterStep;
+use super::{Controller, SETTLED, Status};
+use crate::dynamics::canonical::Canonical;
+use crate::dynamics::command_filter::{FilterGains, FilterStep};
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
 
@@ -58,7 +59,7 @@ impl Controller {
         self.speed = speed;
         let rate = [speed / self.conditions.tau];
         if self.started {
-            self.rate.follow(&rate, &self.filter);
+            self.rate.follow(&rate, &self.rate_filter);
         } else {
             self.rate.jump(&rate);
         }
@@ -84,7 +85,7 @@ impl Controller {
     }
 
     fn set(&mut self, command: &Command) -> Result<()> {
-        command.check(&self.model)?;
+        command.check(&self.primitive)?;
         self.apply(command);
         Ok(())
     }
@@ -110,7 +111,7 @@ impl Controller {
         }
         if let Some(tau) = command.tau.filter(|tau| *tau != self.conditions.tau) {
             self.conditions.tau = tau;
-            self.rate.follow(&[self.speed / tau], &filter);
+            self.rate.follow(&[self.speed / tau], &self.rate_filter);
             news = true;
         }
         if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != self.conditions.amplitude) {
@@ -128,6 +129,29 @@ impl Controller {
         // A style that was switched to at once.
         if filter.immediate() {
             self.read_forcing();
+        }
+    }
+    /// The filter of a goal commanded now.
+    ///
+    /// Such a goal enters Eq. (1) alone, as in the paper, but over what remains of the movement: the filter takes so long,
+    /// less the time 1/β_z by which the output system lags behind, and never less than a transition. A goal at once is
+    /// what immediate transport has, an anchor, and any goal from shortly before the end on.
+    fn centre_filter(&self) -> FilterGains {
+        match self.primitive.canonical() {
+            Canonical::Discrete { u_end, .. } if !self.primitive.transport.is_immediate() => {
+                let remaining = u_end - self.clock.value() - 1.0 / self.primitive.attractor().beta_z;
+                self.filter.lasting(remaining)
+            }
+            _ => self.filter,
+        }
+    }
+
+    /// Sets the distances at which the way from here to the goal counts as gone, not below what rounding leaves of it.
+    pub(super) fn set_tolerance(&mut self) {
+        let ends = self.centre.target().iter().zip(&self.position);
+        for (group, (&centre, &position)) in self.groups.iter_mut().zip(ends) {
+            let rounding = centre.abs().max(position.abs()) * (8.0 * f64::EPSILON);
+            group.tolerance = group.least.max(((centre - position).abs() * SETTLED).max(rounding));
         }
     }
 }

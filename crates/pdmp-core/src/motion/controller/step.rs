@@ -1,13 +1,14 @@
 //! One tick.
 
+use super::group::{Forcing, Gate, Group, carried};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum, amplitude, faded};
-use crate::dynamics::forcing_table::{Fade, ForcingTable, TableIndex};
+use crate::dynamics::forcing_table::Fade;
 use crate::dynamics::output_system::{Attractor, CubicSample, State};
 use crate::dynamics::transport::Lag;
 use crate::error::{Error, Result};
 use crate::motion::perturbation::PerturbationTerms;
-use crate::numerics::simd::{F64x4, Real, Register, flush, unpack};
+use crate::numerics::simd::{F64x4, Register, flush, unpack};
 
 /// Most pieces of a tick; a longer one is still stable, only less exact.
 const MAX_PIECES: f64 = 1000.0;
@@ -15,69 +16,6 @@ const MAX_PIECES: f64 = 1000.0;
 const MIN_RATE: f64 = 1e-6;
 /// Longest tick, in units of τ.
 const MAX_TICK: f64 = 1000.0;
-
-/// What the landscape gives a group of DoFs at the clock.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Forcing {
-    /// sᵀb.
-    pub(super) shape: F64x4,
-    /// Its derivative with respect to the phase's clock.
-    slope: F64x4,
-    /// ṡᵀb, per second at the nominal rate.
-    swing: F64x4,
-}
-
-impl Forcing {
-    /// Reads a group at a place, for a style s and, while it is on its way, ṡ.
-    #[inline(always)]
-    fn read<T: Register>(
-        forcing_table: &ForcingTable,
-        place: TableIndex,
-        group: usize,
-        s: &[f64],
-        rate: Option<&[f64]>,
-    ) -> Self {
-        let [along, swing] = match rate {
-            Some(rate) => forcing_table.blend_both::<T>(place, group, [s, rate]),
-            None => [forcing_table.blend(place, group, s), CubicSample::default()],
-        };
-        Self { shape: along.value.store(), slope: along.slope.store(), swing: swing.value.store() }
-    }
-}
-
-/// What turns a [`Forcing`] into w = r·sᵀb and its slope along the motion, w′ = rκ·sᵀb′ + rτ_n·ṡᵀb + r′·sᵀb. Past the
-/// end of a discrete movement r stands for the fading phase, and b for what is faded.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Gate {
-    pub(super) r: f64,
-    /// The landscape is read at the phase's pace κ; style and amplitude keep the output system's clock.
-    along: f64,
-    swing: f64,
-    growth: f64,
-    /// ρ and ρ̇.
-    rate: [f64; 2],
-}
-
-impl Gate {
-    #[inline(always)]
-    fn jet<T: Register>(&self, forcing: &Forcing) -> CubicSample<T> {
-        let [shape, slope, swing] = [&forcing.shape, &forcing.slope, &forcing.swing].map(T::load);
-        CubicSample { value: shape * self.r, slope: slope * self.along + (swing * self.swing + shape * self.growth) }
-    }
-
-    /// ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w, where w has the motion c′ of the frame in it.
-    #[inline(always)]
-    fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: CubicSample<T>) -> [T; 2] {
-        let ([rate, change], flow) = (self.rate, state.z + w.value);
-        [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
-    }
-}
-
-/// Adds the motion of a frame that covers a `way` to the forcing, for m with respect to the output system's clock.
-#[inline(always)]
-fn carried<T: Real>(w: CubicSample<T>, way: T, [slope, bend]: [f64; 2]) -> CubicSample<T> {
-    CubicSample { value: w.value + way * slope, slope: w.slope + way * bend }
-}
 
 impl Controller {
     /// Checks that a tick is not too long for the rates at which it starts and to which it goes.
@@ -96,13 +34,13 @@ impl Controller {
         self.started = true;
         let mut parts = h / self.finest;
         if !(self.style.settled() && self.amplitude.settled()) {
-            parts = parts.max(self.filter.parts(h * self.model.tau()));
+            parts = parts.max(self.filter.parts(h));
         }
         if !self.centre.settled() {
-            parts = parts.max(self.centre_filter.parts(h * self.model.tau()));
+            parts = parts.max(self.centre_filter.parts(h));
         }
         if !self.rate.settled() {
-            parts = parts.max(self.filter.parts(dt));
+            parts = parts.max(self.rate_filter.parts(dt));
         }
         if parts <= 1.0 {
             self.piece(dt, h);
@@ -116,13 +54,14 @@ impl Controller {
         self.time.add(dt);
         // What has settled stays settled, unless it is pushed or commanded.
         if self.status == Status::Working || self.held.push().is_some() {
-            let past = self.model.forcing_table().is_past(self.clock.value());
+            let past = self.primitive.forcing_table().is_past(self.clock.value());
             self.status = if past { self.settled() } else { Status::Working };
         }
         self.status
     }
 
     /// The stretch of the clock that `dt` seconds from now on cover.
+    #[inline(always)]
     pub(super) fn stretch(&mut self, dt: f64) -> f64 {
         if self.rate.settled() {
             return first(self.rate.value()) * dt;
@@ -134,25 +73,25 @@ impl Controller {
     /// Gets the filter of the rate ready for `dt` seconds.
     fn measure(&mut self, dt: f64) {
         if dt != self.glide.dt() {
-            self.glide = self.filter.glide(dt);
+            self.glide = self.rate_filter.glide(dt);
         }
     }
 
     /// Gets the filters on the clock that are at work ready for a stretch `h` of it.
     #[inline(always)]
     fn measure_clock(&mut self, h: f64) {
-        let seconds = h * self.model.tau();
-        if seconds != self.course.dt() && !(self.style.settled() && self.amplitude.settled()) {
-            self.course = self.filter.pass(seconds);
+        if !(self.style.settled() && self.amplitude.settled()) && h != self.course.dt() {
+            self.course = self.filter.pass(h);
         }
-        if seconds != self.centre_course.dt() && !self.centre.settled() {
-            self.centre_course = self.centre_filter.pass(seconds);
+        if !self.centre.settled() && h != self.centre_course.dt() {
+            self.centre_course = self.centre_filter.pass(h);
         }
     }
 
     /// Moves on by `dt` seconds, `h` on the clock, stopping at the demonstrated end, where the forcing has a kink.
+    #[inline(always)]
     fn piece(&mut self, dt: f64, h: f64) {
-        let Canonical::Discrete { u_end, .. } = self.model.canonical() else {
+        let Canonical::Discrete { u_end, .. } = self.primitive.canonical() else {
             return self.advance(dt, h);
         };
         let (left, way) = (u_end - self.clock.value(), self.held.pace() * h);
@@ -160,7 +99,7 @@ impl Controller {
         if left <= 0.0 || left > way * (1.0 + 1e-9) {
             return self.advance(dt, h);
         }
-        let before = self.rate.time_to(left / self.held.pace(), dt, &self.filter);
+        let before = self.rate.time_to(left / self.held.pace(), dt, &self.rate_filter);
         // What rounding left of a tick that should have ended here is not worth a piece of its own.
         if left > 1e-9 * way {
             let h = self.stretch(before);
@@ -174,18 +113,29 @@ impl Controller {
     }
 
     /// Moves on by `dt` seconds, `h` on the clock.
+    #[inline(always)]
     pub(super) fn advance(&mut self, dt: f64, h: f64) {
         if h <= 0.0 {
-            // A pause: nothing moves but the rate.
-            self.measure(dt);
-            self.rate.advance::<F64x4>(&self.glide);
-            self.held.rest();
-            return self.read_out();
+            return self.pause(dt);
         }
         #[cfg(target_arch = "x86_64")]
         if super::avx::advance(self, dt, h) {
             return;
         }
+        self.advance_anywhere(dt, h);
+    }
+
+    /// A pause: nothing moves but the rate.
+    fn pause(&mut self, dt: f64) {
+        self.measure(dt);
+        self.rate.advance::<F64x4>(&self.glide);
+        self.held.rest();
+        self.read_out();
+    }
+
+    /// Moves on as any processor can. A call of its own, so that [`Controller::advance`] stays small.
+    #[inline(never)]
+    fn advance_anywhere(&mut self, dt: f64, h: f64) {
         self.advance_in::<F64x4>(dt, h);
     }
 
@@ -197,30 +147,27 @@ impl Controller {
         if h != self.propagator.step() {
             self.propagator = self.series.propagator::<T>(h);
         }
-        let demonstrated = !self.model.forcing_table().is_past(self.clock.value());
+        let demonstrated = !self.primitive.forcing_table().is_past(self.clock.value());
         let levers = self.held.push().map(|_| self.levers());
-        let before = if demonstrated { self.gate_within() } else { self.gate() };
-        for (from, forcing) in self.from.iter_mut().zip(&self.forcing) {
-            let CubicSample { value, slope } = before.jet::<T>(forcing);
-            *from = CubicSample { value: value.store(), slope: slope.store() };
+        if self.held.pace() != self.paced {
+            self.open_gate();
         }
         self.style.advance::<T>(&self.course);
         self.rate.advance::<T>(&self.glide);
         let moving = self.centre.elapse(&self.centre_course);
         self.clock.add(self.held.pace() * h);
-        if let Canonical::Rhythmic { mu } = self.model.canonical() {
+        if let Canonical::Rhythmic { mu } = self.primitive.canonical() {
             self.clock.wrap();
             self.r = if self.amplitude.settled() {
                 amplitude(mu, self.r, self.conditions.amplitude, h)
             } else {
-                let (tau, dt) = (self.model.tau(), self.course.dt());
-                let r = faded(self.filter.lag(&self.amplitude, self.r, mu / tau, dt));
+                let r = faded(self.filter.lag(&self.amplitude, self.r, mu, h));
                 self.amplitude.advance::<T>(&self.course);
                 r
             };
         }
         if !self.stretch.reaches(self.clock.value()) {
-            self.stretch = self.model.transport.stretch(self.clock.value());
+            self.stretch = self.primitive.transport.stretch(self.clock.value());
         }
         let Lag { value, slope, bend } = self.stretch.lag(self.clock.value());
         let lags = [std::mem::replace(&mut self.lag, value), value];
@@ -228,40 +175,37 @@ impl Controller {
         // A piece that reaches u_end has the slopes of the demonstrated side at both its ends.
         let after = if demonstrated { self.gate_within() } else { self.gate() };
 
-        let (model, propagator) = (&*self.model, &self.propagator);
-        let (forcing_table, attractor, clock) = (model.forcing_table(), model.attractor(), self.clock.value());
+        let (primitive, propagator) = (&*self.primitive, &self.propagator);
+        let (forcing_table, attractor, clock) = (primitive.forcing_table(), primitive.attractor(), self.clock.value());
         let place = if demonstrated { forcing_table.place_within(clock) } else { forcing_table.place(clock) };
-        let style = unpack(self.style.value(), model.n_styles());
-        let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), model.n_styles()));
-        let (n, rest, nominal) = (self.forcing.len(), T::splat(self.rest), model.tau());
-        let (forcing, centre) = (&mut self.forcing[..n], &mut self.centre);
-        let (starts, way) = (&self.from[..n], &self.way[..n]);
-        let (position, z) = (&mut self.position[..n], &mut self.z[..n]);
-        let (velocity, acceleration) = (&mut self.velocity[..n], &mut self.acceleration[..n]);
-        for group in 0..n {
-            let from = CubicSample { value: T::load(&starts[group].value), slope: T::load(&starts[group].slope) };
-            forcing[group] = Forcing::read::<T>(forcing_table, place, group, style, swing);
-            let to = after.jet(&forcing[group]);
+        let style = unpack(self.style.value(), primitive.n_styles());
+        let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), primitive.n_styles()));
+        let (n, rest, centre) = (self.groups.len(), T::splat(self.rest), &mut self.centre);
+        let (position, velocity, acceleration) =
+            (&mut self.position[..n], &mut self.velocity[..n], &mut self.acceleration[..n]);
+        for (index, group) in self.groups.iter_mut().enumerate() {
+            let from = CubicSample { value: T::load(&group.w.value), slope: T::load(&group.w.slope) };
+            group.forcing = Forcing::read::<T>(forcing_table, place, index, style, swing);
+            let to = after.jet::<T>(&group.forcing);
+            group.w = CubicSample { value: to.value.store(), slope: to.slope.store() };
 
-            let (goal, way) = (T::load(&centre.value()[group]), T::load(&way[group]));
+            let (goal, way) = (T::load(&centre.value()[index]), T::load(&group.way));
             let [start, mut origin] = lags.map(|lag| goal + way * lag);
-            let state = State { e: T::load(&position[group]) - start, z: T::load(&z[group]) };
+            let state = State { e: T::load(&position[index]) - start, z: T::load(&group.z) };
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
-                let set_out = CubicSample { value: T::default(), slope: T::load(&centre.rate()[group]) * nominal };
-                centre.advance_group::<T>(group, &self.centre_course);
-                let arrived = T::load(&centre.value()[group]);
-                let slope = T::load(&centre.rate()[group]) * nominal;
+                let set_out = CubicSample { value: T::default(), slope: T::load(&centre.rate()[index]) };
+                let [arrived, slope] = centre.advance_group::<T>(index, &self.centre_course);
                 let moved = propagator.follow([set_out, CubicSample { value: arrived - goal, slope }]);
                 y = y + moved.e;
                 origin = arrived + way * lags[1];
                 next.z = next.z + moved.z;
             }
-            let (y, z_next) = (flush(y, rest), flush(next.z, rest));
-            (position[group], z[group]) = (y.store(), z_next.store());
-            let [speed, change] = after.motion(attractor, State { e: y - origin, z: z_next }, carried(to, way, carry));
-            (velocity[group], acceleration[group]) = (speed.store(), change.store());
+            let (y, z) = (flush(y, rest), flush(next.z, rest));
+            (position[index], group.z) = (y.store(), z.store());
+            let [speed, change] = after.motion(attractor, State { e: y - origin, z }, carried(to, way, carry));
+            (velocity[index], acceleration[index]) = (speed.store(), change.store());
         }
         forcing_table.prefetch(clock + self.lead * self.held.pace() * h);
         if let Some(before) = levers {
@@ -276,19 +220,19 @@ impl Controller {
         let by_velocity = self.propagator.advance(State::default(), [before[0], after[0]]);
         let by_acceleration = self.propagator.follow([before[1], after[1]]);
         let Some(PerturbationTerms { velocity, acceleration }) = self.held.push() else { return };
-        for group in 0..self.z.len() {
-            let (v, a) = (velocity[group], acceleration[group]);
-            self.position[group] += v * by_velocity.e + a * by_acceleration.e;
-            self.z[group] += v * by_velocity.z + a * by_acceleration.z;
+        for (index, group) in self.groups.iter_mut().enumerate() {
+            let (v, a) = (velocity[index], acceleration[index]);
+            self.position[index] += v * by_velocity.e + a * by_acceleration.e;
+            group.z += v * by_velocity.z + a * by_acceleration.z;
         }
     }
 
     /// What a unit of c_v adds to the forcing, τ, and a unit of c_a to the centre: τ²/(α_zβ_z), for that is how far the
     /// centre must move to add τ² to the row of Eq. (1).
     fn levers(&self) -> [CubicSample; 2] {
-        let Attractor { alpha_z, beta_z } = self.model.attractor();
+        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
         // On the way into a pause the terms fade with it once τ lies beyond all that can be commanded.
-        let least = MIN_RATE / self.model.tau();
+        let least = MIN_RATE / self.primitive.tau();
         let (rate, change) = (first(self.rate.value()), first(self.rate.rate()));
         let tau = 1.0 / rate.max(least);
         // dτ/du = τ·dτ/dt.
@@ -301,10 +245,10 @@ impl Controller {
     #[inline(always)]
     pub(super) fn gate(&self) -> Gate {
         let within = self.gate_within();
-        match self.model.forcing_table().fading(self.clock.value()) {
+        match self.primitive.forcing_table().fading(self.clock.value()) {
             Some(Fade { value, growth, along, .. }) => {
-                let [along, growth] = [along, growth].map(|slope| self.held.pace() * slope);
-                Gate { r: value, along, swing: value * within.swing, growth, ..within }
+                let pace = self.held.pace();
+                Gate { r: value, pace: pace * along, growth: pace * growth, ..within }
             }
             None => within,
         }
@@ -314,11 +258,11 @@ impl Controller {
     #[inline(always)]
     fn gate_within(&self) -> Gate {
         let (r, rate) = (self.r, [self.rate.value(), self.rate.rate()].map(first));
-        let growth = match self.model.canonical() {
+        let growth = match self.primitive.canonical() {
             Canonical::Discrete { .. } => 0.0,
             Canonical::Rhythmic { mu } => mu * (first(self.amplitude.value()) - r),
         };
-        Gate { r, along: r * self.held.pace(), swing: r * self.model.tau(), growth, rate }
+        Gate { r, pace: self.held.pace(), growth, rate }
     }
 
     /// m′ and m″ with respect to the output system's clock, from those with respect to the phase's.
@@ -330,33 +274,39 @@ impl Controller {
 
     /// Reads the frame at a clock that was set.
     pub(super) fn read_frame(&mut self) {
-        self.stretch = self.model.transport.stretch(self.clock.value());
+        self.stretch = self.primitive.transport.stretch(self.clock.value());
         self.lag = self.stretch.lag(self.clock.value()).value;
     }
 
-    /// Reads the forcing at the clock.
+    /// Reads the forcing at a clock or style that was set.
     pub(super) fn read_forcing(&mut self) {
-        let (model, place) = (&self.model, self.model.forcing_table().place(self.clock.value()));
-        let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, model.n_styles()));
-        for (group, forcing) in self.forcing.iter_mut().enumerate() {
-            *forcing = Forcing::read::<F64x4>(model.forcing_table(), place, group, style, Some(swing));
+        let (primitive, place) = (&self.primitive, self.primitive.forcing_table().place(self.clock.value()));
+        let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, primitive.n_styles()));
+        for (index, group) in self.groups.iter_mut().enumerate() {
+            group.forcing = Forcing::read::<F64x4>(primitive.forcing_table(), place, index, style, Some(swing));
         }
+        self.open_gate();
+    }
+
+    /// Computes w at the clock for the pace at work. A tick does so for its end, where the next one starts.
+    fn open_gate(&mut self) {
+        self.paced = self.held.pace();
+        let gate = self.gate();
+        self.groups.iter_mut().for_each(|group| group.w = gate.jet(&group.forcing));
     }
 
     /// Velocity and acceleration of the present state.
     pub(super) fn read_out(&mut self) {
-        let (gate, attractor) = (self.gate(), self.model.attractor());
-        let Lag { value, slope, bend } = self.model.transport.lag(self.clock.value());
+        let (gate, attractor) = (self.gate(), self.primitive.attractor());
+        let Lag { value, slope, bend } = self.primitive.transport.lag(self.clock.value());
         let carry = self.carry(slope, bend);
-        for group in 0..self.z.len() {
-            let way = self.way[group];
-            let w = carried(gate.jet(&self.forcing[group]), way, carry);
-            let e = self.position[group] - (self.centre.value()[group] + way * value);
-            let state = State { e, z: self.z[group] };
-            [self.velocity[group], self.acceleration[group]] = gate.motion(attractor, state, w);
+        for (index, &Group { forcing, way, z, .. }) in self.groups.iter().enumerate() {
+            let w = carried(gate.jet(&forcing), way, carry);
+            let e = self.position[index] - (self.centre.value()[index] + way * value);
+            [self.velocity[index], self.acceleration[index]] = gate.motion(attractor, State { e, z }, w);
         }
         if let Some(PerturbationTerms { velocity, acceleration }) = self.held.push() {
-            for group in 0..self.z.len() {
+            for group in 0..self.groups.len() {
                 self.velocity[group] += velocity[group];
                 self.acceleration[group] += acceleration[group];
             }
@@ -367,23 +317,24 @@ impl Controller {
     /// left of its way, of its speed at critical damping, and of its forcing, be it of the style that is on its way, and
     /// as far as the goal itself still goes.
     fn settled(&self) -> Status {
-        let Some(fade) = self.model.forcing_table().fading(self.clock.value()) else {
+        let Some(fade) = self.primitive.forcing_table().fading(self.clock.value()) else {
             return Status::Working;
         };
-        let Attractor { alpha_z, beta_z } = self.model.attractor();
-        let (forcing_table, target) = (self.model.forcing_table(), unpack(self.style.target(), self.model.n_styles()));
+        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
+        let (forcing_table, target) =
+            (self.primitive.forcing_table(), unpack(self.style.target(), self.primitive.n_styles()));
         let place = forcing_table.place(self.clock.value());
-        let over = (0..self.z.len()).all(|group| {
-            let way = (self.position[group] - self.centre.target()[group]).abs();
-            let Forcing { shape, slope, .. } = self.forcing[group];
+        let over = self.groups.iter().enumerate().all(|(index, group)| {
+            let way = (self.position[index] - self.centre.target()[index]).abs();
+            let Forcing { shape, slope, .. } = group.forcing;
             let forcing = shape * fade.value;
-            let flow = (self.z[group] + forcing).abs() * (2.0 / alpha_z);
+            let flow = (group.z + forcing).abs() * (2.0 / alpha_z);
             let mut push = fade.push(CubicSample { value: shape, slope });
             if !self.style.settled() {
-                push = push.max(fade.push(forcing_table.blend(place, group, target)));
+                push = push.max(fade.push(forcing_table.blend(place, index, target)));
             }
-            let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, group);
-            left.simd_le(self.tolerance[group]).all()
+            let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, index);
+            left.simd_le(group.tolerance).all()
         });
         if over { Status::Finished } else { Status::Working }
     }
@@ -414,16 +365,14 @@ mod tests {
             Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
         };
         let demos = [0.0, 0.4, 1.0].map(reach);
-        let options = FitOptions {
-            basis: crate::learning::regression::Basis::NGnet(Default::default()),
-            ..FitOptions::new(Kind::Discrete)
-        };
+        let options =
+            FitOptions::new(Kind::Discrete).basis(crate::learning::regression::Basis::NGnet(Default::default()));
         let model = Arc::new(fit(&demos, &options).unwrap());
         let mut any = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
         any.step().unwrap();
         any.set_goal(&[0.3; 6]).unwrap();
         any.set_tau(0.8).unwrap();
-        any.set_style(&vec![0.5; any.model.n_styles()]).unwrap();
+        any.set_style(&vec![0.5; any.primitive.n_styles()]).unwrap();
         let mut four = any.clone();
         for _ in 0..1500 {
             let h = any.stretch(1e-3);
