@@ -29,8 +29,8 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 /// Estimates the style (J,) of a demonstration outside the training set.
 ///
 /// The estimate is the maximum a posteriori style given the target, with Gaussian residuals and a zero-mean Gaussian prior
-/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that begins in another phase than those of the model is first
-/// shifted to their phase.
+/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that
+/// begins in another phase than those of the model is first shifted to their phase.
 ///
 /// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
 /// same warp, or by landmarks, for which `landmarks` (E,) are the times in seconds.
