@@ -208,7 +208,7 @@ def fit(
     n_samples : int, optional
         Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
         that has fewer than 150.
-    transport : {"learnt", "immediate"}
+    transport : {"learnt", "immediate"}, optional
         Motion of the frame of a discrete movement from start to goal: along the learnt profile of the demonstrations
         (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the
         movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
@@ -236,8 +236,8 @@ def fit(
         Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With
         "immediate" transport the forcing fades with x past the end: if a movement leaves its goal there before it
         settles, `alpha_x = alpha_z` reduces the deviation most.
-    mu : float
-        Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit.
+    mu : float, optional
+        Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit; 1 by default.
     threads : int, optional
         Largest number of threads; by default all that the system offers. The model does not depend on it.
     progress : callable, optional
@@ -1700,7 +1700,7 @@ class GP:
 
     Parameters
     ----------
-    kernel : {"matern52", "matern32", "squared_exponential"}
+    kernel : {"matern52", "matern32"}
         Covariance function over the clock u; periodic for rhythmic movements.
     length : float, optional
         Length scale, in units of the clock u = t / tau; positive. Estimated if not given.
