@@ -3,6 +3,9 @@
 import re
 import subprocess
 import sys
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -166,3 +169,101 @@ def test_one_name_for_two_dofs_is_refused() -> None:
     """Columns of a rollout could not be told apart."""
     with pytest.raises(ValueError, match="names must differ"):
         Demonstration(POSITION, dt=0.02, names=["a", "a"])
+
+
+DEMO = Demonstration(POSITION, dt=0.02)
+SCALARS: dict[str, tuple[Callable[..., Any], list[str]]] = {
+    "rollout": (
+        lambda model, **scalar: model.rollout(**scalar),
+        ["dt", "duration", "tau", "amplitude", "phase"],
+    ),
+    "rollouts": (
+        lambda model, **scalar: model.rollouts(model.styles, **scalar),
+        ["dt", "duration", "tau", "amplitude", "derivatives", "threads"],
+    ),
+    "rollout_chunks": (
+        lambda model, **scalar: model.rollout_chunks(model.styles, **scalar),
+        ["dt", "duration", "tau", "amplitude", "derivatives", "threads", "size"],
+    ),
+    "controller": (
+        lambda model, **scalar: model.controller(**scalar),
+        ["dt", "transition", "tau", "amplitude", "phase"],
+    ),
+    "step": (lambda model, **scalar: model.controller().step(**scalar), ["dt"]),
+    "reset": (lambda model, **scalar: model.controller().reset(**scalar), ["tau", "amplitude"]),
+    "command": (
+        lambda model, **scalar: setattr(model.controller(), *next(iter(scalar.items()))),
+        ["tau", "amplitude", "speed"],
+    ),
+    "jacobian": (
+        lambda model, **scalar: model.jacobian("goal", **scalar),
+        ["dt", "duration", "tau", "derivative"],
+    ),
+    "band": (lambda model, **scalar: model.band([0.0], **scalar), ["level", "dt"]),
+    "style_of": (lambda model, **scalar: model.style_of(DEMO, **scalar), ["dt", "period"]),
+    "tau_at": (lambda model, phase: model.tau_at(phase, [1.0]), ["phase"]),
+    "blend": (
+        lambda model, share: pdmp.blend(model.conditions(0), model.conditions(1), share),
+        ["share"],
+    ),
+    "fit": (
+        lambda model, **scalar: pdmp.fit([POSITION, POSITION], **(RATE | scalar)),
+        [
+            *("dt", "n_styles", "singular_value_share", "nominal", "n_samples", "tau"),
+            *("alpha_z", "beta_z", "alpha_x", "mu", "threads"),
+        ],
+    ),
+    "Demonstration": (lambda model, dt: Demonstration(POSITION, dt=dt), ["dt"]),
+    "Conditions": (
+        lambda model, **scalar: pdmp.Conditions(**scalar),
+        ["tau", "amplitude", "phase"],
+    ),
+    "GP": (lambda model, **scalar: pdmp.GP(**scalar), ["length", "noise"]),
+    "NGnet": (lambda model, **scalar: pdmp.NGnet(**scalar), ["n_basis", "overlap"]),
+    "TimeWarp": (lambda model, **scalar: pdmp.TimeWarp(**scalar), ["n_segments", "max_slope"]),
+    "factorise": (
+        lambda model, **scalar: pdmp.factorise(np.eye(3), **scalar),
+        ["n_styles", "singular_value_share"],
+    ),
+    "resample": (lambda model, dt: pdmp.preprocessing.resample(DEMO, dt), ["dt"]),
+    "trim": (lambda model, threshold: pdmp.preprocessing.trim(DEMO, threshold), ["threshold"]),
+    "lowpass": (lambda model, cut_off: pdmp.preprocessing.lowpass(DEMO, cut_off), ["cut_off"]),
+}
+CALLS = [(call, name) for call, (_, names) in SCALARS.items() for name in names]
+NO_SCALARS = {
+    "text": "a",
+    "list": [1],
+    "vector": np.array([1.0, 2.0]),
+    "single": np.array([1.0]),
+    "complex": 1j,
+    "masked": np.ma.masked,
+    "interval": np.timedelta64(1, "ns"),
+    "object": object(),
+}
+
+
+@pytest.mark.parametrize("value", NO_SCALARS.values(), ids=NO_SCALARS)
+@pytest.mark.parametrize(("call", "name"), CALLS)
+def test_scalars_that_are_no_numbers_are_refused_by_name(
+    reach: pdmp.Model, call: str, name: str, value: Any
+) -> None:
+    """The error text begins with the name of the argument and its value."""
+    function = SCALARS[call][0]
+    with pytest.raises(ValueError, match=f"^{name} = .*: (expected one|must be)"):
+        function(reach, **{name: value})
+
+
+@pytest.mark.parametrize("value", [np.float32(0.5), np.array(0.5), Fraction(1, 2), Decimal("0.5")])
+def test_every_kind_of_number_is_a_scalar(value: Any) -> None:
+    """Objects that convert to a float are accepted."""
+    assert pdmp.Conditions(tau=value).tau == pdmp.Conditions(tau=0.5).tau
+    assert pdmp.NGnet(overlap=value).overlap == 0.5
+
+
+@pytest.mark.parametrize("value", [10**400, 2**70])
+def test_integers_beyond_the_range_are_refused_by_name(value: int) -> None:
+    """An integer without a float or a machine word is no overflow error without a name."""
+    with pytest.raises(ValueError, match=r"^n_basis = 1\d+.*: its magnitude is too large"):
+        pdmp.NGnet(value)
+    with pytest.raises(ValueError, match=r"^overlap = 1\S*: (its magnitude|must lie)"):
+        pdmp.NGnet(overlap=value)

@@ -98,7 +98,7 @@ def test_what_is_no_condition_is_refused_by_name(how: str) -> None:
     with pytest.raises(ValueError, match="tau = 'slow': expected one number"):
         call(tau="slow")
     if how != "controller":
-        with pytest.raises(TypeError, match="conditions: expected pdmp.Conditions, found list"):
+        with pytest.raises(TypeError, match=r"conditions = \[0.1, 0.2\]: expected pdmp.Conditions"):
             call([0.1, 0.2])
 
 

@@ -331,16 +331,16 @@ def test_readers_mappings_go_everywhere(tmp_path: Path) -> None:
 
 
 def test_cycles_take_mappings() -> None:
-    """Recordings by name, with events by name, are cut as those in a list are."""
+    """Recordings by name, with onsets by name, are cut as those in a list are."""
     (loop, *_) = loops()
     wave = Demonstration(np.tile(loop.position, (4, 1)), dt=loop.dt)
     period = loop.dt * loop.n_samples
-    events = [0.0, period, 2 * period, 3 * period]
-    listed = pdmp.preprocessing.cycles([wave, wave], events=[events, events])
-    named = pdmp.preprocessing.cycles({"a": wave, "b": wave}, events={"b": events, "a": events})
+    onsets = [0.0, period, 2 * period, 3 * period]
+    listed = pdmp.preprocessing.cycles([wave, wave], onsets=[onsets, onsets])
+    named = pdmp.preprocessing.cycles({"a": wave, "b": wave}, onsets={"b": onsets, "a": onsets})
     assert named.recordings == listed.recordings == [0] * 3 + [1] * 3
     for one, other in zip(named, listed, strict=True):
         np.testing.assert_array_equal(one.position, other.position)
     assert len(pdmp.preprocessing.cycles({"a": wave})) >= 3
-    with pytest.raises(ValueError, match="events: 'c' is among"):
-        pdmp.preprocessing.cycles({"a": wave}, events={"a": events, "c": events})
+    with pytest.raises(ValueError, match="onsets: 'c' is among"):
+        pdmp.preprocessing.cycles({"a": wave}, onsets={"a": onsets, "c": onsets})

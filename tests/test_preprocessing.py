@@ -172,11 +172,11 @@ def test_trimming_finds_the_rests_beside_a_noisy_movement() -> None:
 
 
 def test_events_take_the_place_of_the_search() -> None:
-    """One list of events serves one recording; several need one each."""
-    found = pdmp.preprocessing.cycles(recording(), events=[0.5, 1.5, 2.6])
+    """One list of onsets serves one recording; several need one each."""
+    found = pdmp.preprocessing.cycles(recording(), onsets=[0.5, 1.5, 2.6])
     np.testing.assert_allclose(found.periods, [1.0, 1.1])
-    with pytest.raises(ValueError, match="events has length 1, expected 2"):
-        pdmp.preprocessing.cycles([recording(), recording()], events=[[0.5, 1.5]])
+    with pytest.raises(ValueError, match="onsets has length 1, expected 2"):
+        pdmp.preprocessing.cycles([recording(), recording()], onsets=[[0.5, 1.5]])
 
 
 @given(st.floats(-3, 3), st.floats(-0.9, 0.9), st.integers(5, 60), st.sampled_from(["rad", "deg"]))

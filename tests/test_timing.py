@@ -1,4 +1,4 @@
-"""Time beyond linear scaling: warps and events, their timing kept, predicted and played back."""
+"""Time beyond linear scaling: warps and landmarks, their timing kept, predicted and played back."""
 
 import pickle
 
@@ -64,14 +64,14 @@ def test_events_are_met_at_one_phase() -> None:
     """Landmarks of all demonstrations fall on those of the nominal one."""
     shown = demos([0.0, 0.4, -0.4])
     phases = np.array([0.25, 0.7])
-    events = np.array([np.interp(phases, hurried(bend), SHARES) for bend in (0.0, 0.4, -0.4)])
-    model = pdmp.fit(shown, nominal=0, events=events, n_styles=3)
+    landmarks = np.array([np.interp(phases, hurried(bend), SHARES) for bend in (0.0, 0.4, -0.4)])
+    model = pdmp.fit(shown, nominal=0, landmarks=landmarks, n_styles=3)
     np.testing.assert_allclose(model.breaks, [0, *phases, 1])
-    np.testing.assert_allclose(np.cumsum(model.segment_durations, axis=1)[:, :2], events)
+    np.testing.assert_allclose(np.cumsum(model.segment_durations, axis=1)[:, :2], landmarks)
     np.testing.assert_allclose(
-        model.style_of(shown[2], events=events[2]), model.styles[2], atol=0.01
+        model.style_of(shown[2], landmarks=landmarks[2]), model.styles[2], atol=0.01
     )
-    with pytest.raises(ValueError, match="pass the events of this demonstration"):
+    with pytest.raises(ValueError, match="pass the landmarks of this demonstration"):
         model.style_of(shown[2])
 
 
@@ -160,10 +160,10 @@ def test_timing_survives_a_file() -> None:
             'alignment = \'elastic\': must be "linear", "warp" or pdmp.TimeWarp',
         ),
         ({"alignment": TimeWarp(101)}, "segments = 101: must lie between 1 and 100"),
-        ({"events": [[0.5], [0.5]]}, "events has length 2, expected 3: one value per demo"),
-        ({"events": [[0.5, 0.4]] * 3}, r"events\[1\] = 0.4 s must come after 0.5 s"),
-        ({"events": [[np.nan]] * 3}, "events"),
-        ({"events": [[0.5]] * 3, "alignment": "warp"}, "events align by themselves"),
+        ({"landmarks": [[0.5], [0.5]]}, "landmarks has length 2, expected 3: one value per demo"),
+        ({"landmarks": [[0.5, 0.4]] * 3}, r"landmarks\[1\] = 0.4 s must come after 0.5 s"),
+        ({"landmarks": [[np.nan]] * 3}, "landmarks"),
+        ({"landmarks": [[0.5]] * 3, "alignment": "warp"}, "pass a warp or landmarks, not both"),
     ],
 )
 def test_what_cannot_align_is_refused(options: dict[str, object], message: str) -> None:

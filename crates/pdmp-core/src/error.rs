@@ -202,17 +202,17 @@ pub enum Error {
         /// The least correlation of a periodic recording.
         least: f64,
     },
-    /// Events out of order, or outside the demonstration.
+    /// Landmarks out of order, or outside the demonstration.
     #[error(
-        "events[{index}] = {time} s must come after {before} s, the start or the event before, and before {end} s, the end, \
-         by more than 1e-6 of the duration: sort the events, in the time of the demonstration"
+        "landmarks[{index}] = {time} s must come after {before} s, the start or the landmark before, and before {end} s, the end, \
+         by more than 1e-6 of the duration: sort the landmarks, in the time of the demonstration"
     )]
-    Event {
-        /// Index of the offending event.
+    Landmark {
+        /// Index of the offending landmark.
         index: usize,
         /// Its time, in seconds.
         time: f64,
-        /// The event before it, or the start, in seconds.
+        /// The landmark before it, or the start, in seconds.
         before: f64,
         /// The end of the demonstration, in seconds.
         end: f64,
@@ -408,7 +408,7 @@ impl Error {
             | Self::Single { .. }
             | Self::Range { .. }
             | Self::TooLarge { .. }
-            | Self::Event { .. }
+            | Self::Landmark { .. }
             | Self::Segments { .. }
             | Self::NoDemonstrations
             | Self::Styles { .. }

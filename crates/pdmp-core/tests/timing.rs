@@ -142,7 +142,7 @@ fn every_demonstration_is_reproduced_in_its_own_timing() {
                 Demonstration::new(position, Sampling::Uniform { dt: 0.004 * a }).unwrap()
             })
             .collect();
-        let events = Array2::from_shape_fn((4, 2), |(m, e)| {
+        let landmarks = Array2::from_shape_fn((4, 2), |(m, e)| {
             let duration = demos[m].n_samples() as f64 * 0.004 * [1.0, 0.8, 1.3, 0.9][m];
             duration * [0.3 + 0.02 * m as f64, 0.7 - 0.05 * m as f64][e]
         });
@@ -151,8 +151,8 @@ fn every_demonstration_is_reproduced_in_its_own_timing() {
             (0..demos.len()).map(|m| reproduction_error(&model, &demos, m)).fold(0.0, f64::max)
         };
         let (linear, warp) = (error(TimeScaling::Linear), error(TimeScaling::Warp(TimeWarp::default())));
-        let events = error(TimeScaling::Events(events));
-        assert!(linear <= 1e-4 && warp <= 1e-4 && events <= 1e-4, "{kind}: {linear:e} {warp:e} {events:e}");
+        let landmarks = error(TimeScaling::Landmarks(landmarks));
+        assert!(linear <= 1e-4 && warp <= 1e-4 && landmarks <= 1e-4, "{kind}: {linear:e} {warp:e} {landmarks:e}");
     }
 }
 
@@ -162,23 +162,23 @@ fn landmarks_coincide_with_the_breaks() {
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
         let linear = learn(&demos, &with(kind, TimeScaling::Linear));
         let durations = &linear.demonstrated().durations;
-        let events = Array2::from_shape_fn((demos.len(), 2), |(m, e)| {
+        let landmarks = Array2::from_shape_fn((demos.len(), 2), |(m, e)| {
             durations[m] * [0.25 + 0.03 * m as f64, 0.6 + 0.02 * m as f64][e]
         });
-        let model = learn(&demos, &with(kind, TimeScaling::Events(events.clone())));
+        let model = learn(&demos, &with(kind, TimeScaling::Landmarks(landmarks.clone())));
         let breaks = model.breaks();
         assert!((breaks[1] - 0.25).abs() < 1e-14 && (breaks[2] - 0.6).abs() < 1e-14);
         for m in 0..demos.len() {
-            assert!((model.demonstrated().segment_durations[[m, 0]] - events[[m, 0]]).abs() < 1e-14);
+            assert!((model.demonstrated().segment_durations[[m, 0]] - landmarks[[m, 0]]).abs() < 1e-14);
             assert!(
                 (model.demonstrated().segment_durations[[m, 0]] + model.demonstrated().segment_durations[[m, 1]]
-                    - events[[m, 1]])
+                    - landmarks[[m, 1]])
                 .abs()
                     < 1e-14
             );
             assert!((model.demonstrated().durations[m] - durations[m]).abs() < 1e-14);
-            // The landmark is at its time in the recording, and at the phase of the break in the movement.
-            let at = TimeGrid { dt: events[[m, 0]], duration: Some(events[[m, 0]]) };
+            // The landmark is an instant of the recording and a phase of the movement, where all demonstrations have theirs.
+            let at = TimeGrid { dt: landmarks[[m, 0]], duration: Some(landmarks[[m, 0]]) };
             let conditions = conditions_of(&model, m);
             let there = rollout(model.primitive(), &conditions, at).unwrap().position.row(1).to_vec();
             let still = Conditions { segment_durations: None, ..conditions };
@@ -304,20 +304,19 @@ fn segment_durations_are_predicted_from_contexts() {
 fn style_of_recovers_the_styles_of_warped_demonstrations() {
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.7, &UNEVEN, 1.3), warped(kind, 1.4, &SLOWER, 0.8)];
-        let events = array![[0.4], [0.5], [0.3]];
-        for time_scaling in [TimeScaling::Warp(TimeWarp::default()), TimeScaling::Events(events.clone())] {
-            let by_events = matches!(time_scaling, TimeScaling::Events(_));
+        let landmarks = array![[0.4], [0.5], [0.3]];
+        for time_scaling in [TimeScaling::Warp(TimeWarp::default()), TimeScaling::Landmarks(landmarks.clone())] {
+            let by_landmarks = matches!(time_scaling, TimeScaling::Landmarks(_));
             let model = learn(&demos, &with(kind, time_scaling).n_styles(Truncation::Rank(3)));
             for (m, demo) in demos.iter().enumerate() {
-                let own = events.row(m).to_vec();
-                let style = style_of(&model, demo, None, None, by_events.then_some(&own)).unwrap();
+                let own = landmarks.row(m).to_vec();
+                let style = style_of(&model, demo, None, None, by_landmarks.then_some(&own)).unwrap();
                 for (j, s) in style.iter().enumerate() {
                     assert!((s - model.demonstrated().styles[[m, j]]).abs() < 5e-3, "{kind} {m} {j} {s}");
                 }
             }
-            let wrong = style_of(&model, &demos[1], None, None, (!by_events).then_some(&[0.5])).unwrap_err();
-            let reason = if by_events { "fitted with events" } else { "fitted without events" };
-            assert!(wrong.to_string().contains(reason), "{wrong}");
+            let wrong = style_of(&model, &demos[1], None, None, (!by_landmarks).then_some(&[0.5])).unwrap_err();
+            assert!(wrong.to_string().contains("landmarks"), "{wrong}");
         }
     }
 }
@@ -412,17 +411,18 @@ fn invalid_timings_are_rejected() {
     ] {
         assert_eq!(refused(TimeScaling::Warp(TimeWarp { n_segments: segments, max_slope: slope })), message);
     }
-    let events = |rows: [[f64; 2]; 5]| refused(TimeScaling::Events(Array2::from_shape_fn((5, 2), |(m, e)| rows[m][e])));
+    let landmarks =
+        |rows: [[f64; 2]; 5]| refused(TimeScaling::Landmarks(Array2::from_shape_fn((5, 2), |(m, e)| rows[m][e])));
     let good = [0.3, 0.6];
-    let message = events([good, good, [0.6, 0.3], good, good]);
-    assert!(message.starts_with("demo 2: events[1] = 0.3 s must come after 0.6 s"), "{message}");
-    let message = events([good, good, good, good, [0.3, 1.08]]);
-    assert!(message.starts_with("demo 4: events[1] = 1.08 s must come after 0.3 s"), "{message}");
-    let message = events([[0.0, 0.3], good, good, good, good]);
-    assert!(message.starts_with("demo 0: events[0] = 0 s must come after 0 s, the start"), "{message}");
-    assert!(events([good, [0.1, f64::NAN], good, good, good]).starts_with("demo 1: events[1] = NaN s"));
-    let wrong = |shape: (usize, usize)| refused(TimeScaling::Events(Array2::from_elem(shape, 0.5)));
-    assert_eq!(wrong((4, 1)), "events has length 4, expected 5: one value per demonstration");
+    let message = landmarks([good, good, [0.6, 0.3], good, good]);
+    assert!(message.starts_with("demo 2: landmarks[1] = 0.3 s must come after 0.6 s"), "{message}");
+    let message = landmarks([good, good, good, good, [0.3, 1.08]]);
+    assert!(message.starts_with("demo 4: landmarks[1] = 1.08 s must come after 0.3 s"), "{message}");
+    let message = landmarks([[0.0, 0.3], good, good, good, good]);
+    assert!(message.starts_with("demo 0: landmarks[0] = 0 s must come after 0 s, the start"), "{message}");
+    assert!(landmarks([good, [0.1, f64::NAN], good, good, good]).starts_with("demo 1: landmarks[1] = NaN s"));
+    let wrong = |shape: (usize, usize)| refused(TimeScaling::Landmarks(Array2::from_elem(shape, 0.5)));
+    assert_eq!(wrong((4, 1)), "landmarks has length 4, expected 5: one value per demonstration");
     assert!(wrong((5, 0)).contains("pass an array of shape (M, E)"));
 
     let model = learn(&demos, &by_warp(Kind::Discrete));

@@ -33,7 +33,7 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 /// begins in another phase than those of the model is first shifted to their phase.
 ///
 /// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
-/// same warp, or by landmarks, for which `events` (E,) are the times in seconds.
+/// same warp, or by landmarks, for which `landmarks` (E,) are the times in seconds.
 ///
 /// # Errors
 /// A demonstration that does not match the model, one that no style describes, or landmarks where the model has none.
@@ -59,7 +59,7 @@ pub fn style_of(
     demo: &Demonstration,
     dt: Option<f64>,
     period: Option<f64>,
-    events: Option<&[f64]>,
+    landmarks: Option<&[f64]>,
 ) -> Result<Vec<f64>> {
     let n_dofs = model.n_dofs();
     if demo.n_dofs() != n_dofs {
@@ -84,16 +84,16 @@ pub fn style_of(
     };
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
-    let by_events = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
-    match (&model.learnt.template, events) {
-        (None, Some(events)) if by_events => aligned.register_to(model.breaks(), events)?,
-        (None, None) if by_events => {
+    let by_landmarks = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
+    match (&model.learnt.template, landmarks) {
+        (None, Some(landmarks)) if by_landmarks => aligned.register_to(model.breaks(), landmarks)?,
+        (None, None) if by_landmarks => {
             return Err(Error::Arguments(
-                "the model was fitted with events: pass the events of this demonstration too",
+                "the model was fitted with landmarks: pass the landmarks of this demonstration too",
             ));
         }
         (_, Some(_)) => {
-            return Err(Error::Arguments("the model was fitted without events: pass none"));
+            return Err(Error::Arguments("the model was fitted without landmarks: leave out the landmarks"));
         }
         (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}
