@@ -447,6 +447,6 @@ fn invalid_timings_are_rejected() {
     assert!(refused(both).starts_with("pass tau or segment_durations, not both"));
     assert!(model.tau_at(0.0, &[0.1; 8]).unwrap() > 0.0, "long after the end");
     for phase in [-0.1, 1.1, f64::NAN] {
-        assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] where discrete"));
+        assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] for a discrete"));
     }
 }
