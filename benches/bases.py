@@ -17,7 +17,7 @@ import pdmp
 from peers.arena import machine
 from recordings import Group, groups, sources
 
-KERNELS = ("matern32", "matern52", "squared_exponential")
+KERNELS = ("matern32", "matern52")
 SIZES = (20, 35, 50, 75, 100, 150, 200)
 WIDTHS = (1.0, 1.2, 1.5)
 FINE = 4000  # samples of a rollout: straight lines between them are exact to 1e-6
@@ -59,7 +59,7 @@ repetitions, {demos} demonstrations; at most ten a group, of at most 400 samples
 
 The defaults follow from it. The Gaussian process reproduces best and needs no N. Matérn-5/2
 reproduces closer than 3/2 on 12 of the 15 sets, by up to a half, and is smoother; 3/2 predicts as
-well, with a higher log density. The squared exponential is overconfident, and dense. Of a network,
+well, with a higher log density. Of a network,
 75 to 100 functions reproduce closer, but they predict cycles of twenty samples worse: 50, 1.2 wide,
 serve both.
 """

@@ -111,7 +111,7 @@ def test_networks_of_impossible_width_are_refused(overlap: float) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"kernel": "cubic"}, 'kernel = "cubic": must be "matern32", "matern52" or'),
+        ({"kernel": "cubic"}, 'kernel = "cubic": must be "matern32" or "matern52"'),
         ({"length": 0.0}, "length = 0: must be positive"),
         ({"length": NAN}, "length = NaN: must be positive"),
         ({"noise": 0.0}, "noise = 0: must lie between 1e-10 and 1e6"),

@@ -18,7 +18,7 @@ _Context: TypeAlias = ArrayLike | Sequence[float | str]
 _Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
 _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
-_Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
+_Kernel: TypeAlias = Literal["matern32", "matern52"]
 
 __all__ = [
     "Conditions",
@@ -153,7 +153,7 @@ def fit(
     smoothing: Literal["auto"] | float | None = "auto",
     nominal: int | None = None,
     n_samples: int | None = None,
-    transport: Literal["learnt", "immediate"] = "learnt",
+    transport: Literal["learnt", "immediate"] | None = None,
     dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
     alignment: Literal["linear", "warp"] | TimeWarp = "linear",
     landmarks: ArrayLike | None = None,  # (M, E)
@@ -161,7 +161,7 @@ def fit(
     alpha_z: float = 25.0,
     beta_z: float | None = None,
     alpha_x: float | None = None,
-    mu: float = 1.0,
+    mu: float | None = None,
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model:
@@ -208,10 +208,11 @@ def fit(
     n_samples : int, optional
         Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
         that has fewer than 150.
-    transport : {"learnt", "immediate"}
-        Motion of the frame of a discrete movement from start to goal: along the learnt profile of the demonstrations
-        (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the
-        movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
+    transport : {"learnt", "immediate"}, optional
+        Motion of the frame of a discrete movement from start to goal: by default along the learnt profile of the
+        demonstrations (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past
+        its end the movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as
+        in the paper.
     dof_scale : None, "unit", "range" or array_like, (D,)
         Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
         units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
@@ -236,8 +237,8 @@ def fit(
         Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With
         "immediate" transport the forcing fades with x past the end: if a movement leaves its goal there before it
         settles, `alpha_x = alpha_z` reduces the deviation most.
-    mu : float
-        Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit.
+    mu : float, optional
+        Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit; 1 by default.
     threads : int, optional
         Largest number of threads; by default all that the system offers. The model does not depend on it.
     progress : callable, optional
@@ -1700,7 +1701,7 @@ class GP:
 
     Parameters
     ----------
-    kernel : {"matern52", "matern32", "squared_exponential"}
+    kernel : {"matern52", "matern32"}
         Covariance function over the clock u; periodic for rhythmic movements.
     length : float, optional
         Length scale, in units of the clock u = t / tau; positive. Estimated if not given.

@@ -1,4 +1,5 @@
 //! What a running primitive must do.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 #[path = "common/accepted.rs"]

@@ -1,4 +1,5 @@
 //! What a running primitive does when its robot is disturbed, or its user adds terms.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 #[path = "common/accepted.rs"]

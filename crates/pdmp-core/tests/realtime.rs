@@ -3,6 +3,7 @@
 //!
 //! A counting allocator watches everywhere. `make rtsan` compiles the same ticks with the real-time sanitizer of a
 //! nightly compiler, which ends the process at an allocation, a lock or any other system call that may wait.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 #![cfg_attr(rtsan, feature(sanitize))]
 

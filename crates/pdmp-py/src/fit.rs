@@ -7,7 +7,7 @@ use ndarray::Array2;
 use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::regression::Basis;
 use pdmp_core::learning::{
-    Alignment, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
+    CanonicalOptions, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
 };
 use pdmp_core::numerics::Smoothing;
 use pdmp_core::{FitOptions, Kind};
@@ -17,7 +17,7 @@ use pyo3::types::{PyBool, PyList, PyMapping};
 
 use crate::convert::{items, matrix, numbers, quoted};
 use crate::demonstration::{Demonstration, Source, Trajectory};
-use crate::error::detached;
+use crate::error::{detached, raise};
 use crate::model::Model;
 use crate::regression::{Gp, NGnet};
 use crate::scalar::{Scalar, optional_count, optional_number};
@@ -66,10 +66,11 @@ use crate::warp::TimeWarp;
 /// n_samples : int, optional
 ///     Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
 ///     that has fewer than 150.
-/// transport : {"learnt", "immediate"}
-///     Motion of the frame of a discrete movement from start to goal: along the learnt profile of the demonstrations
-///     (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the
-///     movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
+/// transport : {"learnt", "immediate"}, optional
+///     Motion of the frame of a discrete movement from start to goal: by default along the learnt profile of the
+///     demonstrations (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past
+///     its end the movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as
+///     in the paper.
 /// dof_scale : None, "unit", "range" or array_like, (D,)
 ///     Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
 ///     units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
@@ -94,8 +95,8 @@ use crate::warp::TimeWarp;
 ///     Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With
 ///     "immediate" transport the forcing fades with x past the end: if a movement leaves its goal there before it
 ///     settles, `alpha_x = alpha_z` reduces the deviation most.
-/// mu : float
-///     Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit.
+/// mu : float, optional
+///     Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit; 1 by default.
 /// threads : int, optional
 ///     Largest number of threads; by default all that the system offers. The model does not depend on it.
 /// progress : callable, optional
@@ -139,13 +140,13 @@ use crate::warp::TimeWarp;
     signature = (
         demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None,
         singular_value_share=None, basis=None, smoothing=SmoothingArgument(Smoothing::Auto), nominal=None,
-        n_samples=None, transport="learnt", dof_scale=None, alignment=None, landmarks=None, tau=None,
-        alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None, mu=Scalar::Number(1.0), threads=None, progress=None
+        n_samples=None, transport=None, dof_scale=None, alignment=None, landmarks=None, tau=None,
+        alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None, mu=None, threads=None, progress=None
     ),
     text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, \
                       singular_value_share=None, basis='gp', smoothing='auto', nominal=None, n_samples=None, \
-                      transport='learnt', dof_scale=None, alignment='linear', landmarks=None, tau=None, alpha_z=25.0, \
-                      beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)"
+                      transport=None, dof_scale=None, alignment='linear', landmarks=None, tau=None, alpha_z=25.0, \
+                      beta_z=None, alpha_x=None, mu=None, threads=None, progress=None)"
 )]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
@@ -162,7 +163,7 @@ pub(crate) fn fit(
     smoothing: SmoothingArgument,
     nominal: Option<Scalar<'_>>,
     n_samples: Option<Scalar<'_>>,
-    transport: &str,
+    transport: Option<&str>,
     dof_scale: Option<&Bound<'_, PyAny>>,
     alignment: Option<&Bound<'_, PyAny>>,
     landmarks: Option<&Bound<'_, PyAny>>,
@@ -170,34 +171,27 @@ pub(crate) fn fit(
     alpha_z: Scalar<'_>,
     beta_z: Option<Scalar<'_>>,
     alpha_x: Option<Scalar<'_>>,
-    mu: Scalar<'_>,
+    mu: Option<Scalar<'_>>,
     threads: Option<Scalar<'_>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
     let demos = demonstrations("demos", demos)?;
-    let options = FitOptions {
-        alignment: Alignment {
-            kind: kind_of(kind)?,
-            dt: optional_number("dt", dt)?,
-            period: numbers("period", period)?,
-            smoothing: smoothing.0,
-            nominal: optional_count("nominal", nominal)?,
-            n_samples: optional_count("n_samples", n_samples)?,
-            time_scaling: time_scaling_of(alignment, landmarks)?,
-        },
-        contexts: contexts.map(crate::convert::contexts).transpose()?,
-        map: map_of(map)?,
-        n_styles: n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?,
-        basis: basis_of(basis)?,
-        transport: transport_of(transport)?,
-        dof_scale: dof_scale_of(dof_scale)?,
-        tau: optional_number("tau", tau)?,
-        alpha_z: alpha_z.number("alpha_z")?,
-        beta_z: optional_number("beta_z", beta_z)?,
-        alpha_x: optional_number("alpha_x", alpha_x)?,
-        mu: mu.number("mu")?,
-        threads: crate::convert::threads(threads)?,
-    };
+    let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
+    let rhythmic = (optional_number("mu", mu)?, period);
+    let mut options = FitOptions::new(canonical_of(kind_of(kind)?, discrete, rhythmic)?);
+    options.dt = optional_number("dt", dt)?;
+    options.smoothing = smoothing.0;
+    options.nominal = optional_count("nominal", nominal)?;
+    options.n_samples = optional_count("n_samples", n_samples)?;
+    options.time_scaling = time_scaling_of(alignment, landmarks)?;
+    options.contexts = contexts.map(crate::convert::contexts).transpose()?;
+    options.map = map_of(map)?;
+    options.n_styles = n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?;
+    options.basis = basis_of(basis)?;
+    options.dof_scale = dof_scale_of(dof_scale)?;
+    options.alpha_z = alpha_z.number("alpha_z")?;
+    options.beta_z = optional_number("beta_z", beta_z)?;
+    options.threads = crate::convert::threads(threads)?;
     let report = |py: Python<'_>, stage: Stage, fraction| match &progress {
         Some(progress) => progress.call1(py, (stage.name(), fraction)).map(drop),
         None => Ok(()),
@@ -205,6 +199,31 @@ pub(crate) fn fit(
     let model = detached(py, report, |progress| fit_with(&demos, &options, progress))?;
     crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
+}
+
+/// Returns the options of the canonical system. Rejects arguments of the other kind.
+fn canonical_of(
+    kind: Kind,
+    (tau, alpha_x, transport): (Option<f64>, Option<f64>, Option<&str>),
+    (mu, period): (Option<f64>, Option<&Bound<'_, PyAny>>),
+) -> PyResult<CanonicalOptions> {
+    let reject = |name, is_present: bool| match is_present {
+        true => Err(raise(pdmp_core::Error::Kind { name, kind, instead: ": leave it out" })),
+        false => Ok(()),
+    };
+    match kind {
+        Kind::Discrete => {
+            reject("mu", mu.is_some())?;
+            reject("period", period.is_some())?;
+            Ok(CanonicalOptions::Discrete { tau, alpha_x, transport: transport_of(transport.unwrap_or("learnt"))? })
+        }
+        Kind::Rhythmic => {
+            reject("tau", tau.is_some())?;
+            reject("alpha_x", alpha_x.is_some())?;
+            reject("transport", transport.is_some())?;
+            Ok(CanonicalOptions::Rhythmic { mu: mu.unwrap_or(1.0), periods: numbers("period", period)? })
+        }
+    }
 }
 
 fn n_styles_of(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {
@@ -345,7 +364,7 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
 
 fn transport_of(transport: &str) -> PyResult<TransportSelection> {
     match transport {
-        "learnt" => Ok(TransportSelection::FitSummary),
+        "learnt" => Ok(TransportSelection::Learnt),
         "immediate" => Ok(TransportSelection::Immediate),
         _ => Err(PyValueError::new_err(format!("transport = {transport:?}: must be \"learnt\" or \"immediate\""))),
     }

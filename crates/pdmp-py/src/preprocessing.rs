@@ -95,7 +95,7 @@ pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) 
 #[pyfunction]
 pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>) -> PyResult<Vec<Demonstration>> {
     let times = vector("times", times)?;
-    let parts = py.detach(|| preprocessing::cut(&demo.0, &times)).map_err(raise)?;
+    let parts = py.detach(|| preprocessing::split_at(&demo.0, &times)).map_err(raise)?;
     Ok(parts.into_iter().map(Demonstration).collect())
 }
 
@@ -226,7 +226,7 @@ pub(crate) fn fill<'py>(
     let (position, time) = (matrix("position", "(T, D)", position)?, vector("time", time)?);
     let (names, turns) = (texts("names", names)?, vector("turns", turns)?);
     let max_gap = max_gap.number("max_gap")?;
-    let filled = preprocessing::fill(position, &time, &names, &turns, max_gap).map_err(raise)?;
+    let filled = preprocessing::fill_gaps(position, &time, &names, &turns, max_gap).map_err(raise)?;
     Ok(filled.into_pyarray(py))
 }
 

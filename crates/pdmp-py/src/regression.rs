@@ -19,7 +19,7 @@ use crate::scalar::{Scalar, optional_number};
 ///
 /// Parameters
 /// ----------
-/// kernel : {"matern52", "matern32", "squared_exponential"}
+/// kernel : {"matern52", "matern32"}
 ///     Covariance function over the clock u; periodic for rhythmic movements.
 /// length : float, optional
 ///     Length scale, in units of the clock u = t / tau; positive. Estimated if not given.
@@ -41,9 +41,7 @@ impl Gp {
     fn new(kernel: &str, length: Option<Scalar<'_>>, noise: Option<Scalar<'_>>) -> PyResult<Self> {
         let (length, noise) = (optional_number("length", length)?, optional_number("noise", noise)?);
         let kernel = Kernel::from_name(kernel).ok_or_else(|| {
-            PyValueError::new_err(format!(
-                "kernel = {kernel:?}: must be \"matern32\", \"matern52\" or \"squared_exponential\""
-            ))
+            PyValueError::new_err(format!("kernel = {kernel:?}: must be \"matern32\" or \"matern52\""))
         })?;
         regression::Gp::new(kernel, length, noise).map(Self).map_err(raise)
     }

@@ -208,7 +208,7 @@ struct Evidence<'a> {
 
 impl<'a> Evidence<'a> {
     fn new(kriging: &'a Kriging, values: &Values) -> Self {
-        let eigenvalues = kriging.eigenvalues().and_then(|values| values.as_slice()).unwrap_or_default();
+        let eigenvalues = kriging.eigenvalues().map(crate::validate::row_major).unwrap_or_default();
         let unit = (eigenvalues.iter().sum::<f64>() / eigenvalues.len().max(1) as f64).max(f64::MIN_POSITIVE);
         Self { eigenvalues, squares: values.rest.mapv(|b| b * b), unit }
     }

@@ -1,5 +1,6 @@
 use approx::assert_relative_eq;
 use ndarray::{Array2, Axis, array};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::model_selection::Shown;
 use super::*;
@@ -210,4 +211,34 @@ fn units_of_outputs_do_not_matter() {
             assert_relative_eq!(value, plain[p], epsilon = 1e-9);
         }
     }
+}
+
+/// White noise of unit variance, the sum of twelve uniform numbers.
+fn white_noise(mut state: u64) -> impl FnMut() -> f64 {
+    let mut uniform = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
+/// The ratio of signal to noise is known from the same few contexts as the noise: bands that ignore that hold 78 % here.
+#[test]
+fn bands_of_few_contexts_hold_as_many_new_values_as_they_say() {
+    let mut noise = white_noise(3);
+    let (mut held, mut tried) = (0, 0);
+    for _ in 0..600 {
+        let h: Vec<f64> = (0..5).map(|m| 0.25 * m as f64 + 0.02 * noise()).collect();
+        let outputs = Array2::from_shape_fn((5, 1), |_| noise());
+        let map = ContextMap::fit(&contexts(&h), outputs.view(), MapSelection::Auto).unwrap();
+        let quantile = StudentsT::new(0.0, 1.0, map.degrees_of_freedom() as f64).unwrap().inverse_cdf(0.95);
+        for at in [0.3, 0.45, 0.7] {
+            let found = map.predict(&[at]).unwrap();
+            let width = quantile * found.covariance.unwrap()[[0, 0]].sqrt();
+            held += usize::from((noise() - found.mean[0]).abs() < width);
+            tried += 1;
+        }
+    }
+    let share = held as f64 / tried as f64;
+    assert!((0.85..0.95).contains(&share), "{share}");
 }

@@ -365,10 +365,8 @@ mod tests {
             Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
         };
         let demos = [0.0, 0.4, 1.0].map(reach);
-        let options = FitOptions {
-            basis: crate::learning::regression::Basis::NGnet(Default::default()),
-            ..FitOptions::new(Kind::Discrete)
-        };
+        let options =
+            FitOptions::new(Kind::Discrete).basis(crate::learning::regression::Basis::NGnet(Default::default()));
         let model = Arc::new(fit(&demos, &options).unwrap());
         let mut any = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
         any.step().unwrap();

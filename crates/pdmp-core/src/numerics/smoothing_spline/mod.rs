@@ -23,7 +23,7 @@ mod tests;
 
 use std::f64::consts::PI;
 
-use ndarray::{Array2, ArrayView1, ArrayView2};
+use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
@@ -107,26 +107,26 @@ impl Samples<'_> {
         if self.period.is_some() { (MAX_COPIES * self.len()).min(reach as usize) } else { 0 }
     }
 
-    /// Deviations of up to four columns from their first values (n,), with the largest of each.
+    /// Deviations of one to four columns from their first values (n,), with the largest of each; the last column fills up.
     fn deviations(&self, columns: &[usize]) -> (Vec<F64x4>, F64x4) {
-        let mut largest = F64x4::ZERO;
-        let mut first = [0.0; WIDTH];
-        columns.iter().zip(&mut first).for_each(|(&d, first)| *first = self.values[[0, d]]);
-        let deviation = |row: ArrayView1<f64>| {
-            let mut value = first;
-            columns.iter().zip(&mut value).for_each(|(&d, value)| *value = row[d]);
-            let deviation = F64x4::new(value) - F64x4::new(first);
+        let rows = self.values.as_standard_layout();
+        let rows = rows.as_slice().unwrap_or_default();
+        let columns: [usize; WIDTH] = std::array::from_fn(|lane| columns[lane.min(columns.len() - 1)]);
+        let at = |row: &[f64]| F64x4::new(columns.map(|d| row[d]));
+        let (first, mut largest) = (at(rows), F64x4::ZERO);
+        let deviation = |row: &[f64]| {
+            let deviation = at(row) - first;
             largest = largest.fast_max(deviation.abs());
             deviation
         };
-        (self.values.outer_iter().map(deviation).collect(), largest)
+        (rows.chunks_exact(self.values.ncols()).map(deviation).collect(), largest)
     }
 
     /// The smoothed values (n, D) by rows, each column at its cut-off in Hz; columns without one stay.
     pub(crate) fn smoothed(&self, cut_offs: &[Option<f64>]) -> Array2<f64> {
         let mut smoothed = self.values.as_standard_layout().into_owned();
         let Some(lowest) = cut_offs.iter().flatten().copied().reduce(f64::min) else { return smoothed };
-        let (n, pad) = (self.len(), self.pad(lowest));
+        let pad = self.pad(lowest);
         let roughness = Roughness::new(&self.knots(pad));
         let columns: Vec<usize> = (0..cut_offs.len()).filter(|&d| cut_offs[d].is_some()).collect();
         for columns in columns.chunks(WIDTH) {
@@ -141,9 +141,9 @@ impl Samples<'_> {
             copy_cycle(&mut shares, pad);
             roughness.bend(&mut shares);
             roughness.factor(lambda).solve(&mut shares);
-            roughness.residual(&mut shares);
-            for (mut row, residual) in smoothed.outer_iter_mut().zip(&shares[pad..pad + n]) {
-                let off = (*residual * lambda * scale).to_array();
+            let rows = smoothed.as_slice_mut().unwrap_or_default().chunks_exact_mut(self.values.ncols());
+            for (row, residual) in rows.zip(roughness.residuals(&shares).skip(pad)) {
+                let off = (residual * lambda * scale).to_array();
                 columns.iter().zip(off).for_each(|(&d, off)| row[d] -= off);
             }
         }
@@ -152,7 +152,7 @@ impl Samples<'_> {
 }
 
 /// Puts `pad` samples of the copies of a cycle on either side of it.
-fn copy_cycle(cycle: &mut Vec<F64x4>, pad: usize) {
+fn copy_cycle<T: Copy>(cycle: &mut Vec<T>, pad: usize) {
     let n = cycle.len();
     if pad > 0 {
         *cycle = (0..n + 2 * pad).map(|k| cycle[(k + MAX_COPIES * n - pad) % n]).collect();

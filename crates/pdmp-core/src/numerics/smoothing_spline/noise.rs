@@ -9,7 +9,7 @@
 //! recording that was resampled more densely becomes white again. Where the best cut-off is too high for that, they are
 //! searched again with more samples, at last with all.
 
-use ndarray::{Array1, Array2, Axis};
+use ndarray::{Array1, Array2};
 
 use super::roughness::Roughness;
 use super::{Samples, Smoothing, copy_cycle, lambda};
@@ -156,8 +156,20 @@ impl Scores {
     pub(super) fn of(pool: &[Thinned], columns: &[usize], grid: &[f64], threads: Threads) -> Result<Self> {
         let shape = (columns.len(), grid.len());
         let mut parts: Vec<Self> = pool.iter().map(|_| Self::zeros(shape)).collect();
-        threads.try_for_each(pool.iter().zip(&mut parts).collect(), |(thinned, part)| {
-            thinned.score(columns, grid, part);
+        // Recordings with the same knots share their factorisations.
+        let mut families: Vec<Vec<(&Thinned, &mut Self)>> = Vec::new();
+        for (thinned, part) in pool.iter().zip(&mut parts) {
+            match families.iter_mut().find(|family| family[0].0.has_knots_of(thinned)) {
+                Some(family) => family.push((thinned, part)),
+                None => families.push(vec![(thinned, part)]),
+            }
+        }
+        let tasks = families.iter_mut().flat_map(|family| {
+            let n = family.len().div_ceil(threads.get());
+            family.chunks_mut(n)
+        });
+        threads.try_for_each(tasks.collect(), |recordings| {
+            score(recordings, columns, grid);
             Ok(())
         })?;
         let mut sum = Self::zeros(shape);
@@ -223,9 +235,15 @@ impl Thinned {
         let block = (samples.len() / least).max(1);
         let chunks = samples.time.chunks_exact(block);
         let time: Vec<f64> = chunks.map(|times| times.iter().sum::<f64>() / block as f64).collect();
-        let mut values = Array2::zeros((time.len(), samples.values.ncols()));
-        for (mut mean, block) in values.rows_mut().into_iter().zip(samples.values.axis_chunks_iter(Axis(0), block)) {
-            mean.assign(&block.mean_axis(Axis(0)).unwrap_or_default());
+        let n_dofs = samples.values.ncols();
+        let mut values = Array2::zeros((time.len(), n_dofs));
+        let rows = samples.values.as_standard_layout();
+        let blocks = rows.as_slice().unwrap_or_default().chunks_exact(block * n_dofs);
+        for (mean, rows) in values.as_slice_mut().unwrap_or_default().chunks_exact_mut(n_dofs).zip(blocks) {
+            for row in rows.chunks_exact(n_dofs) {
+                mean.iter_mut().zip(row).for_each(|(mean, y)| *mean += y);
+            }
+            mean.iter_mut().for_each(|mean| *mean /= block as f64);
         }
         let interval = Samples { time: &time, period: samples.period, values: values.view() }.interval();
         Self { time, period: samples.period, values, block: block as f64, interval }
@@ -235,52 +253,62 @@ impl Thinned {
         Samples { time: &self.time, period: self.period, values: self.values.view() }
     }
 
-    /// Fills the scores of the columns of this recording.
-    fn score(&self, columns: &[usize], grid: &[f64], scores: &mut Scores) {
-        let (samples, n) = (self.samples(), self.time.len());
-        let shares: Vec<Option<(f64, Vec<F64x4>)>> = columns.iter().map(|&d| shares(&samples, d)).collect();
-        for (column, shares) in shares.iter().enumerate() {
-            let Some((_, shares)) = shares else { continue };
-            let y: Vec<f64> = shares.iter().map(|share| share.to_array()[0]).collect();
+    /// Returns whether the samples lie at the same times as those of another recording.
+    fn has_knots_of(&self, other: &Self) -> bool {
+        self.period == other.period && self.time == other.time
+    }
+
+    /// Deviations of a column from its first value in shares of the largest, and the largest; `None` where all are equal.
+    fn shares(&self, d: usize) -> Option<(f64, Vec<f64>)> {
+        let column = self.values.column(d);
+        let deviations = column.iter().map(|y| y - column[0]);
+        let scale = deviations.clone().fold(0.0f64, |most, y| most.max(y.abs()));
+        (scale > 0.0).then(|| (scale, deviations.map(|y| y / scale).collect()))
+    }
+}
+
+/// Fills the scores of the columns of recordings with the same knots (at least one).
+fn score(recordings: &mut [(&Thinned, &mut Scores)], columns: &[usize], grid: &[f64]) {
+    let first = recordings[0].0;
+    let (samples, n) = (first.samples(), first.time.len());
+    let mut moving = Vec::new();
+    for (m, (thinned, scores)) in recordings.iter_mut().enumerate() {
+        for (column, &d) in columns.iter().enumerate() {
+            let Some((scale, y)) = thinned.shares(d) else { continue };
             let mean = y.iter().sum::<f64>() / n as f64;
             scores.moving[column] = 1.0;
             scores.variation[[0, column]] = y.windows(2).map(|y| (y[1] - y[0]).powi(2)).sum::<f64>() / (n - 1) as f64;
             scores.variation[[1, column]] = y.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / n as f64;
+            moving.push((m, column, scale, y));
         }
-        for (group, hz) in grid.chunks_exact(WIDTH).enumerate() {
-            let pad = samples.pad(hz[0]);
-            let roughness = Roughness::new(&samples.knots(pad));
-            let lambdas = [0, 1, 2, 3].map(|k| lambda(hz[k] * self.interval));
-            let factor = roughness.factor(F64x4::new(lambdas));
-            // The columns of Q that belong to a cycle, or all.
-            let own = if self.period.is_some() { pad - 1..pad - 1 + n } else { 0..n - 2 };
-            let traces = roughness.trace(&factor, own).to_array();
-            for (column, shares) in shares.iter().enumerate() {
-                let Some((scale, shares)) = shares else { continue };
-                let mut bend = shares.clone();
-                copy_cycle(&mut bend, pad);
-                roughness.bend(&mut bend);
-                factor.solve(&mut bend);
-                roughness.residual(&mut bend);
-                let squares = bend[pad..pad + n].iter().fold(F64x4::ZERO, |sum, r| sum + *r * *r).to_array();
-                for (k, ((square, lambda), trace)) in squares.into_iter().zip(lambdas).zip(traces).enumerate() {
-                    let at = [column, group * WIDTH + k];
-                    // n‖Qγ‖²/tr(QM⁻¹Qᵀ)², from which λ is cancelled: no 0/0 where the spline interpolates.
-                    let score = n as f64 * square / (trace * trace);
-                    scores.logarithms[at] = score.max(f64::MIN_POSITIVE).ln();
-                    scores.squares[at] = square * (lambda * scale).powi(2) * self.block;
-                    scores.traces[at] = lambda * trace;
-                }
+    }
+    for (group, hz) in grid.chunks_exact(WIDTH).enumerate() {
+        let pad = samples.pad(hz[0]);
+        let roughness = Roughness::new(&samples.knots(pad));
+        let lambdas = [0, 1, 2, 3].map(|k| lambda(hz[k] * first.interval));
+        let factor = roughness.factor(F64x4::new(lambdas));
+        // The columns of Q that belong to a cycle, or all.
+        let own = if first.period.is_some() { pad - 1..pad - 1 + n } else { 0..n - 2 };
+        let traces = roughness.trace(&factor, own).to_array();
+        for (m, column, scale, y) in &moving {
+            let mut bend = y.clone();
+            copy_cycle(&mut bend, pad);
+            roughness.bend(&mut bend);
+            let mut gamma: Vec<F64x4> = bend.into_iter().map(F64x4::splat).collect();
+            factor.solve(&mut gamma);
+            let residuals = roughness.residuals(&gamma).skip(pad).take(n);
+            let squares = residuals.fold(F64x4::ZERO, |sum, r| sum + r * r).to_array();
+            let (thinned, scores) = &mut recordings[*m];
+            for (k, ((square, lambda), trace)) in squares.into_iter().zip(lambdas).zip(traces).enumerate() {
+                let at = [*column, group * WIDTH + k];
+                // n‖Qγ‖²/tr(QM⁻¹Qᵀ)², from which λ is cancelled: no 0/0 where the spline interpolates.
+                let score = n as f64 * square / (trace * trace);
+                scores.logarithms[at] = score.max(f64::MIN_POSITIVE).ln();
+                scores.squares[at] = square * (lambda * scale).powi(2) * thinned.block;
+                scores.traces[at] = lambda * trace;
             }
         }
     }
-}
-
-/// Deviations of a column from its first value in shares of the largest, and the largest; `None` where all are equal.
-fn shares(samples: &Samples, d: usize) -> Option<(f64, Vec<F64x4>)> {
-    let (deviations, largest) = samples.deviations(&[d; WIDTH]);
-    let [scale, ..] = largest.to_array();
-    (scale > 0.0).then(|| (scale, deviations.into_iter().map(|deviation| deviation / largest).collect()))
 }
 
 /// Returns the DoFs that may be noisy: all, unless the intervals of the recordings are even; then those whose sixth
