@@ -14,7 +14,7 @@ from reproduction import swing as arms
 from reproduction.__main__ import main
 from reproduction.baxter import mjcf
 from reproduction.demo.__main__ import main as demo_main
-from reproduction.human import BOX, RESTING, minimum_jerk
+from reproduction.human import BOX, HAND_HEIGHT, minimum_jerk
 from reproduction.loop import NewGoal, from_rest, reach_over
 from reproduction.reaching import GOAL, Reaching, demonstrate, height_of
 from reproduction.robot import DT, Robot, boxes
@@ -84,7 +84,7 @@ def test_boxes_in_the_way_are_hit(reaching: Reaching, learnt: pdmp.Model) -> Non
     """A movement shown without boxes touches two of them, and throws the upper one down."""
     robot = reach_over(learnt, reaching, 0.30, learnt.styles[0])
     assert robot.log.contact() > 0.01
-    height = robot.data.body("box_1").xpos[2] - (reaching.task.goal[2] - RESTING)
+    height = robot.data.body("box_1").xpos[2] - (reaching.task.goal[2] - HAND_HEIGHT)
     assert height < 1.5 * BOX[2] - 0.01
 
 
@@ -101,7 +101,7 @@ def test_error_saturates_at_three_styles(reaching: Reaching) -> None:
     As found: E = 0.043 with one style, 0.057 with two, 0.052 from three on; at best 0.028 with two
     and 0.012 with three.
     """
-    found = heights.errors(reaching, most=6)
+    found = heights.errors(reaching, max_styles=6)
     predicted, best = found.predicted.mean(axis=1), found.best.mean(axis=1)
     np.testing.assert_allclose(predicted[3:], predicted[2], rtol=0.02)
     assert predicted[0] < predicted[2] < 0.95 * predicted[1] < 0.06
@@ -177,9 +177,9 @@ def test_goal_moved_on_the_way_is_reached(reaching: Reaching) -> None:
 
 def test_what_the_paper_argues_with(reaching: Reaching) -> None:
     """One demonstration knows one height, components no goal, a library nothing beyond its own."""
-    command, grip = rivals.disturbances(reaching)
+    command, lock = rivals.disturbances(reaching)
     tall = {
-        name: rivals.attempt(rival, reaching, 0.60, command, grip)
+        name: rivals.run_trial(rival, reaching, 0.60, command, lock)
         for name, rival in rivals.RIVALS.items()
     }
     primitive, single, components, library = tall.values()
@@ -191,7 +191,7 @@ def test_what_the_paper_argues_with(reaching: Reaching) -> None:
     ]
     assert left[0] < CLOSE < 100 < left[1]
     assert 2 * primitive.speed_ratio() < components.speed_ratio()
-    assert primitive.held.log.contact() == 0
+    assert primitive.locked.log.contact() == 0
 
 
 def test_switches_converge_within_five_periods() -> None:
@@ -201,7 +201,7 @@ def test_switches_converge_within_five_periods() -> None:
     commands = walking.switches(
         model, [names.index(n) for n in ("normal", "running", "tired")], names
     )
-    done = walking.swing(model, commands, lasting=9.0)
+    done = walking.swing(model, commands, interval=9.0)
     assert max(done.off) < 0.03
     assert min(done.off[1:]) > 0
     apart = [np.ptp(done.position[k : k + 1000], axis=0).max() for k in (7_000, 16_000, 43_000)]
@@ -216,7 +216,7 @@ def test_both_arms_swing_on_the_robot(reaching: Reaching) -> None:
         model, [names.index(n) for n in ("normal", "marching", "girly")], names
     )
     robot = Robot(model.rollout(**commands[0].command).position[0])
-    walking.swing(model, commands, robot, lasting=2.0)
+    walking.swing(model, commands, robot, interval=2.0)
     assert robot.log.tracking_error() < 0.01
 
 
@@ -225,7 +225,7 @@ def test_pictures_show_the_robot_move(reaching: Reaching, learnt: pdmp.Model) ->
     robot = reach_over(learnt, reaching, 0.30, learnt.styles[7])
     try:
         figure = film.strip({"two boxes": (robot, [0.0, 1.4, 4.0])}, film.REACHING)
-    except film.NoRenderer as reason:
+    except film.RendererError as reason:
         pytest.skip(str(reason))
     frames = [axes.get_images()[0].get_array() for axes in figure.axes]
     assert len(frames) == 3

@@ -71,7 +71,7 @@ def test_events_are_met_at_one_phase() -> None:
     np.testing.assert_allclose(
         model.style_of(shown[2], landmarks=landmarks[2]), model.styles[2], atol=0.01
     )
-    with pytest.raises(ValueError, match="pass those of this demonstration"):
+    with pytest.raises(ValueError, match="pass the landmarks of this demonstration"):
         model.style_of(shown[2])
 
 

@@ -296,7 +296,7 @@ fn exercise(model: &Arc<Model>) {
         let Conditions { style, segment_durations: times, .. } = &prediction.conditions;
         assert_finite("prediction", style.iter().chain(times).flatten().chain([&prediction.duration]));
         assert_finite("covariance", prediction.covariance.iter().flatten());
-        assert_finite("distance", &prediction.outside);
+        assert_finite("distance", &prediction.extrapolation);
         if let Ok([lower, upper]) = prediction_band(model, &prediction, 0.9, grid) {
             assert_finite("band", lower.iter().chain(&upper));
         }

@@ -335,7 +335,7 @@ fn outliers_among_the_cycles_are_rejected_with_a_reason() {
     assert!(found.rejected[0].reason.to_string().contains("median period is 1.0"));
 }
 
-/// Cycles begin at given onsets.
+/// Cycles begin at the onsets that are given, to the last bit.
 #[test]
 fn cycles_begin_at_given_onsets() {
     let onsets = vec![0.25, 1.26, 2.24, 3.25];

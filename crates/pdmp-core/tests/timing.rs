@@ -423,7 +423,7 @@ fn invalid_timings_are_rejected() {
     assert!(landmarks([good, [0.1, f64::NAN], good, good, good]).starts_with("demo 1: landmarks[1] = NaN s"));
     let wrong = |shape: (usize, usize)| refused(TimeScaling::Landmarks(Array2::from_elem(shape, 0.5)));
     assert_eq!(wrong((4, 1)), "landmarks has length 4, expected 5: one value per demonstration");
-    assert!(wrong((5, 0)).contains("pass an array of shape (M, E)"));
+    assert!(wrong((5, 0)).contains("pass their times (M, E)"));
 
     let model = learn(&demos, &by_warp(Kind::Discrete));
     let refused = |conditions: Conditions| {
@@ -447,6 +447,6 @@ fn invalid_timings_are_rejected() {
     assert!(refused(both).starts_with("pass tau or segment_durations, not both"));
     assert!(model.tau_at(0.0, &[0.1; 8]).unwrap() > 0.0, "long after the end");
     for phase in [-0.1, 1.1, f64::NAN] {
-        assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] where discrete"));
+        assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] for a discrete"));
     }
 }

@@ -28,9 +28,9 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 
 /// Estimates the style (J,) of a demonstration outside the training set.
 ///
-/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals, and a prior as wide as the
-/// styles of the demonstrations. A rhythmic demonstration that begins in another phase than those of the model is first
-/// shifted to their phase.
+/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals and a zero-mean Gaussian prior
+/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that
+/// begins in another phase than those of the model is first shifted to their phase.
 ///
 /// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
 /// same warp, or by landmarks, whose times `landmarks` (E,) are in seconds.
@@ -88,12 +88,14 @@ pub fn style_of(
     match (&model.learnt.template, landmarks) {
         (None, Some(landmarks)) if by_landmarks => aligned.register_to(model.breaks(), landmarks)?,
         (None, None) if by_landmarks => {
-            return Err(Error::Arguments("the model was fitted with landmarks: pass those of this demonstration too"));
+            return Err(Error::Arguments(
+                "the model was fitted with landmarks: pass the landmarks of this demonstration too",
+            ));
         }
         (_, Some(_)) => {
-            return Err(Error::Arguments("the model was fitted without landmarks: leave out landmarks"));
+            return Err(Error::Arguments("the model was fitted without landmarks: leave out the landmarks"));
         }
-        (Some(template), None) => aligned.warp_to(template)?,
+        (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}
     }
     let mut targets = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;

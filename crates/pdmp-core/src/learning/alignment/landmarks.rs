@@ -26,7 +26,7 @@ impl Aligned<'_> {
         }
         if landmarks.ncols() == 0 {
             return Err(Error::Arguments(
-                "landmarks is empty: pass an array of shape (M, E) with E of at least 1, in seconds",
+                "landmarks has no columns: pass their times (M, E) in seconds, with E of at least 1",
             ));
         }
         let mut segment_durations = Array2::zeros((expected, landmarks.ncols() + 1));

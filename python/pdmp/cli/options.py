@@ -1,19 +1,19 @@
-"""Options that several commands share."""
+"""Options shared by several commands."""
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from typing import Any
 
 
-def path(text: str) -> str:
-    """Returns the name of a file or folder, which must not be a stream."""
+def file_path(text: str) -> str:
+    """Returns the path of a file or folder; rejects -, which stands for a stream elsewhere."""
     if text == "-":
-        raise ArgumentTypeError("- is no file: name one, or ./- where it is called so")
+        raise ArgumentTypeError("- is not a file: name one, or write ./- for a file called -")
     return text
 
 
-def add_reading(parser: ArgumentParser) -> None:
-    """Adds the options of the readers."""
+def add_reader_options(parser: ArgumentParser) -> None:
+    """Adds the options of the readers of recordings."""
     parser.add_argument(
         "--columns", nargs="+", metavar="NAME", help="degrees of freedom to keep; default: all"
     )
@@ -21,8 +21,8 @@ def add_reading(parser: ArgumentParser) -> None:
         "--time",
         default="t",
         metavar="NAME",
-        help="CSV column of the time stamps, with [ms], [us] or [ns] where it has no unit; "
-        "default: t or time",
+        help="CSV column of the time stamps, followed by [ms], [us] or [ns] if its header gives no "
+        "unit; default: t or time",
     )
     parser.add_argument(
         "--dt", type=float, metavar="S", help="sampling interval [s], in place of time stamps"
@@ -32,19 +32,19 @@ def add_reading(parser: ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="S",
-        help="longest gap [s] that is interpolated; default: none is",
+        help="longest gap [s] to interpolate; default: 0, none",
     )
 
 
-def reading(options: Namespace) -> dict[str, Any]:
-    """Returns the arguments of `pdmp.io.read` that these options are."""
+def reader_arguments(options: Namespace) -> dict[str, Any]:
+    """Returns the arguments of `pdmp.io.read`, other than the context."""
     return {name: getattr(options, name) for name in ("columns", "time", "dt", "max_gap")}
 
 
-def add_learning(parser: ArgumentParser) -> None:
+def add_fit_options(parser: ArgumentParser) -> None:
     """Adds the options of a fit."""
     parser.add_argument(
-        "--context", nargs="+", metavar="NAME", help="columns of index.csv that make the context"
+        "--context", nargs="+", metavar="NAME", help="columns of index.csv that form the context"
     )
     parser.add_argument(
         "--map",
@@ -56,9 +56,11 @@ def add_learning(parser: ArgumentParser) -> None:
         "--kind",
         choices=["discrete", "rhythmic"],
         default="discrete",
-        help="from start to goal (default), or one cycle per demonstration",
+        help="movements from start to goal (default), or one cycle per demonstration",
     )
-    parser.add_argument("--period", type=float, metavar="S", help="period of rhythmic ones [s]")
+    parser.add_argument(
+        "--period", type=float, metavar="S", help="period of rhythmic demonstrations [s]"
+    )
     parser.add_argument(
         "--alignment",
         choices=["linear", "warp"],
@@ -69,14 +71,14 @@ def add_learning(parser: ArgumentParser) -> None:
         "--styles",
         type=_or_named(int, "whole number", auto="auto"),
         metavar="J",
-        help="number of style parameters, or auto: by cross-validation over contexts",
+        help="number of style parameters J, or auto: selected by cross-validation over contexts",
     )
     parser.add_argument(
         "--singular-value-share",
         type=float,
         metavar="SHARE",
-        help="without --styles: keep this share of the singular-value sum, such as the paper's 0.9;"
-        " default: the systematic styles, which exceed the measurement noise",
+        help="without --styles: smallest J whose share of the sum of singular values exceeds this, "
+        "0.9 in the paper; default: the systematic styles, those above the measurement noise",
     )
     parser.add_argument(
         "--basis",
@@ -99,7 +101,7 @@ def add_learning(parser: ArgumentParser) -> None:
     )
 
 
-def settings(options: Namespace) -> dict[str, Any]:
+def fit_arguments(options: Namespace) -> dict[str, Any]:
     """Returns the arguments of `pdmp.fit` other than kind and period."""
     return {
         "map": options.map,
@@ -112,14 +114,14 @@ def settings(options: Namespace) -> dict[str, Any]:
     }
 
 
-def _or_named(read: Callable[[str], Any], wanted: str, **named: str | None) -> Callable[[str], Any]:
-    """Returns a reader of an argument that may be one of some names instead."""
+def _or_named(read: Callable[[str], Any], kind: str, **named: str | None) -> Callable[[str], Any]:
+    """Returns a parser of an argument that is a value of this kind or one of the names."""
 
     def value(text: str) -> Any:
         try:
             return named[text] if text in named else read(text)
         except ValueError:
             names = " or ".join(named)
-            raise ArgumentTypeError(f'"{text}" is neither a {wanted} nor {names}') from None
+            raise ArgumentTypeError(f'"{text}" is neither a {kind} nor {names}') from None
 
     return value
