@@ -102,7 +102,6 @@ def test_linear_family_is_predicted() -> None:
 def test_full_primitive_is_principal_components() -> None:
     """With J = M and a linear map, both are the same linear predictor of positions.
 
-    The remaining difference, 3e-6, is the error of a smooth process as interpolant.
     """
     contexts = [[height**2] for height in HEIGHTS]
     full = PDMP(map="linear", singular_value_share=1.0, basis=pdmp.GP(noise=1e-10))

@@ -209,9 +209,10 @@ def fit(
         Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
         that has fewer than 150.
     transport : {"learnt", "immediate"}, optional
-        Motion of the frame of a discrete movement from start to goal: along the learnt profile of the demonstrations
-        (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the
-        movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
+        Motion of the frame of a discrete movement from start to goal: by default along the learnt profile of the
+        demonstrations (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past
+        its end the movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as
+        in the paper.
     dof_scale : None, "unit", "range" or array_like, (D,)
         Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
         units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
