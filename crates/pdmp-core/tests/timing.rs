@@ -177,7 +177,7 @@ fn landmarks_coincide_with_the_breaks() {
                     < 1e-14
             );
             assert!((model.demonstrated().durations[m] - durations[m]).abs() < 1e-14);
-            // The landmark is an instant of the recording and a phase of the movement, where all demonstrations have theirs.
+            // The landmark is at its time in the recording, and at the phase of the break in the movement.
             let at = TimeGrid { dt: landmarks[[m, 0]], duration: Some(landmarks[[m, 0]]) };
             let conditions = conditions_of(&model, m);
             let there = rollout(model.primitive(), &conditions, at).unwrap().position.row(1).to_vec();
@@ -423,7 +423,7 @@ fn invalid_timings_are_rejected() {
     assert!(landmarks([good, [0.1, f64::NAN], good, good, good]).starts_with("demo 1: landmarks[1] = NaN s"));
     let wrong = |shape: (usize, usize)| refused(TimeScaling::Landmarks(Array2::from_elem(shape, 0.5)));
     assert_eq!(wrong((4, 1)), "landmarks has length 4, expected 5: one value per demonstration");
-    assert!(wrong((5, 0)).contains("pass an array of shape (M, E)"));
+    assert!(wrong((5, 0)).contains("pass their times (M, E)"));
 
     let model = learn(&demos, &by_warp(Kind::Discrete));
     let refused = |conditions: Conditions| {

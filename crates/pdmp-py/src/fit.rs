@@ -67,9 +67,10 @@ use crate::warp::TimeWarp;
 ///     Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
 ///     that has fewer than 150.
 /// transport : {"learnt", "immediate"}, optional
-///     Motion of the frame of a discrete movement from start to goal: along the learnt profile of the demonstrations
-///     (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the
-///     movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
+///     Motion of the frame of a discrete movement from start to goal: by default along the learnt profile of the
+///     demonstrations (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past
+///     its end the movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as
+///     in the paper.
 /// dof_scale : None, "unit", "range" or array_like, (D,)
 ///     Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
 ///     units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
@@ -176,8 +177,8 @@ pub(crate) fn fit(
 ) -> PyResult<Model> {
     let demos = demonstrations("demos", demos)?;
     let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
-    let canonical = canonical_of(kind_of(kind)?, discrete, (optional_number("mu", mu)?, period))?;
-    let mut options = FitOptions::new(canonical);
+    let rhythmic = (optional_number("mu", mu)?, period);
+    let mut options = FitOptions::new(canonical_of(kind_of(kind)?, discrete, rhythmic)?);
     options.dt = optional_number("dt", dt)?;
     options.smoothing = smoothing.0;
     options.nominal = optional_count("nominal", nominal)?;
@@ -200,13 +201,13 @@ pub(crate) fn fit(
     Ok(Model(Arc::new(model)))
 }
 
-/// Returns the canonical system, and rejects arguments of the other kind.
+/// Returns the options of the canonical system. Rejects arguments of the other kind.
 fn canonical_of(
     kind: Kind,
     (tau, alpha_x, transport): (Option<f64>, Option<f64>, Option<&str>),
     (mu, period): (Option<f64>, Option<&Bound<'_, PyAny>>),
 ) -> PyResult<CanonicalOptions> {
-    let reject = |name, given: bool| match given {
+    let reject = |name, is_present: bool| match is_present {
         true => Err(raise(pdmp_core::Error::Kind { name, kind, instead: ": leave it out" })),
         false => Ok(()),
     };

@@ -33,7 +33,7 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 /// begins in another phase than those of the model is first shifted to their phase.
 ///
 /// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
-/// same warp, or by landmarks, for which `landmarks` (E,) are the times in seconds.
+/// same warp, or by landmarks, whose times `landmarks` (E,) are in seconds.
 ///
 /// # Errors
 /// A demonstration that does not match the model, one that no style describes, or landmarks where the model has none.

@@ -173,7 +173,7 @@ impl TimeScaling {
                 let segments = warp.n_segments.min(aligned.max_segments());
                 aligned.warp(&TimeWarp { n_segments: segments, ..warp }, unit, threads, progress).map(Some)
             }
-            Self::Landmarks(times) => aligned.register(times.view()).map(|()| None),
+            Self::Landmarks(landmarks) => aligned.register(landmarks.view()).map(|()| None),
         }
     }
 }
