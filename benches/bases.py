@@ -12,9 +12,9 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from peers.arena import machine
 
 import pdmp
+from peers.timing import machine
 from recordings import Group, groups, sources
 
 KERNELS = ("matern32", "matern52")

@@ -1,4 +1,4 @@
-"""Small families of movements that the tests learn from."""
+"""Small families of movements for the tests."""
 
 import numpy as np
 
