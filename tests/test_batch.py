@@ -290,8 +290,8 @@ except MemoryError as error:
 print(next(model.rollout_chunks(styles, dt=1e-3, duration=1.0, threads=1))[0].shape)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    told, shape = done.stdout.splitlines()
-    assert told.startswith("rollouts would take 2002000000.0 numbers: not enough memory")
+    reported, shape = done.stdout.splitlines()
+    assert reported.startswith("rollouts would take 2002000000.0 numbers: not enough memory")
     assert shape == "(1000, 1001, 2)"
 
 

@@ -243,8 +243,19 @@ def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
     [
         (["info", "none.safetensors"], "none.safetensors"),
         (["fit", "none.csv", "-o", "m"], "none.csv: No such file"),
-        (["rollout", "{model}", "--style", "1", "-o", "o"], "style has length 1, expected 2"),
-        (["rollout", "{model}", "--demo", "9", "-o", "o"], "9 must lie between 0 and 4"),
+        (["rollout", "{model}", "--style", "1", "-o", "o"], "--style has length 1, expected 2"),
+        (["rollout", "{model}", "--goal", "1", "-o", "o"], "--goal has length 1, expected 2"),
+        (["rollout", "{model}", "--tau", "-1", "-o", "o"], "--tau = -1: must be positive"),
+        (["rollout", "{model}", "--demo", "9", "-o", "o"], "--demo.* 9 must lie between 0 and 4"),
+        (["rollout", "{model}", "--demo", "-1", "-o", "o"], "--demo.* -1 must lie between 0 and 4"),
+        (["fit", "{folder}", "--styles", "9", "-o", "m"], "--styles = 9: must lie between 1 and 5"),
+        (
+            ["fit", "{folder}", "--styles", "1", "--singular-value-share", "0.5", "-o", "m"],
+            "--styles and --singular-value-share: pass one of them",
+        ),
+        (["fit", "{folder}", "--smoothing", "-3", "-o", "m"], "--smoothing = -3: must be positive"),
+        (["fit", "{folder}", "--period", "1", "-o", "m"], "--period does not apply to a discrete"),
+        (["fit", "{folder}", "--max-gap", "-1", "-o", "m"], "--max-gap = -1: must not be negative"),
         (["info", "{index}"], "model file"),
     ],
 )
@@ -256,8 +267,8 @@ def test_errors_are_one_line_and_exit_with_1(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Errors are reported in one line on standard error, without a traceback."""
-    places = {"model": model_file, "index": folder / "index.csv"}
-    assert run(*(argument.format(**places) for argument in arguments)) == 1
+    paths = {"model": model_file, "folder": folder, "index": folder / "index.csv"}
+    assert run(*(argument.format(**paths) for argument in arguments)) == 1
     captured = capsys.readouterr()
     assert re.fullmatch(rf"pdmp: error: .*{message}.*\n", captured.err)
     assert captured.out == ""
@@ -300,9 +311,9 @@ def test_missing_folder_is_reported_before_learning(
 ) -> None:
     """A missing output folder is reported before the fit."""
     assert run("fit", folder, "-o", tmp_path / "nowhere" / "model.safetensors") == 1
-    told = capsys.readouterr().err
-    assert "no such folder" in told
-    assert "learning" not in told
+    reported = capsys.readouterr().err
+    assert "no such folder" in reported
+    assert "learning" not in reported
 
 
 def test_extrapolated_contexts_are_reported(
@@ -313,7 +324,7 @@ def test_extrapolated_contexts_are_reported(
     assert run("rollout", model_file, "--context", 0.0, "-o", out) == 0
     assert capsys.readouterr().err == ""
     assert run("rollout", model_file, "--context", 1.2, "-o", out) == 0
-    assert "outside of those demonstrated" in capsys.readouterr().err
+    assert "outside the demonstrated ones" in capsys.readouterr().err
 
 
 def test_errors_name_options(

@@ -135,10 +135,10 @@ def test_wide_models_and_trajectories_are_abridged() -> None:
 def test_hostile_names_are_escaped() -> None:
     """Names, units and labels from files are text in a table, never markup or control codes."""
     model = hostile()
-    for shown in (model, model.rollout()):
-        html = shown._repr_html_()  # type: ignore[attr-defined]
+    for value in (model, model.rollout()):
+        html = value._repr_html_()  # type: ignore[attr-defined]
         table = Table(html)
         assert "<script" not in html and "\x1b" not in html and "\u202e" not in html
         text = " ".join(" ".join(row) for row in table.rows)
         assert "<script>alert('x')</script>\"&\\u{1b}[31m\\u{202e}" in text
-        assert repr(shown).isascii() and repr(shown).isprintable()
+        assert repr(value).isascii() and repr(value).isprintable()

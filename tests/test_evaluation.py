@@ -21,6 +21,7 @@ from pdmp.evaluation import (
     baselines,
 )
 from pdmp.evaluation.splits import within_hull
+from report.baselines import library_baselines
 from synthetic import loops, reaches
 
 HEIGHTS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
@@ -74,8 +75,8 @@ def test_error_is_the_papers() -> None:
 
     class Off(Known):
         def fit(self, recordings: Recordings) -> Any:
-            foresee = super().fit(recordings)
-            return lambda context: Forecast(foresee(context).position + [0.3, -0.4], 2.0)
+            predict = super().fit(recordings)
+            return lambda context: Forecast(predict(context).position + [0.3, -0.4], 2.0)
 
     found = evaluated({"off": Off()}).summary("off")
     assert found.error == pytest.approx(0.25)
@@ -234,7 +235,7 @@ def test_evaluation_prints_a_table(found: Evaluation) -> None:
 def test_missing_library_leaves_its_predictor_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Other predictors are evaluated, and the reason is reported."""
     monkeypatch.setitem(sys.modules, "sklearn.gaussian_process", None)
-    found = pdmp.evaluate(reaches())
+    found = pdmp.evaluate(reaches(), predictors=library_baselines() | {"PDMP": PDMP()})
     assert "PDMP" in found.scores
     assert "left out: PCA, Gaussian processes: scikit-learn is not installed" in repr(found)
 
@@ -295,16 +296,19 @@ def test_forecast_of_another_shape_is_rejected() -> None:
         def fit(self, recordings: Recordings) -> Any:
             return lambda context: Forecast(np.zeros((5, 2)), 1.0)
 
-    with pytest.raises(ValueError, match=r"'short' foresees positions of shape \(5, 2\), expected"):
+    with pytest.raises(ValueError, match=r"'short' predicts positions of shape \(5, 2\), expected"):
         evaluated({"short": Short()})
 
 
 @pytest.mark.parametrize(
     ("forecast", "message"),
     [
-        (Forecast(np.full((101, 2), np.nan), 1.0), "a position that is not finite"),
-        (Forecast(np.zeros((101, 2)), 1.0, np.zeros((101, 1))), r"variances of shape \(101, 1\)"),
-        ((np.zeros((101, 2)), 1.0), "a tuple, expected an evaluation.Forecast"),
+        (Forecast(np.full((101, 2), np.nan), 1.0), "predicts a position that is not finite"),
+        (
+            Forecast(np.zeros((101, 2)), 1.0, np.zeros((101, 1))),
+            r"predicts variances of shape \(101, 1\)",
+        ),
+        ((np.zeros((101, 2)), 1.0), "returns a tuple, expected an evaluation.Forecast"),
     ],
 )
 def test_invalid_forecasts_are_rejected(forecast: Any, message: str) -> None:
@@ -314,16 +318,16 @@ def test_invalid_forecasts_are_rejected(forecast: Any, message: str) -> None:
         def fit(self, recordings: Recordings) -> Any:
             return lambda context: forecast
 
-    with pytest.raises(ValueError, match=f"'given' foresees {message}"):
+    with pytest.raises(ValueError, match=f"'given' {message}"):
         evaluated({"given": Given()})
 
 
 def test_progress_is_reported_and_can_end_the_evaluation() -> None:
     """Progress has predictors and rising fractions; exceptions of the callback propagate."""
-    told: list[tuple[str, float]] = []
-    evaluated({"known": Known()}, progress=lambda *at: told.append(at))
-    assert list(dict(told)) == ["mean demonstration", "known"]
-    shares = [share for _, share in told]
+    reported: list[tuple[str, float]] = []
+    evaluated({"known": Known()}, progress=lambda *at: reported.append(at))
+    assert list(dict(reported)) == ["mean demonstration", "known"]
+    shares = [share for _, share in reported]
     assert shares == sorted(shares) and shares[0] == 0 and shares[-1] < 1
 
     def stop(name: str, share: float) -> None:
@@ -359,7 +363,8 @@ def mannered() -> tuple[list[np.ndarray], list[list[float | str]]]:
 def test_labels_are_conditions_too() -> None:
     """Labels beside numbers are contexts for primitives and all baselines."""
     movements, contexts = mannered()
-    predictors = baselines() | {"PDMP": PDMP(map="linear", singular_value_share=0.999)}
+    predictors = baselines() | library_baselines()
+    predictors["PDMP"] = PDMP(map="linear", singular_value_share=0.999)
     found = pdmp.evaluate(movements, contexts=contexts, dt=0.01, predictors=predictors)
     assert {split.reach for split in found.splits} == {"interpolation", "extrapolation"}
     assert sum(len(split.test) for split in found.splits) == len(movements)
@@ -373,7 +378,7 @@ def test_labels_without_training_demonstrations_are_rejected() -> None:
     """A label without a training demonstration is rejected."""
     movements, contexts = mannered()
     manners = [[manner] for manner, _ in contexts]
-    with pytest.raises(ValueError, match="is held out altogether"):
+    with pytest.raises(ValueError, match="has no training demonstration"):
         pdmp.evaluate(movements, contexts=manners, dt=0.01)
     mixed = [[0.1], *manners[1:]]
     with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 numbers"):

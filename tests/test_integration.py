@@ -177,7 +177,7 @@ def integrated(
         state, last = solution.y[:, -1], until
         target |= commands.get(until, {})
         if "centre" in commands.get(until, {}) and family.model.braking is not None:
-            # The transition of a goal lasts for the rest of the movement less the lag of the output system.
+            # A goal is reached in the rest of the movement, less the lag of the output system.
             remaining = (1 - state[0] - 1 / BETA) * nominal
             omegas["centre"] = settling / max(TRANSITION, remaining)
     return np.concatenate(found)

@@ -15,28 +15,28 @@ from synthetic import reaches
 
 def test_progress_is_reported_in_order() -> None:
     """The four stages are reported in order, each with rising fractions within [0, 1]."""
-    told: list[tuple[str, float]] = []
-    pdmp.fit(reaches(), progress=lambda stage, share: told.append((stage, share)))
-    stages = list(dict.fromkeys(stage for stage, _ in told))
+    reported: list[tuple[str, float]] = []
+    pdmp.fit(reaches(), progress=lambda stage, share: reported.append((stage, share)))
+    stages = list(dict.fromkeys(stage for stage, _ in reported))
     assert stages == ["targets", "factorise", "regress", "compile"]
-    assert told == sorted(told, key=lambda entry: (stages.index(entry[0]), entry[1]))
-    assert all(0 <= share <= 1 for _, share in told)
-    assert sum(stage == "regress" for stage, _ in told) > 10
+    assert reported == sorted(reported, key=lambda entry: (stages.index(entry[0]), entry[1]))
+    assert all(0 <= share <= 1 for _, share in reported)
+    assert sum(stage == "regress" for stage, _ in reported) > 10
 
 
 @pytest.mark.parametrize("stage", ["targets", "factorise", "regress", "compile"])
 def test_exception_in_progress_ends_the_fit(stage: str) -> None:
     """An exception of the callback propagates and ends the fit."""
-    told = []
+    reported = []
 
     def stop(now: str, _: float) -> None:
-        told.append(now)
+        reported.append(now)
         if now == stage:
             raise LookupError("enough")
 
     with pytest.raises(LookupError, match="enough"):
         pdmp.fit(reaches(), progress=stop)
-    assert told.count(stage) == 1
+    assert reported.count(stage) == 1
 
 
 def test_interrupt_in_progress_ends_the_fit() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pdmp
-from synthetic import reaches
+from synthetic import BVH, reaches
 
 TABLE = "t,x,y\n0.0,1,10\n0.1,2,20\n0.2,3,30\n0.4,4,40\n"
 POSITION = np.array([[1.0, 10.0], [2.0, 20.0], [3.0, 30.0], [4.0, 40.0]])
@@ -502,31 +502,6 @@ def test_npz_has_units_and_gaps(tmp_path: Path) -> None:
         pdmp.io.read_npz(path, dt=0.1)
 
 
-BVH = """HIERARCHY
-ROOT Hips
-{
-\tOFFSET 0 0 0
-\tCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-
-\tJOINT Left Leg
-\t{
-\t\tOFFSET 0 -40 0
-\t\tCHANNELS 4 Yposition Zrotation Xrotation Yrotation
-\t\tEnd Site
-\t\t{
-\t\t\tOFFSET 0 -40 0
-\t\t}
-\t}
-}
-MOTION
-Frames:\t4
-Frame Time: 0.01
-0 90 0 10 20 30 1 100 -170 5
-0 91 1 10 20 30 1 110 -180 5
-0 92 2 10 20 30 1 120 -190 5
-0 93 3 10 20 30 1 130 -200 5"""
-
-
 @pytest.fixture
 def bvh(tmp_path: Path) -> Path:
     """Returns a BVH file of two joints and four frames, without a final line break."""
@@ -561,9 +536,9 @@ def test_bvh_is_read_like_csv(bvh: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (BVH, "", "not a whole BVH file"),
-        ("}\nMOTION", "}}\nMOTION", "not a whole BVH file"),
-        ("CHANNELS 4", "CHANNEL 4", "not a whole BVH file"),
+        (BVH, "", "an incomplete BVH file"),
+        ("}\nMOTION", "}}\nMOTION", "an incomplete BVH file"),
+        ("CHANNELS 4", "CHANNEL 4", "an incomplete BVH file"),
         ("Frames:\t4", "Frames:\t5", "holds 4 frames, but announces 5"),
         ("-190 5", "-190", r"frame 2: 9 numbers, expected 10"),
         ("-190", "l90", r"frame 2, 'Left Leg\.Xrotation': 'l90' is not a number"),

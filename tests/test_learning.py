@@ -29,8 +29,8 @@ def reproduction_error(model: pdmp.Model, demos: list[Demonstration], m: int) ->
     time = demo.time - demo.time[0]
     dt = model.durations[m] / (demo.n_samples - 1)
     made = model.rollout(model.conditions(m), dt=dt)
-    shown = interpolate.CubicSpline(time, demo.position)(made.time)
-    return float(np.sqrt(np.mean((made.position - shown) ** 2)) / np.ptp(demo.position, 0).max())
+    expected = interpolate.CubicSpline(time, demo.position)(made.time)
+    return float(np.sqrt(np.mean((made.position - expected) ** 2)) / np.ptp(demo.position, 0).max())
 
 
 @pytest.mark.parametrize("name", ["WShape", "GShape", "Sine", "Multi_Models_3"])
@@ -140,9 +140,12 @@ def test_network_is_a_sum_of_the_stated_functions(periodic: bool, overlap: float
 
 def test_defaults_of_a_network_are_those_of_its_signature() -> None:
     """The defaults in the signature are those in use."""
-    shown = inspect.signature(pdmp.NGnet).parameters
+    parameters = inspect.signature(pdmp.NGnet).parameters
     used = pdmp.NGnet()
-    assert (shown["n_basis"].default, shown["overlap"].default) == (used.n_basis, used.overlap)
+    assert (parameters["n_basis"].default, parameters["overlap"].default) == (
+        used.n_basis,
+        used.overlap,
+    )
     assert repr(used) == f"pdmp.NGnet({used.n_basis}, overlap={used.overlap})"
 
 

@@ -19,14 +19,13 @@ from pdmp.evaluation import (
     MeanDemonstration,
     MovedGoal,
     NearestDemonstration,
-    PeerWeights,
     Predictor,
-    ProcessWeights,
     RadialWeights,
     Recordings,
     Scores,
     Split,
 )
+from report.baselines import PeerWeights, ProcessWeights
 
 PROMP = Path(__file__).parent / "data" / "promp.npz"
 PREDICTORS: dict[str, Predictor] = {
@@ -83,8 +82,8 @@ def test_a_predictor_forecasts_positions_and_duration(name: str) -> None:
 def test_mean_demonstration_is_the_same_for_every_context() -> None:
     """Arithmetic mean of positions, geometric of durations, variance of a new movement."""
     sampled = np.array([[[0.0]] * 4, [[1.0]] * 4, [[5.0]] * 4])
-    foresee = MeanDemonstration().fit(recorded(sampled, [1.0, 2.0, 4.0], [0, 1, 2]))
-    near, far = foresee(np.array([0.0])), foresee(np.array([1e6]))
+    predict = MeanDemonstration().fit(recorded(sampled, [1.0, 2.0, 4.0], [0, 1, 2]))
+    near, far = predict(np.array([0.0])), predict(np.array([1e6]))
     np.testing.assert_array_equal(near.position, far.position)
     np.testing.assert_allclose(near.position, 2.0)
     assert near.duration == pytest.approx(2.0)
@@ -147,10 +146,10 @@ def test_larger_ridge_gives_smaller_weights() -> None:
 
 def test_linear_weights_extend_a_linear_family() -> None:
     """For movements that are linear in the context, weights interpolate and extrapolate exactly."""
-    foresee = LinearWeights(Components(1.0)).fit(bumps())
+    predict = LinearWeights(Components(1.0)).fit(bumps())
     for height in (0.23, 0.7):
         np.testing.assert_allclose(
-            foresee(np.array([height])).position, arches([height])[0], atol=1e-9
+            predict(np.array([height])).position, arches([height])[0], atol=1e-9
         )
 
 
@@ -178,9 +177,9 @@ def promp() -> Any:
 def test_radial_weights_forecast_as_promps_of_movement_primitives(promp: Any) -> None:
     """Forecasts agree within 1 % with those of a ProMP with other widths."""
     family = recorded(promp.sampled, [1.0] * 6, promp.heights)
-    foresee = LinearWeights(RadialWeights()).fit(family)
+    predict = LinearWeights(RadialWeights()).fit(family)
     for height, expected in zip(promp.at, promp.forecasts, strict=True):
-        np.testing.assert_allclose(foresee(np.array([height])).position, expected, atol=0.01)
+        np.testing.assert_allclose(predict(np.array([height])).position, expected, atol=0.01)
 
 
 def test_weights_of_the_peer_forecast_as_the_peer(
@@ -208,9 +207,9 @@ def test_weights_of_the_peer_forecast_as_the_peer(
     weights, offset, basis = PeerWeights()(family)
     back = (offset + weights @ basis).reshape(promp.sampled.shape)
     np.testing.assert_allclose(back, promp.sampled, atol=2e-3)
-    foresee = LinearWeights(PeerWeights()).fit(family)
+    predict = LinearWeights(PeerWeights()).fit(family)
     for height, expected in zip(promp.at, promp.forecasts, strict=True):
-        np.testing.assert_allclose(foresee(np.array([height])).position, expected, atol=1e-6)
+        np.testing.assert_allclose(predict(np.array([height])).position, expected, atol=1e-6)
 
 
 def test_missing_peer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -260,8 +260,8 @@ def test_recordings_of_walks_are_learnt(tmp_path: Path) -> None:
         np.savetxt(tmp_path / f"{name}.csv", rows, "%.9g", ",", header=header, comments="")
     rows[:, 1:] = noise.normal(0, 1e-3, rows[:, 1:].shape)
     np.savetxt(tmp_path / "still.csv", rows, "%.9g", ",", header=header, comments="")
-    told, figure = walking.recorded(tmp_path)
-    assert "4 walks, without still" in told[0]
+    reported, figure = walking.recorded(tmp_path)
+    assert "4 walks, without still" in reported[0]
     assert len(figure.axes) == 16
 
 

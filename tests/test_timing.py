@@ -18,7 +18,7 @@ def reach(phase: np.ndarray, height: float = 0.3) -> np.ndarray:
     return np.column_stack([rise, height * 64 * (phase - phase**2) ** 3, np.sin(6 * phase)])
 
 
-def hurried(bend: float) -> np.ndarray:
+def warped_phase(bend: float) -> np.ndarray:
     """Returns phases that are ahead of linear time by up to `bend` / 3 half way."""
     return SHARES + bend * SHARES * (1 - SHARES)
 
@@ -27,15 +27,15 @@ def demos(bends: list[float], heights: list[float] | None = None) -> list[Demons
     """Returns reaches of 1 s with different time courses."""
     heights = [0.3] * len(bends) if heights is None else heights
     return [
-        Demonstration(reach(hurried(bend), height), dt=1 / (N - 1), context=[bend])
+        Demonstration(reach(warped_phase(bend), height), dt=1 / (N - 1), context=[bend])
         for bend, height in zip(bends, heights, strict=True)
     ]
 
 
 def test_movements_that_differ_in_time_alone_have_one_singular_value() -> None:
     """After a warp, movements that differ in their time course alone have one singular value."""
-    shown = demos([0.0, 0.4, -0.4, 0.2, -0.2])
-    linear, warped = (pdmp.fit(shown, nominal=0, alignment=a) for a in ("linear", "warp"))
+    training = demos([0.0, 0.4, -0.4, 0.2, -0.2])
+    linear, warped = (pdmp.fit(training, nominal=0, alignment=a) for a in ("linear", "warp"))
 
     def rest(model: pdmp.Model) -> float:
         return np.linalg.norm(model.singular_values[1:]) / model.singular_values[0]
@@ -49,30 +49,32 @@ def test_movements_that_differ_in_time_alone_have_one_singular_value() -> None:
 @pytest.mark.parametrize("alignment", ["warp", TimeWarp(5, max_slope=3)])
 def test_demonstrations_are_reproduced_with_their_time_course(alignment: str | TimeWarp) -> None:
     """The conditions of a demonstration reproduce it with its time course."""
-    shown = demos([0.0, 0.4, -0.4], [0.3, 0.2, 0.4])
-    model = pdmp.fit(shown, nominal=0, alignment=alignment, n_styles=3)
-    for m, demo in enumerate(shown):
+    training = demos([0.0, 0.4, -0.4], [0.3, 0.2, 0.4])
+    model = pdmp.fit(training, nominal=0, alignment=alignment, n_styles=3)
+    for m, demo in enumerate(training):
         made = model.rollout(model.conditions(m), dt=1 / (N - 1))
         np.testing.assert_allclose(made.position, demo.position, atol=0.01)
         rates = np.gradient(made.position, made.time, axis=0)
         np.testing.assert_allclose(rates[2:-2], made.velocity[2:-2], atol=0.05)
-    style = model.style_of(shown[1])
+    style = model.style_of(training[1])
     np.testing.assert_allclose(style, model.styles[1], atol=0.01)
 
 
 def test_landmarks_are_aligned() -> None:
     """Landmarks of all demonstrations are aligned with those of the nominal one."""
-    shown = demos([0.0, 0.4, -0.4])
+    training = demos([0.0, 0.4, -0.4])
     phases = np.array([0.25, 0.7])
-    landmarks = np.array([np.interp(phases, hurried(bend), SHARES) for bend in (0.0, 0.4, -0.4)])
-    model = pdmp.fit(shown, nominal=0, landmarks=landmarks, n_styles=3)
+    landmarks = np.array(
+        [np.interp(phases, warped_phase(bend), SHARES) for bend in (0.0, 0.4, -0.4)]
+    )
+    model = pdmp.fit(training, nominal=0, landmarks=landmarks, n_styles=3)
     np.testing.assert_allclose(model.breaks, [0, *phases, 1])
     np.testing.assert_allclose(np.cumsum(model.segment_durations, axis=1)[:, :2], landmarks)
     np.testing.assert_allclose(
-        model.style_of(shown[2], landmarks=landmarks[2]), model.styles[2], atol=0.01
+        model.style_of(training[2], landmarks=landmarks[2]), model.styles[2], atol=0.01
     )
     with pytest.raises(ValueError, match="pass the landmarks of this demonstration"):
-        model.style_of(shown[2])
+        model.style_of(training[2])
 
 
 def test_timing_is_predicted_from_the_context() -> None:
@@ -85,7 +87,7 @@ def test_timing_is_predicted_from_the_context() -> None:
     size = model.n_styles + 2 * model.n_dofs + 8
     assert found.covariance.shape == (size, size)
     made = model.rollout(context=[0.15], dt=1 / (N - 1)).position
-    np.testing.assert_allclose(made, reach(hurried(0.15)), atol=0.02)
+    np.testing.assert_allclose(made, reach(warped_phase(0.15)), atol=0.02)
     lower, upper = model.band([0.15], dt=1 / (N - 1))
     np.testing.assert_allclose((lower + upper) / 2, made, atol=1e-12)
 
@@ -94,14 +96,17 @@ def test_default_warp_predicts_no_worse_than_linear_scaling() -> None:
     """Variation in time that contexts do not explain is not warped; without contexts it is."""
     rng = np.random.default_rng(3)
     heights = np.linspace(0.2, 0.4, 12)
-    shown = demos(list(rng.uniform(-0.5, 0.5, 12)), list(heights))
+    training = demos(list(rng.uniform(-0.5, 0.5, 12)), list(heights))
     contexts = heights[:, None]
-    assert pdmp.fit(shown, contexts=contexts, alignment="warp").segment_durations.shape == (12, 1)
-    assert pdmp.fit(shown, contexts=contexts, alignment=TimeWarp()).segment_durations.shape == (
+    assert pdmp.fit(training, contexts=contexts, alignment="warp").segment_durations.shape == (
+        12,
+        1,
+    )
+    assert pdmp.fit(training, contexts=contexts, alignment=TimeWarp()).segment_durations.shape == (
         12,
         8,
     )
-    bare = [demo.position for demo in shown]
+    bare = [demo.position for demo in training]
     assert pdmp.fit(bare, dt=1 / (N - 1), alignment="warp").segment_durations.shape == (12, 8)
 
 
@@ -119,12 +124,12 @@ def test_a_band_includes_the_uncertainty_of_timing() -> None:
     inside = []
     for _ in range(6):
         bends = list(rng.uniform(-0.5, 0.5, 14))
-        shown = demos(bends, list(np.linspace(0.2, 0.4, 14)))
+        training = demos(bends, list(np.linspace(0.2, 0.4, 14)))
         heights = np.linspace(0.2, 0.4, 14)[:, None]
-        model = pdmp.fit(shown, contexts=heights, alignment=TimeWarp())
+        model = pdmp.fit(training, contexts=heights, alignment=TimeWarp())
         lower, upper = model.band([0.3], dt=1 / (N - 1))
         for bend in rng.uniform(-0.5, 0.5, 10):
-            new = reach(hurried(bend))
+            new = reach(warped_phase(bend))
             inside.append(((lower <= new) & (new <= upper))[40:-40].mean())
     assert 0.8 < np.mean(inside) < 0.99
 

@@ -46,26 +46,21 @@ def add_fit_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--context", nargs="+", metavar="NAME", help="columns of index.csv that form the context"
     )
-    parser.add_argument(
-        "--map",
-        choices=["auto", "stacked", "gp", "linear", "polynomial"],
-        default="auto",
-        help="map from contexts to movements; default: auto",
-    )
-    parser.add_argument(
-        "--kind",
-        choices=["discrete", "rhythmic"],
-        default="discrete",
-        help="movements from start to goal (default), or one cycle per demonstration",
-    )
+    for name, choices, text in (
+        (
+            "map",
+            ("auto", "stacked", "gp", "linear", "polynomial"),
+            "map from contexts to movements",
+        ),
+        ("kind", ("discrete", "rhythmic"), "from start to goal, or one cycle per demonstration"),
+        ("alignment", ("linear", "warp"), "alignment in time with the nominal demonstration"),
+        ("basis", ("gp", "ngnet"), "Gaussian process or normalised Gaussian network"),
+        ("transport", ("learnt", "immediate"), "distribution of changes of start or goal in time"),
+    ):
+        text = f"{text}; default: %(default)s"
+        parser.add_argument(f"--{name}", choices=choices, default=choices[0], help=text)
     parser.add_argument(
         "--period", type=float, metavar="S", help="period of rhythmic demonstrations [s]"
-    )
-    parser.add_argument(
-        "--alignment",
-        choices=["linear", "warp"],
-        default="linear",
-        help="alignment in time with the nominal demonstration; default: linear",
     )
     parser.add_argument(
         "--styles",
@@ -81,23 +76,11 @@ def add_fit_options(parser: ArgumentParser) -> None:
         "0.9 in the paper; default: the systematic styles, those above the measurement noise",
     )
     parser.add_argument(
-        "--basis",
-        choices=["gp", "ngnet"],
-        default="gp",
-        help="Gaussian process (default) or normalised Gaussian network",
-    )
-    parser.add_argument(
         "--smoothing",
         type=_or_named(float, "frequency [Hz]", auto="auto", none=None),
         default="auto",
         metavar="HZ",
         help="cut-off [Hz], auto (default: by cross-validation), or none",
-    )
-    parser.add_argument(
-        "--transport",
-        choices=["learnt", "immediate"],
-        default="learnt",
-        help="distribution of a change of start or goal over the movement; default: learnt",
     )
 
 
