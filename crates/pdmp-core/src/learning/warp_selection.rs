@@ -75,7 +75,7 @@ impl WarpSelection<'_> {
             let numbers = self.numbers.select(Axis(0), training);
             let map = ContextMap::learn(self.columns.to_vec(), &numbers, outputs.view(), metric.view(), self.map)?;
             for group in held_out {
-                let expected = map.expect(&self.numbers.row(group[0]).to_vec());
+                let expected = map.predict_mean(&self.numbers.row(group[0]).to_vec());
                 let predicted = predicted(&expected, &factors, aligned, kind);
                 let error = |m: &usize| (&recorded.row(*m) - &predicted).mapv(|x| x * x).sum();
                 errors.push(group.iter().map(error).sum::<f64>() / (group.len() * recorded.ncols()) as f64);

@@ -16,7 +16,7 @@ use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::template::{TimeWarp, WarpTemplate};
-use crate::numerics::smoothing_spline::{MIN_THINNED, Noise, Samples, Smoothing, pool};
+use crate::numerics::smoothing_spline::{MIN_DECIMATED, Noise, Samples, Smoothing, pooled};
 use crate::numerics::spline::{Knots, Splines};
 use crate::numerics::threads::Threads;
 use sample_times::{Clock, Ticks};
@@ -129,9 +129,9 @@ impl Alignment {
                 self.smoothing.check(&aligned.samples(m, &aligned.seconds(m))).map_err(|error| error.in_demo(m))?;
             }
         }
-        let pool: Vec<(usize, Vec<f64>)> = pool(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
+        let pool: Vec<(usize, Vec<f64>)> = pooled(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
         let samples: Vec<Samples> = pool.iter().map(|(m, time)| aligned.samples(*m, time)).collect();
-        Noise::of(self.smoothing, &samples, MIN_THINNED, threads)
+        Noise::estimate(self.smoothing, &samples, MIN_DECIMATED, threads)
     }
 
     /// Returns the given nominal index, or that of the lower median of the durations, the first of equals.

@@ -122,7 +122,7 @@ impl<'a> StyleSelection<'a> {
         let map = ContextMap::learn(columns.to_vec(), &of(contexts), outputs.view(), metric.view(), map)?;
 
         let errors_of = |group: &Vec<usize>| {
-            let expected = map.expect(&contexts.row(group[0]).to_vec());
+            let expected = map.predict_mean(&contexts.row(group[0]).to_vec());
             let (style, locations) = expected.split_at(curves.styles.len());
             let (centre, start) = locations.split_at(n_dofs);
             // A cycle has no start; its frame depends on the anchor alone.

@@ -7,7 +7,7 @@ use safetensors::tensor::{Dtype, SafeTensors};
 use serde::Deserialize;
 
 use super::{Constants, Map, SCHEMA, Sealed, checksum, header};
-use crate::context::{ContextMap, ContextMapKind, Kernel, Recipe, Stack};
+use crate::context::{ContextMap, ContextMapKind, Kernel, MapParameters, StackingWeights};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::forcing_table::ForcingTable;
 use crate::dynamics::hermite_table::{KnotTable, MAX_CELLS};
@@ -239,25 +239,26 @@ impl Reader<'_> {
         }
         let errors = map.errors.iter().map(|&(kind, error)| (kind, error.unwrap_or(f64::INFINITY))).collect();
         let directions = self.matrix("map.directions", (outputs.ncols(), outputs.ncols()))?;
-        let trend = match map.kind {
-            ContextMapKind::Stacked => Some(self.trend(outputs.ncols())?),
+        let line = match map.kind {
+            ContextMapKind::Stacked => Some(self.stacked_line(outputs.ncols())?),
             _ => None,
         };
-        let recipe = Recipe { kind: map.kind, kernel: map.kernel, directions, ratios, trend, errors };
-        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), recipe)
+        let parameters = MapParameters { kind: map.kind, kernel: map.kernel, directions, ratios, line, errors };
+        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), parameters)
             .map_err(|error| Error::File(error.to_string()))
     }
 
-    /// Returns the linear trend of a stacked map: its variance ratios (P,) and the stacking weights.
-    fn trend(&self, n_outputs: usize) -> Result<(Vec<f64>, Stack)> {
-        let slopes = self.array("map.slopes", &[n_outputs])?;
+    /// Returns the line of a stacked map: its signal-to-noise ratios (P,) and the stacking weights.
+    fn stacked_line(&self, n_outputs: usize) -> Result<(Vec<f64>, StackingWeights)> {
+        let ratios = self.array("map.slopes", &[n_outputs])?;
         let weights = self.array("map.weights", &[2, 2])?;
-        let stack = Stack { inside: [weights[0], weights[1]], outside: [weights[2], weights[3]] };
+        let weights =
+            StackingWeights { interpolation: [weights[0], weights[1]], extrapolation: [weights[2], weights[3]] };
         let valid = |[g, l]: [f64; 2]| g >= 0.0 && l >= 0.0 && g + l <= 1.0 + 1e-9;
-        if slopes.iter().any(|ratio| *ratio < 0.0) || !valid(stack.inside) || !valid(stack.outside) {
-            return Err(Error::File("the map's trend is out of range".to_string()));
+        if ratios.iter().any(|ratio| *ratio < 0.0) || !valid(weights.interpolation) || !valid(weights.extrapolation) {
+            return Err(Error::File("the map's line is out of range".to_string()));
         }
-        Ok((slopes, stack))
+        Ok((ratios, weights))
     }
 
     /// Checks that the file contains the arrays of the model and no others, and compares the checksum.

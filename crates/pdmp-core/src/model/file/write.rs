@@ -6,7 +6,7 @@ use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
 use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header};
-use crate::context::{ContextMap, Recipe, Stack};
+use crate::context::{ContextMap, MapParameters, StackingWeights};
 use crate::dynamics::hermite_table::KnotTable;
 use crate::error::{Error, Result};
 use crate::model::Model;
@@ -92,12 +92,12 @@ impl Model {
         }
         if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
             arrays.push(matrix("contexts", contexts));
-            let recipe = map.recipe();
-            arrays.push(matrix("map.directions", &recipe.directions));
-            arrays.push(vector("map.ratios", &recipe.ratios));
-            if let Some((slopes, Stack { inside, outside })) = &recipe.trend {
-                arrays.push(vector("map.slopes", slopes));
-                arrays.push(("map.weights", vec![2, 2], [*inside, *outside].concat()));
+            let parameters = map.parameters();
+            arrays.push(matrix("map.directions", &parameters.directions));
+            arrays.push(vector("map.ratios", &parameters.ratios));
+            if let Some((ratios, StackingWeights { interpolation, extrapolation })) = &parameters.line {
+                arrays.push(vector("map.slopes", ratios));
+                arrays.push(("map.weights", vec![2, 2], [*interpolation, *extrapolation].concat()));
             }
             arrays.extend(
                 self.learnt
@@ -113,7 +113,7 @@ impl Model {
 impl Map {
     /// Returns the constants of a context map.
     fn of(map: &ContextMap) -> Self {
-        let Recipe { kind, kernel, errors, .. } = map.recipe();
+        let MapParameters { kind, kernel, errors, .. } = map.parameters();
         // JSON has no infinity, the error of a map that no other contexts can predict.
         let errors = errors.into_iter().map(|(kind, error)| (kind, error.is_finite().then_some(error))).collect();
         Self { columns: map.columns().to_vec(), kind, kernel, errors }

@@ -1,22 +1,24 @@
-//! The banded matrices of the smoothing spline, for four penalties side by side.
+//! Banded matrices of the smoothing spline, factorised for four values of λ at once.
 
 use std::ops::Range;
 
 use crate::numerics::simd::{F64x4, Real};
 
-/// Columns of Q, and the upper bands of R and QᵀQ: (diagonal, first, second) in each row. Two columns of zeros follow
-/// those of Q, so that there are as many as knots.
+/// Matrices of the roughness penalty ∫f̈² of splines with n knots.
 pub(super) struct Roughness {
+    /// Nonzero elements of each column of Q (n, n−2), padded to n columns with zeros.
     q: Vec<[f64; 3]>,
+    /// Diagonal and superdiagonal of R (n−2, n−2).
     r: Vec<[f64; 2]>,
+    /// Diagonal and two superdiagonals of QᵀQ (n−2, n−2).
     qq: Vec<[f64; 3]>,
 }
 
-/// M = LDLᵀ: in row i, 1/d_i and the elements of L in rows i + 1 and i + 2 of column i.
-pub(super) struct Factor(Vec<[F64x4; 3]>);
+/// Factorisation M = LDLᵀ: 1/d_i, and the elements (i+1, i) and (i+2, i) of L.
+pub(super) struct Factorization(Vec<[F64x4; 3]>);
 
 impl Roughness {
-    /// The matrices of splines with these knots (n,), at least three.
+    /// Computes the matrices for at least three increasing knots (n,).
     pub(super) fn new(knots: &[f64]) -> Self {
         let h: Vec<f64> = knots.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let inverse: Vec<f64> = h.iter().map(|h| 1.0 / h).collect();
@@ -31,9 +33,9 @@ impl Roughness {
         Self { q, r, qq }
     }
 
-    /// M = R + λQᵀQ, factorised.
-    pub(super) fn factor(&self, lambda: F64x4) -> Factor {
-        // Of the two rows before: L's elements, and these times d.
+    /// Factorises M = R + λQᵀQ.
+    pub(super) fn factorize(&self, lambda: F64x4) -> Factorization {
+        // Elements of L in the two previous columns, alone and times d.
         let ([mut first, mut second, mut earlier], [mut first_d, mut second_d, mut earlier_d]) =
             ([F64x4::ZERO; 3], [F64x4::ZERO; 3]);
         let row = |(r, qq): (&[f64; 2], &[f64; 3])| {
@@ -45,19 +47,19 @@ impl Roughness {
             (first, second, first_d, second_d) = (next_d * inverse, after_d * inverse, next_d, after_d);
             [inverse, first, second]
         };
-        Factor(self.r.iter().zip(&self.qq).map(row).collect())
+        Factorization(self.r.iter().zip(&self.qq).map(row).collect())
     }
 
-    /// Qᵀy of samples (n,), in their place; the last two become zero.
-    pub(super) fn bend<T: Real>(&self, y: &mut [T]) {
-        let n_bends = self.r.len();
-        for (i, q) in self.q[..n_bends].iter().enumerate() {
+    /// Replaces samples y (n,) by their second divided differences Qᵀy (n−2,), followed by two zeros.
+    pub(super) fn second_differences<T: Real>(&self, y: &mut [T]) {
+        let n_differences = self.r.len();
+        for (i, q) in self.q[..n_differences].iter().enumerate() {
             y[i] = (y[i] - y[i + 1]) * q[0] + (y[i + 2] - y[i + 1]) * q[2];
         }
-        y[n_bends..].fill(T::default());
+        y[n_differences..].fill(T::default());
     }
 
-    /// Qγ (n,) of γ = M⁻¹Qᵀy, which ends in two zeros: λ times it is taken off the samples.
+    /// Returns Qγ = (y − f)/λ (n,) for γ = M⁻¹Qᵀy padded with two zeros.
     pub(super) fn residuals(&self, gamma: &[F64x4]) -> impl Iterator<Item = F64x4> {
         let [mut next, mut after] = [F64x4::ZERO; 2];
         gamma.iter().zip(&self.q).map(move |(&here, q)| {
@@ -67,12 +69,13 @@ impl Roughness {
         })
     }
 
-    /// tr(QᵀQ M⁻¹) = tr(I − A)/λ, the terms of some columns of Q, from the elements (i, i), (i, i + 1) and (i, i + 2) of M⁻¹ = L⁻ᵀD⁻¹ + M⁻¹(I − L)
-    /// (Hutchinson and de Hoog).
-    pub(super) fn trace(&self, factor: &Factor, columns: Range<usize>) -> F64x4 {
+    /// Computes tr(QᵀQM⁻¹) = tr(I − A)/λ, restricted to the terms of some columns of Q.
+    ///
+    /// The elements (i, i), (i, i + 1) and (i, i + 2) of M⁻¹ follow from M⁻¹ = L⁻ᵀD⁻¹ + M⁻¹(I − L) (Hutchinson and de Hoog).
+    pub(super) fn trace(&self, factors: &Factorization, columns: Range<usize>) -> F64x4 {
         let [mut next, mut after] = [[F64x4::ZERO; 3]; 2];
         let mut trace = F64x4::ZERO;
-        for (i, (q, &[inverse, first, second])) in self.qq.iter().zip(&factor.0).enumerate().rev() {
+        for (i, (q, &[inverse, first, second])) in self.qq.iter().zip(&factors.0).enumerate().rev() {
             let one = F64x4::ZERO - first * next[0] - second * next[1];
             let two = F64x4::ZERO - first * next[1] - second * after[0];
             let here = [inverse - first * one - second * two, one, two];
@@ -85,8 +88,8 @@ impl Roughness {
     }
 }
 
-impl Factor {
-    /// M⁻¹b, in place (n−2, at least).
+impl Factorization {
+    /// Replaces the first n−2 elements of b by M⁻¹b.
     pub(super) fn solve(&self, b: &mut [F64x4]) {
         let [mut before, mut last, mut beyond] = [F64x4::ZERO; 3];
         for (x, [_, first, second]) in b.iter_mut().zip(&self.0) {
