@@ -2,21 +2,25 @@
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use super::{ACCURACY, product};
+use super::{ACCURACY, PANEL, product, projected};
 use crate::error::Result;
 
 /// Smallest ratio σ/σ₁ for which the Gram matrix is accurate enough: the error of an eigenvector is ε·(σ₁/σ)².
 pub(super) const SMALL: f64 = 1e-4;
 
+/// Largest sum of squared cosines between the rows of VᵀA: the scaled product then has eigenvalues above one half.
+const MAX_OFF_DIAGONAL: f64 = 0.1;
+
 /// Eigendecomposition of the Gram matrix A·Aᵀ for A (K, L).
 pub(super) struct Gram {
     matrix: Mat<f64>,
     /// Eigenvectors (K, K) by ascending eigenvalues.
-    vectors: Mat<f64>,
+    pub(super) vectors: Mat<f64>,
     /// Square roots of the eigenvalues in decreasing order, with an error of √(K·ε)·σ₁ where they vanish.
     pub(super) values: Vec<f64>,
 }
@@ -48,6 +52,38 @@ impl Gram {
         }
         let values: Vec<f64> = ascending.column_vector().iter().rev().map(|l| l.max(0.0).sqrt()).collect();
         Ok(Some(Self { matrix, vectors, values }))
+    }
+
+    /// Returns the triangle R with V·Rᵀ·R·Vᵀ = A·Aᵀ for the eigenvectors V, as accurate as by reflections, or `None` if V
+    /// is too far from the singular vectors.
+    ///
+    /// The rows b of VᵀA are nearly orthogonal. P = VᵀA·AᵀV, scaled by their lengths to a unit diagonal, has eigenvalues
+    /// close to one, and so a Cholesky factor to full accuracy, however much the lengths differ (CholeskyQR2: Yamamoto,
+    /// Nakatsukasa, Yanagisawa, Fukaya, ETNA 44 (2015) 306–326).
+    pub(super) fn triangle(
+        &self,
+        wide: MatRef<f64>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Option<Mat<f64>>> {
+        let (k, length) = wide.shape();
+        let (mut products, mut part) = (Mat::zeros(k, k), vec![0.0; k * PANEL.min(length)]);
+        for start in (0..length).step_by(PANEL) {
+            progress(start as f64 / length as f64)?;
+            let rows = projected(&mut part, self.vectors.as_ref(), wide.subcols(start, PANEL.min(length - start)));
+            add_square(products.as_mut(), rows);
+        }
+        let lengths: Vec<f64> = (0..k).map(|j| products[(j, j)].sqrt()).collect();
+        let mut scaled = Mat::from_fn(k, k, |i, j| products[(i.max(j), i.min(j))] / (lengths[i] * lengths[j]));
+        let off: f64 = (0..k).flat_map(|j| (0..j).map(move |i| (i, j))).map(|at| scaled[at].powi(2)).sum();
+        // NaN where a row vanishes.
+        if off.is_nan() || off > MAX_OFF_DIAGONAL {
+            return Ok(None);
+        }
+        let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(k, Par::Seq, Default::default()));
+        let stack = MemStack::new(&mut memory);
+        let factor = cholesky_in_place(scaled.as_mut(), Default::default(), Par::Seq, stack, Default::default());
+        let upper = |i: usize, j: usize| if i <= j { scaled[(j, i)] * lengths[j] } else { 0.0 };
+        Ok(factor.is_ok().then(|| Mat::from_fn(k, k, upper)))
     }
 
     /// Returns the first `kept` vectors, or `None` if one of the leading J is inaccurate: its singular value is below

@@ -356,3 +356,45 @@ proptest! {
         }
     }
 }
+
+/// The triangle of the second Gram pass has the singular values of the construction, and its factors are as accurate as
+/// those of reflections; singular values that fall too far may have none.
+#[test]
+fn second_gram_pass_is_as_accurate_as_reflections() {
+    let cases = [
+        vec![1.0; 6],
+        decaying(6, 0.1),
+        decaying(12, 0.3),
+        decaying(20, 0.5),
+        decaying(6, 1e-3),
+        vec![1.0, 0.5, 0.25, 0.0, 0.0, 0.0],
+    ];
+    for sigma in cases {
+        let targets = matrix(sigma.len(), 3000, &sigma);
+        let scaled = ScaledTargets::of(targets.view()).unwrap().unwrap();
+        let gram = Gram::of(scaled.wide(), &mut go).unwrap().unwrap();
+        let Some(triangle) = gram.triangle(scaled.wide(), &mut go).unwrap() else {
+            assert!(sigma[sigma.len() - 1] < 1e-8, "{sigma:?}");
+            continue;
+        };
+        let n_styles = Truncation::Rank(sigma.len());
+        let factors = scaled.of_triangle(n_styles, triangle.as_ref(), Some(gram.vectors.as_ref())).unwrap();
+        check(&targets, &factors);
+        for (j, sigma) in sigma.iter().enumerate() {
+            assert!((factors.singular_values[j] - sigma).abs() < 1e-14);
+            let residual = targets.dot(&factors.basis.row(j)) - &factors.styles.column(j) * (sigma * sigma);
+            assert!(residual.dot(&residual).sqrt() < 1e-14);
+        }
+    }
+}
+
+/// A row of zeros has no direction, and so no triangle by the second Gram pass.
+#[test]
+fn vanishing_rows_have_no_triangle_of_products() {
+    let mut targets = matrix(6, 3000, &[1.0; 6]);
+    targets.row_mut(2).fill(0.0);
+    let scaled = ScaledTargets::of(targets.view()).unwrap().unwrap();
+    let gram = Gram::of(scaled.wide(), &mut go).unwrap().unwrap();
+    assert!(gram.triangle(scaled.wide(), &mut go).unwrap().is_none());
+    check(&targets, &of(&targets, Truncation::Rank(6)));
+}
