@@ -164,7 +164,7 @@ def test_a_dash_is_rejected_as_a_file(
     """The path - is rejected: it is neither a stream nor a file."""
     with pytest.raises(SystemExit, match="2"):
         main(arguments)
-    assert "- is no file: name one, or ./-" in capsys.readouterr().err
+    assert "- is not a file: name one, or write ./-" in capsys.readouterr().err
     assert not Path("-").exists()
 
 

@@ -558,8 +558,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
         for bad in (0, -1, NAN, INF, 1e-320, 1e300, "fast", [1000])
     ),
     ({"rate_hz": 100, "duration": 0.001}, "duration = 0.001: must be at least one period, 0.01 s"),
-    ({"measured": [0, 0]}, "measured must be a function to ask before each tick"),
-    ({"coupling": ([0, 0], [0, 0])}, "coupling must be a function to ask before each tick"),
+    ({"measured": [0, 0]}, "measured must be a function, called before each tick"),
+    ({"coupling": ([0, 0], [0, 0])}, "coupling must be a function, called before each tick"),
 ]
 
 

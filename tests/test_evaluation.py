@@ -339,7 +339,7 @@ def test_progress_is_reported_and_can_end_the_evaluation() -> None:
 
 def test_reference_keeps_its_name() -> None:
     """The reference predictor cannot be replaced."""
-    with pytest.raises(ValueError, match="'mean demonstration' is always tried"):
+    with pytest.raises(ValueError, match="'mean demonstration' is always included"):
         evaluated({"mean demonstration": Known()})
 
 
