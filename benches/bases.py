@@ -86,12 +86,12 @@ def score(group: Group, basis: Basis) -> Score:
 
 
 def reproduction(model: pdmp.Model, group: Group) -> list[float]:
-    """Returns the RMSE over range of every demonstration, rolled out under its own conditions."""
+    """Returns the RMSE over range of every demonstration, from a rollout of its conditions."""
     errors = []
     for m, demo in enumerate(group.demos):
-        made = model.rollout(model.conditions(m), dt=model.durations[m] / N_SAMPLES)
+        rollout = model.rollout(model.conditions(m), dt=model.durations[m] / N_SAMPLES)
         # Recordings with missing samples have time stamps.
-        sampled = [np.interp(demo.time, made.time, column) for column in made.position.T]
+        sampled = [np.interp(demo.time, rollout.time, column) for column in rollout.position.T]
         difference = np.transpose(sampled) - demo.position
         errors.append(np.sqrt(np.mean(difference**2)) / np.ptp(demo.position, axis=0).max())
     return errors
@@ -101,14 +101,14 @@ def held_out(group: Group, basis: Basis) -> tuple[float, float]:
     """Returns RMSE over range and log density of every second sample from a fit to the others."""
     u, factors, extent = targets(group)
     periodic = group.kind == "rhythmic"
-    given = slice(0, None, 2)
+    training = slice(0, None, 2)
     # Samples beyond the last training sample would be extrapolation.
-    hidden = slice(1, None if periodic else len(u[given]) * 2 - 2, 2)
-    learnt = basis.regress(u[given], factors[given], periodic=periodic)
+    hidden = slice(1, None if periodic else len(u[training]) * 2 - 2, 2)
+    learnt = basis.regress(u[training], factors[training], periodic=periodic)
     mean, variance = learnt.predict(u[hidden])
     error = factors[hidden] - mean
     if variance is None:
-        variance = np.mean(left_out(basis, u[given], factors[given], periodic) ** 2)
+        variance = np.mean(left_out(basis, u[training], factors[training], periodic) ** 2)
     else:
         variance = variance + learnt.noise * learnt.signal_variance
     unit = np.mean(factors**2)
@@ -156,19 +156,19 @@ def targets(group: Group) -> tuple[np.ndarray, np.ndarray, float]:
 def over_sets(scores: dict[Group, Score]) -> list[str]:
     """Returns the results of one basis: medians over sets, the maximum, the median time."""
     sets = defaultdict(list)
-    for group, found in scores.items():
-        sets[group.source].append(found)
+    for group, result in scores.items():
+        sets[group.source].append(result)
     medians = [
         (
-            np.median([error for found in members for error in found.reproduction]),
-            np.median([found.held_out for found in members]),
-            np.median([found.density for found in members]),
+            np.median([error for result in members for error in result.reproduction]),
+            np.median([result.held_out for result in members]),
+            np.median([result.density for result in members]),
         )
         for members in sets.values()
     ]
     reproduced, held_out, density = np.median(medians, axis=0)
-    worst = max(error for found in scores.values() for error in found.reproduction)
-    seconds = np.median([found.seconds for found in scores.values()])
+    worst = max(error for result in scores.values() for error in result.reproduction)
+    seconds = np.median([result.seconds for result in scores.values()])
     shares = [f"{share:.1e}" for share in (reproduced, worst, held_out)]
     return [*shares, f"{density:.2f}", f"{1e3 * seconds:.3g}"]
 
@@ -193,8 +193,8 @@ def report(scores: dict[str, dict[Group, Score]]) -> str:
     )
     for kind in ("discrete", "rhythmic"):
         rows = []
-        for name, found in scores.items():
-            of_kind = {group: score for group, score in found.items() if group.kind == kind}
+        for name, group_scores in scores.items():
+            of_kind = {group: score for group, score in group_scores.items() if group.kind == kind}
             if of_kind:
                 mark = "**" if name in DEFAULTS else ""
                 rows.append([f"{mark}{name}{mark}", *over_sets(of_kind)])

@@ -144,6 +144,6 @@ def styled_walks() -> Iterator[Demonstration]:
     with open(walks / "strides.csv", newline="") as file:
         for stride in csv.DictReader(file):
             if stride["stride"] == "0" and stride["id"].startswith("walk"):
-                whole = read_csv(walks / "demos" / f"{stride['id']}.csv", columns=ARM)
+                recording = read_csv(walks / "demos" / f"{stride['id']}.csv", columns=ARM)
                 start, end = int(stride["start_frame"]), int(stride["end_frame"])
-                yield cycle(whole.position[start:end], float(stride["duration_s"]))
+                yield cycle(recording.position[start:end], float(stride["duration_s"]))

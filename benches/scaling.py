@@ -56,13 +56,13 @@ def lapack(n_demos: int) -> Call:
 
 def times(method: Callable[[int], Call], sizes: list[int]) -> dict[int, float]:
     """Returns the minimum time [s] by size, until one exceeds `MAX_TIME`."""
-    found: dict[int, float] = {}
+    seconds: dict[int, float] = {}
     for size in sizes:
         call = method(size)
-        found[size] = min(timed(call) for _ in range(REPEATS))
-        if found[size] > MAX_TIME:
+        seconds[size] = min(timed(call) for _ in range(REPEATS))
+        if seconds[size] > MAX_TIME:
             break
-    return found
+    return seconds
 
 
 def timed(call: Call) -> float:
@@ -79,12 +79,12 @@ def panel(
     label_axes(axes, over, "time [s]")
     print(title)
     for index, (name, method) in enumerate(methods.items()):
-        found = times(method, sizes)
+        seconds = times(method, sizes)
         style = {"marker": MARKERS[index], "color": PALETTE[index], "markersize": 4}
-        axes.loglog(list(found), list(found.values()), label=name, **style)
-        print(f"{name}: " + ", ".join(f"{size}: {1e3 * t:.3g} ms" for size, t in found.items()))
-    place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "alignment": "left"}
-    axes.legend(title=title, title_fontsize="large", frameon=False, **place)
+        axes.loglog(list(seconds), list(seconds.values()), label=name, **style)
+        print(f"{name}: " + ", ".join(f"{size}: {1e3 * t:.3g} ms" for size, t in seconds.items()))
+    location = {"loc": "lower left", "bbox_to_anchor": (0, 1), "alignment": "left"}
+    axes.legend(title=title, title_fontsize="large", frameon=False, **location)
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ demos = [
 model = pdmp.fit(demos, n_styles=2)
 print(model)
 
-# Styles are points in a vector space: the mean of two of them.
+# Styles are points in a vector space; this is the mean of two of them.
 style = (model.styles[0] + model.styles[4]) / 2
 trajectory = model.rollout(style=style, dt=DT)
 peak = trajectory.position[:, 1].max()

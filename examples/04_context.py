@@ -25,5 +25,5 @@ conditions = prediction.conditions
 print(f"style {np.round(conditions.style, 3)}, goal {np.round(conditions.goal, 3)} m")
 print(f"duration {prediction.duration:.2f} s")
 trajectory = model.rollout(context=[unseen])
-wanted = reach(unseen)[:, 1].max()
-print(f"peak {trajectory.position[:, 1].max():.3f} m, wanted {wanted:.3f} m")
+expected = reach(unseen)[:, 1].max()
+print(f"peak {trajectory.position[:, 1].max():.3f} m, expected {expected:.3f} m")

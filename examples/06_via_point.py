@@ -26,6 +26,6 @@ style = nominal + np.linalg.lstsq(jacobian, point - before, rcond=None)[0]
 took = time.perf_counter() - began
 
 made = model.rollout(style=style, dt=DT).position
-print(f"before: {before.round(3)} m at {k * DT} s, wanted: {point.round(3)}")
+print(f"before: {before.round(3)} m at {k * DT} s, via-point: {point.round(3)}")
 print(f"style {style.round(3)} misses by {np.linalg.norm(made[k] - point):.1e} m")
 print(f"and ends at {made[-1].round(3)} m; found in {1000 * took:.1f} ms")

@@ -66,9 +66,9 @@ def engine() -> Any:
             f"the robot needs {missing.name}: pip install --group reproduction"
         ) from None
     except (AttributeError, ImportError, OSError, RuntimeError) as error:
-        asked = os.environ.get("MUJOCO_GL", "")
+        requested = os.environ.get("MUJOCO_GL", "")
         raise ImportError(
-            f'MuJoCo cannot start with MUJOCO_GL="{asked}" ({error}): leave it unset'
+            f'MuJoCo cannot start with MUJOCO_GL="{requested}" ({error}): leave it unset'
         ) from None
     return mujoco
 
@@ -162,9 +162,9 @@ class Arm:
             q = solution.x
             inside = np.all((self.lowest <= q) & (q <= self.highest))
             if not inside or np.linalg.norm(solution.fun) > 1e-6:
-                place = np.round(hand, 3)
+                position = np.round(hand, 3)
                 raise UnreachableError(
-                    f"hands: {place} m is out of reach with the elbow at {swivel:.2f} rad"
+                    f"hands: {position} m is out of reach with the elbow at {swivel:.2f} rad"
                 )
             path.append(q)
         return np.array(path)

@@ -44,21 +44,21 @@ def learn(reaching: Reaching, n_styles: int) -> pdmp.Model:
 
 def error(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration, style: Array) -> float:
     """Returns E = (1/T) Σ ‖ŷ − y‖² [rad²] of the movement of a style, in aligned time."""
-    gap = movement(model, reaching, style) - aligned(demo)
-    return float(np.mean(np.sum(gap**2, axis=1)))
+    difference = movement(model, reaching, style) - aligned(demo)
+    return float(np.mean(np.sum(difference**2, axis=1)))
 
 
 def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
     """Returns the movement of a style (N_SAMPLES, D) over normalised time."""
     duration = float(model.durations[model.nominal])
-    made = model.rollout(
+    rollout = model.rollout(
         style=style,
         goal=reaching.goal,
         start=reaching.start,
         dt=duration / (N_SAMPLES - 1),
         duration=duration,
     )
-    return made.position
+    return rollout.position
 
 
 def predicted_style(model: pdmp.Model, height: float) -> Array:
@@ -116,8 +116,8 @@ def reach_predicted(
 def new_goal(model: pdmp.Model, reaching: Reaching) -> NewGoal:
     """Returns a command during the movement: a goal 12 cm farther from the body."""
     usual = np.array([reaching.arm.swivel(reaching.goal)])
-    place = (reaching.task.goal + GOAL_OFFSET)[None]
-    goal = reaching.arm.reach(place, usual, reaching.goal)[0]
+    goal_hand = (reaching.task.goal + GOAL_OFFSET)[None]
+    goal = reaching.arm.reach(goal_hand, usual, reaching.goal)[0]
     return NewGoal(GOAL_CHANGE_AT * robot_duration(model), goal)
 
 
@@ -131,12 +131,12 @@ def figure_4(seed: int = SEED) -> Section:
     reaching = demonstrate(seed)
     test_errors = errors(reaching)
     models = {n_styles: learn(reaching, n_styles) for n_styles in range(1, 5)}
-    tried = {
+    robots_by_styles = {
         n_styles: {height: reach_predicted(model, reaching, height) for height in TESTED}
         for n_styles, model in models.items()
     }
     command = new_goal(models[3], reaching)
-    robots = tried[3]
+    robots = robots_by_styles[3]
     moved = {height: reach_predicted(models[3], reaching, height, command) for height in TESTED}
     by_styles = [
         [
@@ -144,7 +144,7 @@ def figure_4(seed: int = SEED) -> Section:
             *(f"{robot.log.contact():.3f} s" for robot in reached.values()),
             *(f"{1e3 * robot.log.tracking_error():.0f} mrad" for robot in reached.values()),
         ]
-        for n_styles, reached in tried.items()
+        for n_styles, reached in robots_by_styles.items()
     ]
     text = [
         "Learnt from nine reaches over none, two and three boxes; six over one box and over four "
@@ -223,8 +223,8 @@ def draw_paths(
         after = turned[round(command.time / DT) :]
         style_kwargs: dict[str, Any] = {"color": PALETTE[2], "marker": "^", "markevery": 250}
         paths.draw_hand(axes, reaching, after, **style_kwargs, label="goal moved")
-        way, up = reaching.side_view(reaching.arm.hands([command.goal]))
-        axes.plot(way, up, "*", color=PALETTE[2], markersize=12, label="new goal")
+        distance, hand_height = reaching.side_view(reaching.arm.hands([command.goal]))
+        axes.plot(distance, hand_height, "*", color=PALETTE[2], markersize=12, label="new goal")
         paths.label_side_view(axes, pile(height))
     panels[0].set_ylim(bottom=0)
     legend(figure, panels[0])

@@ -84,10 +84,10 @@ def reach(task: Task, height: float, noise: Generator) -> Reach:
     clear = CLEARANCE * np.sqrt(0.5)
     lift = height + clear - HAND_HEIGHT if height > 0 else 0.0
     spread = np.hypot(VIA_NOISE, [0, 0, LIFT_NOISE * lift])
-    off = np.array([0, 0, lift]) + noise.normal(0, spread) @ task.axes
+    deviation = np.array([0, 0, lift]) + noise.normal(0, spread) @ task.axes
     edge = (0.5 * BOX[0] + clear) * task.forward
     start, goal = (place + noise.normal(0, END_NOISE, 3) for place in (task.start, task.goal))
-    points = np.array([start, task.middle - edge + off, task.middle + edge + off, goal])
+    points = np.array([start, task.middle - edge + deviation, task.middle + edge + deviation, goal])
     path = minimum_jerk(points, delay=noise.normal(0, PASSING_NOISE))
     length = np.linalg.norm(np.diff(path(np.linspace(0, 1, 400)), axis=0), axis=1).sum()
     straight = np.linalg.norm(task.goal - task.start)
@@ -111,7 +111,7 @@ def minimum_jerk(points: Array, delay: float = 0.0) -> Callable[[Array], Array]:
     delay : float
         Delay of the via-points, as a share of the duration.
     """
-    from scipy.interpodelay import make_interp_spline
+    from scipy.interpolate import make_interp_spline
     from scipy.optimize import minimize_scalar
 
     rest = [(1, np.zeros(3)), (2, np.zeros(3))]

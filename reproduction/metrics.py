@@ -13,5 +13,5 @@ def reproduction_error(model: pdmp.Model, demo: pdmp.Demonstration, m: int) -> f
     """
     position = demo.position
     dt = model.durations[m] / (len(position) - (model.kind == "discrete"))
-    made = model.rollout(model.conditions(m), dt=dt).position[: len(position)]
-    return float(np.sqrt(np.mean((made - position) ** 2)) / np.ptp(position, axis=0).max())
+    reproduced = model.rollout(model.conditions(m), dt=dt).position[: len(position)]
+    return float(np.sqrt(np.mean((reproduced - position) ** 2)) / np.ptp(position, axis=0).max())

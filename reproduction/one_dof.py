@@ -72,8 +72,8 @@ def rhythmic(noise: Generator) -> Example:
 
 def extremes(model: pdmp.Model) -> tuple[int, int]:
     """Returns the two demonstrations whose styles are the farthest apart."""
-    gaps = np.linalg.norm(model.styles[:, None] - model.styles, axis=2)
-    first, second = np.unravel_index(np.argmax(gaps), gaps.shape)
+    distances = np.linalg.norm(model.styles[:, None] - model.styles, axis=2)
+    first, second = np.unravel_index(np.argmax(distances), distances.shape)
     return int(first), int(second)
 
 
@@ -122,14 +122,14 @@ def draw(examples: Sequence[Example]) -> Figure:
     grid = figure.subplots(len(examples), 3)
     for row, example in zip(grid, examples, strict=True):
         model = example.model
-        demonstrated, made, between = row
+        demonstrated, reproduced, between = row
         for m in range(N_DEMOS):
             demonstrated.plot(*example.demonstrated(m), color=GREY, linewidth=0.9)
         for m, color, name in zip(extremes(model), (BLUE, ORANGE), ("s1", "s2"), strict=True):
-            _variants(made, example, m, color, name)
-        made.plot([], [], color="black", linestyle=":", label="demonstrated")
-        made.plot([], [], color="black", linewidth=1.0, label="goal moved")
-        made.plot([], [], color="black", linewidth=1.0, linestyle="-.", label="1.5 τ")
+            _variants(reproduced, example, m, color, name)
+        reproduced.plot([], [], color="black", linestyle=":", label="demonstrated")
+        reproduced.plot([], [], color="black", linewidth=1.0, label="goal moved")
+        reproduced.plot([], [], color="black", linewidth=1.0, linestyle="-.", label="1.5 τ")
         first, second = (model.conditions(m) for m in extremes(model))
         for share in SHARES:
             path = _path(model, pdmp.blend(first, second, float(share)), model.nominal)

@@ -44,8 +44,8 @@ class Reaching:
 
     def miss(self, hand: Array, goal: Array | None = None) -> float:
         """Returns the distance [mm] of a hand (3,) [m] from its position at a goal [rad]."""
-        place = self.arm.places(self.goal if goal is None else goal)[2]
-        return 1e3 * float(np.linalg.norm(hand - place))
+        goal_hand = self.arm.places(self.goal if goal is None else goal)[2]
+        return 1e3 * float(np.linalg.norm(hand - goal_hand))
 
     def side_view(self, hands: Array) -> tuple[Array, Array]:
         """Returns distance (T,) from start towards goal and height (T,) of hands (T, 3), in m."""

@@ -105,9 +105,9 @@ def figure_3(seed: int = SEED) -> Section:
 def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) -> Figure:
     """Draws the path of the hand from the side, for several styles and several goals."""
     figure = ensure_figure(None, 9.5, 4.2)
-    styles, places = figure.subplots(1, 2, sharey=True)
+    styles, goal_panel = figure.subplots(1, 2, sharey=True)
     tallest = max(HEIGHTS)
-    for axes in (styles, places):
+    for axes in (styles, goal_panel):
         paths.draw_boxes(axes, reaching, tallest, alpha=0.12)
     for demo in reaching.demos:
         hands = reaching.arm.hands(demo.position)
@@ -126,11 +126,11 @@ def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) 
                 duration=4.0,
             )
             hands = reaching.arm.hands(moved.position)
-            paths.draw_hand(places, reaching, hands, color=color, linewidth=1.2)
-        way, height = reaching.side_view(reaching.arm.hands([goal]))
-        places.plot(way, height, "*", color=color, markersize=11)
+            paths.draw_hand(goal_panel, reaching, hands, color=color, linewidth=1.2)
+        distance, height = reaching.side_view(reaching.arm.hands([goal]))
+        goal_panel.plot(distance, height, "*", color=color, markersize=11)
     paths.label_side_view(styles, "styles, on the robot")
-    paths.label_side_view(places, "goals (stars), each in these styles")
+    paths.label_side_view(goal_panel, "goals (stars), each in these styles")
     styles.set_ylim(bottom=0)
     styles.legend(frameon=False, fontsize=8)
     return figure

@@ -87,7 +87,7 @@ def swing(
 ) -> SwingResult:
     """Swings the arms, with a command every `interval` seconds; a robot, if given, follows."""
     controller = model.controller(dt=DT, **switches[0].command)
-    done = SwingResult()
+    result = SwingResult()
     for switch in switches:
         for name, value in switch.command.items():
             setattr(controller, name, value)
@@ -97,12 +97,12 @@ def swing(
             controller.step()
             if robot is not None:
                 robot.move(controller.position, controller.velocity, controller.acceleration)
-            done.position.append(controller.position.copy())
+            result.position.append(controller.position.copy())
             since += DT / cycle.period
             if SETTLING_PERIODS <= since < SETTLING_PERIODS + 1:
                 worst = float(np.fmax(worst, cycle.distance(controller)))
-        done.distances.append(worst)
-    return done
+        result.distances.append(worst)
+    return result
 
 
 class _Cycle:
@@ -111,7 +111,7 @@ class _Cycle:
     def __init__(self, model: pdmp.Model, controller: pdmp.Controller) -> None:
         self.period = 2 * np.pi * float(controller.tau)
         n_steps = 2000
-        made = model.rollout(
+        rollout = model.rollout(
             style=controller.style,
             anchor=controller.anchor,
             amplitude=controller.amplitude,
@@ -119,7 +119,7 @@ class _Cycle:
             dt=self.period / n_steps,
         )
         self._phases = 2 * np.pi * np.arange(n_steps + 1) / n_steps
-        self._position = made.position[: n_steps + 1]
+        self._position = rollout.position[: n_steps + 1]
         self._range = np.ptp(self._position, axis=0).max()
 
     def distance(self, controller: pdmp.Controller) -> float:
@@ -136,16 +136,16 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
     chosen = [names.index(name) for name in ("normal", "marching", "girly")]
     commands = switches(model, chosen, names)
     robot = Robot(model.rollout(**commands[0].command).position[0])
-    done = swing(model, commands, robot)
+    result = swing(model, commands, robot)
     text = [
         f"{len(names)} styles of both arms, {model.n_dofs} joints. {_spectrum(model)} The largest "
         f"tracking error on the robot is {1e3 * robot.log.tracking_error():.1f} mrad.",
-        _settling(commands, done),
+        _settling(commands, result),
     ]
     section = Section(
         "Fig. 5: stylised arm swing",
         text,
-        {"fig5_joints": draw(model, commands, done, NAMES[:4])},
+        {"fig5_joints": draw(model, commands, result, NAMES[:4])},
     )
     film.attach(section, "fig5_robot", _instants(model, robot, chosen, names), film.SWINGING)
     if walks is not None:
@@ -155,10 +155,10 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
 
 
 def draw(
-    model: pdmp.Model, commands: Sequence[Switch], done: SwingResult, names: Sequence[str]
+    model: pdmp.Model, commands: Sequence[Switch], result: SwingResult, names: Sequence[str]
 ) -> Figure:
     """Draws the joints of one arm about each switch."""
-    position = np.array(done.position)
+    position = np.array(result.position)
     interval = len(position) * DT / len(commands)
     figure = ensure_figure(None, 11.0, 7.0)
     panels = figure.subplots(len(names), len(commands) - 1, sharey="row", sharex="col")
@@ -196,36 +196,36 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
     files = sorted(folder.glob("*.csv"))
     if not files:
         raise ValueError(f"recordings: {folder} has no CSV file; each is one person walking")
-    kept, names, odd = [], [], []
+    demos, names, aperiodic = [], [], []
     for file in files:
         recording = read_csv(file, columns=RECORDED)
         try:
             period = float(cycles(recording, average=True).periods[0])
         except ValueError:
-            odd.append(file.stem)
+            aperiodic.append(file.stem)
             continue
         if period * MAX_STRIDE_RATE < 1:
-            odd.append(file.stem)
+            aperiodic.append(file.stem)
             continue
-        kept.append(recording)
+        demos.append(recording)
         names.append(file.stem)
-    if len(kept) < 4:
+    if len(demos) < 4:
         raise ValueError(
-            f"recordings: {folder} has {len(kept)} in which strides repeat: pass at least 4"
+            f"recordings: {folder} has {len(demos)} in which strides repeat: pass at least 4"
         )
-    strides = cycles(kept, average=True)
+    strides = cycles(demos, average=True)
     model = learn(list(strides))
     by_range = np.argsort([np.ptp(stride.position, axis=0).max() for stride in strides])
     # Recordings of median, larger and largest range: no style is switched to itself.
-    chosen = [int(by_range[share * (len(kept) - 1) // 4]) for share in (2, 3, 4)]
+    chosen = [int(by_range[share * (len(demos) - 1) // 4]) for share in (2, 3, 4)]
     commands = switches(model, chosen, names)
-    done = swing(model, commands)
-    without = f", without {', '.join(odd)}, in which no stride repeats" if odd else ""
+    result = swing(model, commands)
+    without = f", without {', '.join(aperiodic)}, in which no stride repeats" if aperiodic else ""
     paragraphs = [
-        f"Recordings of {len(kept)} walks{without}. {_spectrum(model)}",
-        _settling(commands, done),
+        f"Recordings of {len(demos)} walks{without}. {_spectrum(model)}",
+        _settling(commands, result),
     ]
-    return paragraphs, draw(model, commands, done, RECORDED[:4])
+    return paragraphs, draw(model, commands, result, RECORDED[:4])
 
 
 def _spectrum(model: pdmp.Model) -> str:
@@ -237,8 +237,8 @@ def _spectrum(model: pdmp.Model) -> str:
     )
 
 
-def _settling(commands: Sequence[Switch], done: SwingResult) -> str:
-    rows = zip(commands, done.distances, strict=True)
+def _settling(commands: Sequence[Switch], result: SwingResult) -> str:
+    rows = zip(commands, result.distances, strict=True)
     header = ["switch", "off the new cycle in the sixth period"]
     return markdown_table(
         header, ([switch.name, f"{distance:.2%} of its range"] for switch, distance in rows)

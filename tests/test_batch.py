@@ -68,7 +68,7 @@ def test_number_of_arrays_follows_derivatives(model: pdmp.Model, derivatives: in
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_chunks_and_threads_are_bitwise_equal(model: pdmp.Model, threads: int) -> None:
-    """All chunks together equal the batch bit for bit, for any number of threads."""
+    """The chunks together equal the batch bit for bit, for any number of threads."""
     styles, velocities = np.tile(STYLES, (20, 1)), np.tile(STYLES, (20, 1)) / 3
     expected = model.rollouts(styles, dt=0.005, velocities=velocities, threads=1)
     whole = model.rollouts(styles, dt=0.005, velocities=velocities, threads=threads)
@@ -180,7 +180,7 @@ def test_jacobian_follows_the_amplitude(cycle: pdmp.Model) -> None:
     np.testing.assert_array_equal(half, model.jacobian("style", velocity=[0, 0]) / 2)
 
 
-REFUSED: list[tuple[dict[str, Any], str]] = [
+REJECTED: list[tuple[dict[str, Any], str]] = [
     ({"goals": np.zeros((3, 2))}, "goals has 3 rows, but there are 23 styles: pass one row for ea"),
     ({"starts": np.zeros((23, 3))}, "starts has length 3, expected 2: one value per DoF"),
     ({"velocities": [0.0]}, "velocities has length 1, expected 2: one value per DoF"),
@@ -201,7 +201,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("given", "message"), REFUSED, ids=str)
+@pytest.mark.parametrize(("given", "message"), REJECTED, ids=str)
 def test_invalid_batches_are_rejected(
     reach: pdmp.Model, given: dict[str, Any], message: str
 ) -> None:

@@ -86,8 +86,8 @@ def test_ticks_of_two_threads_are_atomic(model: pdmp.Model) -> None:
                 controller.step(measured=list(controller.position), coupling=(place, place))
                 ticks += 1
                 assert np.isfinite(controller.velocity).all()
-            except RuntimeError as refused:
-                assert "borrowed" in str(refused)
+            except RuntimeError as error:
+                assert "borrowed" in str(error)
             except BaseException as error:
                 other.append(error)
         return ticks

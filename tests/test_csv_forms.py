@@ -62,13 +62,13 @@ FORMS = {
 
 @pytest.mark.parametrize("lines", FORMS.values(), ids=FORMS)
 def test_form_of_the_table_does_not_matter(tmp_path: Path, lines: list[str]) -> None:
-    """The same samples are read bit for bit from every form."""
+    """Samples are read bit for bit from every form."""
     assert_read(read(tmp_path, lines))
 
 
 def test_random_tables_are_read_or_rejected(tmp_path: Path) -> None:
     """No form of a table changes a number or a name, and most are accepted."""
-    random, refused = np.random.default_rng(0), 0
+    random, n_rejected = np.random.default_rng(0), 0
     n_tables = 400
     for _ in range(n_tables):
         n_dofs, n_samples = random.integers(1, 6), random.integers(4, 12)
@@ -94,12 +94,12 @@ def test_random_tables_are_read_or_rejected(tmp_path: Path) -> None:
         try:
             demo = read(tmp_path, lines, **({} if timed else {"dt": 0.125}))
         except ValueError:
-            refused += 1
+            n_rejected += 1
             continue
         np.testing.assert_array_equal(demo.position, expected)
         np.testing.assert_array_equal(demo.time, np.arange(n_samples) / 8)
         assert demo.names == names
-    assert refused < 0.03 * n_tables
+    assert n_rejected < 0.03 * n_tables
 
 
 def test_tables_of_numpy_and_pandas_are_read(tmp_path: Path) -> None:
@@ -189,7 +189,7 @@ def test_empty_rows_are_gaps_where_time_is_counted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (["t;x", *(f"{k};{k + 1},000" for k in range(9))], "commas may be decimal or separate"),
+        (["t;x", *(f"{k};{k + 1},000" for k in range(9))], "commas are decimal or separate"),
         (["t;x;y", *rows(";", ","), "0,2;1.5;2"], "line 22: numbers have decimal commas and"),
         (["t;x", *(f"0,{k};1.000,5" for k in range(9))], "decimal commas and decimal points"),
         (["t,x", *(f"0,{k},1,{k}" for k in range(9))], "4 fields, expected 2 .* semicolons"),
@@ -197,8 +197,8 @@ def test_empty_rows_are_gaps_where_time_is_counted(tmp_path: Path) -> None:
         (["t,x", *(f'0.{k},"1,5"' for k in range(9))], "'1,5' is not a number: decimal commas are"),
         (["stamp,x", "clock,z", *rows()[:0], "0,1", "1,2"], "lines 1 and 2 may both name"),
         (["0.0,1", "0.1,2", "t,x", "0.2,3"], "line 1: '0.0' is not a name"),
-        ([",x", *(f"{k / 10},{k}" for k in range(9))], "stands in column 1, which has no name"),
-        (["t,,x", *(f"{k},{k},{k}" for k in range(9))], "stands in column 2, which has no name"),
+        ([",x", *(f"{k / 10},{k}" for k in range(9))], "is in column 1, which has no name"),
+        (["t,,x", *(f"{k},{k},{k}" for k in range(9))], "is in column 2, which has no name"),
         (["t,x", "0,inf", "1,2"], "inf is not finite"),
         (["t,x", "0," + "1" * 100_000 + "x"], "'1{80}[.]{3}' is not a number"),
         (["t,x", "1" * 100_000 + "x,m", "0,1"], "'1{80}[.]{3}' is not a number"),

@@ -28,7 +28,7 @@ def test_shapes_have_seven_demonstrations_that_end_at_the_origin() -> None:
 
 
 def test_thirty_shapes_by_default() -> None:
-    """All shapes are returned by default."""
+    """Every shape is returned by default."""
     assert len(handwriting()) == 30
 
 

@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as arrays
 import pdmp
 from synthetic import reaches
 
-REFUSALS = (ValueError, TypeError, OverflowError, pdmp.FitError)
+REJECTIONS = (ValueError, TypeError, OverflowError, pdmp.FitError)
 QUICK = settings(max_examples=300)
 FIXTURES = {"discrete": "reach", "rhythmic": "cycle"}
 KINDS = pytest.mark.parametrize("kind", FIXTURES)
@@ -84,8 +84,8 @@ class Tally:
         self.calls += 1
         try:
             result = function(*args, **kwargs)
-        except REFUSALS as refusal:
-            assert str(refusal)
+        except REJECTIONS as error:
+            assert str(error)
             return None
         self.accepted += 1
         return result

@@ -106,10 +106,10 @@ def test_gaps_across_a_wrap_need_the_unit(tmp_path: Path) -> None:
     rows = np.column_stack([S, wrapped]).astype(object)
     missing = (np.abs(angle - np.pi) < 0.15) & (S > 0)
     rows[missing, 1] = ""
-    for header, refused in (("t,q", True), ("t,q [rad]", False)):
+    for header, rejected in (("t,q", True), ("t,q [rad]", False)):
         path = tmp_path / "angle.csv"
         path.write_text("\n".join([header, *(f"{t},{q}" for t, q in rows)]))
-        if refused:
+        if rejected:
             with pytest.raises(
                 ValueError, match=r"column 'q': changes by -5.\d+ in the gap.*\[rad\]"
             ):

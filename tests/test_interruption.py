@@ -90,9 +90,9 @@ resource.setrlimit(resource.RLIMIT_FSIZE, ({len(saved) // 2}, {len(saved) // 2})
 try:
     model.save({str(path)!r})
 except OSError as error:
-    print("refused")
+    print("rejected")
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout == "refused\n", done.stderr
+    assert done.stdout == "rejected\n", done.stderr
     assert path.read_bytes() == saved
     assert os.listdir(tmp_path) == ["model"]

@@ -136,21 +136,21 @@ def test_cycles_of_walks_last_as_long_as_their_strides() -> None:
     Of 22, three have too low an autocorrelation over all degrees of freedom: two are rejected, and
     the third has the period of two strides.
     """
-    refused, doubled = [], []
+    rejected, doubled = [], []
     for name, durations in strides().items():
         recording = pdmp.io.read_csv(folder("walk_styles_bandai") / "demos" / f"{name}.csv")
         try:
             cycles = pdmp.preprocessing.cycles(recording)
         except ValueError as error:
             assert "no period" in str(error)
-            refused.append(name)
+            rejected.append(name)
             continue
         share = np.median(cycles.periods) / np.mean(durations)
         if share > 1.5:
             doubled.append(name)
         else:
             assert share == pytest.approx(1, abs=0.03), name
-    assert refused == ["walk_not-confident_001", "walk_sad_002"]
+    assert rejected == ["walk_not-confident_001", "walk_sad_002"]
     assert doubled == ["walk_not-confident_002"]
 
 

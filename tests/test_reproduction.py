@@ -202,8 +202,8 @@ def test_switches_converge_within_five_periods() -> None:
         model, [names.index(n) for n in ("normal", "running", "tired")], names
     )
     done = walking.swing(model, commands, interval=9.0)
-    assert max(done.off) < 0.03
-    assert min(done.off[1:]) > 0
+    assert max(done.distances) < 0.03
+    assert min(done.distances[1:]) > 0
     apart = [np.ptp(done.position[k : k + 1000], axis=0).max() for k in (7_000, 16_000, 43_000)]
     assert apart[1] > 1.5 * apart[0] > 1.5 * apart[2]
 
@@ -353,7 +353,7 @@ def test_commands_have_help_and_reject_a_dash(
     figure = ["fig2"] if command is main else []
     with pytest.raises(SystemExit, match="2"):
         command([*figure, "-o", "-"])
-    assert "- is no file" in capsys.readouterr().err
+    assert "- is not a file" in capsys.readouterr().err
 
 
 def test_commands_report_errors_in_one_line(

@@ -64,31 +64,31 @@ def ruckig_start() -> tuple[Any, Any, Any]:
     """
     from ruckig import InputParameter, OutputParameter, Ruckig
 
-    given = InputParameter(N_DOFS)
-    given.target_position = movement(0)[-1].tolist()
-    given.max_velocity = [10.0] * N_DOFS
-    given.max_acceleration = [40.0] * N_DOFS
-    given.max_jerk = [400.0] * N_DOFS
-    return Ruckig(N_DOFS, DT), given, OutputParameter(N_DOFS)
+    parameters = InputParameter(N_DOFS)
+    parameters.target_position = movement(0)[-1].tolist()
+    parameters.max_velocity = [10.0] * N_DOFS
+    parameters.max_acceleration = [40.0] * N_DOFS
+    parameters.max_jerk = [400.0] * N_DOFS
+    return Ruckig(N_DOFS, DT), parameters, OutputParameter(N_DOFS)
 
 
-def ruckig_rest(given: Any) -> None:
+def ruckig_rest(parameters: Any) -> None:
     """Sets the input to rest at the start."""
-    given.current_position = movement(0)[0].tolist()
-    given.current_velocity = [0.0] * N_DOFS
-    given.current_acceleration = [0.0] * N_DOFS
+    parameters.current_position = movement(0)[0].tolist()
+    parameters.current_velocity = [0.0] * N_DOFS
+    parameters.current_acceleration = [0.0] * N_DOFS
 
 
 def ruckig_sample() -> Begin:
     """Samples a trajectory; its computation, in the first update, is not timed."""
-    generator, given, output = ruckig_start()
+    generator, parameters, output = ruckig_start()
 
     def tick() -> None:
-        generator.update(given, output)
-        output.pass_to_input(given)
+        generator.update(parameters, output)
+        output.pass_to_input(parameters)
 
     def begin() -> Call:
-        ruckig_rest(given)
+        ruckig_rest(parameters)
         tick()
         return tick
 
@@ -97,16 +97,16 @@ def ruckig_sample() -> Begin:
 
 def ruckig_new_goal() -> Begin:
     """Computes a trajectory at every tick, with a new target before each."""
-    generator, given, output = ruckig_start()
+    generator, parameters, output = ruckig_start()
     targets = cycle([goal.tolist() for goal in goals()])
 
     def tick() -> None:
-        given.target_position = next(targets)
-        generator.update(given, output)
-        output.pass_to_input(given)
+        parameters.target_position = next(targets)
+        generator.update(parameters, output)
+        output.pass_to_input(parameters)
 
     def begin() -> Call:
-        ruckig_rest(given)
+        ruckig_rest(parameters)
         tick()
         return tick
 

@@ -31,14 +31,14 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--write", action="store_true", help="write docs/report.md")
     write = arguments.parse_args().write
-    asked = list(questions())
-    if not asked:
+    available = list(questions())
+    if not available:
         raise SystemExit("no recordings: set PDMP_DATA to a folder with sets of them")
     answers: list[tuple[Question, Evaluation]] = []
     with ProcessPoolExecutor() as pool:
-        for question, found in zip(asked, pool.map(answer, asked), strict=True):
-            print(f"{question.name}\n\n{found}\n", flush=True)
-            answers.append((question, found))
+        for question, evaluation in zip(available, pool.map(answer, available), strict=True):
+            print(f"{question.name}\n\n{evaluation}\n", flush=True)
+            answers.append((question, evaluation))
     report = text(answers)
     if write:
         (ROOT / "docs" / "report.md").write_text(report, encoding="utf-8")
@@ -47,16 +47,16 @@ def main() -> None:
 
 def answer(question: Question) -> Evaluation:
     """Evaluates all predictors on one question, and draws their predictions."""
-    given = {"contexts": question.contexts} | question.options
+    options = {"contexts": question.contexts} | question.options
     predictors = baselines() | library_baselines() | PRIMITIVES
-    found = evaluate(question.demos, predictors=predictors, **given)
-    figure = plot.held_out(found, PRIMITIVE, unit=question.unit)
+    evaluation = evaluate(question.demos, predictors=predictors, **options)
+    figure = plot.held_out(evaluation, PRIMITIVE, unit=question.unit)
     plot.save(figure, FIGURES / f"{slug(question.name)}.png")
     if question.name in CURVES:
-        curve = evaluate(question.demos, predictors=over_styles(8), **given)
+        curve = evaluate(question.demos, predictors=over_styles(8), **options)
         figure = plot.prediction_error(curve, unit=question.unit)
         plot.save(figure, FIGURES / f"{slug(question.name)}_styles.png")
-    return found
+    return evaluation
 
 
 def slug(name: str) -> str:

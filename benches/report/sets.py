@@ -86,11 +86,11 @@ def doors() -> Iterator[Question]:
     """Yields reaches for the handle of a door at many places, and the opening of the door."""
     index = rows("door_adroit")
     demos = list(read_folder(folder("door_adroit"), columns=HAND).values())
-    places = numbers(index, "door_x", "door_y", "door_z")
+    contexts = numbers(index, "door_x", "door_y", "door_z")
     ends = numbers(index, "latch_turns_at_s")
     reaches = cut(demos, np.hstack([0 * ends, ends]))
-    yield Question("door_adroit, reach", "place of the door", "rad", reaches, places)
-    yield Question("door_adroit, whole", "place of the door", "rad", demos, places)
+    yield Question("door_adroit, reach", "place of the door", "rad", reaches, contexts)
+    yield Question("door_adroit, whole", "place of the door", "rad", demos, contexts)
 
 
 def styled_walks() -> Iterator[Question]:
@@ -99,9 +99,11 @@ def styled_walks() -> Iterator[Question]:
     demos, contexts = [], []
     for stride in rows("walk_styles_bandai", "strides.csv"):
         if stride["id"].startswith("walk") and stride["foot"] == "r":
-            whole = walk(stride["id"])
+            recording = walk(stride["id"])
             start, end = int(stride["start_frame"]), int(stride["end_frame"])
-            demos.append(cycle(whole.position[start:end], float(stride["duration_s"]), whole.names))
+            demos.append(
+                cycle(recording.position[start:end], float(stride["duration_s"]), recording.names)
+            )
             contexts.append([speeds[stride["id"]]])
     options = {"kind": "rhythmic"}
     yield Question("walk_styles_bandai", "speed", "rad", demos, np.array(contexts), options)
@@ -128,8 +130,8 @@ def pushes() -> Iterator[Question]:
     """Yields pushes of an object to a target with a planar arm."""
     index = rows("arm3_pushing")
     demos = list(read_folder(folder("arm3_pushing")).values())
-    places = numbers(index, "object_x", "object_y", "target_x", "target_y")
-    yield Question("arm3_pushing", "object and target", "rad", demos, places)
+    contexts = numbers(index, "object_x", "object_y", "target_x", "target_y")
+    yield Question("arm3_pushing", "object and target", "rad", demos, contexts)
 
 
 ASKED = {
@@ -158,8 +160,8 @@ def cut(demos: list[Demonstration], bounds: np.ndarray) -> list[Demonstration]:
     """Returns the part of each demonstration between two times [s]."""
     parts = []
     for demo, (begin, end) in zip(demos, bounds, strict=True):
-        kept = (demo.time >= begin - 1e-3) & (demo.time <= end + 1e-3)
-        parts.append(Demonstration(demo.position[kept], time=demo.time[kept], names=demo.names))
+        inside = (demo.time >= begin - 1e-3) & (demo.time <= end + 1e-3)
+        parts.append(Demonstration(demo.position[inside], time=demo.time[inside], names=demo.names))
     return parts
 
 

@@ -63,18 +63,18 @@ def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
     """Returns the report on all answers."""
     names = [name for name in answers[0][1].predictors if name != REFERENCE]
     errors, itself, time = [], [], []
-    for question, found in answers:
+    for question, evaluation in answers:
         chosen, shares = choices(question), spectra(question)
-        for reach in found.reaches():
-            splits = [split for split in found.splits if split.reach == reach]
-            held = sum(len(split.test) for split in splits)
-            asked = [question.name, reach]
-            over_mean = [relative(found, name, reach) for name in names]
-            errors.append([*asked, question.context, f"{len(splits)}, {held}", *over_mean])
-            itself.append([*asked, *chosen, *primitive(question, found, reach)])
+        for reach in evaluation.reaches():
+            splits = [split for split in evaluation.splits if split.reach == reach]
+            n_held_out = sum(len(split.test) for split in splits)
+            cells = [question.name, reach]
+            over_mean = [relative(evaluation, name, reach) for name in names]
+            errors.append([*cells, question.context, f"{len(splits)}, {n_held_out}", *over_mean])
+            itself.append([*cells, *chosen, *primitive(question, evaluation, reach)])
             if question.options.get("kind") != "rhythmic":
-                gained = difference(found, WARPED, PRIMITIVE, reach)
-                time.append([*asked, *shares, f"{gained} {question.unit}²"])
+                gained = difference(evaluation, WARPED, PRIMITIVE, reach)
+                time.append([*cells, *shares, f"{gained} {question.unit}²"])
     primitives = ["J", "J selected", "map", "E", "inside", "duration", "best other", "difference"]
     spectrum = ["first three, linear", "first three, warped", "difference"]
     return "\n".join(
@@ -94,29 +94,29 @@ def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
     )
 
 
-def relative(found: Evaluation, name: str, reach: str) -> str:
+def relative(evaluation: Evaluation, name: str, reach: str) -> str:
     """Returns E over that of the mean demonstration."""
-    if name in found.left_out:
+    if name in evaluation.left_out:
         return "–"
-    summary = found.summary(name, reach)
+    summary = evaluation.summary(name, reach)
     return f"{summary.relative:.2g} ± {summary.relative_error:.1g}"
 
 
-def primitive(question: Question, found: Evaluation, reach: str) -> Iterable[str]:
+def primitive(question: Question, evaluation: Evaluation, reach: str) -> Iterable[str]:
     """Returns coverage of the band and error of the duration of the primitive."""
-    summary = found.summary(PRIMITIVE, reach)
+    summary = evaluation.summary(PRIMITIVE, reach)
     yield f"{summary.error:.2g} ± {summary.deviation:.1g} {question.unit}²"
     yield f"{summary.coverage:.0%}"
     yield f"{summary.duration:.0%}"
-    others = [name for name in baselines() | library_baselines() if name not in found.left_out]
-    best = min(others, key=lambda name: found.summary(name, reach).error)
+    others = [name for name in baselines() | library_baselines() if name not in evaluation.left_out]
+    best = min(others, key=lambda name: evaluation.summary(name, reach).error)
     yield best
-    yield difference(found, PRIMITIVE, best, reach)
+    yield difference(evaluation, PRIMITIVE, best, reach)
 
 
-def difference(found: Evaluation, one: str, other: str, reach: str) -> str:
+def difference(evaluation: Evaluation, one: str, other: str, reach: str) -> str:
     """Returns the difference of E of two predictors on the same folds."""
-    compared = found.compare(one, other, reach)
+    compared = evaluation.compare(one, other, reach)
     return f"{compared.mean:.2g} ± {compared.standard_error:.1g}"
 
 
@@ -132,7 +132,7 @@ def spectra(question: Question) -> tuple[str, str]:
         learnt(question, alignment=alignment).singular_values
         for alignment in ("linear", TimeWarp(4))
     ]
-    linear, warped = (f"{found[:3].sum() / found.sum():.1%}" for found in values)
+    linear, warped = (f"{sigma[:3].sum() / sigma.sum():.1%}" for sigma in values)
     return linear, warped
 
 

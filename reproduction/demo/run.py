@@ -55,7 +55,7 @@ def run_demo(
     with timed(times, "learn, J by the spectrum"):
         model = pdmp.fit(demos, progress=progress)
     with timed(times, "learn, J = M"):
-        whole = pdmp.fit(demos, n_styles=len(demos), progress=progress)
+        model_of_all = pdmp.fit(demos, n_styles=len(demos), progress=progress)
     with timed(times, "save and load"):
         model.save(folder / "model.safetensors")
         model = pdmp.load(folder / "model.safetensors")
@@ -88,7 +88,7 @@ def run_demo(
             f"{len(demos)} human demonstrations, J = {model.n_styles}. An error is the RMSE of a "
             "reproduction over the range of the demonstration, averaged over those of the shape.",
             spectrum_table(model),
-            error_table([model, whole], demos, members),
+            error_table([model, model_of_all], demos, members),
             loop_table(runs),
             time_table(times),
         ]

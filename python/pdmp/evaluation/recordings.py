@@ -117,10 +117,10 @@ def recordings(
     for m, demo in enumerate(valid):
         if demo.n_dofs != valid[0].n_dofs:
             raise value_error(f"demo {m}: expected {valid[0].n_dofs} DoFs, found {demo.n_dofs}")
-    whole, findings = inspected(list(valid), dt=dt)
+    inspected_demos, findings = inspected(list(valid), dt=dt)
     for finding in findings:
         warn(finding)
-    valid = tuple(whole)
+    valid = tuple(inspected_demos)
     if kind == "discrete" and period is not None:
         raise ValueError("period does not apply to discrete demonstrations: leave it out")
     periods = np.full(len(valid), np.nan) if period is None else np.asarray(period)

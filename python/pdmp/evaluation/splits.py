@@ -63,7 +63,7 @@ def held_out(contexts: Array, max_folds: int) -> list[Split]:
 def neighbours(conditions: Array, max_folds: int) -> list[Rows]:
     """Partitions conditions (K, Q) into at most `max_folds` folds of neighbours.
 
-    The fold with the most conditions is halved projection its longest side until there are enough.
+    The fold with the most conditions is halved along its longest side until there are enough.
     """
     unit = _unit(conditions)
     folds: list[Rows] = [np.arange(len(conditions))]
@@ -93,10 +93,8 @@ def within_hull(point: Array, points: Array) -> bool:
         if residual @ residual <= TOLERANCE**2:
             return True
         projection = offset @ residual
-        target, source = (
-            np.argmin(projection),
-            np.argmax(np.where(weights > 0, projection, -np.inf)),
-        )
+        target = np.argmin(projection)
+        source = np.argmax(np.where(weights > 0, projection, -np.inf))
         if projection[target] > 0:
             return False
         direction = offset[target] - offset[source]

@@ -29,7 +29,7 @@ def make_demonstration(
     turns = [FULL_TURN.get(unit, 0.0) if unit else np.nan for unit in units or [""] * n_dofs]
     clock = np.arange(n_samples) * (dt or 1.0) if time is None else time
     try:
-        whole = fill(position, clock, columns, turns, max_gap)
-        return Demonstration(whole, dt=dt, time=time, context=context, names=names, units=units)
+        filled = fill(position, clock, columns, turns, max_gap)
+        return Demonstration(filled, dt=dt, time=time, context=context, names=names, units=units)
     except ValueError as error:
         raise value_error(f"{source}: {error}") from None

@@ -50,22 +50,22 @@ def read_number(path: Path, line: int, name: str, field: str, *, gaps: bool = Fa
     """Returns the finite number in a field of column `name`, or NaN for a gap if `gaps` is True."""
     value = parse_number(field)
     field = short(field)
-    place = f"{path}, line {line}, column '{name}'"
+    location = f"{path}, line {line}, column '{name}'"
     if is_gap(field):
         if gaps:
             return math.nan
         reason = f"{field} is not finite" if value is not None else f"'{field}' marks a gap"
         raise value_error(
-            f"{place}: {reason if field else 'empty'}: pass max_gap= to interpolate "
+            f"{location}: {reason if field else 'empty'}: pass max_gap= to interpolate "
             "gaps, or delete the row"
         )
     if value is None:
         hint = ""
         if parse_number(field.replace(",", ".")) is not None:
             hint = ": decimal commas are read where semicolons or tabs separate the fields"
-        raise value_error(f"{place}: '{field}' is not a number{hint}")
+        raise value_error(f"{location}: '{field}' is not a number{hint}")
     if not math.isfinite(value):
-        raise value_error(f"{place}: {field} is not finite: delete the row")
+        raise value_error(f"{location}: {field} is not finite: delete the row")
     return value
 
 

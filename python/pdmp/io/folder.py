@@ -124,16 +124,16 @@ def read_folder(
             name: _read_single(file, time, context=contexts[name], **options)
             for name, file in files.items()
         }
-    found = list(read_recordings(archive, columns, dt))
-    if len(found) != len(contexts):
+    stored = list(read_recordings(archive, columns, dt))
+    if len(stored) != len(contexts):
         raise value_error(
-            f"{archive}: has {len(found)} demonstrations, but index.csv lists {len(contexts)}"
+            f"{archive}: has {len(stored)} demonstrations, but index.csv lists {len(contexts)}"
         )
     return {
         name: make_demonstration(
             f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **arguments
         )
-        for (name, values), (_, position, arguments) in zip(contexts.items(), found, strict=True)
+        for (name, values), (_, position, arguments) in zip(contexts.items(), stored, strict=True)
     }
 
 

@@ -118,7 +118,7 @@ def held_out(
     labels = dof_labels(recordings.names, units)
     spread = np.ptp(recordings.sampled, axis=(0, 1))
     dofs = np.sort(np.argsort(-spread, kind="stable")[:MAX_DOFS])
-    whole = "duration" if recordings.kind == "discrete" else "period"
+    duration = "duration" if recordings.kind == "discrete" else "period"
     reaches = evaluation.reaches()
     figure = ensure_figure(figure, 4.2 * len(reaches), 1.7 * len(dofs) + 0.8)
     grid = figure.subplots(len(dofs), len(reaches), squeeze=False, sharex=True, sharey="row")
@@ -141,6 +141,6 @@ def held_out(
             label_axes(axes, "", labels[dof])
         values = (v if isinstance(v, str) else f"{v:.3g}" for v in context)
         column[0].set_title(f"{reach}, context {' '.join(values)}")
-        column[-1].set_xlabel(f"share of the {whole}")
+        column[-1].set_xlabel(f"share of the {duration}")
     legend(figure, grid[0, 0])
     return figure

@@ -164,8 +164,8 @@ def cycles(
     demos, periods, gains, sources, outliers, gained = _native.cycles(
         recordings, per_recording, average
     )
-    for recording, _, _, reason, whole in outliers:
-        if whole:
+    for recording, _, _, reason, is_recording in outliers:
+        if is_recording:
             warn(f"recording {recording} is left out: {reason}")
     growths = [Growth(*growth) for growth in gained]
     if gaining := [growth for growth in growths if not growth.turns]:
