@@ -36,6 +36,7 @@ reproduce: .venv/with-reproduction  ## The paper's figures, on a simulated robot
 
 test: .venv/with-test  ## Runs every test, Rust and Python
 	cargo test --release --workspace
+	cargo test --release --package pdmp-core --no-default-features --test runtime
 	$(BIN)/pytest
 
 check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, stubs against the module, and licences

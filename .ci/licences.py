@@ -1,8 +1,8 @@
 """Checks licences and sources of the linked crates, and collects their licence texts.
 
 `licences.py` checks that every crate in the extension or the C library comes from crates.io, that
-its licence is among those allowed, and that LICENSE-THIRD-PARTY, which the wheel holds, is up to
-date; `licences.py --write` writes that file. Cargo reads what it has downloaded, nothing else.
+its licence is allowed, and that LICENSE-THIRD-PARTY, which the wheel includes, is up to date;
+`licences.py --write` writes that file. Cargo runs offline.
 """
 
 import json
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "LICENSE-THIRD-PARTY"
 PACKAGES = ("pdmp-py", "pdmp-capi")
 REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
-# Permissive, and met by reproducing their texts; the first that a crate offers is chosen.
+# Permissive licences that require only a copy of their text, in order of preference.
 ALLOWED = {
     "MIT": "MIT",
     "Apache-2.0": "APACHE",
@@ -44,7 +44,7 @@ def cargo(*arguments: str) -> str:
 
 
 def linked() -> list[dict[str, Any]]:
-    """Returns the crates of others that the libraries contain, as cargo describes them."""
+    """Returns the metadata of cargo of all linked crates of others."""
     target = "x86_64-unknown-linux-gnu"
     packages = [argument for package in PACKAGES for argument in ("-p", package)]
     options = ["-e", "normal,no-proc-macro", "--prefix", "none", "-f", "{p}", "--target", target]
@@ -61,7 +61,7 @@ def linked() -> list[dict[str, Any]]:
 
 
 def chosen(crate: dict[str, Any]) -> list[str] | None:
-    """Returns the licences chosen from those that a crate offers, or None if one is not allowed."""
+    """Returns the selected licences of a crate, or None if one is not allowed."""
     found = []
     for part in re.split(r"\s+AND\s+", crate["license"] or ""):
         offered = re.split(r"\s+OR\s+|/", part.strip("() "))
@@ -89,7 +89,7 @@ def texts(crate: dict[str, Any], licence: str) -> list[str]:
 
 
 def standard(crate: dict[str, Any], licence: str) -> str:
-    """Returns the standard text of a licence for a crate that names it but has no copy."""
+    """Returns the standard text of a licence for a crate without a copy."""
     if licence == "Apache-2.0":
         return (ROOT / "LICENSE-APACHE").read_text(encoding="utf-8").strip()
     if licence == "MIT":
@@ -100,7 +100,7 @@ def standard(crate: dict[str, Any], licence: str) -> str:
 
 
 def collected(crates: list[dict[str, Any]]) -> str:
-    """Returns all texts, each once, after the crates that it applies to."""
+    """Returns all texts, each once, below the crates that it applies to."""
     groups: dict[str, list[str]] = defaultdict(list)
     whole: dict[str, str] = {}
     for crate in crates:
@@ -118,7 +118,7 @@ def collected(crates: list[dict[str, Any]]) -> str:
 
 
 def main() -> int:
-    """Checks or writes, and returns 1 if a check fails."""
+    """Checks the licences or writes their texts; returns 1 if a check fails."""
     crates = linked()
     wrong = [
         f"{crate['name']} {crate['version']}: {problem}"

@@ -1,6 +1,6 @@
-"""Prints the requirements of a dependency group, one a line, with groups and extras resolved.
+"""Prints the requirements of a dependency group, one per line, with groups and extras resolved.
 
-pip reads dependency groups from version 25.1 on only, and would look for `pdmp[plot]` in an index.
+pip before version 25.1 does not read dependency groups, and looks for `pdmp[plot]` in an index.
 """
 
 import re
@@ -15,7 +15,7 @@ GROUPS = PROJECT["dependency-groups"]
 
 
 def requirements(lines: list[str | dict[str, str]]) -> Iterator[str]:
-    """Yields the requirements that the lines of a group or an extra stand for."""
+    """Yields the requirements in the lines of a group or an extra."""
     for line in lines:
         if isinstance(line, dict):
             yield from requirements(GROUPS[line["include-group"]])

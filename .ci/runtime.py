@@ -1,17 +1,17 @@
-"""Checks the crates that a build without learning depends on."""
+"""Checks the dependencies of a build without learning."""
 
 import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-# Crates that a control loop pulls in, build-time macros included; one more needs a reason.
+# Largest number of dependencies, build-time macros included; one more needs a reason.
 MAX_CRATES = 47
 TREE = ("cargo", "tree", "--locked", "--edges", "normal", "--prefix", "none")
 
 
 def main() -> int:
-    """Report a dependency that belongs to learning, or too many, for the core and the C ABI."""
+    """Reports dependencies of learning, or too many dependencies, of the core and the C ABI."""
     for package in (["pdmp-core", "--no-default-features"], ["pdmp-capi"]):
         tree = subprocess.run(
             [*TREE, "--package", *package], cwd=ROOT, capture_output=True, text=True, check=True

@@ -19,7 +19,7 @@ STUB = Path(__file__).resolve().parent.parent / "python" / "pdmp" / "_native.pyi
 def documented(text: str, module: ModuleType) -> str:
     """Returns the text of a stub with the docstrings of the module it describes."""
     lines = text.splitlines()
-    # From the end on, so that line numbers stay valid.
+    # Backwards, so that line numbers stay valid.
     for node, doc in reversed(list(_docstrings(ast.parse(text), module))):
         if isinstance(node, ast.ClassDef) and node.body[0].lineno > node.lineno:
             _document_class(lines, node, doc)
@@ -48,7 +48,7 @@ def _docstrings(
 
 
 def _is_silent(function: ast.FunctionDef) -> bool:
-    """Returns whether a method has no docstring of its own: special methods and setters."""
+    """Returns True for special methods and setters, which have no docstrings."""
     setter = any(isinstance(each, ast.Attribute) for each in function.decorator_list)
     return setter or function.name.startswith("__")
 
@@ -69,7 +69,7 @@ def _document_body(lines: list[str], node: ast.ClassDef | ast.FunctionDef, doc: 
     header = lines[body.lineno - 1][: body.col_offset].rstrip()
     rest = lines[body.lineno - 1][body.end_col_offset or 0 :].strip()
     start = body.lineno - 1
-    if not header:  # the docstring stands on lines of its own
+    if not header:  # the body is on separate lines
         start -= 1
         header, _, rest = lines[start].partition("  # ")
         rest = f"# {rest}" if rest else ""
@@ -90,7 +90,7 @@ def _document_class(lines: list[str], node: ast.ClassDef, doc: str) -> None:
 
 
 def main() -> int:
-    """Write the docstrings, or report that they are stale."""
+    """Writes the docstrings, or reports that they are stale."""
     present = STUB.read_text(encoding="utf-8")
     wanted = documented(present, _native)
     if "--write" in sys.argv[1:]:

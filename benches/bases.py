@@ -14,13 +14,13 @@ from time import perf_counter
 import numpy as np
 
 import pdmp
-from peers.arena import machine
+from peers.timing import machine
 from recordings import Group, groups, sources
 
 KERNELS = ("matern32", "matern52")
 SIZES = (20, 35, 50, 75, 100, 150, 200)
 WIDTHS = (1.0, 1.2, 1.5)
-FINE = 4000  # samples of a rollout: straight lines between them are exact to 1e-6
+N_SAMPLES = 4000  # samples of a rollout; linear interpolation between them is exact to 1e-6
 
 Basis = pdmp.GP | pdmp.NGnet
 
@@ -67,7 +67,7 @@ serve both.
 
 @dataclass(frozen=True)
 class Score:
-    """What one basis makes of one group."""
+    """Errors of one basis on one group."""
 
     reproduction: list[float]  # RMSE over range, of each demonstration
     held_out: float  # RMSE over range of the targets
@@ -76,7 +76,7 @@ class Score:
 
 
 def score(group: Group, basis: Basis) -> Score:
-    """Learns a group with a basis, and tries it."""
+    """Fits a basis to a group and computes its errors."""
     begin = perf_counter()
     model = pdmp.fit(
         group.demos, kind=group.kind, n_styles=len(group.demos), basis=basis, smoothing=None
@@ -86,11 +86,11 @@ def score(group: Group, basis: Basis) -> Score:
 
 
 def reproduction(model: pdmp.Model, group: Group) -> list[float]:
-    """Returns the RMSE over range of every demonstration, rolled out in its own conditions."""
+    """Returns the RMSE over range of every demonstration, rolled out under its own conditions."""
     errors = []
     for m, demo in enumerate(group.demos):
-        made = model.rollout(model.conditions(m), dt=model.durations[m] / FINE)
-        # Recordings that lost a sample here and there have their own clock.
+        made = model.rollout(model.conditions(m), dt=model.durations[m] / N_SAMPLES)
+        # Recordings with missing samples have time stamps.
         sampled = [np.interp(demo.time, made.time, column) for column in made.position.T]
         difference = np.transpose(sampled) - demo.position
         errors.append(np.sqrt(np.mean(difference**2)) / np.ptp(demo.position, axis=0).max())
@@ -98,11 +98,11 @@ def reproduction(model: pdmp.Model, group: Group) -> list[float]:
 
 
 def held_out(group: Group, basis: Basis) -> tuple[float, float]:
-    """Returns RMSE over range and log density of every second sample, given the others."""
+    """Returns RMSE over range and log density of every second sample from a fit to the others."""
     u, factors, extent = targets(group)
     periodic = group.kind == "rhythmic"
     given = slice(0, None, 2)
-    # Samples past the last one given would be extrapolation.
+    # Samples beyond the last training sample would be extrapolation.
     hidden = slice(1, None if periodic else len(u[given]) * 2 - 2, 2)
     learnt = basis.regress(u[given], factors[given], periodic=periodic)
     mean, variance = learnt.predict(u[hidden])
@@ -119,7 +119,7 @@ def held_out(group: Group, basis: Basis) -> tuple[float, float]:
 def left_out(net: pdmp.NGnet, u: np.ndarray, targets: np.ndarray, periodic: bool) -> np.ndarray:
     """Returns the leave-one-out residuals (C, P) of a network.
 
-    It is linear, f̂ = Hf, and so misses sample i by (fᵢ − f̂ᵢ)/(1 − Hᵢᵢ) without it.
+    The network is linear, f̂ = Hf; its leave-one-out residual is (fᵢ − f̂ᵢ)/(1 − Hᵢᵢ).
     """
     missed = targets - net.regress(u, targets, periodic=periodic).predict(u)[0]
     hat = net.regress(u, np.eye(len(u)), periodic=periodic).predict(u)[0]
@@ -136,8 +136,7 @@ def rmse(error: np.ndarray, group: Group) -> float:
 def targets(group: Group) -> tuple[np.ndarray, np.ndarray, float]:
     """Returns the clock (C,), the basis targets (C, J·D) and the largest range of the targets.
 
-    A rough process with the least noise goes through every target, and so its landscape gives them
-    back.
+    The landscape of a rough process with minimal noise interpolates the targets.
     """
     exact = pdmp.GP("matern32", noise=1e-10)
     model = pdmp.fit(
@@ -155,7 +154,7 @@ def targets(group: Group) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def over_sets(scores: dict[Group, Score]) -> list[str]:
-    """Returns the figures of one basis: medians over sets, worst of all, median time."""
+    """Returns the results of one basis: medians over sets, the maximum, the median time."""
     sets = defaultdict(list)
     for group, found in scores.items():
         sets[group.source].append(found)
@@ -175,7 +174,7 @@ def over_sets(scores: dict[Group, Score]) -> list[str]:
 
 
 def table(names: list[str], rows: list[list[str]]) -> list[str]:
-    """Writes a table in Markdown: names at the left, figures at the right."""
+    """Returns the lines of a table in Markdown: names aligned left, numbers right."""
     align = ["---"] * len(names) + ["---:"] * len(FIGURES)
     return [f"| {' | '.join(row)} |" for row in [[*names, *FIGURES], align, *rows]] + [""]
 

@@ -1,7 +1,7 @@
 //! Instruction count of one tick, measured by callgrind and independent of other load on the machine.
 //!
-//! The bench starts itself under valgrind with a short and a long loop; the difference of the counts is that of the
-//! additional ticks. For a profile, set `--callgrind-out-file` in [`count`].
+//! The bench starts itself under valgrind, which collects inside [`counted_ticks`] only: neither the fit before it nor the
+//! environment of the process affects the count. For a profile, set `--callgrind-out-file` in [`per_tick`].
 #![allow(missing_docs)]
 
 mod control_loop;
@@ -11,35 +11,40 @@ use std::process::Command;
 
 use control_loop::{CommandLoad, ControlLoop, N_DOFS, N_STYLES, is_benchmark, model};
 
-/// Ticks of the short loop.
-const N_SHORT: u64 = 100;
-/// Ticks of the long loop, which still ends before the movement and its transitions.
-const N_LONG: u64 = 800;
+/// Ticks before the count begins.
+const N_WARM_UP: u64 = 100;
+/// Ticks that are counted. They end before the movement and its transitions.
+const N_TICKS: u64 = 700;
 
-/// Runs the `n` ticks that are counted.
-fn run(n_dofs: usize, n_styles: usize, load: CommandLoad, n: u64) {
+/// Runs the loop in the process that valgrind observes.
+fn run(n_dofs: usize, n_styles: usize, load: CommandLoad) {
     let mut control_loop = ControlLoop::new(&model(n_dofs, n_styles), load);
     control_loop.prepare();
-    (0..n).for_each(|_| control_loop.tick());
+    (0..N_WARM_UP).for_each(|_| control_loop.tick());
+    counted_ticks(&mut control_loop);
 }
 
-/// Returns the instruction count of a process that runs `n` ticks.
-fn count(n_dofs: usize, n_styles: usize, load: CommandLoad, n: u64) -> u64 {
+/// Runs the ticks that are counted. It must stay a call: callgrind finds it by its name.
+#[inline(never)]
+fn counted_ticks(control_loop: &mut ControlLoop) {
+    (0..N_TICKS).for_each(|_| control_loop.tick());
+}
+
+/// Returns the mean instruction count of one tick.
+fn per_tick(n_dofs: usize, n_styles: usize, load: CommandLoad) -> u64 {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .args(["--collect-atstart=no", "--toggle-collect=*counted_ticks*"])
         .arg(env::current_exe().expect("the path of this bench"))
-        .args([n_dofs.to_string(), n_styles.to_string(), load.name().to_string(), n.to_string()])
+        .args([n_dofs.to_string(), n_styles.to_string(), load.name().to_string()])
         .output()
         .expect("valgrind starts");
     let report = String::from_utf8_lossy(&output.stderr);
-    let collected = report.lines().find_map(|line| line.split_once("Collected :")?.1.trim().parse().ok());
-    collected.unwrap_or_else(|| panic!("callgrind reports no count:\n{report}"))
-}
-
-/// Returns the instruction count of one tick.
-fn per_tick(n_dofs: usize, n_styles: usize, load: CommandLoad) -> u64 {
-    let [short, long] = [N_SHORT, N_LONG].map(|n| count(n_dofs, n_styles, load, n));
-    (long - short) / (N_LONG - N_SHORT)
+    let collected = report.lines().find_map(|line| line.split_once("Collected :")?.1.trim().parse::<u64>().ok());
+    match collected {
+        Some(instructions) if instructions > 0 => instructions / N_TICKS,
+        _ => panic!("callgrind reports no count:\n{report}"),
+    }
 }
 
 /// Prints the table of all sizes and loads.
@@ -57,10 +62,10 @@ fn print_table() {
 
 fn main() {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    if let [n_dofs, n_styles, name, n] = &arguments[..] {
+    if let [n_dofs, n_styles, name] = &arguments[..] {
         let number = |text: &String| text.parse::<usize>().expect("a number");
         let load = CommandLoad::ALL.into_iter().find(|load| load.name() == name).expect("the name of a load");
-        return run(number(n_dofs), number(n_styles), load, number(n) as u64);
+        return run(number(n_dofs), number(n_styles), load);
     }
     if !is_benchmark() {
         return;

@@ -1,6 +1,6 @@
-"""Recordings of people and robots in groups, from the folder that PDMP_DATA names.
+"""Recordings of people and robots in groups, from the folder in PDMP_DATA.
 
-A group is the repetitions of one task, from which one primitive is learnt.
+A group has the repetitions of one task, the demonstrations of one primitive.
 """
 
 import csv
@@ -24,7 +24,7 @@ Recordings are converted to the form that `pdmp.io.read_folder` reads, and found
 that the environment variable `PDMP_DATA` names. `pdmp.datasets.REGISTRY` holds this table.
 """
 ARM = ["r_sh1", "r_sh2", "r_sh3", "r_elb"]
-# The first 28 columns of the door are joints; what follows is measured from them.
+# The first 28 columns of the door are joints; the others are computed from them.
 HAND = [
     *["ARTz", "ARRx", "ARRy", "ARRz", "WRJ1", "WRJ0"],
     *[f"{finger}J{joint}" for finger in ("FF", "MF", "RF") for joint in (3, 2, 1, 0)],
@@ -38,7 +38,7 @@ class Selection:
     """Columns of a set of recordings, and the part of an id that names its group."""
 
     columns: list[str] | None = None
-    group: int = 0  # parts of the id, between underscores, that name the group
+    group: int = 0  # number of parts of the id, between underscores, that name the group
 
 
 DISCRETE = {
@@ -67,7 +67,7 @@ class Group:
 
 
 def groups() -> Iterator[Group]:
-    """Yields every group that is available, and prints the reasons why others are not."""
+    """Yields every available group, and prints why others are not available."""
     try:
         for shape, demos in handwriting().items():
             yield Group("handwriting", shape, "discrete", [thinned(demo) for demo in demos])
@@ -86,7 +86,7 @@ def groups() -> Iterator[Group]:
         yield Group("gait_boys", "", "rhythmic", few([cycle(demo.position, 1.0) for demo in boys]))
     if is_available("running_strides"):
         strides = read_folder(folder("running_strides")).values()
-        # The last of 101 points is the first of the next stride.
+        # The last of 101 samples is the first of the next stride.
         closed = [cycle(demo.position[:-1], 1.0) for demo in strides]
         yield Group("running_strides", "", "rhythmic", few(closed))
     if is_available("walk_styles_bandai"):
@@ -94,7 +94,7 @@ def groups() -> Iterator[Group]:
 
 
 def is_available(source: str) -> bool:
-    """Returns whether a set of recordings is there, and prints the reason if it is not."""
+    """Returns True if a set of recordings is available, and prints the reason otherwise."""
     try:
         folder(source)
     except FileNotFoundError as reason:
@@ -123,18 +123,18 @@ def sources(names: Iterable[str]) -> str:
 
 
 def few(demos: list[Demonstration]) -> list[Demonstration]:
-    """Returns at most MAX_DEMOS demonstrations, evenly chosen."""
+    """Returns at most MAX_DEMOS demonstrations, evenly spaced."""
     return demos[:: -(-len(demos) // MAX_DEMOS)]
 
 
 def thinned(demo: Demonstration) -> Demonstration:
-    """Returns a discrete demonstration with at most MAX_SAMPLES samples, evenly chosen."""
+    """Returns a discrete demonstration with at most MAX_SAMPLES samples, evenly spaced."""
     step = -(-demo.n_samples // MAX_SAMPLES)
     return Demonstration(demo.position[::step], time=demo.time[::step])
 
 
 def cycle(position: np.ndarray, period: float, names: list[str] | None = None) -> Demonstration:
-    """Returns one cycle, whose first sample follows upon the last."""
+    """Returns one cycle, whose first sample follows the last."""
     return Demonstration(position, dt=period / len(position), names=names)
 
 

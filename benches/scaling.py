@@ -1,4 +1,4 @@
-"""How the time to learn grows: Gaussian processes with samples, factors with demonstrations.
+"""Scaling of the time to learn: Gaussian processes with samples, factors with demonstrations.
 
 ``make bench-scaling`` runs this and draws docs/scaling.png.
 """
@@ -14,11 +14,11 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import Matern
 
 import pdmp
-from pdmp.plot._canvas import MARKERS, PALETTE, canvas, dress
+from pdmp.plot.canvas import MARKERS, PALETTE, ensure_figure, label_axes
 from peers.factors import library
 from peers.regression import LENGTH, NOISE, samples
 
-LONGEST = 2.0  # s: longer times are left out
+MAX_TIME = 2.0  # s: longer times are left out
 REPEATS = 5
 SIZES = [round(10 ** (exponent / 4)) for exponent in range(6, 21)]  # C, 32 to 100 000
 LIBRARIES = [round(10 ** (exponent / 4)) for exponent in range(2, 15)]  # M, 3 to 3162
@@ -28,39 +28,39 @@ Call = Callable[[], object]
 
 
 def process(**hyperparameters: float) -> Callable[[int], Call]:
-    """Regresses as many samples with three outputs."""
+    """Returns a function of the number of samples that fits a process with three outputs."""
     return lambda count: partial(pdmp.GP("matern52", **hyperparameters).regress, *samples(count))
 
 
 def dense(count: int) -> Call:
-    """Does the same with scikit-learn, hyperparameters given."""
+    """Fits a process of scikit-learn with given hyperparameters."""
     u, f = samples(count)
     gp = GaussianProcessRegressor(Matern(LENGTH, nu=2.5), alpha=NOISE, optimizer=None)
     return partial(gp.fit, u[:, None], f)
 
 
 def leading(n_demos: int) -> Call:
-    """Finds the five leading factors."""
+    """Computes the five leading factors."""
     return partial(pdmp.factorise, library(n_demos, N_VALUES), n_styles=min(5, n_demos))
 
 
 def every(n_demos: int) -> Call:
-    """Finds all factors."""
+    """Computes all factors."""
     return partial(pdmp.factorise, library(n_demos, N_VALUES), n_styles=n_demos)
 
 
 def lapack(n_demos: int) -> Call:
-    """Finds all factors with numpy."""
+    """Computes all factors with numpy."""
     return partial(np.linalg.svd, library(n_demos, N_VALUES), full_matrices=False)
 
 
-def times(work: Callable[[int], Call], sizes: list[int]) -> dict[int, float]:
-    """Returns the least time [s] by size, until one takes too long."""
+def times(method: Callable[[int], Call], sizes: list[int]) -> dict[int, float]:
+    """Returns the minimum time [s] by size, until one exceeds `MAX_TIME`."""
     found: dict[int, float] = {}
     for size in sizes:
-        call = work(size)
+        call = method(size)
         found[size] = min(timed(call) for _ in range(REPEATS))
-        if found[size] > LONGEST:
+        if found[size] > MAX_TIME:
             break
     return found
 
@@ -73,14 +73,14 @@ def timed(call: Call) -> float:
 
 
 def panel(
-    axes: Axes, title: str, works: dict[str, Callable[[int], Call]], sizes: list[int], over: str
+    axes: Axes, title: str, methods: dict[str, Callable[[int], Call]], sizes: list[int], over: str
 ) -> None:
-    """Draws the times of several works over the size of the problem, and prints them."""
-    dress(axes, over, "time [s]")
+    """Draws the times of several methods over the size of the problem, and prints them."""
+    label_axes(axes, over, "time [s]")
     print(title)
-    for look, (name, work) in enumerate(works.items()):
-        found = times(work, sizes)
-        style = {"marker": MARKERS[look], "color": PALETTE[look], "markersize": 4}
+    for index, (name, method) in enumerate(methods.items()):
+        found = times(method, sizes)
+        style = {"marker": MARKERS[index], "color": PALETTE[index], "markersize": 4}
         axes.loglog(list(found), list(found.values()), label=name, **style)
         print(f"{name}: " + ", ".join(f"{size}: {1e3 * t:.3g} ms" for size, t in found.items()))
     place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "alignment": "left"}
@@ -88,7 +88,7 @@ def panel(
 
 
 def main() -> None:
-    """Times both and draws the figure."""
+    """Measures the times and draws the figure."""
     processes = {
         "pdmp, hyperparameters given": process(length=LENGTH, noise=NOISE),
         "pdmp, with hyperparameters": process(),
@@ -99,7 +99,7 @@ def main() -> None:
         "pdmp, all factors": every,
         "numpy, all factors": lapack,
     }
-    figure = canvas(None, 9, 4.2)
+    figure = ensure_figure(None, 9, 4.2)
     left, right = figure.subplots(1, 2)
     title = "Gaussian process, Matérn-5/2, three outputs"
     panel(left, title, processes, SIZES, "samples C")

@@ -1,4 +1,4 @@
-"""Learns one primitive from five reaches over obstacles of different height, and rolls it out."""
+"""Fits one primitive to five reaches over obstacles of different heights, and computes rollouts."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ DT = 0.01  # s
 
 
 def reach(height: float, duration: float) -> np.ndarray:
-    """Return a minimum-jerk reach of 0.4 m with a bump of this height [m], shape (T, 2)."""
+    """Returns a minimum-jerk reach of 0.4 m with a bump of this height [m], shape (T, 2)."""
     s = np.arange(0, duration + DT / 2, DT) / duration
     forward = 0.4 * s**3 * (10 - 15 * s + 6 * s**2)
     upward = 64 * height * (s * (1 - s)) ** 3
@@ -22,12 +22,12 @@ demos = [
 model = pdmp.fit(demos, n_styles=2)
 print(model)
 
-# A style is a point in the space that the demonstrations span; half way between two of them:
+# Styles are points in a vector space: the mean of two of them.
 style = (model.styles[0] + model.styles[4]) / 2
 trajectory = model.rollout(style=style, dt=DT)
 peak = trajectory.position[:, 1].max()
 print(f"style {np.round(style, 3)}: {len(trajectory.time)} samples, peak {peak:.3f} m")
 
-# The nominal demonstration again, but to another goal and in half the time.
+# The nominal style with another goal and half the duration.
 trajectory = model.rollout(goal=[0.5, 0.1], tau=model.tau / 2)
 print(f"at {trajectory.time[-1]:.2f} s: {np.round(trajectory.position[-1], 3)} m")

@@ -1,4 +1,4 @@
-"""Runs a primitive in a control loop at 1 kHz, and moves its goal and its style on the way."""
+"""Runs a control loop at 1 kHz, and changes goal and style during the movement."""
 
 from time import perf_counter
 

@@ -1,4 +1,4 @@
-"""Learns a family of closed loops, and changes amplitude, pace and place while they run."""
+"""Fits a family of closed loops, and changes amplitude, frequency and anchor on line."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ import pdmp
 
 PERIOD = 2.0  # s
 SAMPLES = 200
-# One cycle each; the last sample is not the first one again.
+# One cycle each; the first sample is not repeated at the end.
 phi = np.linspace(0, 2 * np.pi, SAMPLES, endpoint=False)
 demos = [
     pdmp.Demonstration(

@@ -6,7 +6,7 @@ import pdmp
 
 
 def reach(height: float) -> np.ndarray:
-    """Return a reach over an obstacle of this height [m] to a place behind it, shape (T, 2)."""
+    """Returns a reach over an obstacle of this height [m] to a position behind it, shape (T, 2)."""
     s = np.linspace(0, 1, 101)
     ramp = s**3 * (10 - 15 * s + 6 * s**2)
     return np.column_stack([0.4 * ramp, height / 2 * ramp + 64 * height * (s * (1 - s)) ** 3])

@@ -1,4 +1,4 @@
-"""Runs a primitive on the clock, with a robot that lags behind and is held for a while."""
+"""Runs a primitive on the wall clock, with a robot that lags behind and is blocked temporarily."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ robot = controller.position.copy()
 
 loop = pdmp.PacedLoop(controller, rate_hz=1000, measured=lambda: robot)
 for tick in loop:
-    if not 0.2 < tick.time < 0.4:  # held in between: the phase waits
+    if not 0.2 < tick.time < 0.4:  # the robot is blocked in between: the phase waits
         robot += 0.2 * (controller.position - robot)
     if tick.missed:
         print(f"at {tick.time:.3f} s: {1000 * tick.lateness:.1f} ms late, {tick.missed} missed")

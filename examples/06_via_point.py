@@ -1,4 +1,4 @@
-"""Finds the style whose movement passes a given point at a given time."""
+"""Computes the style whose movement passes a via-point at a given time."""
 
 import time
 
@@ -14,12 +14,12 @@ upward = [h * np.sin(np.pi * s**k) ** 2 for h in (0.1, 0.2, 0.3) for k in (0.8, 
 model = pdmp.fit([np.column_stack([forward, z]) for z in upward], dt=DT, n_styles=4)
 
 nominal = model.styles[model.nominal]
-k = 40  # the sample to pass the point at, 0.4 s
+k = 40  # sample of the via-point, at 0.4 s
 before = model.rollout(style=nominal, dt=DT).position[k]
 point = np.array([before[0], 0.24])  # m
 
-# A movement is linear in its style: one step of least squares is all it takes. Of the styles that
-# pass the point it finds the one nearest to the nominal demonstration's.
+# Movements are linear in the style, so that one least-squares step suffices. Of the styles that
+# pass the point, it gives the nearest to that of the nominal demonstration.
 began = time.perf_counter()
 jacobian = model.jacobian("style", dt=DT)[k]
 style = nominal + np.linalg.lstsq(jacobian, point - before, rcond=None)[0]

@@ -1,4 +1,4 @@
-"""Makes the figures and tables of the paper, on a simulated robot.
+"""Reproduces the figures and tables of the paper on a simulated robot.
 
 example: python -m reproduction fig3 -o out/reproduction
 """
@@ -7,7 +7,7 @@ import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
-from pdmp.cli._options import path
+from pdmp.cli.options import file_path
 from reproduction import command
 from reproduction.run import FIGURES, reproduce
 from reproduction.section import SEED
@@ -22,7 +22,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             options.output,
             options.recordings,
             options.seed,
-            progress=lambda name: print(f"making {name}", file=sys.stderr),
+            progress=lambda name: print(f"reproducing {name}", file=sys.stderr),
         )
     )
 
@@ -42,9 +42,9 @@ def _parser() -> ArgumentParser:
         "-o",
         "--output",
         default="out/reproduction",
-        type=path,
+        type=file_path,
         metavar="FOLDER",
-        help="folder of the pictures and tables; default: %(default)s",
+        help="folder for figures and tables; default: %(default)s",
     )
     parser.add_argument(
         "--seed",
@@ -55,7 +55,7 @@ def _parser() -> ArgumentParser:
     )
     parser.add_argument(
         "--recordings",
-        type=path,
+        type=file_path,
         metavar="FOLDER",
         help="for fig5, CSV files of people walking: t [s]; r_sh1, r_sh2, r_sh3, r_elb, l_sh1, … "
         "[rad]",

@@ -1,7 +1,7 @@
-"""The arm of Baxter, a robot with two arms of seven joints, of which the paper's four are used.
+"""Kinematics of an arm of the robot Baxter; the four joints of the paper of its seven are used.
 
-The model is that of robosuite 1.5.2 (MIT licence), read as it lies in its wheel: nothing of
-robosuite is imported, and what it depends on need not be installed.
+The model is that of robosuite 1.5.2 (MIT licence), read from its wheel without an import, so that
+its dependencies need not be installed.
 """
 
 from __future__ import annotations
@@ -23,17 +23,16 @@ JOINTS = ("s0", "s1", "e0", "e1")
 DIRECTIONS = {"right": np.array([1.0, -1.0, 1.0, -1.0]), "left": np.array([-1.0, -1.0, -1.0, -1.0])}
 """q = direction · angle, so that the same q of both arms are mirror images.
 
-Baxter counts the pitch of the shoulder and the bending of the elbow the other way than the paper
-prints them. So read, the goal that it prints is a hand on a table before the body, with the elbow
-as far out as people hold it, give or take 15°; with no other signs is it that and within the limits
-of the joints.
+Baxter's signs of the shoulder pitch and the elbow flexion are opposite to those of the paper. With
+these signs the printed goal places the hand on a table in front of the body, with a swivel angle
+within 15° of that of people; no other combination of signs does so within the joint limits.
 """
 MOUTH = np.array([0.20, 0.0, 0.55])
-"""Where a mouth would be, below Baxter's screen [m]."""
+"""Position of a mouth, below Baxter's screen [m]."""
 
 
 def mjcf() -> Path:
-    """Returns the file of the model.
+    """Returns the path of the model file.
 
     Raises
     ------
@@ -54,9 +53,9 @@ def engine() -> Any:
     Raises
     ------
     ImportError
-        It is not installed, or asked by `MUJOCO_GL` to draw with what is not there.
+        MuJoCo is not installed, or the renderer in `MUJOCO_GL` is not available.
     """
-    # It settles what it draws with when it is imported, and on a window by default.
+    # MuJoCo selects its renderer when it is imported, by default one that needs a window.
     if sys.platform == "linux" and "DISPLAY" not in os.environ:
         os.environ.setdefault("MUJOCO_GL", _windowless())
     try:
@@ -75,7 +74,7 @@ def engine() -> Any:
 
 
 def specification() -> Any:
-    """Returns the model, a `mujoco.MjSpec` to be added to.
+    """Returns the model as a `mujoco.MjSpec`, to which bodies can be added.
 
     Raises
     ------
@@ -85,17 +84,17 @@ def specification() -> Any:
     return engine().MjSpec.from_file(str(mjcf()))
 
 
-class OutOfReach(ValueError):
-    """A place that the arm does not reach within its joint limits."""
+class UnreachableError(ValueError):
+    """A position that the arm does not reach within its joint limits."""
 
 
 class Arm:
-    """Kinematics of one arm, the wrist straight.
+    """Kinematics of one arm with a straight wrist.
 
     Parameters
     ----------
     side : {"right", "left"}
-        Which arm.
+        Side of the arm.
     """
 
     def __init__(self, side: str = "right") -> None:
@@ -124,47 +123,47 @@ class Arm:
     def swivel(self, q: ArrayLike) -> float:
         """Returns the angle [rad] of the elbow about the line from shoulder to hand.
 
-        It is zero where the plane of the arm holds the mouth, on the other side of that line: a
-        hand so held would be brought to the mouth by bending the elbow alone. People reach within
-        some 5° of that (Kim, Miller, Byl, Abrams, Rosen, IEEE Transactions on Biomedical
+        It is zero if the plane of the arm contains the mouth, on the other side of that line, so
+        that elbow flexion alone brings the hand to the mouth. People reach within some 5° of this
+        angle (Kim, Miller, Byl, Abrams, Rosen, IEEE Transactions on Biomedical
         Engineering 59, 2012, 1770-1779, doi:10.1109/TBME.2012.2194489).
         """
         return _swivel(self.places(q))
 
     def reach(self, hands: Array, swivels: Array, near: ArrayLike) -> Array:
-        """Returns joint angles (T, 4) [rad] that bring hand and elbow along a path.
+        """Returns joint angles (T, 4) [rad] for paths of hand and elbow (inverse kinematics).
 
-        Least squares of the hand's distance [m] and of 0.1 m times the sine of half the swivel's
-        error, twice: from each solution to the next, the first from `near`.
+        They minimise the squares of the hand's distance [m] and of 0.1 m times the sine of half the
+        swivel's error. Each optimisation starts from the previous solution, the first from `near`.
 
         Parameters
         ----------
         hands : (T, 3) array
             Path of the hand [m].
         swivels : (T,) array
-            Angles of the elbow [rad], as `swivel` counts them.
+            Swivel angles [rad], as from `swivel`.
         near : (4,) array_like
-            Joint angles near those of the first place.
+            Initial joint angles of the first optimisation.
 
         Raises
         ------
-        OutOfReach
-            A place that the arm does not reach within its joint limits.
+        UnreachableError
+            A position that the arm does not reach within its joint limits.
         """
         from scipy.optimize import least_squares
 
-        def gaps(q: Array, hand: Array, swivel: float) -> Array:
+        def residuals(q: Array, hand: Array, swivel: float) -> Array:
             places = self.places(q)
             return np.append(places[2] - hand, 0.2 * np.sin(0.5 * (_swivel(places) - swivel)))
 
         q, path = np.asarray(near, dtype=float), []
         for hand, swivel in zip(hands, swivels, strict=True):
-            solution = least_squares(gaps, q, method="lm", xtol=1e-12, args=(hand, swivel))
+            solution = least_squares(residuals, q, method="lm", xtol=1e-12, args=(hand, swivel))
             q = solution.x
             inside = np.all((self.lowest <= q) & (q <= self.highest))
             if not inside or np.linalg.norm(solution.fun) > 1e-6:
                 place = np.round(hand, 3)
-                raise OutOfReach(
+                raise UnreachableError(
                     f"hands: {place} m is out of reach with the elbow at {swivel:.2f} rad"
                 )
             path.append(q)
@@ -172,7 +171,7 @@ class Arm:
 
 
 def _windowless() -> str:
-    """Returns the available renderer: with a missing one, MuJoCo cannot be imported at all."""
+    """Returns an available renderer; MuJoCo cannot be imported with one that is missing."""
     if find_library("EGL") and (find_library("OpenGL") or find_library("GL")):
         return "egl"
     return "osmesa" if find_library("OSMesa") else "disable"

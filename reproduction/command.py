@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 
 from pdmp import PdmpError
-from pdmp.cli._console import console, report, say
+from pdmp.cli.console import console, report, say
 
 
 def run(make_report: Callable[[], str]) -> int:

@@ -1,4 +1,4 @@
-"""Pictures of the robot, where there is something to draw them with."""
+"""Images of the robot, rendered by MuJoCo if a renderer is available."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pdmp.plot._canvas import canvas
+from pdmp.plot.canvas import ensure_figure
 from reproduction.baxter import engine
 from reproduction.robot import DT, Robot
 from reproduction.section import Section
@@ -22,8 +22,8 @@ ELEVATION = -20.0  # °
 TRAIL_STEP, TRAIL_WIDTH, TRAIL_COLOR = 0.02, 0.014, (0.0, 0.45, 0.7, 1.0)  # s, m, RGBA
 
 
-class Shot(NamedTuple):
-    """Where the camera stands, and how much of the hand's way it shows."""
+class CameraView(NamedTuple):
+    """Camera position, and duration of the drawn path of the hand."""
 
     azimuth: float  # °
     distance: float  # m
@@ -31,35 +31,35 @@ class Shot(NamedTuple):
     trail: float  # s
 
 
-REACHING = Shot(210.0, 1.9, (0.4, -0.3, 0.15), trail=np.inf)
-SWINGING = Shot(140.0, 2.3, (0.35, -0.25, 0.05), trail=1.0)
+REACHING = CameraView(210.0, 1.9, (0.4, -0.3, 0.15), trail=np.inf)
+SWINGING = CameraView(140.0, 2.3, (0.35, -0.25, 0.05), trail=1.0)
 
 
-class NoRenderer(Exception):
-    """There is nothing to draw with; the reason is its text."""
+class RendererError(Exception):
+    """No renderer is available; the text gives the reason."""
 
 
 def attach(
-    section: Section, name: str, rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: Shot
+    section: Section, name: str, rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: CameraView
 ) -> Section:
-    """Adds a strip to a section, or the reason why there is none."""
+    """Adds a strip of images to a section, or the reason for its absence."""
     try:
         section.figures[name] = strip(rows, shot)
-    except NoRenderer as reason:
+    except RendererError as reason:
         section.text.append(f"No pictures of the robot: {reason}.")
     return section
 
 
-def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: Shot) -> Figure:
-    """Draws robots at some times [s], a row for each, and the path of the right hand.
+def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: CameraView) -> Figure:
+    """Draws robots at given times [s], with a row per robot, and the path of the right hand.
 
     Raises
     ------
-    NoRenderer
-        MuJoCo cannot draw here.
+    RendererError
+        MuJoCo cannot render.
     """
     n_columns = max(len(times) for _, times in rows.values())
-    figure = canvas(None, 2.1 * n_columns, 2.2 * len(rows))
+    figure = ensure_figure(None, 2.1 * n_columns, 2.2 * len(rows))
     grid = figure.subplots(len(rows), n_columns, squeeze=False)
     for row, (name, (robot, times)) in zip(grid, rows.items(), strict=True):
         for axes, time, picture in zip(row, times, _pictures(robot, times, shot), strict=True):
@@ -71,10 +71,10 @@ def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: Shot) -> Figu
     return figure
 
 
-def _pictures(robot: Robot, times: Sequence[float], shot: Shot) -> list[Any]:
+def _pictures(robot: Robot, times: Sequence[float], shot: CameraView) -> list[Any]:
     mujoco = engine()
     if reason := _missing():
-        raise NoRenderer(f"MuJoCo cannot draw here ({reason}): install EGL or OSMesa")
+        raise RendererError(f"MuJoCo cannot draw here ({reason}): install EGL or OSMesa")
     renderer = mujoco.Renderer(robot.model, HEIGHT, WIDTH)
     camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
     camera.lookat[:] = shot.centre
@@ -95,7 +95,7 @@ def _pictures(robot: Robot, times: Sequence[float], shot: Shot) -> list[Any]:
 
 
 def _trail(scene: Any, places: Sequence[Any]) -> None:
-    """Adds a line through some places to a scene, up to its capacity."""
+    """Adds a line through positions to a scene, up to its capacity."""
     mujoco = engine()
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
     for start, end in itertools.pairwise(places[: scene.maxgeom - scene.ngeom]):
@@ -114,10 +114,10 @@ def _trail(scene: Any, places: Sequence[Any]) -> None:
 
 @cache
 def _missing() -> str:
-    """Returns the reason why drawing fails; tried once, a second attempt may end the process."""
+    """Returns the reason why rendering fails; cached, as a second try may end the process."""
     mujoco = engine()
     try:
         mujoco.Renderer(mujoco.MjSpec().compile(), 1, 1).close()
-    except Exception as error:  # what a missing library or driver raises differs among them
+    except Exception as error:  # missing libraries and drivers raise different errors
         return str(error) or type(error).__name__
     return ""

@@ -1,4 +1,4 @@
-"""Fig. 4: heights of obstacles without a demonstration."""
+"""Fig. 4: obstacles of heights that were not demonstrated."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, PALETTE, canvas, dress, legend
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, PALETTE, ensure_figure, label_axes, legend
 from pdmp.preprocessing import resample
 from reproduction import paths
-from reproduction.loop import PACE, NewGoal, reach_over
+from reproduction.loop import TAU, NewGoal, reach_over
 from reproduction.reaching import (
     CONSTANTS,
     HEIGHTS,
-    TRAINED,
+    TRAINING_HEIGHTS,
     Reaching,
     demonstrate,
     duration_of,
@@ -31,25 +31,25 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TESTED = tuple(height for height in HEIGHTS if height not in TRAINED)
+TESTED = tuple(height for height in HEIGHTS if height not in TRAINING_HEIGHTS)
 N_SAMPLES = 201
-MOVED = np.array([0.12, 0.0, 0.0])  # m, of the hand: where the goal goes in mid-movement
-MOVED_AT = 0.4  # of the demonstrated duration
+GOAL_OFFSET = np.array([0.12, 0.0, 0.0])  # m, change of the goal of the hand during the movement
+GOAL_CHANGE_AT = 0.4  # of the demonstrated duration
 
 
 def learn(reaching: Reaching, n_styles: int) -> pdmp.Model:
-    """Learns from the reaches over none, two and three boxes, and U: h ↦ β[h, 1]."""
-    return pdmp.fit(reaching.of(TRAINED), n_styles=n_styles, map="linear", **CONSTANTS)
+    """Fits the reaches over zero, two and three boxes, with U: h ↦ β[h, 1]."""
+    return pdmp.fit(reaching.of(TRAINING_HEIGHTS), n_styles=n_styles, map="linear", **CONSTANTS)
 
 
 def error(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration, style: Array) -> float:
-    """Returns E = (1/T) Σ ‖ŷ − y‖² [rad²] of a movement in this style, in aligned time."""
+    """Returns E = (1/T) Σ ‖ŷ − y‖² [rad²] of the movement of a style, in aligned time."""
     gap = movement(model, reaching, style) - aligned(demo)
     return float(np.mean(np.sum(gap**2, axis=1)))
 
 
 def movement(model: pdmp.Model, reaching: Reaching, style: Array) -> Array:
-    """Returns the movement in this style at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
+    """Returns the movement of a style (N_SAMPLES, D) over normalised time."""
     duration = float(model.durations[model.nominal])
     made = model.rollout(
         style=style,
@@ -67,7 +67,7 @@ def predicted_style(model: pdmp.Model, height: float) -> Array:
 
 
 def best_style(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration) -> Array:
-    """Returns the style of least E for a demonstration: movements are linear in it."""
+    """Returns the style that minimises E of a demonstration; movements are linear in it."""
     plain = movement(model, reaching, np.zeros(model.n_styles))
     duration = float(model.durations[model.nominal])
     added = model.jacobian("style", dt=duration / (N_SAMPLES - 1), duration=duration)
@@ -76,25 +76,25 @@ def best_style(model: pdmp.Model, reaching: Reaching, demo: pdmp.Demonstration) 
 
 
 def aligned(demo: pdmp.Demonstration) -> Array:
-    """Returns a demonstration at `N_SAMPLES` shares of its duration (N_SAMPLES, D)."""
+    """Returns a demonstration (N_SAMPLES, D) over normalised time."""
     return resample(demo, duration_of(demo) / (N_SAMPLES - 1)).position
 
 
 @dataclass(frozen=True)
 class Errors:
-    """E of the test demonstrations by J, (J, 6) each [rad²]."""
+    """E of the test demonstrations by J [rad²], (J, 6)."""
 
     predicted: Array
-    """In the style that U predicts from the height."""
+    """E of the style that U predicts from the height."""
     best: Array
-    """In the style that makes it least: what J styles can express."""
+    """E of the best of all styles, the limit of J style parameters."""
 
 
-def errors(reaching: Reaching, most: int = 9) -> Errors:
-    """Returns the errors of one to `most` styles on the heights that were not trained."""
+def errors(reaching: Reaching, max_styles: int = 9) -> Errors:
+    """Returns the errors of 1 to `max_styles` style parameters at the test heights."""
     tests = reaching.of(TESTED)
     predicted, best = [], []
-    for n_styles in range(1, most + 1):
+    for n_styles in range(1, max_styles + 1):
         model = learn(reaching, n_styles)
         styles = [predicted_style(model, height_of(demo)) for demo in tests]
         predicted.append(
@@ -108,28 +108,28 @@ def errors(reaching: Reaching, most: int = 9) -> Errors:
 def reach_predicted(
     model: pdmp.Model, reaching: Reaching, height: float, *events: NewGoal
 ) -> Robot:
-    """Reaches over a height [m] in the style predicted for it."""
+    """Drives the robot over an obstacle of this height [m] with the predicted style."""
     style = predicted_style(model, height)
     return reach_over(model, reaching, height, style, *events)
 
 
 def new_goal(model: pdmp.Model, reaching: Reaching) -> NewGoal:
-    """Returns a goal 12 cm farther from the body, given in mid-movement."""
+    """Returns a command during the movement: a goal 12 cm farther from the body."""
     usual = np.array([reaching.arm.swivel(reaching.goal)])
-    place = (reaching.task.goal + MOVED)[None]
+    place = (reaching.task.goal + GOAL_OFFSET)[None]
     goal = reaching.arm.reach(place, usual, reaching.goal)[0]
-    return NewGoal(MOVED_AT * lasting(model), goal)
+    return NewGoal(GOAL_CHANGE_AT * robot_duration(model), goal)
 
 
-def lasting(model: pdmp.Model) -> float:
-    """Returns the duration of the nominal demonstration at the robot's pace [s]."""
-    return float(model.durations[model.nominal] * PACE / model.tau)
+def robot_duration(model: pdmp.Model) -> float:
+    """Returns the duration of the nominal demonstration with the robot's time constant [s]."""
+    return float(model.durations[model.nominal] * TAU / model.tau)
 
 
 def figure_4(seed: int = SEED) -> Section:
     """Reproduces Fig. 4."""
     reaching = demonstrate(seed)
-    found = errors(reaching)
+    test_errors = errors(reaching)
     models = {n_styles: learn(reaching, n_styles) for n_styles in range(1, 5)}
     tried = {
         n_styles: {height: reach_predicted(model, reaching, height) for height in TESTED}
@@ -154,7 +154,7 @@ def figure_4(seed: int = SEED) -> Section:
             ["J", "E predicted", "E at best"],
             (
                 [n + 1, *(f"{1e3 * row.mean():.1f} ± {1e3 * row.std():.1f}" for row in rows)]
-                for n, rows in enumerate(zip(found.predicted, found.best, strict=True))
+                for n, rows in enumerate(zip(test_errors.predicted, test_errors.best, strict=True))
             ),
         ),
         "Time for which the predicted movement touches a box, on the robot, and how far a joint is "
@@ -184,24 +184,24 @@ def figure_4(seed: int = SEED) -> Section:
         "Fig. 4: heights without a demonstration",
         text,
         {
-            "fig4_errors": draw_errors(found),
+            "fig4_errors": draw_errors(test_errors),
             "fig4_paths": draw_paths(reaching, robots, moved, command),
         },
     )
 
 
-def draw_errors(found: Errors) -> Figure:
+def draw_errors(errors: Errors) -> Figure:
     """Draws E over J."""
-    figure = canvas(None, 5.2, 3.8)
+    figure = ensure_figure(None, 5.2, 3.8)
     axes = figure.subplots()
-    n_styles = np.arange(1, len(found.predicted) + 1)
+    n_styles = np.arange(1, len(errors.predicted) + 1)
     for rows, color, label in (
-        (found.predicted, BLUE, "predicted from the height"),
-        (found.best, ORANGE, "at best"),
+        (errors.predicted, BLUE, "predicted from the height"),
+        (errors.best, ORANGE, "at best"),
     ):
         mean, spread = rows.mean(axis=1), rows.std(axis=1)
         axes.errorbar(n_styles, mean, spread, color=color, marker="o", capsize=3, label=label)
-    dress(axes, "number of styles J", "E [rad²]", "prediction error on new heights")
+    label_axes(axes, "number of styles J", "E [rad²]", "prediction error on new heights")
     axes.set_ylim(bottom=0)
     legend(figure, axes)
     return figure
@@ -211,7 +211,7 @@ def draw_paths(
     reaching: Reaching, robots: dict[float, Robot], moved: dict[float, Robot], command: NewGoal
 ) -> Figure:
     """Draws the predicted and the demonstrated path of the hand from the side."""
-    figure = canvas(None, 9.5, 4.6)
+    figure = ensure_figure(None, 9.5, 4.6)
     panels = figure.subplots(1, len(robots), sharey=True)
     for axes, height in zip(panels, robots, strict=True):
         paths.draw_boxes(axes, reaching, height)
@@ -221,11 +221,11 @@ def draw_paths(
         predicted, turned = (np.array(robot[height].log.hands) for robot in (robots, moved))
         paths.draw_hand(axes, reaching, predicted, color=BLUE, label="predicted, J = 3")
         after = turned[round(command.time / DT) :]
-        look: dict[str, Any] = {"color": PALETTE[2], "marker": "^", "markevery": 250}
-        paths.draw_hand(axes, reaching, after, **look, label="goal moved")
+        style_kwargs: dict[str, Any] = {"color": PALETTE[2], "marker": "^", "markevery": 250}
+        paths.draw_hand(axes, reaching, after, **style_kwargs, label="goal moved")
         way, up = reaching.side_view(reaching.arm.hands([command.goal]))
         axes.plot(way, up, "*", color=PALETTE[2], markersize=12, label="new goal")
-        paths.dress_side(axes, pile(height))
+        paths.label_side_view(axes, pile(height))
     panels[0].set_ylim(bottom=0)
     legend(figure, panels[0])
     return figure

@@ -1,4 +1,4 @@
-"""The control loop: a movement is stepped, and the robot driven along it, at 1 kHz."""
+"""Control loop at 1 kHz, which steps a movement and drives the robot along it."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from reproduction.robot import DT, Robot, boxes
 
 Array = NDArray[np.float64]
 
-PACE = 0.6  # s: tau on the robot, as printed; twice that of the learning
-LONGEST = 30.0  # s
+TAU = 0.6  # s, time constant on the robot, as printed; twice that of the fit
+MAX_DURATION = 30.0  # s
 
 
 class Movement(Protocol):
-    """What a loop needs to know of a controller."""
+    """Interface of a controller in the loop."""
 
     goal: Any
 
     def step(self, *, measured: Array | None = None) -> pdmp.Status:
-        """Takes one tick."""
+        """Steps by one tick."""
 
     @property
     def position(self) -> Array: ...  # noqa: D102
@@ -37,27 +37,27 @@ class Movement(Protocol):
 
 @dataclass(frozen=True)
 class NewGoal:
-    """A goal (D,) [rad] that is given at a time [s]."""
+    """Command of a new goal (D,) [rad] at a time [s]."""
 
     time: float
     goal: Array
 
     def __call__(self, time: float, movement: Movement, robot: Robot) -> None:
-        """Gives the command, when it is time."""
+        """Sets the goal at its time."""
         if _same_tick(time, self.time):
             movement.goal = self.goal
 
 
 @dataclass(frozen=True)
-class Held:
-    """A joint that is held fast from one time to another [s]."""
+class JointLock:
+    """Disturbance: a joint is locked from one time to another [s]."""
 
     joint: int
     start: float
     end: float
 
     def __call__(self, time: float, movement: Movement, robot: Robot) -> None:
-        """Grips or releases the joint, when it is time."""
+        """Locks or releases the joint at its time."""
         if _same_tick(time, self.start):
             robot.hold(self.joint)
         if _same_tick(time, self.end):
@@ -71,25 +71,25 @@ def _same_tick(one: float, other: float) -> bool:
 def drive(
     robot: Robot,
     movement: Movement,
-    events: Sequence[NewGoal | Held] = (),
+    events: Sequence[NewGoal | JointLock] = (),
     *,
     feedback: bool = False,
 ) -> Robot:
-    """Drives the robot along a movement until it has settled on its goal.
+    """Drives the robot along a movement until it has settled at its goal.
 
     Parameters
     ----------
     robot : Robot
-        Where the movement starts.
+        Robot at the start of the movement.
     movement : Movement
-        A `pdmp.Controller`, or what else steps like one.
+        A `pdmp.Controller`, or an object with the same interface.
     events : sequence
-        What happens on the way.
+        Commands and disturbances during the movement.
     feedback : bool
-        Tell the movement where the robot is, so that it waits when held.
+        Pass the measured position to the movement, which slows its phase when the robot is blocked.
     """
     status, tick = pdmp.Status.WORKING, 0
-    while status == pdmp.Status.WORKING and tick < LONGEST / DT:
+    while status == pdmp.Status.WORKING and tick < MAX_DURATION / DT:
         for event in events:
             event(tick * DT, movement, robot)
         status = movement.step(measured=robot.position) if feedback else movement.step()
@@ -103,18 +103,18 @@ def reach_over(
     reaching: Reaching,
     height: float,
     style: Array,
-    *events: NewGoal | Held,
-    tau: float = PACE,
+    *events: NewGoal | JointLock,
+    tau: float = TAU,
 ) -> Robot:
-    """Reaches over an obstacle of this height [m] from rest, in this style."""
+    """Drives the robot from rest over an obstacle of this height [m] with a style."""
     robot = Robot(reaching.start, reaching.task, boxes(height))
     return drive(robot, from_rest(model, reaching, style, tau), events)
 
 
 def from_rest(
-    model: pdmp.Model, reaching: Reaching, style: Array, tau: float = PACE
+    model: pdmp.Model, reaching: Reaching, style: Array, tau: float = TAU
 ) -> pdmp.Controller:
-    """Returns a controller that starts with the robot at rest and goes to the goal as printed."""
+    """Returns a controller that starts with the robot at rest and moves to the printed goal."""
     return model.controller(
         dt=DT,
         style=style,

@@ -1,4 +1,4 @@
-"""Fig. 2: one degree of freedom, and what style, goal and time constant do to it."""
+"""Fig. 2: effects of style, goal and time constant on one degree of freedom."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, gradient, legend
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, colormap, ensure_figure, label_axes, legend
 from reproduction.metrics import reproduction_error
 from reproduction.section import SEED, Section
 
@@ -29,13 +29,13 @@ SHARES = np.linspace(0, 1, 7)
 
 @dataclass(frozen=True)
 class Example:
-    """One of the two kinds: its demonstrations, and what is changed in them."""
+    """Demonstrations and model of one kind, and the changes to reproduce them with."""
 
     title: str
     model: pdmp.Model
     demos: list[pdmp.Demonstration]
     moved: Callable[[pdmp.Conditions], pdmp.Conditions]
-    """Goal or anchor elsewhere."""
+    """Changed goal or anchor."""
 
     def demonstrated(self, m: int) -> tuple[Array, Array]:
         """Returns time [s] and position of a demonstration."""
@@ -49,7 +49,7 @@ class Example:
 
 
 def discrete(noise: Generator) -> Example:
-    """Learns reaches of three dimensions: how far, and how much of two detours."""
+    """Fits discrete movements that vary by their distance and by two detours."""
     s = np.linspace(0, 1, N_SAMPLES)
     straight = s**3 * (10 - 15 * s + 6 * s**2)
     detour = (4 * s * (1 - s)) ** 3
@@ -61,7 +61,7 @@ def discrete(noise: Generator) -> Example:
 
 
 def rhythmic(noise: Generator) -> Example:
-    """Learns cycles of three dimensions: how much of three waves."""
+    """Fits cycles that vary by the amplitudes of three waves."""
     phase = 2 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES
     shapes = np.column_stack([np.sin(phase), np.cos(2 * phase), np.sin(3 * phase)])
     weights = noise.normal([1.0, 0.0, 0.0], [0.3, 0.3, 0.2], (N_DEMOS, 3))
@@ -71,7 +71,7 @@ def rhythmic(noise: Generator) -> Example:
 
 
 def extremes(model: pdmp.Model) -> tuple[int, int]:
-    """Returns the two demonstrations whose styles are farthest from each other."""
+    """Returns the two demonstrations whose styles are the farthest apart."""
     gaps = np.linalg.norm(model.styles[:, None] - model.styles, axis=2)
     first, second = np.unravel_index(np.argmax(gaps), gaps.shape)
     return int(first), int(second)
@@ -117,8 +117,8 @@ def figure_2(seed: int = SEED) -> Section:
 
 
 def draw(examples: Sequence[Example]) -> Figure:
-    """Draws demonstrations, reproductions under other goals and paces, and styles in between."""
-    figure = canvas(None, 12.0, 6.8)
+    """Draws demonstrations, reproductions with other goals and tau, and blended styles."""
+    figure = ensure_figure(None, 12.0, 6.8)
     grid = figure.subplots(len(examples), 3)
     for row, example in zip(grid, examples, strict=True):
         model = example.model
@@ -133,16 +133,16 @@ def draw(examples: Sequence[Example]) -> Figure:
         first, second = (model.conditions(m) for m in extremes(model))
         for share in SHARES:
             path = _path(model, pdmp.blend(first, second, float(share)), model.nominal)
-            between.plot(path.time, path.position, color=gradient()(share), linewidth=1.3)
+            between.plot(path.time, path.position, color=colormap()(share), linewidth=1.3)
         titles = ("demonstrations", "two styles, goals, time constants", "from s1 to s2")
         for axes, title in zip(row, titles, strict=True):
-            dress(axes, "time [s]", "position [–]", f"{example.title}: {title}")
+            label_axes(axes, "time [s]", "position [–]", f"{example.title}: {title}")
     legend(figure, grid[0, 1])
     return figure
 
 
 def _variants(axes: Axes, example: Example, m: int, color: str, name: str) -> None:
-    """Draws a demonstration, its reproduction, and that elsewhere and slower."""
+    """Draws a demonstration, its reproduction, and the reproduction with changed goal and tau."""
     model = example.model
     own = model.conditions(m)
     tau = model.tau * float(model.durations[m] / model.durations[model.nominal])
@@ -165,7 +165,7 @@ def _variants(axes: Axes, example: Example, m: int, color: str, name: str) -> No
 def _path(
     model: pdmp.Model, conditions: pdmp.Conditions, m: int, slower: float = 1.0
 ) -> pdmp.Trajectory:
-    """Rolls out for a little longer than a demonstration takes, or its cycle twice."""
+    """Returns a rollout somewhat longer than a demonstration, or of two cycles."""
     span = 1.2 * _n_periods(model) * model.durations[m] * slower
     return model.rollout(conditions, dt=0.002, duration=span)
 

@@ -1,4 +1,4 @@
-"""Drawings of paths of hands and joints."""
+"""Figures of paths of hands and joints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp.plot._canvas import GREY, PALETTE, canvas, dress, legend
+from pdmp.plot.canvas import GREY, PALETTE, ensure_figure, label_axes, legend
 from reproduction.human import BOX
 from reproduction.reaching import NAMES, Reaching
 from reproduction.robot import DT, SHADES, Robot, boxes
@@ -20,25 +20,27 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def draw_boxes(axes: Axes, reaching: Reaching, height: float, **look: Any) -> None:
+def draw_boxes(axes: Axes, reaching: Reaching, height: float, **style_kwargs: Any) -> None:
     """Draws a pile of boxes from the side."""
     from matplotlib.patches import Rectangle
 
     middle = 0.5 * np.linalg.norm(reaching.task.goal - reaching.task.start)
     for k in range(boxes(height)):
         corner = (middle - 0.5 * BOX[0], k * BOX[2])
-        box = Rectangle(corner, BOX[0], BOX[2], **{"color": SHADES[k % 2], "alpha": 0.35, **look})
+        box = Rectangle(
+            corner, BOX[0], BOX[2], **{"color": SHADES[k % 2], "alpha": 0.35, **style_kwargs}
+        )
         axes.add_patch(box)
 
 
-def draw_hand(axes: Axes, reaching: Reaching, hands: Array, **look: Any) -> None:
+def draw_hand(axes: Axes, reaching: Reaching, hands: Array, **style_kwargs: Any) -> None:
     """Draws the path of a hand (T, 3) from the side."""
-    axes.plot(*reaching.side_view(hands), **look)
+    axes.plot(*reaching.side_view(hands), **style_kwargs)
 
 
-def dress_side(axes: Axes, title: str) -> None:
-    """Labels a view from the side."""
-    dress(axes, "way from start to goal [m]", "height over the table [m]", title)
+def label_side_view(axes: Axes, title: str) -> None:
+    """Labels the axes of a side view."""
+    label_axes(axes, "way from start to goal [m]", "height over the table [m]", title)
 
 
 def joints(robots: Mapping[str, Robot], until: float) -> Figure:
@@ -47,15 +49,15 @@ def joints(robots: Mapping[str, Robot], until: float) -> Figure:
     Parameters
     ----------
     robots : mapping of str to Robot
-        By their name in the legend.
+        Robots by their name in the legend.
     until : float
-        How much of their time to draw [s].
+        End of the drawn time [s].
     """
-    figure = canvas(None, 7.5, 8.5)
+    figure = ensure_figure(None, 7.5, 8.5)
     panels = figure.subplots(len(NAMES) + 1, 1, sharex=True)
     for axes, name in zip(panels, NAMES, strict=False):
-        dress(axes, "", f"{name} [rad]")
-    dress(panels[-1], "time [s]", "off by [mrad]")
+        label_axes(axes, "", f"{name} [rad]")
+    label_axes(panels[-1], "time [s]", "off by [mrad]")
     for (name, robot), color in zip(robots.items(), PALETTE, strict=False):
         commanded, done = (rows[: round(until / DT)] for rows in robot.log.rows())
         time = DT * np.arange(1, len(commanded) + 1)

@@ -1,4 +1,4 @@
-"""The fifteen reaches of Section 4.1: five heights of obstacle, three trials each, four joints."""
+"""Fifteen reaches of Section 4.1: obstacles of five heights, three trials each, four joints."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from reproduction.baxter import Arm, OutOfReach
-from reproduction.human import RESTING, Task, reach
+from reproduction.baxter import Arm, UnreachableError
+from reproduction.human import HAND_HEIGHT, Task, reach
 from reproduction.section import SEED
 
 Array = NDArray[np.float64]
 
 GOAL = np.array([-0.55, -0.97, 0.54, -1.42])  # rad, as printed
-START = np.array([0.30, -0.55, 0.0])  # m, of the hand, from where it ends
+START = np.array([0.30, -0.55, 0.0])  # m, start of the hand relative to its goal
 HEIGHTS = (0.0, 0.15, 0.30, 0.45, 0.60)  # m: none to four boxes
-TRAINED = (0.0, 0.30, 0.45)  # m
+TRAINING_HEIGHTS = (0.0, 0.30, 0.45)  # m
 TRIALS = 3
 MOST_TRIALS = 100
 CONSTANTS: dict[str, Any] = {
@@ -34,7 +34,7 @@ NAMES = ["q1", "q2", "q3", "q4"]
 
 @dataclass(frozen=True)
 class Reaching:
-    """The task on the robot, and its demonstrations."""
+    """Task on the robot, and its demonstrations."""
 
     arm: Arm
     task: Task
@@ -48,9 +48,9 @@ class Reaching:
         return 1e3 * float(np.linalg.norm(hand - place))
 
     def side_view(self, hands: Array) -> tuple[Array, Array]:
-        """Returns the way of hands (T, 3) from start to goal, and their height, in m."""
-        way = (hands - self.task.start) @ self.task.forward
-        return way, hands[:, 2] - self.task.goal[2] + RESTING
+        """Returns distance (T,) from start towards goal and height (T,) of hands (T, 3), in m."""
+        distance = (hands - self.task.start) @ self.task.forward
+        return distance, hands[:, 2] - self.task.goal[2] + HAND_HEIGHT
 
     def of(self, heights: tuple[float, ...]) -> list[pdmp.Demonstration]:
         """Returns the demonstrations over obstacles of these heights [m]."""
@@ -59,14 +59,14 @@ class Reaching:
 
 @cache
 def demonstrate(seed: int = SEED) -> Reaching:
-    """Lets a person reach over every obstacle, and brings that to the robot's right arm.
+    """Returns simulated human reaches over all obstacles, mapped to the right arm.
 
-    A trial that the robot cannot follow, with the elbow at its limit, is made anew.
+    A trial that the robot cannot follow, with the elbow at its limit, is repeated.
 
     Parameters
     ----------
     seed : int
-        Which person, as it were: that of the noise.
+        Seed of the noise.
     """
     arm = Arm()
     usual, end = arm.swivel(GOAL), arm.places(GOAL)[2]
@@ -89,17 +89,19 @@ def demonstrate(seed: int = SEED) -> Reaching:
 def _trial(
     arm: Arm, task: Task, height: float, usual: float, start: Array, noise: np.random.Generator
 ) -> tuple[Array, float]:
-    """Returns the joint angles of one reach [rad], and the time between two of them [s]."""
+    """Returns the joint angles of one reach [rad], and their sampling interval [s]."""
     for _ in range(MOST_TRIALS):
         trial = reach(task, height, noise)
-        with suppress(OutOfReach):
+        with suppress(UnreachableError):
             elbow = np.full(len(trial.hand), usual + trial.elbow)
             return arm.reach(trial.hand, elbow, start), trial.dt
-    raise OutOfReach(f"height = {height} m: none of {MOST_TRIALS} trials is within the arm's reach")
+    raise UnreachableError(
+        f"height = {height} m: none of {MOST_TRIALS} trials is within the arm's reach"
+    )
 
 
 def height_of(demo: pdmp.Demonstration) -> float:
-    """Returns the height of the obstacle that was reached over [m]."""
+    """Returns the height of the obstacle [m]."""
     return float(np.asarray(demo.context)[0])
 
 

@@ -1,12 +1,12 @@
-"""What the paper argues with: other ways to learn the same reaches, on the same robot.
+"""Comparison with the other methods that the paper discusses, on the same task and robot.
 
-- a DMP of one demonstration, whose goal and pace can be changed, and nothing else;
-- principal components of the joint trajectories themselves, about their mean, as many as there are
-  styles, played back in time: it stands for the models of trajectories that the paper names;
-- a library of movements from which a new DMP is learnt for every height, by locally weighted
+- a DMP of one demonstration, of which only goal and time constant can change;
+- principal components of the joint trajectories about their mean, as many as style parameters,
+  replayed in time, in place of the models of trajectories that the paper mentions;
+- a library of demonstrations from which a new DMP is fitted for every height, by locally weighted
   regression (Gams, Ude, IEEE-RAS International Conference on Humanoid Robots, 2009, 28-33).
 
-All learn from the nine reaches over none, two and three boxes, and meet one box and four.
+All learn from the nine reaches over zero, two and three boxes; one and four boxes are the tests.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, canvas, dress, legend
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, ensure_figure, label_axes, legend
 from reproduction.heights import (
     N_SAMPLES,
     TESTED,
     aligned,
-    lasting,
     learn,
     new_goal,
     predicted_style,
+    robot_duration,
 )
-from reproduction.loop import PACE, Held, Movement, NewGoal, drive, from_rest
+from reproduction.loop import TAU, JointLock, Movement, NewGoal, drive, from_rest
 from reproduction.reaching import (
     CONSTANTS,
-    TRAINED,
+    TRAINING_HEIGHTS,
     Reaching,
     demonstrate,
     duration_of,
@@ -48,34 +48,34 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]  # of float64
 Rival: TypeAlias = Callable[[Reaching], Callable[[float], Movement]]
-"""A way to learn: from reaches to what makes a movement for a height [m]."""
+"""Method: a function from reaches to a generator of movements for a height [m]."""
 
 N_STYLES = 3
-WIDTH = 0.45  # m, of the library's kernel: the range of demonstrated heights
-HELD_JOINT, HELD_FOR = 3, 0.5  # the elbow; s
-HELD_AT = 0.3  # of the demonstrated duration
+WIDTH = 0.45  # m, kernel width of the library: the range of the demonstrated heights
+LOCKED_JOINT, LOCK_DURATION = 3, 0.5  # index of the elbow; s
+LOCK_AT = 0.3  # of the demonstrated duration
 
 
 def styles(reaching: Reaching) -> Callable[[float], Movement]:
-    """Learns one primitive with three styles, predicted from the height."""
+    """Fits one primitive with three style parameters, predicted from the height."""
     model = learn(reaching, N_STYLES)
     return lambda height: from_rest(model, reaching, predicted_style(model, height))
 
 
 def one_demonstration(reaching: Reaching) -> Callable[[float], Movement]:
-    """Learns a DMP from the demonstration of median duration."""
+    """Fits a DMP to the demonstration of median duration."""
     nominal = learn(reaching, N_STYLES).nominal
-    model = pdmp.fit([reaching.of(TRAINED)[nominal]], n_styles=1, **CONSTANTS)
+    model = pdmp.fit([reaching.of(TRAINING_HEIGHTS)[nominal]], n_styles=1, **CONSTANTS)
     return lambda height: from_rest(model, reaching, model.styles[0])
 
 
 def library(reaching: Reaching) -> Callable[[float], Movement]:
-    """Keeps all demonstrations, and learns a DMP for each height from those of similar heights.
+    """Stores all demonstrations, and fits a DMP for each height to those of similar heights.
 
-    The target is linear in the trajectory, so that the weighted regression of all targets is the
-    regression of the weighted mean; the kernel is (1 − (|h − hᵐ|/width)³)³.
+    The target is linear in the trajectory: weighted regression of all targets equals regression of
+    their weighted mean; the kernel is (1 − (|h − hᵐ|/width)³)³.
     """
-    paths, heights, duration = _shown(reaching)
+    paths, heights, duration = _training_reaches(reaching)
 
     def synthesise(height: float) -> Movement:
         near = np.clip(1 - (np.abs(heights - height) / WIDTH) ** 3, 0, None) ** 3
@@ -88,14 +88,14 @@ def library(reaching: Reaching) -> Callable[[float], Movement]:
 
 @dataclass
 class Recording:
-    """A trajectory that is played back in time, regardless of commands; `goal` changes nothing."""
+    """A trajectory that is replayed in time; commands, such as `goal`, have no effect."""
 
     trajectory: tuple[Array, Array, Array]
     goal: Array
     tick: int = 0
 
     def step(self, *, measured: Array | None = None) -> pdmp.Status:
-        """Goes on to the next sample, or stays at the last."""
+        """Advances to the next sample, or stays at the last."""
         self.tick = min(self.tick + 1, len(self.trajectory[0]) - 1)
         ended = self.tick == len(self.trajectory[0]) - 1
         return pdmp.Status.FINISHED if ended else pdmp.Status.WORKING
@@ -120,11 +120,11 @@ class Recording:
 
 
 def components(reaching: Reaching) -> Callable[[float], Movement]:
-    """Learns principal components of the trajectories, and their weights from the height."""
+    """Computes principal components of the trajectories, weighted by the height."""
     from scipy.interpolate import CubicSpline
 
-    paths, heights, duration = _shown(reaching)
-    duration *= PACE / CONSTANTS["tau"]
+    paths, heights, duration = _training_reaches(reaching)
+    duration *= TAU / CONSTANTS["tau"]
     flat = paths.reshape(len(paths), -1)
     mean = flat.mean(axis=0)
     factors = pdmp.factorise(flat - mean, n_styles=N_STYLES)
@@ -134,7 +134,7 @@ def components(reaching: Reaching) -> Callable[[float], Movement]:
         weights = chosen.predict([[height]])[0][0]
         path = (mean + weights @ factors.basis).reshape(N_SAMPLES, -1)
         spline = CubicSpline(np.linspace(0, duration, N_SAMPLES), path, bc_type="clamped")
-        # A recording cannot wait for the robot to come to rest; it stays where it ends.
+        # A recording does not wait for the robot; it stays at its last sample.
         times = np.minimum(np.arange(0, duration + 1.0, DT), duration)
         moving = (times < duration)[:, None]
         rows = (spline(times), moving * spline(times, 1), moving * spline(times, 2))
@@ -152,30 +152,32 @@ RIVALS: dict[str, Rival] = {
 
 
 @dataclass(frozen=True)
-class Trial:
-    """What became of one rival at one height: left alone, to a goal that moves, and held."""
+class TrialResult:
+    """Result of a method at one height: undisturbed, with a moved goal, with a locked joint."""
 
     alone: Robot
     moved: Robot
-    held: Robot
-    grip: Held
+    locked: Robot
+    lock: JointLock
     new_style: float
-    """Median time to have the movement for a height, ready for its first tick [ms]."""
+    """Median time to compute the movement for a height, ready for its first tick [ms]."""
 
     def speed_ratio(self) -> float:
-        """Returns the largest joint speed once let go, over the largest when left alone."""
-        return _fastest(self.held, after=self.grip.end) / _fastest(self.alone)
+        """Returns the maximum joint speed after the release over the undisturbed maximum."""
+        return _fastest(self.locked, after=self.lock.end) / _fastest(self.alone)
 
 
-def disturbances(reaching: Reaching) -> tuple[NewGoal, Held]:
-    """Returns the disturbances, timed by the clock of the primitive: goal moved, elbow held."""
+def disturbances(reaching: Reaching) -> tuple[NewGoal, JointLock]:
+    """Returns the disturbances, a moved goal and a locked elbow, at times of the primitive."""
     model = learn(reaching, N_STYLES)
-    start = HELD_AT * lasting(model)
-    return new_goal(model, reaching), Held(HELD_JOINT, start, start + HELD_FOR)
+    start = LOCK_AT * robot_duration(model)
+    return new_goal(model, reaching), JointLock(LOCKED_JOINT, start, start + LOCK_DURATION)
 
 
-def attempt(rival: Rival, reaching: Reaching, height: float, command: NewGoal, grip: Held) -> Trial:
-    """Lets one rival reach over a height [m]."""
+def run_trial(
+    rival: Rival, reaching: Reaching, height: float, command: NewGoal, lock: JointLock
+) -> TrialResult:
+    """Runs one method over a height [m]."""
     movement_for = rival(reaching)
     times = []
     for _ in range(21):
@@ -183,20 +185,20 @@ def attempt(rival: Rival, reaching: Reaching, height: float, command: NewGoal, g
         movement_for(height)
         times.append(1e3 * (perf_counter() - began))
 
-    def run(*events: NewGoal | Held, feedback: bool = False) -> Robot:
+    def run(*events: NewGoal | JointLock, feedback: bool = False) -> Robot:
         movement = movement_for(height)
         robot = Robot(movement.position, reaching.task, boxes(height))
         return drive(robot, movement, events, feedback=feedback)
 
-    return Trial(run(), run(command), run(grip, feedback=True), grip, float(np.median(times)))
+    return TrialResult(run(), run(command), run(lock, feedback=True), lock, float(np.median(times)))
 
 
 def comparison(seed: int = SEED) -> Section:
-    """Compares the methods that the paper compares in words."""
+    """Compares the methods that the paper compares verbally."""
     reaching = demonstrate(seed)
-    command, grip = disturbances(reaching)
+    command, lock = disturbances(reaching)
     trials = {
-        (name, height): attempt(rival, reaching, height, command, grip)
+        (name, height): run_trial(rival, reaching, height, command, lock)
         for name, rival in RIVALS.items()
         for height in TESTED
     }
@@ -208,7 +210,7 @@ def comparison(seed: int = SEED) -> Section:
             f"{reaching.miss(trial.alone.log.hands[-1]):.1f} mm",
             f"{reaching.miss(trial.moved.log.hands[-1], command.goal):.1f} mm",
             f"{trial.speed_ratio():.1f}",
-            f"{trial.held.log.contact():.3f} s",
+            f"{trial.locked.log.contact():.3f} s",
             f"{trial.new_style:.2f} ms",
         ]
         for (name, height), trial in trials.items()
@@ -230,37 +232,37 @@ def comparison(seed: int = SEED) -> Section:
         "have no way to. A run ends after 30 s.",
         markdown_table(header, rows),
     ]
-    held = {name: trials[name, TESTED[0]] for name in ("PDMP, J = 3", "principal components, 3")}
-    return Section("What the paper argues with", text, {"held": draw_held(held)})
+    locked = {name: trials[name, TESTED[0]] for name in ("PDMP, J = 3", "principal components, 3")}
+    return Section("What the paper argues with", text, {"held": draw_locked(locked)})
 
 
-def draw_held(trials: dict[str, Trial]) -> Figure:
-    """Draws commanded and measured elbow angle while it was held and after."""
-    figure = canvas(None, 9.5, 3.8)
+def draw_locked(trials: dict[str, TrialResult]) -> Figure:
+    """Draws commanded and measured elbow angle during the lock and after it."""
+    figure = ensure_figure(None, 9.5, 3.8)
     panels = figure.subplots(1, len(trials), sharey=True)
     for axes, (name, trial) in zip(panels, trials.items(), strict=True):
-        commanded, done = (rows[:, HELD_JOINT] for rows in trial.held.log.rows())
+        commanded, done = (rows[:, LOCKED_JOINT] for rows in trial.locked.log.rows())
         time = DT * np.arange(1, len(commanded) + 1)
-        within = time < trial.grip.end + 3.0
-        axes.axvspan(trial.grip.start, trial.grip.end, color=ORANGE, alpha=0.2, label="held")
-        undisturbed = trial.alone.log.rows()[0][: within.sum(), HELD_JOINT]
+        within = time < trial.lock.end + 3.0
+        axes.axvspan(trial.lock.start, trial.lock.end, color=ORANGE, alpha=0.2, label="held")
+        undisturbed = trial.alone.log.rows()[0][: within.sum(), LOCKED_JOINT]
         axes.plot(time[: len(undisturbed)], undisturbed, "k:", linewidth=1, label="undisturbed")
         axes.plot(time[within], commanded[within], color=GREY, linewidth=3, label="commanded")
         axes.plot(time[within], done[within], color=BLUE, label="measured")
-        dress(axes, "time [s]", "q4 [rad]", name)
+        label_axes(axes, "time [s]", "q4 [rad]", name)
     legend(figure, panels[0])
     return figure
 
 
 def _fastest(robot: Robot, after: float = 0.0) -> float:
-    """Returns the largest speed of a joint from some time on [rad/s]."""
+    """Returns the maximum joint speed from a time on [rad/s]."""
     _, done = robot.log.rows()
     return float(np.abs(np.diff(done[round(after / DT) :], axis=0)).max() / DT)
 
 
-def _shown(reaching: Reaching) -> tuple[Array, Array, float]:
+def _training_reaches(reaching: Reaching) -> tuple[Array, Array, float]:
     """Returns the training reaches (M, N, D), their heights (M,) [m], and their median duration."""
-    demos = reaching.of(TRAINED)
+    demos = reaching.of(TRAINING_HEIGHTS)
     paths = np.array([aligned(demo) for demo in demos])
     heights = np.array([height_of(demo) for demo in demos])
     return paths, heights, float(np.median([duration_of(demo) for demo in demos]))

@@ -1,4 +1,4 @@
-"""Baxter in MuJoCo: a table, boxes that can be knocked over, and torques at 1 kHz."""
+"""Simulation of Baxter in MuJoCo with a table and movable boxes; torque control at 1 kHz."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from reproduction.baxter import DIRECTIONS, JOINTS, engine, specification
-from reproduction.human import BOX, RESTING, Task
+from reproduction.human import BOX, HAND_HEIGHT, Task
 
 Array = NDArray[np.float64]
 
 DT = 0.001  # s
 STIFFNESS, DAMPING = 900.0, 60.0  # per s², per s: errors vanish in 0.2 s, critically damped
-GRIP, GRIP_DAMPING = 4000.0, 100.0  # N m/rad, N m s/rad: a hand that holds a joint fast
+LOCK_STIFFNESS, LOCK_DAMPING = 4000.0, 100.0  # N m/rad, N m s/rad, of a locked joint
 BOX_MASS = 0.5  # kg
 TABLE = np.array([0.80, 1.10, 0.04])  # m
-RESTING_ARM = {"s0": 0.0, "s1": 0.9, "e0": 0.0, "e1": 0.6}  # rad, as Baxter counts
+RESTING_ARM = {"s0": 0.0, "s1": 0.9, "e0": 0.0, "e1": 0.6}  # rad, with Baxter's signs
 WOOD, SHADES = (0.72, 0.62, 0.48, 1), ((0.95, 0.60, 0.25, 1), (0.84, 0.37, 0.0, 1))
 
 
 @dataclass
 class Log:
-    """What happened, a row per tick."""
+    """Record of a run, with a row per tick."""
 
     commanded: list[Array] = field(default_factory=list)  # rad
     measured: list[Array] = field(default_factory=list)  # rad
@@ -43,14 +43,14 @@ class Log:
         return float(np.abs(commanded - measured).max())
 
     def contact(self) -> float:
-        """Returns the time during which the robot touched a box [s]."""
+        """Returns the time during which the robot contact_times a box [s]."""
         return DT * sum(self.touching)
 
 
 class Robot:
-    """Baxter, some arms of which are moved and the rest held still.
+    """Baxter with one or two moving arms; the others are fixed.
 
-    Torques are those that the model asks for, by computed torque control::
+    The torques are those of computed torque control::
 
         τ = M (q̈_d + 60 (q̇_d − q̇) + 900 (q_d − q)) + h(q, q̇)
 
@@ -59,11 +59,11 @@ class Robot:
     Parameters
     ----------
     start : (4,) or (8,) array_like
-        Joint angles q1 to q4 [rad] to start from; of the right arm, or of the right and the left.
+        Initial joint angles q1 to q4 [rad] of the right arm, or of the right and the left arm.
     task : Task, optional
-        Where table and boxes stand; without, there are none.
+        Task with a table and boxes; none by default.
     n_boxes : int
-        How many boxes are piled up.
+        Number of boxes in the pile.
     """
 
     def __init__(self, start: ArrayLike, task: Task | None = None, n_boxes: int = 0) -> None:
@@ -73,24 +73,24 @@ class Robot:
         names = [f"{side}_{joint}" for side in sides for joint in JOINTS]
         specified = specification()
         specified.option.timestep = DT
-        _light(specified)
-        _free_the_arms(specified)
+        _add_lights(specified)
+        _disable_torso_contacts(specified)
         if task is not None:
-            _furnish(specified, task, n_boxes)
+            _add_table_and_boxes(specified, task, n_boxes)
         self._mujoco = mujoco
         self.model = model = specified.compile()
         self.data: Any = mujoco.MjData(model)
         moved = [model.joint(name) for name in names]
         self._moved = np.array([joint.qposadr[0] for joint in moved])
         self._motors = model.actuator_trnid[:, 0]
-        # The motors' joints come before the boxes, with one degree of freedom and one coordinate
-        # each, in the order of the motors: one index serves for all.
+        # The actuated joints precede the boxes and are in the order of the motors, with one degree
+        # of freedom and one coordinate each: a single index addresses all of them.
         self._driven = model.jnt_dofadr[self._motors]
         self._signs = np.concatenate([DIRECTIONS[side] for side in sides])
         self._is_box = np.array([_root(model, g).startswith("box") for g in range(model.ngeom)])
         self._is_robot = np.array([_root(model, g) == "base" for g in range(model.ngeom)])
         self._hand = model.body("right_hand").id
-        self._grip: tuple[int, float] | None = None
+        self._lock: tuple[int, float] | None = None
         for side, joint in product(("right", "left"), JOINTS):
             self.data.joint(f"{side}_{joint}").qpos = RESTING_ARM[joint]
         self.data.qpos[self._moved] = self._signs * q
@@ -104,33 +104,33 @@ class Robot:
         return np.array(self._signs * self.data.qpos[self._moved])
 
     def hold(self, joint: int | None) -> None:
-        """Grips the joint of this index at its position, or releases it."""
+        """Locks the joint of this index at its position, or releases it."""
         if joint is None:
-            self._grip = None
+            self._lock = None
             self.data.qfrc_applied[:] = 0
         else:
-            at = int(self._moved[joint])
-            self._grip = (at, float(self.data.qpos[at]))
+            index = int(self._moved[joint])
+            self._lock = (index, float(self.data.qpos[index]))
 
     def move(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> None:
-        """Drives the arms towards a state for one tick: (D,) [rad, rad/s, rad/s²]."""
+        """Controls the arms towards a state (D,) [rad, rad/s, rad/s²] for one tick."""
         model, data, mujoco = self.model, self.data, self._mujoco
-        wanted, rate, asked = self._target, np.zeros(model.nv), np.zeros(model.nv)
-        wanted[self._moved] = self._signs * position
+        target, rate, acceleration_command = self._target, np.zeros(model.nv), np.zeros(model.nv)
+        target[self._moved] = self._signs * position
         rate[self._moved] = self._signs * velocity
-        asked[self._moved] = self._signs * acceleration
+        acceleration_command[self._moved] = self._signs * acceleration
         driven = self._driven
-        asked[driven] += STIFFNESS * (wanted - data.qpos[driven])
-        asked[driven] += DAMPING * (rate[driven] - data.qvel[driven])
+        acceleration_command[driven] += STIFFNESS * (target - data.qpos[driven])
+        acceleration_command[driven] += DAMPING * (rate[driven] - data.qvel[driven])
         torque = np.zeros(model.nv)
-        mujoco.mj_mulM(model, data, torque, asked)
+        mujoco.mj_mulM(model, data, torque, acceleration_command)
         data.ctrl[:] = np.clip((torque + data.qfrc_bias)[driven], *model.actuator_ctrlrange.T)
-        if self._grip is not None:
-            at, place = self._grip
-            pull = GRIP * (place - data.qpos[at]) - GRIP_DAMPING * data.qvel[at]
-            data.qfrc_applied[at] = pull
+        if self._lock is not None:
+            index, angle = self._lock
+            spring = LOCK_STIFFNESS * (angle - data.qpos[index])
+            data.qfrc_applied[index] = spring - LOCK_DAMPING * data.qvel[index]
         mujoco.mj_step2(model, data)
-        # Where all is now, and what the next torques are made from.
+        # Updates kinematics and dynamics, from which the next torques are computed.
         mujoco.mj_step1(model, data)
         self._write(position)
 
@@ -146,14 +146,14 @@ class Robot:
         self.log.states.append(self.data.qpos.copy())
 
 
-def _furnish(specified: Any, task: Task, n_boxes: int) -> None:
-    """Puts a table below start and goal, and a pile of boxes half way."""
+def _add_table_and_boxes(specified: Any, task: Task, n_boxes: int) -> None:
+    """Adds a table below start and goal, and a pile of boxes half way."""
     box = engine().mjtGeom.mjGEOM_BOX
     forward = task.forward
     turned = [0, 0, float(np.arctan2(forward[1], forward[0]))]
-    top = task.middle - [0, 0, RESTING]
+    top = task.middle - [0, 0, HAND_HEIGHT]
     specified.compiler.degree = False
-    # Pictures show group 1, where the robot's meshes are; what they collide as is group 0.
+    # Geom group 1, with the robot's meshes, is rendered; group 0 has the collision shapes.
     table = specified.worldbody.add_geom(type=box, size=0.5 * TABLE, rgba=WOOD, group=1)
     table.pos = top + [0.05, 0, -0.5 * TABLE[2]]
     for k in range(n_boxes):
@@ -163,17 +163,17 @@ def _furnish(specified: Any, task: Task, n_boxes: int) -> None:
         body.add_geom(type=box, size=0.5 * BOX, mass=BOX_MASS, rgba=SHADES[k % 2], group=1)
 
 
-def _free_the_arms(specified: Any) -> None:
-    """Lets the upper arms pass through the convex hull that stands for the torso.
+def _disable_torso_contacts(specified: Any) -> None:
+    """Disables contacts between the upper arms and the convex hull of the torso.
 
-    Lowered arms are inside of it while their shells are five centimetres from the robot's own.
+    Lowered arms are inside the hull although five centimetres from the surface of the torso.
     """
     for side, part in product(("right", "left"), ("upper_elbow", "lower_elbow")):
         specified.add_exclude(bodyname1="torso", bodyname2=f"{side}_{part}")
 
 
-def _light(specified: Any) -> None:
-    """Adds two lamps, and a white background."""
+def _add_lights(specified: Any) -> None:
+    """Adds two lights and a white background."""
     mujoco = engine()
     sky = specified.add_texture(type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=16, height=96)
     sky.builtin, sky.rgb1, sky.rgb2 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, [1, 1, 1], [1, 1, 1]
@@ -182,7 +182,7 @@ def _light(specified: Any) -> None:
 
 
 def _root(model: Any, geom: int) -> str:
-    """Returns the name of the body below the world that a shape belongs to."""
+    """Returns the name of the top-level body of a geom."""
     return str(model.body(model.body_rootid[model.geom_bodyid[geom]]).name)
 
 

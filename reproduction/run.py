@@ -1,4 +1,4 @@
-"""The figures of the paper and their files."""
+"""Reproduction of the figures of the paper, and their files."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from pdmp import plot
-from pdmp._atomic_write import atomic_write
-from pdmp.plot._canvas import canvas
+from pdmp.files import atomic_write
+from pdmp.plot.canvas import ensure_figure
 from reproduction.section import SEED, Section
 
 Folder: TypeAlias = str | PathLike[str]
@@ -23,21 +23,21 @@ def reproduce(
     seed: int = SEED,
     progress: Callable[[str], object] | None = None,
 ) -> str:
-    """Makes a figure of Matsubara, Hyon and Morimoto (2011), or all of them, and their numbers.
+    """Reproduces one or all figures of Matsubara, Hyon and Morimoto (2011), and their numbers.
 
     Parameters
     ----------
     figure : {"fig2", "fig3", "fig4", "fig5", "comparison", "all"}
-        Figure; the comparison is with the methods that the paper argues with.
+        Figure; the comparison is with the methods that the paper discusses.
     folder : path
-        Folder of its pictures and tables: `fig3.md` for "fig3".
+        Folder for figures and tables: `fig3.md` for "fig3".
     recordings : path, optional
-        Folder of CSV files, one person walking in each, with a column `t` [s] and columns
-        `r_sh1, r_sh2, r_sh3, r_elb, l_sh1, …` [rad]; "fig5" then learns from them as well.
+        Folder of CSV files, each of one walking person, with a column `t` [s] and columns
+        `r_sh1, r_sh2, r_sh3, r_elb, l_sh1, …` [rad]; "fig5" then uses them too.
     seed : int
-        Seed of the noise in the demonstrations, which stands for a person.
+        Seed of the noise in the demonstrations.
     progress : callable, optional
-        Called with the name of each figure when it begins.
+        Called with the name of each figure before it is reproduced.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def reproduce(
         raise ValueError(f'recordings: only "fig5" learns from them, not "{figure}"')
     if recordings is not None and not Path(recordings).is_dir():
         raise ValueError(f"recordings: {recordings} is not a folder")
-    canvas(None, 1, 1)  # raises an error at once without matplotlib
+    ensure_figure(None, 1, 1)  # raises an error at once without matplotlib
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     reports = []
@@ -79,7 +79,7 @@ def reproduce(
 
 
 def _make(figure: str, seed: int, recordings: Folder | None) -> Section:
-    """Makes one of `FIGURES`; imports its module here, so that others do not wait for it."""
+    """Reproduces one of `FIGURES`; only its module is imported."""
     match figure:
         case "fig2":
             from reproduction.one_dof import figure_2

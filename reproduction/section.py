@@ -14,7 +14,7 @@ SEED = 2011
 
 @dataclass
 class Section:
-    """A title, paragraphs and tables in Markdown, and figures by the name of their file."""
+    """Title, paragraphs and tables in Markdown, and figures by file name."""
 
     title: str
     text: list[str]

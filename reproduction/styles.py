@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
-from pdmp.plot._canvas import GREY, PALETTE, canvas
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import GREY, PALETTE, ensure_figure
 from reproduction import film, paths
 from reproduction.loop import reach_over
 from reproduction.reaching import CONSTANTS, HEIGHTS, Reaching, demonstrate, height_of
@@ -22,30 +22,29 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 N_STYLES = 3
-SHOWN = (1, 7, 13)  # the second trial over none, two and four boxes
+DRAWN_TRIALS = (1, 7, 13)  # the second trials over zero, two and four boxes
 FRAMES = (0.0, 0.7, 1.2, 1.7, 2.3, 4.0)  # s
-ASIDE = np.array([[0.12, 0.0, 0.0], [0.05, 0.05, 0.12]])  # m, of the hand, from the goal as printed
+GOAL_OFFSETS = np.array(
+    [[0.12, 0.0, 0.0], [0.05, 0.05, 0.12]]
+)  # m, goals of the hand relative to the printed goal
 
 
 def learn(reaching: Reaching, n_styles: int = N_STYLES) -> pdmp.Model:
-    """Learns from all fifteen reaches, with the constants as printed."""
+    """Fits all fifteen reaches with the printed constants."""
     return pdmp.fit(reaching.demos, n_styles=n_styles, **CONSTANTS)
 
 
 def goals(reaching: Reaching) -> list[Array]:
-    """Returns the goal as printed and two beside it [rad]."""
+    """Returns the printed goal and two others [rad]."""
     usual = reaching.arm.swivel(reaching.goal)
     aside = reaching.arm.reach(
-        reaching.task.goal + ASIDE, np.full(len(ASIDE), usual), reaching.goal
+        reaching.task.goal + GOAL_OFFSETS, np.full(len(GOAL_OFFSETS), usual), reaching.goal
     )
     return [reaching.goal, *aside]
 
 
-def touched(model: pdmp.Model, reaching: Reaching) -> list[float]:
-    """Returns how long the style of each demonstration touches its own boxes [s].
-
-    The movements are as fast as the demonstrations.
-    """
+def contact_times(model: pdmp.Model, reaching: Reaching) -> list[float]:
+    """Returns how long each reproduction, at demonstrated speed, touches its boxes [s]."""
     return [
         reach_over(model, reaching, height_of(demo), style, tau=model.tau).log.contact()
         for demo, style in zip(reaching.demos, model.styles, strict=True)
@@ -61,7 +60,7 @@ def figure_3(seed: int = SEED) -> Section:
         pile(height_of(reaching.demos[m])): reach_over(
             model, reaching, height_of(reaching.demos[m]), model.styles[m]
         )
-        for m in SHOWN
+        for m in DRAWN_TRIALS
     }
     lines = [
         [
@@ -71,11 +70,13 @@ def figure_3(seed: int = SEED) -> Section:
             f"{reaching.miss(robot.log.hands[-1]):.2f} mm",
             f"{1e3 * robot.log.tracking_error():.1f} mrad",
         ]
-        for m, (name, robot) in zip(SHOWN, robots.items(), strict=True)
+        for m, (name, robot) in zip(DRAWN_TRIALS, robots.items(), strict=True)
     ]
     by_styles = []
     for n_styles in range(1, 5):
-        contacts = np.reshape(touched(learn(reaching, n_styles), reaching), (len(HEIGHTS), -1))
+        contacts = np.reshape(
+            contact_times(learn(reaching, n_styles), reaching), (len(HEIGHTS), -1)
+        )
         clear = (contacts == 0).sum(axis=1)
         by_styles.append([n_styles, *(f"{n} of {contacts.shape[1]}" for n in clear)])
     text = [
@@ -102,8 +103,8 @@ def figure_3(seed: int = SEED) -> Section:
 
 
 def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) -> Figure:
-    """Draws the hand from the side: over several styles, and to several goals."""
-    figure = canvas(None, 9.5, 4.2)
+    """Draws the path of the hand from the side, for several styles and several goals."""
+    figure = ensure_figure(None, 9.5, 4.2)
     styles, places = figure.subplots(1, 2, sharey=True)
     tallest = max(HEIGHTS)
     for axes in (styles, places):
@@ -116,7 +117,7 @@ def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) 
         paths.draw_hand(styles, reaching, hands, color=color, label=name)
     styles.plot([], [], color=GREY, linewidth=0.8, label="demonstrations")
     for goal, color in zip(goals(reaching), PALETTE[3:], strict=False):
-        for m in SHOWN:
+        for m in DRAWN_TRIALS:
             moved = model.rollout(
                 model.styles[m],
                 goal=goal,
@@ -128,8 +129,8 @@ def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) 
             paths.draw_hand(places, reaching, hands, color=color, linewidth=1.2)
         way, height = reaching.side_view(reaching.arm.hands([goal]))
         places.plot(way, height, "*", color=color, markersize=11)
-    paths.dress_side(styles, "styles, on the robot")
-    paths.dress_side(places, "goals (stars), each in these styles")
+    paths.label_side_view(styles, "styles, on the robot")
+    paths.label_side_view(places, "goals (stars), each in these styles")
     styles.set_ylim(bottom=0)
     styles.legend(frameon=False, fontsize=8)
     return figure

@@ -1,12 +1,12 @@
-"""Twelve ways to swing the arms while walking, one cycle of both arms each.
+"""Model of arm swing in twelve styles of walking, with a cycle of both arms for each.
 
-The recordings of the paper were never published. What stands in for them is made from figures of
-human gait:
+The recordings of the paper were never published. This model, based on published measurements of
+human gait, replaces them:
 
-- People walk at two steps, so one swing of an arm, per second, at any size (MacDougall,
+- People of any size walk at two steps, and thus one swing of an arm, per second (MacDougall,
   Moore, Journal of Applied Physiology 99, 2005, 1164-1173), and make 0.83 to 1.95 strides per
   second between walking at 1 m/s and running at 8 (Nilsson, Thorstensson, Acta Physiologica
-  Scandinavica 129, 1987, 107-114); at some 1.2 they begin to run.
+  Scandinavica 129, 1987, 107-114); running begins at some 1.2.
 - The shoulder swings through about 30° at usual speed, more of it backwards, with the elbow some
   30° bent and bending as the arm comes forward (Murray, Sepic, Barnard, Physical Therapy 47, 1967,
   272-284); both arcs grow with speed.
@@ -15,8 +15,8 @@ human gait:
 - Arms take turns, half a stride apart. In very slow walking they swing with every step, twice a
   stride (Wagenaar, van Emmerik, Journal of Biomechanics 33, 2000, 853-861).
 
-What makes a style is read off these and common experience, which also has slower walks; it was set
-before any result was seen.
+The parameters of the styles follow from these references and, for slower walks, from common
+experience. They were chosen before any result was known.
 """
 
 from __future__ import annotations
@@ -33,32 +33,32 @@ from reproduction.section import SEED
 Array = NDArray[np.float64]
 
 N_SAMPLES = 120
-NOISE = 0.4  # °, of each of the harmonics 1 to 3 of each joint
+NOISE = 0.4  # °, of harmonics 1 to 3 of each joint
 HANGING = np.radians([10.0, -50.0, 0.0, 0.0])
 """Joint angles [rad] about which the arms swing.
 
-Baxter's upper arms cannot hang: at most they point 60° down. Its first joint turns about the
-vertical, and carries the swing to the front and back with the arm lowered.
+Baxter's upper arms cannot hang: they point at most 60° down. The first joint turns about the
+vertical and makes the swing, forward and backward, of the lowered arm.
 """
 NAMES = [f"{side}_q{joint}" for side in ("r", "l") for joint in (1, 2, 3, 4)]
 
 
 @dataclass(frozen=True)
 class Style:
-    """A way to swing the arms: means and arcs [°]; forward, outward, inward and bent count up."""
+    """Style of arm swing: means and arcs [°]; forward, outward, inward and flexion are positive."""
 
     frequency: float
     """Strides per second."""
     shoulder: tuple[float, float]
-    """Mean and arc of the shoulder, forward."""
+    """Mean and arc of the shoulder flexion."""
     elbow: tuple[float, float]
-    """Mean and arc of its bending."""
+    """Mean and arc of the elbow flexion."""
     outward: tuple[float, float] = (0.0, 4.0)
-    """Mean and arc of the upper arm, away from the body."""
+    """Mean and arc of the abduction of the upper arm."""
     inward: tuple[float, float] = (0.0, 6.0)
-    """Mean and arc of the turn about the upper arm."""
+    """Mean and arc of the rotation about the upper arm."""
     lag: float = 20.0
-    """Of the elbow after the shoulder."""
+    """Phase lag of the elbow behind the shoulder."""
     twice: float = 0.0
     """Arc of the shoulder's swing at twice the frequency."""
 

@@ -1,4 +1,4 @@
-"""Fig. 5: swinging the arms in several styles, switched while they swing."""
+"""Fig. 5: arm swing with switches of style, amplitude and frequency."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp._markdown import markdown_table
 from pdmp.io import read_csv
-from pdmp.plot._canvas import BLUE, ORANGE, canvas, dress
+from pdmp.markdown import markdown_table
+from pdmp.plot.canvas import BLUE, ORANGE, ensure_figure, label_axes
 from pdmp.preprocessing import cycles
 from reproduction import film
 from reproduction.robot import DT, Robot
@@ -30,43 +30,43 @@ CONSTANTS: dict[str, Any] = {
     **{"alpha_z": 0.5, "beta_z": 0.5, "mu": 0.1},
     **{"singular_value_share": 0.9, "smoothing": None},
 }
-"""The line that prints them lacks a comma, or means β_z = 1: it is read as α_z = 0.5, β_z = 0.5."""
-LASTING = 20.0  # s, between switches
-SETTLED = 5  # periods after which a new cycle should be reached
+"""The printed line lacks a comma, or means β_z = 1; it is read as α_z = 0.5, β_z = 0.5."""
+SWITCH_INTERVAL = 20.0  # s between switches
+SETTLING_PERIODS = 5  # periods until convergence to a new cycle
 RECORDED = [f"{side}_{angle}" for side in "rl" for angle in ("sh1", "sh2", "sh3", "elb")]
-FASTEST = 1.95  # Hz, of strides: people run no faster unless asked to (see `swing`)
+MAX_STRIDE_RATE = 1.95  # strides per second, the maximum of people who run freely (see `swing`)
 
 
 @dataclass(frozen=True)
 class Switch:
-    """What is commanded, and how it is called."""
+    """Command and its name."""
 
     name: str
     command: dict[str, Any]
 
 
 @dataclass
-class Swinging:
-    """Commanded movement of the arms."""
+class SwingResult:
+    """Commanded movement of the arms and its switches."""
 
     position: list[Array] = field(default_factory=list)
-    """Joint angles, a row per tick [rad]."""
-    off: list[float] = field(default_factory=list)
-    """Share of the new cycle's range by which it is missed in the sixth period after a switch.
+    """Joint angles [rad], with a row per tick."""
+    distances: list[float] = field(default_factory=list)
+    """Distance from the new cycle, over its range, in the sixth period after each switch.
 
-    Not a number where the next switch comes before that.
+    NaN if the next switch is earlier.
     """
 
 
 def learn(demos: Sequence[pdmp.Demonstration]) -> pdmp.Model:
-    """Learns as many styles as the spectrum asks for, with the constants as printed."""
+    """Fits a model with the printed constants; J follows from the singular values."""
     return pdmp.fit(demos, kind="rhythmic", **CONSTANTS)
 
 
 def switches(model: pdmp.Model, styles: Sequence[int], names: Sequence[str]) -> list[Switch]:
-    """Returns a style to begin with; then a new style, amplitude, frequency, and style again.
+    """Returns an initial style, then switches of style, amplitude, frequency, and style again.
 
-    A style goes with its anchor. The frequency stays that of the first until it is switched.
+    A style is switched with its anchor. The frequency is that of the first style until switched.
     """
     first, second, third = (_style(model, m) for m in styles)
     tau = model.tau * float(model.durations[styles[0]] / model.durations[model.nominal])
@@ -83,30 +83,30 @@ def swing(
     model: pdmp.Model,
     switches: Sequence[Switch],
     robot: Robot | None = None,
-    lasting: float = LASTING,
-) -> Swinging:
-    """Swings the arms, with a command every `lasting` seconds; a robot, if given, follows."""
+    interval: float = SWITCH_INTERVAL,
+) -> SwingResult:
+    """Swings the arms, with a command every `interval` seconds; a robot, if given, follows."""
     controller = model.controller(dt=DT, **switches[0].command)
-    done = Swinging()
+    done = SwingResult()
     for switch in switches:
         for name, value in switch.command.items():
             setattr(controller, name, value)
         cycle = _Cycle(model, controller)
         since, worst = 0.0, np.nan
-        for _ in range(round(lasting / DT)):
+        for _ in range(round(interval / DT)):
             controller.step()
             if robot is not None:
                 robot.move(controller.position, controller.velocity, controller.acceleration)
             done.position.append(controller.position.copy())
             since += DT / cycle.period
-            if SETTLED <= since < SETTLED + 1:
-                worst = float(np.fmax(worst, cycle.off(controller)))
-        done.off.append(worst)
+            if SETTLING_PERIODS <= since < SETTLING_PERIODS + 1:
+                worst = float(np.fmax(worst, cycle.distance(controller)))
+        done.distances.append(worst)
     return done
 
 
 class _Cycle:
-    """The limit cycle that a controller's commands lead to."""
+    """Limit cycle of a controller's commands."""
 
     def __init__(self, model: pdmp.Model, controller: pdmp.Controller) -> None:
         self.period = 2 * np.pi * float(controller.tau)
@@ -122,14 +122,14 @@ class _Cycle:
         self._position = made.position[: n_steps + 1]
         self._range = np.ptp(self._position, axis=0).max()
 
-    def off(self, controller: pdmp.Controller) -> float:
+    def distance(self, controller: pdmp.Controller) -> float:
         """Returns the distance from the cycle at the phase of a controller, over its range."""
         here = [np.interp(controller.phase, self._phases, joint) for joint in self._position.T]
         return float(np.abs(controller.position - here).max() / self._range)
 
 
 def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) -> Section:
-    """Reproduces Fig. 5, with generated cycles on the robot, and with recordings if there are."""
+    """Reproduces Fig. 5 with generated cycles on the robot, and with recordings if given."""
     walks = None if recordings is None else recorded(Path(recordings))
     names = list(STYLES)
     model = learn(demonstrate(seed))
@@ -155,22 +155,22 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
 
 
 def draw(
-    model: pdmp.Model, commands: Sequence[Switch], done: Swinging, names: Sequence[str]
+    model: pdmp.Model, commands: Sequence[Switch], done: SwingResult, names: Sequence[str]
 ) -> Figure:
     """Draws the joints of one arm about each switch."""
     position = np.array(done.position)
-    lasting = len(position) * DT / len(commands)
-    figure = canvas(None, 11.0, 7.0)
+    interval = len(position) * DT / len(commands)
+    figure = ensure_figure(None, 11.0, 7.0)
     panels = figure.subplots(len(names), len(commands) - 1, sharey="row", sharex="col")
     for column, switch in enumerate(commands[1:], start=1):
-        at = column * lasting
+        at = column * interval
         rows = slice(round((at - 4) / DT), round((at + 8) / DT))
         time = DT * np.arange(rows.start, rows.stop)
         for joint, name in enumerate(names):
             axes = panels[joint, column - 1]
             axes.axvline(at, color=ORANGE, linewidth=1)
             axes.plot(time, position[rows, joint], color=BLUE, linewidth=1.1)
-            dress(axes, "", f"{name} [rad]" if column == 1 else "")
+            label_axes(axes, "", f"{name} [rad]" if column == 1 else "")
         panels[0, column - 1].set_title(switch.name, fontsize=9)
         panels[-1, column - 1].set_xlabel("time [s]")
     return figure
@@ -184,15 +184,15 @@ def _style(model: pdmp.Model, m: int) -> dict[str, Any]:
 def _instants(
     model: pdmp.Model, robot: Robot, chosen: Sequence[int], names: Sequence[str]
 ) -> dict[str, tuple[Robot, list[float]]]:
-    """Returns six moments of a stride in each style, late in the first, second and last spell."""
+    """Returns six times in a stride, late in the first, second and last interval."""
     normal, marching, girly = (names[m] for m in chosen)
     stride = np.arange(6) / 6 * model.durations[chosen[0]]
     spells = {normal: 1, marching: 2, girly: 5}
-    return {name: (robot, list(n * LASTING - 4 + stride)) for name, n in spells.items()}
+    return {name: (robot, list(n * SWITCH_INTERVAL - 4 + stride)) for name, n in spells.items()}
 
 
 def recorded(folder: Path) -> tuple[list[str], Figure]:
-    """Learns from recordings of people who walk, one mean stride of each."""
+    """Fits recordings of walking people, one mean stride each."""
     files = sorted(folder.glob("*.csv"))
     if not files:
         raise ValueError(f"recordings: {folder} has no CSV file; each is one person walking")
@@ -204,7 +204,7 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
         except ValueError:
             odd.append(file.stem)
             continue
-        if period * FASTEST < 1:
+        if period * MAX_STRIDE_RATE < 1:
             odd.append(file.stem)
             continue
         kept.append(recording)
@@ -216,7 +216,7 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
     strides = cycles(kept, average=True)
     model = learn(list(strides))
     by_range = np.argsort([np.ptp(stride.position, axis=0).max() for stride in strides])
-    # The median, one of the wider and the widest: no style is switched to itself.
+    # Recordings of median, larger and largest range: no style is switched to itself.
     chosen = [int(by_range[share * (len(kept) - 1) // 4]) for share in (2, 3, 4)]
     commands = switches(model, chosen, names)
     done = swing(model, commands)
@@ -229,7 +229,7 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
 
 
 def _spectrum(model: pdmp.Model) -> str:
-    """Returns a sentence on the number of styles, and the share of the paper's four."""
+    """Returns a sentence on the number of styles and the share of four, the number in the paper."""
     share = model.singular_values[:4].sum() / model.singular_values.sum()
     return (
         f"To exceed 90 % of the sum, the spectrum asks for J = {model.n_styles}; "
@@ -237,9 +237,9 @@ def _spectrum(model: pdmp.Model) -> str:
     )
 
 
-def _settling(commands: Sequence[Switch], done: Swinging) -> str:
-    rows = zip(commands, done.off, strict=True)
+def _settling(commands: Sequence[Switch], done: SwingResult) -> str:
+    rows = zip(commands, done.distances, strict=True)
     header = ["switch", "off the new cycle in the sixth period"]
     return markdown_table(
-        header, ([switch.name, f"{off:.2%} of its range"] for switch, off in rows)
+        header, ([switch.name, f"{distance:.2%} of its range"] for switch, distance in rows)
     )

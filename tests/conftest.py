@@ -1,4 +1,4 @@
-"""Models that several modules of tests move, and the policy of random tests.
+"""Models shared by several test modules, and the policy of random tests.
 
 Tests of random values, by hypothesis here and by proptest in Rust, draw the same values in every
 run: a failure then comes from the change that is tested, on every machine, and the search for new

@@ -1,10 +1,35 @@
-"""Small families of movements that the tests learn from."""
+"""Small families of movements for the tests."""
 
 import numpy as np
 
 import pdmp
 
 DT = 0.02
+
+BVH = """HIERARCHY
+ROOT Hips
+{
+\tOFFSET 0 0 0
+\tCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+
+\tJOINT Left Leg
+\t{
+\t\tOFFSET 0 -40 0
+\t\tCHANNELS 4 Yposition Zrotation Xrotation Yrotation
+\t\tEnd Site
+\t\t{
+\t\t\tOFFSET 0 -40 0
+\t\t}
+\t}
+}
+MOTION
+Frames:\t4
+Frame Time: 0.01
+0 90 0 10 20 30 1 100 -170 5
+0 91 1 10 20 30 1 110 -180 5
+0 92 2 10 20 30 1 120 -190 5
+0 93 3 10 20 30 1 130 -200 5"""
+"""BVH file of two joints and four frames, with a blank line and without a final line break."""
 
 
 def reaches() -> list[pdmp.Demonstration]:

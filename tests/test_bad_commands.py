@@ -1,4 +1,4 @@
-"""Bad arguments of movements are refused, and those given in the loop leave it as it was."""
+"""Invalid arguments of movements are rejected; in the loop they leave the state unchanged."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,13 +14,13 @@ NAN, INF = float("nan"), float("inf")
 
 @pytest.fixture(scope="module")
 def discrete() -> pdmp.Model:
-    """Return a model of reaches with two styles and one context value."""
+    """Returns a model of reaches with two styles and one context value."""
     return pdmp.fit(reaches(), n_styles=2)
 
 
 @pytest.fixture(scope="module")
 def rhythmic() -> pdmp.Model:
-    """Return a model of loops with two styles and no context."""
+    """Returns a model of loops with two styles and no context."""
     return pdmp.fit(loops(), kind="rhythmic", n_styles=2)
 
 
@@ -70,71 +70,73 @@ RHYTHMIC: list[tuple[dict[str, Any], str]] = [
 
 @pytest.mark.parametrize(("given", "message"), DISCRETE, ids=str)
 @pytest.mark.parametrize("call", [pdmp.Model.rollout, pdmp.Model.controller])
-def test_bad_conditions_are_refused(
+def test_invalid_conditions_are_rejected(
     discrete: pdmp.Model, call: Callable[..., Any], given: dict[str, Any], message: str
 ) -> None:
-    """Rollouts and controllers tell the argument and the number that they cannot use."""
+    """Rollouts and controllers report the argument and the number that they reject."""
     with pytest.raises(ValueError, match=message):
         call(discrete, **given)
 
 
 @pytest.mark.parametrize(("given", "message"), RHYTHMIC, ids=str)
 @pytest.mark.parametrize("call", [pdmp.Model.rollout, pdmp.Model.controller])
-def test_bad_conditions_of_a_rhythmic_one_are_refused(
+def test_invalid_conditions_of_a_rhythmic_one_are_rejected(
     rhythmic: pdmp.Model, call: Callable[..., Any], given: dict[str, Any], message: str
 ) -> None:
-    """The same holds about an anchor."""
+    """Rhythmic primitives report the argument and the number that they reject."""
     with pytest.raises(ValueError, match=message):
         call(rhythmic, **given)
 
 
 @pytest.mark.parametrize("duration", [-1.0, NAN, INF])
-def test_impossible_durations_are_refused(discrete: pdmp.Model, duration: float) -> None:
-    """A rollout has a length."""
+def test_impossible_durations_are_rejected(discrete: pdmp.Model, duration: float) -> None:
+    """A duration must be finite and not negative."""
     with pytest.raises(ValueError, match="duration = "):
         discrete.rollout(duration=duration)
 
 
 @pytest.mark.parametrize("dt", [1e-300, 1e-12])
-def test_endless_rollouts_are_refused_in_one_line(discrete: pdmp.Model, dt: float) -> None:
-    """Too fine an interval is refused before memory is asked for, with a readable number."""
+def test_rollouts_of_too_many_samples_are_rejected_in_one_line(
+    discrete: pdmp.Model, dt: float
+) -> None:
+    """Too short an interval is rejected before memory is allocated, with a readable number."""
     with pytest.raises(ValueError, match="dt = .*: gives more than 1e7 samples: enlarge it") as e:
         discrete.rollout(dt=dt)
     assert len(str(e.value)) < 120
 
 
 @pytest.mark.parametrize("transition", [-1.0, NAN, INF, 1e200])
-def test_impossible_transitions_are_refused(discrete: pdmp.Model, transition: float) -> None:
-    """A transition takes some time or none."""
+def test_impossible_transitions_are_rejected(discrete: pdmp.Model, transition: float) -> None:
+    """A transition must be finite and not negative."""
     with pytest.raises(ValueError, match="transition = .*: must lie between 0, an immediate"):
         discrete.controller(transition=transition)
 
 
 def outputs(model: pdmp.Model) -> tuple[np.ndarray, np.ndarray]:
-    """Return arrays that fit the rollouts of a model's own styles at 0.1 s."""
+    """Returns output arrays for the rollouts of a model's styles at 0.1 s."""
     shape = model.rollouts(model.styles, dt=0.1)[0].shape
     return np.zeros(shape), np.zeros(shape)
 
 
-def test_outputs_of_another_shape_are_refused_before_anything_is_written(
+def test_outputs_of_another_shape_are_rejected_before_anything_is_written(
     discrete: pdmp.Model,
 ) -> None:
-    """Both shapes are told, and neither array is touched."""
+    """The error states both shapes, and neither array is changed."""
     positions, velocities = outputs(discrete)
     with pytest.raises(ValueError, match=r"out: shape \[5, 12, 2\]; expected .* \[5, 13, 2\]"):
         discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
     assert not positions.any()
 
 
-def test_outputs_of_another_type_are_refused(discrete: pdmp.Model) -> None:
-    """Only float64 can be written in place, which the error says."""
+def test_outputs_of_another_type_are_rejected(discrete: pdmp.Model) -> None:
+    """Only float64 can be written in place, as the error states."""
     positions, velocities = outputs(discrete)
     with pytest.raises(ValueError, match="out.*float64"):
         discrete.rollouts(discrete.styles, dt=0.1, out=(positions.astype(np.float32), velocities))
 
 
-def test_read_only_outputs_are_refused(discrete: pdmp.Model) -> None:
-    """What must not be written is not written."""
+def test_read_only_outputs_are_rejected(discrete: pdmp.Model) -> None:
+    """Read-only arrays are not written."""
     positions, velocities = outputs(discrete)
     velocities.setflags(write=False)
     with pytest.raises(ValueError, match="out.* not writeable"):
@@ -143,8 +145,8 @@ def test_read_only_outputs_are_refused(discrete: pdmp.Model) -> None:
 
 
 @pytest.mark.parametrize("u", [[NAN], [INF], [-0.1]])
-def test_landscape_has_no_place_for_odd_clocks(discrete: pdmp.Model, u: list[float]) -> None:
-    """A clock is finite, and a discrete one starts at zero."""
+def test_invalid_clocks_are_rejected(discrete: pdmp.Model, u: list[float]) -> None:
+    """A clock must be finite, and not negative for a discrete primitive."""
     with pytest.raises(ValueError, match="u = .*: must be finite, and not negative"):
         discrete.landscape(u)
 
@@ -160,10 +162,10 @@ COMMANDS: list[tuple[str, str, Any]] = [
 
 
 @pytest.mark.parametrize(("kind", "name", "value"), COMMANDS, ids=str)
-def test_bad_command_leaves_the_loop_as_it_was(
+def test_invalid_command_leaves_the_loop_unchanged(
     kind: str, name: str, value: Any, request: pytest.FixtureRequest
 ) -> None:
-    """The last good value stays in force, and the movement goes on as if nothing had been said."""
+    """The last valid value stays in force, and the movement continues unchanged."""
     model: pdmp.Model = request.getfixturevalue(kind)
     disturbed, undisturbed = model.controller(0.01), model.controller(0.01)
     for k in range(80):
@@ -179,8 +181,8 @@ def test_bad_command_leaves_the_loop_as_it_was(
 
 
 @pytest.mark.parametrize("dt", [-0.01, NAN, INF, 1e9])
-def test_bad_tick_leaves_the_state_as_it_was(discrete: pdmp.Model, dt: float) -> None:
-    """A tick that is refused moves nothing."""
+def test_invalid_tick_leaves_the_state_unchanged(discrete: pdmp.Model, dt: float) -> None:
+    """A rejected tick leaves the state unchanged."""
     controller = discrete.controller(0.01)
     controller.step()
     position, time = controller.position.copy(), controller.time
@@ -190,8 +192,8 @@ def test_bad_tick_leaves_the_state_as_it_was(discrete: pdmp.Model, dt: float) ->
     assert controller.time == time
 
 
-def test_bad_reset_leaves_the_movement_as_it_was(discrete: pdmp.Model) -> None:
-    """A reset that is refused does not start again."""
+def test_invalid_reset_leaves_the_movement_unchanged(discrete: pdmp.Model) -> None:
+    """A rejected reset does not restart the movement."""
     controller = discrete.controller(0.01)
     controller.step()
     with pytest.raises(ValueError, match=r"goal\[0\] = NaN"):

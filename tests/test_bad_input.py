@@ -1,4 +1,4 @@
-"""Bad demonstrations are refused with one ValueError that says what to mend."""
+"""Invalid demonstrations are rejected with one ValueError that states the remedy."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,7 +17,7 @@ RATE = {"dt": 0.02}
 
 
 def changed(value: float) -> np.ndarray:
-    """Return positions with one value changed."""
+    """Returns positions with one value changed."""
     position = POSITION.copy()
     position[3, 1] = value
     return position
@@ -58,8 +58,8 @@ POSITIONS = {
 
 
 @pytest.mark.parametrize(("position", "message"), POSITIONS.values(), ids=POSITIONS)
-def test_bad_positions_are_refused(position: Any, message: str) -> None:
-    """What is no (T, D) array of at least four rows of finite numbers is refused with the place."""
+def test_invalid_positions_are_rejected(position: Any, message: str) -> None:
+    """Positions must be (T, D) finite numbers with T ≥ 4; the error locates the fault."""
     with pytest.raises(ValueError, match=message):
         Demonstration(position, **RATE)
     with pytest.raises(ValueError, match=f"demo 1: {message}"):
@@ -68,8 +68,8 @@ def test_bad_positions_are_refused(position: Any, message: str) -> None:
 
 @pytest.mark.filterwarnings("ignore::numpy.exceptions.ComplexWarning")
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
-def test_complex_positions_are_refused(dtype: type) -> None:
-    """An imaginary part is never dropped."""
+def test_complex_positions_are_rejected(dtype: type) -> None:
+    """Complex numbers are rejected instead of losing their imaginary part."""
     with pytest.raises(ValueError, match="position has dtype"):
         Demonstration(POSITION.astype(dtype), **RATE)
 
@@ -92,7 +92,7 @@ GIVEN = {
 
 
 @pytest.mark.parametrize(("given", "message"), GIVEN.values(), ids=GIVEN)
-def test_bad_descriptions_of_a_demonstration_are_refused(given: Any, message: str) -> None:
+def test_invalid_descriptions_of_a_demonstration_are_rejected(given: Any, message: str) -> None:
     """Time, goal, context and names must fit the positions."""
     with pytest.raises(ValueError, match=message):
         Demonstration(POSITION, **given)
@@ -133,14 +133,16 @@ LISTS: dict[str, tuple[Callable[[], Any], str]] = {
 
 
 @pytest.mark.parametrize(("demos", "message"), LISTS.values(), ids=LISTS)
-def test_bad_lists_of_demonstrations_are_refused(demos: Callable[[], Any], message: str) -> None:
-    """Demonstrations that do not belong together are refused, and the odd one is named."""
+def test_invalid_lists_of_demonstrations_are_rejected(
+    demos: Callable[[], Any], message: str
+) -> None:
+    """Inconsistent demonstrations are rejected, and the deviating one is named."""
     with pytest.raises(ValueError, match=message):
         pdmp.fit(demos(), **RATE)
 
 
 def test_new_demonstration_has_the_labels_of_the_model() -> None:
-    """A style is not found in other units, or of other degrees of freedom, than those learnt."""
+    """A style is not inferred from a demonstration with other units or degrees of freedom."""
     described = {"dt": 0.02, "names": ["x", "y"], "units": ["m", "m"]}
     model = pdmp.fit([Demonstration(demo.position, **described) for demo in reaches()])
     for other in ({"names": ["y", "x"]}, {"units": ["mm", "mm"]}):

@@ -1,8 +1,11 @@
-"""Bad options of a fit are refused with one ValueError that names them, their value and range."""
+"""Invalid options of a fit are rejected with one ValueError that names option, value and range."""
 
 import re
 import subprocess
 import sys
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -18,7 +21,7 @@ RATE = {"dt": 0.02}
 
 
 def numbers(name: str, allowed: str, *values: float) -> list[tuple[dict[str, Any], str]]:
-    """Return one case per value of an option, refused with its name, value and range."""
+    """Returns one case per invalid value of an option, with its name, value and range."""
     texts = {0: "0", -1: "-1", INF: "inf"}
     return [({name: v}, f"{name} = {texts.get(v, 'NaN')}: .*{allowed}") for v in values]
 
@@ -60,8 +63,8 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("option", "message"), OPTIONS, ids=str)
-def test_bad_options_of_a_fit_are_refused(option: dict[str, Any], message: str) -> None:
-    """The option, its value and what is allowed are told."""
+def test_invalid_options_of_a_fit_are_rejected(option: dict[str, Any], message: str) -> None:
+    """The error states the option, its value and the allowed range."""
     with pytest.raises(ValueError, match=message):
         pdmp.fit([demo.position for demo in reaches()], **(RATE | option))
 
@@ -71,36 +74,38 @@ RHYTHMIC: list[tuple[dict[str, Any], str]] = [
     *numbers("period", "positive and finite", 0, -1, NAN, INF),
     ({"period": 1.98}, "period = 1.98: must exceed the last time stamp"),
     ({"period": [2, 2]}, "period has length 2, expected 3: one value per demonstration"),
-    ({"period": None}, "time-stamped cycle .*: pass period= in seconds"),
+    ({"period": None}, "time-stamped cycle .*: pass period in seconds"),
     ({"tau": 1.0}, "tau does not apply to a rhythmic primitive"),
     ({"alpha_x": 1.0}, "alpha_x does not apply to a rhythmic primitive"),
 ]
 
 
 @pytest.mark.parametrize(("option", "message"), RHYTHMIC, ids=str)
-def test_bad_options_of_a_rhythmic_fit_are_refused(option: dict[str, Any], message: str) -> None:
-    """Periods must exceed the stamps, and constants of the other kind are refused."""
+def test_invalid_options_of_a_rhythmic_fit_are_rejected(
+    option: dict[str, Any], message: str
+) -> None:
+    """Periods must exceed the time stamps, and constants of discrete primitives are rejected."""
     demos = [Demonstration(demo.position, time=np.arange(100) / 99 * 1.98) for demo in loops()]
     with pytest.raises(ValueError, match=message):
         pdmp.fit(demos, **({"kind": "rhythmic", "period": 2.0} | option))
 
 
-def test_missing_rate_is_asked_for() -> None:
+def test_missing_interval_is_reported() -> None:
     """Bare arrays need a sampling interval."""
-    with pytest.raises(ValueError, match=r"no sampling interval: pass dt= in seconds"):
+    with pytest.raises(ValueError, match=r"no sampling interval: pass dt in seconds"):
         pdmp.fit([POSITION])
 
 
 @pytest.mark.parametrize("n_basis", [0, -5, 10**6])
-def test_networks_of_impossible_size_are_refused(n_basis: int) -> None:
-    """The number that was given is told."""
+def test_networks_of_impossible_size_are_rejected(n_basis: int) -> None:
+    """The error states the number."""
     with pytest.raises(ValueError, match=f"n_basis = {n_basis}: must "):
         pdmp.NGnet(n_basis)
 
 
 @pytest.mark.parametrize("overlap", [0, -1, 0.29, 3.01, NAN, INF])
-def test_networks_of_impossible_width_are_refused(overlap: float) -> None:
-    """The width that was given and its range are told."""
+def test_networks_of_impossible_width_are_rejected(overlap: float) -> None:
+    """The error states the width and its range."""
     with pytest.raises(ValueError, match="overlap = .*: must lie between 0.3 and 3"):
         pdmp.NGnet(overlap=overlap)
 
@@ -115,22 +120,22 @@ def test_networks_of_impossible_width_are_refused(overlap: float) -> None:
         ({"noise": NAN}, "noise = NaN: must lie between 1e-10 and 1e6"),
     ],
 )
-def test_impossible_processes_are_refused(arguments: dict[str, Any], message: str) -> None:
-    """Kernel, length and noise are checked at once, before any fit."""
+def test_impossible_processes_are_rejected(arguments: dict[str, Any], message: str) -> None:
+    """Kernel, length and noise are checked at construction, before any fit."""
     with pytest.raises(ValueError, match=message):
         pdmp.GP(**arguments)
 
 
 @pytest.mark.parametrize("interval", [1e-300, 1e-160])
-def test_rates_whose_squares_overflow_are_refused(interval: float) -> None:
-    """A fit is refused where accelerations would not be numbers."""
+def test_rates_whose_squares_overflow_are_rejected(interval: float) -> None:
+    """A fit is rejected if accelerations would not be finite."""
     with pytest.raises(ValueError, match="duration = .*check dt or time"):
         pdmp.fit([POSITION], dt=interval)
 
 
 @pytest.mark.parametrize("n_samples", [10**14, 2**60])
-def test_more_samples_than_memory_holds_are_refused(n_samples: int) -> None:
-    """A slip in n_samples neither panics nor ends the process."""
+def test_more_samples_than_memory_are_rejected(n_samples: int) -> None:
+    """A huge n_samples neither panics nor ends the process."""
     code = f"""
 import numpy as np, pdmp
 try:
@@ -143,26 +148,124 @@ except (ValueError, MemoryError) as error:
     assert re.search(r"n_samples = [\d.e]+: must lie between 4 and 1e6", done.stdout)
 
 
-def test_phases_that_vanish_are_refused() -> None:
-    """The landscape divides by the phase at the end, which must be a number."""
+def test_phases_that_underflow_are_rejected() -> None:
+    """The final phase, by which the landscape is divided, must not underflow."""
     with pytest.raises(ValueError, match=r"alpha_x = 1000: must not exceed 300"):
         pdmp.fit(reaches(), alpha_x=1000.0)
 
 
-def test_contexts_that_hardly_vary_are_refused() -> None:
-    """Their squares would leave the range of numbers."""
+def test_contexts_that_hardly_vary_are_rejected() -> None:
+    """Contexts whose range underflows when squared are rejected."""
     with pytest.raises(ValueError, match=r"contexts = 2\S*e-152: each must vary by"):
         pdmp.fit(reaches(), contexts=[[k * 1e-152] for k in range(5)])
 
 
-def test_goals_of_cycles_are_refused() -> None:
-    """A cycle has an anchor, and a goal given for it is not passed over in silence."""
+def test_goals_of_cycles_are_rejected() -> None:
+    """A goal of a cycle is rejected: cycles have an anchor."""
     loop = Demonstration(loops()[1].position, dt=0.02, goal=[0.0, 0.0])
     with pytest.raises(ValueError, match="demo 1: goal does not apply to a rhythmic"):
         pdmp.fit([loops()[0], loop], kind="rhythmic")
 
 
-def test_one_name_for_two_dofs_is_refused() -> None:
-    """Columns of a rollout could not be told apart."""
+def test_duplicate_names_are_rejected() -> None:
+    """Names of degrees of freedom must be unique."""
     with pytest.raises(ValueError, match="names must differ"):
         Demonstration(POSITION, dt=0.02, names=["a", "a"])
+
+
+DEMO = Demonstration(POSITION, dt=0.02)
+SCALARS: dict[str, tuple[Callable[..., Any], list[str]]] = {
+    "rollout": (
+        lambda model, **scalar: model.rollout(**scalar),
+        ["dt", "duration", "tau", "amplitude", "phase"],
+    ),
+    "rollouts": (
+        lambda model, **scalar: model.rollouts(model.styles, **scalar),
+        ["dt", "duration", "tau", "amplitude", "derivatives", "threads"],
+    ),
+    "rollout_chunks": (
+        lambda model, **scalar: model.rollout_chunks(model.styles, **scalar),
+        ["dt", "duration", "tau", "amplitude", "derivatives", "threads", "size"],
+    ),
+    "controller": (
+        lambda model, **scalar: model.controller(**scalar),
+        ["dt", "transition", "tau", "amplitude", "phase"],
+    ),
+    "step": (lambda model, **scalar: model.controller().step(**scalar), ["dt"]),
+    "reset": (lambda model, **scalar: model.controller().reset(**scalar), ["tau", "amplitude"]),
+    "command": (
+        lambda model, **scalar: setattr(model.controller(), *next(iter(scalar.items()))),
+        ["tau", "amplitude", "speed"],
+    ),
+    "jacobian": (
+        lambda model, **scalar: model.jacobian("goal", **scalar),
+        ["dt", "duration", "tau", "derivative"],
+    ),
+    "band": (lambda model, **scalar: model.band([0.0], **scalar), ["level", "dt"]),
+    "style_of": (lambda model, **scalar: model.style_of(DEMO, **scalar), ["dt", "period"]),
+    "tau_at": (lambda model, phase: model.tau_at(phase, [1.0]), ["phase"]),
+    "blend": (
+        lambda model, share: pdmp.blend(model.conditions(0), model.conditions(1), share),
+        ["share"],
+    ),
+    "fit": (
+        lambda model, **scalar: pdmp.fit([POSITION, POSITION], **(RATE | scalar)),
+        [
+            *("dt", "n_styles", "singular_value_share", "nominal", "n_samples", "tau"),
+            *("alpha_z", "beta_z", "alpha_x", "mu", "threads"),
+        ],
+    ),
+    "Demonstration": (lambda model, dt: Demonstration(POSITION, dt=dt), ["dt"]),
+    "Conditions": (
+        lambda model, **scalar: pdmp.Conditions(**scalar),
+        ["tau", "amplitude", "phase"],
+    ),
+    "GP": (lambda model, **scalar: pdmp.GP(**scalar), ["length", "noise"]),
+    "NGnet": (lambda model, **scalar: pdmp.NGnet(**scalar), ["n_basis", "overlap"]),
+    "TimeWarp": (lambda model, **scalar: pdmp.TimeWarp(**scalar), ["n_segments", "max_slope"]),
+    "factorise": (
+        lambda model, **scalar: pdmp.factorise(np.eye(3), **scalar),
+        ["n_styles", "singular_value_share"],
+    ),
+    "resample": (lambda model, dt: pdmp.preprocessing.resample(DEMO, dt), ["dt"]),
+    "trim": (lambda model, threshold: pdmp.preprocessing.trim(DEMO, threshold), ["threshold"]),
+    "lowpass": (lambda model, cut_off: pdmp.preprocessing.lowpass(DEMO, cut_off), ["cut_off"]),
+}
+CALLS = [(call, name) for call, (_, names) in SCALARS.items() for name in names]
+NO_SCALARS = {
+    "text": "a",
+    "list": [1],
+    "vector": np.array([1.0, 2.0]),
+    "single": np.array([1.0]),
+    "complex": 1j,
+    "masked": np.ma.masked,
+    "interval": np.timedelta64(1, "ns"),
+    "object": object(),
+}
+
+
+@pytest.mark.parametrize("value", NO_SCALARS.values(), ids=NO_SCALARS)
+@pytest.mark.parametrize(("call", "name"), CALLS)
+def test_scalars_that_are_no_numbers_are_rejected_by_name(
+    reach: pdmp.Model, call: str, name: str, value: Any
+) -> None:
+    """The error text begins with the name of the argument and its value."""
+    function = SCALARS[call][0]
+    with pytest.raises(ValueError, match=f"^{name} = .*: (expected one|must be)"):
+        function(reach, **{name: value})
+
+
+@pytest.mark.parametrize("value", [np.float32(0.5), np.array(0.5), Fraction(1, 2), Decimal("0.5")])
+def test_every_kind_of_number_is_a_scalar(value: Any) -> None:
+    """Objects that convert to a float are accepted."""
+    assert pdmp.Conditions(tau=value).tau == pdmp.Conditions(tau=0.5).tau
+    assert pdmp.NGnet(overlap=value).overlap == 0.5
+
+
+@pytest.mark.parametrize("value", [10**400, 2**70])
+def test_integers_beyond_the_range_are_rejected_by_name(value: int) -> None:
+    """An integer without a float or a machine word is no overflow error without a name."""
+    with pytest.raises(ValueError, match=r"^n_basis = 1\d+.*: its magnitude is too large"):
+        pdmp.NGnet(value)
+    with pytest.raises(ValueError, match=r"^overlap = 1\S*: (its magnitude|must lie)"):
+        pdmp.NGnet(overlap=value)

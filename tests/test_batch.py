@@ -1,4 +1,4 @@
-"""Many movements at once, in pieces and on several threads, and the derivatives of a movement."""
+"""Batches, in chunks and on several threads, and derivatives of movements."""
 
 import pickle
 import signal
@@ -20,7 +20,7 @@ STYLES = np.random.default_rng(0).normal(size=(23, 2))
 
 
 def centres(model: pdmp.Model) -> str:
-    """Return the name of the argument that moves a batch as a whole."""
+    """Returns the name of the argument that moves a batch as a whole."""
     return "goals" if model.kind == "discrete" else "anchors"
 
 
@@ -33,7 +33,7 @@ SINGULAR = {"goals": "goal", "anchors": "anchor", "starts": "start", "velocities
 def test_each_movement_has_its_own_conditions(
     model: pdmp.Model, names: tuple[str, ...], one_each: bool, dt: float
 ) -> None:
-    """Movement b is the rollout of row b of every argument, or of what is given for all."""
+    """Movement b is the rollout of row b of batched arguments and of the shared ones."""
     rng = np.random.default_rng(1)
     shape = (len(STYLES), 2) if one_each else (2,)
     given = {name: rng.normal(size=shape) for name in (centres(model), *names)}
@@ -48,7 +48,7 @@ def test_each_movement_has_its_own_conditions(
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.4, 2.5])
 def test_amplitude_is_that_of_all(cycle: pdmp.Model, amplitude: float) -> None:
-    """A rhythmic batch swings as widely as the rollout does; not at all at zero."""
+    """The amplitude applies to all movements of a batch as to a rollout, zero included."""
     model = cycle
     positions, _ = model.rollouts(STYLES, amplitude=amplitude)
     expected = model.rollout(style=STYLES[3], amplitude=amplitude).position
@@ -57,8 +57,8 @@ def test_amplitude_is_that_of_all(cycle: pdmp.Model, amplitude: float) -> None:
 
 
 @pytest.mark.parametrize("derivatives", [0, 1, 2])
-def test_as_many_derivatives_as_asked_for(model: pdmp.Model, derivatives: int) -> None:
-    """The tuple has one array more, and what is left out does not change the rest."""
+def test_number_of_arrays_follows_derivatives(model: pdmp.Model, derivatives: int) -> None:
+    """The tuple has derivatives + 1 arrays, which do not depend on the number of derivatives."""
     made = model.rollouts(STYLES, derivatives=derivatives)
     expected = model.rollouts(STYLES, derivatives=2)
     assert len(made) == 1 + derivatives
@@ -67,8 +67,8 @@ def test_as_many_derivatives_as_asked_for(model: pdmp.Model, derivatives: int) -
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
-def test_pieces_and_threads_leave_the_bits(model: pdmp.Model, threads: int) -> None:
-    """All pieces together are the batch to the last bit, whatever the number of threads."""
+def test_chunks_and_threads_are_bitwise_equal(model: pdmp.Model, threads: int) -> None:
+    """All chunks together equal the batch bit for bit, for any number of threads."""
     styles, velocities = np.tile(STYLES, (20, 1)), np.tile(STYLES, (20, 1)) / 3
     expected = model.rollouts(styles, dt=0.005, velocities=velocities, threads=1)
     whole = model.rollouts(styles, dt=0.005, velocities=velocities, threads=threads)
@@ -82,7 +82,7 @@ def test_pieces_and_threads_leave_the_bits(model: pdmp.Model, threads: int) -> N
 
 
 def test_many_movements_take_little_memory(reach: pdmp.Model) -> None:
-    """A million movements pass in pieces of a thousand; as one batch they would take 1.4 GB."""
+    """A million movements in chunks need little memory; one batch would take 1.4 GB."""
     model, total = reach, 0
     styles = np.zeros((10**6, 2))
     tracemalloc.start()
@@ -94,8 +94,8 @@ def test_many_movements_take_little_memory(reach: pdmp.Model) -> None:
     assert peak < 5e6
 
 
-def test_pieces_may_be_shared_among_threads(model: pdmp.Model) -> None:
-    """Threads that take from one iterator get every piece once."""
+def test_chunks_can_be_shared_among_threads(model: pdmp.Model) -> None:
+    """Threads that share an iterator receive every chunk once."""
     styles = np.arange(600.0).reshape(300, 2)
     chunks = model.rollout_chunks(styles, size=7, dt=0.05, derivatives=0)
     assert iter(chunks) is chunks
@@ -110,15 +110,15 @@ def test_pieces_may_be_shared_among_threads(model: pdmp.Model) -> None:
 
 
 def test_no_styles_give_no_movements(model: pdmp.Model) -> None:
-    """A batch may be empty, and has then no pieces."""
+    """An empty batch is valid and has no chunks."""
     none = np.zeros((0, 2))
     positions, velocities = model.rollouts(none, dt=0.1, duration=1.0)
     assert positions.shape == velocities.shape == (0, 11, 2)
     assert list(model.rollout_chunks(none)) == []
 
 
-def test_what_is_remembered_has_the_same_bits(model: pdmp.Model) -> None:
-    """A model that was asked much before answers like one that was not, from several threads."""
+def test_cached_responses_are_bitwise_equal(model: pdmp.Model) -> None:
+    """Cached responses do not change results, from several threads too."""
     times = [{"dt": dt, "tau": tau} for dt in (0.01, 0.02, 0.03, 0.05) for tau in (0.5, 0.8, 1, 2)]
     fresh: pdmp.Model = pickle.loads(pickle.dumps(model))
     expected = [pickle.loads(pickle.dumps(model)).rollouts(STYLES, **t)[1] for t in times]
@@ -144,7 +144,7 @@ WAYS: list[dict[str, Any]] = [
 def test_movement_is_its_jacobians_times_the_changes(
     model: pdmp.Model, given: dict[str, Any], derivative: int
 ) -> None:
-    """However far style, goal or anchor, and start are moved, the rollout moves as they say."""
+    """Changes of a rollout equal the Jacobians times the changes of its conditions."""
     rng, name = np.random.default_rng(2), FIELDS[derivative]
     style, step, shift, push = rng.normal(size=(4, 2))
     centre = SINGULAR[centres(model)]
@@ -174,7 +174,7 @@ def test_movement_is_its_jacobians_times_the_changes(
 
 
 def test_jacobian_follows_the_amplitude(cycle: pdmp.Model) -> None:
-    """A style counts as much as the amplitude lets it."""
+    """The Jacobian of the style is proportional to the amplitude."""
     model = cycle
     half = model.jacobian("style", amplitude=0.5, velocity=[0, 0])
     np.testing.assert_array_equal(half, model.jacobian("style", velocity=[0, 0]) / 2)
@@ -202,22 +202,24 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("given", "message"), REFUSED, ids=str)
-def test_bad_batches_are_refused(reach: pdmp.Model, given: dict[str, Any], message: str) -> None:
-    """Batches and pieces alike name the argument and the numbers, before anything is done."""
+def test_invalid_batches_are_rejected(
+    reach: pdmp.Model, given: dict[str, Any], message: str
+) -> None:
+    """Batches and chunks name the argument and the numbers before any computation."""
     for call in (reach.rollouts, reach.rollout_chunks):
         with pytest.raises(ValueError, match=message):
             call(**{"styles": STYLES, "dt": 0.1, **given})
 
 
 @pytest.mark.parametrize("size", [0, -1])
-def test_pieces_have_a_size(reach: pdmp.Model, size: int) -> None:
-    """An iterator that would never end is not begun."""
+def test_chunks_have_a_size(reach: pdmp.Model, size: int) -> None:
+    """A chunk size of zero is rejected."""
     with pytest.raises(ValueError, match=f"size = {size}: must"):
         reach.rollout_chunks(STYLES, size=size)
 
 
-def test_jacobians_belong_to_a_kind(reach: pdmp.Model, cycle: pdmp.Model) -> None:
-    """A discrete primitive has no anchor, a rhythmic one no goal; there is no third derivative."""
+def test_jacobians_of_the_other_kind_are_rejected(reach: pdmp.Model, cycle: pdmp.Model) -> None:
+    """Jacobians by arguments of the other kind, and of order three, are rejected."""
     with pytest.raises(ValueError, match="goal does not apply to a rhythmic primitive"):
         cycle.jacobian("goal")
     with pytest.raises(ValueError, match="anchor does not apply to a discrete primitive"):
@@ -232,12 +234,12 @@ def test_jacobians_belong_to_a_kind(reach: pdmp.Model, cycle: pdmp.Model) -> Non
 
 
 def arrays(n: int = 2) -> list[np.ndarray]:
-    """Return arrays that fit the movements of `STYLES` at 0.1 s for 1 s."""
+    """Returns output arrays for the movements of `STYLES` at 0.1 s for 1 s."""
     return [np.zeros((23, 11, 2)) for _ in range(n)]
 
 
 def test_outputs_are_one_for_each_derivative(reach: pdmp.Model) -> None:
-    """Too few and too many arrays are refused with their number."""
+    """A wrong number of output arrays is rejected with the number."""
     model, batch = reach, {"styles": STYLES, "dt": 0.1, "duration": 1.0}
     for n, derivatives in ((1, 1), (2, 0), (2, 2)):
         message = f"out: {n} arrays; expected {derivatives + 1} float64 arrays"
@@ -245,8 +247,8 @@ def test_outputs_are_one_for_each_derivative(reach: pdmp.Model) -> None:
             model.rollouts(**batch, derivatives=derivatives, out=arrays(n))
 
 
-def test_outputs_that_overlap_are_refused(reach: pdmp.Model) -> None:
-    """One memory cannot hold positions and velocities; nothing is written."""
+def test_outputs_that_overlap_are_rejected(reach: pdmp.Model) -> None:
+    """Output arrays that share memory are rejected; nothing is written."""
     model, (one, _) = reach, arrays()
     for out in ((one, one), (one, one[::-1])):
         with pytest.raises(ValueError, match="out: .*share memory"):
@@ -254,8 +256,8 @@ def test_outputs_that_overlap_are_refused(reach: pdmp.Model) -> None:
     assert not one.any()
 
 
-def test_outputs_off_the_grid_of_numbers_are_refused(reach: pdmp.Model) -> None:
-    """A field of packed records is not written."""
+def test_misaligned_outputs_are_rejected(reach: pdmp.Model) -> None:
+    """Misaligned output arrays, such as fields of packed records, are rejected."""
     records = np.zeros((23, 11, 2), [("value", "f8"), ("other", "f4")])
     with pytest.raises(ValueError, match="out: not aligned in memory"):
         reach.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=0, out=(records["value"],))
@@ -263,8 +265,8 @@ def test_outputs_off_the_grid_of_numbers_are_refused(reach: pdmp.Model) -> None:
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
-def test_outputs_may_lie_in_memory_as_they_like(model: pdmp.Model, order: Any) -> None:
-    """The arrays given are those returned, with the numbers of a batch without them."""
+def test_outputs_can_have_any_strides(model: pdmp.Model, order: Any) -> None:
+    """Output arrays of any strides are returned, with the numbers of a batch without them."""
     expected = model.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=2)
     out = [np.full((23, 11, 2), NAN, order=order)[::-1] for _ in range(3)]
     made = model.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=2, out=out)
@@ -274,8 +276,8 @@ def test_outputs_may_lie_in_memory_as_they_like(model: pdmp.Model, order: Any) -
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="this system has no limit on memory")
-def test_more_than_memory_holds_is_refused(reach: pdmp.Model, tmp_path: Path) -> None:
-    """A batch beyond the memory allowed is a MemoryError that tells its size; pieces of it fit."""
+def test_batch_beyond_memory_is_rejected(reach: pdmp.Model, tmp_path: Path) -> None:
+    """A batch beyond the memory limit raises a MemoryError with its size; its chunks fit."""
     reach.save(tmp_path / "model")
     code = f"""
 import resource, numpy as np, pdmp
@@ -288,14 +290,14 @@ except MemoryError as error:
 print(next(model.rollout_chunks(styles, dt=1e-3, duration=1.0, threads=1))[0].shape)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    told, shape = done.stdout.splitlines()
-    assert told.startswith("rollouts would take 2002000000.0 numbers: not enough memory")
+    reported, shape = done.stdout.splitlines()
+    assert reported.startswith("rollouts would take 2002000000.0 numbers: not enough memory")
     assert shape == "(1000, 1001, 2)"
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no timer signals")
 def test_signal_ends_a_long_batch(reach: pdmp.Model) -> None:
-    """An exception of a signal handler comes out of the batch while it is written."""
+    """An exception of a signal handler ends a batch."""
 
     class Late(Exception):
         pass

@@ -1,4 +1,4 @@
-"""Lengths that lie, arrays of many holders, endless recursion, costly files."""
+"""Robustness of the bindings: wrong lengths, shared arrays, endless recursion, forged files."""
 
 import errno
 import json
@@ -20,13 +20,13 @@ REACHES = [np.column_stack([S**2 * (3 - 2 * S), h * S * (1 - S)]) for h in (0.0,
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    """Learn reaches of several heights."""
+    """Returns a model of reaches of several heights."""
     return pdmp.fit(REACHES, dt=0.02, basis="ngnet", n_styles=2)
 
 
 @pytest.mark.parametrize("length", [2**62, 2**40])
-def test_a_length_that_lies_is_refused_by_name(model: Model, length: int) -> None:
-    """Nothing is reserved for items before they come."""
+def test_a_wrong_length_is_rejected_by_name(model: Model, length: int) -> None:
+    """No memory is reserved for a stated length; a wrong one is rejected."""
     lie: Any = range(length)
     calls: list[tuple[str, Callable[[], object]]] = [
         ("names", lambda: pdmp.Demonstration(REACHES[0], dt=0.02, names=lie)),
@@ -38,8 +38,8 @@ def test_a_length_that_lies_is_refused_by_name(model: Model, length: int) -> Non
             call()
 
 
-def test_who_reshapes_a_motion_changes_it_for_nobody_else(model: Model) -> None:
-    """Each access is an array of its own over the same numbers."""
+def test_reshaping_a_motion_has_no_effect_elsewhere(model: Model) -> None:
+    """Each access returns a new array over the same numbers, which can be reshaped separately."""
     controller = model.controller(0.001)
     first, second = controller.position, controller.position
     first.shape = (2, 1)
@@ -52,14 +52,14 @@ def test_who_reshapes_a_motion_changes_it_for_nobody_else(model: Model) -> None:
 
 @pytest.mark.parametrize("name", ["goal", "style"])
 def test_one_element_of_a_command_cannot_be_assigned(model: Model, name: str) -> None:
-    """A command is set as a whole."""
+    """A command is read-only and can only be set as a whole."""
     controller = model.controller(0.001)
     with pytest.raises(ValueError, match="read-only"):
         getattr(controller, name)[0] = 1.0
 
 
 def test_a_tick_of_length_zero_changes_nothing(model: Model) -> None:
-    """Status, time and motion stay."""
+    """A tick of length zero leaves status, time and motion unchanged."""
     controller = model.controller(0.001)
     for _ in range(100):
         controller.step()
@@ -72,7 +72,7 @@ def test_a_tick_of_length_zero_changes_nothing(model: Model) -> None:
 
 @pytest.mark.parametrize("transition", [5e-324, 1e-300, 1e-200, 1e-100, 1e-16, 1e-14])
 def test_tiny_transitions_and_ticks_stay_finite(model: Model, transition: float) -> None:
-    """However short, a transition and its ticks leave finite numbers."""
+    """Very short transitions and ticks give finite numbers."""
     controller = model.controller(0.001, transition=transition)
     for k, dt in enumerate([5e-324, 1e-300, 1e-100, 1e-15, 1e-3] * 4):
         controller.style = [0.1 * k, -0.2]
@@ -82,8 +82,8 @@ def test_tiny_transitions_and_ticks_stay_finite(model: Model, transition: float)
         assert np.isfinite(controller.acceleration).all()
 
 
-def test_outputs_that_overlap_themselves_are_refused(model: Model) -> None:
-    """Threads would write to one place."""
+def test_outputs_that_overlap_themselves_are_rejected(model: Model) -> None:
+    """An output array with overlapping elements is rejected."""
     shape = model.rollouts(model.styles, dt=0.1, derivatives=0)[0].shape
     out = np.lib.stride_tricks.as_strided(np.zeros(1), shape, (0, 0, 0))
     with pytest.raises(ValueError, match="share memory"):
@@ -92,8 +92,8 @@ def test_outputs_that_overlap_themselves_are_refused(model: Model) -> None:
     model.rollouts(model.styles, dt=0.1, derivatives=0, out=[slices])
 
 
-def test_recursion_without_end_is_an_exception() -> None:
-    """Neither an array nor a callback that calls its caller takes the process down."""
+def test_endless_recursion_is_an_exception() -> None:
+    """Endless recursion through an array or a callback raises an exception."""
 
     class Endless:
         def __array__(self, *_: object, **__: object) -> object:
@@ -109,8 +109,8 @@ def test_recursion_without_end_is_an_exception() -> None:
         fit()
 
 
-def test_targets_are_factorised_as_they_came() -> None:
-    """What other threads write to them meanwhile is no matter."""
+def test_targets_are_copied_before_factorisation() -> None:
+    """Targets are copied: later writes of other threads have no effect."""
     targets = np.random.default_rng(0).random((100, 2000))
     stop = threading.Event()
 
@@ -132,8 +132,8 @@ def test_targets_are_factorised_as_they_came() -> None:
         thread.join()
 
 
-def test_a_header_of_countless_arrays_is_refused_before_they_are_read() -> None:
-    """A model has few arrays."""
+def test_a_header_of_too_many_arrays_is_rejected_before_they_are_read() -> None:
+    """A header with too many arrays is rejected before they are read."""
     entries = {f"a{k}": {"dtype": "F64", "shape": [0], "data_offsets": [0, 0]} for k in range(1000)}
     header = json.dumps(entries).encode()
     with pytest.raises(pdmp.ModelFileError, match="more arrays than any model"):
@@ -143,7 +143,7 @@ def test_a_header_of_countless_arrays_is_refused_before_they_are_read() -> None:
 def test_an_error_of_saving_keeps_its_number_and_leaves_no_draft(
     model: Model, tmp_path: Path
 ) -> None:
-    """Errors of the system come with errno, whichever step they come from."""
+    """Errors of the operating system keep their errno in every step of saving."""
     (tmp_path / "folder").mkdir()
     for path, number in [
         (tmp_path / "absent" / "m", errno.ENOENT),
@@ -157,7 +157,7 @@ def test_an_error_of_saving_keeps_its_number_and_leaves_no_draft(
 
 
 def test_threads_that_save_on_one_path_leave_a_whole_model(model: Model, tmp_path: Path) -> None:
-    """Each writes a draft of its own."""
+    """Each thread writes a separate temporary file."""
     path = tmp_path / "m.safetensors"
     threads = [threading.Thread(target=lambda: [model.save(path) for _ in range(5)]) for _ in "12"]
     for thread in threads:

@@ -1,4 +1,4 @@
-"""The command line does what its help says, and fails in one line with the right exit code."""
+"""Results, error messages and exit codes of the command line."""
 
 import re
 import subprocess
@@ -18,7 +18,7 @@ COMMANDS = ["fit", "rollout", "evaluate", "info", "plot"]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Return a folder of five reaches with their bend in the index."""
+    """Returns a folder of five reaches with their bend in the index."""
     path = tmp_path / "recordings"
     (path / "demos").mkdir(parents=True)
     index = ["id,bend"]
@@ -32,19 +32,19 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def model_file(tmp_path: Path) -> Path:
-    """Return the file of a model of five reaches with two style parameters."""
+    """Returns the file of a model of five reaches with two style parameters."""
     path = tmp_path / "model.safetensors"
     pdmp.fit(reaches(), n_styles=2).save(path)
     return path
 
 
 def run(*arguments: object) -> int:
-    """Run the command line and return its exit code."""
+    """Runs the command line and return its exit code."""
     return main([str(argument) for argument in arguments])
 
 
 def test_fit_learns_what_the_library_learns(folder: Path, tmp_path: Path) -> None:
-    """The model file holds the styles and contexts of the same fit made in Python."""
+    """The model file has the styles and contexts of the same fit in Python."""
     path = tmp_path / "model.safetensors"
     assert run("fit", folder, "--context", "bend", "--styles", 2, "-o", path) == 0
     model = pdmp.load(path)
@@ -54,7 +54,7 @@ def test_fit_learns_what_the_library_learns(folder: Path, tmp_path: Path) -> Non
 
 
 def test_fit_takes_single_files(folder: Path, tmp_path: Path) -> None:
-    """CSV files are one demonstration each, with the columns that are asked for."""
+    """Each CSV file is one demonstration with the selected columns."""
     path = tmp_path / "model.safetensors"
     files = sorted((folder / "demos").glob("*.csv"))[:3]
     assert run("fit", *files, "--columns", "y", "--basis", "ngnet", "-o", path) == 0
@@ -63,7 +63,7 @@ def test_fit_takes_single_files(folder: Path, tmp_path: Path) -> None:
 
 
 def test_fit_reads_time_by_its_name(folder: Path, tmp_path: Path) -> None:
-    """With --time, another column than t has the time stamps, and is no degree of freedom."""
+    """With --time, the named column has the time stamps and is not a degree of freedom."""
     plain, named = tmp_path / "plain.safetensors", tmp_path / "named.safetensors"
     assert run("fit", folder, "-o", plain) == 0
     for file in (folder / "demos").glob("*.csv"):
@@ -74,7 +74,7 @@ def test_fit_reads_time_by_its_name(folder: Path, tmp_path: Path) -> None:
 
 
 def test_fit_and_plot_bridge_gaps_and_keep_units(folder: Path, tmp_path: Path) -> None:
-    """With --max-gap, an empty field is interpolated; units go into model and table."""
+    """With --max-gap, an empty field is interpolated; units are kept in model and table."""
     path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"
     for file in (folder / "demos").glob("*.csv"):
         lines = file.read_text().replace("t,x,y", "t,x [m],y").splitlines()
@@ -87,18 +87,18 @@ def test_fit_and_plot_bridge_gaps_and_keep_units(folder: Path, tmp_path: Path) -
     assert run("plot", path, folder, "--max-gap", 0.05, "-o", tmp_path / "figures") == 0
 
 
-def test_fit_learns_rhythmic_ones(tmp_path: Path) -> None:
-    """The kind is handed on."""
+def test_fit_learns_rhythmic_movements(tmp_path: Path) -> None:
+    """The option --kind reaches the fit."""
     archive, path = tmp_path / "loops.npz", tmp_path / "model.safetensors"
     np.savez(archive, *[demo.position for demo in loops()])
     assert run("fit", archive, "--kind", "rhythmic", "--dt", DT, "-o", path) == 0
     assert pdmp.load(path).kind == "rhythmic"
 
 
-def test_fit_tells_its_progress_on_standard_error(
+def test_fit_reports_its_progress_on_standard_error(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Standard output holds the result alone."""
+    """Progress is on standard error; standard output has the result alone."""
     run("fit", folder, "-o", tmp_path / "model.safetensors")
     captured = capsys.readouterr()
     assert captured.err
@@ -106,7 +106,7 @@ def test_fit_tells_its_progress_on_standard_error(
 
 
 def test_rollout_writes_the_movement(model_file: Path, tmp_path: Path) -> None:
-    """The CSV holds, to the last bit, what the library's rollout returns."""
+    """The CSV file equals the rollout of the library bit for bit."""
     path = tmp_path / "out.csv"
     code = run("rollout", model_file, "--style", 0.1, -0.2, "--goal", 1, 0.5, "-o", path)
     assert code == 0
@@ -116,8 +116,8 @@ def test_rollout_writes_the_movement(model_file: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(made.position, expected.position)
 
 
-def test_rollout_repeats_a_demonstration(model_file: Path, tmp_path: Path) -> None:
-    """With --demo, style, place and duration are those of the demonstration."""
+def test_rollout_reproduces_a_demonstration(model_file: Path, tmp_path: Path) -> None:
+    """With --demo, style, goal, start and duration are those of the demonstration."""
     path = tmp_path / "out.csv"
     assert run("rollout", model_file, "--demo", 4, "--dt", DT, "-o", path) == 0
     made = pdmp.io.read_csv(path, columns=["x", "y"])
@@ -125,7 +125,7 @@ def test_rollout_repeats_a_demonstration(model_file: Path, tmp_path: Path) -> No
     assert made.n_samples == reaches()[4].n_samples
 
 
-def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
+def test_rollout_of_a_context_is_its_prediction(model_file: Path, tmp_path: Path) -> None:
     """With --context, the movement is the one that the library predicts."""
     path = tmp_path / "out.csv"
     assert run("rollout", model_file, "--context", 0.15, "-o", path) == 0
@@ -134,7 +134,7 @@ def test_rollout_meets_a_context(model_file: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(made.position, expected.position)
 
 
-def test_warped_models_are_told_and_repeat_demonstrations(
+def test_warped_models_are_described_and_reproduce_demonstrations(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """With --alignment and --styles auto the fit is the library's; --tau overrides a timing."""
@@ -158,8 +158,8 @@ def test_warped_models_are_told_and_repeat_demonstrations(
     assert pdmp.io.read_csv(out).time[-1] == pytest.approx(2 * model.durations[model.nominal], 0.02)
 
 
-def test_evaluate_fills_gaps_when_told(folder: Path) -> None:
-    """A missing field is refused by its place, and interpolated up to a stated length."""
+def test_evaluate_fills_gaps_up_to_max_gap(folder: Path) -> None:
+    """A missing field is rejected with its location, or interpolated up to a given length."""
     path = folder / "demos" / "2.csv"
     lines = path.read_text().split("\n")
     lines[30] = lines[30].rsplit(",", 1)[0] + ","
@@ -169,10 +169,10 @@ def test_evaluate_fills_gaps_when_told(folder: Path) -> None:
     assert run(*given, "--max-gap", 2.5 * DT) == 0
 
 
-def test_evaluate_tells_what_the_library_finds(
+def test_evaluate_prints_the_results_of_the_library(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The table is printed, and with a folder, written beside two figures."""
+    """The table is printed and, with --output, written with two figures."""
     out = tmp_path / "evaluation"
     assert run("evaluate", folder, "--context", "bend", "--styles", 2, "-o", out) == 0
     written = {path.name for path in out.iterdir()}
@@ -182,10 +182,10 @@ def test_evaluate_tells_what_the_library_finds(
     assert repr(pdmp.evaluate(recordings, predictors=predictors)) in capsys.readouterr().out
 
 
-def test_info_tells_kind_names_and_styles(
+def test_info_prints_kind_names_and_styles(
     model_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The most asked of a model file is told, a line each."""
+    """The main properties of a model are printed, one per line."""
     assert run("info", model_file) == 0
     text = capsys.readouterr().out
     for expected in (
@@ -198,7 +198,7 @@ def test_info_tells_kind_names_and_styles(
 
 
 def test_plot_writes_every_figure(model_file: Path, folder: Path, tmp_path: Path) -> None:
-    """With demonstrations, they are drawn too; a discrete model has no phase portrait."""
+    """Demonstrations are drawn if given; a discrete model has no phase portrait."""
     figures = tmp_path / "figures"
     assert run("plot", model_file, folder, "-o", figures) == 0
     written = {path.name for path in figures.iterdir()}
@@ -215,7 +215,7 @@ def test_plot_draws_the_phase_portrait_of_a_rhythmic_model(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The help of each command ends well and shows a line to start from."""
+    """The help of each command exits with 0 and has an example."""
     with pytest.raises(SystemExit, match="0"):
         run(command, "--help")
     assert f"example: pdmp {command}" in capsys.readouterr().out
@@ -233,7 +233,7 @@ def test_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -
     ],
 )
 def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
-    """Usage errors are told from all others by their exit code."""
+    """Usage errors have the exit code 2."""
     with pytest.raises(SystemExit, match="2"):
         run(*arguments)
 
@@ -243,8 +243,19 @@ def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
     [
         (["info", "none.safetensors"], "none.safetensors"),
         (["fit", "none.csv", "-o", "m"], "none.csv: No such file"),
-        (["rollout", "{model}", "--style", "1", "-o", "o"], "style has length 1, expected 2"),
-        (["rollout", "{model}", "--demo", "9", "-o", "o"], "9 must lie between 0 and 4"),
+        (["rollout", "{model}", "--style", "1", "-o", "o"], "--style has length 1, expected 2"),
+        (["rollout", "{model}", "--goal", "1", "-o", "o"], "--goal has length 1, expected 2"),
+        (["rollout", "{model}", "--tau", "-1", "-o", "o"], "--tau = -1: must be positive"),
+        (["rollout", "{model}", "--demo", "9", "-o", "o"], "--demo.* 9 must lie between 0 and 4"),
+        (["rollout", "{model}", "--demo", "-1", "-o", "o"], "--demo.* -1 must lie between 0 and 4"),
+        (["fit", "{folder}", "--styles", "9", "-o", "m"], "--styles = 9: must lie between 1 and 5"),
+        (
+            ["fit", "{folder}", "--styles", "1", "--singular-value-share", "0.5", "-o", "m"],
+            "--styles and --singular-value-share: pass one of them",
+        ),
+        (["fit", "{folder}", "--smoothing", "-3", "-o", "m"], "--smoothing = -3: must be positive"),
+        (["fit", "{folder}", "--period", "1", "-o", "m"], "--period does not apply to a discrete"),
+        (["fit", "{folder}", "--max-gap", "-1", "-o", "m"], "--max-gap = -1: must not be negative"),
         (["info", "{index}"], "model file"),
     ],
 )
@@ -255,9 +266,9 @@ def test_errors_are_one_line_and_exit_with_1(
     message: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Whatever goes wrong, one line on standard error says what, without a traceback."""
-    places = {"model": model_file, "index": folder / "index.csv"}
-    assert run(*(argument.format(**places) for argument in arguments)) == 1
+    """Errors are reported in one line on standard error, without a traceback."""
+    paths = {"model": model_file, "folder": folder, "index": folder / "index.csv"}
+    assert run(*(argument.format(**paths) for argument in arguments)) == 1
     captured = capsys.readouterr()
     assert re.fullmatch(rf"pdmp: error: .*{message}.*\n", captured.err)
     assert captured.out == ""
@@ -277,8 +288,8 @@ def test_interruption_exits_with_130_and_leaves_no_file(
     assert not path.exists()
 
 
-def test_reader_that_leaves_early_sees_no_traceback(model_file: Path) -> None:
-    """Output into a closed pipe ends quietly."""
+def test_closed_pipe_causes_no_traceback(model_file: Path) -> None:
+    """Output to a closed pipe ends without a traceback."""
     command = [sys.executable, "-m", "pdmp", "info", str(model_file)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.close()
@@ -288,38 +299,38 @@ def test_reader_that_leaves_early_sees_no_traceback(model_file: Path) -> None:
 
 
 def test_negative_exponents_are_numbers(model_file: Path, tmp_path: Path) -> None:
-    """-1e-3 is a number, as models print it, and no option."""
+    """-1e-3, as models print it, is parsed as a number and not as an option."""
     out = tmp_path / "out.csv"
     assert run("rollout", model_file, "--goal", "-1e-3", "2", "-o", out) == 0
     end = pdmp.io.read_csv(out, columns=["x", "y"]).position[-1]
     np.testing.assert_allclose(end, [-1e-3, 2], atol=0.2)
 
 
-def test_missing_folder_is_told_before_learning(
+def test_missing_folder_is_reported_before_learning(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Nobody waits for a model that cannot be written."""
+    """A missing output folder is reported before the fit."""
     assert run("fit", folder, "-o", tmp_path / "nowhere" / "model.safetensors") == 1
-    told = capsys.readouterr().err
-    assert "no such folder" in told
-    assert "learning" not in told
+    reported = capsys.readouterr().err
+    assert "no such folder" in reported
+    assert "learning" not in reported
 
 
-def test_contexts_outside_are_told(
+def test_extrapolated_contexts_are_reported(
     model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A movement for a context beyond those shown is written, and said to be one."""
+    """A movement for a context outside the demonstrated ones is written, with a note."""
     out = tmp_path / "out.csv"
     assert run("rollout", model_file, "--context", 0.0, "-o", out) == 0
     assert capsys.readouterr().err == ""
     assert run("rollout", model_file, "--context", 1.2, "-o", out) == 0
-    assert "outside of those demonstrated" in capsys.readouterr().err
+    assert "outside the demonstrated ones" in capsys.readouterr().err
 
 
 def test_errors_name_options(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What is an argument in Python is told as the option that it is here."""
+    """Errors name the options of the command instead of arguments of Python."""
     assert run("evaluate", folder) == 1
     assert "pass --context" in capsys.readouterr().err
     assert run("fit", folder, "-o", tmp_path) == 1

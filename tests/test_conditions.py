@@ -1,4 +1,4 @@
-"""Conditions of a movement: those of demonstrations, and those in between."""
+"""Conditions of movements: of demonstrations, their means and blends."""
 
 import pickle
 from typing import Any
@@ -12,7 +12,7 @@ from synthetic import loops, reaches
 
 @pytest.mark.parametrize("m", range(5))
 def test_rollout_of_demonstrated_conditions_gives_the_demonstration_back(m: int) -> None:
-    """With all styles, style, place and pace of a demonstration repeat it."""
+    """With J = M, the conditions of a demonstration reproduce it."""
     demos = reaches()
     model = pdmp.fit(demos, n_styles=5)
     made = model.rollout(model.conditions(m), dt=0.02)
@@ -20,7 +20,7 @@ def test_rollout_of_demonstrated_conditions_gives_the_demonstration_back(m: int)
 
 
 def test_rhythmic_rollout_of_demonstrated_conditions_gives_the_cycle_back() -> None:
-    """A rhythmic one repeats its demonstration, from the first tick on."""
+    """A rhythmic primitive reproduces its demonstration from the first tick on."""
     demos = loops()
     model = pdmp.fit(demos, kind="rhythmic", n_styles=2)
     made = model.rollout(model.conditions(1), dt=0.02)
@@ -28,7 +28,7 @@ def test_rhythmic_rollout_of_demonstrated_conditions_gives_the_cycle_back() -> N
 
 
 def test_several_demonstrations_give_their_mean() -> None:
-    """Style, place and duration are averaged."""
+    """Conditions of several demonstrations are their mean."""
     model = pdmp.fit(reaches())
     mean = model.conditions([0, 1])
     np.testing.assert_allclose(mean.goal, model.goals[:2].mean(axis=0))
@@ -46,13 +46,13 @@ def test_blend_ends_at_both() -> None:
 
 @pytest.mark.parametrize("demos", [1.0, None, "1", [[0, 1], [1, 0]]])
 def test_index_is_a_whole_number(demos: Any) -> None:
-    """What is no index, or list of them, is told as it was given."""
+    """An invalid index is quoted in the error."""
     with pytest.raises(ValueError, match="demos = .*: pass the index of a demonstration"):
         pdmp.fit(reaches()).conditions(demos)
 
 
-def test_blend_refuses_what_has_no_middle() -> None:
-    """Unequal lengths and a share that is not finite are refused by name."""
+def test_blend_rejects_unequal_lengths_and_shares_that_are_not_finite() -> None:
+    """Conditions of unequal lengths and a share that is not finite are rejected by name."""
     one, two = pdmp.Conditions(style=[1.0]), pdmp.Conditions(style=[1.0, 2.0])
     with pytest.raises(ValueError, match="style has length 2, expected 1"):
         pdmp.blend(one, two, 0.5)
@@ -60,20 +60,20 @@ def test_blend_refuses_what_has_no_middle() -> None:
         pdmp.blend(one, one, float("nan"))
 
 
-def test_blend_refuses_a_name_that_one_lacks() -> None:
-    """What has no counterpart is named."""
+def test_blend_rejects_a_condition_that_one_lacks() -> None:
+    """A condition that only one of the two has is named."""
     with pytest.raises(ValueError, match="goal: given for one of the two only"):
         pdmp.blend(pdmp.Conditions(style=[1.0]), pdmp.Conditions(style=[1.0], goal=[0.0]), 0.5)
 
 
 @pytest.mark.parametrize("demos", [-1, 5, [0, 7], []])
-def test_unknown_demonstration_is_refused(demos: int | list[int]) -> None:
-    """An index outside the demonstrations is refused with the range."""
+def test_unknown_demonstration_is_rejected(demos: int | list[int]) -> None:
+    """An index outside the demonstrations is rejected with the range."""
     with pytest.raises(ValueError, match=r"between 0 and 4|empty"):
         pdmp.fit(reaches()).conditions(demos)
 
 
-def test_keywords_take_the_place_of_single_conditions() -> None:
+def test_keywords_replace_single_conditions() -> None:
     """A keyword replaces the condition of its name, and the others stay."""
     model = pdmp.fit(reaches())
     conditions = model.conditions(2)
@@ -86,7 +86,7 @@ def test_keywords_take_the_place_of_single_conditions() -> None:
 
 
 @pytest.mark.parametrize("how", ["rollout", "controller", "jacobian"])
-def test_what_is_no_condition_is_refused_by_name(how: str) -> None:
+def test_invalid_conditions_are_rejected_by_name(how: str) -> None:
     """Unknown keywords, values that are not numbers and other objects are named."""
     model = pdmp.fit(reaches())
     first = ["style"] if how == "jacobian" else []
@@ -98,12 +98,12 @@ def test_what_is_no_condition_is_refused_by_name(how: str) -> None:
     with pytest.raises(ValueError, match="tau = 'slow': expected one number"):
         call(tau="slow")
     if how != "controller":
-        with pytest.raises(TypeError, match="conditions: expected pdmp.Conditions, found list"):
+        with pytest.raises(TypeError, match=r"conditions = \[0.1, 0.2\]: expected pdmp.Conditions"):
             call([0.1, 0.2])
 
 
 def test_conditions_are_values() -> None:
-    """Equal conditions are equal, survive a pickle, and show what is given."""
+    """Conditions compare by value, survive pickling, and print their values."""
     conditions = pdmp.Conditions(goal=np.array([0.5, 1.0]), amplitude=np.float64(0.5))
     assert pickle.loads(pickle.dumps(conditions)) == conditions
     assert conditions != conditions.replace(tau=1)
@@ -111,8 +111,8 @@ def test_conditions_are_values() -> None:
     assert eval(repr(conditions)) == conditions
 
 
-def test_conditions_of_the_other_kind_are_refused_everywhere() -> None:
-    """An amplitude of a discrete movement is refused by rollout, controller and reset alike."""
+def test_conditions_of_the_other_kind_are_rejected_everywhere() -> None:
+    """An amplitude of a discrete movement is rejected by rollout, controller and reset alike."""
     model = pdmp.fit(reaches())
     controller = model.controller(0.01)
     for call in (model.rollout, model.controller, controller.reset):

@@ -1,4 +1,4 @@
-"""What reaches a terminal has no control characters, and any console can print it."""
+"""Output to a terminal has no control characters, and suits every encoding."""
 
 import os
 import re
@@ -19,7 +19,7 @@ S = np.linspace(0, 1, 61)[:, None]
 
 
 def hostile() -> list[Demonstration]:
-    """Return demonstrations whose names, units and labels would disturb a terminal."""
+    """Returns demonstrations whose names, units and labels contain control characters."""
     return [
         Demonstration(
             np.hstack([k * S, S * (k - S)]),
@@ -34,18 +34,18 @@ def hostile() -> list[Demonstration]:
 
 @pytest.fixture
 def model_file(tmp_path: Path) -> Path:
-    """Return the file of a model of them."""
+    """Returns the file of a model of these demonstrations."""
     pdmp.fit(hostile()).save(tmp_path / "model.safetensors")
     return tmp_path / "model.safetensors"
 
 
 def assert_harmless(text: str) -> None:
-    """Assert that no control character is left, line breaks aside."""
+    """Asserts that a text has no control characters except line breaks."""
     assert all(c.isprintable() or c == "\n" for c in text), ascii(text)
 
 
 def test_reprs_are_harmless() -> None:
-    """An object prints as one line of printable characters, most of it ASCII."""
+    """The repr of an object is one line of printable characters, most of them ASCII."""
     model = pdmp.fit(hostile())
     context = [1.5, "left" + HOSTILE]
     objects = [model, model.map, model.predict(context), model.rollout(), model.controller()]
@@ -105,10 +105,8 @@ def test_errors_are_harmless(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ["cp932", "cp1251", "ascii", "utf-8"])
-def test_any_console_takes_what_commands_write(
-    model_file: Path, tmp_path: Path, encoding: str
-) -> None:
-    """Characters that a console does not have are replaced; control characters are escaped."""
+def test_commands_can_print_to_any_console(model_file: Path, tmp_path: Path, encoding: str) -> None:
+    """Characters outside the console's encoding are replaced; control characters are escaped."""
     script = "import pdmp, sys; print(pdmp.load(sys.argv[1]))"
     table = tmp_path / "é\x1b.csv"
     pdmp.load(model_file).rollout().to_csv(table)
@@ -137,10 +135,10 @@ def test_any_console_takes_what_commands_write(
     assert_harmless(failed.stderr.decode(encoding).replace(os.linesep, "\n"))
 
 
-def test_info_tells_names_and_labels_in_their_lines(
+def test_info_prints_names_and_labels_in_one_line(
     model_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A line break in a name makes no line of its own."""
+    """A line break in a name is escaped."""
     assert main(["info", str(model_file)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert all(re.match(r"[\w ]{16}\S", line) for line in lines)
@@ -160,8 +158,10 @@ def test_info_tells_names_and_labels_in_their_lines(
         ["plot", "m", "-", "-o", "figures"],
     ],
 )
-def test_a_dash_is_no_file(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """No command takes it for standard input or output, nor for a file of that name."""
+def test_a_dash_is_rejected_as_a_file(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The path - is rejected: it is neither a stream nor a file."""
     with pytest.raises(SystemExit, match="2"):
         main(arguments)
     assert "- is no file: name one, or ./-" in capsys.readouterr().err
@@ -169,7 +169,7 @@ def test_a_dash_is_no_file(arguments: list[str], capsys: pytest.CaptureFixture[s
 
 
 def test_warnings_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What the library warns of, a command says in one line on standard error."""
+    """Warnings of the library are printed in one line on standard error."""
     path = tmp_path / "a.csv"
     path.write_text("t,x\n" + "".join(f"{1_700_000_000_000 + 10 * k},{k}\n" for k in range(20)))
     assert main(["fit", str(path), "-o", str(tmp_path / "m")]) == 0

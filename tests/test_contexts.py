@@ -1,4 +1,4 @@
-"""Contexts lead to movements: by which map, how surely, and how far from what was shown."""
+"""Maps from contexts to movements: their selection, covariance and extrapolation."""
 
 import pickle
 
@@ -14,18 +14,18 @@ BENDS = [(TIME * (1 - TIME)) ** 3 * [0.0, 64.0], np.sin(np.pi * TIME) ** 4 * [1.
 
 
 def bent(first: float, second: float = 0.0) -> np.ndarray:
-    """Return a reach that is bent in two ways."""
+    """Returns a reach with two kinds of bends."""
     return BASE + first * BENDS[0] + second * BENDS[1]
 
 
 def curved(heights: np.ndarray, **options: object) -> pdmp.Model:
-    """Return a model whose movements depend on the height, but not in proportion."""
+    """Returns a model whose movements depend nonlinearly on the height."""
     movements = [bent(np.sin(3 * h), h**2) for h in heights]
     return pdmp.fit(movements, dt=0.02, contexts=heights[:, None], **options)
 
 
-def test_auto_follows_what_is_no_line() -> None:
-    """A height between those shown is met where a line goes astray."""
+def test_auto_follows_nonlinear_relations() -> None:
+    """At a height between the demonstrated ones, "auto" is accurate where the linear map fails."""
     heights = np.linspace(0, 1, 9)
     wanted = bent(np.sin(3 * 0.56), 0.56**2)
     off = {
@@ -35,8 +35,8 @@ def test_auto_follows_what_is_no_line() -> None:
     assert off["auto"].max() < 0.02 < 0.2 < off["linear"].max()
 
 
-def test_auto_says_what_it_chose_and_why() -> None:
-    """A curve has the process alone, a line the line; weights and errors stand in the repr."""
+def test_auto_reports_its_selection() -> None:
+    """A nonlinear relation selects the process, a linear one the line; the repr states why."""
     chosen = curved(np.linspace(0, 1, 9)).map
     assert chosen is not None and chosen.kind == "stacked"
     errors = dict(chosen.errors)
@@ -50,7 +50,7 @@ def test_auto_says_what_it_chose_and_why() -> None:
 
 
 def test_labels_alone_give_the_mean_of_their_demonstrations() -> None:
-    """However many labels there are, each has what was recorded with it."""
+    """The prediction for a label is the mean of its demonstrations, for any number of labels."""
     random = np.random.default_rng(2)
     bends = {name: k / 5 for k, name in enumerate("abcdef")}
     labels = [name for name in bends for _ in range(4)]
@@ -70,7 +70,7 @@ def test_labels_alone_give_the_mean_of_their_demonstrations() -> None:
 
 
 def test_three_contexts_without_effect_do_not_make_a_line() -> None:
-    """Movements that vary at random are predicted no worse than twice as far off as their mean."""
+    """For random movements, errors of predictions are at most twice those of the mean."""
     random = np.random.default_rng(0)
     off, off_mean = [], []
     for _ in range(20):
@@ -83,7 +83,7 @@ def test_three_contexts_without_effect_do_not_make_a_line() -> None:
 
 
 def test_predicted_durations_stay_near_those_of_the_demonstrations() -> None:
-    """Far outside they leave the range of the demonstrations threefold at most."""
+    """Far outside, predicted durations exceed the demonstrated range at most threefold."""
     movements = [
         pdmp.Demonstration(bent(0.1 * k), dt=0.02 * np.exp(0.3 * k), context=[k]) for k in range(6)
     ]
@@ -96,7 +96,7 @@ def test_predicted_durations_stay_near_those_of_the_demonstrations() -> None:
 
 @pytest.mark.parametrize("name", ["linear", "polynomial", "gp", "stacked", "auto"])
 def test_models_with_a_map_survive_a_file(name: str, tmp_path: pytest.TempPathFactory) -> None:
-    """Predictions of a model loaded or unpickled are those of the one saved, to the last bit."""
+    """Predictions of a loaded or unpickled model equal those of the original bit for bit."""
     model = curved(np.linspace(0, 1, 7), map=name)
     model.save(tmp_path / "model.safetensors")
     for other in (pdmp.load(tmp_path / "model.safetensors"), pickle.loads(pickle.dumps(model))):
@@ -109,7 +109,7 @@ def test_models_with_a_map_survive_a_file(name: str, tmp_path: pytest.TempPathFa
 
 
 def labelled() -> pdmp.Model:
-    """Return a model of two manners, each at several heights, that remembers them by name."""
+    """Returns a model of two labelled manners, each at several heights."""
     demos = [
         Demonstration(bent(height, lean), dt=0.02, context=[manner, height])
         for manner, lean in (("proud", 0.8), ("tired", -0.8))
@@ -118,14 +118,14 @@ def labelled() -> pdmp.Model:
     return pdmp.fit(demos, map="linear", singular_value_share=0.999)
 
 
-def test_labels_stand_beside_numbers() -> None:
-    """A manner and a height never shown together are met."""
+def test_labels_and_numbers_are_combined() -> None:
+    """A combination of label and height that was not demonstrated is predicted."""
     made = labelled().rollout(context=["tired", 0.6], dt=0.02).position
     np.testing.assert_allclose(made, bent(0.6, -0.8), atol=1e-3)
 
 
-def test_labels_come_back_as_they_were() -> None:
-    """Model and demonstration show labels by name."""
+def test_labels_are_returned_by_name() -> None:
+    """Models and demonstrations return labels by name."""
     model = labelled()
     assert model.contexts[0] == ["proud", 0.1]
     demo = Demonstration(BASE, dt=0.02, context=["proud", 0.1])
@@ -143,20 +143,20 @@ def test_labels_come_back_as_they_were() -> None:
         (["proud", np.nan], r"context\[1\] = NaN"),
     ],
 )
-def test_strange_contexts_are_refused(context: list[object], message: str) -> None:
-    """A label never shown is refused with those that were."""
+def test_unknown_labels_are_rejected(context: list[object], message: str) -> None:
+    """An unknown label is rejected with the list of known ones."""
     with pytest.raises(ValueError, match=message):
         labelled().predict(context)
 
 
 def test_labels_and_numbers_do_not_mix_in_a_column() -> None:
-    """A value is a label in all demonstrations or in none."""
+    """A context value is a label in all demonstrations or in none."""
     with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 1 labels and 2 numbers"):
         pdmp.fit([BASE] * 3, dt=0.02, contexts=[[0.1], ["high"], [0.2]])
 
 
 def test_contexts_far_away_are_flagged() -> None:
-    """How far a context lies outside is told in ranges of those shown."""
+    """The extrapolation of a context is in units of the demonstrated range."""
     model = curved(np.linspace(0.2, 0.7, 6))
     np.testing.assert_allclose(model.predict([0.45]).extrapolation, [0.0])
     found = model.predict([1.7])
@@ -164,8 +164,8 @@ def test_contexts_far_away_are_flagged() -> None:
     assert "extrapolated by 2.00 of the demonstrated range of contexts" in repr(found)
 
 
-def test_process_does_not_run_away_and_says_so() -> None:
-    """Far away the Gaussian process stays where it is, with all the variance there is."""
+def test_process_returns_to_its_mean_far_outside() -> None:
+    """Far outside, the Gaussian process returns to its mean, with its full variance."""
     model = curved(np.linspace(0, 1, 12), map="gp")
     near, far = model.predict([0.5]), model.predict([100.0])
     np.testing.assert_allclose(
@@ -175,7 +175,7 @@ def test_process_does_not_run_away_and_says_so() -> None:
 
 
 def test_one_context_value_only_predicts_the_mean() -> None:
-    """Repetitions of one condition give its mean, with their scatter; another one is outside."""
+    """Repetitions of one condition predict their mean and scatter; another context is outside."""
     movements = [bent(b) for b in (0.2, 0.3, 0.4)]
     model = pdmp.fit(movements, dt=0.02, contexts=[[1.0]] * 3)
     found = model.predict([2.0])
@@ -183,8 +183,8 @@ def test_one_context_value_only_predicts_the_mean() -> None:
     assert np.isinf(found.extrapolation[0])
 
 
-def test_band_holds_what_it_promises() -> None:
-    """Nine tenths of the numbers of new movements lie within a band of 0.9."""
+def test_band_covers_its_level() -> None:
+    """A band of 0.9 contains nine tenths of the positions of new movements."""
     rng = np.random.default_rng(3)
 
     def noisy(height: float) -> np.ndarray:
@@ -205,7 +205,7 @@ def test_band_holds_what_it_promises() -> None:
 
 
 def test_band_surrounds_the_rollout_and_grows_with_its_level() -> None:
-    """Bounds lie evenly about the predicted movement."""
+    """The bounds are symmetric about the predicted movement."""
     rng = np.random.default_rng(1)
     heights = np.linspace(0, 1, 9)
     movements = [bent(h + 0.05 * rng.normal(), 0.05 * rng.normal()) for h in heights]
@@ -219,7 +219,7 @@ def test_band_surrounds_the_rollout_and_grows_with_its_level() -> None:
 
 
 def test_map_alone_agrees_with_least_squares() -> None:
-    """The linear map is numpy's least squares, with any units of the contexts."""
+    """The linear map equals least squares of numpy, in any units of the contexts."""
     rng = np.random.default_rng(0)
     contexts, outputs = rng.normal(size=(20, 3)) * [1, 1e3, 1e-3], rng.normal(size=(20, 2))
     design = np.column_stack([np.ones(20), contexts])
@@ -230,7 +230,7 @@ def test_map_alone_agrees_with_least_squares() -> None:
 
 
 def test_map_agrees_with_scikit_learn() -> None:
-    """With the same length and noise, the process is that of scikit-learn about a wide constant."""
+    """With the same length and noise, the process equals that of scikit-learn."""
     gaussian = pytest.importorskip("sklearn.gaussian_process")
     kernels = gaussian.kernels
     contexts = np.linspace(0, 1, 15)[:, None]
@@ -249,7 +249,7 @@ def test_map_agrees_with_scikit_learn() -> None:
 
 
 def scattered(rng: np.random.Generator, n: int = 16) -> tuple[list[np.ndarray], np.ndarray]:
-    """Return movements that the height bends in two ways, and chance in three others."""
+    """Returns movements with two bends that depend on the height, and three random ones."""
     heights = rng.uniform(0, 1, n)
     chance = [np.sin(k * np.pi * TIME) ** 2 * [1.0, (-1.0) ** k] for k in (3, 4, 5)]
     movements = [
@@ -259,14 +259,13 @@ def scattered(rng: np.random.Generator, n: int = 16) -> tuple[list[np.ndarray], 
     return movements, heights[:, None]
 
 
-def test_styles_are_as_many_as_contexts_foresee() -> None:
-    """What contexts do not tell needs no style; the spectrum cannot know."""
+def test_number_of_styles_is_that_explained_by_contexts() -> None:
+    """Cross-validation omits variation that contexts do not explain; singular values cannot."""
     rng = np.random.default_rng(2)
     few, many = [], []
     for _ in range(9):
         movements, heights = scattered(rng)
-        # About a goal that acts at once the mean movement has a dimension of its own, apart from
-        # those of the heights.
+        # With immediate transport, the mean movement adds a dimension to those of the heights.
         options = {"dt": 0.02, "contexts": heights, "transport": "immediate"}
         few.append(pdmp.fit(movements, n_styles="auto", **options).n_styles)
         many.append(pdmp.fit(movements, singular_value_share=0.99, **options).n_styles)
@@ -275,7 +274,7 @@ def test_styles_are_as_many_as_contexts_foresee() -> None:
 
 @pytest.mark.parametrize("kind", ["discrete", "rhythmic"])
 def test_styles_are_those_of_cross_validation(kind: str) -> None:
-    """Models fitted without one fold after the other come to the same number."""
+    """Models fitted without each fold in turn select the same number."""
     rng = np.random.default_rng(4)
     movements, heights = scattered(rng, 10)
     if kind == "rhythmic":
@@ -309,7 +308,9 @@ def test_styles_are_those_of_cross_validation(kind: str) -> None:
         ({"n_styles": "most"}, 'n_styles = "most": must be a number, "auto" or None'),
     ],
 )
-def test_styles_that_cannot_be_chosen_are_refused(options: dict[str, object], message: str) -> None:
-    """A choice by contexts needs some that differ."""
+def test_selection_without_varying_contexts_is_rejected(
+    options: dict[str, object], message: str
+) -> None:
+    """Selection by cross-validation needs contexts that vary."""
     with pytest.raises(ValueError, match=message):
         pdmp.fit([bent(0.1), bent(0.2), bent(0.3)], dt=0.02, **options)

@@ -1,4 +1,4 @@
-"""The control loop in Python: its memory, its threads and its clock."""
+"""The control loop in Python: memory, threads and clock."""
 
 import asyncio
 import copy
@@ -20,7 +20,7 @@ NAN, INF = float("nan"), float("inf")
 
 
 def blocks(work: Callable[[], object]) -> int:
-    """Return by how many memory blocks of Python a second run of some work grows."""
+    """Returns the growth of the number of Python's memory blocks in a second run of a function."""
     work()
     gc.collect()
     before = sys.getallocatedblocks()
@@ -28,8 +28,8 @@ def blocks(work: Callable[[], object]) -> int:
     return sys.getallocatedblocks() - before
 
 
-def test_a_hundred_thousand_ticks_leave_nothing_behind(model: pdmp.Model) -> None:
-    """Steps, commands as arrays and reads of the views keep no memory."""
+def test_a_hundred_thousand_ticks_accumulate_no_memory(model: pdmp.Model) -> None:
+    """Steps, commands as arrays and reads of views do not accumulate memory."""
     controller = model.controller(0.01)
     style, place = np.array([0.1, 0.2]), np.array([0.3, -0.1])
     centre = "goal" if model.kind == "discrete" else "anchor"
@@ -43,8 +43,8 @@ def test_a_hundred_thousand_ticks_leave_nothing_behind(model: pdmp.Model) -> Non
     assert blocks(work) < 20
 
 
-def test_a_tick_makes_no_object(model: pdmp.Model) -> None:
-    """What a tick returns is the object of the tick before, and what it shows lies where it lay."""
+def test_a_tick_creates_no_object(model: pdmp.Model) -> None:
+    """A tick returns the same object, and its views stay at the same addresses."""
     controller = model.controller(0.01)
     names = ("position", "velocity", "acceleration")
     places = []
@@ -56,7 +56,7 @@ def test_a_tick_makes_no_object(model: pdmp.Model) -> None:
 
 
 def test_views_outlive_the_controller_unchanged(model: pdmp.Model) -> None:
-    """Memory of a controller that is gone is not given to the next."""
+    """Memory of a deleted controller is not reused while views exist."""
     controller = model.controller(0.01)
     controller.step()
     views = controller.position, controller.velocity, controller.acceleration
@@ -69,8 +69,8 @@ def test_views_outlive_the_controller_unchanged(model: pdmp.Model) -> None:
         assert not any(np.shares_memory(view, other.position) for other in others)
 
 
-def test_two_threads_take_turns(model: pdmp.Model) -> None:
-    """Whatever two threads do to one controller, each tick is whole, and errors are clean."""
+def test_ticks_of_two_threads_are_atomic(model: pdmp.Model) -> None:
+    """With two threads on one controller, ticks are atomic and errors clean."""
     controller = model.controller(0.001)
     centre = "goal" if model.kind == "discrete" else "anchor"
     end = time.perf_counter() + 0.5
@@ -101,7 +101,7 @@ def test_two_threads_take_turns(model: pdmp.Model) -> None:
 
 
 def test_a_thread_may_reset_what_another_steps(model: pdmp.Model) -> None:
-    """The controller is then somewhere on its way, finite and as usable as before."""
+    """After concurrent resets the controller is finite and usable."""
     controller = model.controller(0.001)
     stop = threading.Event()
 
@@ -121,8 +121,8 @@ def test_a_thread_may_reset_what_another_steps(model: pdmp.Model) -> None:
     np.testing.assert_array_equal(controller.position, alone.position)
 
 
-def test_a_tick_within_a_tick_is_refused(reach: pdmp.Model) -> None:
-    """An argument that steps the controller it is given to makes one tick, not a torn one."""
+def test_a_tick_within_a_tick_is_rejected(reach: pdmp.Model) -> None:
+    """An argument that steps its own controller raises an error in the inner tick only."""
     controller = reach.controller(0.001)
 
     class Measured:
@@ -138,7 +138,7 @@ def test_a_tick_within_a_tick_is_refused(reach: pdmp.Model) -> None:
 
 
 def test_controllers_in_threads_move_as_one_by_one(model: pdmp.Model) -> None:
-    """Several controllers of one model do not disturb each other, to the last bit."""
+    """Controllers of one model in threads move as they do one by one, bit for bit."""
 
     def move(k: int) -> np.ndarray:
         controller = model.controller(0.01, style=[0.1 * k, -0.1])
@@ -156,25 +156,25 @@ def test_controllers_in_threads_move_as_one_by_one(model: pdmp.Model) -> None:
 
 
 class Clock:
-    """A clock that only sleeping and working move on."""
+    """Simulated clock that advances only by sleep and work."""
 
     def __init__(self) -> None:
         self.now = 1000.0
         self.slept: list[float] = []
 
     def work(self, seconds: float) -> None:
-        """Spend time."""
+        """Advances by a time."""
         self.now += seconds
 
     def sleep(self, seconds: float) -> None:
-        """Spend time asleep, and wake a little late."""
+        """Advances by the time asleep and a small delay."""
         self.slept.append(seconds)
         self.now += seconds + 60e-6
 
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    """Put paced loops on a clock of their own."""
+    """Replaces the clock of paced loops by a simulated one."""
     clock = Clock()
     monkeypatch.setattr(realtime, "perf_counter", lambda: clock.now)
     monkeypatch.setattr(realtime, "sleep", clock.sleep)
@@ -182,7 +182,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def test_paced_loop_is_the_repeated_step(model: pdmp.Model, clock: Clock) -> None:
-    """On time, tick k comes at start + k / rate without drift, and moves as step does."""
+    """Without delays, tick k is at start + k / rate without drift, and moves as step does."""
     controller, alone = model.controller(), model.controller()
     start = clock.now
     for k, tick in enumerate(pdmp.PacedLoop(controller, rate_hz=1000, duration=0.7), 1):
@@ -196,7 +196,7 @@ def test_paced_loop_is_the_repeated_step(model: pdmp.Model, clock: Clock) -> Non
 
 
 def test_discrete_movements_end_as_they_finish(reach: pdmp.Model, clock: Clock) -> None:
-    """The last tick is the one that is FINISHED; the rate is by default the controller's own."""
+    """The last tick is FINISHED; the default rate is that of the controller."""
     controller, alone = reach.controller(0.01), reach.controller(0.01)
     ticks = sum(1 for _ in pdmp.PacedLoop(controller))
     expected = 1
@@ -206,8 +206,8 @@ def test_discrete_movements_end_as_they_finish(reach: pdmp.Model, clock: Clock) 
     assert controller.time == pytest.approx(clock.now - 1000, abs=1e-4)
 
 
-def test_a_goal_set_as_it_finishes_is_gone_to(reach: pdmp.Model, clock: Clock) -> None:
-    """What the body of the last tick commands keeps the loop going."""
+def test_a_goal_set_in_the_last_tick_is_reached(reach: pdmp.Model, clock: Clock) -> None:
+    """A command in the body of the last tick continues the loop."""
     controller = reach.controller(0.01)
     goals = [[2, 1], [0.5, 0]]
     for _ in pdmp.PacedLoop(controller):
@@ -217,8 +217,8 @@ def test_a_goal_set_as_it_finishes_is_gone_to(reach: pdmp.Model, clock: Clock) -
     np.testing.assert_allclose(controller.position, [2, 1], atol=5e-3)
 
 
-def test_a_given_duration_outlasts_the_movement(reach: pdmp.Model, clock: Clock) -> None:
-    """A loop with a duration holds the goal, and goes to a new one."""
+def test_a_duration_can_exceed_the_movement(reach: pdmp.Model, clock: Clock) -> None:
+    """A loop with a duration stays at the goal, and moves to a new one."""
     controller = reach.controller(0.01)
     for tick in pdmp.PacedLoop(controller, duration=10):
         if tick.time > 5:
@@ -227,8 +227,8 @@ def test_a_given_duration_outlasts_the_movement(reach: pdmp.Model, clock: Clock)
     np.testing.assert_allclose(controller.position, [2, 1], atol=5e-3)
 
 
-def test_late_ticks_keep_the_time_of_the_clock(reach: pdmp.Model, clock: Clock) -> None:
-    """Missed deadlines are told, made good in one step, and do not move the later ones."""
+def test_late_ticks_catch_up_with_the_clock(reach: pdmp.Model, clock: Clock) -> None:
+    """Missed deadlines are reported, caught up in one step, and do not shift later ones."""
     controller = reach.controller()
     run = pdmp.PacedLoop(controller, rate_hz=1000, duration=0.5, late="catch up")
     missed, late = [], []
@@ -246,7 +246,7 @@ def test_late_ticks_keep_the_time_of_the_clock(reach: pdmp.Model, clock: Clock) 
 
 
 def test_a_movement_waits_for_a_late_tick(reach: pdmp.Model, clock: Clock) -> None:
-    """By default every tick moves by one period, and the deadlines to come are later."""
+    """By default every tick has one period, and the remaining deadlines are delayed."""
     controller, alone = reach.controller(), reach.controller()
     run = pdmp.PacedLoop(controller, rate_hz=1000, duration=0.5)
     for k, tick in enumerate(run):
@@ -259,7 +259,7 @@ def test_a_movement_waits_for_a_late_tick(reach: pdmp.Model, clock: Clock) -> No
 
 
 def test_a_controller_runs_in_one_loop_at_a_time(reach: pdmp.Model, clock: Clock) -> None:
-    """A second loop is refused while the first runs, and no longer."""
+    """A second loop is rejected only while the first runs."""
     controller = reach.controller()
     first = iter(pdmp.PacedLoop(controller, duration=0.1))
     next(first)
@@ -270,7 +270,7 @@ def test_a_controller_runs_in_one_loop_at_a_time(reach: pdmp.Model, clock: Clock
     assert sum(1 for _ in pdmp.PacedLoop(controller, duration=0.1)) == 100
 
     async def twice() -> None:
-        """Leave one loop and begin the next at once."""
+        """Leaves one loop and begins the next immediately."""
         for _ in range(2):
             async for _ in pdmp.PacedLoop(controller, rate_hz=500, duration=60):
                 break
@@ -283,8 +283,8 @@ def test_a_controller_runs_in_one_loop_at_a_time(reach: pdmp.Model, clock: Clock
         realtime.perf_counter = monkeypatched
 
 
-def test_status_is_true_while_the_movement_goes_on(reach: pdmp.Model) -> None:
-    """`while controller.step()` runs to the end; the numbers are those of C."""
+def test_status_is_true_while_the_movement_continues(reach: pdmp.Model) -> None:
+    """`while controller.step()` runs to the end; the values are those of the C interface."""
     controller = reach.controller()
     ticks = 0
     while controller.step():
@@ -295,8 +295,8 @@ def test_status_is_true_while_the_movement_goes_on(reach: pdmp.Model) -> None:
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
-def test_a_copy_goes_on_bit_for_bit_and_apart(model: pdmp.Model, copied: Any) -> None:
-    """A copy moves like the original would, which it does not disturb."""
+def test_a_copy_continues_bit_for_bit_and_independently(model: pdmp.Model, copied: Any) -> None:
+    """A copy continues like the original, which it does not affect."""
     controller, alone = model.controller(), model.controller()
     for each in (controller, alone):
         for _ in range(100):
@@ -316,7 +316,7 @@ def test_a_copy_goes_on_bit_for_bit_and_apart(model: pdmp.Model, copied: Any) ->
 
 
 def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
-    """A pause ends at a place of the path, keeps it, and goes on from there."""
+    """A pause stays at a point of the path, and the movement continues from there."""
     free, paused = model.controller(), model.controller()
     for _ in range(200):
         free.step()
@@ -353,7 +353,7 @@ def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
 
 
 def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase(reach: pdmp.Model) -> None:
-    """Nothing dies away after a start at a phase."""
+    """A start at a phase has no transient."""
     s = np.arange(100) / 100 * 2 * np.pi
     cycles = [np.column_stack([a * np.sin(s), 0.3 * a * np.cos(2 * s)]) for a in (1, 1.2, 1.5)]
     model = pdmp.fit(cycles, dt=0.01, kind="rhythmic")
@@ -380,12 +380,12 @@ def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase(reach: pdmp.Model)
 
 
 def test_an_amplitude_changes_as_smoothly_as_tau() -> None:
-    """Halving the amplitude jumps no harder in acceleration than halving tau."""
+    """Halving the amplitude causes no larger jump of the acceleration than halving tau."""
     s = np.arange(100) / 100 * 2 * np.pi
     model = pdmp.fit([a * np.sin(s)[:, None] for a in (1, 1.5)], dt=0.01, kind="rhythmic")
 
     def jump(**command: float) -> float:
-        """Return the largest jump of the acceleration after a command."""
+        """Returns the largest jump of the acceleration after a command."""
         controller = model.controller()
         for _ in range(1300):
             controller.step()
@@ -403,7 +403,7 @@ def test_an_amplitude_changes_as_smoothly_as_tau() -> None:
 def test_a_body_that_is_always_late_misses_and_does_not_burst(
     reach: pdmp.Model, clock: Clock
 ) -> None:
-    """At 2.5 periods a tick the loop makes as many ticks as there is time for."""
+    """With 2.5 periods per tick, the number of ticks is that which fits into the time."""
     run = pdmp.PacedLoop(reach.controller(), rate_hz=1000, duration=1, late="catch up")
     for _ in run:
         clock.work(2.5e-3)
@@ -413,7 +413,7 @@ def test_a_body_that_is_always_late_misses_and_does_not_burst(
 
 
 def test_commands_of_the_body_act_on_the_next_tick(reach: pdmp.Model, clock: Clock) -> None:
-    """A goal set in the body of tick k is that of step k + 1."""
+    """A goal set in the body of tick k acts in step k + 1."""
     controller, alone = reach.controller(), reach.controller()
     for k, _ in enumerate(pdmp.PacedLoop(controller, duration=0.3)):
         alone.step()
@@ -422,8 +422,8 @@ def test_commands_of_the_body_act_on_the_next_tick(reach: pdmp.Model, clock: Clo
             controller.goal = alone.goal = [0.7, 0.3]
 
 
-def test_perturbations_are_asked_before_each_tick(reach: pdmp.Model, clock: Clock) -> None:
-    """What measured and coupling return is what step is given, None included."""
+def test_measured_and_coupling_are_called_before_each_tick(reach: pdmp.Model, clock: Clock) -> None:
+    """The results of measured and coupling, None included, are passed to step."""
     controller, alone = reach.controller(), reach.controller()
     places = [None if k % 3 else np.array([0.01 * k, 0.1]) for k in range(50)]
     terms = [None if k % 2 else ([0, 0.1], [0.01 * k, 0]) for k in range(50)]
@@ -443,7 +443,7 @@ def test_interrupted_loops_leave_the_controller_between_two_ticks(
     error: type[BaseException],
     place: str,
 ) -> None:
-    """Wherever an exception comes from, it comes out, and the movement can go on."""
+    """An exception from any part of the loop propagates, and the movement can continue."""
     controller = reach.controller()
     trouble = False
 
@@ -471,7 +471,7 @@ def test_interrupted_loops_leave_the_controller_between_two_ticks(
 
 
 def test_paced_loops_keep_real_time(reach: pdmp.Model) -> None:
-    """On the system's clock no tick comes early, and all of the time is moved through."""
+    """On the system clock no tick is early, and the whole duration is covered."""
     controller = reach.controller()
     begin = time.perf_counter()
     run = pdmp.PacedLoop(controller, rate_hz=1000, duration=0.2, late="catch up")
@@ -483,7 +483,7 @@ def test_paced_loops_keep_real_time(reach: pdmp.Model) -> None:
 
 
 def test_other_threads_run_while_a_loop_sleeps(reach: pdmp.Model) -> None:
-    """A paced loop gives the interpreter away between its ticks."""
+    """A paced loop releases the interpreter between its ticks."""
     waited = threading.Event()
     done = threading.Event()
 
@@ -503,7 +503,7 @@ def test_other_threads_run_while_a_loop_sleeps(reach: pdmp.Model) -> None:
 
 
 def test_tasks_run_beside_an_asynchronous_loop(reach: pdmp.Model) -> None:
-    """`async for` makes the same ticks, and another task is served between them."""
+    """`async for` makes the same ticks, and other tasks run between them."""
     controller, alone = reach.controller(), reach.controller()
     served = 0
 
@@ -531,7 +531,7 @@ def test_tasks_run_beside_an_asynchronous_loop(reach: pdmp.Model) -> None:
 
 
 def test_a_cancelled_loop_leaves_the_controller_usable(reach: pdmp.Model) -> None:
-    """A task that is cancelled ends between two ticks."""
+    """A cancelled task ends between two ticks."""
     controller = reach.controller()
 
     async def follow() -> None:
@@ -564,16 +564,16 @@ BAD: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("given", "message"), BAD, ids=str)
-def test_bad_arguments_are_refused_at_the_call(
+def test_invalid_arguments_are_rejected_at_the_call(
     reach: pdmp.Model, given: dict[str, Any], message: str
 ) -> None:
-    """A loop that could not run is not made."""
+    """Invalid arguments are rejected at construction."""
     with pytest.raises(ValueError) as error:
         pdmp.PacedLoop(reach.controller(), **given)
     assert message in str(error.value)
 
 
-def test_numbers_of_numpy_are_rates(reach: pdmp.Model) -> None:
-    """A rate may come out of an array."""
+def test_scalars_of_numpy_are_rates(reach: pdmp.Model) -> None:
+    """Scalars of numpy are valid rates."""
     for number in (np.int64(100), np.float32(100)):
         assert next(iter(pdmp.PacedLoop(reach.controller(), number))).time > 0

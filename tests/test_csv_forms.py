@@ -1,4 +1,4 @@
-"""Tables come in as spreadsheets, pandas and robots write them, or are refused by their form."""
+"""Tables of spreadsheets, pandas and robots are read, or rejected for their form."""
 
 import math
 import time as clock
@@ -15,20 +15,20 @@ NAMES = ["x", "y"]
 
 
 def rows(separator: str = ",", point: str = ".") -> list[str]:
-    """Return the samples as lines of text."""
+    """Returns the samples as lines of text."""
     lines = np.column_stack([TIME, POSITION]).tolist()
     return [separator.join(map(repr, line)).replace(".", point) for line in lines]
 
 
 def read(tmp_path: Path, lines: list[str], **options: object) -> pdmp.Demonstration:
-    """Return what is read from lines of text."""
+    """Returns the demonstration read from lines of text."""
     path = tmp_path / "table.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return pdmp.io.read_csv(path, **options)
 
 
 def assert_read(demo: pdmp.Demonstration, names: list[str] | None = None) -> None:
-    """Assert that the samples came in to the last bit."""
+    """Asserts that the samples are read bit for bit."""
     np.testing.assert_array_equal(demo.time, TIME)
     np.testing.assert_array_equal(demo.position, POSITION)
     assert demo.names == (names or NAMES)
@@ -62,12 +62,12 @@ FORMS = {
 
 @pytest.mark.parametrize("lines", FORMS.values(), ids=FORMS)
 def test_form_of_the_table_does_not_matter(tmp_path: Path, lines: list[str]) -> None:
-    """The same samples come in to the last bit, in whichever form they are written."""
+    """The same samples are read bit for bit from every form."""
     assert_read(read(tmp_path, lines))
 
 
-def test_random_tables_are_read_or_refused(tmp_path: Path) -> None:
-    """No form of a table changes a number or a name; nearly all of them are read."""
+def test_random_tables_are_read_or_rejected(tmp_path: Path) -> None:
+    """No form of a table changes a number or a name, and most are accepted."""
     random, refused = np.random.default_rng(0), 0
     n_tables = 400
     for _ in range(n_tables):
@@ -102,8 +102,8 @@ def test_random_tables_are_read_or_refused(tmp_path: Path) -> None:
     assert refused < 0.03 * n_tables
 
 
-def test_writers_of_others_are_read(tmp_path: Path) -> None:
-    """What numpy and pandas write by default comes in to the last bit."""
+def test_tables_of_numpy_and_pandas_are_read(tmp_path: Path) -> None:
+    """Tables of numpy and pandas with default options are read bit for bit."""
     path = tmp_path / "table.csv"
     table = np.column_stack([TIME, POSITION])
     np.savetxt(path, table, "%.17g", header="t x y")
@@ -119,20 +119,20 @@ def test_writers_of_others_are_read(tmp_path: Path) -> None:
 
 
 def test_unicode_text_of_spreadsheets_is_read(tmp_path: Path) -> None:
-    """UTF-16 with its mark, separated by tabs, is what Excel calls Unicode text."""
+    """Excel's "Unicode text", UTF-16 with a byte order mark and tabs, is read."""
     path = tmp_path / "table.csv"
     path.write_text("\n".join(["t\tx\ty", *rows("\t", ",")]), encoding="utf-16")
     assert_read(pdmp.io.read_csv(path))
 
 
 def test_time_is_no_degree_of_freedom_beside_dt(tmp_path: Path) -> None:
-    """With dt, the column with the time is left out, by any of its names."""
+    """With dt, a column of time stamps of any default name is not a degree of freedom."""
     for name in ("t", "time"):
         assert read(tmp_path, [f"{name},x,y", *rows()], dt=0.01).names == NAMES
 
 
 @pytest.mark.parametrize("units", ["s,m,rad", "[s],[m],[rad]", "(s),(m),(rad)", "-,m,rad"])
-def test_units_may_have_a_row(tmp_path: Path, units: str) -> None:
+def test_a_row_of_units_is_read(tmp_path: Path, units: str) -> None:
     """A row of units below the header gives the units of the columns."""
     demo = read(tmp_path, ["t,x,y", units, *rows()])
     assert_read(demo)
@@ -140,13 +140,13 @@ def test_units_may_have_a_row(tmp_path: Path, units: str) -> None:
 
 
 def test_samples_of_ones_are_no_row_of_units(tmp_path: Path) -> None:
-    """Numbers are samples, also where they could be the unit of a ratio."""
+    """Numbers are samples even where 1 could be the unit of a ratio."""
     lines = ["x,y", "1,1", "1,", *["1,1"] * 9]
     np.testing.assert_array_equal(read(tmp_path, lines, dt=0.1, max_gap=0.5).position, 1)
 
 
 def test_units_in_a_row_scale_the_time(tmp_path: Path) -> None:
-    """Time stamps below ms are ms; a unit in the header goes before one below."""
+    """A row of units applies to time stamps; a unit in the header takes precedence."""
     lines = ["t,x [cm],y", "ms,m,m/s^2", *rows()]
     demo = read(tmp_path, lines)
     np.testing.assert_allclose(demo.time, TIME / 1000, rtol=1e-15)
@@ -154,7 +154,7 @@ def test_units_in_a_row_scale_the_time(tmp_path: Path) -> None:
 
 
 def test_words_that_are_no_units_are_no_row_of_units(tmp_path: Path) -> None:
-    """A sample of words is refused with its place."""
+    """A sample of words is rejected with its location."""
     with pytest.raises(ValueError, match="line 2, column 't': 'zero' is not a number"):
         read(tmp_path, ["t,x,y", "zero,one,two", *rows()])
 
@@ -164,7 +164,7 @@ GAPS = ["", "NA", "N/A", "#N/A", "nan", "NaN", "-nan", "-nan(ind)", "null", "NUL
 
 @pytest.mark.parametrize("gap", GAPS)
 def test_marks_of_missing_numbers_are_gaps(tmp_path: Path, gap: str) -> None:
-    """They are interpolated where that is asked for, and refused as what they are otherwise."""
+    """Gaps are interpolated if requested, and otherwise rejected as gaps."""
     lines = ["t,x,y", *rows()]
     lines[8] = ",".join([*lines[8].split(",")[:2], gap])
     filled = read(tmp_path, lines, max_gap=0.05).position
@@ -176,7 +176,7 @@ def test_marks_of_missing_numbers_are_gaps(tmp_path: Path, gap: str) -> None:
 
 
 def test_empty_rows_are_gaps_where_time_is_counted(tmp_path: Path) -> None:
-    """With dt, a row without any number does not make the rest of the movement earlier."""
+    """With dt, an empty row is a gap and does not shift later samples."""
     lines = ["x,y", *(row.split(",", 1)[1] for row in rows())]
     lines[8] = ","
     demo = read(tmp_path, lines, dt=0.01, max_gap=0.05)
@@ -204,8 +204,8 @@ def test_empty_rows_are_gaps_where_time_is_counted(tmp_path: Path) -> None:
         (["t,x", "1" * 100_000 + "x,m", "0,1"], "'1{80}[.]{3}' is not a number"),
     ],
 )
-def test_doubtful_tables_are_refused(tmp_path: Path, lines: list[str], message: str) -> None:
-    """Where a table could be read in two ways, the error names the place and both."""
+def test_ambiguous_tables_are_rejected(tmp_path: Path, lines: list[str], message: str) -> None:
+    """Ambiguous tables are rejected with the location and both readings."""
     with pytest.raises(ValueError, match=message):
         read(tmp_path, lines, **({"dt": 0.1} if lines[0] in (",x", "stamp,x") else {}))
 
@@ -227,7 +227,7 @@ def test_tables_may_have_thousands_of_columns(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("unit", ["ns", "us", "ms"])
 def test_stamps_since_1970_are_recognised(tmp_path: Path, unit: str) -> None:
-    """Without a unit they are read as what they must be, with a warning, from the first on."""
+    """Stamps without a unit are recognised with a warning, and relative to the first."""
     scale = {"ns": 10**9, "us": 10**6, "ms": 10**3}[unit]
     stamps = [1_700_000_000 * scale + k * scale // 100 for k in range(20)]
     table = ["t,x", *(f"{stamp},{k}" for k, stamp in enumerate(stamps))]
@@ -241,8 +241,10 @@ def test_stamps_since_1970_are_recognised(tmp_path: Path, unit: str) -> None:
 
 
 @pytest.mark.parametrize(("step", "units"), [(10_000_000, "ns"), (10_000, "us"), (10, "ms")])
-def test_long_steps_are_refused_with_the_likely_unit(tmp_path: Path, step: int, units: str) -> None:
-    """Stamps from 0 in ms, µs or ns are not taken for seconds; said to be, they are."""
+def test_long_steps_are_rejected_with_the_likely_unit(
+    tmp_path: Path, step: int, units: str
+) -> None:
+    """Stamps from 0 in ms, µs or ns are not read as seconds; with a unit they are converted."""
     table = ["t,x", *(f"{k * step},{k}" for k in range(20))]
     with pytest.raises(
         ValueError, match=rf"time stamps from 0 in steps of .*'t \[{units}\]' in .*0\.01 s"
@@ -252,8 +254,8 @@ def test_long_steps_are_refused_with_the_likely_unit(tmp_path: Path, step: int, 
     np.testing.assert_allclose(read(tmp_path, table, time=f"t [{units}]").time, TIME)
 
 
-def test_whole_seconds_are_warned_of(tmp_path: Path) -> None:
-    """Stamps 0, 1, 2, … may be ms or a counter; with a unit they are what it says."""
+def test_whole_seconds_cause_a_warning(tmp_path: Path) -> None:
+    """Stamps 0, 1, 2, … without a unit cause a warning; with a unit they do not."""
     table = ["t,x", *(f"{k},{k}" for k in range(20))]
     with pytest.warns(UserWarning, match="whole numbers that rise by 1, and read as s"):
         assert read(tmp_path, table).time[-1] == 19
@@ -261,14 +263,14 @@ def test_whole_seconds_are_warned_of(tmp_path: Path) -> None:
 
 
 def test_seconds_since_1970_stay_seconds(tmp_path: Path) -> None:
-    """A clock that counts seconds needs no unit."""
+    """Seconds since 1970 need no unit."""
     table = ["t,x", *(f"{1_700_000_000 + k / 4},{k}" for k in range(20))]
     demo = read(tmp_path, table)
     np.testing.assert_array_equal(demo.time, 1_700_000_000 + np.arange(20) / 4)
 
 
-def test_arrays_of_stamps_in_nanoseconds_are_refused() -> None:
-    """A demonstration does not last for a billion seconds; the error says how to scale."""
+def test_arrays_of_stamps_in_nanoseconds_are_rejected() -> None:
+    """Time stamps in nanoseconds are rejected with the scale to apply."""
     stamps = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(20)
     with pytest.raises(ValueError, match=r"time\[0\] = 1\.7e18 s .*\* 1e-9"):
         pdmp.Demonstration(POSITION, time=stamps)

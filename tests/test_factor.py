@@ -1,4 +1,4 @@
-"""Factors of targets are those of numpy's decomposition, whatever the shape and the way."""
+"""Factors of targets equal those of numpy's decomposition, for any shape and method."""
 
 import signal
 
@@ -11,7 +11,7 @@ import pdmp
 
 
 def library(n_demos: int, n_values: int, decay: float = 0.5, noise: float = 1e-3) -> np.ndarray:
-    """Return targets of twelve factors that each have `decay` of the one before, and noise."""
+    """Returns noisy targets of twelve factors with the ratio `decay` of consecutive sizes."""
     random = np.random.default_rng(n_demos)
     left, right = random.normal(size=(n_demos, 12)), random.normal(size=(12, n_values))
     return (left * decay ** np.arange(12)) @ right + noise * random.normal(size=(n_demos, n_values))
@@ -24,10 +24,10 @@ def library(n_demos: int, n_values: int, decay: float = 0.5, noise: float = 1e-3
     noise=st.sampled_from([0, 1e-6, 1e-2]),
     share=st.floats(0.05, 1),
 )
-def test_product_is_numpys_of_the_same_rank(
+def test_product_is_that_of_numpy_of_the_same_rank(
     n_demos: int, n_values: int, decay: float, noise: float, share: float
 ) -> None:
-    """The leading product S F_basis is the one of LAPACK, and J that of the spectrum rule."""
+    """The product S F_basis equals that of LAPACK, and J follows from the singular values."""
     targets = library(n_demos, n_values, decay, noise)
     u, sigma, vt = np.linalg.svd(targets, full_matrices=False)
     n_styles = 1 + round(share * (len(sigma) - 1))
@@ -50,7 +50,7 @@ def test_product_is_numpys_of_the_same_rank(
 
 @pytest.mark.parametrize("shape", [(400, 900), (900, 400)])
 def test_few_factors_of_a_large_library_are_the_first_of_all(shape: tuple[int, int]) -> None:
-    """Products with the targets alone find them, to the digits of the whole decomposition."""
+    """The leading factors of an iterative method equal those of the whole decomposition."""
     targets = library(*shape)
     u, sigma, _ = np.linalg.svd(targets, full_matrices=False)
     found = pdmp.factorise(targets, n_styles=5)
@@ -60,7 +60,7 @@ def test_few_factors_of_a_large_library_are_the_first_of_all(shape: tuple[int, i
 
 
 def test_few_styles_of_many_demonstrations_are_the_first_of_more() -> None:
-    """A model does not depend on the way in which its factors were found."""
+    """A model does not depend on the method of its factorisation."""
     s = np.linspace(0, 1, 120)[:, None]
     random = np.random.default_rng(0)
     waves = np.sin(np.pi * np.arange(1, 7) * s)
@@ -73,8 +73,8 @@ def test_few_styles_of_many_demonstrations_are_the_first_of_more() -> None:
     assert more.truncation_error < few.truncation_error < 1
 
 
-def test_what_styles_leave_out_is_told_and_kept() -> None:
-    """It follows from the singular values, and from none of them where all demonstrations agree."""
+def test_truncation_error_is_reported_and_saved() -> None:
+    """The truncation error follows from the singular values; it is 0 if demonstrations agree."""
     s = np.linspace(0, 1, 80)[:, None]
     demos = [s**2 * (3 - 2 * s) + h * np.sin(np.pi * s) ** 2 for h in (0.1, 0.4, 0.5)]
     model = pdmp.fit(demos, dt=0.01, n_styles=1)
@@ -94,15 +94,17 @@ def test_what_styles_leave_out_is_told_and_kept() -> None:
         ({"singular_value_share": float("nan")}, "singular_value_share"),
     ],
 )
-def test_number_of_factors_out_of_range_is_refused(options: dict[str, float], message: str) -> None:
-    """The number is named."""
+def test_number_of_factors_out_of_range_is_rejected(
+    options: dict[str, float], message: str
+) -> None:
+    """The error states the number."""
     with pytest.raises(ValueError, match=message):
         pdmp.factorise(np.ones((3, 8)), **options)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e200])
-def test_targets_that_are_no_numbers_are_refused(value: float) -> None:
-    """The place is named."""
+def test_targets_that_are_no_numbers_are_rejected(value: float) -> None:
+    """The error states the position."""
     targets = np.ones((3, 8))
     targets[1, 5] = value
     with pytest.raises(ValueError, match=r"targets\[1, 5\]"):
@@ -113,7 +115,7 @@ def test_targets_that_are_no_numbers_are_refused(value: float) -> None:
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no timer signals")
 def test_signal_ends_a_long_factorisation() -> None:
-    """A signal handler runs between two passes over the targets, and its exception comes out."""
+    """A signal handler runs between two passes over the targets, and its exception propagates."""
 
     class Late(Exception):
         pass

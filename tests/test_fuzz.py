@@ -1,8 +1,7 @@
-"""No value that Python can pass makes the library panic or move in numbers that are not finite.
+"""No argument from Python makes the library panic or move in numbers that are not finite.
 
-About half of the calls have good arguments alone, the others one that is odd. Each test counts the
-calls that were accepted and fails below half of them: where everything is refused, nothing is
-tested.
+About half of the calls have valid arguments only, the others one unusual argument. Each test fails
+if fewer than half of its calls are accepted, as rejected calls test little.
 """
 
 from typing import Any
@@ -20,7 +19,7 @@ REFUSALS = (ValueError, TypeError, OverflowError, pdmp.FitError)
 QUICK = settings(max_examples=300)
 FIXTURES = {"discrete": "reach", "rhythmic": "cycle"}
 KINDS = pytest.mark.parametrize("kind", FIXTURES)
-# Of complex numbers as real ones, and of odd demonstrations that are learnt.
+# Warnings of complex numbers read as real ones, and of unusual demonstrations.
 WARNED = pytest.mark.filterwarnings(
     "ignore::numpy.exceptions.ComplexWarning", "ignore::UserWarning"
 )
@@ -61,9 +60,9 @@ Strategy = st.SearchStrategy[Any]
 
 @st.composite
 def mostly(draw: st.DrawFn, **strategies: tuple[Strategy | None, Strategy]) -> dict[str, Any]:
-    """Draws any of the arguments, each good; in about half of the draws, one is odd instead.
+    """Draws any of the arguments, each valid; in about half of the draws, one is invalid instead.
 
-    Each argument has a strategy for good values, None where no value is good, and one for odd ones.
+    Each argument has a strategy for valid values, None if there are none, and one for unusual ones.
     """
     good = {name: pair[0] for name, pair in strategies.items() if pair[0] is not None}
     drawn: dict[str, Any] = draw(st.fixed_dictionaries({}, optional=good))
@@ -74,14 +73,14 @@ def mostly(draw: st.DrawFn, **strategies: tuple[Strategy | None, Strategy]) -> d
 
 
 class Tally:
-    """Counts of calls that were accepted and refused."""
+    """Counts of accepted and rejected calls."""
 
     def __init__(self) -> None:
         self.accepted = 0
         self.calls = 0
 
     def attempt(self, function: Any, *args: Any, **kwargs: Any) -> Any:
-        """Returns the result of a call, or None if it was refused, with a reason."""
+        """Returns the result of a call, or None if it was rejected with a reason."""
         self.calls += 1
         try:
             result = function(*args, **kwargs)
@@ -123,7 +122,7 @@ FIT: dict[str, tuple[Strategy | None, Strategy]] = {
 
 
 def assert_moves(model: pdmp.Model) -> None:
-    """Asserts that what was learnt, and what is made of it, is finite."""
+    """Asserts that a model and its movements are finite."""
     assert np.isfinite(model.styles).all()
     assert np.isfinite(model.durations).all()
     made = model.rollout(dt=model.durations[model.nominal] / 20)
@@ -132,8 +131,8 @@ def assert_moves(model: pdmp.Model) -> None:
 
 
 @WARNED
-def test_fit_of_odd_demonstrations_is_orderly() -> None:
-    """One odd demonstration among good ones, or odd ones alone: a model that moves, or a reason."""
+def test_fit_of_unusual_demonstrations_is_finite_or_rejected() -> None:
+    """Unusual demonstrations give a model with finite movements, or an error with a reason."""
     tally = Tally()
 
     @QUICK
@@ -157,8 +156,8 @@ def test_fit_of_odd_demonstrations_is_orderly() -> None:
 
 
 @WARNED
-def test_fit_with_odd_options_is_orderly() -> None:
-    """Models with good and odd options move in finite numbers."""
+def test_fit_with_unusual_options_is_finite_or_rejected() -> None:
+    """A fit with unusual options gives a model with finite movements, or an error with a reason."""
     tally = Tally()
 
     @QUICK
@@ -173,7 +172,7 @@ def test_fit_with_odd_options_is_orderly() -> None:
 
 
 def moves(kind: str) -> dict[str, tuple[Strategy | None, Strategy]]:
-    """Returns the arguments of a movement of one kind; those of the other are odd."""
+    """Returns strategies for arguments of one kind; those of the other are invalid."""
     discrete = kind == "discrete"
     return {
         "dt": (SHORT, SPANS),
@@ -188,8 +187,10 @@ def moves(kind: str) -> dict[str, tuple[Strategy | None, Strategy]]:
 
 @WARNED
 @KINDS
-def test_rollout_with_odd_arguments_is_orderly(kind: str, request: pytest.FixtureRequest) -> None:
-    """Every rollout that is not refused is of finite numbers."""
+def test_rollout_with_unusual_arguments_is_finite_or_rejected(
+    kind: str, request: pytest.FixtureRequest
+) -> None:
+    """Every accepted rollout is finite."""
     model = request.getfixturevalue(FIXTURES[kind])
     tally = Tally()
 
@@ -207,8 +208,10 @@ def test_rollout_with_odd_arguments_is_orderly(kind: str, request: pytest.Fixtur
 
 @WARNED
 @KINDS
-def test_batch_with_odd_arguments_is_orderly(kind: str, request: pytest.FixtureRequest) -> None:
-    """Every batch that is not refused is of finite numbers."""
+def test_batch_with_unusual_arguments_is_finite_or_rejected(
+    kind: str, request: pytest.FixtureRequest
+) -> None:
+    """Every accepted batch is finite."""
     model = request.getfixturevalue(FIXTURES[kind])
     tally = Tally()
     three = arrays.arrays(np.float64, (3, 2), elements=st.floats(-2, 2))
@@ -237,8 +240,8 @@ def test_batch_with_odd_arguments_is_orderly(kind: str, request: pytest.FixtureR
 
 @WARNED
 @KINDS
-def test_loop_with_odd_commands_is_orderly(kind: str, request: pytest.FixtureRequest) -> None:
-    """Every state of the loop is finite, and a refused command leaves the state what it was."""
+def test_loop_with_unusual_commands_is_finite(kind: str, request: pytest.FixtureRequest) -> None:
+    """Every state of the loop is finite, and a rejected command leaves the state unchanged."""
     model = request.getfixturevalue(FIXTURES[kind])
     tally = Tally()
     centre = "goal" if kind == "discrete" else "anchor"

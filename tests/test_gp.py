@@ -27,7 +27,7 @@ TEXTBOOK = {
 
 
 class Problem(NamedTuple):
-    """What a process is asked to learn, and where it is asked."""
+    """Data of a process, and inputs of its predictions."""
 
     length: float
     noise: float
@@ -36,13 +36,13 @@ class Problem(NamedTuple):
     at: np.ndarray
 
     def regress(self, kernel: Any, **options: Any) -> pdmp.GPRegression:
-        """Return the process given the data."""
+        """Returns the process conditioned on the data."""
         return pdmp.GP(kernel, self.length, self.noise).regress(self.u, self.f, **options)
 
 
 @st.composite
 def problems(draw: st.DrawFn, extent: float | None = None) -> Problem:
-    """Return uneven, partly repeated inputs with outputs of any unit."""
+    """Returns uneven, partly repeated inputs with outputs of any unit."""
     gaps = draw(st.lists(st.just(0.0) | st.floats(0.0, 1.0), min_size=2, max_size=30))
     u = np.cumsum(gaps)
     assume(u[-1] >= 0.1)
@@ -68,7 +68,7 @@ def assert_agrees(
     deviation: np.ndarray,
     log_likelihood: float,
 ) -> None:
-    """Assert agreement to 1e-8 of the size of the outputs, of the signal, of the likelihood."""
+    """Asserts agreement to 1e-8 of the size of outputs, signal and likelihood."""
     found, variance = regression.predict(problem.at)
     assert regression.noise == problem.noise
     assert regression.signal_variance == pytest.approx(signal, rel=1e-8)
@@ -78,7 +78,7 @@ def assert_agrees(
 
 
 def likeliest_signal(k: np.ndarray, f: np.ndarray) -> float:
-    """Return Σ fᵀK⁻¹f/(CP)."""
+    """Returns Σ fᵀK⁻¹f/(CP)."""
     return float(np.sum(f * np.linalg.solve(k, f)) / f.size)
 
 
@@ -86,7 +86,7 @@ def likeliest_signal(k: np.ndarray, f: np.ndarray) -> float:
 @MANY
 @given(problem=problems())
 def test_processes_are_those_of_scikit_learn(kernel: str, problem: Problem) -> None:
-    """Mean, deviation and likelihood on any inputs, with signal variance Σ fᵀK⁻¹f/(CP)."""
+    """Mean, deviation and likelihood agree for any inputs, with signal variance Σ fᵀK⁻¹f/(CP)."""
     unit = THEIRS[kernel](problem.length)
     u, noise = problem.u[:, None], problem.noise
     signal = likeliest_signal(unit(u) + noise * np.eye(len(u)), problem.f)
@@ -105,7 +105,7 @@ def test_processes_are_those_of_scikit_learn(kernel: str, problem: Problem) -> N
 
 
 def wrapped(kernel: str, length: float, r: np.ndarray) -> np.ndarray:
-    """Return Σₙ k(r + 2πn)/Σₙ k(2πn)."""
+    """Returns Σₙ k(r + 2πn)/Σₙ k(2πn)."""
     turns = 2 * np.pi * np.arange(-120, 121)
     images = TEXTBOOK[kernel](np.abs(np.append(r.ravel(), 0.0)[:, None] + turns) / length)
     *sums, norm = images.sum(axis=1)
@@ -116,7 +116,7 @@ def wrapped(kernel: str, length: float, r: np.ndarray) -> np.ndarray:
 @MANY
 @given(problem=problems(extent=6.0))
 def test_periodic_processes_have_the_wrapped_kernel(kernel: str, problem: Problem) -> None:
-    """On the circle they are normal variables of covariance Σₙ k(r + 2πn)/Σₙ k(2πn)."""
+    """On the circle, processes have the covariance Σₙ k(r + 2πn)/Σₙ k(2πn)."""
     length, noise, u, f, at = problem
     k = wrapped(kernel, length, u[:, None] - u) + noise * np.eye(len(u))
     signal = likeliest_signal(k, f)
@@ -136,7 +136,7 @@ def test_periodic_processes_have_the_wrapped_kernel(kernel: str, problem: Proble
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("kernel", ["matern32", "matern52"])
 def test_matern_processes_are_those_of_tinygp(kernel: str, seed: int) -> None:
-    """Another algorithm of linear time has the same mean, deviation and likelihood."""
+    """Another linear-time algorithm gives the same mean, deviation and likelihood."""
     with np.load(TINYGP) as archive:
         problem = Problem(
             length=float(archive[f"{seed}/length"]),
@@ -157,10 +157,10 @@ def test_matern_processes_are_those_of_tinygp(kernel: str, seed: int) -> None:
     [(None, 1e-7, 0.05), (None, 1e-2, 0.05), (1e-8, 1e-8, 1e-3), (1e-2, 1e-2, 1e-3)],
 )
 @pytest.mark.parametrize("kernel", THEIRS)
-def test_scikit_learn_finds_nothing_likelier(
+def test_scikit_learn_finds_no_larger_likelihood(
     kernel: Any, noise: float | None, true: float, most: float, seed: int
 ) -> None:
-    """Its optimum in the same box gains at most 1e-3 in length, 0.05 in length and noise."""
+    """Its optimum is better by at most 1e-3 in length, 0.05 in length and noise."""
     random = np.random.default_rng(seed)
     u = np.append(0.0, np.sort(random.uniform(0, 1, 39)))[:, None]
     truth = THEIRS[kernel](10 ** random.uniform(-1.3, 0))(u)
@@ -179,8 +179,8 @@ def test_scikit_learn_finds_nothing_likelier(
 
 
 @pytest.mark.parametrize("deviation", [1e-3, 0.05, 0.5])
-def test_noise_is_found_where_a_regression_is_used_by_itself(deviation: float) -> None:
-    """Two waves with white noise: its deviation is found within a tenth, the waves within it."""
+def test_noise_is_estimated_by_a_regression(deviation: float) -> None:
+    """For two waves with white noise, the estimated deviation is accurate to a tenth."""
     u = np.linspace(0, 1, 500)
     waves = np.column_stack([np.sin(7 * u), np.cos(4 * u)])
     noise = deviation * np.random.default_rng(1).normal(size=waves.shape)
@@ -190,7 +190,7 @@ def test_noise_is_found_where_a_regression_is_used_by_itself(deviation: float) -
 
 
 def test_signal_variance_is_in_the_squared_unit_of_the_outputs() -> None:
-    """Outputs in mm have a million times the variance of outputs in m, and are less dense."""
+    """Signal variance and density scale with the unit of the outputs."""
     u = np.linspace(0, 1, 50)
     f = np.column_stack([np.sin(7 * u), u**2])
     metres, millimetres = (pdmp.GP().regress(u, unit * f) for unit in (1, 1e3))
@@ -200,16 +200,16 @@ def test_signal_variance_is_in_the_squared_unit_of_the_outputs() -> None:
 
 
 @pytest.mark.parametrize("kernel", THEIRS)
-def test_nothing_but_zeros_has_no_variance(kernel: Any) -> None:
-    """Signal variance and likelihood of zeros are 0, as is all that is predicted."""
+def test_zeros_have_no_variance(kernel: Any) -> None:
+    """Outputs of zero have zero signal variance, likelihood and predictions."""
     regression = pdmp.GP(kernel).regress([0.0, 0.5, 1.0], np.zeros((3, 2)))
     assert (regression.signal_variance, regression.log_likelihood) == (0.0, 0.0)
     assert not np.any(regression.predict([0.2, 3.0]))
 
 
 @pytest.mark.parametrize("kernel", THEIRS)
-def test_a_process_says_what_was_used(kernel: Any) -> None:
-    """Kernel, length and noise are properties, and in the text."""
+def test_a_process_states_its_hyperparameters(kernel: Any) -> None:
+    """Kernel, length and noise are properties and part of the repr."""
     regression = pdmp.GP(kernel, 0.25, 1e-3).regress([0.0, 1.0], [[0.0], [1.0]])
     assert (regression.kernel, regression.length, regression.noise) == (kernel, 0.25, 1e-3)
     name = {"matern32": "Matern-3/2", "matern52": "Matern-5/2"}[kernel]

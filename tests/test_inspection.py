@@ -1,4 +1,4 @@
-"""Samples that no movement makes are warned about by a fit, a style and an evaluation."""
+"""Implausible samples cause warnings of a fit, a style and an evaluation."""
 
 import warnings
 from collections.abc import Callable
@@ -16,22 +16,22 @@ HEIGHTS = [0.0, 0.15, 0.3, 0.45, 0.6]
 
 
 def reach(height: float) -> np.ndarray:
-    """Return a reach over an obstacle, away from zero."""
+    """Returns a reach over an obstacle, with an offset from zero."""
     return np.column_stack([0.5 + RISE, 0.2 + 64 * height * (S - S**2) ** 3])
 
 
 def lost(position: np.ndarray) -> np.ndarray:
-    """Return the positions with a marker lost for 60 ms."""
+    """Returns the positions with a marker lost for 60 ms."""
     return np.where((S >= 0.4)[:, None] & (S < 0.455)[:, None], 0.0, position)
 
 
 def padded(position: np.ndarray) -> np.ndarray:
-    """Return a movement of 80 samples with its last row repeated."""
+    """Returns a movement of 80 samples with its last row repeated."""
     return position[np.minimum(np.arange(101) * 100 // 79, 100)]
 
 
 def counted(position: np.ndarray) -> np.ndarray:
-    """Return the positions beside a counter of frames."""
+    """Returns the positions beside a counter of frames."""
     return np.column_stack([np.arange(1, 102), position])
 
 
@@ -53,7 +53,7 @@ KINDS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], slice, str]] = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_fit_style_and_evaluation_warn_of_the_place(kind: str) -> None:
-    """Each names demonstration, degree of freedom and place, at the line of the caller."""
+    """Each warning names demonstration, degree of freedom and sample, at the line of the caller."""
     change, which, text = KINDS[kind]
     demos = [reach(height) for height in HEIGHTS]
     demos[which] = [change(demo) for demo in demos[which]]
@@ -67,14 +67,14 @@ def test_fit_style_and_evaluation_warn_of_the_place(kind: str) -> None:
 
 
 def test_style_of_warns_of_lost_samples() -> None:
-    """A recording that a model is asked about is inspected like those it was fitted to."""
+    """A recording whose style is inferred is inspected like those of the fit."""
     model = pdmp.fit([reach(height) for height in HEIGHTS], dt=0.01, n_styles=2)
     with pytest.warns(UserWarning, match=r'"y0", "y1" are exactly 0'), pytest.raises(ValueError):
         model.style_of(Demonstration(lost(reach(0.3)), dt=0.01))
 
 
 def test_clean_and_noisy_movements_are_learnt_without_a_warning() -> None:
-    """Zero, rest and noise of three percent of the range are no reason to warn."""
+    """Zeros, rest and noise of three percent of the range cause no warning."""
     rng = np.random.default_rng(0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -83,8 +83,8 @@ def test_clean_and_noisy_movements_are_learnt_without_a_warning() -> None:
             pdmp.fit(demos, dt=0.01)
 
 
-def test_turns_between_recordings_of_an_angle_are_taken_off() -> None:
-    """Goals of one joint are within a turn of each other, and an evaluation compares them so."""
+def test_turns_between_recordings_of_an_angle_are_removed() -> None:
+    """Full turns between recordings of an angle are removed, in an evaluation too."""
     demos = [
         Demonstration(
             reach(h) + [2 * np.pi * (k == 3), 0], dt=0.01, units=["rad", "m"], context=[h]
@@ -100,7 +100,7 @@ def test_turns_between_recordings_of_an_angle_are_taken_off() -> None:
 
 
 def test_gaps_across_a_wrap_need_the_unit(tmp_path: Path) -> None:
-    """Without a unit the way through the gap is not known; with it it is the shorter one."""
+    """A gap across a wrap needs a unit of angle, which gives the shorter path."""
     angle = np.pi * (0.9 + 1.9 * S)
     wrapped = np.angle(np.exp(1j * angle))
     rows = np.column_stack([S, wrapped]).astype(object)

@@ -1,4 +1,4 @@
-"""Movements agree with an integration of the stated equations, whose forcing term is a formula.
+"""Movements agree with an integration of the stated equations with a forcing term in closed form.
 
 Demonstrations are polynomials and harmonics, so that their learning targets are known without a
 fit: w = e' - z with z' = -alpha_z (beta_z e + z), where e is the distance from the frame and ' the
@@ -23,7 +23,7 @@ Function = Callable[[float], np.ndarray]
 
 
 class Family(NamedTuple):
-    """A model, and what is known of its demonstrations without it.
+    """A model and the closed forms of its demonstrations.
 
     `forcing(u)` (M, D) are the forcing terms of the demonstrations, `frame(u)` is m and m' of a
     discrete movement.
@@ -35,7 +35,7 @@ class Family(NamedTuple):
 
 
 def discrete(transport: Any) -> Family:
-    """Returns reaches that end at rest, y = y0 + (g - y0) p(s) and k b(s) in one second."""
+    """Returns reaches of one second that end at rest, y = y0 + (g - y0) p(s) and k b(s)."""
     reach = np.polynomial.Polynomial([0, 0, 0, 10, -15, 6])
     bend = 64 * np.polynomial.Polynomial([0, 1, -1]) ** 3
     rows = [(0.0, 1.0, 0.2), (0.1, 1.3, -0.3), (-0.2, 0.9, 0.5), (0.05, 1.1, 0.0)]
@@ -123,7 +123,7 @@ def integrated(
     commands: dict[float, dict[str, np.ndarray]],
     time: np.ndarray,
 ) -> np.ndarray:
-    """Returns positions (T, D) at times, where commands pass critically damped filters.
+    """Returns positions (T, D) at times; commands pass critically damped filters.
 
     Shares of the demonstrations, centre and amplitude pass theirs on the clock, in seconds at the
     nominal rate; the rate 1/tau passes its own in seconds.
@@ -140,7 +140,7 @@ def integrated(
     omegas = dict.fromkeys(target, settling / TRANSITION)
     sizes = [len(value) for value in target.values()]
     parts = np.cumsum([1, 1, 2, 2, *sizes, *sizes])[:-1]
-    # The frame covers the way of the start; a goal or anchor that moves later enters by itself.
+    # The frame includes changes of the start; a goal or anchor that moves later enters separately.
     way = start["centre"] - start["position"] if discrete else np.zeros(2)
 
     def flow(t: float, state: np.ndarray) -> np.ndarray:
@@ -177,14 +177,14 @@ def integrated(
         state, last = solution.y[:, -1], until
         target |= commands.get(until, {})
         if "centre" in commands.get(until, {}) and family.model.braking is not None:
-            # A goal takes what remains of the movement, less the lag of the output system.
+            # A goal is reached in the rest of the movement, less the lag of the output system.
             remaining = (1 - state[0] - 1 / BETA) * nominal
             omegas["centre"] = settling / max(TRANSITION, remaining)
     return np.concatenate(found)
 
 
 def started(family: Family, shares: np.ndarray) -> dict[str, np.ndarray]:
-    """Returns conditions that are not those of any demonstration."""
+    """Returns conditions that differ from those of all demonstrations."""
     return {
         "shares": shares[: family.model.n_demos],
         "position": np.array([0.15, -0.1]),
@@ -194,7 +194,7 @@ def started(family: Family, shares: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def given(family: Family, start: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Returns the same conditions as the library takes them."""
+    """Returns these conditions as arguments of the library."""
     centre = "goal" if family.model.kind == "discrete" else "anchor"
     return {
         "style": start["shares"] @ family.model.styles,
@@ -209,7 +209,7 @@ def given(family: Family, start: dict[str, np.ndarray]) -> dict[str, Any]:
 def test_rollouts_solve_the_equations(
     families: dict[str, Family], name: str, shares: np.ndarray
 ) -> None:
-    """A movement of unseen style, start, velocity and goal, past its end; a rollout and a loop."""
+    """Movements with new style, start, velocity and goal solve the equations, past the end too."""
     family = families[name]
     start = started(family, shares)
     made = family.model.rollout(**given(family, start), dt=0.01, duration=2.0)
@@ -237,7 +237,7 @@ CASES = [
 
 
 def scheduled(family: Family, changed: str) -> dict[float, dict[str, np.ndarray]]:
-    """Returns commands at times, for the number of demonstrations, the kind and tau of a model."""
+    """Returns commands at times for a model."""
     model = family.model
     unit = {"rate": 1 / model.tau}
     return {
@@ -254,7 +254,7 @@ def scheduled(family: Family, changed: str) -> dict[float, dict[str, np.ndarray]
 def test_commands_in_a_loop_solve_the_equations_of_their_filters(
     families: dict[str, Family], name: str, changed: str
 ) -> None:
-    """Goal or anchor, style, tau and amplitude change while the movement goes on, past its end."""
+    """Changes of goal or anchor, style, tau and amplitude solve the equations of their filters."""
     family = families[name]
     model, start, commands = family.model, started(family, BETWEEN), scheduled(family, changed)
     controller = model.controller(0.001, **given(family, start), transition=TRANSITION)

@@ -1,4 +1,4 @@
-"""Long calls tell their progress, end when they are told to, and leave no broken file."""
+"""Long calls report progress, can be interrupted, and leave no incomplete file."""
 
 import os
 import signal
@@ -13,41 +13,41 @@ import pdmp
 from synthetic import reaches
 
 
-def test_progress_is_told_in_order() -> None:
-    """The four stages come one after the other, each with shares that rise within [0, 1]."""
-    told: list[tuple[str, float]] = []
-    pdmp.fit(reaches(), progress=lambda stage, share: told.append((stage, share)))
-    stages = list(dict.fromkeys(stage for stage, _ in told))
+def test_progress_is_reported_in_order() -> None:
+    """The four stages are reported in order, each with rising fractions within [0, 1]."""
+    reported: list[tuple[str, float]] = []
+    pdmp.fit(reaches(), progress=lambda stage, share: reported.append((stage, share)))
+    stages = list(dict.fromkeys(stage for stage, _ in reported))
     assert stages == ["targets", "factorise", "regress", "compile"]
-    assert told == sorted(told, key=lambda entry: (stages.index(entry[0]), entry[1]))
-    assert all(0 <= share <= 1 for _, share in told)
-    assert sum(stage == "regress" for stage, _ in told) > 10
+    assert reported == sorted(reported, key=lambda entry: (stages.index(entry[0]), entry[1]))
+    assert all(0 <= share <= 1 for _, share in reported)
+    assert sum(stage == "regress" for stage, _ in reported) > 10
 
 
 @pytest.mark.parametrize("stage", ["targets", "factorise", "regress", "compile"])
 def test_exception_in_progress_ends_the_fit(stage: str) -> None:
-    """It comes out as it is, and nothing is called after it."""
-    told = []
+    """An exception of the callback propagates and ends the fit."""
+    reported = []
 
     def stop(now: str, _: float) -> None:
-        told.append(now)
+        reported.append(now)
         if now == stage:
             raise LookupError("enough")
 
     with pytest.raises(LookupError, match="enough"):
         pdmp.fit(reaches(), progress=stop)
-    assert told.count(stage) == 1
+    assert reported.count(stage) == 1
 
 
 def test_interrupt_in_progress_ends_the_fit() -> None:
-    """Ctrl-C while Python shows the progress is a KeyboardInterrupt."""
+    """Ctrl-C in the callback raises KeyboardInterrupt."""
     with pytest.raises(KeyboardInterrupt):
         pdmp.fit(reaches(), progress=lambda *_: signal.raise_signal(signal.SIGINT))
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no timer signals")
 def test_signal_ends_a_long_fit() -> None:
-    """A signal handler runs within a fit that shows no progress, and its exception ends the fit."""
+    """A signal handler runs during a fit without a callback, and its exception ends the fit."""
 
     class Late(Exception):
         pass
@@ -68,7 +68,7 @@ def test_signal_ends_a_long_fit() -> None:
 
 
 def test_failed_save_leaves_nothing(tmp_path: Path) -> None:
-    """Saving over a folder fails, and no draft stays behind."""
+    """Saving over a folder fails without leaving a temporary file."""
     (tmp_path / "folder").mkdir()
     with pytest.raises(OSError, match="folder"):
         pdmp.fit(reaches()).save(tmp_path / "folder")
@@ -78,7 +78,7 @@ def test_failed_save_leaves_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="this system has no limit on file sizes")
 def test_save_that_runs_out_of_space_leaves_the_older_file(tmp_path: Path) -> None:
-    """A write that stops half-way is an OSError; the model saved before is still there, alone."""
+    """An incomplete write raises OSError, and the former file is unchanged."""
     path = tmp_path / "model"
     model = pdmp.fit(reaches(), basis="ngnet")
     model.save(path)

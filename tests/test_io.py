@@ -1,4 +1,4 @@
-"""Demonstrations come in from files whole or with one clear error; trajectories go out whole."""
+"""Readers return complete demonstrations or one clear error; writers write complete files."""
 
 import os
 import sys
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pdmp
-from synthetic import reaches
+from synthetic import BVH, reaches
 
 TABLE = "t,x,y\n0.0,1,10\n0.1,2,20\n0.2,3,30\n0.4,4,40\n"
 POSITION = np.array([[1.0, 10.0], [2.0, 20.0], [3.0, 30.0], [4.0, 40.0]])
@@ -18,7 +18,7 @@ TIME = np.array([0.0, 0.1, 0.2, 0.4])
 
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
-    """Return a CSV file of four samples."""
+    """Returns a CSV file of four samples."""
     path = tmp_path / "demo.csv"
     path.write_text(TABLE, encoding="utf-8")
     return path
@@ -26,7 +26,7 @@ def table(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Return a folder with an index of two demonstrations in CSV files."""
+    """Returns a folder with an index of two demonstrations in CSV files."""
     (tmp_path / "demos").mkdir()
     (tmp_path / "index.csv").write_text("id,shape,height\na,C,0.1\nb,S,0.2\n")
     for name in "ab":
@@ -35,7 +35,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_csv_gives_positions_times_and_names(table: Path) -> None:
-    """The column t is the time; all others are degrees of freedom under their names."""
+    """The column t is the time; all others are named degrees of freedom."""
     demo = pdmp.io.read_csv(table)
     np.testing.assert_array_equal(demo.position, POSITION)
     np.testing.assert_array_equal(demo.time, TIME)
@@ -43,27 +43,27 @@ def test_csv_gives_positions_times_and_names(table: Path) -> None:
 
 
 def test_csv_columns_are_kept_in_the_order_asked_for(table: Path) -> None:
-    """Columns choose and order the degrees of freedom."""
+    """The argument columns selects and orders the degrees of freedom."""
     demo = pdmp.io.read_csv(table, columns=["y", "x"])
     np.testing.assert_array_equal(demo.position, POSITION[:, ::-1])
 
 
 def test_csv_time_may_have_another_name(table: Path) -> None:
-    """The time column is the one that is named, and t becomes a degree of freedom."""
+    """The argument time names the time column, and t becomes a degree of freedom."""
     demo = pdmp.io.read_csv(table, time="y [s]")
     np.testing.assert_array_equal(demo.time, POSITION[:, 1])
     assert list(demo.names) == ["t", "x"]
 
 
 def test_dt_takes_the_place_of_time_stamps(table: Path) -> None:
-    """With dt, the time column is neither needed nor a degree of freedom."""
+    """With dt, a time column is neither needed nor a degree of freedom."""
     demo = pdmp.io.read_csv(table, dt=0.5)
     assert demo.dt == 0.5
     assert list(demo.names) == ["x", "y"]
 
 
-def test_csv_bears_what_spreadsheets_write(tmp_path: Path) -> None:
-    """A byte-order mark, spaces, blank lines and CRLF do not matter."""
+def test_csv_of_spreadsheets_is_read(tmp_path: Path) -> None:
+    """A byte order mark, spaces, blank lines and CRLF are accepted."""
     path = tmp_path / "demo.csv"
     path.write_bytes(b"\xef\xbb\xbf" + TABLE.replace(",", " , ").replace("\n", "\r\n\r\n").encode())
     np.testing.assert_array_equal(pdmp.io.read_csv(path).position, POSITION)
@@ -85,30 +85,32 @@ def test_csv_bears_what_spreadsheets_write(tmp_path: Path) -> None:
         (TABLE.replace("0.2", "0.1"), "time"),
     ],
 )
-def test_bad_csv_is_refused_with_file_and_place(tmp_path: Path, text: str, message: str) -> None:
-    """Whatever is wrong, the error is a ValueError that names the file and where to look."""
+def test_invalid_csv_is_rejected_with_file_and_location(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    """Every fault raises a ValueError that names the file and the location."""
     path = tmp_path / "broken.csv"
     path.write_text(text)
     with pytest.raises(ValueError, match=rf"broken\.csv.*{message}"):
         pdmp.io.read_csv(path)
 
 
-def test_csv_in_another_encoding_is_refused(tmp_path: Path) -> None:
-    """Bytes that are not UTF-8 are named as such."""
+def test_csv_in_another_encoding_is_rejected(tmp_path: Path) -> None:
+    """Text that is not UTF-8 is rejected with this reason."""
     path = tmp_path / "latin.csv"
     path.write_bytes("t,höhe\n0,1\n".encode("latin-1"))
     with pytest.raises(ValueError, match=r"latin\.csv: not UTF-8"):
         pdmp.io.read_csv(path)
 
 
-def test_missing_column_names_those_there_are(table: Path) -> None:
-    """The error lists what could have been meant."""
+def test_missing_column_is_reported_with_the_available_ones(table: Path) -> None:
+    """The error lists the available columns."""
     with pytest.raises(ValueError, match=r"no column 'z' among t, x, y"):
         pdmp.io.read_csv(table, columns=["z"])
 
 
 def test_npz_gives_an_array_per_demonstration(tmp_path: Path) -> None:
-    """Arrays are demonstrations under their own names, with their time stamps under NAME.t."""
+    """Arrays are demonstrations under their names, with their time stamps under NAME.t."""
     path = tmp_path / "demos.npz"
     np.savez(path, **{"a": POSITION, "a.t": TIME, "b": 2 * POSITION, "b.t": TIME})
     found = pdmp.io.read_npz(path)
@@ -118,7 +120,7 @@ def test_npz_gives_an_array_per_demonstration(tmp_path: Path) -> None:
 
 
 def test_npz_gives_demonstrations_stored_one_after_another(tmp_path: Path) -> None:
-    """The array start tells where each begins; names choose the columns."""
+    """The array start has the first row of each; names select the columns."""
     path = tmp_path / "demos.npz"
     rows = np.concatenate([POSITION, POSITION + 1]).astype(np.float32)
     np.savez(path, y=rows, t=np.tile(TIME, 2), start=[0, 4, 8], names=["x", "y"])
@@ -128,7 +130,7 @@ def test_npz_gives_demonstrations_stored_one_after_another(tmp_path: Path) -> No
 
 
 def test_npz_gives_time_and_position(tmp_path: Path) -> None:
-    """What most would write first is read; a stack holds several demonstrations."""
+    """The simplest layout is read; a stack has several demonstrations."""
     path = tmp_path / "demos.npz"
     np.savez(path, time=TIME, position=POSITION, velocity=POSITION, names=["x", "y"])
     (demo,) = pdmp.io.read_npz(path).values()
@@ -146,7 +148,7 @@ def test_npz_gives_time_and_position(tmp_path: Path) -> None:
 
 
 def test_npz_stamps_are_seconds(tmp_path: Path) -> None:
-    """Stamps in ns since 1970 are recognised to the last digit; other long steps are refused."""
+    """Stamps in ns since 1970 are recognised exactly; other long steps are rejected."""
     path, steps = tmp_path / "demos.npz", 10_000_000 * np.arange(4)
     np.savez(path, time=1_700_000_000_000_000_000 + steps, position=POSITION)
     with pytest.warns(UserWarning, match="read as ns since 1970"):
@@ -180,16 +182,16 @@ def test_npz_stamps_are_seconds(tmp_path: Path) -> None:
         ({"a": POSITION, "a.t": TIME[::-1]}, "'a': time"),
     ],
 )
-def test_bad_npz_is_refused(tmp_path: Path, arrays: dict[str, object], message: str) -> None:
-    """Whatever is wrong, the error is a ValueError that names the file and the array."""
+def test_invalid_npz_is_rejected(tmp_path: Path, arrays: dict[str, object], message: str) -> None:
+    """Every fault raises a ValueError that names the file and the array."""
     path = tmp_path / "broken.npz"
     np.savez(path, **arrays)
     with pytest.raises(ValueError, match=rf"broken\.npz.*{message}"):
         pdmp.io.read_npz(path)
 
 
-def test_a_file_that_is_no_npz_is_refused(tmp_path: Path) -> None:
-    """Foreign bytes are not handed to any parser that could run them."""
+def test_a_file_that_is_no_npz_is_rejected(tmp_path: Path) -> None:
+    """Files that are not NPZ are rejected before any parser that could run them."""
     path = tmp_path / "broken.npz"
     path.write_bytes(b"PK\x03\x04 and nothing more")
     with pytest.raises(ValueError, match=r"broken\.npz: not an NPZ file"):
@@ -197,13 +199,13 @@ def test_a_file_that_is_no_npz_is_refused(tmp_path: Path) -> None:
 
 
 def test_folder_gives_demonstrations_by_id_with_their_context(folder: Path) -> None:
-    """Columns of the index make the context."""
+    """Columns of the index form the context."""
     found = pdmp.io.read_folder(folder, context=["height"])
     assert list(found) == ["a", "b"]
     np.testing.assert_array_equal(found["b"].context, [0.2])
 
 
-def test_folder_may_hold_an_npz(folder: Path) -> None:
+def test_folder_can_have_an_npz(folder: Path) -> None:
     """A demos.npz is read in the order of the index."""
     rows = np.concatenate([POSITION, POSITION + 1])
     np.savez(folder / "demos.npz", y=rows, t=np.tile(TIME, 2), start=[0, 4, 8])
@@ -213,7 +215,7 @@ def test_folder_may_hold_an_npz(folder: Path) -> None:
 
 
 def test_npz_and_index_must_agree(folder: Path) -> None:
-    """A demonstration too many or too few is refused."""
+    """A number of demonstrations other than in the index is rejected."""
     np.savez(folder / "demos.npz", y=POSITION, t=TIME, start=[0, 4])
     with pytest.raises(ValueError, match=r"holds 1 demonstrations, but index\.csv lists 2"):
         pdmp.io.read_folder(folder)
@@ -221,7 +223,7 @@ def test_npz_and_index_must_agree(folder: Path) -> None:
 
 @pytest.mark.parametrize("place", [".", "demos"])
 def test_folder_without_an_index_is_read_by_its_files(tmp_path: Path, place: str) -> None:
-    """All files come by their names, numbers in their order; a context needs an index."""
+    """All files are read in natural order of their names; a context needs an index."""
     (tmp_path / place).mkdir(exist_ok=True)
     for name in ("take 10", "take 9", "b"):
         (tmp_path / place / f"{name}.csv").write_text(TABLE)
@@ -231,8 +233,8 @@ def test_folder_without_an_index_is_read_by_its_files(tmp_path: Path, place: str
         pdmp.io.read_folder(tmp_path, context=["height"])
 
 
-def test_folder_with_nothing_to_read_is_answered_with_the_format(tmp_path: Path) -> None:
-    """No index and no files, an index without rows, or no folder at all."""
+def test_folder_without_demonstrations_is_rejected_with_the_format(tmp_path: Path) -> None:
+    """A folder without demonstrations is rejected with the expected format."""
     with pytest.raises(ValueError, match=r"and no files: expected an index\.csv .*demos/<id>\.csv"):
         pdmp.io.read_folder(tmp_path)
     (tmp_path / "index.csv").write_text("id,height\n")
@@ -246,34 +248,34 @@ def test_folder_with_nothing_to_read_is_answered_with_the_format(tmp_path: Path)
     "name", ["../a", "/etc/passwd", "a/../a", "x/a", "..", ".", r"..\a", "C:a", "a\x00b", '""']
 )
 def test_id_names_a_file_in_the_folder(folder: Path, name: str) -> None:
-    """No id leads elsewhere; the error says what is expected."""
+    """An id cannot lead outside the folder; the error states the format."""
     (folder / "a.csv").write_text(TABLE)
     (folder / "index.csv").write_text(f"id,height\n{name},1\n")
     with pytest.raises(ValueError, match=r"index\.csv.* is no name of a file: expected an index"):
         pdmp.io.read_folder(folder)
 
 
-def test_id_may_be_the_name_of_the_file(folder: Path) -> None:
-    """With its suffix, there is only one file that it can be."""
+def test_id_can_be_the_name_of_the_file(folder: Path) -> None:
+    """An id may include the suffix of its file."""
     (folder / "index.csv").write_text("id;height\na.csv;0,5\nb;1\n")
     found = pdmp.io.read_folder(folder, context=["height"])
     assert [demo.context.tolist() for demo in found.values()] == [[0.5], [1.0]]
 
 
 def test_index_of_pandas_is_read(folder: Path) -> None:
-    """A column without a name before the others is passed over."""
+    """A first column without a name is ignored."""
     (folder / "index.csv").write_text(",id,height\n0,a,0.1\n1,b,0.2\n")
     assert pdmp.io.read_folder(folder, context=["height"])["b"].context == [0.2]
 
 
 def test_context_may_be_labels(folder: Path) -> None:
-    """A column of words makes labels."""
+    """A column of words gives labels."""
     found = pdmp.io.read_folder(folder, context=["shape", "height"])
     assert found["a"].context == ["C", 0.1]
 
 
 def test_context_is_all_numbers_or_all_labels(folder: Path) -> None:
-    """A word among numbers is refused with its place."""
+    """A word among numbers is rejected with its location."""
     index = folder / "index.csv"
     index.write_text(index.read_text().replace("0.1", "low"))
     with pytest.raises(ValueError, match=r"index\.csv, line 2, column 'height': 'low' is not a n"):
@@ -281,7 +283,7 @@ def test_context_is_all_numbers_or_all_labels(folder: Path) -> None:
 
 
 def test_label_must_not_be_missing(folder: Path) -> None:
-    """An empty field is no label of its own, and a mark of a missing number is none."""
+    """An empty field or a mark of a missing number is not a label."""
     (folder / "index.csv").write_text("id,height\na,NA\nb,1\n")
     with pytest.raises(ValueError, match=r"index\.csv, line 2, column 'height': no number"):
         pdmp.io.read_folder(folder, context=["height"])
@@ -291,33 +293,33 @@ def test_label_must_not_be_missing(folder: Path) -> None:
 
 
 def test_id_must_be_unique(folder: Path) -> None:
-    """Two rows of the index with the same id are refused."""
+    """Two rows of the index with the same id are rejected."""
     (folder / "index.csv").write_text("id\na\na\n")
     with pytest.raises(ValueError, match=r"line 3: id 'a' appears twice"):
         pdmp.io.read_folder(folder)
 
 
 def test_read_takes_files_and_folders_together(folder: Path) -> None:
-    """Demonstrations come in the order of the paths."""
+    """Demonstrations are in the order of the paths."""
     single = folder / "demos" / "a.csv"
     assert len(pdmp.io.read([single, folder, single])) == 4
     assert len(pdmp.io.read(single)) == 1
 
 
-def test_read_refuses_what_it_does_not_know(tmp_path: Path) -> None:
-    """Another suffix is refused with those that are read."""
+def test_read_rejects_unknown_formats(tmp_path: Path) -> None:
+    """Another suffix is rejected with the supported ones."""
     with pytest.raises(ValueError, match=r"expected a \.csv, \.bvh or \.npz file or a folder"):
         pdmp.io.read([tmp_path / "demo.txt"])
 
 
 def test_context_needs_an_index(table: Path) -> None:
-    """A context asked of a lone file is refused, not left out."""
+    """A context of a single file is rejected rather than ignored."""
     with pytest.raises(ValueError, match=r"index\.csv"):
         pdmp.io.read([table], context=["height"])
 
 
 def test_names_come_in_a_list(table: Path, folder: Path) -> None:
-    """A text is not taken apart letter by letter."""
+    """A single text is not read as a list of letters."""
     with pytest.raises(ValueError, match=r"columns = 'xy': pass a list of names, \['xy'\]"):
         pdmp.io.read_csv(table, columns="xy")
     with pytest.raises(ValueError, match="context = 'height': pass a list"):
@@ -328,7 +330,7 @@ def test_names_come_in_a_list(table: Path, folder: Path) -> None:
     ("header", "second"), [("t [ms]", 1e-3), ("t (ms)", 1e-3), ("t [ns]", 1e-9)]
 )
 def test_time_has_its_unit(table: Path, header: str, second: float) -> None:
-    """Time stamps come in the unit that their header tells, in brackets or parentheses."""
+    """Time stamps have the unit in their header, in brackets or parentheses."""
     table.write_text(TABLE.replace("t,", f"{header},", 1))
     name = header if "(" in header else "t"
     time = pdmp.io.read_csv(table, time=name).time
@@ -336,21 +338,21 @@ def test_time_has_its_unit(table: Path, header: str, second: float) -> None:
 
 
 def test_missing_file_is_an_os_error(tmp_path: Path) -> None:
-    """A file that is not there is no matter of its contents."""
+    """A missing file raises OSError."""
     with pytest.raises(FileNotFoundError):
         pdmp.io.read([tmp_path / "none.csv"])
 
 
 @pytest.mark.parametrize("names", [["1", "2"], ["t", "x"], ["x", "x_velocity"], [" ", "x"]])
-def test_csv_that_would_not_be_read_is_not_written(tmp_path: Path, names: list[str]) -> None:
-    """Names that `read_csv` refuses are refused when they are written."""
+def test_csv_that_cannot_be_read_is_not_written(tmp_path: Path, names: list[str]) -> None:
+    """Names that `read_csv` rejects are rejected by the writer."""
     with pytest.raises(ValueError, match="is not a name|two columns are called"):
         pdmp.io.write_csv(tmp_path / "out.csv", pdmp.fit(reaches()).rollout(), names)
     assert not (tmp_path / "out.csv").exists()
 
 
-def test_what_a_link_leads_to_is_replaced(tmp_path: Path) -> None:
-    """A link stays one, in a table as in a model file."""
+def test_target_of_a_link_is_replaced(tmp_path: Path) -> None:
+    """The target of a link is replaced, and the link stays, for tables and model files."""
     model = pdmp.fit(reaches())
     for name, write in (
         ("table", lambda path: pdmp.io.write_csv(path, model.rollout(), model.names)),
@@ -368,7 +370,7 @@ def test_what_a_link_leads_to_is_replaced(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("older", [None, 0o600, 0o664])
 def test_files_have_the_mode_of_others(tmp_path: Path, older: int | None) -> None:
-    """A new file is as readable as the process makes its files; one that is replaced stays so."""
+    """A new file has the default mode of the process; a replaced file keeps its mode."""
     model = pdmp.fit(reaches())
     before = os.umask(0o027)
     try:
@@ -387,7 +389,7 @@ def test_files_have_the_mode_of_others(tmp_path: Path, older: int | None) -> Non
 
 
 def test_pipes_are_written_to(tmp_path: Path) -> None:
-    """A pipe is not replaced by a file: who reads from it gets the table, or the model."""
+    """A pipe is written, not replaced, for tables and models."""
     model, pipe = pdmp.fit(reaches()), tmp_path / "pipe"
     os.mkfifo(pipe)
     for write in (
@@ -402,13 +404,13 @@ def test_pipes_are_written_to(tmp_path: Path) -> None:
 
 
 def test_folder_is_no_file(tmp_path: Path) -> None:
-    """A folder in place of a file is told by its own name."""
+    """A folder in place of a file is named in the error."""
     with pytest.raises(IsADirectoryError, match=tmp_path.name):
         pdmp.io.write_csv(tmp_path, pdmp.fit(reaches()).rollout(), ["x", "y"])
 
 
 def test_written_csv_reads_back_to_the_last_bit(tmp_path: Path) -> None:
-    """Positions and times survive a round trip unchanged."""
+    """Positions and times are equal after a round trip."""
     model = pdmp.fit(reaches())
     trajectory = model.rollout()
     pdmp.io.write_csv(tmp_path / "out.csv", trajectory, model.names)
@@ -420,7 +422,7 @@ def test_written_csv_reads_back_to_the_last_bit(tmp_path: Path) -> None:
 def test_interrupted_write_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C just before the end leaves what was there, and no draft beside it."""
+    """Ctrl-C just before the end leaves the former file, without a temporary one."""
     trajectory = pdmp.fit(reaches()).rollout()
 
     def interrupt(*_: object) -> None:
@@ -436,14 +438,14 @@ def test_interrupted_write_leaves_the_old_file(
 
 
 def test_each_dof_needs_a_name(tmp_path: Path) -> None:
-    """A name too few is refused before anything is written."""
+    """A wrong number of names is rejected before writing."""
     with pytest.raises(ValueError, match="names has length 1, expected 2"):
         pdmp.io.write_csv(tmp_path / "out.csv", pdmp.fit(reaches()).rollout(), ["x"])
     assert os.listdir(tmp_path) == []
 
 
 def test_written_csv_keeps_units(tmp_path: Path) -> None:
-    """Headers tell the units that are known, and reading takes them off the names."""
+    """Headers have the units, which reading separates from the names."""
     model = pdmp.fit(reaches())
     pdmp.io.write_csv(tmp_path / "out.csv", model.rollout(), model.names, model.units)
     header = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()[0]
@@ -452,8 +454,8 @@ def test_written_csv_keeps_units(tmp_path: Path) -> None:
     assert (demo.names, demo.units) == (["y", "x_velocity"], ["m", "m/s"])
 
 
-def test_csv_headers_tell_units(tmp_path: Path) -> None:
-    """Names go without them, and a time in ms comes in s."""
+def test_csv_headers_have_units(tmp_path: Path) -> None:
+    """Units are separated from names, and a time in ms is converted to s."""
     path = tmp_path / "demo.csv"
     path.write_text("t [ms],knee [rad],height[m],count\n0,1,2,3\n1,1,2,3\n2,1,2,3\n3,1,2,3\n")
     demo = pdmp.io.read_csv(path)
@@ -469,7 +471,7 @@ def test_csv_headers_tell_units(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("gap", ["", "nan", "NaN"])
 def test_csv_gaps_are_interpolated_up_to_a_length(tmp_path: Path, gap: str) -> None:
-    """From the sample before to the one after; what is longer is refused with its place."""
+    """Gaps are interpolated between neighbours; longer ones are rejected with their location."""
     path = tmp_path / "demo.csv"
     rows = [f"{0.1 * k:.1f},{k},{gap if k in (3, 4) else k**3}" for k in range(8)]
     path.write_text("\n".join(["t,x,y", *rows]))
@@ -485,7 +487,7 @@ def test_csv_gaps_are_interpolated_up_to_a_length(tmp_path: Path, gap: str) -> N
 
 
 def test_npz_has_units_and_gaps(tmp_path: Path) -> None:
-    """The array units goes with names; NaN is a gap, refused where none is allowed."""
+    """The array units is read like names; NaN is a gap, rejected unless allowed."""
     path = tmp_path / "demos.npz"
     holed = np.arange(16.0).reshape(8, 2) / 10
     holed[3, 1] = np.nan
@@ -500,41 +502,16 @@ def test_npz_has_units_and_gaps(tmp_path: Path) -> None:
         pdmp.io.read_npz(path, dt=0.1)
 
 
-BVH = """HIERARCHY
-ROOT Hips
-{
-\tOFFSET 0 0 0
-\tCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-
-\tJOINT Left Leg
-\t{
-\t\tOFFSET 0 -40 0
-\t\tCHANNELS 4 Yposition Zrotation Xrotation Yrotation
-\t\tEnd Site
-\t\t{
-\t\t\tOFFSET 0 -40 0
-\t\t}
-\t}
-}
-MOTION
-Frames:\t4
-Frame Time: 0.01
-0 90 0 10 20 30 1 100 -170 5
-0 91 1 10 20 30 1 110 -180 5
-0 92 2 10 20 30 1 120 -190 5
-0 93 3 10 20 30 1 130 -200 5"""
-
-
 @pytest.fixture
 def bvh(tmp_path: Path) -> Path:
-    """Return a BVH file of two joints and four frames, without an end of its last line."""
+    """Returns a BVH file of two joints and four frames, without a final line break."""
     path = tmp_path / "leg.bvh"
     path.write_text(BVH)
     return path
 
 
-def test_bvh_gives_every_channel_as_it_is_written(bvh: Path) -> None:
-    """Angles come in rad, beyond half a turn too; positions as they are, of any joint."""
+def test_bvh_gives_every_channel_unwrapped(bvh: Path) -> None:
+    """Angles are in rad, without wrapping, and positions unchanged, for any joint."""
     demo = pdmp.io.read_bvh(bvh)
     assert demo.dt == 0.01
     assert demo.names is not None
@@ -545,8 +522,8 @@ def test_bvh_gives_every_channel_as_it_is_written(bvh: Path) -> None:
     assert demo.units == [""] * 3 + ["rad"] * 3 + [""] + ["rad"] * 3
 
 
-def test_bvh_is_read_wherever_csv_is(bvh: Path) -> None:
-    """Among files, and in a folder under the id of its index."""
+def test_bvh_is_read_like_csv(bvh: Path) -> None:
+    """BVH files are read among files, and in a folder by the ids of its index."""
     (demo,) = pdmp.io.read([bvh], columns=["Left Leg.Zrotation"])
     assert demo.position.shape == (4, 1)
     (bvh.parent / "demos").mkdir()
@@ -559,26 +536,26 @@ def test_bvh_is_read_wherever_csv_is(bvh: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (BVH, "", "not a whole BVH file"),
-        ("}\nMOTION", "}}\nMOTION", "not a whole BVH file"),
-        ("CHANNELS 4", "CHANNEL 4", "not a whole BVH file"),
+        (BVH, "", "an incomplete BVH file"),
+        ("}\nMOTION", "}}\nMOTION", "an incomplete BVH file"),
+        ("CHANNELS 4", "CHANNEL 4", "an incomplete BVH file"),
         ("Frames:\t4", "Frames:\t5", "holds 4 frames, but announces 5"),
         ("-190 5", "-190", r"frame 2: 9 numbers, expected 10"),
         ("-190", "l90", r"frame 2, 'Left Leg\.Xrotation': 'l90' is not a number"),
         ("Time: 0.01", "Time: 0", "dt = 0"),
     ],
 )
-def test_bad_bvh_is_refused_with_file_and_place(
+def test_invalid_bvh_is_rejected_with_file_and_location(
     bvh: Path, old: str, new: str, message: str
 ) -> None:
-    """Whatever is wrong, the error is a ValueError that names the file and where to look."""
+    """Every fault raises a ValueError that names the file and the location."""
     bvh.write_text(BVH.replace(old, new))
     with pytest.raises(ValueError, match=rf"leg\.bvh.*{message}"):
         pdmp.io.read_bvh(bvh)
 
 
 def test_missing_bvh_package_is_named(bvh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the extra, one sentence says what to install."""
+    """Without the extra, the error names it."""
     monkeypatch.setitem(sys.modules, "bvh", None)
     with pytest.raises(ImportError, match=r"^BVH files need .*: pip install 'pdmp\[bvh\]'$"):
         pdmp.io.read_bvh(bvh)

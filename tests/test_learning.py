@@ -1,4 +1,4 @@
-"""What is learnt, against numpy and scipy, and on human handwriting."""
+"""Learning, compared with numpy and scipy, and on human handwriting."""
 
 import inspect
 from typing import Any
@@ -16,7 +16,7 @@ interpolate = pytest.importorskip("scipy.interpolate")
 
 
 def shapes(*names: str) -> dict[str, list[Demonstration]]:
-    """Return recordings of handwriting, or skip where they are not installed."""
+    """Returns recordings of handwriting, or skip where they are not installed."""
     try:
         return handwriting(names or None)
     except ImportError as error:
@@ -24,25 +24,25 @@ def shapes(*names: str) -> dict[str, list[Demonstration]]:
 
 
 def reproduction_error(model: pdmp.Model, demos: list[Demonstration], m: int) -> float:
-    """Return the RMSE of a demonstration's reproduction over the larger of its DoFs' ranges."""
+    """Returns the RMSE of a demonstration's reproduction over the larger of its DoFs' ranges."""
     demo = demos[m]
     time = demo.time - demo.time[0]
     dt = model.durations[m] / (demo.n_samples - 1)
     made = model.rollout(model.conditions(m), dt=dt)
-    shown = interpolate.CubicSpline(time, demo.position)(made.time)
-    return float(np.sqrt(np.mean((made.position - shown) ** 2)) / np.ptp(demo.position, 0).max())
+    expected = interpolate.CubicSpline(time, demo.position)(made.time)
+    return float(np.sqrt(np.mean((made.position - expected) ** 2)) / np.ptp(demo.position, 0).max())
 
 
 @pytest.mark.parametrize("name", ["WShape", "GShape", "Sine", "Multi_Models_3"])
-def test_gp_gives_handwriting_back(name: str) -> None:
-    """With J = M, the reproduction of every demonstration is off by 1e-4 of its range at most."""
+def test_gp_reproduces_handwriting(name: str) -> None:
+    """With J = M, the error of every reproduction is at most 1e-4 of the range."""
     demos = shapes(name)[name]
     model = pdmp.fit(demos, n_styles=7)
     assert max(reproduction_error(model, demos, m) for m in range(7)) <= 1e-4
 
 
-def test_network_gives_all_handwriting_back() -> None:
-    """With J = M and 50 functions, every demonstration of 30 shapes is off by 1e-3 at most."""
+def test_network_reproduces_all_handwriting() -> None:
+    """With J = M and 50 functions, reproductions of 30 shapes are accurate to 1e-3."""
     for name, demos in shapes().items():
         model = pdmp.fit(demos, n_styles=7, basis="ngnet")
         worst = max(reproduction_error(model, demos, m) for m in range(7))
@@ -50,7 +50,7 @@ def test_network_gives_all_handwriting_back() -> None:
 
 
 def filtered(model: pdmp.Model, spline: Any, centre: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return z (C, D) of Eq. (1) driven by y(u), from z = 0 at the first u, integrated by scipy."""
+    """Returns z (C, D) of Eq. (1) driven by y(u) from z = 0, integrated by scipy."""
 
     def slope(u: float, z: np.ndarray) -> np.ndarray:
         return model.alpha_z * (model.beta_z * (centre - spline(u)) - z)
@@ -63,7 +63,7 @@ def filtered(model: pdmp.Model, spline: Any, centre: np.ndarray, u: np.ndarray) 
 
 @pytest.mark.parametrize("transport", ["learnt", "immediate"])
 def test_singular_values_are_those_of_the_targets_of_reaches(transport: Any) -> None:
-    """Targets f = e' - z about the frame, made here by scipy from the resampled demonstrations."""
+    """Singular values are those of targets f = e' - z about the frame, computed by scipy."""
     demos = reaches()
     n = 120
     model = pdmp.fit(demos, n_styles=3, n_samples=n, transport=transport)
@@ -80,7 +80,7 @@ def test_singular_values_are_those_of_the_targets_of_reaches(transport: Any) -> 
 
 
 def test_singular_values_are_those_of_the_targets_of_loops() -> None:
-    """On a circle, z is the periodic steady state, here the second turn of two."""
+    """For cycles, z is the periodic steady state, computed as the second of two periods."""
     model = pdmp.fit(loops(), kind="rhythmic", n_styles=2, n_samples=100)
     u = np.linspace(0, 2 * np.pi, 100, endpoint=False)
     targets = []
@@ -94,7 +94,7 @@ def test_singular_values_are_those_of_the_targets_of_loops() -> None:
 
 
 def test_sharp_turns_between_few_samples_are_kept() -> None:
-    """What jumps within a sample is given back, though its target shows only between samples."""
+    """Jumps within a sampling interval are reproduced."""
     u = np.linspace(0, 1, 101)[:, None]
     demos = [size * (u > 0.005) * (1.5 + np.cos(9 * u)) * (1 - u) for size in (1, 2, 3)]
     model = pdmp.fit(demos, dt=0.01, singular_value_share=1.0)
@@ -114,8 +114,8 @@ def test_styles_are_orthonormal(n_styles: int) -> None:
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.99, 0.999999, 1.0])
-def test_spectrum_keeps_the_fewest_that_exceed_its_share(share: float) -> None:
-    """J is the smallest for which the sum of the values kept exceeds the share of all."""
+def test_singular_value_share_selects_the_smallest_number(share: float) -> None:
+    """J is the smallest whose sum of singular values exceeds the share."""
     model = pdmp.fit(reaches(), singular_value_share=share)
     shares = np.cumsum(model.singular_values) / model.singular_values.sum()
     assert model.n_styles == min(5, 1 + np.sum(shares <= share))
@@ -124,7 +124,7 @@ def test_spectrum_keeps_the_fewest_that_exceed_its_share(share: float) -> None:
 @pytest.mark.parametrize("overlap", [0.5, 1.2, 2.0])
 @pytest.mark.parametrize("periodic", [False, True])
 def test_network_is_a_sum_of_the_stated_functions(periodic: bool, overlap: float) -> None:
-    """What is learnt is b(u) = Σ wₖψₖ(u) / Σ ψₖ(u) of width s = overlap·h for some weights."""
+    """The network is b(u) = Σ wₖψₖ(u) / Σ ψₖ(u) of width s = overlap·h for some weights."""
     end, n = 2 * np.pi, 20
     u = np.linspace(0, end, 200, endpoint=not periodic)
     h = end / n if periodic else end / (n - 5)
@@ -139,15 +139,18 @@ def test_network_is_a_sum_of_the_stated_functions(periodic: bool, overlap: float
 
 
 def test_defaults_of_a_network_are_those_of_its_signature() -> None:
-    """What help() shows is what is used."""
-    shown = inspect.signature(pdmp.NGnet).parameters
+    """The defaults in the signature are those in use."""
+    parameters = inspect.signature(pdmp.NGnet).parameters
     used = pdmp.NGnet()
-    assert (shown["n_basis"].default, shown["overlap"].default) == (used.n_basis, used.overlap)
+    assert (parameters["n_basis"].default, parameters["overlap"].default) == (
+        used.n_basis,
+        used.overlap,
+    )
     assert repr(used) == f"pdmp.NGnet({used.n_basis}, overlap={used.overlap})"
 
 
 def noisy() -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return six movements of rank two, clean and with 1 % noise."""
+    """Returns six movements of rank two, clean and with 1 % noise."""
     s = np.linspace(0, 1, 201)
     rise, bump = s**3 * (10 - 15 * s + 6 * s**2), np.sin(2 * np.pi * s) ** 3
     clean = [np.column_stack([rise + k * bump, k * rise]) for k in (-1, -0.6, -0.2, 0.2, 0.6, 1)]
@@ -155,8 +158,8 @@ def noisy() -> tuple[list[np.ndarray], list[np.ndarray]]:
     return clean, [x + 0.01 * random.normal(size=x.shape) for x in clean]
 
 
-def test_automatic_smoothing_comes_closer_to_what_was_meant() -> None:
-    """From 1 % noise, the reproduction is closer to the clean movement than the recording was."""
+def test_automatic_smoothing_reduces_the_error() -> None:
+    """With 1 % noise, the reproduction is closer to the clean movement than the recording is."""
     clean, recorded = noisy()
 
     def error(smoothing: Any) -> float:
@@ -169,7 +172,7 @@ def test_automatic_smoothing_comes_closer_to_what_was_meant() -> None:
 
 
 def _reach(*bends: float) -> np.ndarray:
-    """Return a reach of 1 (101, 2) with bends of several shapes."""
+    """Returns a reach of length 1 (101, 2) with bends of several shapes."""
     s = np.linspace(0, 1, 101)[:, None]
     shapes = [np.sin(np.pi * (j + 1) * s) * (4 * s * (1 - s)) ** 2 for j in range(len(bends))]
     rise = s**3 * (10 - 15 * s + 6 * s**2) * [1.0, 0.6]
@@ -180,7 +183,7 @@ def _reach(*bends: float) -> np.ndarray:
 
 
 def _cycle(*bends: float) -> np.ndarray:
-    """Return a wave (100, 2) with harmonics."""
+    """Returns a wave (100, 2) with harmonics."""
     phi = np.arange(100)[:, None] / 100 * 2 * np.pi
     shapes = [np.cos((j + 2) * phi + [0.0, j]) / (j + 1) for j in range(len(bends))]
     return np.sin(phi + [0.0, 1.0]) + sum(bend * x for bend, x in zip(bends, shapes, strict=True))
@@ -190,7 +193,7 @@ def _cycle(*bends: float) -> np.ndarray:
 @pytest.mark.parametrize("n_demos", [20, 60, 200])
 @pytest.mark.parametrize("kind", ["discrete", "rhythmic"])
 def test_styles_end_at_the_noise(kind: Any, n_demos: int, noise: float) -> None:
-    """A mean and three styles have J = 4, however many demonstrations and whatever the noise."""
+    """A mean and three styles give J = 4 for any number of demonstrations and level of noise."""
     random = np.random.default_rng(n_demos)
     make = _reach if kind == "discrete" else _cycle
     clean = [make(*bends) for bends in random.uniform(-0.3, 0.3, (n_demos, 3))]
@@ -203,7 +206,7 @@ def test_styles_end_at_the_noise(kind: Any, n_demos: int, noise: float) -> None:
 
 @pytest.mark.parametrize("noise", [0.001, 0.005, 0.02])
 def test_styles_end_at_noise_that_was_resampled(noise: float) -> None:
-    """Recordings of half the rate, or less, brought to a higher one have the same J."""
+    """Recordings that were resampled from half the rate or less give the same J."""
     random = np.random.default_rng(5)
     clean = [_reach(*bends) for bends in random.uniform(-0.3, 0.3, (40, 3))]
     recorded = [x + noise * np.ptp(clean[0]) * random.normal(size=x.shape) for x in clean]
@@ -214,7 +217,7 @@ def test_styles_end_at_noise_that_was_resampled(noise: float) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_repetitions_of_one_movement_are_one_style(seed: int) -> None:
-    """A hundred noisy recordings of one reach have J = 1, and its peak of acceleration."""
+    """A hundred noisy recordings of one reach give J = 1 and its peak acceleration."""
     random = np.random.default_rng(seed)
     clean = _reach()
     recorded = [clean + 0.003 * random.normal(size=clean.shape) for _ in range(100)]
@@ -226,8 +229,8 @@ def test_repetitions_of_one_movement_are_one_style(seed: int) -> None:
         assert np.abs(made.acceleration).max() < 1.3 * peak
 
 
-def test_noise_does_not_kick_a_joint_at_rest() -> None:
-    """Half a milliradian of it moves a joint at rest by less than 1 rad/s²."""
+def test_noise_does_not_accelerate_a_joint_at_rest() -> None:
+    """Noise of half a milliradian accelerates a joint at rest by less than 1 rad/s²."""
     random = np.random.default_rng(0)
     clean = _reach() * [1.0, 0.0]
     recorded = [clean + 5e-4 * random.normal(size=clean.shape) for _ in range(5)]
@@ -240,7 +243,7 @@ def test_noise_does_not_kick_a_joint_at_rest() -> None:
 
 
 def test_layout_of_noisy_arrays_does_not_matter() -> None:
-    """Arrays by columns and by rows, both smoothed, give one model to the last bit."""
+    """Noisy arrays in C and Fortran order give the same model bit for bit."""
     random = np.random.default_rng(4)
     recorded = [_reach(0.1) + 0.003 * random.normal(size=(101, 2)) for _ in range(6)]
     by_rows = pdmp.fit(recorded, dt=0.01)
@@ -249,7 +252,7 @@ def test_layout_of_noisy_arrays_does_not_matter() -> None:
 
 
 def test_clean_demonstrations_are_not_smoothed() -> None:
-    """Automatic smoothing leaves a clean model as it is, to the last bit."""
+    """Automatic smoothing does not change a model of clean demonstrations."""
     clean = [_reach(bend) for bend in (-0.2, 0.0, 0.1, 0.3)]
     models = [pdmp.fit(clean, dt=0.01, smoothing=x, n_styles=2) for x in ("auto", None)]
     assert models[0].to_bytes() == models[1].to_bytes()
@@ -257,7 +260,7 @@ def test_clean_demonstrations_are_not_smoothed() -> None:
 
 
 def test_small_effects_of_a_context_are_kept() -> None:
-    """A context counts among the styles, however small its effect beside random variation."""
+    """The styles include small effects of a context beside larger random variation."""
     random = np.random.default_rng(1)
     heights = np.linspace(0, 0.02, 24)
     others = random.uniform(-1, 1, (24, 6))
@@ -268,7 +271,7 @@ def test_small_effects_of_a_context_are_kept() -> None:
 
 
 def test_degrees_of_freedom_in_different_units_weigh_alike() -> None:
-    """An effect in rad beside one in mm is kept; small ranges in the same unit stay small."""
+    """Effects in rad beside mm are kept; small ranges in the same unit stay small."""
     s = np.linspace(0, 1, 101)
     rise, bump = s**3 * (10 - 15 * s + 6 * s**2), (4 * s * (1 - s)) ** 3
     turns = np.linspace(-1, 1, 8)
@@ -286,7 +289,7 @@ def test_degrees_of_freedom_in_different_units_weigh_alike() -> None:
 
 @pytest.mark.parametrize(("hz", "gain"), [(5.0, 1 / (1 + 4**4)), (20.0, 0.5), (80.0, 1.0)])
 def test_cut_off_damps_as_stated(hz: float, gain: float) -> None:
-    """A tremor of 20 Hz keeps 1/(1 + (f/f_c)⁴) of its amplitude: half at the cut-off."""
+    """The gain for a tremor of 20 Hz is 1/(1 + (f/f_c)⁴), one half at the cut-off."""
     t = np.arange(401) / 200
     tremor = np.sin(2 * np.pi * 20 * t)
     s = t / 2
@@ -299,7 +302,7 @@ def test_cut_off_damps_as_stated(hz: float, gain: float) -> None:
 
 
 def test_noise_that_is_large_is_reported() -> None:
-    """A tenth of the range is named with its size; half a percent is smoothed without a word."""
+    """Noise of a tenth of the range is reported; half a percent is smoothed silently."""
     random = np.random.default_rng(0)
     clean = _reach()
     with pytest.warns(UserWarning, match=r'"y0" has measurement noise of standard deviation 0\.'):
@@ -309,7 +312,7 @@ def test_noise_that_is_large_is_reported() -> None:
 
 
 def test_small_degrees_of_freedom_that_are_left_out_are_reported() -> None:
-    """Radians beside millimetres of unknown unit are named where the styles leave them out."""
+    """Degrees of freedom with small numbers that the styles omit are reported."""
     random = np.random.default_rng(0)
     s = np.linspace(0, 1, 101)
     wave, bump = np.sin(2 * np.pi * s) ** 3, (4 * s * (1 - s)) ** 3

@@ -1,4 +1,4 @@
-"""Movements in Python: the same numbers from every way to make them, and the right ones."""
+"""Movements in Python: consistency of rollouts, controllers, batches, copies and files."""
 
 import copy
 import pickle
@@ -18,14 +18,14 @@ FIELDS = ("time", "position", "velocity", "acceleration")
 
 
 def assert_same_motion(model: pdmp.Model, other: pdmp.Model) -> None:
-    """Assert that two models move alike to the last bit."""
+    """Asserts that two models move equally bit for bit."""
     for name in FIELDS:
         made, expected = (getattr(m.rollout(style=[0.3, -0.2]), name) for m in (model, other))
         np.testing.assert_array_equal(made, expected)
 
 
 def test_step_k_is_sample_k(model: pdmp.Model) -> None:
-    """A controller repeats the rollout, start included, beyond the demonstrated end."""
+    """Step k of a controller equals sample k of the rollout, beyond the demonstrated end too."""
     conditions = {"style": [0.4, 0.1], "start": [0.2, 0.3], "velocity": [0.1, 0.0], "tau": 0.7}
     trajectory = model.rollout(dt=0.01, duration=3.0, **conditions)
     controller = model.controller(0.01, **conditions)
@@ -40,7 +40,7 @@ def test_step_k_is_sample_k(model: pdmp.Model) -> None:
 
 @pytest.mark.parametrize("name", ["position", "velocity", "acceleration"])
 def test_outputs_are_read_only_views(model: pdmp.Model, name: str) -> None:
-    """Each is a view of the same memory, which only a step can write."""
+    """Each output is a view of the same memory, which only a step can write."""
     controller = model.controller(0.01)
     view = getattr(controller, name)
     address, before = view.ctypes.data, view.copy()
@@ -52,7 +52,7 @@ def test_outputs_are_read_only_views(model: pdmp.Model, name: str) -> None:
 
 
 def test_outputs_cannot_be_made_writable(model: pdmp.Model) -> None:
-    """Read-only is not a flag that the user can take off a view."""
+    """Views cannot be made writable."""
     position = model.controller(0.01).position
     with pytest.raises(ValueError, match="WRITEABLE"):
         position.setflags(write=True)
@@ -62,7 +62,7 @@ def test_outputs_cannot_be_made_writable(model: pdmp.Model) -> None:
 
 
 def test_trajectories_are_the_users_own(model: pdmp.Model) -> None:
-    """Writing into one does not change what comes next."""
+    """Writing into a trajectory does not change later ones."""
     first = model.rollout()
     expected = first.position.copy()
     first.position[:] = np.nan
@@ -71,14 +71,14 @@ def test_trajectories_are_the_users_own(model: pdmp.Model) -> None:
 
 @pytest.mark.parametrize("name", ["styles", "goals", "starts", "anchors", "durations"])
 def test_models_cannot_be_changed_through_their_arrays(model: pdmp.Model, name: str) -> None:
-    """What a model shows is a copy."""
+    """Arrays of a model are copies."""
     expected = getattr(model, name).copy()
     getattr(model, name)[:] = np.nan
     np.testing.assert_array_equal(getattr(model, name), expected)
 
 
 def test_status_is_one_of_two_objects(reach: pdmp.Model) -> None:
-    """A step returns the very members, so that `is`, `==` and a dictionary tell them apart."""
+    """A step returns members of Status, which `is`, `==` and dictionaries distinguish."""
     controller = reach.controller(0.01)
     assert controller.step() is Status.WORKING
     while controller.time < 5:
@@ -89,7 +89,7 @@ def test_status_is_one_of_two_objects(reach: pdmp.Model) -> None:
 
 
 def test_finished_movements_stay_finished(reach: pdmp.Model) -> None:
-    """After the first FINISHED no WORKING follows, as nothing was commanded."""
+    """Without commands, no WORKING follows the first FINISHED."""
     controller = reach.controller(0.01)
     statuses = [controller.step() for _ in range(400)]
     first = statuses.index(Status.FINISHED)
@@ -100,13 +100,13 @@ def test_finished_movements_stay_finished(reach: pdmp.Model) -> None:
     "again", [copy.copy, copy.deepcopy, lambda m: pickle.loads(pickle.dumps(m))]
 )
 def test_copied_models_move_alike(model: pdmp.Model, again: Callable[[Any], Any]) -> None:
-    """Copies and pickles of a model move as it does, to the last bit."""
+    """Copies and pickles of a model move equally bit for bit."""
     assert_same_motion(again(model), model)
 
 
 @pytest.mark.parametrize("again", [copy.copy, lambda it: pickle.loads(pickle.dumps(it))])
 def test_results_can_leave_a_process(again: Callable[[Any], Any]) -> None:
-    """Trajectories, predictions and states come back from a pool as they were."""
+    """Trajectories, predictions and states are picklable."""
     model = pdmp.fit(reaches())
     results = {
         "time position velocity acceleration": model.rollout(),
@@ -142,7 +142,7 @@ def test_copied_arguments_are_equal(original: Any, again: Callable[[Any], Any]) 
 
 
 def test_saved_models_move_alike(model: pdmp.Model, tmp_path: Path) -> None:
-    """Save, load: the same bits, and a second save writes the same file."""
+    """A loaded model is equal bit for bit, and saves the same file."""
     model.save(tmp_path / "a")
     loaded = pdmp.load(tmp_path / "a")
     assert_same_motion(loaded, model)
@@ -151,14 +151,14 @@ def test_saved_models_move_alike(model: pdmp.Model, tmp_path: Path) -> None:
 
 
 def test_bytes_of_a_model_are_its_file(model: pdmp.Model, tmp_path: Path) -> None:
-    """Bytes in memory and a file on disk are the same, and either gives the model back."""
+    """Bytes in memory equal the file, and both restore the model."""
     model.save(tmp_path / "model")
     assert model.to_bytes() == (tmp_path / "model").read_bytes()
     assert_same_motion(pdmp.Model.from_bytes(model.to_bytes()), model)
 
 
-def test_bytes_that_are_cut_are_refused(model: pdmp.Model) -> None:
-    """A part of a model is a ModelFileError, as a damaged file is."""
+def test_bytes_that_are_cut_are_rejected(model: pdmp.Model) -> None:
+    """Truncated bytes raise ModelFileError, like a damaged file."""
     for end in (0, 8, 100, -1):
         with pytest.raises(pdmp.ModelFileError):
             pdmp.Model.from_bytes(model.to_bytes()[:end])
@@ -166,14 +166,14 @@ def test_bytes_that_are_cut_are_refused(model: pdmp.Model) -> None:
 
 @pytest.mark.parametrize("basis", ["gp", "ngnet"])
 def test_table_error_is_stated_and_kept(basis: Any) -> None:
-    """It is at most 1e-9 of the largest forcing where the table is fine enough, and is kept."""
+    """The table error is at most 1e-9 of the largest forcing for a fine table, and is saved."""
     model = pdmp.fit(reaches(), n_styles=2, basis=basis)
     assert 0 < model.table_error < 1e-9
     assert pdmp.Model.from_bytes(model.to_bytes()).table_error == model.table_error
 
 
 @pytest.mark.parametrize("content", [b"", b"{}", b"not a model" * 99, b"\xff" * 64, None])
-def test_damaged_files_are_told_from_other_errors(
+def test_damaged_files_are_distinct_from_other_errors(
     reach: pdmp.Model, tmp_path: Path, content: bytes | None
 ) -> None:
     """Garbage and truncated files raise ModelFileError, a PdmpError, with the path."""
@@ -185,13 +185,13 @@ def test_damaged_files_are_told_from_other_errors(
 
 
 def test_missing_files_are_missing_files(tmp_path: Path) -> None:
-    """A path that does not exist raises what Python raises."""
+    """A missing path raises FileNotFoundError."""
     with pytest.raises(FileNotFoundError, match="none"):
         pdmp.load(tmp_path / "none")
 
 
 def test_batch_is_written_in_place(model: pdmp.Model) -> None:
-    """With `out`, positions and velocities appear in the arrays given, strided ones too."""
+    """With `out`, positions and velocities are written into given arrays, strided ones too."""
     expected = model.rollouts(model.styles, dt=0.05)
     shape = expected[0].shape
     out = np.full(shape, np.nan), np.full((*shape[:2], 4), np.nan)[:, :, ::2]
@@ -212,7 +212,7 @@ def test_batch_is_the_rollouts_one_by_one(model: pdmp.Model) -> None:
 
 @pytest.mark.parametrize("given", [{}, {"start": [0.1, 0.2]}, {"velocity": [0.5, -0.5]}], ids=str)
 def test_jacobian_is_the_difference_of_rollouts(model: pdmp.Model, given: dict[str, Any]) -> None:
-    """Finite differences of rollouts agree with it for every way to start."""
+    """Finite differences of rollouts agree with the Jacobian, for all kinds of start."""
     jacobian = model.jacobian("style", dt=0.05, **given)
     style, h = np.array([0.3, -0.4]), 1e-3
     for j, step in enumerate(h * np.eye(2)):
@@ -222,7 +222,7 @@ def test_jacobian_is_the_difference_of_rollouts(model: pdmp.Model, given: dict[s
 
 
 def test_threads_share_a_model(model: pdmp.Model) -> None:
-    """Rollouts from several threads at once are those of one."""
+    """Concurrent rollouts equal sequential ones."""
     styles = np.random.default_rng(0).normal(size=(40, 2))
     expected = [model.rollout(style=style).position for style in styles]
     with ThreadPoolExecutor(8) as pool:
@@ -230,8 +230,8 @@ def test_threads_share_a_model(model: pdmp.Model) -> None:
     np.testing.assert_array_equal(made, expected)
 
 
-def test_goal_moved_from_rest_is_reached() -> None:
-    """A model of demonstrations that never move still goes where it is sent, and finishes."""
+def test_goal_of_a_model_at_rest_is_reached() -> None:
+    """A model of demonstrations at rest still moves to a goal and finishes."""
     controller = pdmp.fit([np.ones((50, 2))] * 3, dt=0.01).controller(0.01)
     for _ in range(10):
         controller.step()
@@ -244,7 +244,7 @@ def test_goal_moved_from_rest_is_reached() -> None:
 
 
 def test_reset_starts_as_the_nominal_demonstration() -> None:
-    """What is not given to reset is the nominal demonstration's, not what was commanded before."""
+    """Conditions omitted in reset are those of the nominal demonstration, not of commands."""
     model = pdmp.fit(reaches(), n_styles=2)
     controller = model.controller(style=[0.5, 0.1], tau=2.0)
     controller.step()

@@ -1,4 +1,4 @@
-"""Data frames, labelled arrays and trajectories serve wherever numbers do, with their names."""
+"""Data frames, labelled arrays and trajectories are accepted as arrays, with their names."""
 
 import pickle
 import sys
@@ -19,35 +19,35 @@ TIME = DT * np.arange(81)
 
 
 class Frame:
-    """A stand-in for a data frame, with a method that is called as the mask of an array is."""
+    """Minimal data frame, with a method named like the mask of a masked array."""
 
     def __init__(self, values: np.ndarray, columns: list[Any] | None = None) -> None:
         self.values, self.shape, self.ndim = values, values.shape, values.ndim
         self.columns = columns
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """Return the values."""
+        """Returns the values."""
         return np.array(self.values, dtype=dtype)
 
     def __iter__(self) -> Any:
-        """Go through the names of the columns, as data frames do."""
+        """Iterates over the names of the columns, as data frames do."""
         return iter(self.columns or [])
 
     def __len__(self) -> int:
-        """Return the number of rows."""
+        """Returns the number of rows."""
         return len(self.values)
 
     def mask(self, condition: Any, other: Any = None) -> "Frame":
-        """Hide nothing: this is no masked array."""
+        """Returns the frame: this is not a masked array."""
         return self
 
     def any(self) -> bool:
-        """Say yes, so that it would be noticed if this was taken for a mask."""
+        """Returns True, which would be noticed if this were used as a mask."""
         return True
 
 
 class Labelled(Frame):
-    """A stand-in for a labelled array, whose names are a coordinate."""
+    """Minimal labelled array, whose names are a coordinate."""
 
     def __init__(self, values: np.ndarray, names: list[str]) -> None:
         super().__init__(values)
@@ -58,27 +58,27 @@ class Labelled(Frame):
 
 
 class Capsule:
-    """An array that only the protocol of DLPack reaches."""
+    """An array accessible only by DLPack."""
 
     def __init__(self, values: np.ndarray) -> None:
         self._values = values
 
     def __dlpack__(self, **options: Any) -> Any:
-        """Return the capsule."""
+        """Returns the capsule."""
         return self._values.__dlpack__(**options)
 
     def __dlpack_device__(self) -> Any:
-        """Return where the array lies."""
+        """Returns the device of the array."""
         return self._values.__dlpack_device__()
 
 
 def pandas_frame(values: np.ndarray, columns: list[str]) -> Any:
-    """Return a data frame of pandas."""
+    """Returns a data frame of pandas."""
     return pytest.importorskip("pandas").DataFrame(values, columns=columns)
 
 
 def polars_frame(values: np.ndarray, columns: list[str]) -> Any:
-    """Return a data frame of polars."""
+    """Returns a data frame of polars."""
     return pytest.importorskip("polars").DataFrame(values, schema=columns, orient="row")
 
 
@@ -96,7 +96,7 @@ series = pytest.mark.parametrize("vector", SERIES.values(), ids=SERIES)
 
 @frames
 def test_frames_are_positions_with_names(frame: Callable[..., Any]) -> None:
-    """The numbers come in to the last bit, with the names and units of the columns."""
+    """Data frames are read bit for bit, with names and units of their columns."""
     demo = Demonstration(frame(POSITION, ["x", "knee [rad]"]), dt=DT)
     np.testing.assert_array_equal(demo.position, POSITION)
     assert (demo.names, demo.units) == (["x", "knee"], ["", "rad"])
@@ -105,7 +105,7 @@ def test_frames_are_positions_with_names(frame: Callable[..., Any]) -> None:
 
 
 def test_columns_without_names_give_none() -> None:
-    """Numbers are no names."""
+    """Columns that are numbers give no names."""
     assert Demonstration(Frame(POSITION, [0, 1]), dt=DT).names is None
     assert Demonstration(Frame(POSITION), dt=DT).names is None
 
@@ -127,8 +127,8 @@ def test_labelled_arrays_have_names_and_units() -> None:
 
 
 @series
-def test_vectors_serve_wherever_numbers_do(vector: Callable[[np.ndarray], Any]) -> None:
-    """Time, goals, styles and commands are the same from any object."""
+def test_vectors_are_accepted_as_arrays(vector: Callable[[np.ndarray], Any]) -> None:
+    """Time, goals, styles and commands are accepted from any array object."""
     given = {"time": TIME, "goal": np.array([2.0, 1.0])}
     plain = Demonstration(POSITION, **given)
     demo = Demonstration(POSITION, **{name: vector(values) for name, values in given.items()})
@@ -148,7 +148,7 @@ def test_vectors_serve_wherever_numbers_do(vector: Callable[[np.ndarray], Any]) 
 
 @frames
 def test_frames_are_demonstrations_and_contexts(frame: Callable[..., Any]) -> None:
-    """A list or a mapping of them is learnt; their rows, not their columns, are contexts."""
+    """Data frames are demonstrations, in lists and mappings; their rows are contexts."""
     scales = np.array([[1.0], [2.0], [3.0], [4.0]])
     movements = [frame(scale * POSITION, ["x", "y"]) for scale in scales]
     expected = pdmp.fit([scale * POSITION for scale in scales], dt=DT, contexts=scales)
@@ -166,14 +166,14 @@ def test_frames_are_demonstrations_and_contexts(frame: Callable[..., Any]) -> No
 
 
 def test_frames_of_numbers_and_labels_are_contexts() -> None:
-    """Mixed columns of a data frame are numbers and labels."""
+    """A data frame of mixed columns gives numbers and labels."""
     values = np.array([[1.0, "left"], [2.0, "right"], [3.0, "left"]], object)
     model = pdmp.fit([k * POSITION for k in (1, 2, 3)], dt=DT, contexts=Frame(values, ["h", "s"]))
     assert model.contexts == [[1.0, "left"], [2.0, "right"], [3.0, "left"]]
 
 
 def test_dates_are_times_from_the_first() -> None:
-    """Dates and durations of numpy count in seconds, in any unit of theirs."""
+    """Dates and durations of numpy are converted to seconds from any unit."""
     since = np.datetime64("2026-03-01T12:00", "ns") + np.round(1e9 * TIME).astype("m8[ns]")
     for time in (since, since - since[0], since.astype("M8[us]")):
         np.testing.assert_allclose(Demonstration(POSITION, time=time).time, TIME, atol=1e-12)
@@ -202,7 +202,7 @@ TEXTS: dict[str, Any] = {
 
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 def test_text_is_never_read_as_numbers(text: Any) -> None:
-    """At any depth it is refused, and the argument is named."""
+    """Text is rejected at any depth, and the argument is named."""
     model = pdmp.fit(reaches(), n_styles=2)
     controller = model.controller(0.01)
     for call, name in (
@@ -220,14 +220,14 @@ def test_text_is_never_read_as_numbers(text: Any) -> None:
 
 @pytest.mark.parametrize("value", [b"1.5", np.bytes_(b"1.5"), np.array("1.5"), np.complex128(1)])
 def test_context_is_numbers_and_texts(value: Any) -> None:
-    """Bytes and texts in arrays are neither; the numbers in them are not read."""
+    """Bytes and texts in arrays are rejected, not parsed as numbers."""
     model = pdmp.fit(reaches())
     with pytest.raises(ValueError, match=r"context\[0\] holds"):
         model.predict([value])
 
 
 def test_missing_values_of_pandas_are_named() -> None:
-    """NA is neither a number nor an obscure error."""
+    """NA of pandas is reported clearly."""
     pandas = pytest.importorskip("pandas")
     column = pandas.array([1, None] * 5, dtype="Int64")
     with pytest.raises(ValueError, match="position has missing values: fill them, or cut"):
@@ -236,25 +236,25 @@ def test_missing_values_of_pandas_are_named() -> None:
 
 @pytest.fixture
 def trajectory() -> pdmp.Trajectory:
-    """Return a movement of two degrees of freedom, whose units are known."""
+    """Returns a movement of two degrees of freedom with units."""
     return pdmp.fit(reaches()).rollout(dt=0.013)
 
 
 def test_trajectories_have_names_and_units(trajectory: pdmp.Trajectory) -> None:
-    """They are those of the model, also after pickling."""
+    """Trajectories have the names and units of the model, also after pickling."""
     for made in (trajectory, pickle.loads(pickle.dumps(trajectory))):
         assert (made.names, made.units) == (["x", "y"], ["m", "m"])
 
 
 def assert_back(demo: Demonstration, trajectory: pdmp.Trajectory) -> None:
-    """Assert that a demonstration is a trajectory to the last bit, with its names and units."""
+    """Asserts that a demonstration equals a trajectory bit for bit, with its names and units."""
     np.testing.assert_array_equal(demo.position, trajectory.position)
     np.testing.assert_array_equal(demo.time, trajectory.time)
     assert (demo.names, demo.units) == (trajectory.names, trajectory.units)
 
 
 def test_trajectories_are_demonstrations(trajectory: pdmp.Trajectory) -> None:
-    """By themselves, in a list of a fit, and of an evaluation."""
+    """Trajectories are demonstrations in a constructor, a fit and an evaluation."""
     assert_back(Demonstration(trajectory), trajectory)
     assert Demonstration(trajectory, dt=0.5).dt == 0.5
     demo = Demonstration(trajectory)
@@ -268,7 +268,7 @@ def test_trajectories_are_demonstrations(trajectory: pdmp.Trajectory) -> None:
 
 
 def test_trajectories_come_back_from_files(trajectory: pdmp.Trajectory, tmp_path: Path) -> None:
-    """CSV and NPZ keep every bit, names and units."""
+    """CSV and NPZ files preserve every bit, names and units."""
     trajectory.to_csv(tmp_path / "a.csv")
     assert_back(pdmp.io.read_csv(tmp_path / "a.csv"), trajectory)
     assert_back(pdmp.io.read_csv(tmp_path / "a.csv", columns=trajectory.names), trajectory)
@@ -278,7 +278,7 @@ def test_trajectories_come_back_from_files(trajectory: pdmp.Trajectory, tmp_path
 
 
 def test_trajectories_are_dictionaries(trajectory: pdmp.Trajectory) -> None:
-    """Each array has its own name."""
+    """A trajectory converts to a dictionary of named arrays."""
     values = trajectory.to_dict()
     assert list(values) == ["time", "position", "velocity", "acceleration", "names", "units"]
     given = {name: values[name] for name in ("position", "time", "names", "units")}
@@ -288,7 +288,7 @@ def test_trajectories_are_dictionaries(trajectory: pdmp.Trajectory) -> None:
 def test_trajectories_are_data_frames(
     trajectory: pdmp.Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Their columns are those of the CSV file, their index is the time; they come back too."""
+    """Data frames have the columns of the CSV file and time as index, and convert back."""
     pandas = pytest.importorskip("pandas")
     frame = trajectory.to_dataframe()
     assert frame.index.name == "t"
@@ -304,8 +304,8 @@ def test_trajectories_are_data_frames(
         trajectory.to_dataframe()
 
 
-def test_readers_mappings_go_everywhere(tmp_path: Path) -> None:
-    """What a reader returns is learnt, evaluated, drawn and prepared as its values are."""
+def test_mappings_of_readers_are_accepted(tmp_path: Path) -> None:
+    """Mappings of readers are accepted by fit, evaluation, plots and preprocessing."""
     listed = reaches()
     named = {f"d{m}": demo for m, demo in enumerate(listed)}
     model = pdmp.fit(named)
@@ -331,16 +331,16 @@ def test_readers_mappings_go_everywhere(tmp_path: Path) -> None:
 
 
 def test_cycles_take_mappings() -> None:
-    """Recordings by name, with events by name, are cut as those in a list are."""
+    """Recordings and onsets by name are cut like those in a list."""
     (loop, *_) = loops()
     wave = Demonstration(np.tile(loop.position, (4, 1)), dt=loop.dt)
     period = loop.dt * loop.n_samples
-    events = [0.0, period, 2 * period, 3 * period]
-    listed = pdmp.preprocessing.cycles([wave, wave], events=[events, events])
-    named = pdmp.preprocessing.cycles({"a": wave, "b": wave}, events={"b": events, "a": events})
+    onsets = [0.0, period, 2 * period, 3 * period]
+    listed = pdmp.preprocessing.cycles([wave, wave], onsets=[onsets, onsets])
+    named = pdmp.preprocessing.cycles({"a": wave, "b": wave}, onsets={"b": onsets, "a": onsets})
     assert named.recordings == listed.recordings == [0] * 3 + [1] * 3
     for one, other in zip(named, listed, strict=True):
         np.testing.assert_array_equal(one.position, other.position)
     assert len(pdmp.preprocessing.cycles({"a": wave})) >= 3
-    with pytest.raises(ValueError, match="events: 'c' is among"):
-        pdmp.preprocessing.cycles({"a": wave}, events={"a": events, "c": events})
+    with pytest.raises(ValueError, match="onsets: 'c' is among"):
+        pdmp.preprocessing.cycles({"a": wave}, onsets={"a": onsets, "c": onsets})

@@ -1,4 +1,4 @@
-"""A disturbed robot and terms of the user's own, across the border."""
+"""Measured positions and coupling terms from Python."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import pdmp
 
 
 def test_zero_perturbation_changes_nothing(model: pdmp.Model) -> None:
-    """A robot where it should be and terms of zero leave the movement what it was."""
+    """A robot without error and terms of zero do not change the movement."""
     plain, perturbed = model.controller(), model.controller()
     for _ in range(100):
         status = plain.step()
@@ -17,7 +17,7 @@ def test_zero_perturbation_changes_nothing(model: pdmp.Model) -> None:
 
 
 def test_coupling_adds_to_velocity_and_acceleration(reach: pdmp.Model) -> None:
-    """Over a short tick the terms are what is added."""
+    """Over a short tick, the coupling terms are added to velocity and acceleration."""
     plain, coupled = (reach.controller(dt=1e-7) for _ in range(2))
     plain.step()
     coupled.step(coupling=((0.5, 0), np.float32([0, 3])))
@@ -25,8 +25,8 @@ def test_coupling_adds_to_velocity_and_acceleration(reach: pdmp.Model) -> None:
     np.testing.assert_allclose((coupled.acceleration - plain.acceleration)[1], 3, atol=1e-4)
 
 
-def test_held_robot_waits_and_then_arrives(reach: pdmp.Model) -> None:
-    """Held for longer than the movement lasts, it neither finishes nor misses its goal then."""
+def test_blocked_robot_waits_and_then_arrives(reach: pdmp.Model) -> None:
+    """A robot blocked for longer than the movement still reaches its goal and finishes."""
     model = reach
     controller = model.controller()
     for _ in range(500):
@@ -41,8 +41,8 @@ def test_held_robot_waits_and_then_arrives(reach: pdmp.Model) -> None:
     np.testing.assert_allclose(controller.position, controller.goal, atol=2e-3)
 
 
-def test_robot_that_sags_is_as_far_from_the_goal_as_it_sags(reach: pdmp.Model) -> None:
-    """A constant error keeps the movement neither from its goal nor from its end."""
+def test_constant_tracking_error_is_kept_at_the_goal(reach: pdmp.Model) -> None:
+    """A constant error prevents neither the goal nor the end of the movement."""
     controller = reach.controller()
     sag = np.array([0.0, 0.02])
     while controller.step(measured=controller.position - sag) == pdmp.Status.WORKING:
@@ -53,10 +53,10 @@ def test_robot_that_sags_is_as_far_from_the_goal_as_it_sags(reach: pdmp.Model) -
 @pytest.mark.parametrize(
     "bad", [[0.0], [0.0] * 3, [0.0, np.nan], [np.inf, 0.0], [[0.0, 0.0]], ["a", "b"]]
 )
-def test_bad_perturbations_are_refused_and_change_nothing(
+def test_invalid_perturbations_are_rejected_and_change_nothing(
     reach: pdmp.Model, bad: list[object]
 ) -> None:
-    """Wrong shapes and numbers that are not finite are named; the state stays as it was."""
+    """Wrong shapes and numbers that are not finite are named; the state is unchanged."""
     controller = reach.controller()
     controller.step()
     before = controller.position.copy()
@@ -74,7 +74,7 @@ def test_bad_perturbations_are_refused_and_change_nothing(
 
 
 def test_compliance_is_checked_and_survives_a_reset(reach: pdmp.Model) -> None:
-    """Gains have defaults, are refused when negative, and belong to the controller."""
+    """Gains have defaults, are rejected when negative, and survive a reset."""
     controller = reach.controller()
     assert controller.compliance == (1000, 10)
     controller.compliance = (200, 0)

@@ -1,4 +1,4 @@
-"""Figures show what they say, on axes that name quantity and unit."""
+"""Contents of figures, on axes with quantity and unit."""
 
 import sys
 from pathlib import Path
@@ -16,43 +16,43 @@ from synthetic import loops, reaches
 
 @pytest.fixture(scope="module")
 def model() -> pdmp.Model:
-    """Return a discrete model of five reaches."""
+    """Returns a discrete model of five reaches."""
     return pdmp.fit(reaches(), n_styles=2)
 
 
 @pytest.fixture(scope="module")
 def rhythmic() -> pdmp.Model:
-    """Return a rhythmic model of three loops."""
+    """Returns a rhythmic model of three loops."""
     return pdmp.fit(loops(), kind="rhythmic", n_styles=2)
 
 
 @pytest.fixture(scope="module")
 def evaluation() -> Evaluation:
-    """Return what primitives with one and two styles foresee of reaches held out."""
+    """Returns an evaluation of primitives with one and two styles."""
     return pdmp.evaluate(reaches(), predictors=over_styles(2))
 
 
 def labels_of(figure: Figure) -> set[str]:
-    """Return the labels of all axes."""
+    """Returns the labels of all axes."""
     return {text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel())}
 
 
-def test_demonstrations_stand_beside_reproductions(model: pdmp.Model) -> None:
-    """The path panel has a line for each demonstration and one for its reproduction."""
+def test_demonstrations_are_drawn_with_reproductions(model: pdmp.Model) -> None:
+    """The path panel has a line for each demonstration and for its reproduction."""
     figure = plot.demonstrations(model, reaches())
     assert len(figure.axes[0].lines) == 2 * model.n_demos
     assert labels_of(figure) == {"x [m]", "y [m]", "time [s]"}
 
 
 def test_demonstrations_have_a_column_per_label(model: pdmp.Model) -> None:
-    """Labels part the demonstrations, in the order in which they appear."""
+    """Labels group the demonstrations in order of appearance."""
     figure = plot.demonstrations(model, reaches(), labels=["b", "b", "a", "a", "a"])
     assert [axes.get_title() for axes in figure.axes[:2]] == ["b", "a"]
 
 
 @pytest.mark.parametrize("n_dofs", [1, 3])
 def test_only_a_plane_has_a_path_panel(n_dofs: int) -> None:
-    """One and three degrees of freedom are drawn over time alone."""
+    """One and three degrees of freedom are drawn over time only."""
     demos = [demo.position[:, [0, 1, 0][:n_dofs]] for demo in reaches()]
     figure = plot.demonstrations(
         pdmp.fit(demos, dt=0.02), [pdmp.Demonstration(demo, dt=0.02) for demo in demos]
@@ -61,7 +61,7 @@ def test_only_a_plane_has_a_path_panel(n_dofs: int) -> None:
 
 
 def test_demonstrations_must_be_those_of_the_fit(model: pdmp.Model) -> None:
-    """A demonstration too few is refused."""
+    """A wrong number of demonstrations is rejected."""
     with pytest.raises(ValueError, match="demos has length 4, expected 5"):
         plot.demonstrations(model, reaches()[:4])
 
@@ -77,20 +77,20 @@ def test_demonstrations_must_be_those_of_the_fit(model: pdmp.Model) -> None:
 def test_demonstrations_have_the_dofs_of_the_model(
     model: pdmp.Model, given: dict[str, Any], message: str
 ) -> None:
-    """What has other degrees of freedom is not drawn in their panels."""
+    """Demonstrations with other degrees of freedom are rejected."""
     other = pdmp.Demonstration(given.pop("position"), dt=0.01, **given)
     with pytest.raises(ValueError, match=message):
         plot.demonstrations(model, [other] * model.n_demos)
 
 
-def test_spectrum_tells_the_chosen_number_of_styles(model: pdmp.Model) -> None:
-    """The title says how many of how many singular values were kept."""
+def test_spectrum_states_the_number_of_styles(model: pdmp.Model) -> None:
+    """The title has J and the number of singular values."""
     (axes,) = plot.spectrum(model).axes
     assert axes.get_title().startswith("J = 2 of 5: ")
 
 
 def test_styles_are_labelled(model: pdmp.Model) -> None:
-    """Each label has its own points, as many as demonstrations carry it."""
+    """Each label has a point per demonstration."""
     axes = plot.styles(model, ["a", "a", "b", "b", "b"]).axes[0]
     assert [len(dots.get_offsets()) for dots in axes.collections] == [2, 3]
 
@@ -108,7 +108,7 @@ def test_styles_of_any_dimension_can_be_drawn(n_styles: int) -> None:
 
 
 def test_fan_has_a_movement_per_share(model: pdmp.Model) -> None:
-    """As many movements as asked for, and a bar that names the two ends."""
+    """A fan has n movements, and a colour bar that names the two ends."""
     ends = [model.conditions(m) for m in (0, 4)]
     figure = plot.fan(model, *ends, n=6, ends=("left", "right"))
     assert len(figure.axes[0].lines) == 6
@@ -117,13 +117,13 @@ def test_fan_has_a_movement_per_share(model: pdmp.Model) -> None:
 
 
 def test_fan_needs_two_ends(model: pdmp.Model) -> None:
-    """A single movement is no fan."""
+    """A fan of fewer than two movements is rejected."""
     style = model.conditions(0)
     with pytest.raises(ValueError, match="n = 1"):
         plot.fan(model, style, style, n=1)
 
 
-def test_phase_portrait_shows_cycles_and_how_one_is_joined(rhythmic: pdmp.Model) -> None:
+def test_phase_portrait_has_cycles_and_a_movement_from_rest(rhythmic: pdmp.Model) -> None:
     """Each panel has the cycle of every demonstration and one movement from rest."""
     figure = plot.phase_portrait(rhythmic)
     assert [len(axes.lines) for axes in figure.axes] == [rhythmic.n_demos + 1] * rhythmic.n_dofs
@@ -137,7 +137,7 @@ def test_phase_portrait_needs_a_rhythmic_model(model: pdmp.Model) -> None:
 
 
 def test_prediction_error_is_drawn_over_the_styles(evaluation: Evaluation) -> None:
-    """One panel a reach: a point per J with its deviation, and the mean demonstration's level."""
+    """Each reach has a panel: mean and deviation per J, and the mean demonstration's level."""
     figure = plot.prediction_error(evaluation, unit="m")
     assert [axes.get_title() for axes in figure.axes] == ["interpolation", "extrapolation"]
     assert labels_of(figure) == {"number of style parameters J", "E [m²]", ""}
@@ -147,13 +147,13 @@ def test_prediction_error_is_drawn_over_the_styles(evaluation: Evaluation) -> No
 
 
 def test_prediction_error_needs_numbers_of_styles() -> None:
-    """Predictors without J have no place on the axis."""
+    """Predictors without J are rejected."""
     with pytest.raises(ValueError, match="no PDMP with n_styles among mean demonstration"):
         plot.prediction_error(pdmp.evaluate(reaches(), predictors={}))
 
 
 def test_held_out_movements_have_a_column_per_reach(evaluation: Evaluation) -> None:
-    """A panel for each degree of freedom: the recording, the forecast and its band."""
+    """Each degree of freedom has a panel with recording, forecast and band."""
     figure = plot.held_out(evaluation, "PDMP, J = 2", unit="m")
     titles = [axes.get_title() for axes in figure.axes[:2]]
     assert titles[0].startswith("interpolation, context ")
@@ -163,21 +163,21 @@ def test_held_out_movements_have_a_column_per_reach(evaluation: Evaluation) -> N
 
 
 def test_given_figure_is_drawn_on(model: pdmp.Model) -> None:
-    """A figure that is handed in is the one that comes back."""
+    """A given figure is drawn on and returned."""
     figure = Figure()
     assert plot.spectrum(model, figure=figure) is figure
     assert figure.axes
 
 
 def test_saved_figure_is_a_png(model: pdmp.Model, tmp_path: Path) -> None:
-    """Saving makes the folder and writes a PNG, and nothing else."""
+    """Saving creates the folder and writes a PNG only."""
     plot.save(plot.spectrum(model), tmp_path / "new" / "spectrum.png")
     (file,) = (tmp_path / "new").iterdir()
     assert file.read_bytes().startswith(b"\x89PNG")
 
 
-def test_suffix_chooses_the_format(model: pdmp.Model, tmp_path: Path) -> None:
-    """Vectors for a paper are vectors; what matplotlib does not write is refused."""
+def test_suffix_selects_the_format(model: pdmp.Model, tmp_path: Path) -> None:
+    """The suffix selects the format; unsupported ones are rejected."""
     figure = plot.spectrum(model)
     plot.save(figure, tmp_path / "spectrum.pdf")
     assert (tmp_path / "spectrum.pdf").read_bytes().startswith(b"%PDF")
@@ -187,14 +187,14 @@ def test_suffix_chooses_the_format(model: pdmp.Model, tmp_path: Path) -> None:
 
 
 def test_missing_matplotlib_is_named(model: pdmp.Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without matplotlib, the error says what to install."""
+    """Without matplotlib, the error names the extra."""
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(ImportError, match=r"pip install 'pdmp\[plot\]'"):
         plot.spectrum(model)
 
 
-def test_cut_off_is_where_as_much_is_taken_off_as_there_is_noise() -> None:
-    """The line of noise alone, followed to 0 Hz, tells its level; the dot lies on both curves."""
+def test_cut_off_is_where_the_residual_equals_the_noise() -> None:
+    """The fitted line at 0 Hz gives the level of noise; the dot is where the residual equals it."""
     rng = np.random.default_rng(2)
     t = np.arange(2000) * 0.005
     noise = 0.01 * rng.standard_normal((2000, 2))
@@ -213,6 +213,6 @@ def test_cut_off_is_where_as_much_is_taken_off_as_there_is_noise() -> None:
 
 
 def test_cut_off_needs_a_clock() -> None:
-    """Frequencies are per second."""
+    """A recording without times is rejected."""
     with pytest.raises(ValueError, match="does not tell when"):
         plot.cut_off(pdmp.Demonstration(np.zeros((9, 1))))

@@ -1,4 +1,4 @@
-"""Predictors of an evaluation, each by itself, and the figures that are made of their forecasts."""
+"""Predictors of an evaluation, and the scores of their forecasts."""
 
 import sys
 from pathlib import Path
@@ -19,14 +19,13 @@ from pdmp.evaluation import (
     MeanDemonstration,
     MovedGoal,
     NearestDemonstration,
-    PeerWeights,
     Predictor,
-    ProcessWeights,
     RadialWeights,
     Recordings,
     Scores,
     Split,
 )
+from report.baselines import PeerWeights, ProcessWeights
 
 PROMP = Path(__file__).parent / "data" / "promp.npz"
 PREDICTORS: dict[str, Predictor] = {
@@ -70,7 +69,7 @@ def bumps() -> Recordings:
 
 @pytest.mark.parametrize("name", PREDICTORS)
 def test_a_predictor_forecasts_positions_and_duration(name: str) -> None:
-    """From one context (Q,): as many samples and DoFs as it learnt from, finite, in seconds."""
+    """A forecast for a context (Q,) has (C, D) positions and a duration, all finite."""
     forecast = PREDICTORS[name].fit(bumps())(np.array([0.25]))
     assert forecast.position.shape == (101, 2)
     assert np.isfinite(forecast.position).all()
@@ -80,11 +79,11 @@ def test_a_predictor_forecasts_positions_and_duration(name: str) -> None:
         assert (forecast.variance >= -1e-12).all()
 
 
-def test_mean_demonstration_averages_whatever_the_context() -> None:
-    """Arithmetic mean of positions, geometric of durations, variance of one more movement."""
+def test_mean_demonstration_is_the_same_for_every_context() -> None:
+    """Arithmetic mean of positions, geometric of durations, variance of a new movement."""
     sampled = np.array([[[0.0]] * 4, [[1.0]] * 4, [[5.0]] * 4])
-    foresee = MeanDemonstration().fit(recorded(sampled, [1.0, 2.0, 4.0], [0, 1, 2]))
-    near, far = foresee(np.array([0.0])), foresee(np.array([1e6]))
+    predict = MeanDemonstration().fit(recorded(sampled, [1.0, 2.0, 4.0], [0, 1, 2]))
+    near, far = predict(np.array([0.0])), predict(np.array([1e6]))
     np.testing.assert_array_equal(near.position, far.position)
     np.testing.assert_allclose(near.position, 2.0)
     assert near.duration == pytest.approx(2.0)
@@ -94,7 +93,7 @@ def test_mean_demonstration_averages_whatever_the_context() -> None:
 
 
 def test_mean_of_one_demonstration_has_no_variance() -> None:
-    """One movement does not tell how much movements vary."""
+    """One demonstration has no variance."""
     only = recorded(arches([0.2]), [1.0], [0.2])
     forecast = MeanDemonstration().fit(only)(np.array([0.2]))
     np.testing.assert_array_equal(forecast.position, only.sampled[0])
@@ -102,7 +101,7 @@ def test_mean_of_one_demonstration_has_no_variance() -> None:
 
 
 def test_nearest_is_measured_in_deviations_of_each_context_value() -> None:
-    """A context in another unit does not drown the others."""
+    """Distances of contexts do not depend on units."""
     contexts = [[0.0, 0.0], [0.0, 1000.0], [1.0, 0.0], [1.0, 1000.0]]
     four = recorded(arches([0, 1, 2, 3]), [1.0, 2.0, 3.0, 4.0], contexts)
     forecast = NearestDemonstration().fit(four)(np.array([0.9, 300.0]))
@@ -111,7 +110,7 @@ def test_nearest_is_measured_in_deviations_of_each_context_value() -> None:
 
 
 def test_moved_goal_ends_where_the_context_leads() -> None:
-    """Start, goal and log duration are linear in the context; the path between is one's own."""
+    """Start, goal and log duration are linear in the context; the path is demonstrated."""
     forecast = MovedGoal().fit(bumps())(np.array([0.23]))
     (expected,) = arches([0.23])
     np.testing.assert_allclose(forecast.position[0], expected[0], atol=1e-9)
@@ -120,8 +119,8 @@ def test_moved_goal_ends_where_the_context_leads() -> None:
 
 
 @pytest.mark.parametrize("kind", ["discrete", "rhythmic"])
-def test_radial_weights_give_movements_back(kind: Any) -> None:
-    """Offset + weights · basis is each movement; a cycle's functions join at its end."""
+def test_radial_weights_reproduce_movements(kind: Any) -> None:
+    """Offset + weights · basis gives each movement; functions of a cycle are periodic."""
     n = 100
     s = np.linspace(0, 2 * np.pi, n, endpoint=kind == "discrete")
     sampled = np.array([np.column_stack([np.sin(s), k * np.cos(2 * s)]) for k in (0.5, 1, 2)])
@@ -136,8 +135,8 @@ def test_radial_weights_give_movements_back(kind: Any) -> None:
         np.testing.assert_allclose(first[1:], first[1:][::-1], atol=1e-12)
 
 
-def test_heavier_ridge_makes_smaller_weights() -> None:
-    """The ridge is on the sum of squared weights."""
+def test_larger_ridge_gives_smaller_weights() -> None:
+    """A larger ridge parameter gives smaller weights."""
     sizes = [
         np.sum(RadialWeights(ridge=ridge)(bumps())[0] ** 2) for ridge in (1e-9, 1e-3, 1.0, 1e3)
     ]
@@ -146,16 +145,16 @@ def test_heavier_ridge_makes_smaller_weights() -> None:
 
 
 def test_linear_weights_extend_a_linear_family() -> None:
-    """Weights of movements that are linear in their context are, between and beyond."""
-    foresee = LinearWeights(Components(1.0)).fit(bumps())
+    """For movements that are linear in the context, weights interpolate and extrapolate exactly."""
+    predict = LinearWeights(Components(1.0)).fit(bumps())
     for height in (0.23, 0.7):
         np.testing.assert_allclose(
-            foresee(np.array([height])).position, arches([height])[0], atol=1e-9
+            predict(np.array([height])).position, arches([height])[0], atol=1e-9
         )
 
 
-def test_processes_bend_where_lines_cannot() -> None:
-    """Of a family that is a parabola in its context, processes forecast what lines miss."""
+def test_processes_follow_nonlinear_families() -> None:
+    """For a family that is quadratic in the context, processes are accurate where lines are not."""
     contexts = np.linspace(-1, 1, 11)
     family = recorded(arches(contexts**2), [1.0] * 11, contexts)
     errors = [
@@ -176,20 +175,20 @@ def promp() -> Any:
 
 
 def test_radial_weights_forecast_as_promps_of_movement_primitives(promp: Any) -> None:
-    """Other widths of the functions, the same movements between and beyond, within 1 %."""
+    """Forecasts agree within 1 % with those of a ProMP with other widths."""
     family = recorded(promp.sampled, [1.0] * 6, promp.heights)
-    foresee = LinearWeights(RadialWeights()).fit(family)
+    predict = LinearWeights(RadialWeights()).fit(family)
     for height, expected in zip(promp.at, promp.forecasts, strict=True):
-        np.testing.assert_allclose(foresee(np.array([height])).position, expected, atol=0.01)
+        np.testing.assert_allclose(predict(np.array([height])).position, expected, atol=0.01)
 
 
 def test_weights_of_the_peer_forecast_as_the_peer(
     promp: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its recorded weights and trajectories are read in its order of DoFs and samples."""
+    """Recorded weights and trajectories of movement_primitives give its recorded forecasts."""
 
     class Replay:
-        """The answers of movement_primitives for these movements, and for unit weights."""
+        """Recorded results of movement_primitives for these movements and for unit weights."""
 
         def __init__(self, n_dims: int, n_weights_per_dim: int) -> None:
             assert (n_dims, n_weights_per_dim) == (2, 20)
@@ -208,41 +207,41 @@ def test_weights_of_the_peer_forecast_as_the_peer(
     weights, offset, basis = PeerWeights()(family)
     back = (offset + weights @ basis).reshape(promp.sampled.shape)
     np.testing.assert_allclose(back, promp.sampled, atol=2e-3)
-    foresee = LinearWeights(PeerWeights()).fit(family)
+    predict = LinearWeights(PeerWeights()).fit(family)
     for height, expected in zip(promp.at, promp.forecasts, strict=True):
-        np.testing.assert_allclose(foresee(np.array([height])).position, expected, atol=1e-6)
+        np.testing.assert_allclose(predict(np.array([height])).position, expected, atol=1e-6)
 
 
 def test_missing_peer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An encoding of a library that is not installed says which."""
+    """A missing library is named."""
     monkeypatch.setitem(sys.modules, "movement_primitives.promp", None)
     with pytest.raises(ImportError, match="movement_primitives is not installed"):
         PeerWeights()(bumps())
 
 
 class Shifted:
-    """A predictor that is off by a step of its own in each DoF, of known variance."""
+    """A predictor with a constant error per degree of freedom and a given variance."""
 
     def __init__(self, step: float, variance: float) -> None:
         self.step = step
         self.variance = variance
 
     def fit(self, recordings: Recordings) -> Any:
-        """Keep the first movement."""
+        """Returns the shifted first movement."""
         first = recordings.sampled[0] + self.step
         return lambda _: Forecast(first, 2.0, np.full_like(first, self.variance))
 
 
 @pytest.fixture(scope="module")
 def evaluation() -> Evaluation:
-    """Returns figures of two predictors on three equal movements of 1 s."""
+    """Returns an evaluation of two predictors on three equal movements of 1 s."""
     demos, splits = [arches([0.0])[0]] * 3, [([0, 1], [2], "interpolation")] * 2
     tried = {"near": Shifted(0.1, 0.1), "far": Shifted(0.3, 0.01)}
     return pdmp.evaluate(demos, dt=0.01, contexts=[[0], [1], [2]], predictors=tried, splits=splits)
 
 
 def test_scores_are_arrays_over_splits(evaluation: Evaluation) -> None:
-    """Squared distance, relative error of the duration, share of positions inside the band."""
+    """Scores are squared distance, relative duration error and coverage of the band, per split."""
     scores = evaluation.score("near")
     assert isinstance(scores, Scores)
     np.testing.assert_allclose(scores.error, [0.02, 0.02])
@@ -253,7 +252,7 @@ def test_scores_are_arrays_over_splits(evaluation: Evaluation) -> None:
 
 
 def test_comparison_is_a_difference_of_errors(evaluation: Evaluation) -> None:
-    """A less b: negative where a is better, and the other way round its negative."""
+    """The comparison of a with b is negative where a is better, and antisymmetric."""
     better, worse = evaluation.compare("near", "far"), evaluation.compare("far", "near")
     assert isinstance(better, Comparison)
     np.testing.assert_allclose(better.differences, [0.02 - 0.18] * 2)
@@ -262,8 +261,8 @@ def test_comparison_is_a_difference_of_errors(evaluation: Evaluation) -> None:
     assert better.standard_error == pytest.approx(0.0, abs=1e-12)
 
 
-def test_splits_are_kept_with_what_was_tried(evaluation: Evaluation) -> None:
-    """Which were learnt from, which held out, and of which reach."""
+def test_evaluation_has_splits_and_predictors(evaluation: Evaluation) -> None:
+    """An evaluation has training and test demonstrations, reaches and predictors."""
     for split in evaluation.splits:
         assert isinstance(split, Split)
         assert (list(split.train), list(split.test)) == ([0, 1], [2])

@@ -1,4 +1,4 @@
-"""Raw recordings become demonstrations: cycles of a walk, angles unwrapped, noise taken off."""
+"""Preprocessing of raw recordings: cycles, unwrapped angles, filters, resampling."""
 
 import pickle
 from pathlib import Path
@@ -15,12 +15,12 @@ STRIDE = 1.17
 UNITS = ["rad", "rad", "m"]
 
 
-# The pelvis of these walks goes on; that cycles lack its way is warned of, and claimed in one test.
+# The pelvis of these walks advances; one test claims the warning about it, the others ignore it.
 pytestmark = pytest.mark.filterwarnings("ignore:more is gained per cycle")
 
 
 def walk(n: int = 700, dt: float = 0.01, phase: float = 0.0) -> NDArray[np.float64]:
-    """Return both hips [rad] and a pelvis [m] that walks on at 1.3 m/s."""
+    """Returns both hips [rad] and a pelvis [m] that advances at 1.3 m/s."""
     t = np.arange(n) * dt
     phi = 2 * np.pi * t / STRIDE + phase
     pelvis = 1.3 * t + 0.02 * np.sin(2 * phi)
@@ -28,14 +28,14 @@ def walk(n: int = 700, dt: float = 0.01, phase: float = 0.0) -> NDArray[np.float
 
 
 def recording(**given: object) -> pdmp.Demonstration:
-    """Return a walk at 100 Hz with names and units."""
+    """Returns a walk at 100 Hz with names and units."""
     options = {"dt": 0.01, "names": ["hip_l", "hip_r", "pelvis"], "units": UNITS} | given
     return pdmp.Demonstration(walk(), **options)  # type: ignore[arg-type]
 
 
 @pytest.fixture
 def raw(tmp_path: Path) -> Path:
-    """Return a raw recording: stamps that jitter, noise, a gap and an odd stride."""
+    """Returns the file of a raw recording with jitter, noise, a gap and an outlying stride."""
     rng = np.random.default_rng(5)
     t = np.arange(700) * 0.01 + rng.uniform(-0.003, 0.003, 700)
     position = np.array([np.interp(t, np.arange(700) * 0.01, y) for y in walk().T]).T
@@ -51,7 +51,7 @@ def raw(tmp_path: Path) -> Path:
 
 
 def test_a_raw_walk_becomes_a_rhythmic_primitive(raw: Path) -> None:
-    """Two lines lead from a file to a model, in its units, of its period, without a jump."""
+    """Two lines convert a file to a model with its units and period, without a jump."""
     cycles = pdmp.preprocessing.cycles(pdmp.io.read_csv(raw, max_gap=0.1))
     model = pdmp.fit(cycles, kind="rhythmic", smoothing="auto")
     assert model.units == UNITS
@@ -65,7 +65,7 @@ def test_a_raw_walk_becomes_a_rhythmic_primitive(raw: Path) -> None:
 
 
 def test_cycles_last_as_long_as_their_samples() -> None:
-    """T · dt is the period, and names, units and context go along; the goal does not."""
+    """T · dt is the period; names, units and context are kept, the goal is not."""
     cycles = pdmp.preprocessing.cycles(recording(context=[1.3], goal=[0, 0, 9]))
     for cycle, period in zip(cycles, cycles.periods, strict=True):
         assert cycle.dt is not None
@@ -74,7 +74,7 @@ def test_cycles_last_as_long_as_their_samples() -> None:
 
 
 def test_a_mean_cycle_has_less_noise() -> None:
-    """Averaged, the noise falls with the root of the number of cycles."""
+    """The noise of a mean cycle falls with the square root of the number of cycles."""
     rng = np.random.default_rng(1)
     noisy = pdmp.Demonstration(walk(2000) + 0.02 * rng.standard_normal((2000, 3)), dt=0.01)
 
@@ -86,8 +86,8 @@ def test_a_mean_cycle_has_less_noise() -> None:
     assert noise(mean[0]) < 0.5 * np.median([noise(cycle) for cycle in each])
 
 
-def test_recordings_are_told_apart_and_in_phase() -> None:
-    """Each cycle tells its recording, and begins where those of the first recording do."""
+def test_cycles_have_their_recording_and_a_common_phase() -> None:
+    """Each cycle has the index of its recording, and the phase of those of the first recording."""
     found = pdmp.preprocessing.cycles(
         [pdmp.Demonstration(walk(phase=p), dt=0.01) for p in (0.0, 2.0, 5.0)]
     )
@@ -97,13 +97,13 @@ def test_recordings_are_told_apart_and_in_phase() -> None:
 
 
 def reach() -> pdmp.Demonstration:
-    """Return a movement that repeats nothing."""
+    """Returns a movement that is not periodic."""
     s = np.linspace(0, 1, 200)
     return pdmp.Demonstration(np.column_stack([s**3, s, s**2 * (3 - 2 * s)]), dt=0.01)
 
 
-def test_a_recording_without_a_period_is_refused_with_the_figure() -> None:
-    """The error names the recording, how well it repeats itself and how well it must."""
+def test_a_recording_without_a_period_is_rejected_with_its_correlation() -> None:
+    """The error states the recording, its autocorrelation and the threshold."""
     with pytest.raises(
         ValueError, match=r"demo 0: no period: .* correlation of -?\d\.\d+, below 0\."
     ):
@@ -111,7 +111,7 @@ def test_a_recording_without_a_period_is_refused_with_the_figure() -> None:
 
 
 def test_a_recording_without_a_period_among_others_is_left_out_with_a_warning() -> None:
-    """The others are cut; what is left out is listed with its figure and its duration."""
+    """Other recordings are cut; the rejected one is listed with its correlation and duration."""
     with pytest.warns(UserWarning, match=r"recording 1 is left out: no period: .* correlation of"):
         found = pdmp.preprocessing.cycles([recording(), reach(), recording()])
     assert set(found.recordings) == {0, 2}
@@ -120,8 +120,8 @@ def test_a_recording_without_a_period_among_others_is_left_out_with_a_warning() 
     assert "no period" in rejected.reason
 
 
-def test_the_turns_of_a_crank_are_taken_off() -> None:
-    """Cycles of an angle that goes on are about one mean, without a warning."""
+def test_the_turns_of_a_crank_are_removed() -> None:
+    """Full turns per cycle are removed without a warning."""
     t = 0.01 * np.arange(len(walk()))
     crank = 2 * np.pi * t / STRIDE + 0.2 * np.sin(2 * np.pi * t / STRIDE)
     turning = np.column_stack([walk()[:, :2], crank])
@@ -136,8 +136,8 @@ def test_the_turns_of_a_crank_are_taken_off() -> None:
         assert np.ptp([cycle.position[:, 2].mean() for cycle in found]) < 0.1
 
 
-def test_a_way_gained_in_each_cycle_is_warned_of_with_its_size() -> None:
-    """Someone who walks off has cycles in place, and the warning gives name, gain and unit."""
+def test_a_gain_per_cycle_causes_a_warning_with_its_size() -> None:
+    """A gain per cycle, such as of a walk, causes a warning with name, gain and unit."""
     with pytest.warns(UserWarning, match=r"'pelvis' gains 1\.52 m in recording 0; closed cycles"):
         found = pdmp.preprocessing.cycles(recording())
     assert found.gains.shape == (len(found), 3)
@@ -145,8 +145,8 @@ def test_a_way_gained_in_each_cycle_is_warned_of_with_its_size() -> None:
     assert np.abs(found.gains[:, :2]).max() < 0.02
 
 
-def test_sampling_anew_makes_no_styles_of_noise() -> None:
-    """Noisy reaches at twice their rate, and the cycles of a noisy walk, are one style each."""
+def test_resampling_adds_no_styles_of_noise() -> None:
+    """Upsampled noisy reaches, and cycles of a noisy walk, have one style each."""
     rng = np.random.default_rng(2)
     s = np.linspace(0, 1, 101)
     path = np.column_stack([s**3 * (10 - 15 * s + 6 * s**2), (4 * s * (1 - s)) ** 3])
@@ -162,7 +162,7 @@ def test_sampling_anew_makes_no_styles_of_noise() -> None:
 
 
 def test_trimming_finds_the_rests_beside_a_noisy_movement() -> None:
-    """A second of movement between rests of 0.8 s stays a second at a noise of a thousandth."""
+    """One second of movement between rests of 0.8 s is kept with a noise of a thousandth."""
     s = np.clip(np.linspace(-0.8, 1.8, 261), 0, 1)
     path = np.column_stack([s**3 * (10 - 15 * s + 6 * s**2), -(s**2) * (3 - 2 * s)])
     for seed in range(5):
@@ -171,17 +171,17 @@ def test_trimming_finds_the_rests_beside_a_noisy_movement() -> None:
         assert 90 <= kept.n_samples <= 110
 
 
-def test_events_take_the_place_of_the_search() -> None:
-    """One list of events serves one recording; several need one each."""
-    found = pdmp.preprocessing.cycles(recording(), events=[0.5, 1.5, 2.6])
+def test_onsets_replace_the_search() -> None:
+    """One recording takes one list of onsets; several need one each."""
+    found = pdmp.preprocessing.cycles(recording(), onsets=[0.5, 1.5, 2.6])
     np.testing.assert_allclose(found.periods, [1.0, 1.1])
-    with pytest.raises(ValueError, match="events has length 1, expected 2"):
-        pdmp.preprocessing.cycles([recording(), recording()], events=[[0.5, 1.5]])
+    with pytest.raises(ValueError, match="onsets has length 1, expected 2"):
+        pdmp.preprocessing.cycles([recording(), recording()], onsets=[[0.5, 1.5]])
 
 
 @given(st.floats(-3, 3), st.floats(-0.9, 0.9), st.integers(5, 60), st.sampled_from(["rad", "deg"]))
 def test_unwrapping_undoes_wrapping(start: float, step: float, n: int, unit: str) -> None:
-    """An angle that turns less than half a turn a sample comes back, but for whole turns."""
+    """An angle with less than half a turn per sample is restored up to full turns."""
     turn = {"rad": 2 * np.pi, "deg": 360.0}[unit]
     angle = start + step * np.pi * np.arange(n)
     wrapped = ((angle + np.pi) % (2 * np.pi) - np.pi) * turn / (2 * np.pi)
@@ -193,15 +193,15 @@ def test_unwrapping_undoes_wrapping(start: float, step: float, n: int, unit: str
 
 
 def test_a_goal_turns_with_the_last_sample() -> None:
-    """Half a turn past the wrap, the goal is still as far from the end as it was."""
+    """The goal moves with the last sample by full turns."""
     wrapped = np.array([[3.0], [3.1], [-3.1], [-3.0]])
     demo = pdmp.preprocessing.unwrap(pdmp.Demonstration(wrapped, dt=0.1, goal=[-2.9]))
     assert demo.goal is not None
     assert demo.goal[0] - demo.position[-1, 0] == pytest.approx(0.1)
 
 
-def test_preparing_keeps_what_belongs_to_the_movement() -> None:
-    """Filter, resampling and trimming keep names, units, context and goal."""
+def test_preprocessing_keeps_names_units_context_and_goal() -> None:
+    """Filters, resampling and trimming keep names, units, context and goal."""
     whole = recording(context=[1.0], goal=[0, 0, 9])
     for demo in (
         pdmp.preprocessing.lowpass(whole, 6),
@@ -214,7 +214,7 @@ def test_preparing_keeps_what_belongs_to_the_movement() -> None:
 
 
 def test_units_survive_pickling_and_saving(tmp_path: Path) -> None:
-    """Demonstration, model and model file tell the same units."""
+    """Demonstration, model and model file have the same units."""
     cycles = pdmp.preprocessing.cycles(recording())
     assert pickle.loads(pickle.dumps(cycles[0])).units == UNITS
     model = pdmp.fit(cycles, kind="rhythmic")
@@ -224,7 +224,7 @@ def test_units_survive_pickling_and_saving(tmp_path: Path) -> None:
 
 
 def test_units_must_agree() -> None:
-    """Radians and degrees do not make one model, and each degree of freedom has one unit."""
+    """Demonstrations must have the same units, one per degree of freedom."""
     other = pdmp.Demonstration(walk(), dt=0.01, units=["deg", "deg", "m"])
     with pytest.raises(ValueError, match="demo 1: units differ"):
         pdmp.fit([pdmp.Demonstration(walk(), dt=0.01, units=UNITS), other])
@@ -233,7 +233,7 @@ def test_units_must_agree() -> None:
 
 
 def test_a_recording_needs_a_clock() -> None:
-    """Whatever asks for times says so where there are none."""
+    """Functions that need times reject recordings without them."""
     bare = pdmp.Demonstration(walk())
     for call in (pdmp.preprocessing.period, pdmp.preprocessing.trim, pdmp.preprocessing.cycles):
         with pytest.raises(ValueError, match=r"no sampling times: .* dt= or time="):

@@ -1,4 +1,4 @@
-"""The README shows what is true."""
+"""The README is correct."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_every_snippet_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The Python snippets run in their order, and the loop ends on the goal it was given."""
+    """The Python snippets run in order, and the loop ends at its goal."""
     monkeypatch.chdir(tmp_path)
     snippets = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     assert len(snippets) >= 2
@@ -22,8 +22,8 @@ def test_every_snippet_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert (tmp_path / "reach.safetensors").exists()
 
 
-def test_commands_and_links_lead_somewhere() -> None:
-    """Every make target, file and picture that the README names exists."""
+def test_commands_and_links_exist() -> None:
+    """Every make target, file and figure in the README exists."""
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     targets = re.findall(r"^make (\w+)", README, re.MULTILINE)
     assert targets[:2] == ["demo", "test"]

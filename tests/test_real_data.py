@@ -1,4 +1,4 @@
-"""Recordings of people load, are learnt, given back, and predicted from their context."""
+"""Recordings of people are read, learnt, reproduced, and predicted from contexts."""
 
 import csv
 from pathlib import Path
@@ -26,7 +26,7 @@ def recordings(name: str, step: int, **options: Any) -> list[Demonstration]:
 
 
 def worst_error(model: pdmp.Model, demos: list[Demonstration]) -> float:
-    """Return the largest RMSE over range of a reproduction, of any demonstration."""
+    """Returns the largest RMSE over range of a reproduction, of any demonstration."""
     errors = []
     for m, demo in enumerate(demos):
         steps = demo.n_samples - (model.kind == "discrete")
@@ -37,7 +37,7 @@ def worst_error(model: pdmp.Model, demos: list[Demonstration]) -> float:
 
 
 def assert_finite(trajectory: pdmp.Trajectory) -> None:
-    """Assert that a movement has no number that is none."""
+    """Asserts that a movement is finite."""
     for name in ("position", "velocity", "acceleration"):
         assert np.isfinite(getattr(trajectory, name)).all()
 
@@ -46,11 +46,11 @@ ARM = ["r_sh1", "r_sh2", "r_sh3", "r_elb"]
 
 
 def raised_hands() -> list[Demonstration]:
-    """Return movements of a four-joint arm that raises its hand to several heights."""
+    """Returns movements of a four-joint arm that raises its hand to several heights."""
     return recordings("raise_hand_bandai", 8, columns=ARM, context=["hold_height_m"])
 
 
-def test_raised_hands_are_given_back() -> None:
+def test_raised_hands_are_reproduced() -> None:
     """With J = M, arm movements at 30 Hz are reproduced to 1e-3 of their range."""
     demos = raised_hands()
     model = pdmp.fit(demos, n_styles=len(demos))
@@ -59,7 +59,7 @@ def test_raised_hands_are_given_back() -> None:
 
 
 def test_raised_hands_are_predicted_from_their_height() -> None:
-    """Heights between and beyond those shown lead to movements of finite numbers and duration."""
+    """Predicted movements for heights between and beyond the demonstrated ones are finite."""
     model = pdmp.fit(raised_hands())
     for height in (1.0, 1.4, 1.8):
         assert_finite(model.rollout(context=[height]))
@@ -74,12 +74,12 @@ def test_noisy_hands_can_be_smoothed() -> None:
 
 
 def walking_forces() -> list[Demonstration]:
-    """Return forces of the first walker's stances at many speeds."""
+    """Returns forces of the first walker's stances at many speeds."""
     return recordings("walking_force_speed", 1, context=["speed_m_s"])[:60]
 
 
 @pytest.mark.parametrize("basis", ["gp", "ngnet"])
-def test_walking_forces_are_given_back(basis: Any) -> None:
+def test_walking_forces_are_reproduced(basis: Any) -> None:
     """With J = M, forces that jump within a sample are reproduced to 5 % of their range."""
     demos = walking_forces()[::5]
     model = pdmp.fit(demos, n_styles=len(demos), basis=basis)
@@ -88,7 +88,7 @@ def test_walking_forces_are_given_back(basis: Any) -> None:
 
 @pytest.mark.parametrize("basis", ["gp", "ngnet"])
 def test_unseen_speeds_are_predicted_better_than_by_the_mean(basis: Any) -> None:
-    """Stances left out of the fit are closer to the prediction for their speed than to the mean."""
+    """Held-out stances are closer to the prediction for their speed than to the mean."""
     demos = walking_forces()
     seen, unseen = demos[::2], demos[1::2]
     model = pdmp.fit(seen, n_styles=3, basis=basis)
@@ -102,14 +102,14 @@ def test_unseen_speeds_are_predicted_better_than_by_the_mean(basis: Any) -> None
 
 
 @pytest.mark.parametrize("basis", ["gp", "ngnet"])
-def test_gait_of_boys_is_given_back(basis: Any) -> None:
+def test_gait_of_boys_is_reproduced(basis: Any) -> None:
     """Cycles of only twenty samples are reproduced to 2 % of their range, from the first on."""
     demos = recordings("gait_boys", 4)
     model = pdmp.fit(demos, kind="rhythmic", period=1.0, n_styles=len(demos), basis=basis)
     assert worst_error(model, demos) <= 0.02
 
 
-def test_running_strides_are_given_back() -> None:
+def test_running_strides_are_reproduced() -> None:
     """Strides in three planes of three joints are reproduced to 0.5 % of their range."""
     whole = recordings("running_strides", 60)
     # The last of 101 points is the first of the next stride.
@@ -120,7 +120,7 @@ def test_running_strides_are_given_back() -> None:
 
 
 def strides() -> dict[str, list[float]]:
-    """Return the durations [s] of the strides of each walk that has several."""
+    """Returns the durations [s] of the strides of each walk that has several."""
     path = folder("walk_styles_bandai") / "strides.csv"
     durations: dict[str, list[float]] = {}
     with path.open(encoding="utf-8") as file:
@@ -131,10 +131,10 @@ def strides() -> dict[str, list[float]]:
 
 @pytest.mark.filterwarnings("ignore:more is gained per cycle")
 def test_cycles_of_walks_last_as_long_as_their_strides() -> None:
-    """Raw recordings of whole bodies, pelvis walking off, have the period of their foot strikes.
+    """Cycles of raw whole-body recordings have the period of the foot strikes.
 
-    Of 22, three repeat themselves too little for all their degrees of freedom to tell; two of these
-    are refused, and the third repeats itself after two strides.
+    Of 22, three have too low an autocorrelation over all degrees of freedom: two are rejected, and
+    the third has the period of two strides.
     """
     refused, doubled = [], []
     for name, durations in strides().items():
@@ -155,7 +155,7 @@ def test_cycles_of_walks_last_as_long_as_their_strides() -> None:
 
 
 def test_bvh_walks_give_the_period_of_their_strides() -> None:
-    """Joints with positions, which few parsers read, come in whole."""
+    """BVH files with joint positions, which few parsers read, are read completely."""
     name = "walk_normal_001"
     durations = strides()[name]
     path = folder("walk_styles_bandai") / "raw" / f"dataset-1_{name}.bvh"
@@ -164,8 +164,8 @@ def test_bvh_walks_give_the_period_of_their_strides() -> None:
     assert pdmp.preprocessing.period(recording) == pytest.approx(np.mean(durations), rel=0.03)
 
 
-def test_walks_of_two_gaits_become_one_rhythmic_primitive() -> None:
-    """Walks and runs of one person, at their own periods, are learnt in one phase, on the spot."""
+def test_walks_of_two_gaits_form_one_rhythmic_primitive() -> None:
+    """Walks and runs of one person with different periods form one rhythmic primitive."""
     demos = recordings("walk_run_cmu35", 1)
     with pytest.warns(UserWarning, match=r"'root_z' gains 2\.\d+ in recording"):
         cycles = pdmp.preprocessing.cycles(demos)

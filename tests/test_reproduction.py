@@ -1,4 +1,4 @@
-"""The paper's claims, on movements made by their sources and a robot that can knock things over."""
+"""The paper's claims, on simulated movements and a simulated robot."""
 
 import itertools
 import re
@@ -14,7 +14,7 @@ from reproduction import swing as arms
 from reproduction.__main__ import main
 from reproduction.baxter import mjcf
 from reproduction.demo.__main__ import main as demo_main
-from reproduction.human import BOX, RESTING, minimum_jerk
+from reproduction.human import BOX, HAND_HEIGHT, minimum_jerk
 from reproduction.loop import NewGoal, from_rest, reach_over
 from reproduction.reaching import GOAL, Reaching, demonstrate, height_of
 from reproduction.robot import DT, Robot, boxes
@@ -25,7 +25,7 @@ CLOSE = 1.0  # mm
 
 @pytest.fixture(scope="module")
 def reaching() -> Reaching:
-    """Return the fifteen reaches, where there are a physics engine and a robot."""
+    """Returns the fifteen reaches, or skips without MuJoCo and the robot model."""
     try:
         return demonstrate()
     except ImportError as reason:
@@ -34,12 +34,12 @@ def reaching() -> Reaching:
 
 @pytest.fixture(scope="module")
 def learnt(reaching: Reaching) -> pdmp.Model:
-    """Return what is learnt from all of them with three styles."""
+    """Returns a model of all reaches with three styles."""
     return styles.learn(reaching)
 
 
 def test_one_dof_has_three_dimensions_and_is_reproduced() -> None:
-    """Twenty demonstrations of three dimensions leave nothing to a fourth style (Fig. 2)."""
+    """Twenty demonstrations of three dimensions have three styles (Fig. 2)."""
     noise = np.random.default_rng(3)
     for example in (one_dof.discrete(noise), one_dof.rhythmic(noise)):
         values = example.model.singular_values
@@ -49,7 +49,7 @@ def test_one_dof_has_three_dimensions_and_is_reproduced() -> None:
 
 
 def test_hands_move_with_minimum_jerk() -> None:
-    """Through points of the straight movement of least jerk, the path is that movement."""
+    """Through points of the straight minimum-jerk movement, the path is that movement."""
     share = np.linspace(0, 1, 101)
     straight = share**3 * (10 - 15 * share + 6 * share**2)
     end = np.array([0.3, -0.2, 0.1])
@@ -57,8 +57,8 @@ def test_hands_move_with_minimum_jerk() -> None:
     np.testing.assert_allclose(minimum_jerk(points)(share), straight[:, None] * end, atol=2e-5)
 
 
-def test_arm_reaches_what_it_is_asked_to(reaching: Reaching) -> None:
-    """Hand and elbow of the joint angles found are those that were asked for."""
+def test_arm_reaches_the_requested_positions(reaching: Reaching) -> None:
+    """Inverse kinematics gives the requested hand position and swivel angle."""
     hands = np.linspace(reaching.task.start, reaching.task.goal + [0, 0, 0.2], 9)
     angles = np.linspace(-0.3, 0.1, 9)
     path = reaching.arm.reach(hands, angles, reaching.start)
@@ -69,7 +69,7 @@ def test_arm_reaches_what_it_is_asked_to(reaching: Reaching) -> None:
 
 
 def test_people_clear_their_boxes(reaching: Reaching) -> None:
-    """No demonstration touches the boxes that it was made over, on the robot."""
+    """No demonstration touches its boxes on the robot."""
     for demo in reaching.demos:
         whole = pdmp.fit([demo], n_styles=1)
         robot = Robot(demo.position[0], reaching.task, boxes(height_of(demo)))
@@ -80,28 +80,28 @@ def test_people_clear_their_boxes(reaching: Reaching) -> None:
         assert robot.log.tracking_error() < 5e-3
 
 
-def test_boxes_in_the_way_are_hit(reaching: Reaching, learnt: pdmp.Model) -> None:
-    """A movement shown without boxes touches two of them, and throws the upper one down."""
+def test_boxes_on_the_path_are_hit(reaching: Reaching, learnt: pdmp.Model) -> None:
+    """A movement demonstrated without boxes touches two of them and topples the upper one."""
     robot = reach_over(learnt, reaching, 0.30, learnt.styles[0])
     assert robot.log.contact() > 0.01
-    height = robot.data.body("box_1").xpos[2] - (reaching.task.goal[2] - RESTING)
+    height = robot.data.body("box_1").xpos[2] - (reaching.task.goal[2] - HAND_HEIGHT)
     assert height < 1.5 * BOX[2] - 0.01
 
 
-def test_three_styles_are_what_the_spectrum_asks_for(reaching: Reaching) -> None:
-    """On the nine training reaches: more than 90 % of the sum, which two do not make."""
+def test_singular_values_select_three_styles(reaching: Reaching) -> None:
+    """For the training reaches, three styles exceed 90 % of the singular values, two do not."""
     values = heights.learn(reaching, 3).singular_values
     shares = values.cumsum() / values.sum()
     assert shares[1] < 0.9 < shares[2]
 
 
 def test_error_saturates_at_three_styles(reaching: Reaching) -> None:
-    """Further styles change what is foreseen by 2 %; the third halves what styles can do at best.
+    """Beyond three styles, predictions change by 2 %; the third halves the best style's error.
 
     As found: E = 0.043 with one style, 0.057 with two, 0.052 from three on; at best 0.028 with two
     and 0.012 with three.
     """
-    found = heights.errors(reaching, most=6)
+    found = heights.errors(reaching, max_styles=6)
     predicted, best = found.predicted.mean(axis=1), found.best.mean(axis=1)
     np.testing.assert_allclose(predicted[3:], predicted[2], rtol=0.02)
     assert predicted[0] < predicted[2] < 0.95 * predicted[1] < 0.06
@@ -113,7 +113,7 @@ def test_error_saturates_at_three_styles(reaching: Reaching) -> None:
 def test_three_styles_are_needed_over_four_boxes(
     reaching: Reaching, n_styles: int, clear: int
 ) -> None:
-    """Of the three styles shown over four boxes, fewer than three dimensions clear one at most."""
+    """With fewer than three styles, at most one movement over four boxes clears them."""
     model = styles.learn(reaching, n_styles)
     tallest = [m for m, demo in enumerate(reaching.demos) if boxes(height_of(demo)) == 4]
     robots = [reach_over(model, reaching, 0.60, model.styles[m], tau=model.tau) for m in tallest]
@@ -121,7 +121,7 @@ def test_three_styles_are_needed_over_four_boxes(
 
 
 def test_every_other_style_clears_its_boxes(reaching: Reaching, learnt: pdmp.Model) -> None:
-    """With three dimensions, the styles shown over up to three boxes touch none of them."""
+    """With three styles, movements demonstrated over up to three boxes touch none of them."""
     for demo, style in list(zip(reaching.demos, learnt.styles, strict=True))[:12]:
         robot = reach_over(learnt, reaching, height_of(demo), style, tau=learnt.tau)
         assert robot.log.contact() == 0
@@ -129,14 +129,14 @@ def test_every_other_style_clears_its_boxes(reaching: Reaching, learnt: pdmp.Mod
 
 @pytest.mark.parametrize(("n_styles", "height", "touches"), [(1, 0.15, True), (3, 0.15, False)])
 def test_new_heights(reaching: Reaching, n_styles: int, height: float, touches: bool) -> None:
-    """What is foreseen for one box clears it with three styles, and not with one."""
+    """The movement predicted for one box clears it with three styles, and not with one."""
     robot = heights.reach_predicted(heights.learn(reaching, n_styles), reaching, height)
     assert (robot.log.contact() > 0) == touches
     assert reaching.miss(robot.log.hands[-1]) < CLOSE
 
 
-def test_four_boxes_are_brushed(reaching: Reaching) -> None:
-    """What a line foresees from three boxes and fewer brushes four for some hundredths of a second.
+def test_four_boxes_are_touched_briefly(reaching: Reaching) -> None:
+    """The movement extrapolated to four boxes touches them for some hundredths of a second.
 
     The paper's movement clears them; ours meets the elbow's limit on the way. It still arrives.
     """
@@ -148,7 +148,7 @@ def test_four_boxes_are_brushed(reaching: Reaching) -> None:
 
 
 def test_every_style_reaches_every_goal(reaching: Reaching, learnt: pdmp.Model) -> None:
-    """The end depends on the goal alone, and what a goal adds does not depend on the style."""
+    """The end depends on the goal alone, and the effect of a goal does not depend on the style."""
     near, *others = styles.goals(reaching)
     for goal in others:
         added = []
@@ -164,8 +164,8 @@ def test_every_style_reaches_every_goal(reaching: Reaching, learnt: pdmp.Model) 
         np.testing.assert_allclose(added, added[:1] * len(added), atol=1e-9)
 
 
-def test_goal_moved_on_the_way_is_reached(reaching: Reaching) -> None:
-    """On the robot, whatever the height; and the movement stays as smooth as it was."""
+def test_goal_moved_during_the_movement_is_reached(reaching: Reaching) -> None:
+    """A goal moved during the movement is reached on the robot, at any height and as smoothly."""
     model = heights.learn(reaching, 3)
     command = heights.new_goal(model, reaching)
     assert reaching.miss(reaching.arm.places(command.goal)[2]) > 100
@@ -175,11 +175,11 @@ def test_goal_moved_on_the_way_is_reached(reaching: Reaching) -> None:
     assert robot.log.tracking_error() < 5e-3
 
 
-def test_what_the_paper_argues_with(reaching: Reaching) -> None:
-    """One demonstration knows one height, components no goal, a library nothing beyond its own."""
-    command, grip = rivals.disturbances(reaching)
+def test_other_methods_fail_as_the_paper_argues(reaching: Reaching) -> None:
+    """A DMP reproduces one height, components ignore the goal, a library does not extrapolate."""
+    command, lock = rivals.disturbances(reaching)
     tall = {
-        name: rivals.attempt(rival, reaching, 0.60, command, grip)
+        name: rivals.run_trial(rival, reaching, 0.60, command, lock)
         for name, rival in rivals.RIVALS.items()
     }
     primitive, single, components, library = tall.values()
@@ -191,17 +191,17 @@ def test_what_the_paper_argues_with(reaching: Reaching) -> None:
     ]
     assert left[0] < CLOSE < 100 < left[1]
     assert 2 * primitive.speed_ratio() < components.speed_ratio()
-    assert primitive.held.log.contact() == 0
+    assert primitive.locked.log.contact() == 0
 
 
 def test_switches_converge_within_five_periods() -> None:
-    """Style, amplitude and frequency, commanded while the arms swing: off by less than 3 %."""
+    """After switches of style, amplitude and frequency, the distance to the cycle is below 3 %."""
     names = list(arms.STYLES)
     model = walking.learn(arms.demonstrate())
     commands = walking.switches(
         model, [names.index(n) for n in ("normal", "running", "tired")], names
     )
-    done = walking.swing(model, commands, lasting=9.0)
+    done = walking.swing(model, commands, interval=9.0)
     assert max(done.off) < 0.03
     assert min(done.off[1:]) > 0
     apart = [np.ptp(done.position[k : k + 1000], axis=0).max() for k in (7_000, 16_000, 43_000)]
@@ -209,23 +209,23 @@ def test_switches_converge_within_five_periods() -> None:
 
 
 def test_both_arms_swing_on_the_robot(reaching: Reaching) -> None:
-    """Joints stay within 10 mrad of what they are told while styles change."""
+    """Tracking errors stay within 10 mrad while styles change."""
     names = list(arms.STYLES)
     model = walking.learn(arms.demonstrate())
     commands = walking.switches(
         model, [names.index(n) for n in ("normal", "marching", "girly")], names
     )
     robot = Robot(model.rollout(**commands[0].command).position[0])
-    walking.swing(model, commands, robot, lasting=2.0)
+    walking.swing(model, commands, robot, interval=2.0)
     assert robot.log.tracking_error() < 0.01
 
 
-def test_pictures_show_the_robot_move(reaching: Reaching, learnt: pdmp.Model) -> None:
-    """A strip has a frame per time, and they differ."""
+def test_images_show_the_robot_move(reaching: Reaching, learnt: pdmp.Model) -> None:
+    """A strip has a frame per time, and the frames differ."""
     robot = reach_over(learnt, reaching, 0.30, learnt.styles[7])
     try:
         figure = film.strip({"two boxes": (robot, [0.0, 1.4, 4.0])}, film.REACHING)
-    except film.NoRenderer as reason:
+    except film.RendererError as reason:
         pytest.skip(str(reason))
     frames = [axes.get_images()[0].get_array() for axes in figure.axes]
     assert len(frames) == 3
@@ -236,20 +236,20 @@ def test_pictures_show_the_robot_move(reaching: Reaching, learnt: pdmp.Model) ->
 def test_command_writes_tables_and_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The first figure needs no robot."""
+    """The command writes the first figure, which needs no robot."""
     assert main(["fig2", "-o", str(tmp_path)]) == 0
     assert {path.name for path in tmp_path.iterdir()} == {"fig2.md", "fig2.png"}
     assert capsys.readouterr().out.strip() in (tmp_path / "fig2.md").read_text(encoding="utf-8")
 
 
 def test_another_seed_is_another_person(tmp_path: Path) -> None:
-    """The same seed gives the same tables, another one others."""
+    """Equal seeds give equal tables, different seeds different ones."""
     first, again, other = (reproduce("fig2", tmp_path, seed=seed) for seed in (1, 1, 2))
     assert first == again != other
 
 
 def test_recordings_of_walks_are_learnt(tmp_path: Path) -> None:
-    """From raw recordings; those in which no arm swings are named."""
+    """Raw recordings of walks are learnt; those without arm swing are named."""
     noise = np.random.default_rng(5)
     header = "t," + ",".join(walking.RECORDED)
     for name in ("normal", "brisk", "striding", "girly"):
@@ -260,8 +260,8 @@ def test_recordings_of_walks_are_learnt(tmp_path: Path) -> None:
         np.savetxt(tmp_path / f"{name}.csv", rows, "%.9g", ",", header=header, comments="")
     rows[:, 1:] = noise.normal(0, 1e-3, rows[:, 1:].shape)
     np.savetxt(tmp_path / "still.csv", rows, "%.9g", ",", header=header, comments="")
-    told, figure = walking.recorded(tmp_path)
-    assert "4 walks, without still" in told[0]
+    reported, figure = walking.recorded(tmp_path)
+    assert "4 walks, without still" in reported[0]
     assert len(figure.axes) == 16
 
 
@@ -277,21 +277,23 @@ def test_recordings_of_walks_are_learnt(tmp_path: Path) -> None:
         ({"figure": "fig3", "recordings": "."}, 'recordings: only "fig5" learns from them'),
     ],
 )
-def test_bad_requests_are_named(arguments: dict[str, Any], message: str, tmp_path: Path) -> None:
-    """What there is not."""
+def test_invalid_requests_are_reported(
+    arguments: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    """Unknown figures, invalid seeds and missing recordings are named."""
     with pytest.raises(ValueError, match=message):
         reproduce(folder=tmp_path, **arguments)
 
 
 def test_missing_robot_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With what installs it."""
+    """A missing robot model is reported with its installation."""
     monkeypatch.setattr("reproduction.baxter.find_spec", lambda name: None)
     with pytest.raises(ImportError, match="pip install --no-deps robosuite"):
         mjcf()
 
 
 def test_printed_goal_is_a_hand_on_a_table(reaching: Reaching) -> None:
-    """Before the body, below the elbow, which is about as far out as people hold it."""
+    """The printed goal is in front of the body, below the elbow, with a natural swivel angle."""
     shoulder, elbow, hand = reaching.arm.places(GOAL)
     assert hand[0] > 0.3 and abs(hand[1]) < 0.1
     assert hand[2] < elbow[2] < shoulder[2]
@@ -299,8 +301,8 @@ def test_printed_goal_is_a_hand_on_a_table(reaching: Reaching) -> None:
     assert (reaching.arm.lowest < GOAL).all() and (reaching.arm.highest > GOAL).all()
 
 
-def test_events_happen_once_at_any_time(reaching: Reaching, learnt: pdmp.Model) -> None:
-    """Also between two ticks."""
+def test_commands_take_effect_once_at_any_time(reaching: Reaching, learnt: pdmp.Model) -> None:
+    """Commands take effect once, also at times between two ticks."""
     for time in (0.0125, 0.4005, 1.0):
         command = NewGoal(time, GOAL + 0.1)
         movement = from_rest(learnt, reaching, learnt.styles[0])
@@ -312,8 +314,8 @@ def test_events_happen_once_at_any_time(reaching: Reaching, learnt: pdmp.Model) 
         assert sum(given) == 1
 
 
-def test_trials_beyond_reach_are_made_anew() -> None:
-    """Of another person, too, all fifteen lie within the limits of the joints."""
+def test_trials_beyond_reach_are_repeated() -> None:
+    """With another seed, too, all fifteen reaches are within the joint limits."""
     pytest.importorskip("scipy")
     try:
         other = demonstrate(6)
@@ -325,10 +327,10 @@ def test_trials_beyond_reach_are_made_anew() -> None:
         assert (demo.position < other.arm.highest).all()
 
 
-def test_demo_writes_model_report_and_the_figures_it_shows(
+def test_demo_writes_model_report_and_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every figure that the report shows is there, and the tables are printed."""
+    """Every figure of the report exists, and the tables are printed."""
     assert demo_main(["-o", str(tmp_path)]) == 0
     report = (tmp_path / "report.md").read_text(encoding="utf-8")
     figures = re.findall(r"\((\w+\.png)\)", report)
@@ -341,10 +343,10 @@ def test_demo_writes_model_report_and_the_figures_it_shows(
 @pytest.mark.parametrize(
     ("command", "module"), [(main, "reproduction"), (demo_main, "reproduction.demo")]
 )
-def test_commands_have_help_and_refuse_a_dash(
+def test_commands_have_help_and_reject_a_dash(
     command: Any, module: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Help ends well and shows an example; "-" is no folder."""
+    """Help exits with 0 and has an example; "-" is rejected."""
     with pytest.raises(SystemExit, match="0"):
         command(["--help"])
     assert f"example: python -m {module}" in capsys.readouterr().out
@@ -357,7 +359,7 @@ def test_commands_have_help_and_refuse_a_dash(
 def test_commands_report_errors_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A request that cannot be met ends with exit code 1 and its reason."""
+    """An invalid request exits with 1 and its reason."""
     assert main(["fig2", "--seed", "-1", "-o", str(tmp_path)]) == 1
     assert capsys.readouterr().err.strip() == "error: seed = -1: must not be negative"
 

@@ -1,4 +1,4 @@
-"""The layers of the core in CONTRIBUTING.md are those of its sources."""
+"""The layers of the core in CONTRIBUTING.md match its sources."""
 
 import re
 import shutil
@@ -11,13 +11,13 @@ SOURCES = ROOT / "crates" / "pdmp-core" / "src"
 
 
 def layers() -> list[str]:
-    """Return the layers of the core, lowest first, as CONTRIBUTING.md lists them."""
+    """Returns the layers of the core, lowest first, as CONTRIBUTING.md lists them."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     return re.findall(r"^\| \d+ \| `(\w+)/?` \|", text, re.MULTILINE)
 
 
 def code_of(sources: Path) -> list[tuple[str, Path, str]]:
-    """Return layer, path and code of each file, without comments, unit tests and literals."""
+    """Returns layer, path and code of each file, without comments, unit tests and literals."""
     found = []
     for path in sorted(sources.rglob("*.rs")):
         layer = path.relative_to(sources).parts[0].removesuffix(".rs")
@@ -28,7 +28,7 @@ def code_of(sources: Path) -> list[tuple[str, Path, str]]:
 
 
 def upward_imports(sources: Path) -> set[tuple[str, str]]:
-    """Return the files that name a layer above their own, with that layer."""
+    """Returns the files that name a layer above their own, with that layer."""
     order = layers()
     return {
         (str(path.relative_to(sources)), other)
@@ -39,7 +39,7 @@ def upward_imports(sources: Path) -> set[tuple[str, str]]:
 
 
 def stray_methods(sources: Path) -> set[tuple[str, str]]:
-    """Return the files that add methods to a type of another layer, with that type.
+    """Returns the files that add methods to a type of another layer, with that type.
 
     A method call needs no import: were the method defined above its type, a layer below could
     call it unseen.
@@ -58,18 +58,18 @@ def stray_methods(sources: Path) -> set[tuple[str, str]]:
 
 
 def test_every_module_belongs_to_one_layer() -> None:
-    """No layer is missing from the list, and none is on it that is gone."""
+    """The list of layers matches the modules."""
     modules = {path.stem for path in SOURCES.iterdir()} - {"lib"}
     assert sorted(layers()) == sorted(modules)
 
 
 def test_layers_use_only_lower_layers() -> None:
-    """No module names one of a layer above it."""
+    """No module imports from a layer above its own."""
     assert not upward_imports(SOURCES)
 
 
 def test_methods_are_defined_in_the_layer_of_their_type() -> None:
-    """No call reaches a layer above through a method."""
+    """No method is defined in a layer above its type."""
     assert not stray_methods(SOURCES)
 
 

@@ -1,4 +1,4 @@
-"""A start and a goal are carried along the profile by which the demonstrations cover their way."""
+"""Changes of start and goal follow the transport profile learnt from the demonstrations."""
 
 from pathlib import Path
 from typing import Any
@@ -17,12 +17,12 @@ DETOUR = (4 * S * (1 - S)) ** 3
 
 
 def straight(transport: Any = "learnt") -> pdmp.Model:
-    """Return a model of straight reaches of about the same length."""
+    """Returns a model of straight reaches of similar length."""
     return pdmp.fit([(a * RISE)[:, None] for a in (0.9, 1.0, 1.1)], dt=0.01, transport=transport)
 
 
-def test_nearer_goal_is_gone_to_without_swinging_back() -> None:
-    """Half as far, the path stays between start and goal; with the paper's it swings back first."""
+def test_nearer_goal_is_reached_without_swinging_back() -> None:
+    """A path to a nearer goal stays between start and goal; the paper's swings back first."""
     made = straight().rollout(goal=[0.5], start=[0.0]).position
     assert made.min() > -0.01
     assert made.max() < 0.51
@@ -30,15 +30,15 @@ def test_nearer_goal_is_gone_to_without_swinging_back() -> None:
 
 
 def test_one_demonstration_suffices() -> None:
-    """Its progress along the arc is the profile."""
+    """The profile of one demonstration is its arc-length progress."""
     model = pdmp.fit([RISE[:, None]], dt=0.01)
     np.testing.assert_allclose(model.transport(S * model.durations[0] / model.tau), RISE, atol=5e-3)
     made = model.rollout(goal=[0.5], start=[0.0], dt=0.01).position[:, 0]
     np.testing.assert_allclose(made, 0.5 * RISE, atol=5e-3)
 
 
-def test_start_and_goal_of_another_lead_to_its_path() -> None:
-    """Where movements differ by start and goal alone, each is made from any other."""
+def test_start_and_goal_of_another_demonstration_give_its_path() -> None:
+    """Movements that differ only by start and goal are predicted from each other."""
     random = np.random.default_rng(0)
     starts, goals = random.normal(size=(2, 6, 2))
     paths = [
@@ -54,7 +54,7 @@ def test_start_and_goal_of_another_lead_to_its_path() -> None:
 
 
 def test_movements_are_moved_by_the_profile() -> None:
-    """Start and goal weigh 1 - m and m, and nothing else follows from them."""
+    """Changes of start and goal have the weights 1 - m and m, without other effects."""
     model = pdmp.fit(reaches())
     m = model.transport(np.linspace(0, 1, 51))
     assert m[0] == 0 and m[-1] == 1 and np.all(np.diff(m) >= 0)
@@ -65,8 +65,8 @@ def test_movements_are_moved_by_the_profile() -> None:
     )
 
 
-def test_far_goal_does_not_kick() -> None:
-    """Ten ranges away, the acceleration at first is what the profile asks for."""
+def test_far_goal_causes_no_large_initial_acceleration() -> None:
+    """For a goal ten ranges away, the initial acceleration follows from the profile."""
     model = straight()
     clock = np.linspace(0, 1, 2001)
     bend = np.gradient(np.gradient(model.transport(clock), clock), clock)
@@ -76,7 +76,7 @@ def test_far_goal_does_not_kick() -> None:
 
 
 def loop(model: pdmp.Model, at: float, goal: float, transition: float) -> np.ndarray:
-    """Return position, velocity, acceleration (T, 3) of a loop whose goal is moved at a share."""
+    """Returns position, velocity and acceleration (T, 3) of a loop whose goal moves during it."""
     controller = model.controller(0.001, style=model.styles[1], transition=transition)
     motion = []
     for k in range(3000):
@@ -90,10 +90,8 @@ def loop(model: pdmp.Model, at: float, goal: float, transition: float) -> np.nda
 
 @pytest.mark.parametrize("transition", [0.0, 0.1])
 @pytest.mark.parametrize("at", [0.05, 0.2, 0.4, 0.6, 0.8, 0.9, 0.99, 1.2])
-def test_goal_moved_on_the_way_accelerates_no_more_than_the_papers(
-    at: float, transition: float
-) -> None:
-    """At any phase; position and velocity stay continuous, and the goal is reached."""
+def test_moved_goal_accelerates_no_more_than_in_the_paper(at: float, transition: float) -> None:
+    """At any phase, a moved goal keeps position and velocity continuous and is reached."""
     moved, plain, paper, papers_own = (
         loop(model, at, goal, transition)
         for model in (straight(), straight("immediate"))
@@ -108,13 +106,13 @@ def test_goal_moved_on_the_way_accelerates_no_more_than_the_papers(
 
 @pytest.mark.parametrize("at", [0.01, 0.1, 0.2, 0.4])
 def test_goal_moved_early_is_reached_in_time(at: float) -> None:
-    """What remains of the movement is enough."""
+    """A goal that moves early is reached in time."""
     by_goal = loop(straight(), at, 1.5, 0.1) - loop(straight(), at, 1.0, 0.1)
     assert by_goal[1000, 0] == pytest.approx(0.5, abs=0.02)
 
 
 def test_profile_is_saved(tmp_path: Path) -> None:
-    """Moved goals lead to the same paths from a file; an immediate transport stays so."""
+    """Loaded models transport moved goals equally; immediate transport is saved too."""
     for transport in ("learnt", "immediate"):
         model = pdmp.fit(reaches(), transport=transport)
         model.save(tmp_path / "model.safetensors")
@@ -126,7 +124,7 @@ def test_profile_is_saved(tmp_path: Path) -> None:
 
 
 def test_profile_does_not_depend_on_the_unit() -> None:
-    """Neither of all degrees of freedom, nor, with ranges as units, of one."""
+    """The profile does not depend on the unit of all or, with ranges as units, of one DoF."""
     demos = [demo.position for demo in reaches()]
     profile = pdmp.fit(demos, dt=0.02).transport(S)
     for scale in (1e-140, 1e-3, 1e140):
@@ -139,8 +137,8 @@ def test_profile_does_not_depend_on_the_unit() -> None:
     np.testing.assert_allclose(same, ranged, atol=1e-12)
 
 
-def test_bad_transport_is_refused() -> None:
-    """A name that is none, a clock before the start, a rhythmic primitive."""
+def test_invalid_transport_is_rejected() -> None:
+    """Unknown names, negative clocks and rhythmic primitives are rejected."""
     with pytest.raises(ValueError, match='transport = "late": must be "learnt" or "immediate"'):
         pdmp.fit(reaches(), transport="late")  # type: ignore[arg-type]
     model = straight()
@@ -153,7 +151,7 @@ def test_bad_transport_is_refused() -> None:
 
 
 def after(model: pdmp.Model, m: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far a movement is from its goal past its end, and its accelerations there."""
+    """Returns distances from the goal and accelerations past the end of a movement."""
     duration = model.durations[m]
     made = model.rollout(model.conditions(m), dt=0.001, duration=3 * duration)
     late = made.time > duration + 1e-9
@@ -161,7 +159,7 @@ def after(model: pdmp.Model, m: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_movement_that_ends_at_rest_stays_on_its_goal() -> None:
-    """And is finished with its time, where the paper's equations leave the goal again."""
+    """Movements at rest stay at the goal and finish; with the paper's equations they leave it."""
     demos = [np.column_stack([a * RISE, DETOUR + a * RISE**2]) for a in (0.8, 1.0, 1.2)]
     model = pdmp.fit(demos, dt=0.01, n_styles=3)
     assert after(model, 1)[0].max() < 2e-4
@@ -172,7 +170,7 @@ def test_movement_that_ends_at_rest_stays_on_its_goal() -> None:
 
 
 def test_movement_that_ends_in_motion_brakes() -> None:
-    """As hard as the hardest acceleration demonstrated, if that is at least alpha_z y'."""
+    """Braking equals the largest demonstrated acceleration, if at least alpha_z y'."""
     rate = 12 * np.pi
     shakes = [(a * np.sin(rate * S + np.pi / 4))[:, None] for a in (0.8, 1.0, 1.2)]
     slow = [(a * S**2)[:, None] for a in (0.8, 1.0, 1.2)]
@@ -186,6 +184,6 @@ def test_movement_that_ends_in_motion_brakes() -> None:
 
 
 def test_braking_belongs_to_learnt_transport() -> None:
-    """The paper's forcing fades with the phase; a rhythmic one never ends."""
+    """With immediate transport the forcing fades with the phase; a rhythmic one does not end."""
     assert straight("immediate").braking is None
     assert pdmp.fit(loops(), kind="rhythmic").braking is None

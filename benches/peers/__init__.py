@@ -1,9 +1,10 @@
-"""pdmp beside its peers: the same work, side by side, in one run.
+"""Benchmarks of pdmp and other libraries on the same tasks, in one run.
 
-``make bench-peers`` installs the peers and runs this. Contestants take turns, bout by bout, so that
-a machine that slows down slows all of them; garbage collection is off, and BLAS has the one thread
-that the Makefile gives it. Whoever has taken some seconds takes part in no further bout of a work.
-A bout of many calls is run twice: first with every call timed separately, which gives p99.9 and the
-worst and finds the caches as the others left them; then with twenty timed together, so that the
-clock costs nothing, which gives the median. Ratios are those of the medians.
+``make bench-peers`` installs the libraries and runs this. The libraries alternate, round by round,
+so that a machine that slows down slows all of them. Garbage collection is off, and BLAS uses one
+thread, set in the Makefile. A library that has taken some seconds is left out of further rounds of
+a task. A round of many calls is run twice: first with every call timed separately, which gives
+p99.9 and the maximum with the caches as the other libraries left them; then with twenty calls timed
+together, so that reading the clock is negligible, which gives the median. Ratios are those of the
+medians.
 """

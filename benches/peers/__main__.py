@@ -1,4 +1,4 @@
-"""Prints contestants and machine, a table for each work, and one of all."""
+"""Prints libraries and machine, a table per task, and one of all ratios."""
 
 import gc
 import os
@@ -6,7 +6,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 
 from peers import factors, imitation, regression, rollouts, steps
-from peers.arena import Work, machine, ratio, run, written
+from peers.timing import Task, machine, ratio, run, written
 
 PACKAGES = [
     "pdmp",
@@ -30,33 +30,33 @@ def installed(package: str) -> str:
         return f"{package} missing"
 
 
-def summary(results: list[tuple[Work, dict[str, float]]]) -> None:
+def summary(results: list[tuple[Task, dict[str, float]]]) -> None:
     """Prints every ratio of the run in one table."""
-    print(f"\n| {'work':<84} | {'contestant':<46} |  median |  ratio |")
+    print(f"\n| {'task':<84} | {'library':<46} |  median |  ratio |")
     print(f"|{'-' * 86}|{'-' * 48}|--------:|-------:|")
-    for work, medians in results:
+    for task, medians in results:
         first = next(iter(medians.values()))
-        titles = iter([work.title])
+        titles = iter([task.title])
         for name, median in medians.items():
             figures = f"{written(median):>7} | {ratio(median, first):>6}"
             print(f"| {next(titles, ''):<84} | {name:<46} | {figures} |")
 
 
 def main() -> None:
-    """Prints contestants and machine, a table for each work, and one of all."""
+    """Prints libraries and machine, a table per task, and one of all ratios."""
     print(f"{machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     print(", ".join(installed(package) for package in PACKAGES))
     gc.disable()
     results = []
-    for work in [
-        *steps.WORKS,
-        *rollouts.WORKS,
-        *imitation.WORKS,
-        *regression.WORKS,
-        *factors.WORKS,
+    for task in [
+        *steps.TASKS,
+        *rollouts.TASKS,
+        *imitation.TASKS,
+        *regression.TASKS,
+        *factors.TASKS,
     ]:
         gc.collect()
-        results.append((work, run(work)))
+        results.append((task, run(task)))
     summary(results)
 
 

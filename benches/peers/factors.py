@@ -1,11 +1,11 @@
-"""Factors of the targets: all of a small library, the leading ones of a large one."""
+"""Factors of the targets: all of a small set, the leading ones of a large set."""
 
 from functools import cache, partial
 
 import numpy as np
 
 import pdmp
-from peers.arena import Begin, Work
+from peers.timing import Begin, Task
 
 SMALL = (20, 28_000)
 LARGE = (1000, 40_000)
@@ -13,56 +13,56 @@ N_LEADING = 5
 
 
 def library(n_demos: int, n_values: int) -> np.ndarray:
-    """Returns noisy targets (M, C·D) of forty factors, each half as strong as the one before."""
+    """Returns noisy targets (M, C·D) of forty factors, each half as strong as the previous one."""
     random = np.random.default_rng(0)
     strengths = 0.5 ** np.arange(40)
     left, right = random.normal(size=(n_demos, 40)), random.normal(size=(40, n_values))
     return (left * strengths) @ right + 1e-3 * random.normal(size=(n_demos, n_values))
 
 
-# The large one takes a third of a gigabyte, which the contestants share.
+# The large set takes a third of a gigabyte, which the libraries share.
 targets = cache(library)
 
 
 def pdmp_factors(shape: tuple[int, int], n_styles: int) -> Begin:
-    """Finds the leading factors, as many as are asked for."""
+    """Computes the leading `n_styles` factors."""
     return lambda: partial(pdmp.factorise, targets(*shape), n_styles=n_styles)
 
 
 def numpy_factors(shape: tuple[int, int]) -> Begin:
-    """Finds all factors, by LAPACK's divide and conquer."""
+    """Computes all factors by the divide-and-conquer method of LAPACK."""
     return lambda: partial(np.linalg.svd, targets(*shape), full_matrices=False)
 
 
 def scipy_factors() -> Begin:
-    """Finds the leading factors by Lanczos iteration, to machine precision."""
+    """Computes the leading factors by Lanczos iteration, to machine precision."""
     from scipy.sparse.linalg import svds
 
     return lambda: partial(svds, targets(*LARGE), k=N_LEADING, random_state=0)
 
 
 def scikit_learn_factors() -> Begin:
-    """Finds the leading factors by random projection, as precisely as its defaults are."""
+    """Computes the leading factors by random projection, with the default precision."""
     from sklearn.utils.extmath import randomized_svd
 
     return lambda: partial(randomized_svd, targets(*LARGE), N_LEADING, random_state=0)
 
 
-WORKS = [
-    Work(
+TASKS = [
+    Task(
         "singular value decomposition of {} × {}".format(*SMALL),
         calls=1,
-        bouts=20,
-        contestants={
+        rounds=20,
+        libraries={
             "pdmp": partial(pdmp_factors, SMALL, SMALL[0]),
             "numpy": partial(numpy_factors, SMALL),
         },
     ),
-    Work(
+    Task(
         "{} leading factors of {} × {}".format(N_LEADING, *LARGE),
         calls=1,
-        bouts=5,
-        contestants={
+        rounds=5,
+        libraries={
             "pdmp": partial(pdmp_factors, LARGE, N_LEADING),
             "pdmp, all of them": partial(pdmp_factors, LARGE, LARGE[0]),
             "scikit-learn, randomised": scikit_learn_factors,

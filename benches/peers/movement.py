@@ -1,4 +1,4 @@
-"""The movements that every contestant is given."""
+"""Movements for all libraries."""
 
 from functools import cache
 
@@ -9,12 +9,12 @@ import pdmp
 N_DOFS = 7
 N_STYLES = 3
 DT = 0.001  # s
-# As many functions for whoever imitates one movement as pdmp's network has by default.
+# Number of basis functions of the other libraries, the default of pdmp's network.
 N_BASIS = 50
 
 
 def movement(style: float) -> np.ndarray:
-    """Returns a reach of one second (1001, D) whose bends go with the style and with its square."""
+    """Returns a reach of one second (1001, D) with bends linear and quadratic in the style."""
     s = np.linspace(0, 1, 1001)[:, None]
     d = np.arange(N_DOFS)
     reach = s**3 * (10 - 15 * s + 6 * s**2) * (1 + d)
@@ -23,16 +23,16 @@ def movement(style: float) -> np.ndarray:
 
 
 def movements(count: int) -> list[np.ndarray]:
-    """Returns movements whose styles divide [0, 1] evenly."""
+    """Returns movements whose styles are evenly spaced in [0, 1]."""
     return [movement(style) for style in np.linspace(0, 1, count)]
 
 
 @cache
 def primitive() -> pdmp.Model:
-    """Learns pdmp's primitive from ten movements, which J = 3 reproduces."""
+    """Fits a primitive of pdmp to ten movements, which J = 3 reproduces."""
     return pdmp.fit(movements(10), dt=DT, n_styles=N_STYLES)
 
 
 def goals() -> list[np.ndarray]:
-    """Returns two goals, to be given in turn."""
+    """Returns two goals, to alternate between."""
     return [movement(0)[-1], movement(0)[-1] + 0.1]

@@ -1,21 +1,21 @@
-"""Gaussian processes over one input, three outputs: conditioned, and with hyperparameters found."""
+"""Gaussian processes with three outputs, hyperparameters given or optimised."""
 
 from functools import partial
 
 import numpy as np
 
 import pdmp
-from peers.arena import Begin, Work
+from peers.timing import Begin, Task
 
 LENGTH = 0.2
-# Variance of the noise, and its ratio to the signal's where both are given: less than pdmp's search
-# leaves to noise at most, so that it and scikit-learn's have the same summit.
+# Variance of the noise, and its ratio to that of the signal where both are given. The ratio is
+# below the upper bound of pdmp's search, so that its optimum is that of scikit-learn.
 NOISE = 1e-7
 MANY, SOME = 4000, 1000
 
 
 def samples(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns inputs (C,) and three noisy outputs (C, 3) as wiggly as the weak factors of a set."""
+    """Returns inputs (C,) and three noisy outputs (C, 3) as rough as weak factors."""
     u = np.linspace(0, 1, count)
     clean = np.column_stack([np.sin(3 * u), np.sin(11 * u + 1), np.cos(23 * u)])
     return u, clean + NOISE**0.5 * np.random.default_rng(0).normal(size=clean.shape)
@@ -29,7 +29,7 @@ def pdmp_conditioned(kernel: str) -> Begin:
 
 
 def scikit_learn_conditioned(nu: float) -> Begin:
-    """Conditions on the samples through the dense covariance matrix, and finds their likelihood."""
+    """Conditions on the samples by the dense covariance matrix; computes the likelihood."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import Matern
 
@@ -39,9 +39,9 @@ def scikit_learn_conditioned(nu: float) -> Begin:
 
 
 def celerite2_conditioned() -> Begin:
-    """Factorises the covariance and solves for the outputs: no variance is found here.
+    """Factorises the covariance and solves for the outputs; no variance is computed.
 
-    Its Matérn-3/2 is the limit of two exponentials, taken as close as its default does.
+    Its Matérn-3/2 is the limit of two exponentials, as close as its default.
     """
     from celerite2 import GaussianProcess
     from celerite2.terms import Matern32Term
@@ -57,13 +57,13 @@ def celerite2_conditioned() -> Begin:
 
 
 def pdmp_found(kernel: str, count: int) -> Begin:
-    """Finds amplitude, length and noise, and conditions on the samples."""
+    """Optimises amplitude, length and noise, and conditions on the samples."""
     u, f = samples(count)
     return lambda: partial(pdmp.GP(kernel).regress, u, f)
 
 
 def scikit_learn_found() -> Begin:
-    """Finds amplitude, length and noise from one start near them, and conditions on the samples."""
+    """Optimises from one start near the optimum, and conditions on the samples."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
@@ -73,40 +73,40 @@ def scikit_learn_found() -> Begin:
     return lambda: partial(gp.fit, u[:, None], f)
 
 
-WORKS = [
-    Work(
+TASKS = [
+    Task(
         f"Gaussian process of {MANY} samples, 3 outputs, Matérn-5/2, hyperparameters given",
         calls=1,
-        bouts=20,
-        contestants={
+        rounds=20,
+        libraries={
             "pdmp": partial(pdmp_conditioned, "matern52"),
             "scikit-learn": partial(scikit_learn_conditioned, 2.5),
         },
     ),
-    Work(
+    Task(
         f"Gaussian process of {MANY} samples, 3 outputs, Matérn-3/2, hyperparameters given",
         calls=1,
-        bouts=20,
-        contestants={
+        rounds=20,
+        libraries={
             "pdmp": partial(pdmp_conditioned, "matern32"),
             "scikit-learn": partial(scikit_learn_conditioned, 1.5),
             "celerite2": celerite2_conditioned,
         },
     ),
-    Work(
+    Task(
         f"Gaussian process of {SOME} samples, 3 outputs, Matérn-5/2, with hyperparameters",
         calls=1,
-        bouts=5,
-        contestants={
+        rounds=5,
+        libraries={
             "pdmp": partial(pdmp_found, "matern52", SOME),
             "scikit-learn": scikit_learn_found,
         },
     ),
-    # Here scikit-learn would take some minutes.
-    Work(
+    # scikit-learn would take some minutes.
+    Task(
         f"Gaussian process of {MANY} samples, 3 outputs, Matérn-5/2, with hyperparameters",
         calls=1,
-        bouts=20,
-        contestants={"pdmp": partial(pdmp_found, "matern52", MANY)},
+        rounds=20,
+        libraries={"pdmp": partial(pdmp_found, "matern52", MANY)},
     ),
 ]

@@ -1,44 +1,44 @@
-"""Whole movements: one, and many at once."""
+"""Rollouts of one movement and of many."""
 
 from functools import partial
 
 import numpy as np
 
-from peers.arena import Begin, Work
 from peers.libraries import EULER, RK4, movement_primitives_dmp, pydmps_dmp
 from peers.movement import DT, N_DOFS, N_STYLES, primitive
+from peers.timing import Begin, Task
 
 N_ROLLOUTS = 1000
 
 
 def pdmp_rollout() -> Begin:
-    """Rolls out with velocities and accelerations."""
+    """Computes a rollout with velocities and accelerations."""
     return lambda: partial(primitive().rollout, dt=DT)
 
 
 def movement_primitives_rollout(method: str) -> Begin:
-    """Rolls out positions with the compiled Euler or Runge-Kutta method."""
+    """Computes positions with the compiled Euler or Runge-Kutta method."""
     dmp = movement_primitives_dmp()
     return lambda: partial(dmp.open_loop, step_function=method)
 
 
 def pydmps_rollout() -> Begin:
-    """Rolls out with velocities and accelerations."""
+    """Computes a rollout with velocities and accelerations."""
     dmp = pydmps_dmp()
     return lambda: dmp.rollout
 
 
 def pdmp_rollouts() -> Begin:
-    """Rolls out many styles, with velocities."""
+    """Computes rollouts of many styles, with velocities."""
     styles = np.random.default_rng(0).normal(size=(N_ROLLOUTS, N_STYLES))
     return lambda: partial(primitive().rollouts, styles, dt=DT, threads=1)
 
 
 def mp_pytorch_rollouts(kind: str) -> Begin:
-    """Rolls out many weight vectors, with velocities, in float64 and on one thread.
+    """Computes rollouts of many weight vectors, with velocities, in float64 and on one thread.
 
-    What is drawn differs in size: J style parameters there, ten weights for each degree of freedom
-    here, and a goal too for ProDMP. ProMP's velocities are differences of its positions.
+    The inputs differ in size: J style parameters for pdmp; here ten weights per degree of freedom,
+    and a goal for ProDMP. The velocities of ProMP are differences of its positions.
     """
     import torch
     from mp_pytorch.mp import MPFactory
@@ -65,23 +65,23 @@ def mp_pytorch_rollouts(kind: str) -> Begin:
     return lambda: roll
 
 
-WORKS = [
-    Work(
+TASKS = [
+    Task(
         "rollout of one second at 1 kHz, D=7",
         calls=1,
-        bouts=40,
-        contestants={
+        rounds=40,
+        libraries={
             "pdmp, J=3": pdmp_rollout,
             "movement_primitives, Euler": partial(movement_primitives_rollout, EULER),
             "movement_primitives, RK4": partial(movement_primitives_rollout, RK4),
             "pydmps, Euler": pydmps_rollout,
         },
     ),
-    Work(
+    Task(
         f"{N_ROLLOUTS} rollouts of 1001 samples, D={N_DOFS}, with velocities",
         calls=1,
-        bouts=10,
-        contestants={
+        rounds=10,
+        libraries={
             "pdmp, J=3": pdmp_rollouts,
             "mp_pytorch, ProDMP": partial(mp_pytorch_rollouts, "prodmp"),
             "mp_pytorch, ProMP": partial(mp_pytorch_rollouts, "promp"),

@@ -4,15 +4,15 @@ from functools import partial
 from itertools import cycle
 from typing import Any
 
-from peers.arena import Begin, Call, Work
 from peers.libraries import EULER, RK4, movement_primitives_dmp, pydmps_dmp
 from peers.movement import DT, N_DOFS, goals, movement, primitive
+from peers.timing import Begin, Call, Task
 
-TICKS = 800  # within the second that the movement lasts: no one finishes early
+TICKS = 800  # within the duration of one second, so that no movement ends earlier
 
 
 def pdmp_settled() -> Begin:
-    """Steps with style, goal and tau at rest."""
+    """Steps with constant style, goal and tau."""
     controller = primitive().controller(dt=DT)
 
     def begin() -> Call:
@@ -24,7 +24,7 @@ def pdmp_settled() -> Begin:
 
 
 def pdmp_live() -> Begin:
-    """Steps with style, goal and tau on their way to others, slowly enough to take all ticks."""
+    """Steps with style, goal and tau in a transition that lasts for all ticks."""
     model = primitive()
     controller = model.controller(dt=DT, transition=DT * TICKS)
 
@@ -40,7 +40,7 @@ def pdmp_live() -> Begin:
 
 
 def pdmp_new_goal() -> Begin:
-    """Steps with a goal set before each; the filter of the goal starts anew."""
+    """Steps with a new goal before each tick; the filter of the goal restarts."""
     controller = primitive().controller(dt=DT)
     targets = cycle(goals())
 
@@ -57,10 +57,10 @@ def pdmp_new_goal() -> Begin:
 
 
 def ruckig_start() -> tuple[Any, Any, Any]:
-    """Makes generator, input and output for the same way with limits that let it last a second.
+    """Returns generator, input and output, with limits for a duration of a second.
 
-    The work differs in kind: no shape is learnt or followed. A jerk-limited trajectory is computed
-    when the target changes and sampled at every other tick.
+    The task differs in kind: no shape is learnt or followed. A jerk-limited trajectory is computed
+    when the target changes, and sampled at all other ticks.
     """
     from ruckig import InputParameter, OutputParameter, Ruckig
 
@@ -73,14 +73,14 @@ def ruckig_start() -> tuple[Any, Any, Any]:
 
 
 def ruckig_rest(given: Any) -> None:
-    """Puts the input at rest at the start of the way."""
+    """Sets the input to rest at the start."""
     given.current_position = movement(0)[0].tolist()
     given.current_velocity = [0.0] * N_DOFS
     given.current_acceleration = [0.0] * N_DOFS
 
 
 def ruckig_sample() -> Begin:
-    """Samples a trajectory: its computation, in the first update, is not timed."""
+    """Samples a trajectory; its computation, in the first update, is not timed."""
     generator, given, output = ruckig_start()
 
     def tick() -> None:
@@ -96,7 +96,7 @@ def ruckig_sample() -> Begin:
 
 
 def ruckig_new_goal() -> Begin:
-    """Computes a trajectory at every tick, to a target set before each."""
+    """Computes a trajectory at every tick, with a new target before each."""
     generator, given, output = ruckig_start()
     targets = cycle([goal.tolist() for goal in goals()])
 
@@ -152,12 +152,12 @@ def pydmps_step(new_goal: bool) -> Begin:
     return begin
 
 
-WORKS = [
-    Work(
+TASKS = [
+    Task(
         "one step, D=7, at 1 kHz",
         calls=TICKS,
-        bouts=40,
-        contestants={
+        rounds=40,
+        libraries={
             "pdmp, J=3": pdmp_settled,
             "pdmp, J=3, style, goal and tau in transition": pdmp_live,
             "ruckig, sampling its trajectory": ruckig_sample,
@@ -166,11 +166,11 @@ WORKS = [
             "pydmps, Euler": partial(pydmps_step, False),
         },
     ),
-    Work(
+    Task(
         "one step, D=7, to a goal that is new at every tick",
         calls=TICKS,
-        bouts=40,
-        contestants={
+        rounds=40,
+        libraries={
             "pdmp, J=3": pdmp_new_goal,
             "ruckig, computing its trajectory": ruckig_new_goal,
             "movement_primitives, Euler": partial(movement_primitives_step, EULER, True),

@@ -1,1 +1,1 @@
-"""Prediction of movements from their context: the primitive and simpler predictors."""
+"""Report on predictions of movements from their contexts, by primitives and simpler predictors."""

@@ -1,4 +1,4 @@
-"""Predicts movements from their context, with the primitive and with simpler predictors.
+"""Predicts movements from their contexts with primitives and with simpler predictors.
 
 ``make report`` prints the tables and draws figures into out/report/; ``--write`` writes
 docs/report.md too.
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pdmp import TimeWarp, plot
 from pdmp.evaluation import PDMP, Evaluation, baselines, evaluate, over_styles
+from report.baselines import library_baselines
 from report.sets import Question, questions
 from report.text import PRIMITIVE, SELECTED, WARPED, text
 
@@ -47,7 +48,8 @@ def main() -> None:
 def answer(question: Question) -> Evaluation:
     """Evaluates all predictors on one question, and draws their predictions."""
     given = {"contexts": question.contexts} | question.options
-    found = evaluate(question.demos, predictors=baselines() | PRIMITIVES, **given)
+    predictors = baselines() | library_baselines() | PRIMITIVES
+    found = evaluate(question.demos, predictors=predictors, **given)
     figure = plot.held_out(found, PRIMITIVE, unit=question.unit)
     plot.save(figure, FIGURES / f"{slug(question.name)}.png")
     if question.name in CURVES:
@@ -58,7 +60,7 @@ def answer(question: Question) -> Evaluation:
 
 
 def slug(name: str) -> str:
-    """Returns a name for a file."""
+    """Returns the name of a question as a file name."""
     return name.replace(", ", "_").replace(" ", "_")
 
 

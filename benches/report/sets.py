@@ -1,4 +1,4 @@
-"""Sets of recordings with a numeric context, each as one question or several."""
+"""Sets of recordings with numeric contexts, each as one or several questions."""
 
 import csv
 from collections.abc import Iterator
@@ -13,13 +13,13 @@ from pdmp.io import read_csv, read_folder
 from recordings import ARM, HAND, cycle, is_available
 
 LEGS = [f"{side}_{angle}" for side in "rl" for angle in ("hip_flex", "knee_flex", "ank_dorsi")]
-MOST = 120  # demonstrations of a question: Gaussian processes take a second each beyond
+MAX_DEMOS = 120  # of a question; with more, a Gaussian process takes over a second
 STRIDES = 3  # of each runner
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Demonstrations, and the contexts to predict them from."""
+    """Demonstrations and the contexts to predict them from."""
 
     name: str
     context: str
@@ -52,7 +52,7 @@ def raised_hands() -> Iterator[Question]:
 
 
 def high_and_low() -> Iterator[Question]:
-    """Yields grabs from high up and deposits on the floor, by three actors of different size."""
+    """Yields high grabs and deposits on the floor by three actors of different size."""
     index = rows("arms_hdm05")
     demos = list(read_folder(folder("arms_hdm05"), columns=ARM).values())
     columns = {"grabHighR": "peak_height_m", "depositFloorR": "low_height_m"}
@@ -67,7 +67,7 @@ def high_and_low() -> Iterator[Question]:
 
 
 def walking_forces() -> Iterator[Question]:
-    """Yields ground forces of five people who walk at many speeds."""
+    """Yields ground forces of five people at many walking speeds."""
     index = rows("walking_force_speed")
     demos = list(read_folder(folder("walking_force_speed")).values())
     speeds = numbers(index, "speed_m_s")
@@ -78,7 +78,7 @@ def walking_forces() -> Iterator[Question]:
         yield Question(
             f"walking_force_speed, subject {subject}", "speed", "BW", some, speeds[members]
         )
-    step = -(-len(demos) // MOST)
+    step = -(-len(demos) // MAX_DEMOS)
     yield Question("walking_force_speed, all", "speed", "BW", demos[::step], speeds[::step])
 
 
@@ -117,7 +117,7 @@ def runners() -> Iterator[Question]:
         seen[row["runner"]] = seen.get(row["runner"], 0) + 1
         if seen[row["runner"]] <= STRIDES:
             members.append(k)
-    # The last of 101 points is the first of the next stride.
+    # The last of 101 samples is the first of the next stride.
     demos = [cycle(strides[k].position[:-1], 1.0, strides[k].names) for k in members]
     contexts = numbers(index, "age", "height_cm", "mass_kg")[members]
     options = {"kind": "rhythmic"}

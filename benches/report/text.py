@@ -1,4 +1,4 @@
-"""The report as Markdown."""
+"""Report in Markdown."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -8,6 +8,7 @@ from pdmp import TimeWarp
 from pdmp.evaluation import Evaluation, baselines
 from pdmp.evaluation.result import REFERENCE
 from recordings import sources
+from report.baselines import library_baselines
 from report.sets import Question
 
 PRIMITIVE = "PDMP"
@@ -52,14 +53,14 @@ TIME = """\
 What a time warp makes of the spectrum of all demonstrations: the share of the sum of the singular
 values that the first three have, with time scaled linearly and with time warped; and E of the
 primitive with warped time less that with linear time, on the same folds, ± standard error. Both
-errors are over normalised time, in which a warped movement must meet the moments too. A warp brings
-pauses and hurry of a raised hand together and leaves less to vary, but the height held hardly
-determines their times: predicted from the context, movements with their mean times are nearer.
+errors are over normalised time, so that a warped movement must match the timing too. A warp aligns the
+pauses of a raised hand and reduces the variation, but the height hardly determines their times:
+movements with mean times are closer.
 """
 
 
 def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
-    """Writes the tables of all answers."""
+    """Returns the report on all answers."""
     names = [name for name in answers[0][1].predictors if name != REFERENCE]
     errors, itself, time = [], [], []
     for question, found in answers:
@@ -94,7 +95,7 @@ def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
 
 
 def relative(found: Evaluation, name: str, reach: str) -> str:
-    """Writes E over that of the mean demonstration."""
+    """Returns E over that of the mean demonstration."""
     if name in found.left_out:
         return "–"
     summary = found.summary(name, reach)
@@ -102,31 +103,31 @@ def relative(found: Evaluation, name: str, reach: str) -> str:
 
 
 def primitive(question: Question, found: Evaluation, reach: str) -> Iterable[str]:
-    """Writes what the primitive alone knows."""
+    """Returns coverage of the band and error of the duration of the primitive."""
     summary = found.summary(PRIMITIVE, reach)
     yield f"{summary.error:.2g} ± {summary.deviation:.1g} {question.unit}²"
     yield f"{summary.coverage:.0%}"
     yield f"{summary.duration:.0%}"
-    others = [name for name in baselines() if name not in found.left_out]
+    others = [name for name in baselines() | library_baselines() if name not in found.left_out]
     best = min(others, key=lambda name: found.summary(name, reach).error)
     yield best
     yield difference(found, PRIMITIVE, best, reach)
 
 
 def difference(found: Evaluation, one: str, other: str, reach: str) -> str:
-    """Writes E of one less that of the other, on the same folds."""
+    """Returns the difference of E of two predictors on the same folds."""
     compared = found.compare(one, other, reach)
     return f"{compared.mean:.2g} ± {compared.standard_error:.1g}"
 
 
 def choices(question: Question) -> tuple[str, str, str]:
-    """Writes J, J by cross-validation, and the map of a primitive of all demonstrations."""
+    """Returns J, J by cross-validation, and the map of a primitive of all demonstrations."""
     model = learnt(question)
     return str(model.n_styles), str(learnt(question, n_styles="auto").n_styles), model.map.kind
 
 
 def spectra(question: Question) -> tuple[str, str]:
-    """Writes the share of the first three singular values, in linear and in warped time."""
+    """Returns the share of the first three singular values, in linear and in warped time."""
     values = [
         learnt(question, alignment=alignment).singular_values
         for alignment in ("linear", TimeWarp(4))
@@ -136,11 +137,11 @@ def spectra(question: Question) -> tuple[str, str]:
 
 
 def learnt(question: Question, **settings: Any) -> pdmp.Model:
-    """Learns from all demonstrations."""
+    """Fits a primitive to all demonstrations."""
     kind = question.options.get("kind", "discrete")
     return pdmp.fit(question.demos, kind=kind, contexts=question.contexts, **settings)
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Writes a table in Markdown."""
+    """Returns the lines of a table in Markdown."""
     return [f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *rows)]

@@ -1,8 +1,8 @@
-# Types of the compiled half. Its documentation lives with the code in crates/pdmp-py: see help().
+# Types of the compiled module, and copies of its docstrings, which `.ci/stubs.py --write` writes.
 #
-# Shapes: M demonstrations, T samples, D degrees of freedom, J style parameters, Q context values,
-# B trajectories, C samples of a regression with P outputs. Times are in s, positions in the unit of
-# each degree of freedom. Whatever numpy can turn into float64 is accepted; float64 comes back.
+# Shapes: M demonstrations, T samples, D degrees of freedom, J style parameters, Q context values, B movements of a batch,
+# C samples of a regression with P outputs. Times are in s, positions in the unit of each degree of freedom. Arguments are
+# any objects that numpy converts to float64; results are float64.
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
@@ -57,40 +57,47 @@ __all__ = [
 __version__: str
 
 class PdmpError(Exception):
-    """Base of the errors that are not about an argument."""
+    """Base class of the errors that do not concern an argument."""
 
 class FitError(PdmpError):
-    """Learning did not succeed on well-formed demonstrations."""
+    """Numerical failure of a fit to well-formed demonstrations."""
 
 class ModelFileError(PdmpError):
-    """A model file that is damaged, foreign or of another version."""
+    """Model file that is damaged, not a model, or of another version."""
 
 @final
 class Demonstration:
-    """One recorded movement.
+    """Recorded movement.
 
     Parameters
     ----------
-    position : array_like (T, D) or Trajectory
-        Positions in the unit of each degree of freedom; at least four samples. A data frame gives names too, those of
-        its columns, and a trajectory time stamps, names and units, where they are not given.
+    position : array_like, (T, D), or Trajectory
+        Positions in the unit of each degree of freedom; at least four samples. The columns of a data frame supply
+        names, and a trajectory supplies time stamps, names and units, unless they are given.
     dt : float, optional
-        Sampling interval in s. Without `dt` and `time`, the fit is told.
+        Sampling interval in s. Without `dt` and `time`, `fit` needs it.
     time : array_like, (T,), optional
-        Strictly increasing time stamps in s, or dates of numpy, which count from the first.
+        Strictly increasing time stamps in s, or datetimes of numpy, counted from the first.
     goal : array_like, (D,), optional
-        Point attractor; the last sample serves otherwise.
+        Goal g in the unit of each degree of freedom; by default the last sample.
     context : array_like or list, (Q,), optional
-        The condition under which the movement was made, such as an obstacle's height.
-    names : sequence of str, optional
-        One name per degree of freedom.
-    units : sequence of str, optional
-        One unit per degree of freedom, such as "rad" or "m"; "" where it is not known.
+        Numbers and labels that describe the task, such as the height of an obstacle, in any unit.
+    names : sequence of str, (D,), optional
+        Names of the degrees of freedom, all different.
+    units : sequence of str, (D,), optional
+        Units of the degrees of freedom, such as "rad" or "m"; "" if unknown.
 
     Raises
     ------
     ValueError
-        Too few samples, numbers that are not finite, times that do not increase, or lengths that do not agree.
+        Samples are too few, a number is not finite, times do not increase, or lengths differ.
+
+    Examples
+    --------
+    >>> s = np.linspace(0.0, 1.0, 61)
+    >>> reach = np.column_stack([s**3 * (10 - 15 * s + 6 * s**2), 0.2 * np.sin(np.pi * s) ** 2])
+    >>> pdmp.Demonstration(reach, dt=0.02, names=["x", "y"], units=["m", "m"])
+    <pdmp.Demonstration: 61 samples x 2 DoFs, dt 0.02 s>
     """
     def __new__(
         cls,
@@ -106,25 +113,25 @@ class Demonstration:
     def __getnewargs_ex__(self) -> tuple[tuple[_Array], dict[str, Any]]: ...
     @property
     def position(self) -> _Array:  # (T, D)
-        """Positions (T, D)."""
+        """Positions (T, D) in the unit of each degree of freedom."""
     @property
     def time(self) -> _Array | None:  # (T,); None while the rate is unknown
-        """Times of the samples (T,) in s; None while the rate is unknown."""
+        """Times of the samples (T,) in s; None if unknown."""
     @property
     def dt(self) -> float | None:  # None unless given
-        """Sampling interval in s; None unless it was given."""
+        """Sampling interval in s; None if not given."""
     @property
     def goal(self) -> _Array | None:
-        """Point attractor (D,), if one was given."""
+        """Goal g (D,); None if not given."""
     @property
     def context(self) -> _Array | list[float | str] | None:
-        """Condition (Q,), if one was given: an array, or a list where there are labels."""
+        """Context (Q,), an array of numbers or a list with labels; None if not given."""
     @property
     def names(self) -> list[str] | None:
-        """Names of the degrees of freedom, if they were given."""
+        """Names of the degrees of freedom (D,); None if not given."""
     @property
     def units(self) -> list[str] | None:
-        """Units of the degrees of freedom, if they were given."""
+        """Units of the degrees of freedom (D,); None if not given."""
     @property
     def n_samples(self) -> int:
         """Number of samples T."""
@@ -149,7 +156,7 @@ def fit(
     transport: Literal["learnt", "immediate"] | None = None,
     dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
     alignment: Literal["linear", "warp"] | TimeWarp = "linear",
-    events: ArrayLike | None = None,  # (M, E)
+    landmarks: ArrayLike | None = None,  # (M, E)
     tau: float | None = None,
     alpha_z: float = 25.0,
     beta_z: float | None = None,
@@ -158,79 +165,85 @@ def fit(
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model:
-    """Learn one movement primitive from several demonstrations.
+    """Fit a movement primitive to demonstrations.
 
-    The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets
-    f = τẏ − z exactly, factorise F ≈ S·F_basis (Eq. 7), and regress the landscape on the phase.
+    The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets f = τẏ − z exactly,
+    factorise them, F ≈ S·F_basis (Eq. 7), and regress the attractor landscape on the phase.
 
     Parameters
     ----------
-    demos : sequence or mapping of Demonstration, of Trajectory or of (T, D) array_like, or (M, T, D) array_like
-        Demonstrations of one skill; if rhythmic, each is one cycle without its end point. Of a mapping, such as the
-        readers return, the values count. Data frames name their degrees of freedom by their columns.
+    demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D)
+        Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
+        readers return, the values are used. The columns of data frames name the degrees of freedom.
     kind : {"discrete", "rhythmic"}
-        From a start to a goal, or around an anchor.
+        Movement from a start to a goal, or around an anchor.
     dt : float, optional
-        Sampling interval in s of the demonstrations that carry none.
-    period : float or (M,) array_like, optional
+        Sampling interval in s of demonstrations without one.
+    period : float or array_like, (M,), optional
         Periods in s of time-stamped cycles.
-    contexts : (M, Q) array_like, or M lists of Q numbers and labels, optional
-        The condition of each demonstration; otherwise those that they carry.
+    contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
+        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
     map : {"auto", "stacked", "gp", "linear", "polynomial"}
-        Map from contexts to movements: a Gaussian process and a penalised line, weighted by their errors at contexts
-        left out, outside of the contexts of the demonstrations together with the mean ("stacked"); the process alone;
-        least squares as in the paper; or ridge regression on polynomials of second degree. "auto" is "stacked", and
-        "linear" for labels alone, which get the mean of their demonstrations each, for two different contexts and for
-        more than 1024. The repr of `model.map` has the weights.
+        Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
+        regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
+        process alone, "linear" least squares as in the paper, "polynomial" ridge regression of second degree. "auto" is
+        "stacked"; it is "linear" for labels alone, each of which then has the mean of its demonstrations, for two
+        different contexts and for more than 1024. The repr of `model.map` states the weights.
     n_styles : int or "auto", optional
         Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular
-        values, at least five (or half of the demonstrations) and as many as the contexts explain (F-test), but none
-        that measurement noise alone would give (parallel analysis). "auto" is cross-validation over contexts by the
-        one-standard-error rule, in at most ten folds.
+        values, at least five (or half of the demonstrations) and those that the contexts explain (F-test), without
+        those that measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to
+        the error of cross-validation over contexts, in at most ten folds.
     singular_value_share : float, optional
-        The paper's rule instead: the fewest singular values whose sum exceeds this share of the sum of all, such as 0.9.
+        Share in (0, 1], the paper's rule: J is the smallest number of singular values whose sum exceeds this share of
+        the sum of all, for example 0.9.
     basis : {"gp", "ngnet"}, GP or NGnet
-        Function approximator of the landscape.
+        Regression of the landscape.
     smoothing : "auto", float or None
-        Smooth each degree of freedom by generalised cross-validation over all demonstrations, which leaves clean ones as
-        they are; or with this cut-off in Hz; or interpolate every sample. `model.noise` and `model.cut_offs` hold what
-        was found.
+        Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom,
+        which leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
+        `model.noise` and `model.cut_offs` hold the result.
     nominal : int, optional
-        Index of the nominal demonstration; otherwise the one of median duration.
+        Index of the nominal demonstration; by default the one of median duration.
     n_samples : int, optional
-        Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
-        than 150.
-    transport : {"learnt", "immediate"}
-        How the way from start to goal is spread over a discrete movement: along the profile by which the demonstrations
-        cover theirs (:meth:`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path.
-        Past its end a movement brakes (:attr:`Model.braking`), or its forcing fades with the phase as in the paper.
-    dof_scale : None, "unit", "range" or (D,) array_like
-        Unit of each degree of freedom in the factorisation. By default as recorded ("unit") where all units are equal or
-        unknown; otherwise the degrees of freedom of each unit are scaled together by the largest range among them.
-        "range" scales each by its own range. If given as numbers, in a warp of time too.
+        Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
+        that has fewer than 150.
+    transport : {"learnt", "immediate"}, optional
+        Motion of the frame of a discrete movement from start to goal: by default along the learnt profile of the
+        demonstrations (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past
+        its end the movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as
+        in the paper.
+    dof_scale : None, "unit", "range" or array_like, (D,)
+        Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
+        units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
+        them. "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and
+        also apply to a time warp.
     alignment : {"linear", "warp"} or TimeWarp
-        How time is scaled to that of the nominal demonstration: linearly, or by the monotone warp that brings the
-        demonstrations closest to each other, where they pause or hurry in different places. A `TimeWarp` is applied as given;
-        "warp" has eight segments, fewer where a demonstration has fewer than 16 samples, and with at least three
-        different contexts is applied only if it lowers the error at contexts held out by more than its standard error;
-        `model.segment_durations` has one column where it is not.
-    events : (M, E) array_like, optional
-        Times in s of E landmarks in each demonstration, from its first sample or of its time stamps, in place of a
-        warp: all are aligned to those of the nominal demonstration.
+        Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the
+        demonstrations closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a
+        demonstration has fewer than 16 samples; with three or more different contexts it is applied only if it lowers
+        the cross-validation error over contexts by more than its standard error, and `model.segment_durations` has one
+        column if it is not.
+    landmarks : array_like, (M, E), optional
+        Times in s of E landmarks in each demonstration, from its first sample or on the clock of its time stamps. They
+        are aligned to those of the nominal demonstration, in place of a warp.
     tau : float, optional
-        Time constant in s, discrete; otherwise the nominal duration.
-    alpha_z, beta_z : float
-        Constants of the output system; `beta_z` is `alpha_z / 4` (critical damping) unless given.
+        Time constant τ in s of a discrete primitive; by default the nominal duration.
+    alpha_z : float
+        Rate α_z of the output system, from 1e-6 to 1e6, without unit.
+    beta_z : float, optional
+        Stiffness β_z of the output system, from 1e-6 to 1e6, without unit; by default `alpha_z / 4` (critical damping).
     alpha_x : float, optional
-        Constant of the discrete canonical system; otherwise x = 0.01 at the end. Where transport is immediate the
-        forcing fades with x past the end of the demonstrations: if a movement drifts off its goal there before it
-        settles, `alpha_x = alpha_z` keeps it closest.
-    mu : float
-        Constant of the rhythmic canonical system.
+        Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With
+        "immediate" transport the forcing fades with x past the end: if a movement leaves its goal there before it
+        settles, `alpha_x = alpha_z` reduces the deviation most.
+    mu : float, optional
+        Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit; 1 by default.
     threads : int, optional
-        How many threads may work on it; otherwise as many as the system allows. The model does not depend on it.
+        Largest number of threads; by default all that the system offers. The model does not depend on it.
     progress : callable, optional
-        Called with the stage and the share of it that is done; an exception it raises ends the fit.
+        Called as `progress(stage, fraction)` with the name of a stage and its completed fraction. An exception that it
+        raises cancels the fit.
 
     Returns
     -------
@@ -239,20 +252,31 @@ def fit(
     Warns
     -----
     UserWarning
-        Samples that no movement makes, with their place: time stamps far closer than the others, dropouts written as
-        zeros, padding, counters and time stamps among the columns, wrapped angles, angles of different demonstrations
-        whole turns apart (taken off where units say that they are angles), and an `alpha_z` too high for the samples.
+        Implausible samples, with their positions: time stamps much closer than the others, dropouts recorded as zeros,
+        padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole
+        turns apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
 
     Raises
     ------
     ValueError
-        Demonstrations or options that do not fit together.
+        Demonstrations or options are invalid or do not fit together.
     FitError
-        Well-formed demonstrations from which nothing could be learnt.
+        The numerical problem of well-formed demonstrations has no solution.
+    MemoryError
+        The targets do not fit into memory.
 
     References
     ----------
     Matsubara, Hyon, Morimoto, Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
+
+    Examples
+    --------
+    >>> s = np.linspace(0.0, 1.0, 61)
+    >>> reach = s**3 * (10 - 15 * s + 6 * s**2)
+    >>> demos = [np.column_stack([reach, height * np.sin(np.pi * s) ** 2]) for height in (0.1, 0.2, 0.3)]
+    >>> fitted = pdmp.fit(demos, dt=0.02, contexts=[[0.1], [0.2], [0.3]], n_styles=1)
+    >>> fitted.n_demos, fitted.n_dofs, fitted.n_styles
+    (3, 2, 1)
     """
 
 def inspected(
@@ -265,14 +289,19 @@ def inspected(
     demos : list of Demonstration
         Demonstrations of one skill.
     dt : float, optional
-        Sampling interval in s of those that carry none.
+        Sampling interval in s of demonstrations without one.
 
     Returns
     -------
-    list of Demonstration
-        The same, without the whole turns by which angles lie apart, as `fit` learns from them.
-    list of str
-        What is implausible about them, with its place.
+    demos : list of Demonstration
+        The demonstrations as `fit` learns from them, without whole turns between their angles.
+    findings : list of str
+        Descriptions of implausible samples, with their positions.
+
+    Raises
+    ------
+    ValueError
+        `dt` is not a number.
     """
 
 def factorise(
@@ -281,20 +310,20 @@ def factorise(
     n_styles: int | None = None,
     singular_value_share: float = 0.9,
 ) -> Factors:
-    """Factorise stacked targets: the truncated singular value decomposition of step 3 of Section 3.2.
+    """Factorise stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
 
-    F = UΣVᵀ, S = the first J columns of U, F_basis = the first J rows of ΣVᵀ: of all products of this shape the one
-    nearest to F. `fit` does this to its targets. Few factors of many demonstrations are found from products with F
-    alone, the others from its Gram matrix or by reflections; which, depends on J, the shape and the singular values.
+    F = UΣVᵀ; S is the first J columns of U and F_basis the first J rows of ΣVᵀ, the best approximation of F of rank J.
+    `fit` factorises its targets so. A few factors of many demonstrations are computed by Krylov iteration, others from
+    the Gram matrix or by Householder reflections, depending on J, the shape and the singular values.
 
     Parameters
     ----------
-    targets : (M, C·D) array_like
-        One row per demonstration.
+    targets : array_like, (M, C·D)
+        Targets F, one row per demonstration, in any unit.
     n_styles : int, optional
-        Number of factors J, at most min(M, C·D); otherwise from `singular_value_share`.
+        Number J of factors, at most min(M, C·D). By default `singular_value_share` decides.
     singular_value_share : float
-        Keep the fewest singular values whose sum exceeds this share of the sum of all.
+        Share in (0, 1]: J is the smallest number of singular values whose sum exceeds this share of the sum of all.
 
     Returns
     -------
@@ -304,7 +333,7 @@ def factorise(
     Raises
     ------
     ValueError
-        A J or share out of range; targets that are empty, or not finite.
+        `n_styles` or `singular_value_share` is out of range, or `targets` is empty or not finite.
 
     References
     ----------
@@ -317,9 +346,9 @@ def load(path: str | PathLike[str]) -> Model:
     Parameters
     ----------
     path : path-like
-        A `.safetensors` file written by `Model.save`. A file from elsewhere is data: it runs no code and names no other
-        file, takes memory and time in proportion to its size, and moves in finite numbers or not at all. Its checksum
-        finds damage, not intent: the movement itself, and all texts in it, are whatever its author wrote.
+        A `.safetensors` file that `Model.save` wrote. Files of unknown origin are safe to load: a file contains no code
+        and no reference to other files, needs memory and time in proportion to its size, and generates finite numbers
+        or an error. The checksum detects damage, not intent: the author of a file decides its movements and texts.
 
     Returns
     -------
@@ -328,19 +357,27 @@ def load(path: str | PathLike[str]) -> Model:
     Raises
     ------
     OSError
-        A file that cannot be read.
+        The file cannot be read.
     ModelFileError
-        A file that is damaged, not a model, or of another version.
+        The file is damaged, not a model, or of another version.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
+    >>> model.save(path)
+    >>> loaded = pdmp.load(path)
+    >>> np.array_equal(loaded.styles, model.styles)
+    True
     """
 
 def resample(demo: Demonstration, dt: float) -> Demonstration:
-    """Sample a recording anew, at even intervals.
+    """Resample a recording at even intervals.
 
-    Samples at t₀, t₀ + dt, … as far as the recording goes; the clock of what is returned starts at 0. Of irregular time
-    stamps it makes even ones. They are those of the cubic smoothing spline that generalised cross-validation chooses,
-    which meets clean samples. No denser than the recording, they also carry what smoothing takes off the nearest recorded
-    ones: noise stays white, and a fit can still smooth it. A denser grid is that of the spline through all samples. Frequencies above 1/(2 dt) are to be
-    taken off first, by `lowpass`.
+    The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no
+    denser than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the
+    residuals of the nearest recorded samples: noise stays white, so that a fit can still smooth it. A denser grid
+    samples the spline through all samples. Remove frequencies above 1/(2 dt) with `lowpass` first.
 
     Parameters
     ----------
@@ -352,71 +389,70 @@ def resample(demo: Demonstration, dt: float) -> Demonstration:
     Returns
     -------
     Demonstration
-        With its names, units, context and goal.
+        Recording with the same names, units, context and goal.
 
     Raises
     ------
     ValueError
-        An interval that is not positive or leaves fewer than four samples, or a recording without times.
+        `dt` is not positive or leaves fewer than four samples, or the recording has no times.
     """
 
 def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration:
-    """Keep the part of a recording in which there is movement.
+    """Trim the rests before and after the movement of a recording.
 
-    That is from the first to the last sample whose speed is at least the share `threshold` of the largest, with the
-    speed of all degrees of freedom together, v² = Σ_d (ẏ_d / (max y_d − min y_d))², of the recording as generalised
-    cross-validation smooths it. Where noise is faster than the threshold, a movement counts that surpasses noise
-    somewhere, from where the threshold is passed. The samples stay as they were recorded.
+    The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed,
+    where v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise
+    exceeds the threshold, only stretches above the threshold that also exceed the noise count. The samples remain as
+    recorded.
 
     Parameters
     ----------
     demo : Demonstration
         A recording with `dt` or `time`.
     threshold : float
-        Share of the peak speed, between 0 and 1.
+        Share of the peak speed, in (0, 1).
 
     Returns
     -------
     Demonstration
-        With its names, units, context and goal. Time stamps stay as they are.
+        Recording with the same names, units, context, goal and time stamps.
 
     Raises
     ------
     ValueError
-        A threshold that is no share, or a recording that stands still, moves for fewer than four samples, or has no
-        times.
+        `threshold` is out of range, or the recording has no movement, fewer than four samples of it, or no times.
     """
 
 def cut(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fewer than times
-    """Cut a recording at given times into one movement from each to the next.
+    """Cut a recording at given times.
 
-    Each is sampled evenly, as densely as the recording at most, with both ends: it begins and ends at the very times that
-    are given. As with `resample`, noise stays white.
+    Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the
+    recording. As with `resample`, noise stays white.
 
     Parameters
     ----------
     demo : Demonstration
         A recording with `dt` or `time`.
-    times : (K,) array_like
-        At least two times in s of the recording's clock, increasing.
+    times : array_like, (K,)
+        Two or more increasing times in s on the clock of the recording.
 
     Returns
     -------
     list of Demonstration
-        K − 1 of them, with the names, units and context.
+        K − 1 parts with the same names, units and context.
 
     Raises
     ------
     ValueError
-        Times that do not increase or lie outside, a part shorter than three sampling intervals, or a recording without
-        times.
+        `times` do not increase or lie outside the recording, a part is shorter than three sampling intervals, or the
+        recording has no times.
     """
 
 def lowpass(demo: Demonstration, cut_off: float) -> Demonstration:
-    """Filter a recording by a low-pass without phase lag.
+    """Filter a recording with a low-pass of zero phase.
 
-    It is the cubic smoothing spline: of a sine of frequency f the share 1/(1 + (f/f_c)⁴) is left, half at the cut-off
-    f_c. `pdmp.plot.cut_off` draws what helps to choose that.
+    The filter is the cubic smoothing spline, with gain 1/(1 + (f/f_c)⁴) at frequency f: one half at the cut-off f_c.
+    `pdmp.plot.cut_off` plots residuals over the cut-off.
 
     Parameters
     ----------
@@ -428,13 +464,12 @@ def lowpass(demo: Demonstration, cut_off: float) -> Demonstration:
     Returns
     -------
     Demonstration
-        At the same times, with its names, units, context and goal.
+        Recording at the same times, with the same names, units, context and goal.
 
     Raises
     ------
     ValueError
-        A cut-off that is not positive, not below half the sampling rate or below a ten-thousandth of it, or a recording
-        without times.
+        `cut_off` is not between a ten-thousandth and half of the sampling rate, or the recording has no times.
 
     References
     ----------
@@ -442,31 +477,49 @@ def lowpass(demo: Demonstration, cut_off: float) -> Demonstration:
     """
 
 def residuals(demo: Demonstration, cut_offs: ArrayLike) -> _Array:  # (K, D)
-    """What `lowpass` takes off at each of K cut-offs [Hz]: root mean squares (K, D), in the unit of each degree of freedom."""
-
-def period(demo: Demonstration) -> float:
-    """Find the period of a cyclic recording.
-
-    Positions and velocities of all degrees of freedom, each less its linear trend, are correlated with themselves k
-    samples later; A(k) is the mean of these correlations. The period is the first peak of A that is as high as the
-    highest, but for what varies from cycle to cycle; half a cycle, and the period of a harmonic, make lower ones, and
-    an odd cycle is no matter. A parabola finds it to a part of a sample. Peaks that noise of the same memory makes by
-    chance are none: the fewer independent samples overlap, the higher a peak must be.
+    """Compute the residuals of `lowpass` over its cut-off.
 
     Parameters
     ----------
     demo : Demonstration
-        A recording of at least one cycle and a half, with `dt` or `time`.
+        A recording with `dt` or `time`.
+    cut_offs : array_like, (K,)
+        Cut-off frequencies in Hz.
 
     Returns
     -------
-    float
-        The period in s.
+    ndarray, (K, D)
+        Root mean square of the residual, in the unit of each degree of freedom.
 
     Raises
     ------
     ValueError
-        A recording whose peaks are all below 0.35 or by chance, that stands still, or has no times.
+        A cut-off that `lowpass` rejects, or a recording without times.
+    """
+
+def period(demo: Demonstration) -> float:
+    """Estimate the period of a cyclic recording by autocorrelation.
+
+    A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal
+    of linear trends. The period is the first peak of A that equals the highest peak within the variation between
+    cycles, at the vertex of the parabola through three samples; peaks at half a cycle and at periods of harmonics are
+    lower. A peak must exceed the significance level for noise of the same autocorrelation, which rises as fewer
+    independent samples overlap.
+
+    Parameters
+    ----------
+    demo : Demonstration
+        A recording of one and a half cycles or more, with `dt` or `time`.
+
+    Returns
+    -------
+    float
+        Period in s.
+
+    Raises
+    ------
+    ValueError
+        All peaks are below 0.35 or not significant, or the recording has no movement or no times.
 
     References
     ----------
@@ -480,13 +533,35 @@ def fill(
     turns: Sequence[float],  # D of them; 0 where no angle
     max_gap: float,
 ) -> _Array:  # (T, D)
-    """Positions (T, D) with NaN interpolated in gaps up to `max_gap` seconds; `turns` (D,) of angles, 0 of others, NaN where it is
-    not known.
+    """Interpolate missing samples.
+
+    Parameters
+    ----------
+    position : array_like, (T, D)
+        Positions in the unit of each degree of freedom, NaN where missing.
+    time : array_like, (T,)
+        Time stamps in s.
+    names : sequence of str, (D,)
+        Names of the degrees of freedom.
+    turns : array_like, (D,)
+        Full turn of each angle in its unit, 0 for other units, NaN if the unit is unknown.
+    max_gap : float
+        Longest gap in s that is interpolated.
+
+    Returns
+    -------
+    ndarray, (T, D)
+        Positions without missing samples.
+
+    Raises
+    ------
+    ValueError
+        A gap is longer than `max_gap`, or lies at an end.
     """
 
 def cycles(
     recordings: _Demos,
-    events: Sequence[ArrayLike] | None,  # one (K,) for each recording
+    onsets: Sequence[ArrayLike] | None,  # one (K,) for each recording
     average: bool,
 ) -> tuple[
     list[Demonstration],
@@ -496,17 +571,38 @@ def cycles(
     list[tuple[int, float, float, str, bool]],
     list[tuple[int, int, float, int]],
 ]:
-    """Cuts recordings into cycles: what `pdmp.preprocessing.cycles` calls."""
+    """Cut recordings into cycles, for `pdmp.preprocessing.cycles`.
+
+    Parameters
+    ----------
+    recordings : sequence of Demonstration
+        Recordings with `dt` or `time`.
+    onsets : list of array_like, (K,), or None
+        Times in s at which the cycles of each recording begin; the last ends the last cycle.
+    average : bool
+        Return one mean cycle of each recording.
+
+    Returns
+    -------
+    tuple
+        Cycles, their periods (K,) in s, their gains (K, D) in the unit of each degree of freedom, the indices of their
+        recordings, the rejected cycles and the growths.
+
+    Raises
+    ------
+    ValueError
+        Recordings without a period or without times, or invalid onsets.
+    """
 
 @final
 class Model:
-    """A parametric dynamic movement primitive: immutable, picklable, saved by `save`.
+    """Parametric dynamic movement primitive, returned by `fit` and `load`.
 
-    Made by `fit` and `load`.
+    Models are immutable and can be pickled.
     """
     @property
     def kind(self) -> _Kind:
-        """ "discrete" or "rhythmic"."""
+        """Kind of the primitive, "discrete" or "rhythmic"."""
     @property
     def n_demos(self) -> int:
         """Number of demonstrations M."""
@@ -515,90 +611,94 @@ class Model:
         """Number of degrees of freedom D."""
     @property
     def n_styles(self) -> int:
-        """Dimension J of the style parameter."""
+        """Style dimension J."""
     @property
     def tau(self) -> float:
-        """Time constant of the nominal demonstration in s."""
+        """Time constant τ of the nominal demonstration in s: its duration if discrete, its period over 2π if rhythmic."""
     @property
     def alpha_z(self) -> float:
-        """Rate of the output system."""
+        """Rate α_z of the output system, without unit."""
     @property
     def beta_z(self) -> float:
-        """Stiffness of the output system."""
+        """Stiffness β_z of the output system, without unit."""
     @property
     def alpha_x(self) -> float | None:  # None if rhythmic
-        """Rate of the discrete canonical system; None if rhythmic."""
+        """Rate α_x of the discrete canonical system, without unit; None if rhythmic."""
     @property
     def braking(self) -> float | None:  # None if rhythmic or transport is immediate
-        """Rate per unit of the clock at which a discrete movement brakes past its end; None if rhythmic, or if transport
-        is immediate, where the forcing fades with the phase.
+        """Braking rate of a discrete movement past its end, per unit of the clock.
+
+        None if the primitive is rhythmic, or if transport is immediate, so that the forcing fades with the phase.
         """
     @property
     def mu(self) -> float | None:  # None if discrete
-        """Rate of the amplitude; None if discrete."""
+        """Rate μ of the amplitude, without unit; None if discrete."""
     @property
     def names(self) -> list[str]:
-        """Names of the degrees of freedom."""
+        """Names of the degrees of freedom (D,)."""
     @property
     def units(self) -> list[str]:  # "" where unknown
-        """Units of the degrees of freedom; "" where one is not known."""
+        """Units of the degrees of freedom (D,); "" if unknown."""
     @property
     def nominal(self) -> int:
         """Index of the nominal demonstration."""
     @property
     def styles(self) -> _Array:  # (M, J)
-        """Styles S of the demonstrations (M, J)."""
+        """Styles S (M, J) of the demonstrations, without unit."""
     @property
     def singular_values(self) -> _Array:  # decreasing: all, or of a large library the first J
-        """Singular values of the targets, in decreasing order: all min(M, C·D) of them, or the first J alone, where
-        n_styles was given and is so small beside the library that the others were not computed.
+        """Singular values of the targets in decreasing order.
+
+        All min(M, C·D), or the first J if a small `n_styles` was given and the others were not computed.
         """
     @property
     def truncation_error(
         self,
     ) -> float:  # share of the targets, by RMS, that J styles leave out
-        """Share of the targets F, by root mean square, that the J styles leave out: ‖F − S·F_basis‖/‖F‖."""
+        """Truncation error ‖F − S·F_basis‖/‖F‖ of the targets F in the Frobenius norm."""
     @property
     def noise(self) -> _Array:  # (D,), standard deviation
-        """Standard deviation of the measurement noise of each degree of freedom (D,), in its unit, by generalised
-        cross-validation: 0 where none was found, or none was looked for (`smoothing=None`).
+        """Standard deviation (D,) of the measurement noise in the unit of each degree of freedom, by generalised
+        cross-validation.
+
+        0 if no noise was found, or with `smoothing=None`.
         """
     @property
     def cut_offs(self) -> _Array:  # (D,), Hz, inf where nothing is smoothed
-        """Cut-offs of the smoothing (D,) in Hz, at which a sine keeps half of its amplitude; inf where every sample is met."""
+        """Cut-off frequencies (D,) of the smoothing in Hz, at a gain of one half; inf without smoothing."""
     @property
     def dof_scale(self) -> _Array:  # (D,)
-        """Unit of each degree of freedom in the factorisation (D,)."""
+        """Scale (D,) of each degree of freedom in the factorisation, in its unit."""
     @property
     def goals(self) -> _Array:  # (M, D)
-        """Goals of the demonstrations (M, D)."""
+        """Goals (M, D) of the demonstrations in the unit of each degree of freedom."""
     @property
     def starts(self) -> _Array:  # (M, D)
-        """First positions of the demonstrations (M, D)."""
+        """First positions (M, D) of the demonstrations in the unit of each degree of freedom."""
     @property
     def anchors(self) -> _Array:  # (M, D)
-        """Mean positions of the demonstrations (M, D), the anchors of cycles."""
+        """Mean positions (M, D) of the demonstrations, the anchors of cycles, in the unit of each degree of freedom."""
     @property
     def breaks(self) -> _Array:  # (K+1,), K = 1 where time is scaled linearly
-        """Phases (K+1,) from 0 to 1 that divide the movement into segments; K = 1 where time is scaled linearly."""
+        """Bounds (K+1,) of the segments as shares of the movement, from 0 to 1; K = 1 with linear scaling of time."""
     @property
     def segment_durations(self) -> _Array:  # (M, K)
-        """Timings of the demonstrations (M, K): the time in s that each spends in each segment."""
+        """Time (M, K) in s of each demonstration in each segment between `breaks`."""
     @property
     def durations(self) -> _Array:  # (M,)
-        """Durations or periods of the demonstrations (M,) in s: the sums of their segment_durations."""
+        """Durations or periods (M,) of the demonstrations in s, the sums of their segment durations."""
     @property
     def contexts(self) -> _Array | list[list[float | str]] | None:  # (M, Q)
-        """Contexts of the demonstrations (M, Q), if they had any: an array, or lists where there are labels."""
+        """Contexts (M, Q) of the demonstrations, an array of numbers or lists with labels; None without contexts."""
     @property
     def map(self) -> ContextMap | None:
-        """What leads from contexts to movements, if there are any."""
+        """Map from contexts to style, goal, start or anchor, and duration; None without contexts."""
     @property
     def regression(self) -> str:  # what was chosen, in one line
-        """What was chosen for the basis functions, in one line."""
+        """Description of the regression of the landscape."""
     @property
     def table_error(self) -> float:  # estimated error of the compiled landscape
-        """Estimated error of the compiled landscape, relative to its largest value."""
+        """Estimated interpolation error of the tabulated landscape, relative to its largest value."""
     def rollout(
         self,
         conditions: Conditions | None = None,
@@ -610,8 +710,8 @@ class Model:
     ) -> Trajectory:
         """Compute the movement under constant conditions.
 
-        Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c, with w = x·sᵀb (discrete) or r·sᵀb (rhythmic),
-        exactly. Conditions that are not given are those of the nominal demonstration.
+        Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb
+        (discrete) or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
 
         Parameters
         ----------
@@ -620,29 +720,32 @@ class Model:
         dt : float
             Interval between samples in s.
         duration : float, optional
-            Length in s; otherwise the demonstrated duration scaled by `tau`, or the sum of `segment_durations`; one period if
-            rhythmic.
-        context : array_like, (Q,), optional
-            Context whose prediction supplies style, goal, start or anchor, and duration where they are not given.
+            Length in s. By default the demonstrated duration scaled by `tau`, the sum of `segment_durations`, or one
+            period of a rhythmic movement.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies absent conditions: style, goal, start or anchor, and duration.
         **changes
-            Single conditions by name (see `Conditions`), in place of those of `conditions`.
+            Single conditions by name, which replace those of `conditions`; see `Conditions`.
 
         Returns
         -------
         Trajectory
-            n + 1 samples, n = duration / dt rounded down.
+            n + 1 samples, where n is duration / dt rounded down.
 
         Raises
         ------
         ValueError
-            A wrong length, a number that is not finite, or a condition that this kind of primitive does not have.
+            A length is wrong, a number is not finite, or a condition belongs to the other kind of primitive.
         TypeError
-            An unknown keyword, or conditions of another type.
+            A keyword is unknown, or `conditions` has another type.
 
         Examples
         --------
-        >>> model.rollout(goal=[0.4, 0.1], tau=2.0, dt=0.001).position.shape
+        >>> trajectory = model.rollout(goal=[1.1, 0.0], tau=2.0, dt=0.001)
+        >>> trajectory.position.shape
         (2001, 2)
+        >>> np.allclose(trajectory.position[-1], [1.1, 0.0], atol=1e-3)
+        True
         """
     def conditions(self, demos: int | Sequence[int]) -> Conditions:
         """Return the conditions of one demonstration, or the mean of several.
@@ -660,11 +763,13 @@ class Model:
         Raises
         ------
         ValueError
-            No index, one that is no whole number, or one outside the demonstrations.
+            `demos` is empty, not a whole number, or out of range.
 
         Examples
         --------
-        >>> trajectory = model.rollout(model.conditions(3))
+        >>> trajectory = model.rollout(model.conditions(2))
+        >>> np.allclose(trajectory.position[0], model.starts[2])
+        True
         """
     def rollouts(
         self,
@@ -682,10 +787,10 @@ class Model:
         out: Sequence[_Array] | None = None,
         threads: int | None = None,
     ) -> tuple[_Array, ...]:  # positions and as many derivatives (B, T, D)
-        """Movements of many styles.
+        """Compute the movements of many styles.
 
-        For constant style, goal and tau a movement is linear in its conditions: a batch is one product of coefficients
-        with response curves, which the model remembers for a few of the last (dt, tau, duration). Agrees with `rollout`
+        A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
+        response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
         to rounding.
 
         Parameters
@@ -693,34 +798,46 @@ class Model:
         styles : array_like, (B, J)
             Style parameters s.
         goals : array_like, (D,) or (B, D), optional
-            Goals g of all or of each, discrete.
+            Goals g of all or of each movement, in the unit of each degree of freedom; discrete.
         starts : array_like, (D,) or (B, D), optional
-            Start positions; rhythmic movements otherwise start on their cycles.
+            Start positions y₀ of all or of each movement. Rhythmic movements start on their limit cycles by default.
         velocities : array_like, (D,) or (B, D), optional
-            Start velocities per s; otherwise as in the demonstrations.
+            Start velocities per s of all or of each movement; by default those of the demonstrations.
         anchors : array_like, (D,) or (B, D), optional
-            Anchors y_a of all or of each, rhythmic.
-        amplitude, tau, dt, duration
-            As in `rollout`, of all.
+            Anchors y_a of all or of each movement; rhythmic.
+        amplitude : float, optional
+            Amplitude r₀ of all movements; rhythmic.
+        tau : float, optional
+            Time constant τ of all movements in s.
+        dt : float
+            Interval between samples in s.
+        duration : float, optional
+            Length of all movements in s, as in `rollout`.
         derivatives : int
-            0 for positions alone, 1 with velocities, 2 with accelerations too.
-        out : tuple of float64 arrays (B, T, D), optional
-            Where to write, one array for positions and each derivative.
+            Order of the highest derivative to return: 0 for positions, 1 for velocities too, 2 for accelerations too.
+        out : tuple of ndarray, (B, T, D), optional
+            Writable float64 arrays for the results, one per order of derivative.
         threads : int, optional
-            How many threads may work; otherwise as many as the system has. The numbers do not depend on it.
+            Largest number of threads; by default all that the system offers. Results do not depend on it.
 
         Returns
         -------
         tuple of ndarray, (B, T, D)
-            Positions, velocities per s, accelerations per s².
+            Positions in the unit of each degree of freedom, velocities per s, accelerations per s².
 
         Raises
         ------
         ValueError
-            Rows that do not match the styles, a wrong length, a number that is not finite, an argument of the other
-            kind of primitive, or an output that does not fit; nothing is written then.
+            An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit.
+            Nothing is written then.
         MemoryError
-            More numbers than memory holds: see `rollout_chunks`.
+            The results do not fit into memory; use `rollout_chunks`.
+
+        Examples
+        --------
+        >>> positions, velocities = model.rollouts(model.styles, dt=0.1)
+        >>> positions.shape
+        (5, 13, 2)
         """
     def rollout_chunks(
         self,
@@ -738,31 +855,40 @@ class Model:
         derivatives: int = 1,
         threads: int | None = None,
     ) -> RolloutChunks:
-        """Movements of many styles, a piece at a time: what `rollouts` returns for each piece, in order.
+        """Compute the movements of many styles in chunks.
 
-        Only one piece is in memory at a time, and the numbers are those of `rollouts` to the last bit. All arguments are
-        checked by this call.
+        Memory holds one chunk at a time. Results equal those of `rollouts` bit for bit. This call checks all arguments.
 
         Parameters
         ----------
-        styles, goals, starts, velocities, anchors, amplitude, tau, dt, duration, derivatives, threads
-            As in `rollouts`.
+        styles : array_like, (B, J)
+            Style parameters s.
         size : int
-            Movements in a piece; the last may have fewer.
+            Number of movements in a chunk; the last may have fewer.
+        goals, starts, velocities, anchors : array_like, (D,) or (B, D), optional
+            As in `rollouts`.
+        amplitude, tau, dt, duration : float, optional
+            As in `rollouts`.
+        derivatives, threads : int, optional
+            As in `rollouts`.
 
         Returns
         -------
-        iterator of tuple of ndarray, (size, T, D)
+        RolloutChunks
+            Iterator over the results of `rollouts` for each chunk, with arrays (size, T, D).
 
         Raises
         ------
         ValueError
-            As for `rollouts`, or a size below 1.
+            An argument that `rollouts` rejects, or a `size` below 1.
 
         Examples
         --------
-        >>> for positions, velocities in model.rollout_chunks(styles, size=1000):
-        ...     cost.append((velocities**2).sum(axis=(1, 2)))
+        >>> cost = []
+        >>> for positions, velocities in model.rollout_chunks(model.styles, size=2):
+        ...     cost.extend((velocities**2).sum(axis=(1, 2)))
+        >>> len(cost) == model.n_demos
+        True
         """
     def jacobian(
         self,
@@ -775,36 +901,46 @@ class Model:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> _Array:  # (T, D, J) or (T, D, D)
-        """Compute the Jacobian ∂y/∂v of a rollout's positions with respect to one of its conditions v.
+        """Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
 
         A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
-        Jacobian for all their values. It depends on which of `start` and `velocity` are given, on amplitude and on tau.
+        Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start` and
+        `velocity`.
 
         Parameters
         ----------
         wrt : {"style", "goal", "anchor", "start"}
-            Condition with respect to which to differentiate.
+            Condition v.
         conditions : Conditions, optional
             Conditions at the start.
         derivative : int
-            0 for positions, 1 for velocities, 2 for accelerations.
-        dt, duration, context, **changes
-            As in `rollout`.
+            Order of the time derivative of y: 0 for positions, 1 for velocities, 2 for accelerations.
+        dt : float
+            Interval between samples in s.
+        duration : float, optional
+            Length in s, as in `rollout`.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name, as in `rollout`.
 
         Returns
         -------
-        ndarray, (T, D, J) with respect to the style, (T, D, D) otherwise
+        ndarray, (T, D, J) or (T, D, D)
+            ∂y/∂v in the unit of y per unit of v, at the samples of `rollout`; (T, D, J) for the style.
 
         Raises
         ------
         ValueError
-            Conditions that do not fit, a condition that this kind of primitive does not have, or segment durations of
-            several segments.
+            Conditions that `rollout` rejects, a condition of the other kind of primitive, or several segment durations.
 
         Examples
         --------
-        >>> model.jacobian("goal", dt=0.001).shape
-        (1001, 2, 2)
+        >>> jacobian = model.jacobian("goal", dt=0.1)
+        >>> shift = np.array([0.1, 0.0])
+        >>> base, moved = (model.rollout(goal=model.goals[0] + k * shift, dt=0.1).position for k in (0, 1))
+        >>> np.allclose(moved - base, jacobian @ shift)
+        True
         """
     def style_of(
         self,
@@ -812,92 +948,114 @@ class Model:
         *,
         dt: float | None = None,
         period: float | None = None,
-        events: ArrayLike | None = None,  # (E,)
+        landmarks: ArrayLike | None = None,  # (E,)
     ) -> _Array:  # (J,)
-        """The style (J,) of a new demonstration: the likeliest given its target.
+        """Estimate the style of a new demonstration.
 
-        Minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with A the forcing of the styles, σ² what least squares leave of the target f
-        and v_j the largest square of the demonstrations' styles. A cycle that begins in another phase than those of the
-        model is turned to theirs first. The demonstration is inspected as in `fit`, with the same warnings.
+        The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of
+        the styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A
+        cycle with another initial phase is first shifted to that of the model's. The demonstration is inspected as in
+        `fit`, with the same warnings. A model with a time warp warps the demonstration too.
 
         Parameters
         ----------
         demonstration : Demonstration
             A movement of the same degrees of freedom.
-        dt, period : float, optional
-            As in `fit`.
-        events : array_like, (E,), optional
-            Times of its events in s, if the model was fitted with events; where time was warped, its own is too.
+        dt : float, optional
+            Sampling interval in s of a demonstration without one.
+        period : float, optional
+            Period in s of a time-stamped cycle.
+        landmarks : array_like, (E,), optional
+            Times in s of its landmarks; required if the model was fitted with landmarks.
 
         Returns
         -------
         ndarray, (J,)
+            Style s.
 
         Raises
         ------
         ValueError
-            Names or units other than those of the model; a demonstration that it does not describe, where the movement of
-            the closest style deviates by more than half of the demonstration's own and its forcing by more than three times
-            what is left out of those fitted, or where the style is more than ten times as large as any of theirs.
+            Names or units differ from those of the model, or the model does not describe the demonstration: its closest
+            movement deviates by more than half of the demonstration's deviation from its mean while the forcing left
+            out exceeds three times that of the fitted demonstrations, or its style is more than ten times as large as
+            theirs.
+
+        Examples
+        --------
+        >>> new = pdmp.Demonstration(model.rollout(model.conditions(1), dt=0.02))
+        >>> np.allclose(model.style_of(new), model.styles[1], atol=0.01)
+        True
         """
     def landscape(self, u: ArrayLike) -> _Array:  # (len(u), J, D)
-        """The attractor landscape b(u) of each style dimension and degree of freedom.
+        """Compute the attractor landscape b(u) of each style dimension and degree of freedom.
 
         Parameters
         ----------
         u : array_like, (n,)
-            Clock: t / tau where discrete, the phase in rad where rhythmic.
+            Clock: t / tau of a discrete movement, phase in rad of a rhythmic one.
 
         Returns
         -------
         ndarray, (n, J, D)
+            In the unit of each degree of freedom.
+
+        Raises
+        ------
+        ValueError
+            A clock value is not finite, or negative for a discrete movement.
         """
     def transport(self, u: ArrayLike) -> _Array:  # (n,)
-        """Share m(u) of the way from start to goal that a discrete movement has covered, from 0 at the start to 1 from
-        the end on.
+        """Compute the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
 
-        The output system moves about the frame c(u) = y₀ + (g − y₀)·m(u); m ≡ 1 where the model was fitted with
-        ``transport="immediate"``.
+        The frame of the output system is c(u) = y₀ + (g − y₀)·m(u). m increases from 0 at the start to 1 at the end and
+        stays 1; with `transport="immediate"`, m = 1 everywhere.
 
         Parameters
         ----------
         u : array_like, (n,)
-            Clock: t / tau.
+            Clock t / tau.
 
         Returns
         -------
         ndarray, (n,)
+            Shares from 0 to 1.
 
         Raises
         ------
         ValueError
-            A rhythmic primitive, or a clock that is negative or not finite.
+            The primitive is rhythmic, or a clock value is negative or not finite.
         """
     def tau_at(self, phase: float, segment_durations: ArrayLike) -> float:  # (K,)
-        """The time constant in s at a phase of a movement with the given timing.
+        """Compute the time constant τ at a phase for given segment durations.
 
-        A control loop that sets it at every tick follows the timing, as `rollout` does:
-        `controller.tau = model.tau_at(controller.phase, grid)`, with `transition=0`.
+        A control loop follows segment durations, as `rollout` does, if it sets
+        `controller.tau = model.tau_at(controller.phase, segment_durations)` before each tick, with `transition=0`.
 
         Parameters
         ----------
         phase : float
-            Phase of a controller: x in (0, 1] where discrete, φ in rad where rhythmic.
-        timing : array_like, (K,)
+            Phase of a controller: x in (0, 1] of a discrete movement, φ in rad of a rhythmic one.
+        segment_durations : array_like, (K,)
             Time in s in each segment between `breaks`.
+
+        Returns
+        -------
+        float
+            Time constant τ in s.
 
         Raises
         ------
         ValueError
-            A timing that does not fit the model, or a phase out of range.
+            `segment_durations` has a wrong length or is not positive, or `phase` is out of range.
         """
     def predict(self, context: _Context) -> Prediction:
-        """The movement for a condition, as in Section 4.1.2.
+        """Predict the movement for a context (Section 4.1.2).
 
         Parameters
         ----------
         context : array_like or list, (Q,)
-            The condition.
+            Numbers and labels, in the units of the demonstrations' contexts.
 
         Returns
         -------
@@ -906,7 +1064,15 @@ class Model:
         Raises
         ------
         ValueError
-            A model fitted without contexts, a wrong length, a label never shown, or a number that is not finite.
+            The model was fitted without contexts, or `context` has a wrong length, an unknown label, or a number that
+            is not finite.
+
+        Examples
+        --------
+        >>> prediction = model.predict([0.05])
+        >>> trajectory = model.rollout(prediction.conditions)
+        >>> np.allclose(trajectory.position, model.rollout(context=[0.05]).position)
+        True
         """
     def band(
         self,
@@ -915,45 +1081,54 @@ class Model:
         level: float = 0.9,
         dt: float = 0.01,
     ) -> tuple[_Array, _Array]:  # lower, upper (T, D)
-        """Bounds within which a new movement of a condition lies, for each sample of `rollout(context=context, dt=dt)`.
+        """Compute the prediction band of a new movement for a context.
 
-        y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to what is
-        predicted, the variance v that the styles leave out of the demonstrations, and Student's quantile t for the
-        degrees of freedom. Movements are compared at equal shares of their durations: how these vary is in the
-        prediction.
+        y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
+        conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
+        band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
 
         Parameters
         ----------
         context : array_like or list, (Q,)
-            The condition.
+            Numbers and labels, in the units of the demonstrations' contexts.
         level : float
-            Probability that a number lies within its bounds.
+            Probability in (0, 1) that a position of the new movement lies within its bounds.
         dt : float
             Interval between samples in s.
 
         Returns
         -------
-        lower, upper : (T, D) ndarray
-            In the unit of each degree of freedom.
+        lower, upper : ndarray, (T, D)
+            Bounds at the samples of `rollout(context=context, dt=dt)`, in the unit of each degree of freedom.
 
         Raises
         ------
         ValueError
-            A level that is no probability, what `predict` refuses, or demonstrations too few to tell a band.
+            `level` is not in (0, 1), `predict` rejects `context`, or the demonstrations are too few for a covariance.
         """
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a model file. It appears whole or not at all, whatever interrupts the writing; a process that is killed
-        meanwhile leaves a draft `.pdmp-*.draft` beside it.
+        """Write a model file.
+
+        The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary
+        file `.pdmp-*.draft` beside it.
 
         Parameters
         ----------
         path : path-like
-            Where to, by custom with the suffix `.safetensors`.
+            File to write, conventionally with the suffix `.safetensors`.
 
         Raises
         ------
         OSError
-            A path that cannot be written.
+            The file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile, pathlib
+        >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
+        >>> model.save(path)
+        >>> path.exists()
+        True
         """
     def controller(
         self,
@@ -964,54 +1139,89 @@ class Model:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> Controller:
-        """Start a control loop.
+        """Start a movement that is computed tick by tick in a control loop.
 
         Parameters
         ----------
         dt : float
             Length of a tick in s.
         conditions : Conditions, optional
-            Conditions at the start. Of segment durations the loop takes the total, and follows them where `tau_at` sets
-            its τ.
+            Conditions at the start. The controller takes the sum of segment durations; see `tau_at` to follow them.
         transition : float, optional
-            Time in s to 99 % of a changed style, goal, anchor, amplitude, tau or speed, at the model's own tau; 0 is the
-            paper's immediate switch. By default a tenth of the nominal duration (discrete) or a quarter of the period
-            (rhythmic). A goal takes the remaining time of the movement if that is longer, unless transport is immediate.
-        context, **changes
-            As in `rollout`.
+            Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0
+            switches immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of
+            the period (rhythmic). A new goal takes the remaining time of the movement if that is longer, unless
+            transport is immediate.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name, as in `rollout`.
 
         Returns
         -------
         Controller
+
+        Raises
+        ------
+        ValueError
+            `dt` or `transition` is out of range, or `rollout` rejects the conditions.
+        TypeError
+            A keyword is unknown, or `conditions` has another type.
+
+        Examples
+        --------
+        >>> controller = model.controller(dt=0.01, goal=[1.0, 0.1])
+        >>> controller.step()
+        Status.WORKING
+        >>> controller.goal = [1.1, 0.0]
+        >>> while controller.step():
+        ...     pass
+        >>> np.allclose(controller.position, [1.1, 0.0], atol=0.01)
+        True
         """
     def to_bytes(self) -> bytes:
-        """The bytes of a model file."""
+        """Return the contents of a model file as bytes."""
     @staticmethod
     def from_bytes(data: bytes) -> Model:
-        """A model from the bytes of a model file."""
+        """Read a model from the contents of a model file.
+
+        Parameters
+        ----------
+        data : bytes
+            Result of `to_bytes`, or the contents of a file that `save` wrote.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        ModelFileError
+            The data are damaged, not a model, or of another version.
+        """
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
 class RolloutChunks:
-    """An iterator over pieces of a batch, made by `Model.rollout_chunks`."""
+    """Iterator over the chunks of a batch, returned by `Model.rollout_chunks`."""
     def __iter__(self) -> RolloutChunks: ...
     def __next__(self) -> tuple[_Array, ...]: ...
 
 @final
 class Factors:
-    """The leading factors of targets F ≈ S·F_basis (Eq. 7), as `pdmp.factorise` finds them."""
+    """Leading factors of targets F ≈ S·F_basis (Eq. 7), returned by `factorise`."""
     @property
     def styles(self) -> _Array:  # (M, J)
-        """Styles S (M, J) with orthonormal columns, in each of which the entry of largest magnitude is positive."""
+        """Styles S (M, J) with orthonormal columns. The entry of largest magnitude in each column is positive."""
     @property
     def basis(self) -> _Array:  # (J, C*D)
-        """Basis targets F_basis (J, C·D) = SᵀF, whose rows are orthogonal and as long as the singular values."""
+        """Basis targets F_basis = SᵀF (J, C·D). Their rows are orthogonal with the singular values as norms."""
     @property
     def singular_values(self) -> _Array:  # decreasing: all, or of a large library the first J
-        """Singular values in decreasing order: all min(M, C·D), or the first J alone, where the others were not computed."""
+        """Singular values in decreasing order: all min(M, C·D), or the first J if the others were not computed."""
     @property
     def truncation_error(self) -> float:
-        """Share of the targets, by root mean square, that the factors leave out: ‖F − S·F_basis‖/‖F‖."""
+        """Truncation error ‖F − S·F_basis‖/‖F‖ in the Frobenius norm."""
 
 class _Changes(TypedDict, total=False):
     style: ArrayLike | None  # (J,)
@@ -1026,37 +1236,43 @@ class _Changes(TypedDict, total=False):
 
 @final
 class Conditions:
-    """Conditions under which a movement starts. A condition that is None is that of the nominal demonstration.
+    """Conditions of a movement.
 
-    Rollouts, controllers and Jacobians take conditions, with keywords of the same names in place of single ones;
-    `Model.conditions`, `Model.predict` and `blend` return them.
+    A condition that is None is that of the nominal demonstration. `Model.rollout`, `Model.controller` and
+    `Model.jacobian` take conditions, and keywords of the same names that replace single ones; `Model.conditions`,
+    `Model.predict` and `blend` return conditions.
 
     Parameters
     ----------
     style : array_like, (J,), optional
         Style parameter s.
     goal : array_like, (D,), optional
-        Goal g; discrete.
+        Goal g in the unit of each degree of freedom; discrete.
     start : array_like, (D,), optional
-        Start position y₀. A rhythmic movement otherwise starts on its limit cycle.
+        Start position y₀ in the unit of each degree of freedom. A rhythmic movement starts on its limit cycle by
+        default.
     velocity : array_like, (D,), optional
-        Start velocity per s; otherwise that of the demonstrations.
+        Start velocity per s; by default that of the demonstrations.
     anchor : array_like, (D,), optional
-        Anchor y_a, the centre of oscillation; rhythmic.
+        Anchor y_a, the centre of oscillation, in the unit of each degree of freedom; rhythmic.
     amplitude : float, optional
-        Amplitude r₀, 1 as demonstrated; rhythmic.
+        Amplitude r₀ relative to the demonstrations, 1 by default; rhythmic.
     tau : float, optional
-        Time constant τ in s.
+        Time constant τ in s: the duration of a discrete movement, the period over 2π of a rhythmic one.
     segment_durations : array_like, (K,), optional
-        Time in s in each segment between `Model.breaks`, in place of `tau`. Time over phase is the monotone cubic through
-        them. A rollout follows it; a controller takes the total, and `Model.tau_at` gives its τ at each phase.
+        Time in s in each segment between `Model.breaks`, in place of `tau`. Time over phase is the monotone cubic
+        through their sums. A rollout follows it; a controller takes the total, and `Model.tau_at` returns τ at each
+        phase.
     phase : float, optional
-        Phase φ in rad at which a rhythmic movement starts, on its limit cycle; 0 otherwise.
+        Phase φ in rad at which a rhythmic movement starts on its limit cycle; 0 by default.
 
     Raises
     ------
     ValueError
-        A condition that is not a number or a vector of numbers. Lengths and kind are checked where a model takes them.
+        A condition is not a number or a vector of numbers. Models check lengths and finiteness when they take
+        conditions.
+    TypeError
+        A keyword is unknown.
 
     Examples
     --------
@@ -1067,57 +1283,63 @@ class Conditions:
     """
     def __new__(cls, **conditions: Unpack[_Changes]) -> Conditions: ...
     def replace(self, **changes: Unpack[_Changes]) -> Conditions:
-        """Return the same conditions with others in place of those named; None leaves one to the nominal demonstration.
+        """Return a copy with some conditions replaced.
 
         Parameters
         ----------
         **changes
-            Conditions by name. `tau` takes the place of `segment_durations`, and the other way round.
+            Conditions by name; None stands for that of the nominal demonstration. `tau` replaces `segment_durations`
+            and vice versa.
 
         Returns
         -------
         Conditions
+
+        Raises
+        ------
+        ValueError, TypeError
+            As for `Conditions`.
         """
     @property
     def style(self) -> _Array | None:  # (J,)
-        """Style parameter s (J,)."""
+        """Style parameter s (J,), or None."""
     @property
     def goal(self) -> _Array | None:  # (D,)
-        """Goal g (D,), discrete."""
+        """Goal g (D,) of a discrete movement, or None."""
     @property
     def start(self) -> _Array | None:
-        """Start position y₀ (D,)."""
+        """Start position y₀ (D,), or None."""
     @property
     def velocity(self) -> _Array | None:
-        """Start velocity (D,), per s."""
+        """Start velocity (D,) per s, or None."""
     @property
     def anchor(self) -> _Array | None:
-        """Anchor y_a (D,), rhythmic."""
+        """Anchor y_a (D,) of a rhythmic movement, or None."""
     @property
     def amplitude(self) -> float | None:
-        """Amplitude r₀, rhythmic."""
+        """Amplitude r₀ of a rhythmic movement, or None."""
     @property
     def tau(self) -> float | None:
-        """Time constant τ in s."""
+        """Time constant τ in s, or None."""
     @property
     def segment_durations(self) -> _Array | None:  # (K,)
-        """Time in s in each segment (K,)."""
+        """Time in s in each segment (K,), or None."""
     @property
     def phase(self) -> float | None:
-        """Phase φ in rad at which a rhythmic movement starts."""
+        """Phase φ in rad at which a rhythmic movement starts, or None."""
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
 
 def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
-    """Returns the conditions (1 − share)·a + share·b.
+    """Compute the conditions (1 − share)·a + share·b.
 
     Parameters
     ----------
     a, b : Conditions
-        Conditions with the same names, such as two of `Model.conditions`.
+        Conditions of equal names and lengths, such as two of `Model.conditions`.
     share : float
-        0 gives `a`, 1 gives `b`; values outside [0, 1] extrapolate.
+        Share of `b`, from 0 to 1; values outside extrapolate.
 
     Returns
     -------
@@ -1126,58 +1348,68 @@ def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
     Raises
     ------
     ValueError
-        A condition that one of the two lacks, lengths that differ, or a share that is not finite.
+        A condition is given for one of the two only, lengths differ, or `share` is not finite.
+
+    Examples
+    --------
+    >>> between = pdmp.blend(model.conditions(0), model.conditions(1), 0.25)
+    >>> np.allclose(between.goal, 0.75 * model.goals[0] + 0.25 * model.goals[1])
+    True
     """
 
 @final
 class Prediction:
-    """Movement predicted for a context."""
+    """Movement predicted for a context, returned by `Model.predict`."""
     @property
     def conditions(self) -> Conditions:
-        """Style, goal and start or anchor, and segment durations."""
+        """Predicted style, goal and start or anchor, and segment durations."""
     @property
     def duration(self) -> float:
-        """Duration or period in s."""
+        """Predicted duration or period in s."""
     @property
     def covariance(self) -> _Array | None:  # of all conditions in this order, (P, P)
-        """Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order; None
-        where the demonstrations leave no degree of freedom to estimate it.
+        """Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order;
+        None if the demonstrations leave no degree of freedom to estimate it.
         """
     @property
     def degrees_of_freedom(self) -> int:
-        """Degrees of freedom of the covariance."""
+        """Degrees of freedom of the covariance estimate."""
     @property
     def extrapolation(self) -> _Array:  # (Q,), in ranges of the demonstrated contexts
-        """Distance of each context value from the demonstrated ones, in their range (Q,): 0 inside and for labels, infinite
-        where a value that never varied differs.
+        """Distance (Q,) of each context value from the demonstrated range, relative to that range: 0 inside and for
+        labels, inf for a value that differs from a constant one.
         """
 
 @final
 class ContextMap:
-    """A map from contexts to outputs, with the covariance of what it predicts.
+    """Regression from contexts to outputs with predictive covariance.
 
-    What `fit` learns from contexts to style, goal, start and duration (Section 4.1.2 of the paper), for any outputs:
-    y = φ(h)ᵀβ + f(h) + ε for each principal component. "linear" is least squares, φ = (1, h) and no f; "polynomial" and
-    "gp" have a constant and a Gaussian process f, with the kernel of the polynomials of second degree or Matérn-5/2. The
-    ratio of f to the noise is found by restricted maximum likelihood, for each component; the length, by the error at
-    contexts left out. "stacked" combines the deviations g of "gp" and l of a line with penalised slopes from the mean,
-    w_g·g + w_l·l, with the weights of least error at contexts left out: w_g + w_l = 1 inside of the contexts given,
-    w_g + w_l ≤ 1 from a tenth of their range outside on. Numbers are compared by their spread, labels by whether they are
-    the same; repetitions of one context are averaged and count once.
+    `fit` uses it from contexts to style, goal, start and duration (Section 4.1.2 of the paper); here outputs are
+    arbitrary. Each principal component of the outputs is modelled as y = φ(h)ᵀβ + f(h) + ε:
+
+    - "linear" is least squares with φ = (1, h) and f = 0.
+    - "gp" and "polynomial" have φ = 1 and a Gaussian process f, whose kernel is Matérn-5/2 or that of polynomials of
+      second degree. Restricted maximum likelihood estimates the ratio of f to the noise for each component;
+      leave-one-out error decides the length scale.
+    - "stacked" is the mean plus w_g·g + w_l·l, with the deviations g of "gp" and l of a ridge regression. The weights
+      minimise the leave-one-out error under w_g + w_l = 1 inside the range of the contexts, and under w_g + w_l ≤ 1
+      beyond a tenth of their range outside.
+
+    Numbers are scaled by their spread; labels are equal or not. Repetitions of a context are averaged and count once.
 
     Parameters
     ----------
-    contexts : (M, Q) array_like, or M lists of Q numbers and labels
-        Conditions.
-    outputs : (M, P) array_like
-        What was shown in each.
+    contexts : array_like, (M, Q), or M lists of Q numbers and labels
+        Contexts h, numbers in any unit.
+    outputs : array_like, (M, P)
+        Outputs y for each context, in any unit.
     map : {"auto", "stacked", "gp", "linear", "polynomial"}
-        As for `fit`.
+        Model of the outputs; "auto" as in `fit`.
 
     Raises
     ------
     ValueError
-        Contexts and outputs that do not fit together, or numbers that are not finite.
+        Lengths differ, `map` is unknown, or a number is not finite.
 
     References
     ----------
@@ -1191,50 +1423,81 @@ class ContextMap:
     ) -> ContextMap: ...
     @property
     def kind(self) -> Literal["stacked", "gp", "linear", "polynomial"]:
-        """Which kind of map it is."""
+        """Name of the model: "stacked", "gp", "linear" or "polynomial"."""
     @property
     def errors(self) -> list[tuple[str, float]]:
-        """Mean squared error of each kind that was tried, at contexts left out one by one, with the constants of all."""
+        """Mean squared leave-one-out error of each model that was fitted, with hyperparameters of all contexts.
+
+        Pairs (name, error), in the squared unit of the principal components.
+        """
     @property
     def degrees_of_freedom(self) -> int:
-        """Degrees of freedom from which the covariance is known."""
+        """Degrees of freedom of the covariance estimate."""
     def predict(self, contexts: _Contexts) -> tuple[_Array, _Array | None]:
-        """Expected outputs (B, P) for contexts (B, Q), and the covariance (B, P, P) of new ones, or None if unknown."""
+        """Compute the predictive mean and covariance of new outputs.
+
+        Parameters
+        ----------
+        contexts : array_like, (B, Q), or B lists of Q numbers and labels
+            Contexts.
+
+        Returns
+        -------
+        mean : ndarray, (B, P)
+            In the unit of the outputs.
+        covariance : ndarray, (B, P, P), or None
+            None if no degree of freedom is left to estimate it.
+
+        Raises
+        ------
+        ValueError
+            A context has a wrong length, an unknown label, or a number that is not finite.
+        """
 
 @final
 class Trajectory:
-    """A generated movement: row k of each array is the state at `time[k]`.
+    """Generated movement, returned by `Model.rollout`. Row k of each array is the state at `time[k]`.
 
-    `Demonstration(trajectory)` is the movement as a demonstration, as is a trajectory in a list for `fit`.
+    `Demonstration(trajectory)` makes a demonstration of it, and `fit` takes trajectories as demonstrations.
     """
     @property
     def time(self) -> _Array:  # (T,)
-        """Times (T,) in s, from 0."""
+        """Times (T,) in s, starting at 0."""
     @property
     def position(self) -> _Array:  # (T, D)
-        """Positions (T, D), in the unit of each degree of freedom."""
+        """Positions (T, D) in the unit of each degree of freedom."""
     @property
     def velocity(self) -> _Array:  # (T, D)
-        """Velocities (T, D), per s."""
+        """Velocities (T, D) per s."""
     @property
     def acceleration(self) -> _Array:  # (T, D)
-        """Accelerations (T, D), per s²."""
+        """Accelerations (T, D) per s²."""
     @property
     def names(self) -> list[str]:
-        """Names of the degrees of freedom."""
+        """Names of the degrees of freedom (D,)."""
     @property
     def units(self) -> list[str]:  # "" where unknown
-        """Units of the degrees of freedom; "" where one is not known."""
+        """Units of the degrees of freedom (D,); "" if unknown."""
     def to_dict(self) -> dict[str, Any]:
-        """Returns arrays, names and units by their names; `numpy.savez(path, **trajectory.to_dict())` writes what
-        `io.read_npz` reads.
+        """Return the arrays, names and units in a dictionary.
+
+        `io.read_npz` reads the file that `numpy.savez(path, **trajectory.to_dict())` writes.
+
+        Returns
+        -------
+        dict
+            Keys are the names of the attributes.
         """
     def to_dataframe(self) -> Any:  # pandas.DataFrame
-        """Returns a pandas.DataFrame.
+        """Return a data frame of positions, velocities and accelerations.
 
-        Its index is the time `t` in s. Its columns are the position of each degree of freedom under its name, then
-        velocities under `<name>_velocity` and accelerations under `<name>_acceleration`; `attrs["units"]` has the unit
-        of each column. `Demonstration(frame[names], time=frame.index)` is the movement as a demonstration.
+        `Demonstration(frame[names], time=frame.index)` makes a demonstration of it.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The index is the time `t` in s. Columns are positions `<name>`, velocities `<name>_velocity` and
+            accelerations `<name>_acceleration`; `attrs["units"]` maps each column to its unit.
 
         Raises
         ------
@@ -1242,25 +1505,25 @@ class Trajectory:
             pandas is not installed.
         """
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Writes a CSV file, whose positions `io.read_csv` reads back: `io.write_csv` describes it.
+        """Write a CSV file as `io.write_csv` does.
 
         Parameters
         ----------
         path : path-like
-            Where to write.
+            File to write.
 
         Raises
         ------
         OSError
-            A file that cannot be written.
+            The file cannot be written.
         ValueError
-            Names that would not be read back.
+            A name could not be read back by `io.read_csv`.
         """
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
 class Status:
-    """Whether a movement goes on (`WORKING`, 1) or has settled on its goal (`FINISHED`, 2, and false)."""
+    """State of a movement: in progress (`WORKING`, 1, true) or settled on its goal (`FINISHED`, 2, false)."""
 
     WORKING: ClassVar[Status]
     FINISHED: ClassVar[Status]
@@ -1271,11 +1534,11 @@ class Status:
 
 @final
 class Controller:
-    """A running primitive, made by `Model.controller`.
+    """Running movement, returned by `Model.controller`.
 
-    `step` moves on by one tick and writes into `position`, `velocity` and `acceleration`, which are read-only views
-    that stay valid. `goal`, `style`, `tau`, `amplitude`, `anchor` and `compliance` can be set at any tick; values that
-    are refused leave the last good ones in force.
+    `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
+    valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
+    is rejected leaves the present one in force.
     """
     def __copy__(self) -> Controller: ...
     def __deepcopy__(self, _memo: Any, /) -> Controller: ...
@@ -1286,40 +1549,51 @@ class Controller:
         measured: ArrayLike | None = None,  # (D,)
         coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
     ) -> Status:
-        """One tick, perturbed if the robot is measured or terms of one's own are given:
+        """Advance the movement by one tick.
+
+        A measured position and coupling terms perturb the equations::
 
             tau y' = z + w(u) + k_t d + tau c_v
             tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
             tau u' = k = 1 / (1 + k_s |d / range|**2)
             tau o' = 5 k (e - o) / extent
 
-        with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. Of the error e = m - y
-        counts d, what lies beyond the error o that is expected by now; extent is T / tau or 2 pi. All is evaluated at
-        the start of the tick and held over it; however long it is, y is pulled no further than m. A robot that is held
-        fast so holds the movement, all but stops its phase, and, let go, continues from there; one that always lags or
-        sags by the same comes no further from the goal than that, and finishes.
+        with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
+        tracking error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All
+        terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
+        m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
+        there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
+        finishes.
 
         Parameters
         ----------
         dt : float, optional
-            Length of this tick in s, if it differs from the controller's. A tick of length zero changes nothing.
-        measured : array_like (D,), optional
-            Position m at which the robot is, in the unit of each DoF; the error of an angle (rad, deg, °) is taken the
-            short way round. None is no new measurement: the last distance m - y stays in force until the next one or
+            Length of this tick in s; by default that of the controller. A tick of length zero changes nothing.
+        measured : array_like, (D,), optional
+            Measured position m in the unit of each degree of freedom. Errors of angles (rad, deg, °) are wrapped to
+            half a turn. None means no new measurement: the last error m - y stays in force until the next one or
             `release`, so that a sensor may be slower than the loop.
-        coupling : tuple of two array_like (D,), optional
-            Terms (c_v, c_a), per s and per s²: the velocity gains c_v, and jumps where it does; the acceleration c_a.
+        coupling : tuple of two array_like, (D,), optional
+            Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
 
         Returns
         -------
         Status
-            `FINISHED` once a discrete movement's time is over and it has settled on its goal.
+            `FINISHED` once the time of a discrete movement is over and it has settled on its goal.
 
         Raises
         ------
         ValueError
-            A tick that is negative or longer than 1000 tau, a wrong length, or a number that is not finite; the
-            state then stays as it was.
+            The tick is negative or longer than 1000 tau, a length is wrong, or a number is not finite. The state then
+            stays as it was.
+
+        Examples
+        --------
+        >>> controller = model.controller(dt=0.01)
+        >>> while controller.step():
+        ...     command = controller.position
+        >>> np.allclose(command, controller.goal, atol=0.01)
+        True
 
         References
         ----------
@@ -1328,7 +1602,10 @@ class Controller:
         Pastor, Hoffmann, Asfour, Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385 (terms in z').
         """
     def release(self) -> None:
-        """Forget the measured position: no robot follows any more, until the next one is measured."""
+        """Discard the measured position.
+
+        The movement is unperturbed until the next measurement.
+        """
     def reset(
         self,
         conditions: Conditions | None = None,
@@ -1336,76 +1613,79 @@ class Controller:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> None:
-        """Start again.
+        """Restart the movement.
 
         Parameters
         ----------
         conditions : Conditions, optional
-            Conditions at the start. One that is not given is that of the nominal demonstration, not a command of before.
-        context, **changes
-            As in `Model.rollout`.
+            Conditions at the start. One that is absent is that of the nominal demonstration, not an earlier command.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name, as in `Model.rollout`.
 
         Raises
         ------
         ValueError
-            Conditions that `Model.rollout` rejects; the movement then continues.
+            Conditions that `Model.rollout` rejects. The movement then continues.
         """
     @property
     def dt(self) -> float:
         """Length of a tick in s."""
     @property
     def position(self) -> _Array:  # (D,), a read-only view that each step updates
-        """Position y (D,): a read-only view."""
+        """Position y (D,) in the unit of each degree of freedom; a read-only view."""
     @property
     def velocity(self) -> _Array:
-        """Velocity (D,) per s: a read-only view."""
+        """Velocity (D,) per s; a read-only view."""
     @property
     def acceleration(self) -> _Array:
-        """Acceleration (D,) per s²: a read-only view."""
+        """Acceleration (D,) per s²; a read-only view."""
     @property
     def status(self) -> Status:
-        """Whether the movement goes on: what the last `step` returned, or `WORKING` if something was commanded since."""
+        """Result of the last `step`, or `WORKING` after a later command."""
     @property
     def phase(self) -> float:  # x in (0, 1], or phi in [0, 2 pi)
-        """Phase: x in (0, 1] where discrete, φ in [0, 2π) where rhythmic."""
+        """Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one."""
     @property
     def time(self) -> float:
         """Time since the start in s."""
     @property
     def goal(self) -> _Array:
-        """Goal g (D,), discrete: a read-only copy, to be set as a whole."""
+        """Goal g (D,) of a discrete movement; a read-only copy. Assign all values at once."""
     @goal.setter
     def goal(self, goal: ArrayLike, /) -> None: ...
     @property
     def style(self) -> _Array:
-        """Style s (J,): a read-only copy, to be set as a whole."""
+        """Style s (J,); a read-only copy. Assign all values at once."""
     @style.setter
     def style(self, style: ArrayLike, /) -> None: ...
     @property
     def anchor(self) -> _Array:
-        """Anchor y_a (D,), rhythmic: a read-only copy, to be set as a whole."""
+        """Anchor y_a (D,) of a rhythmic movement; a read-only copy. Assign all values at once."""
     @anchor.setter
     def anchor(self, anchor: ArrayLike, /) -> None: ...
     @property
     def tau(self) -> float:
-        """Time constant in s."""
+        """Time constant τ in s."""
     @tau.setter
     def tau(self, tau: float, /) -> None: ...
     @property
     def amplitude(self) -> float:
-        """Amplitude r₀, rhythmic; 1 where discrete."""
+        """Amplitude r₀ of a rhythmic movement; 1 of a discrete one."""
     @amplitude.setter
     def amplitude(self, amplitude: float, /) -> None: ...
     @property
     def speed(self) -> float:
-        """Speed: the share of the rate 1 / tau at which the path is followed. 0 pauses on the path, 1 goes on; a change
-        passes the filter of tau, and stays in force over `reset`.
+        """Speed along the path relative to the rate 1 / tau: 0 pauses on the path, 1 resumes.
+
+        A change passes the filter of tau and stays in force after `reset`.
         """
     @speed.setter
     def speed(self, speed: float, /) -> None: ...
     @property
     def compliance(self) -> tuple[float, float]:  # stopping k_s, tracking k_t
-        """Gains (k_s, k_t) of a measured position: how much it stops the phase, and pulls per unit of u. 0 is without."""
+        """Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each."""
     @compliance.setter
     def compliance(self, compliance: tuple[float, float], /) -> None: ...
 
@@ -1413,24 +1693,25 @@ class Controller:
 class GP:
     """Gaussian process regression, the paper's choice of basis functions.
 
-    All outputs share kernel, length and noise ratio. What is not given is found by maximising the marginal likelihood
-    (Rasmussen and Williams 2006, Section 5.4.1): `regress` by itself searches noise ratios from 1e-10 to 1e4. As a basis
-    of `fit`, noise that is not given is at most 1e-6 of the signal's variance and of the targets' mean square: what the
-    landscape takes for noise no style brings back, and noise on demonstrations is what smoothing is for.
+    All outputs share kernel, length scale and noise ratio. Hyperparameters that are not given maximise the marginal
+    likelihood (Rasmussen and Williams 2006, Section 5.4.1). `regress` searches noise ratios from 1e-10 to 1e4. In
+    `fit`, a noise ratio that is not given is at most 1e-6, and the noise variance at most 1e-6 of the targets' mean
+    square: no style can restore a signal that the landscape takes for noise, and `smoothing` removes the noise of
+    demonstrations.
 
     Parameters
     ----------
     kernel : {"matern52", "matern32"}
-        Covariance function of the clock; wrapped around the circle where the movement is rhythmic.
+        Covariance function over the clock u; periodic for rhythmic movements.
     length : float, optional
-        Length scale, in units of the clock u = t / tau.
+        Length scale, in units of the clock u = t / tau; positive. Estimated if not given.
     noise : float, optional
-        Ratio of noise variance to signal variance, at least 1e-10.
+        Ratio of noise variance to signal variance, from 1e-10 to 1e6. Estimated if not given.
 
     Raises
     ------
     ValueError
-        An unknown kernel, or a number out of range.
+        `kernel` is unknown, or `length` or `noise` is out of range.
     """
     def __new__(
         cls,
@@ -1443,10 +1724,10 @@ class GP:
         """Name of the covariance function."""
     @property
     def length(self) -> float | None:
-        """Length scale, if one was given."""
+        """Length scale in units of the clock; None if it is estimated."""
     @property
     def noise(self) -> float | None:
-        """Noise ratio, if one was given."""
+        """Ratio of noise variance to signal variance; None if it is estimated."""
     def regress(
         self,
         u: ArrayLike,  # (C,)
@@ -1454,105 +1735,130 @@ class GP:
         *,
         periodic: bool = False,
     ) -> GPRegression:
-        """Regress targets on the clock.
+        """Condition the process on targets over the clock.
 
         Parameters
         ----------
         u : array_like, (C,)
-            Increasing inputs from 0; within [0, 2π) if periodic.
+            Increasing clock values, from 0; in rad and within [0, 2π) if periodic.
         targets : array_like, (C, P)
-            Outputs.
+            Values of the P outputs, in any unit.
         periodic : bool
-            Whether 2π and 0 are one.
+            Identify u = 2π with u = 0.
 
         Returns
         -------
         GPRegression
+
+        Raises
+        ------
+        ValueError
+            `u` does not increase from 0, lengths differ, or a number is not finite.
         """
 
 @final
 class GPRegression:
-    """A Gaussian process given data, f(u) ~ N(0, σ̂²K) for each of P outputs, with K = k(u, u′) + νI."""
+    """Gaussian process conditioned on data: f(u) ~ N(0, σ̂²K) for each of P outputs, with K = k(u, u′) + νI.
+
+    Returned by `GP.regress`.
+    """
     @property
     def kernel(self) -> _Kernel:
         """Name of the covariance function."""
     @property
     def length(self) -> float:
-        """Length scale that was used, in units of the clock."""
+        """Length scale in units of the clock, as given or estimated."""
     @property
     def noise(self) -> float:
-        """Ratio ν of noise to signal variance that was used."""
+        """Ratio ν of noise variance to signal variance, as given or estimated."""
     @property
     def signal_variance(self) -> float:  # in the squared unit of the outputs
-        """Signal variance σ̂² = Σ fᵀK⁻¹f/(CP), its likeliest value, in the squared unit of the outputs.
+        """Maximum-likelihood signal variance σ̂² = Σ fᵀK⁻¹f/(CP), in the squared unit of the outputs.
 
-        All outputs share it. The variance of the noise is noise * signal_variance.
+        All outputs share it. The noise variance is `noise * signal_variance`.
         """
     @property
     def log_likelihood(self) -> float:  # summed over the outputs
         """Log marginal likelihood of the data, −CP/2·(ln 2πσ̂² + 1) − P/2·ln|K|, summed over the outputs.
 
-        Of densities in the unit of the outputs; 0 where all of them are zero.
+        Densities are in the unit of the outputs. It is 0 if all outputs are zero.
         """
     def predict(self, u: ArrayLike) -> tuple[_Array, _Array]:  # mean, variance (len(u), P)
-        """Mean and variance (n, P) of the outputs, without their noise, at u (n,).
+        """Compute the posterior mean and variance of the outputs without noise.
 
-        The variance, σ̂²(1 − kᵀK⁻¹k), is the same for all outputs.
+        Parameters
+        ----------
+        u : array_like, (n,)
+            Clock values.
+
+        Returns
+        -------
+        mean : ndarray, (n, P)
+            In the unit of the outputs.
+        variance : ndarray, (n, P)
+            σ̂²(1 − kᵀK⁻¹k), equal for all outputs, in their squared unit.
+
+        Raises
+        ------
+        ValueError
+            A clock value is not finite.
         """
 
 @final
 class TimeWarp:
     """Monotone time warp of the demonstrations to the nominal one.
 
-    Movements are compared by q = ẏ/√|ẏ|, of unit size: γ minimises ∫|q₀ − (q∘γ)√γ̇|² + λ ln²γ̇ dp over the phase p, exactly
-    among the warps that are linear in each segment, with ends on a grid of a tenth of a segment.
+    Movements are compared by their square-root velocity q = ẏ/√|ẏ|, scaled to unit norm. Over the phase p the warp γ
+    minimises ∫|q₀ − (q∘γ)√γ̇|² + λ ln²γ̇ dp, exactly among warps that are linear in each segment with ends on a
+    grid of a tenth of a segment.
 
     Parameters
     ----------
     n_segments : int
-        Number K of n_segments of equal phase; 1 is linear. At most half the samples of each demonstration, and 1000.
+        Number K of segments of equal phase, from 1 (linear scaling) to 1000 and half the samples of each demonstration.
     max_slope : float
-        Bound of a segment's time, from 1 to 10: at most `max_slope` times that of linear scaling, at least 1 / `max_slope`.
+        Bound of the slope of the warp, from 1 to 10: the duration of a segment is at most `max_slope` times that of
+        linear scaling and at least 1 / `max_slope` of it.
 
     Raises
     ------
     ValueError
-        A number out of range.
+        `n_segments` or `max_slope` is out of range.
 
     References
     ----------
-    Srivastava, Klassen, Joshi, Jermyn, IEEE TPAMI 33 (2011), https://doi.org/10.1109/TPAMI.2010.184; Nielsen, Carstensen,
-    Smedsgaard, J. Chromatography A 805 (1998), https://doi.org/10.1016/S0021-9673(98)00021-1
+    Srivastava, Klassen, Joshi, Jermyn, IEEE TPAMI 33 (2011), https://doi.org/10.1109/TPAMI.2010.184
+
+    Nielsen, Carstensen, Smedsgaard, J. Chromatography A 805 (1998), https://doi.org/10.1016/S0021-9673(98)00021-1
     """
     def __new__(cls, n_segments: int = 8, max_slope: float = 2.5) -> TimeWarp: ...
     @property
     def n_segments(self) -> int:
-        """Number K of n_segments."""
+        """Number K of segments."""
     @property
     def max_slope(self) -> float:
-        """Bound of a segment's time, relative to linear scaling."""
+        """Bound of the slope of the warp, relative to linear scaling."""
     def __getnewargs__(self) -> tuple[int, float]: ...
 
 @final
 class NGnet:
-    """Normalised Gaussian network: weighted bell functions on the clock, over their sum.
+    """Normalised Gaussian network, a weighted mean of radial basis functions over the clock.
 
-    b(u) = Σ wₖψₖ(u) / Σ ψₖ(u) with ψₖ = exp(−(u − cₖ)²/2s²), or exp((cos(u − cₖ) − 1)/s²) where the movement is
-    rhythmic. The centres cₖ lie at equal distances h, for discrete movements up to 2h beyond the ends, and
-    s = overlap·h.
+    b(u) = Σ wₖψₖ(u) / Σ ψₖ(u) with ψₖ = exp(−(u − cₖ)²/2s²), or ψₖ = exp((cos(u − cₖ) − 1)/s²) for rhythmic movements.
+    The centres cₖ have equal distances h and extend up to 2h beyond the ends of discrete movements; s = overlap·h.
 
     Parameters
     ----------
     n_basis : int
-        Number of functions N, from 2 to 1000.
+        Number N of basis functions, from 2 to 1000.
     overlap : float
-        Width s of a function in centre spacings h, from 0.3 to 3. Narrow functions ripple between their centres, wide
-        ones are nearly dependent.
+        Width s of a basis function in units of the spacing h, from 0.3 to 3. Narrow functions ripple between their
+        centres; wide functions are nearly linearly dependent.
 
     Raises
     ------
     ValueError
-        A number out of range.
+        `n_basis` or `overlap` is out of range.
 
     References
     ----------
@@ -1561,10 +1867,10 @@ class NGnet:
     def __new__(cls, n_basis: int = 50, overlap: float = 1.2) -> NGnet: ...
     @property
     def n_basis(self) -> int:
-        """Number of functions N."""
+        """Number N of basis functions."""
     @property
     def overlap(self) -> float:  # in centre spacings
-        """Width of a function in centre spacings."""
+        """Width of a basis function in units of the centre spacing."""
     def regress(
         self,
         u: ArrayLike,  # (C,)
@@ -1572,10 +1878,47 @@ class NGnet:
         *,
         periodic: bool = False,
     ) -> NGnetRegression:
-        """Regress targets (C, P) on the clock u (C,), from 0; within [0, 2π) if periodic."""
+        """Fit the network to targets over the clock by least squares.
+
+        Parameters
+        ----------
+        u : array_like, (C,)
+            Increasing clock values, from 0; in rad and within [0, 2π) if periodic.
+        targets : array_like, (C, P)
+            Values of the P outputs, in any unit.
+        periodic : bool
+            Identify u = 2π with u = 0.
+
+        Returns
+        -------
+        NGnetRegression
+
+        Raises
+        ------
+        ValueError
+            `u` does not increase from 0, lengths differ, or a number is not finite.
+        """
 
 @final
 class NGnetRegression:
-    """A normalised Gaussian network given data."""
+    """Normalised Gaussian network fitted to data, returned by `NGnet.regress`."""
     def predict(self, u: ArrayLike) -> tuple[_Array, None]:  # mean (len(u), P), no variance
-        """The outputs (n, P) at u (n,), and None: the network knows no variance."""
+        """Compute the outputs.
+
+        Parameters
+        ----------
+        u : array_like, (n,)
+            Clock values.
+
+        Returns
+        -------
+        mean : ndarray, (n, P)
+            In the unit of the outputs.
+        variance : None
+            The network has no variance; `GPRegression.predict` returns one in this place.
+
+        Raises
+        ------
+        ValueError
+            A clock value is not finite.
+        """

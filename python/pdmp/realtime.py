@@ -1,4 +1,4 @@
-"""A control loop paced by the clock, with its lateness and missed deadlines."""
+"""Control loop on the wall clock, which reports its lateness and missed deadlines."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ _Coupling: TypeAlias = Callable[[], tuple[ArrayLike, ArrayLike] | None] | None
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """One tick of a paced loop.
+    """Timing of one tick of a paced loop.
 
     Attributes
     ----------
     time : float
-        Time of the movement since the loop began in s: whole periods.
+        Time of the movement since the loop began in s, a multiple of the period.
     lateness : float
-        Time in s from its deadline to its start; from the first deadline if it missed some.
+        Time in s from the deadline to the start of the tick; after missed deadlines, from the first
+        of them.
     missed : int
-        Number of deadlines it missed. A loop that catches up moves by as many periods more; one
-        that waits moves the remaining deadlines back by as many.
+        Number n of missed deadlines. With `late="catch up"` the tick lasts n periods more; with
+        `late="wait"` the remaining deadlines move back by n periods.
     """
 
     time: float
@@ -40,37 +41,37 @@ class Tick:
 
 
 class PacedLoop:
-    """A control loop that makes one tick of a controller each period, on the wall clock.
+    """Control loop that steps a controller once per period of the wall clock.
 
-    The first tick comes one period after the loop begins, and commands of the body act on the next.
-    Deadlines are start + k / rate_hz for k = 1, 2, …, so that delays do not add up. Before each
-    deadline the loop sleeps without holding the interpreter; `async for` lets other tasks run
-    instead (event loops wake to the millisecond, so deadlines closer than some 5 ms need threads).
-    `break` or an exception, Ctrl-C included, ends the loop between two ticks. A controller runs in
-    one loop at a time.
+    The first tick comes one period after the loop begins; commands in the body of the loop act on
+    the next tick. Deadlines are start + k / rate_hz for k = 1, 2, …, so that delays do not
+    accumulate. Until each deadline the loop sleeps without the interpreter lock; `async for` runs
+    other tasks instead (event loops wake to the millisecond, so periods below some 5 ms need
+    threads). `break` or an exception, Ctrl-C included, ends the loop between two ticks. A
+    controller runs in one loop at a time.
 
     Parameters
     ----------
     controller : Controller
-        The running movement.
+        Controller of the movement.
     rate_hz : float, optional
-        Ticks per second; 1 / dt of the controller otherwise.
+        Ticks per second; by default 1 / dt of the controller.
     duration : float, optional
-        Length in s, rounded to whole periods. By default a discrete movement runs until its
-        `status` is `FINISHED` and the body has commanded nothing more, a rhythmic one until the
-        loop is left.
+        Duration in s, rounded to whole periods. By default a discrete movement runs until its
+        `status` is `FINISHED` after the commands of the body, a rhythmic one until the loop is
+        left.
     measured, coupling : callable, optional
-        Called without arguments before each tick; its result, which may be None, is the argument
-        of `Controller.step` of this name.
+        Function without arguments that is called before each tick; its result, which may be None,
+        is the argument of `Controller.step` of this name.
     late : {"wait", "catch up"}
         Behaviour after n missed deadlines. "wait": the tick has the usual length, and the remaining
         deadlines move back by n periods, so that the position never jumps. "catch up": one step of
-        n + 1 periods follows the wall clock, and the position jumps as far.
+        n + 1 periods follows the wall clock, and the position jumps accordingly.
 
     Attributes
     ----------
     ticks : int
-        Number of ticks made.
+        Number of ticks.
     missed : int
         Number of deadlines missed.
     max_lateness : float
@@ -80,7 +81,7 @@ class PacedLoop:
     ------
     ValueError
         A rate or duration that is not a number between 1e-9 and 1e9, a duration below one period,
-        `measured` or `coupling` that cannot be called, or another name for `late`.
+        `measured` or `coupling` that is not callable, or an unknown `late`.
     RuntimeError
         On the first tick, if the controller runs in another loop.
 
@@ -122,28 +123,28 @@ class PacedLoop:
         """Begins a loop that lets other tasks run between its ticks."""
         from asyncio import sleep
 
-        for _ in range(3):  # a loop that was left is closed by the event loop
+        for _ in range(3):  # the event loop closes a loop that was left
             if id(self._controller) in _running:
                 await sleep(0)
         with _exclusive(self._controller):
             self._begin()
             while not self._over():
                 await sleep(self._wait())
-                while (early := self._wait()) > 0:  # as event loops may wake
+                while (early := self._wait()) > 0:  # event loops may wake early
                     await sleep(early)
                 yield self._tick()
 
     def _begin(self) -> None:
         self.ticks = self.missed = 0
         self.max_lateness = 0.0
-        self._periods = 0  # that the movement has made
+        self._periods = 0  # of the movement
         self._start = perf_counter()
 
     def _over(self) -> bool:
-        """Returns whether the loop ends, given the commands of its last iteration."""
+        """Returns True if the loop ends after the commands of its last iteration."""
         if self._last is None:
             return self.ticks > 0 and self._controller.status == Status.FINISHED
-        # A movement that has settled is held, and may be commanded anew.
+        # A finished movement rests, and may be commanded again.
         return self._periods >= self._last
 
     def _due(self) -> float:
@@ -182,7 +183,7 @@ def _exclusive(controller: Controller) -> Iterator[None]:
         if key in _running:
             raise RuntimeError(
                 "this controller runs in another loop already: end that one first (close() an "
-                "iterator that was left by break), or give each loop a controller of its own"
+                "iterator that was left by break), or use one controller per loop"
             )
         _running.add(key)
     try:
@@ -193,7 +194,7 @@ def _exclusive(controller: Controller) -> Iterator[None]:
 
 
 def _checked_number(name: str, value: float) -> float:
-    """Returns a number that clocks can count with."""
+    """Returns a number within the range of clocks."""
     if not (isinstance(value, Real) and 1e-9 <= value <= 1e9):
         raise ValueError(f"{name} = {value!r}: must be a number between 1e-9 and 1e9")
     return float(value)
@@ -207,10 +208,10 @@ def _n_periods(duration: float, rate: float) -> int:
     return periods
 
 
-def _function(name: str, ask: Callable[[], T] | None) -> Callable[[], T | None]:
-    """Returns a function to ask before each tick."""
-    if ask is None:
+def _function(name: str, function: Callable[[], T] | None) -> Callable[[], T | None]:
+    """Returns a function to call before each tick."""
+    if function is None:
         return lambda: None
-    if not callable(ask):
-        raise ValueError(f"{name} must be a function to ask before each tick: pass lambda: …")
-    return ask
+    if not callable(function):
+        raise ValueError(f"{name} must be a function, called before each tick: pass lambda: …")
+    return function

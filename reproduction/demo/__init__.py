@@ -1,1 +1,1 @@
-"""A demonstration on human handwriting: five shapes in one primitive."""
+"""Demonstration on human handwriting: five shapes in one primitive."""

@@ -1,4 +1,4 @@
-"""Learns five handwritten shapes in one primitive; writes model, figures and a report.
+"""Fits one primitive to five handwritten shapes; writes model, figures and a report.
 
 example: python -m reproduction.demo -o out/demo
 """
@@ -7,8 +7,8 @@ import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
-from pdmp.cli._options import path
-from pdmp.cli._progress import progress
+from pdmp.cli.options import file_path
+from pdmp.cli.progress import progress
 from reproduction import command
 from reproduction.demo.run import run_demo
 
@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "-o",
         "--output",
-        type=path,
+        type=file_path,
         default="out/demo",
         metavar="FOLDER",
         help="folder to write to; default: %(default)s",

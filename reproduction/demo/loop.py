@@ -1,4 +1,4 @@
-"""A primitive inside a control loop at 1 kHz, with a command half way."""
+"""Control loop at 1 kHz with a command half way."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.plot._canvas import BLUE, GREY, ORANGE, draw_movement, legend, movement_panels
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, draw_movement, legend, movement_panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,7 +21,7 @@ DT = 0.001  # s
 
 @dataclass
 class Run:
-    """What a control loop did: samples, durations of its ticks [µs], the sample of the command."""
+    """Record of a control loop: samples, durations of its ticks [µs], index of the command."""
 
     position: NDArray[np.float64]
     ticks: NDArray[np.float64]
@@ -35,7 +35,7 @@ class Run:
 
 
 def control(model: pdmp.Model, conditions: pdmp.Conditions, command: Mapping[str, Any]) -> Run:
-    """Runs a movement at 1 kHz and gives it a command half way."""
+    """Runs a movement at 1 kHz, with a command half way."""
     controller = model.controller(DT, conditions)
     duration = model.durations[model.nominal] * controller.tau / model.tau
     switch = round(0.5 * duration / DT)

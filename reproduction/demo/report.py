@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 import pdmp
-from pdmp._markdown import markdown_table
+from pdmp.markdown import markdown_table
 from reproduction.demo.loop import Run
 from reproduction.metrics import reproduction_error
 
 
 def spectrum_table(model: pdmp.Model) -> str:
-    """Returns the share of each singular value in their sum, two beyond J included."""
+    """Returns the share of each singular value in their sum, up to two beyond J."""
     shares = model.singular_values / model.singular_values.sum()
     sums = shares.cumsum()
     return markdown_table(
@@ -42,7 +42,7 @@ def error_table(
 
 
 def loop_table(runs: Mapping[str, Run]) -> str:
-    """Returns the distance to the goal at the end and the tick times of each loop."""
+    """Returns the final distance to the goal and the tick times of each loop."""
     return markdown_table(
         ["control loop at 1 kHz", "left to the goal", "mean tick", "worst tick"],
         (
@@ -53,7 +53,7 @@ def loop_table(runs: Mapping[str, Run]) -> str:
 
 
 def time_table(times: Mapping[str, float]) -> str:
-    """Returns the duration of each part."""
+    """Returns the duration of each step."""
     return markdown_table(
         ["part", "time"], ([name, f"{1e3 * time:.1f} ms"] for name, time in times.items())
     )

@@ -1,4 +1,4 @@
-"""A fit of the shapes, and a report on it."""
+"""Fit of the shapes, and a report."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,8 +10,8 @@ import numpy as np
 
 import pdmp
 from pdmp import plot
-from pdmp._atomic_write import atomic_write
 from pdmp.datasets import handwriting
+from pdmp.files import atomic_write
 from reproduction.demo.loop import DT, control, draw_control
 from reproduction.demo.report import error_table, loop_table, spectrum_table, time_table
 
@@ -24,12 +24,12 @@ GOAL_SHIFT = np.array([10.0, 15.0])  # mm
 def run_demo(
     folder: str | PathLike[str], progress: Callable[[str, float], object] | None = None
 ) -> str:
-    """Learns five handwritten shapes together; writes model, figures and a report.
+    """Fits one primitive to five handwritten shapes; writes model, figures and a report.
 
     Parameters
     ----------
     folder : path
-        Folder of `model.safetensors`, `report.md` and the figures.
+        Folder for `model.safetensors`, `report.md` and the figures.
     progress : callable, optional
         Called with the stage of the fit and its completed fraction.
 
@@ -101,7 +101,7 @@ def run_demo(
 
 @contextmanager
 def timed(times: dict[str, float], name: str) -> Iterator[None]:
-    """Records the duration of a part [s]."""
+    """Records the duration of a step [s]."""
     begin = perf_counter()
     yield
     times[name] = perf_counter() - begin

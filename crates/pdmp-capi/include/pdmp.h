@@ -237,7 +237,7 @@ const char *pdmp_model_name(const pdmp_model *model, size_t dof);
 /// Writes the conditions that reproduce demonstration `demonstration`, counted from 0: style, goal and start (discrete)
 /// or anchor (rhythmic), and tau.
 ///
-/// If the model was fitted with time warping or with events, tau matches the duration of the demonstration, and the
+/// If the model was fitted with time warping or with landmarks, tau matches the duration of the demonstration, and the
 /// relative timing within the movement is that of the nominal demonstration.
 ///
 /// The numbers are written to `storage`, of at least pdmp_info.n_conditions elements, and the members of `*conditions`

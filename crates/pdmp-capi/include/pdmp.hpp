@@ -48,6 +48,7 @@ struct Conditions {
 
 /// Motion with n_dofs elements in each vector, see pdmp_motion.
 struct Motion {
+    /// Allocates the vectors.
     explicit Motion(std::size_t n_dofs) : position(n_dofs), velocity(n_dofs), acceleration(n_dofs) {}
 
     std::vector<double> position, velocity, acceleration;
@@ -76,10 +77,10 @@ inline pdmp_conditions to_c(const Conditions &c) noexcept {
 
 inline std::vector<double> copy(pdmp_vector numbers) { return {numbers.data, numbers.data + numbers.length}; }
 
-inline pdmp_buffer to_c(std::vector<double> &numbers) noexcept { return {numbers.data(), numbers.size()}; }
+inline pdmp_buffer buffer(std::vector<double> &numbers) noexcept { return {numbers.data(), numbers.size()}; }
 
 inline pdmp_motion to_c(Motion &motion) noexcept {
-    return {to_c(motion.position), to_c(motion.velocity), to_c(motion.acceleration)};
+    return {buffer(motion.position), buffer(motion.velocity), buffer(motion.acceleration)};
 }
 
 }  // namespace detail
@@ -147,7 +148,7 @@ private:
     Conditions conditions(Call call) const {
         std::vector<double> numbers(info().n_conditions);
         pdmp_conditions c{};
-        detail::check([&](pdmp_text error) { return call(&c, detail::to_c(numbers), error); });
+        detail::check([&](pdmp_text error) { return call(&c, detail::buffer(numbers), error); });
         using detail::copy;
         return {copy(c.style),    copy(c.goal), copy(c.anchor), copy(c.start),
                 copy(c.velocity), std::nullopt, *c.tau,         std::nullopt};

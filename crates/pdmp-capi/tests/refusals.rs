@@ -14,7 +14,7 @@ use pdmp::*;
 use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::TimeScaling;
 use pdmp_core::model::TimeWarp;
-use pdmp_core::{Error, FitOptions, Kind};
+use pdmp_core::{Error, Kind};
 
 const NO_VECTOR: pdmp_vector = pdmp_vector { data: ptr::null(), length: 0 };
 const NO_TEXT: pdmp_text = pdmp_text { data: ptr::null_mut(), size: 0 };

@@ -1,4 +1,5 @@
 //! Batches of movements and Jacobians agree with the control loop and with rollouts.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;

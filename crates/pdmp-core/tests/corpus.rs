@@ -1,4 +1,5 @@
 //! Regression test of inputs that the fuzz target of model files found.
+#![cfg(feature = "learning")]
 #![allow(missing_docs, unreachable_pub, dead_code)]
 
 #[path = "../../../fuzz/src/input.rs"]

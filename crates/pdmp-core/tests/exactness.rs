@@ -1,4 +1,5 @@
 //! The control loop agrees with an accurate numerical solution of its equations, and with closed forms after many ticks.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;

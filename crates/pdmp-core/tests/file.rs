@@ -1,4 +1,5 @@
 //! Model files restore the saved model, and other files are rejected.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;

@@ -1,5 +1,7 @@
 //! Inspection finds implausible samples with their location, and nothing in plausible movements.
 
+#![cfg(feature = "learning")]
+
 use std::f64::consts::TAU;
 
 use ndarray::{Array2, s};

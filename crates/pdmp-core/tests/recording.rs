@@ -1,5 +1,7 @@
 //! Preprocessing of recordings.
 
+#![cfg(feature = "learning")]
+
 use std::f64::consts::{PI, TAU};
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
@@ -333,20 +335,20 @@ fn outliers_among_the_cycles_are_rejected_with_a_reason() {
     assert!(found.rejected[0].reason.to_string().contains("median period is 1.0"));
 }
 
-/// Cycles begin at given events.
+/// Cycles begin at the onsets that are given, to the last bit.
 #[test]
-fn events_are_the_onsets_of_cycles() {
-    let events = vec![0.25, 1.26, 2.24, 3.25];
+fn cycles_begin_at_given_onsets() {
+    let onsets = vec![0.25, 1.26, 2.24, 3.25];
     let recording = recorded(walk(&even(400), |t| TAU * t));
-    let found = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[events]), CycleOutput::Each).unwrap();
+    let found = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[onsets]), CycleOutput::Each).unwrap();
     let periods: Vec<f64> = found.kept.iter().map(|cycle| cycle.period).collect();
     assert_abs_diff_eq!(&periods[..], &[1.01, 0.98, 1.01][..], epsilon = 1e-12);
 
-    for (events, wrong) in [(vec![0.5], "at least"), (vec![1.0, 0.5], "must increase"), (vec![1.0, 9.0], "within")] {
-        let message = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[events]), CycleOutput::Each)
+    for (onsets, wrong) in [(vec![0.5], "at least"), (vec![1.0, 0.5], "must increase"), (vec![1.0, 9.0], "within")] {
+        let message = preprocessing::cycles(std::slice::from_ref(&recording), Some(&[onsets]), CycleOutput::Each)
             .unwrap_err()
             .to_string();
-        assert!(message.starts_with("demo 0: events") && message.contains(wrong), "{message}");
+        assert!(message.starts_with("demo 0: onsets") && message.contains(wrong), "{message}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Many movements at once in Python.
+//! Batches of rollouts.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -13,16 +13,17 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::convert::{Cube, array, count, items, matrix, threads, writable};
+use crate::convert::{Cube, array, items, matrix, threads, writable};
 use crate::error::{interruptible, raise};
 use crate::model::Model;
+use crate::scalar::{Scalar, optional_number};
 
 #[pymethods]
 impl Model {
-    /// Movements of many styles.
+    /// Compute the movements of many styles.
     ///
-    /// For constant style, goal and tau a movement is linear in its conditions: a batch is one product of coefficients
-    /// with response curves, which the model remembers for a few of the last (dt, tau, duration). Agrees with `rollout`
+    /// A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
+    /// response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
     /// to rounding.
     ///
     /// Parameters
@@ -30,38 +31,54 @@ impl Model {
     /// styles : array_like, (B, J)
     ///     Style parameters s.
     /// goals : array_like, (D,) or (B, D), optional
-    ///     Goals g of all or of each, discrete.
+    ///     Goals g of all or of each movement, in the unit of each degree of freedom; discrete.
     /// starts : array_like, (D,) or (B, D), optional
-    ///     Start positions; rhythmic movements otherwise start on their cycles.
+    ///     Start positions y₀ of all or of each movement. Rhythmic movements start on their limit cycles by default.
     /// velocities : array_like, (D,) or (B, D), optional
-    ///     Start velocities per s; otherwise as in the demonstrations.
+    ///     Start velocities per s of all or of each movement; by default those of the demonstrations.
     /// anchors : array_like, (D,) or (B, D), optional
-    ///     Anchors y_a of all or of each, rhythmic.
-    /// amplitude, tau, dt, duration
-    ///     As in `rollout`, of all.
+    ///     Anchors y_a of all or of each movement; rhythmic.
+    /// amplitude : float, optional
+    ///     Amplitude r₀ of all movements; rhythmic.
+    /// tau : float, optional
+    ///     Time constant τ of all movements in s.
+    /// dt : float
+    ///     Interval between samples in s.
+    /// duration : float, optional
+    ///     Length of all movements in s, as in `rollout`.
     /// derivatives : int
-    ///     0 for positions alone, 1 with velocities, 2 with accelerations too.
-    /// out : tuple of float64 arrays (B, T, D), optional
-    ///     Where to write, one array for positions and each derivative.
+    ///     Order of the highest derivative to return: 0 for positions, 1 for velocities too, 2 for accelerations too.
+    /// out : tuple of ndarray, (B, T, D), optional
+    ///     Writable float64 arrays for the results, one per order of derivative.
     /// threads : int, optional
-    ///     How many threads may work; otherwise as many as the system has. The numbers do not depend on it.
+    ///     Largest number of threads; by default all that the system offers. Results do not depend on it.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray, (B, T, D)
-    ///     Positions, velocities per s, accelerations per s².
+    ///     Positions in the unit of each degree of freedom, velocities per s, accelerations per s².
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     Rows that do not match the styles, a wrong length, a number that is not finite, an argument of the other
-    ///     kind of primitive, or an output that does not fit; nothing is written then.
+    ///     An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit.
+    ///     Nothing is written then.
     /// MemoryError
-    ///     More numbers than memory holds: see `rollout_chunks`.
-    #[pyo3(signature = (
-        styles, *, goals=None, starts=None, velocities=None, anchors=None, amplitude=None, tau=None, dt=0.01,
-        duration=None, derivatives=1, out=None, threads=None
-    ))]
+    ///     The results do not fit into memory; use `rollout_chunks`.
+    ///
+    /// Examples
+    /// --------
+    /// >>> positions, velocities = model.rollouts(model.styles, dt=0.1)
+    /// >>> positions.shape
+    /// (5, 13, 2)
+    #[pyo3(
+        signature = (
+            styles, *, goals=None, starts=None, velocities=None, anchors=None, amplitude=None, tau=None,
+            dt=Scalar::Number(0.01), duration=None, derivatives=Scalar::Count(1), out=None, threads=None
+        ),
+        text_signature = "($self, styles, *, goals=None, starts=None, velocities=None, anchors=None, amplitude=None, \
+                          tau=None, dt=0.01, duration=None, derivatives=1, out=None, threads=None)"
+    )]
     #[allow(clippy::too_many_arguments)]
     fn rollouts<'py>(
         &self,
@@ -71,16 +88,17 @@ impl Model {
         starts: Option<&Bound<'py, PyAny>>,
         velocities: Option<&Bound<'py, PyAny>>,
         anchors: Option<&Bound<'py, PyAny>>,
-        amplitude: Option<f64>,
-        tau: Option<f64>,
-        dt: f64,
-        duration: Option<f64>,
-        derivatives: isize,
+        amplitude: Option<Scalar<'py>>,
+        tau: Option<Scalar<'py>>,
+        dt: Scalar<'py>,
+        duration: Option<Scalar<'py>>,
+        derivatives: Scalar<'py>,
         out: Option<&Bound<'py, PyAny>>,
-        threads: Option<isize>,
+        threads: Option<Scalar<'py>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let arguments = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
-        let work = Work::new(py, self, arguments, TimeGrid { dt, duration }, derivatives, threads)?;
+        let conditions = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
+        let options = Options { dt, duration, derivatives, threads };
+        let work = PreparedBatch::new(py, self, conditions, options)?;
         let movements = 0..work.batch.shape().0;
         let out = match out {
             Some(out) => work.check(&movements, &items("out", out, |_, array| Ok(array.clone()))?)?,
@@ -89,63 +107,78 @@ impl Model {
         work.write(py, movements, out)
     }
 
-    /// Movements of many styles, a piece at a time: what `rollouts` returns for each piece, in order.
+    /// Compute the movements of many styles in chunks.
     ///
-    /// Only one piece is in memory at a time, and the numbers are those of `rollouts` to the last bit. All arguments are
-    /// checked by this call.
+    /// Memory holds one chunk at a time. Results equal those of `rollouts` bit for bit. This call checks all arguments.
     ///
     /// Parameters
     /// ----------
-    /// styles, goals, starts, velocities, anchors, amplitude, tau, dt, duration, derivatives, threads
-    ///     As in `rollouts`.
+    /// styles : array_like, (B, J)
+    ///     Style parameters s.
     /// size : int
-    ///     Movements in a piece; the last may have fewer.
+    ///     Number of movements in a chunk; the last may have fewer.
+    /// goals, starts, velocities, anchors : array_like, (D,) or (B, D), optional
+    ///     As in `rollouts`.
+    /// amplitude, tau, dt, duration : float, optional
+    ///     As in `rollouts`.
+    /// derivatives, threads : int, optional
+    ///     As in `rollouts`.
     ///
     /// Returns
     /// -------
-    /// iterator of tuple of ndarray, (size, T, D)
+    /// RolloutChunks
+    ///     Iterator over the results of `rollouts` for each chunk, with arrays (size, T, D).
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `rollouts`, or a size below 1.
+    ///     An argument that `rollouts` rejects, or a `size` below 1.
     ///
     /// Examples
     /// --------
-    /// >>> for positions, velocities in model.rollout_chunks(styles, size=1000):
-    /// ...     cost.append((velocities**2).sum(axis=(1, 2)))
-    #[pyo3(signature = (
-        styles, *, size=1000, goals=None, starts=None, velocities=None, anchors=None, amplitude=None, tau=None, dt=0.01,
-        duration=None, derivatives=1, threads=None
-    ))]
+    /// >>> cost = []
+    /// >>> for positions, velocities in model.rollout_chunks(model.styles, size=2):
+    /// ...     cost.extend((velocities**2).sum(axis=(1, 2)))
+    /// >>> len(cost) == model.n_demos
+    /// True
+    #[pyo3(
+        signature = (
+            styles, *, size=Scalar::Count(1000), goals=None, starts=None, velocities=None, anchors=None, amplitude=None,
+            tau=None, dt=Scalar::Number(0.01), duration=None, derivatives=Scalar::Count(1), threads=None
+        ),
+        text_signature = "($self, styles, *, size=1000, goals=None, starts=None, velocities=None, anchors=None, \
+                          amplitude=None, tau=None, dt=0.01, duration=None, derivatives=1, threads=None)"
+    )]
     #[allow(clippy::too_many_arguments)]
     fn rollout_chunks<'py>(
         &self,
         py: Python<'py>,
         styles: &Bound<'py, PyAny>,
-        size: isize,
+        size: Scalar<'py>,
         goals: Option<&Bound<'py, PyAny>>,
         starts: Option<&Bound<'py, PyAny>>,
         velocities: Option<&Bound<'py, PyAny>>,
         anchors: Option<&Bound<'py, PyAny>>,
-        amplitude: Option<f64>,
-        tau: Option<f64>,
-        dt: f64,
-        duration: Option<f64>,
-        derivatives: isize,
-        threads: Option<isize>,
+        amplitude: Option<Scalar<'py>>,
+        tau: Option<Scalar<'py>>,
+        dt: Scalar<'py>,
+        duration: Option<Scalar<'py>>,
+        derivatives: Scalar<'py>,
+        threads: Option<Scalar<'py>>,
     ) -> PyResult<RolloutChunks> {
-        let arguments = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
-        let work = Work::new(py, self, arguments, TimeGrid { dt, duration }, derivatives, threads)?;
-        let chunks = work.batch.chunks(count("size", size)?).map_err(raise)?;
+        let size = size.count("size")?;
+        let conditions = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
+        let options = Options { dt, duration, derivatives, threads };
+        let work = PreparedBatch::new(py, self, conditions, options)?;
+        let chunks = work.batch.chunks(size).map_err(raise)?;
         Ok(RolloutChunks { work, chunks: Mutex::new(chunks) })
     }
 }
 
-/// An iterator over pieces of a batch, made by `Model.rollout_chunks`.
+/// Iterator over the chunks of a batch, returned by `Model.rollout_chunks`.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct RolloutChunks {
-    work: Work,
+    work: PreparedBatch,
     chunks: Mutex<BatchChunks>,
 }
 
@@ -156,7 +189,7 @@ impl RolloutChunks {
     }
 
     fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyTuple>>> {
-        // The lock is free again before anything is written: several threads may share the pieces.
+        // The lock is released before the chunk is computed, so that threads may share the iterator.
         let next = self.chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
         let Some(movements) = next else { return Ok(None) };
         let out = self.work.allocate(py, &movements)?;
@@ -164,24 +197,19 @@ impl RolloutChunks {
     }
 }
 
-/// A batch, and how it is to be written.
-struct Work {
+/// Batch with the settings of its outputs.
+struct PreparedBatch {
     batch: Batch,
     highest: Derivative,
     threads: Threads,
 }
 
-impl Work {
-    fn new(
-        py: Python<'_>,
-        model: &Model,
-        arguments: Arguments<'_, '_>,
-        grid: TimeGrid,
-        derivatives: isize,
-        n_threads: Option<isize>,
-    ) -> PyResult<Self> {
-        let highest = Derivative::of_order("derivatives", count("derivatives", derivatives)?).map_err(raise)?;
-        let (threads, conditions) = (threads(n_threads)?, arguments.conditions()?);
+impl PreparedBatch {
+    fn new(py: Python<'_>, model: &Model, arguments: Arguments<'_, '_>, options: Options<'_>) -> PyResult<Self> {
+        let highest = Derivative::of_order("derivatives", options.derivatives.count("derivatives")?).map_err(raise)?;
+        let (threads, conditions) = (threads(options.threads)?, arguments.conditions()?);
+        let duration = optional_number("duration", options.duration)?;
+        let grid = TimeGrid { dt: options.dt.number("dt")?, duration };
         let batch = interruptible(py, |progress| batch(model.0.primitive(), conditions, grid, progress))?;
         Ok(Self { batch, highest, threads })
     }
@@ -195,17 +223,17 @@ impl Work {
         [movements.len(), n_samples, n_dofs]
     }
 
-    /// The arrays given, if they fit.
+    /// Checks the number and the shapes of given output arrays.
     fn check<'py>(&self, movements: &Range<usize>, out: &[Bound<'py, PyAny>]) -> PyResult<Vec<Cube<'py>>> {
-        let (found, expected, shape) = (out.len(), self.n_outputs(), self.shape(movements));
-        if found != expected {
-            let message = format!("out: {found} arrays; expected {expected} float64 arrays {shape:?}");
+        let (n_arrays, expected, shape) = (out.len(), self.n_outputs(), self.shape(movements));
+        if n_arrays != expected {
+            let message = format!("out: {n_arrays} arrays; expected {expected} float64 arrays {shape:?}");
             return Err(PyValueError::new_err(message));
         }
         out.iter().map(|out| writable(out, &shape)).collect()
     }
 
-    /// New arrays, by numpy itself: it asks the system for large pages, of which there are fewer to fetch.
+    /// Allocates output arrays by numpy, which requests large pages: fewer page faults than with Rust's allocator.
     fn allocate<'py>(&self, py: Python<'py>, movements: &Range<usize>) -> PyResult<Vec<Cube<'py>>> {
         let shape = self.shape(movements);
         let numbers = shape.iter().map(|&n| n as f64).product();
@@ -234,15 +262,23 @@ impl Work {
 
 const OVERLAP: &str = "out: arrays that share memory, with each other or with one in use; pass separate ones";
 
-/// What the movements of a batch start with, from Python's arguments.
+/// Arguments for the conditions of a batch.
 struct Arguments<'a, 'py> {
     styles: &'a Bound<'py, PyAny>,
     goals: Option<&'a Bound<'py, PyAny>>,
     starts: Option<&'a Bound<'py, PyAny>>,
     velocities: Option<&'a Bound<'py, PyAny>>,
     anchors: Option<&'a Bound<'py, PyAny>>,
-    amplitude: Option<f64>,
-    tau: Option<f64>,
+    amplitude: Option<Scalar<'py>>,
+    tau: Option<Scalar<'py>>,
+}
+
+/// Arguments for the samples of a batch.
+struct Options<'py> {
+    dt: Scalar<'py>,
+    duration: Option<Scalar<'py>>,
+    derivatives: Scalar<'py>,
+    threads: Option<Scalar<'py>>,
 }
 
 impl Arguments<'_, '_> {
@@ -253,13 +289,13 @@ impl Arguments<'_, '_> {
             anchors: rows("anchors", self.anchors)?,
             starts: rows("starts", self.starts)?,
             velocities: rows("velocities", self.velocities)?,
-            amplitude: self.amplitude,
-            tau: self.tau,
+            amplitude: optional_number("amplitude", self.amplitude)?,
+            tau: optional_number("tau", self.tau)?,
         })
     }
 }
 
-/// A vector for all movements, or a matrix with one for each.
+/// Converts to a vector (D,) for all movements or a matrix (B, D) with one row for each.
 fn rows(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<PerMovement>> {
     let Some(value) = value else { return Ok(None) };
     let array = array(name, value)?;

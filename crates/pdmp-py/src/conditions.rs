@@ -1,4 +1,4 @@
-//! Conditions of a movement in Python, and the one place where keywords become conditions.
+//! Conditions of a movement, and the conversion of keywords to conditions.
 
 use numpy::PyArray1;
 use pdmp_core::model::Conditions as Inner;
@@ -6,44 +6,51 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::{number, to_numpy, vector};
+use crate::convert::{quoted, to_numpy, vector};
 use crate::error::{ascii, raise};
+use crate::scalar::{Scalar, number};
 
-/// Names of all conditions, as keywords have them.
+/// Names of all conditions, which are their keywords.
 const NAMES: [&str; 9] =
     ["style", "goal", "start", "velocity", "anchor", "amplitude", "tau", "segment_durations", "phase"];
 
-/// Conditions under which a movement starts. A condition that is None is that of the nominal demonstration.
+/// Conditions of a movement.
 ///
-/// Rollouts, controllers and Jacobians take conditions, with keywords of the same names in place of single ones;
-/// `Model.conditions`, `Model.predict` and `blend` return them.
+/// A condition that is None is that of the nominal demonstration. `Model.rollout`, `Model.controller` and
+/// `Model.jacobian` take conditions, and keywords of the same names that replace single ones; `Model.conditions`,
+/// `Model.predict` and `blend` return conditions.
 ///
 /// Parameters
 /// ----------
 /// style : array_like, (J,), optional
 ///     Style parameter s.
 /// goal : array_like, (D,), optional
-///     Goal g; discrete.
+///     Goal g in the unit of each degree of freedom; discrete.
 /// start : array_like, (D,), optional
-///     Start position y₀. A rhythmic movement otherwise starts on its limit cycle.
+///     Start position y₀ in the unit of each degree of freedom. A rhythmic movement starts on its limit cycle by
+///     default.
 /// velocity : array_like, (D,), optional
-///     Start velocity per s; otherwise that of the demonstrations.
+///     Start velocity per s; by default that of the demonstrations.
 /// anchor : array_like, (D,), optional
-///     Anchor y_a, the centre of oscillation; rhythmic.
+///     Anchor y_a, the centre of oscillation, in the unit of each degree of freedom; rhythmic.
 /// amplitude : float, optional
-///     Amplitude r₀, 1 as demonstrated; rhythmic.
+///     Amplitude r₀ relative to the demonstrations, 1 by default; rhythmic.
 /// tau : float, optional
-///     Time constant τ in s.
+///     Time constant τ in s: the duration of a discrete movement, the period over 2π of a rhythmic one.
 /// segment_durations : array_like, (K,), optional
-///     Time in s in each segment between `Model.breaks`, in place of `tau`. Time over phase is the monotone cubic through
-///     them. A rollout follows it; a controller takes the total, and `Model.tau_at` gives its τ at each phase.
+///     Time in s in each segment between `Model.breaks`, in place of `tau`. Time over phase is the monotone cubic
+///     through their sums. A rollout follows it; a controller takes the total, and `Model.tau_at` returns τ at each
+///     phase.
 /// phase : float, optional
-///     Phase φ in rad at which a rhythmic movement starts, on its limit cycle; 0 otherwise.
+///     Phase φ in rad at which a rhythmic movement starts on its limit cycle; 0 by default.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A condition that is not a number or a vector of numbers. Lengths and kind are checked where a model takes them.
+///     A condition is not a number or a vector of numbers. Models check lengths and finiteness when they take
+///     conditions.
+/// TypeError
+///     A keyword is unknown.
 ///
 /// Examples
 /// --------
@@ -67,77 +74,83 @@ impl Conditions {
         changed(Inner::default(), conditions).map(Self)
     }
 
-    /// Return the same conditions with others in place of those named; None leaves one to the nominal demonstration.
+    /// Return a copy with some conditions replaced.
     ///
     /// Parameters
     /// ----------
     /// **changes
-    ///     Conditions by name. `tau` takes the place of `segment_durations`, and the other way round.
+    ///     Conditions by name; None stands for that of the nominal demonstration. `tau` replaces `segment_durations`
+    ///     and vice versa.
     ///
     /// Returns
     /// -------
     /// Conditions
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As for `Conditions`.
     #[pyo3(signature = (**changes))]
     fn replace(&self, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         changed(self.0.clone(), changes).map(Self)
     }
 
-    /// Style parameter s (J,).
+    /// Style parameter s (J,), or None.
     #[getter]
     fn style<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         array(py, &self.0.style)
     }
 
-    /// Goal g (D,), discrete.
+    /// Goal g (D,) of a discrete movement, or None.
     #[getter]
     fn goal<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         array(py, &self.0.goal)
     }
 
-    /// Start position y₀ (D,).
+    /// Start position y₀ (D,), or None.
     #[getter]
     fn start<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         array(py, &self.0.start)
     }
 
-    /// Start velocity (D,), per s.
+    /// Start velocity (D,) per s, or None.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         array(py, &self.0.velocity)
     }
 
-    /// Anchor y_a (D,), rhythmic.
+    /// Anchor y_a (D,) of a rhythmic movement, or None.
     #[getter]
     fn anchor<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         array(py, &self.0.anchor)
     }
 
-    /// Amplitude r₀, rhythmic.
+    /// Amplitude r₀ of a rhythmic movement, or None.
     #[getter]
     fn amplitude(&self) -> Option<f64> {
         self.0.amplitude
     }
 
-    /// Time constant τ in s.
+    /// Time constant τ in s, or None.
     #[getter]
     fn tau(&self) -> Option<f64> {
         self.0.tau
     }
 
-    /// Time in s in each segment (K,).
+    /// Time in s in each segment (K,), or None.
     #[getter]
     fn segment_durations<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         array(py, &self.0.segment_durations)
     }
 
-    /// Phase φ in rad at which a rhythmic movement starts.
+    /// Phase φ in rad at which a rhythmic movement starts, or None.
     #[getter]
     fn phase(&self) -> Option<f64> {
         self.0.phase
     }
 
     fn __getnewargs_ex__<'py>(slf: &Bound<'py, Self>) -> PyResult<((), Bound<'py, PyDict>)> {
-        Ok(((), given(slf)?))
+        Ok(((), present(slf)?))
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
@@ -145,19 +158,19 @@ impl Conditions {
             let list = value.call_method0("tolist").unwrap_or(value);
             Ok(format!("{name}={}", list.repr()?))
         };
-        let parts = given(slf)?.iter().map(text).collect::<PyResult<Vec<_>>>()?;
+        let parts = present(slf)?.iter().map(text).collect::<PyResult<Vec<_>>>()?;
         Ok(format!("pdmp.Conditions({})", parts.join(", ")))
     }
 }
 
-/// Returns the conditions (1 − share)·a + share·b.
+/// Compute the conditions (1 − share)·a + share·b.
 ///
 /// Parameters
 /// ----------
 /// a, b : Conditions
-///     Conditions with the same names, such as two of `Model.conditions`.
+///     Conditions of equal names and lengths, such as two of `Model.conditions`.
 /// share : float
-///     0 gives `a`, 1 gives `b`; values outside [0, 1] extrapolate.
+///     Share of `b`, from 0 to 1; values outside extrapolate.
 ///
 /// Returns
 /// -------
@@ -166,14 +179,20 @@ impl Conditions {
 /// Raises
 /// ------
 /// ValueError
-///     A condition that one of the two lacks, lengths that differ, or a share that is not finite.
+///     A condition is given for one of the two only, lengths differ, or `share` is not finite.
+///
+/// Examples
+/// --------
+/// >>> between = pdmp.blend(model.conditions(0), model.conditions(1), 0.25)
+/// >>> np.allclose(between.goal, 0.75 * model.goals[0] + 0.25 * model.goals[1])
+/// True
 #[pyfunction]
-pub(crate) fn blend(a: &Conditions, b: &Conditions, share: f64) -> PyResult<Conditions> {
-    a.0.blend(&b.0, share).map(Conditions).map_err(raise)
+pub(crate) fn blend(a: &Conditions, b: &Conditions, share: Scalar<'_>) -> PyResult<Conditions> {
+    a.0.blend(&b.0, share.number("share")?).map(Conditions).map_err(raise)
 }
 
-/// Returns the conditions of a call: `conditions`, with `changes` in place of single ones, and the prediction for a
-/// `context` where both lack one.
+/// Returns the conditions of a call: `conditions`, single ones replaced by `changes`, those absent from both predicted
+/// for `context`.
 pub(crate) fn conditions_of(
     model: &pdmp_core::Model,
     conditions: Option<&Bound<'_, PyAny>>,
@@ -182,12 +201,12 @@ pub(crate) fn conditions_of(
 ) -> PyResult<Inner> {
     let base = match conditions {
         None => Inner::default(),
-        Some(given) => match given.cast::<Conditions>() {
+        Some(object) => match object.cast::<Conditions>() {
             Ok(conditions) => conditions.get().0.clone(),
             Err(_) => {
-                let found = given.get_type().name()?;
                 let text = format!(
-                    "conditions: expected pdmp.Conditions, found {found}; pass single ones by name, such as style="
+                    "conditions = {}: expected pdmp.Conditions; pass single ones by name, such as style=",
+                    quoted(object)
                 );
                 return Err(PyTypeError::new_err(text));
             }
@@ -240,15 +259,15 @@ fn is_absent(changes: &Bound<'_, PyDict>, name: &str) -> bool {
 }
 
 /// Returns the conditions that are not None, by name.
-fn given<'py>(conditions: &Bound<'py, Conditions>) -> PyResult<Bound<'py, PyDict>> {
-    let found = PyDict::new(conditions.py());
+fn present<'py>(conditions: &Bound<'py, Conditions>) -> PyResult<Bound<'py, PyDict>> {
+    let present = PyDict::new(conditions.py());
     for name in NAMES {
         let value = conditions.getattr(name)?;
         if !value.is_none() {
-            found.set_item(name, value)?;
+            present.set_item(name, value)?;
         }
     }
-    Ok(found)
+    Ok(present)
 }
 
 fn array<'py>(py: Python<'py>, values: &Option<Vec<f64>>) -> Option<Bound<'py, PyArray1<f64>>> {

@@ -1,4 +1,4 @@
-//! Maps from contexts, by themselves.
+//! Stand-alone context maps.
 
 use ndarray::{Array2, Array3, Axis};
 use numpy::IntoPyArray;
@@ -9,30 +9,34 @@ use crate::convert::{Cube, Matrix, matrix};
 use crate::error::{ascii, raise};
 use crate::fit::map_of;
 
-/// A map from contexts to outputs, with the covariance of what it predicts.
+/// Regression from contexts to outputs with predictive covariance.
 ///
-/// What `fit` learns from contexts to style, goal, start and duration (Section 4.1.2 of the paper), for any outputs:
-/// y = φ(h)ᵀβ + f(h) + ε for each principal component. "linear" is least squares, φ = (1, h) and no f; "polynomial" and
-/// "gp" have a constant and a Gaussian process f, with the kernel of the polynomials of second degree or Matérn-5/2. The
-/// ratio of f to the noise is found by restricted maximum likelihood, for each component; the length, by the error at
-/// contexts left out. "stacked" combines the deviations g of "gp" and l of a line with penalised slopes from the mean,
-/// w_g·g + w_l·l, with the weights of least error at contexts left out: w_g + w_l = 1 inside of the contexts given,
-/// w_g + w_l ≤ 1 from a tenth of their range outside on. Numbers are compared by their spread, labels by whether they are
-/// the same; repetitions of one context are averaged and count once.
+/// `fit` uses it from contexts to style, goal, start and duration (Section 4.1.2 of the paper); here outputs are
+/// arbitrary. Each principal component of the outputs is modelled as y = φ(h)ᵀβ + f(h) + ε:
+///
+/// - "linear" is least squares with φ = (1, h) and f = 0.
+/// - "gp" and "polynomial" have φ = 1 and a Gaussian process f, whose kernel is Matérn-5/2 or that of polynomials of
+///   second degree. Restricted maximum likelihood estimates the ratio of f to the noise for each component;
+///   leave-one-out error decides the length scale.
+/// - "stacked" is the mean plus w_g·g + w_l·l, with the deviations g of "gp" and l of a ridge regression. The weights
+///   minimise the leave-one-out error under w_g + w_l = 1 inside the range of the contexts, and under w_g + w_l ≤ 1
+///   beyond a tenth of their range outside.
+///
+/// Numbers are scaled by their spread; labels are equal or not. Repetitions of a context are averaged and count once.
 ///
 /// Parameters
 /// ----------
-/// contexts : (M, Q) array_like, or M lists of Q numbers and labels
-///     Conditions.
-/// outputs : (M, P) array_like
-///     What was shown in each.
+/// contexts : array_like, (M, Q), or M lists of Q numbers and labels
+///     Contexts h, numbers in any unit.
+/// outputs : array_like, (M, P)
+///     Outputs y for each context, in any unit.
 /// map : {"auto", "stacked", "gp", "linear", "polynomial"}
-///     As for `fit`.
+///     Model of the outputs; "auto" as in `fit`.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Contexts and outputs that do not fit together, or numbers that are not finite.
+///     Lengths differ, `map` is unknown, or a number is not finite.
 ///
 /// References
 /// ----------
@@ -46,42 +50,61 @@ impl ContextMap {
     #[pyo3(signature = (contexts, outputs, map="auto"))]
     fn new(contexts: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>, map: &str) -> PyResult<Self> {
         let (rows, outputs) = (crate::convert::contexts(contexts)?, matrix("outputs", "(M, P)", outputs)?);
-        let choice: MapSelection = map_of(map)?;
-        pdmp_core::context::ContextMap::fit(&rows, outputs.view(), choice).map(Self).map_err(raise)
+        let selection: MapSelection = map_of(map)?;
+        pdmp_core::context::ContextMap::fit(&rows, outputs.view(), selection).map(Self).map_err(raise)
     }
 
-    /// Which kind of map it is.
+    /// Name of the model: "stacked", "gp", "linear" or "polynomial".
     #[getter]
     fn kind(&self) -> &'static str {
         self.0.kind().name()
     }
 
-    /// Mean squared error of each kind that was tried, at contexts left out one by one, with the constants of all.
+    /// Mean squared leave-one-out error of each model that was fitted, with hyperparameters of all contexts.
+    ///
+    /// Pairs (name, error), in the squared unit of the principal components.
     #[getter]
     fn errors(&self) -> Vec<(&'static str, f64)> {
         self.0.errors().iter().map(|(kind, error)| (kind.name(), *error)).collect()
     }
 
-    /// Degrees of freedom from which the covariance is known.
+    /// Degrees of freedom of the covariance estimate.
     #[getter]
     fn degrees_of_freedom(&self) -> usize {
         self.0.degrees_of_freedom()
     }
 
-    /// Expected outputs (B, P) for contexts (B, Q), and the covariance (B, P, P) of new ones, or None if unknown.
+    /// Compute the predictive mean and covariance of new outputs.
+    ///
+    /// Parameters
+    /// ----------
+    /// contexts : array_like, (B, Q), or B lists of Q numbers and labels
+    ///     Contexts.
+    ///
+    /// Returns
+    /// -------
+    /// mean : ndarray, (B, P)
+    ///     In the unit of the outputs.
+    /// covariance : ndarray, (B, P, P), or None
+    ///     None if no degree of freedom is left to estimate it.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A context has a wrong length, an unknown label, or a number that is not finite.
     fn predict<'py>(&self, py: Python<'py>, contexts: &Bound<'_, PyAny>) -> PyResult<(Matrix<'py>, Option<Cube<'py>>)> {
-        let found = crate::convert::contexts(contexts)?
+        let predictions = crate::convert::contexts(contexts)?
             .iter()
             .map(|context| self.0.predict(context))
             .collect::<pdmp_core::Result<Vec<_>>>()
             .map_err(raise)?;
-        let n_outputs = found.first().map_or(0, |first| first.mean.len());
-        let means = Array2::from_shape_fn((found.len(), n_outputs), |(b, p)| found[b].mean[p]);
-        let known = !found.is_empty() && found.iter().all(|expected| expected.covariance.is_some());
-        let covariances = known.then(|| {
-            let mut covariances = Array3::zeros((found.len(), n_outputs, n_outputs));
-            for (expected, mut to) in found.iter().zip(covariances.axis_iter_mut(Axis(0))) {
-                expected.covariance.iter().for_each(|covariance| to.assign(covariance));
+        let n_outputs = predictions.first().map_or(0, |first| first.mean.len());
+        let means = Array2::from_shape_fn((predictions.len(), n_outputs), |(b, p)| predictions[b].mean[p]);
+        let available = !predictions.is_empty() && predictions.iter().all(|each| each.covariance.is_some());
+        let covariances = available.then(|| {
+            let mut covariances = Array3::zeros((predictions.len(), n_outputs, n_outputs));
+            for (prediction, mut to) in predictions.iter().zip(covariances.axis_iter_mut(Axis(0))) {
+                prediction.covariance.iter().for_each(|covariance| to.assign(covariance));
             }
             covariances.into_pyarray(py)
         });

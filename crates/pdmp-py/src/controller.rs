@@ -1,11 +1,7 @@
-//! The real-time loop in Python.
+//! Control loops.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use ndarray::ArrayView1;
-use numpy::PyArray1;
-use numpy::npyffi::{_PyArray_GET_ITEM_DATA, NPY_ARRAY_WRITEABLE};
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Kind};
 use pyo3::exceptions::PyValueError;
@@ -13,10 +9,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::conditions::conditions_of;
-use crate::convert::{Reduced, Vector, read_only, refill};
+use crate::convert::{Reduced, Vector, items, quoted, read_only, refill};
 use crate::error::raise;
+use crate::output::Output;
+use crate::scalar::{Scalar, number, optional_number};
 
-/// Whether a movement goes on (`WORKING`, 1) or has settled on its goal (`FINISHED`, 2, and false).
+/// State of a movement: in progress (`WORKING`, 1, true) or settled on its goal (`FINISHED`, 2, false).
 #[pyclass(frozen, eq, hash, module = "pdmp")]
 #[derive(PartialEq, Eq, Hash)]
 pub(crate) enum Status {
@@ -28,7 +26,7 @@ pub(crate) enum Status {
 
 #[pymethods]
 impl Status {
-    /// A loop runs `while controller.step()`.
+    /// Return whether the movement is in progress, so that a loop is `while controller.step()`.
     fn __bool__(&self) -> bool {
         *self == Self::Working
     }
@@ -42,62 +40,28 @@ impl Status {
     }
 }
 
-/// The bits of numbers that the loop writes while arrays over them are read.
-#[pyclass(frozen, module = "pdmp._native")]
-struct Memory(Box<[AtomicU64]>);
-
-/// A vector that the loop writes and the user reads without a copy: each access gives a read-only array of its own, so
-/// that who reshapes it changes it for nobody else, over memory that numpy does not own, so that it can neither be made
-/// writable nor resized.
-struct Output(Py<Memory>);
-
-impl Output {
-    fn new(py: Python<'_>, length: usize) -> PyResult<Self> {
-        Py::new(py, Memory((0..length).map(|_| AtomicU64::new(0)).collect())).map(Self)
-    }
-
-    fn write(&self, values: &[f64]) {
-        for (place, value) in self.0.get().0.iter().zip(values) {
-            place.store(value.to_bits(), Relaxed);
-        }
-    }
-
-    #[allow(unsafe_code)]
-    fn view<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        let memory = &self.0.get().0;
-        // SAFETY: the memory has this length, is never moved, and lives as long as the array, whose base it is. Atomic
-        // integers have the layout of doubles. The array is new, so that nobody has written through it.
-        unsafe {
-            let numbers = ArrayView1::from_shape_ptr(memory.len(), memory.as_ptr().cast::<f64>());
-            let array = PyArray1::borrow_from_array(&numbers, self.0.bind(py).clone().into_any());
-            (*_PyArray_GET_ITEM_DATA(array.as_ptr().cast())).flags &= !NPY_ARRAY_WRITEABLE;
-            array
-        }
-    }
-}
-
-/// Vectors given, copied: they may be lists, strided, or the controller's own outputs.
+/// Buffers for vector arguments, which may be lists, strided arrays or the controller's own outputs.
 #[derive(Default)]
-struct Given {
-    /// By a setter.
+struct Arguments {
+    /// Value of a setter.
     command: Vec<f64>,
-    /// For one tick.
+    /// Arguments of one tick.
     measured: Vec<f64>,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
 }
 
-/// A running primitive, made by `Model.controller`.
+/// Running movement, returned by `Model.controller`.
 ///
-/// `step` moves on by one tick and writes into `position`, `velocity` and `acceleration`, which are read-only views
-/// that stay valid. `goal`, `style`, `tau`, `amplitude`, `anchor` and `compliance` can be set at any tick; values that
-/// are refused leave the last good ones in force.
+/// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
+/// valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
+/// is rejected leaves the present one in force.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,
-    /// Predicts conditions from contexts.
+    /// Source of predictions for contexts in `reset`.
     model: Arc<pdmp_core::Model>,
-    given: Given,
+    arguments: Arguments,
     position: Output,
     velocity: Output,
     acceleration: Output,
@@ -115,7 +79,7 @@ impl Controller {
             acceleration: Output::new(py, length)?,
             working: status.getattr("WORKING")?.unbind(),
             finished: status.getattr("FINISHED")?.unbind(),
-            given: Given::default(),
+            arguments: Arguments::default(),
             inner,
             model,
         };
@@ -129,7 +93,7 @@ impl Controller {
         self.acceleration.write(self.inner.acceleration());
     }
 
-    /// A command may hold from the start, and then changes what is shown.
+    /// Publishes the outputs after a command: one before the first tick may change them.
     fn command(&mut self, result: pdmp_core::Result<()>) -> PyResult<()> {
         self.publish();
         result.map_err(raise)
@@ -138,40 +102,51 @@ impl Controller {
 
 #[pymethods]
 impl Controller {
-    /// One tick, perturbed if the robot is measured or terms of one's own are given:
+    /// Advance the movement by one tick.
+    ///
+    /// A measured position and coupling terms perturb the equations::
     ///
     ///     tau y' = z + w(u) + k_t d + tau c_v
     ///     tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
     ///     tau u' = k = 1 / (1 + k_s |d / range|**2)
     ///     tau o' = 5 k (e - o) / extent
     ///
-    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. Of the error e = m - y
-    /// counts d, what lies beyond the error o that is expected by now; extent is T / tau or 2 pi. All is evaluated at
-    /// the start of the tick and held over it; however long it is, y is pulled no further than m. A robot that is held
-    /// fast so holds the movement, all but stops its phase, and, let go, continues from there; one that always lags or
-    /// sags by the same comes no further from the goal than that, and finishes.
+    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
+    /// tracking error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All
+    /// terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
+    /// m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
+    /// there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
+    /// finishes.
     ///
     /// Parameters
     /// ----------
     /// dt : float, optional
-    ///     Length of this tick in s, if it differs from the controller's. A tick of length zero changes nothing.
-    /// measured : array_like (D,), optional
-    ///     Position m at which the robot is, in the unit of each DoF; the error of an angle (rad, deg, °) is taken the
-    ///     short way round. None is no new measurement: the last distance m - y stays in force until the next one or
+    ///     Length of this tick in s; by default that of the controller. A tick of length zero changes nothing.
+    /// measured : array_like, (D,), optional
+    ///     Measured position m in the unit of each degree of freedom. Errors of angles (rad, deg, °) are wrapped to
+    ///     half a turn. None means no new measurement: the last error m - y stays in force until the next one or
     ///     `release`, so that a sensor may be slower than the loop.
-    /// coupling : tuple of two array_like (D,), optional
-    ///     Terms (c_v, c_a), per s and per s²: the velocity gains c_v, and jumps where it does; the acceleration c_a.
+    /// coupling : tuple of two array_like, (D,), optional
+    ///     Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
     ///
     /// Returns
     /// -------
     /// Status
-    ///     `FINISHED` once a discrete movement's time is over and it has settled on its goal.
+    ///     `FINISHED` once the time of a discrete movement is over and it has settled on its goal.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     A tick that is negative or longer than 1000 tau, a wrong length, or a number that is not finite; the
-    ///     state then stays as it was.
+    ///     The tick is negative or longer than 1000 tau, a length is wrong, or a number is not finite. The state then
+    ///     stays as it was.
+    ///
+    /// Examples
+    /// --------
+    /// >>> controller = model.controller(dt=0.01)
+    /// >>> while controller.step():
+    /// ...     command = controller.position
+    /// >>> np.allclose(command, controller.goal, atol=0.01)
+    /// True
     ///
     /// References
     /// ----------
@@ -182,22 +157,23 @@ impl Controller {
     fn step(
         &mut self,
         py: Python<'_>,
-        dt: Option<f64>,
+        dt: Option<Scalar<'_>>,
         measured: Option<&Bound<'_, PyAny>>,
         coupling: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     ) -> PyResult<Py<PyAny>> {
-        let Self { inner, given, .. } = self;
+        let Self { inner, arguments, .. } = self;
+        let dt = optional_number("dt", dt)?;
         if let Some(measured) = measured {
-            refill("measured", measured, &mut given.measured)?;
+            refill("measured", measured, &mut arguments.measured)?;
         }
         if let Some((velocity, acceleration)) = &coupling {
-            refill("coupling velocity", velocity, &mut given.velocity)?;
-            refill("coupling acceleration", acceleration, &mut given.acceleration)?;
+            refill("coupling velocity", velocity, &mut arguments.velocity)?;
+            refill("coupling acceleration", acceleration, &mut arguments.acceleration)?;
         }
-        let terms = Coupling { velocity: &given.velocity, acceleration: &given.acceleration };
+        let terms = Coupling { velocity: &arguments.velocity, acceleration: &arguments.acceleration };
         let command = Command {
             dt,
-            measured: measured.map(|_| given.measured.as_slice()),
+            measured: measured.map(|_| arguments.measured.as_slice()),
             coupling: coupling.map(|_| terms),
             ..Command::default()
         };
@@ -206,19 +182,21 @@ impl Controller {
         Ok(self.status(py))
     }
 
-    /// Start again.
+    /// Restart the movement.
     ///
     /// Parameters
     /// ----------
     /// conditions : Conditions, optional
-    ///     Conditions at the start. One that is not given is that of the nominal demonstration, not a command of before.
-    /// context, **changes
-    ///     As in `Model.rollout`.
+    ///     Conditions at the start. One that is absent is that of the nominal demonstration, not an earlier command.
+    /// context : array_like or list, (Q,), optional
+    ///     Context whose prediction supplies absent conditions.
+    /// **changes
+    ///     Single conditions by name, as in `Model.rollout`.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     Conditions that `Model.rollout` rejects; the movement then continues.
+    ///     Conditions that `Model.rollout` rejects. The movement then continues.
     #[pyo3(
         signature = (conditions=None, *, context=None, **changes),
         text_signature = "($self, conditions=None, *, context=None, **changes)"
@@ -234,31 +212,31 @@ impl Controller {
         self.command(result)
     }
 
-    /// Position y (D,): a read-only view.
+    /// Position y (D,) in the unit of each degree of freedom; a read-only view.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Vector<'py> {
         self.position.view(py)
     }
 
-    /// Velocity (D,) per s: a read-only view.
+    /// Velocity (D,) per s; a read-only view.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Vector<'py> {
         self.velocity.view(py)
     }
 
-    /// Acceleration (D,) per s²: a read-only view.
+    /// Acceleration (D,) per s²; a read-only view.
     #[getter]
     fn acceleration<'py>(&self, py: Python<'py>) -> Vector<'py> {
         self.acceleration.view(py)
     }
 
-    /// Phase: x in (0, 1] where discrete, φ in [0, 2π) where rhythmic.
+    /// Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one.
     #[getter]
     fn phase(&self) -> f64 {
         self.inner.phase()
     }
 
-    /// Whether the movement goes on: what the last `step` returned, or `WORKING` if something was commanded since.
+    /// Result of the last `step`, or `WORKING` after a later command.
     #[getter]
     fn status(&self, py: Python<'_>) -> Py<PyAny> {
         match self.inner.status() {
@@ -279,7 +257,7 @@ impl Controller {
         self.inner.time()
     }
 
-    /// Goal g (D,), discrete: a read-only copy, to be set as a whole.
+    /// Goal g (D,) of a discrete movement; a read-only copy. Assign all values at once.
     #[getter]
     fn goal<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
         self.centre(py, Kind::Discrete, "a rhythmic primitive has no goal; it has an anchor")
@@ -287,12 +265,12 @@ impl Controller {
 
     #[setter]
     fn set_goal(&mut self, goal: &Bound<'_, PyAny>) -> PyResult<()> {
-        refill("goal", goal, &mut self.given.command)?;
-        let result = self.inner.set_goal(&self.given.command);
+        refill("goal", goal, &mut self.arguments.command)?;
+        let result = self.inner.set_goal(&self.arguments.command);
         self.command(result)
     }
 
-    /// Style s (J,): a read-only copy, to be set as a whole.
+    /// Style s (J,); a read-only copy. Assign all values at once.
     #[getter]
     fn style<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
         read_only(py, self.inner.style())
@@ -300,12 +278,12 @@ impl Controller {
 
     #[setter]
     fn set_style(&mut self, style: &Bound<'_, PyAny>) -> PyResult<()> {
-        refill("style", style, &mut self.given.command)?;
-        let result = self.inner.set_style(&self.given.command);
+        refill("style", style, &mut self.arguments.command)?;
+        let result = self.inner.set_style(&self.arguments.command);
         self.command(result)
     }
 
-    /// Anchor y_a (D,), rhythmic: a read-only copy, to be set as a whole.
+    /// Anchor y_a (D,) of a rhythmic movement; a read-only copy. Assign all values at once.
     #[getter]
     fn anchor<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
         self.centre(py, Kind::Rhythmic, "a discrete primitive has no anchor; it has a goal")
@@ -313,61 +291,66 @@ impl Controller {
 
     #[setter]
     fn set_anchor(&mut self, anchor: &Bound<'_, PyAny>) -> PyResult<()> {
-        refill("anchor", anchor, &mut self.given.command)?;
-        let result = self.inner.set_anchor(&self.given.command);
+        refill("anchor", anchor, &mut self.arguments.command)?;
+        let result = self.inner.set_anchor(&self.arguments.command);
         self.command(result)
     }
 
-    /// Time constant in s.
+    /// Time constant τ in s.
     #[getter]
     fn tau(&self) -> f64 {
         self.inner.tau()
     }
 
     #[setter]
-    fn set_tau(&mut self, tau: f64) -> PyResult<()> {
-        let result = self.inner.set_tau(tau);
+    fn set_tau(&mut self, tau: Scalar<'_>) -> PyResult<()> {
+        let result = self.inner.set_tau(tau.number("tau")?);
         self.command(result)
     }
 
-    /// Amplitude r₀, rhythmic; 1 where discrete.
+    /// Amplitude r₀ of a rhythmic movement; 1 of a discrete one.
     #[getter]
     fn amplitude(&self) -> f64 {
         self.inner.amplitude()
     }
 
     #[setter]
-    fn set_amplitude(&mut self, amplitude: f64) -> PyResult<()> {
-        let result = self.inner.set_amplitude(amplitude);
+    fn set_amplitude(&mut self, amplitude: Scalar<'_>) -> PyResult<()> {
+        let result = self.inner.set_amplitude(amplitude.number("amplitude")?);
         self.command(result)
     }
 
-    /// Speed: the share of the rate 1 / tau at which the path is followed. 0 pauses on the path, 1 goes on; a change
-    /// passes the filter of tau, and stays in force over `reset`.
+    /// Speed along the path relative to the rate 1 / tau: 0 pauses on the path, 1 resumes.
+    ///
+    /// A change passes the filter of tau and stays in force after `reset`.
     #[getter]
     fn speed(&self) -> f64 {
         self.inner.speed()
     }
 
     #[setter]
-    fn set_speed(&mut self, speed: f64) -> PyResult<()> {
-        let result = self.inner.set_speed(speed);
+    fn set_speed(&mut self, speed: Scalar<'_>) -> PyResult<()> {
+        let result = self.inner.set_speed(speed.number("speed")?);
         self.command(result)
     }
 
-    /// Gains (k_s, k_t) of a measured position: how much it stops the phase, and pulls per unit of u. 0 is without.
+    /// Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each.
     #[getter]
     fn compliance(&self) -> (f64, f64) {
         self.inner.compliance()
     }
 
     #[setter]
-    fn set_compliance(&mut self, compliance: (f64, f64)) -> PyResult<()> {
-        let (stopping, tracking) = compliance;
+    fn set_compliance(&mut self, compliance: &Bound<'_, PyAny>) -> PyResult<()> {
+        let gains = items("compliance", compliance, number)?;
+        let [stopping, tracking] = gains[..] else {
+            let text = format!("compliance = {}: expected two gains (k_s, k_t)", quoted(compliance));
+            return Err(PyValueError::new_err(text));
+        };
         self.inner.set_compliance(stopping, tracking).map_err(raise)
     }
 
-    /// A controller of its own that goes on bit for bit as this one would; the model is shared.
+    /// Return an independent controller in the same state, with the same model.
     fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
         Self::new(py, Arc::clone(&self.model), self.inner.clone())
     }
@@ -376,7 +359,9 @@ impl Controller {
         self.__copy__(py)
     }
 
-    /// Forget the measured position: no robot follows any more, until the next one is measured.
+    /// Discard the measured position.
+    ///
+    /// The movement is unperturbed until the next measurement.
     fn release(&mut self) {
         self.inner.release();
         self.publish();

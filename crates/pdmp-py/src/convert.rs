@@ -1,4 +1,4 @@
-//! Arrays across the border: anything numpy can turn into float64 comes in, float64 goes out.
+//! Conversion of Python arguments and results: anything that numpy converts to float64 in, float64 out.
 
 use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
 use numpy::{
@@ -14,8 +14,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
 
 use crate::error::{nested, printable, raise};
+use crate::scalar::{Scalar, optional_count};
 
-/// Most items of a list of demonstrations, contexts or names. Lists without an end are refused before memory is.
+/// Largest number of items in a list of demonstrations, contexts or names. An endless iterable is refused before memory
+/// runs out.
 const MAX_ITEMS: usize = 1 << 20;
 
 /// A numpy vector, (n,).
@@ -25,11 +27,10 @@ pub(crate) type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 /// A numpy array of three axes.
 pub(crate) type Cube<'py> = Bound<'py, PyArray3<f64>>;
 
-/// What `__reduce__` returns: a callable, and its arguments.
+/// Result of `__reduce__`: a callable and its arguments.
 pub(crate) type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyTuple>);
 
-/// The items of a list or any other iterable, each converted as it comes: a length that the iterable reports is not
-/// relied on.
+/// Converts the items of an iterable one by one. The length that the iterable reports is not used.
 pub(crate) fn items<'py, T>(
     name: &str,
     value: &Bound<'py, PyAny>,
@@ -49,21 +50,30 @@ pub(crate) fn items<'py, T>(
     Ok(converted)
 }
 
-/// A list of texts.
+/// Converts a list of texts.
 pub(crate) fn texts(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
     items(name, value, |name, item| {
-        item.extract().map_err(|_| PyTypeError::new_err(format!("{name} = {}: expected a text", shown(item))))
+        item.extract().map_err(|_| PyTypeError::new_err(format!("{name} = {}: expected a text", quoted(item))))
     })
 }
 
-/// A value as Python writes it.
-fn shown(value: &Bound<'_, PyAny>) -> String {
-    value.repr().map_or_else(|_| "it".to_string(), |repr| printable(&repr.to_string()))
+/// Largest number of characters of a value in an error text.
+const MAX_QUOTED: usize = 60;
+
+/// Returns the repr of a value, escaped and at most [`MAX_QUOTED`] characters long, for an error text.
+pub(crate) fn quoted(value: &Bound<'_, PyAny>) -> String {
+    let kind = || value.get_type().name().map_or_else(|_| "a value".to_string(), |name| format!("<{name}>"));
+    let text = value.repr().map_or_else(|_| kind(), |repr| printable(&repr.to_string()));
+    if text.chars().count() <= MAX_QUOTED {
+        text
+    } else {
+        text.chars().take(MAX_QUOTED - 3).chain("...".chars()).collect()
+    }
 }
 
-/// An array of any dimension, without a copy where it comes as doubles.
+/// Converts to an array of any dimension, without a copy if it already holds doubles.
 fn doubles<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDyn<'py, f64, AllowTypeChange>> {
-    // What comes as doubles is read without a call to Python.
+    // An array of doubles is read without a call into Python.
     if value.is_exact_instance_of::<PyArrayDyn<f64>>() {
         return converted(name, value);
     }
@@ -86,7 +96,7 @@ fn converted<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLike
     if is_masked(value)? {
         return wrong(MASKED);
     }
-    // Fields of packed records: a view in Rust steps by whole numbers.
+    // A field of a packed record may be unaligned, which a view in Rust must not be.
     if !array.is_aligned() {
         return converted(name, &value.call_method0("copy")?);
     }
@@ -95,7 +105,7 @@ fn converted<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyArrayLike
 
 const MASKED: &str = "has masked values: fill them, or cut them out";
 
-/// The numpy array of a list, or of any object that knows how to become one.
+/// Returns the numpy array of a list or of any object that converts to one.
 pub(crate) fn plain<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = value.py();
     check_items(name, value, 0)?;
@@ -111,8 +121,8 @@ fn not_numbers(name: &str, py: Python<'_>, error: PyErr) -> PyErr {
     PyValueError::new_err(format!("{name} is not an array of numbers: {}", printable(&error.value(py).to_string())))
 }
 
-/// Checks that `float` finds a real number, and does not read one out of a text.
-fn check_real(name: &str, item: &Bound<'_, PyAny>) -> PyResult<()> {
+/// Checks that an object holds a real number. `float` would also parse a text.
+pub(crate) fn check_real(name: &str, item: &Bound<'_, PyAny>) -> PyResult<()> {
     if item.is_instance_of::<PyFloat>() || item.is_instance_of::<PyInt>() || item.is_none() {
         return Ok(());
     }
@@ -129,8 +139,8 @@ fn check_real(name: &str, item: &Bound<'_, PyAny>) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{name} {reason}")))
 }
 
-/// Whether a mask of numpy hides something.
-fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+/// Returns whether a masked array of numpy hides an element.
+pub(crate) fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
     if !value.is_instance_of::<PyUntypedArray>() || value.is_exact_instance_of::<PyUntypedArray>() {
         return Ok(false);
     }
@@ -138,10 +148,10 @@ fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
         && value.getattr("mask")?.call_method0("any")?.is_truthy()?)
 }
 
-/// Deepest list that is searched: numpy has no more axes.
+/// Depth to which nested lists are searched: numpy arrays have at most 64 axes.
 const MAX_DEPTH: usize = 64;
 
-/// Refuses what numpy would take for numbers: in lists, values behind masks and bytes that can be written.
+/// Rejects values in lists that numpy would convert silently: masked ones and bytearrays.
 fn check_items(name: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
     let wrong = |reason: &str| Err(PyValueError::new_err(format!("{name} {reason}")));
     if value.is_instance_of::<PyByteArray>() {
@@ -161,12 +171,12 @@ fn check_items(name: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<(
     Ok(())
 }
 
-/// An array of any dimension.
+/// Converts to an array of any dimension.
 pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64>> {
     Ok(doubles(name, value)?.as_array().to_owned())
 }
 
-/// Positions, whose axes are time and degree of freedom.
+/// Returns positions (T, D).
 pub(crate) fn two_axes(name: &str, array: ArrayD<f64>) -> PyResult<Array2<f64>> {
     let shape = array.shape().to_vec();
     array
@@ -174,9 +184,9 @@ pub(crate) fn two_axes(name: &str, array: ArrayD<f64>) -> PyResult<Array2<f64>> 
         .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes (T, D)")))
 }
 
-/// A vector, (n,).
+/// Converts to a vector (n,).
 pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    // Commands of a loop, mostly.
+    // The usual form of a command in a control loop.
     if let Ok(list) = value.cast_exact::<PyList>()
         && list.iter().all(|item| item.is_exact_instance_of::<PyFloat>())
     {
@@ -190,22 +200,12 @@ pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>>
     Ok(vector.to_vec())
 }
 
-/// Returns one number: a float, or anything that Python or numpy turns into one.
-pub(crate) fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    let single = value.getattr("ndim").is_ok_and(|axes| axes.eq(0).unwrap_or(false));
-    let value = if single { &value.call_method0("item")? } else { value };
-    value.extract().map_err(|_| {
-        let found = value.repr().map_or_else(|_| "a value without repr".to_string(), |text| text.to_string());
-        let found: String = found.chars().take(60).collect();
-        PyValueError::new_err(format!("{name} = {found}: expected one number"))
-    })
-}
-
-/// A vector into a buffer that is kept, without allocation if it comes as an array of doubles.
+/// Copies a vector into a buffer, without allocation if it is an array of doubles and the buffer is large enough.
 #[allow(unsafe_code)]
 pub(crate) fn refill(name: &str, value: &Bound<'_, PyAny>, buffer: &mut Vec<f64>) -> PyResult<()> {
     let doubles = value.cast::<PyArray1<f64>>().ok();
-    // SAFETY: the elements are copied at once, and no Python code runs meanwhile.
+    // SAFETY: the slice is copied before this thread calls into Python or releases the interpreter, so that no other
+    // Python code writes to the array while it is borrowed.
     match doubles.map(|array| unsafe { array.as_slice() }) {
         Some(Ok(values)) => {
             buffer.clear();
@@ -216,12 +216,12 @@ pub(crate) fn refill(name: &str, value: &Bound<'_, PyAny>, buffer: &mut Vec<f64>
     Ok(())
 }
 
-/// A vector that may be missing.
+/// Converts a vector that may be absent.
 pub(crate) fn optional(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
     value.map(|value| vector(name, value)).transpose()
 }
 
-/// A context (Q,) of numbers and labels.
+/// Converts a context (Q,) of numbers and labels.
 pub(crate) fn context(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<ContextValue>> {
     if value.is_instance_of::<PyString>() || value.is_instance_of::<PyBytes>() {
         return Err(PyTypeError::new_err(format!("{name} is a single text: put it into a list, one value per column")));
@@ -233,7 +233,7 @@ pub(crate) fn context(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Cont
     items(name, value, context_value)
 }
 
-/// An array in place of a data frame, which would go through its columns; lists and arrays as they are.
+/// Returns the array of a data frame, which would iterate over its columns; lists and arrays unchanged.
 fn rows_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     if is_masked(value)? {
         return Err(PyValueError::new_err(format!("{name} {MASKED}")));
@@ -249,13 +249,13 @@ fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue>
         return Ok(ContextValue::Label(label));
     }
     check_real(name, value)?;
-    value.extract().map(ContextValue::Number).map_err(|_| {
-        let shown = shown(value);
-        PyTypeError::new_err(format!("{name} = {shown}: expected a number or a text"))
-    })
+    value
+        .extract()
+        .map(ContextValue::Number)
+        .map_err(|_| PyTypeError::new_err(format!("{name} = {}: expected a number or a text", quoted(value))))
 }
 
-/// Contexts (M, Q) of numbers and labels.
+/// Converts contexts (M, Q) of numbers and labels.
 pub(crate) fn contexts(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
     let value = &rows_of("contexts", value)?;
     if let Ok(shape) = value.getattr("shape")
@@ -271,17 +271,17 @@ pub(crate) fn contexts(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValu
     }
     items("contexts", value, |name, row| {
         if row.is_instance_of::<PyString>() || row.try_iter().is_err() {
-            let shown = shown(row);
             return Err(PyValueError::new_err(format!(
-                "{name} = {shown}: expected two axes (M, Q): put the values of each demonstration into a list"
+                "{name} = {}: expected two axes (M, Q): put the values of each demonstration into a list",
+                quoted(row)
             )));
         }
         context(name, row)
     })
 }
 
-/// A context as numpy has it where all are numbers, or as a list with its labels.
-pub(crate) fn shown_context<'py>(py: Python<'py>, context: &[ContextValue]) -> PyResult<Bound<'py, PyAny>> {
+/// Returns a context as an array if all values are numbers, or as a list of numbers and labels.
+pub(crate) fn context_to_python<'py>(py: Python<'py>, context: &[ContextValue]) -> PyResult<Bound<'py, PyAny>> {
     let numbers: Option<Vec<f64>> = context
         .iter()
         .map(|value| if let ContextValue::Number(number) = value { Some(*number) } else { None })
@@ -296,7 +296,7 @@ pub(crate) fn shown_context<'py>(py: Python<'py>, context: &[ContextValue]) -> P
     Ok(PyList::new(py, values.collect::<PyResult<Vec<_>>>()?)?.into_any())
 }
 
-/// One number, or a vector.
+/// Converts one number or a vector; empty if absent.
 pub(crate) fn numbers(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
     let Some(value) = value else { return Ok(Vec::new()) };
     let array = array(name, value)?;
@@ -307,9 +307,9 @@ pub(crate) fn numbers(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<
     Ok(array.iter().copied().collect())
 }
 
-/// A matrix with the named axes.
+/// Converts to a matrix with the named axes.
 pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
-    // Copied: other threads may write to the caller's memory while a long call reads.
+    // Copied: other threads may write to the caller's memory during a long call.
     let array = array(name, value)?;
     let shape = array.shape().to_vec();
     array
@@ -317,7 +317,7 @@ pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResu
         .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
 }
 
-/// A float64 array of this shape that can be written.
+/// Checks that an output is a writable float64 array of the given shape.
 pub(crate) fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Cube<'py>> {
     let wrong = |reason: String| PyValueError::new_err(format!("out: {reason}; expected float64 arrays {shape:?}"));
     let array = out.cast::<PyArray3<f64>>().map_err(|error| wrong(error.to_string()))?;
@@ -334,7 +334,8 @@ pub(crate) fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResul
     Ok(array.clone())
 }
 
-/// Whether elements of an array may share memory: sorted by stride, each axis must step over the whole of the last.
+/// Returns whether elements of an array may share memory: in order of their strides, each axis must step over the
+/// extent of the one before.
 fn overlaps(shape: &[usize], strides: &[isize]) -> bool {
     if shape.contains(&0) {
         return false;
@@ -354,25 +355,19 @@ fn overlaps(shape: &[usize], strides: &[isize]) -> bool {
     })
 }
 
-/// A new numpy vector that cannot be written to: assigning to an element would change nothing else.
+/// Returns a new read-only numpy vector: assignment to an element would not reach the controller.
 pub(crate) fn read_only<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Vector<'py>> {
     let vector = to_numpy(py, values);
     vector.call_method(intern!(py, "setflags"), (false,), None)?;
     Ok(vector)
 }
 
-/// A new numpy vector.
+/// Returns a new numpy vector.
 pub(crate) fn to_numpy<'py>(py: Python<'py>, values: &[f64]) -> Vector<'py> {
     Array1::from_vec(values.to_vec()).into_pyarray(py)
 }
 
-/// A count, which cannot be negative.
-pub(crate) fn count(name: &str, value: isize) -> PyResult<usize> {
-    usize::try_from(value).map_err(|_| PyValueError::new_err(format!("{name} = {value}: must not be negative")))
-}
-
-/// A number of threads; without one, as many as the system has.
-pub(crate) fn threads(value: Option<isize>) -> PyResult<Threads> {
-    let Some(value) = value else { return Ok(Threads::available()) };
-    Threads::new(count("threads", value)?).map_err(raise)
+/// Converts a number of threads; all that the system offers if absent.
+pub(crate) fn threads(value: Option<Scalar<'_>>) -> PyResult<Threads> {
+    optional_count("threads", value)?.map_or_else(|| Ok(Threads::available()), |n| Threads::new(n).map_err(raise))
 }

@@ -1,4 +1,4 @@
-//! How errors of the core appear in Python.
+//! Python exceptions for errors of the core, and long calls that can be interrupted.
 
 use std::cell::Cell;
 use std::path::Path;
@@ -11,13 +11,14 @@ use pyo3::exceptions::{
 };
 use pyo3::prelude::*;
 
-create_exception!(pdmp, PdmpError, PyException, "Base of the errors that are not about an argument.");
-create_exception!(pdmp, FitError, PdmpError, "Learning did not succeed on well-formed demonstrations.");
-create_exception!(pdmp, ModelFileError, PdmpError, "A model file that is damaged, foreign or of another version.");
+create_exception!(pdmp, PdmpError, PyException, "Base class of the errors that do not concern an argument.");
+create_exception!(pdmp, FitError, PdmpError, "Numerical failure of a fit to well-formed demonstrations.");
+create_exception!(pdmp, ModelFileError, PdmpError, "Model file that is damaged, not a model, or of another version.");
 
-/// The Python exception of a core error: `ValueError` for arguments, `OSError` for the system, ours for the rest.
+/// Returns the Python exception of a core error: `ValueError` for arguments and data, `OSError` for the system, and the
+/// module's own for fits and model files.
 pub(crate) fn raise(error: Error) -> PyErr {
-    let text = printable(&error.to_string());
+    let text = printable(&format!("{error}{}", hint(&error)));
     match error.kind() {
         ErrorKind::Argument | ErrorKind::Data => PyValueError::new_err(text),
         ErrorKind::Numerical => FitError::new_err(text),
@@ -31,42 +32,51 @@ pub(crate) fn raise(error: Error) -> PyErr {
     }
 }
 
+/// Returns the name of the Python argument that remedies an error, where the text of the core cannot name it.
+fn hint(error: &Error) -> &'static str {
+    match error {
+        Error::Demo { source, .. } => hint(source),
+        Error::Aperiodic { .. } => " (onsets=)",
+        _ => "",
+    }
+}
+
 fn system_error(path: &Path, source: &std::io::Error) -> PyErr {
     let (reason, path) = (source.to_string(), path.display().to_string());
     match (source.raw_os_error(), source.kind()) {
-        // With an errno Python chooses the subclass.
+        // Python chooses the subclass by the errno.
         (Some(errno), _) => PyOSError::new_err((errno, reason, path)),
         (None, std::io::ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, "No such file or directory", path)),
         (None, std::io::ErrorKind::PermissionDenied) => PyPermissionError::new_err((13, "Permission denied", path)),
-        // A path that never reached the system: EINVAL.
+        // EINVAL: the path is invalid before any system call.
         (None, _) => PyOSError::new_err((22, reason, path)),
     }
 }
 
-/// A text whose control characters are escaped, line breaks and reversed directions of writing among them: names and
-/// labels come from files, and texts end up on terminals.
+/// Escapes control characters, among them line breaks and marks of the writing direction: names and labels come from
+/// files and are printed on terminals.
 pub(crate) fn printable(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
+    let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
-            ' '..='~' => shown.push(c),
-            // After a letter, combining accents stay as they are.
-            _ => shown.extend(format!("a{c}").escape_debug().skip(1)),
+            ' '..='~' => escaped.push(c),
+            // `escape_debug` keeps a combining accent only after a letter.
+            _ => escaped.extend(format!("a{c}").escape_debug().skip(1)),
         }
     }
-    shown
+    escaped
 }
 
-/// A printable text that any console can write.
+/// Escapes a text to printable ASCII, which every console can write.
 pub(crate) fn ascii(text: &str) -> String {
     let plain = printable(&text.replace('é', "e"));
     plain.chars().flat_map(|c| if c.is_ascii() { vec![c] } else { c.escape_unicode().collect() }).collect()
 }
 
-/// Most calls within calls: each takes stack of its own, of which Python's limit of recursion knows nothing.
+/// Largest depth of calls within calls. Each uses native stack, which Python's recursion limit does not count.
 const MAX_NESTED: usize = 16;
 
-/// Runs a call that may call back into Python, and from there into this library again.
+/// Runs a call that may call back into Python, and from there into this library.
 pub(crate) fn nested<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     thread_local!(static DEPTH: Cell<usize> = const { Cell::new(0) });
     struct Level;
@@ -76,7 +86,7 @@ pub(crate) fn nested<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
         }
     }
     if DEPTH.get() >= MAX_NESTED {
-        let message = "a callback, or the __array__ of an argument, calls the function that called it, again and again";
+        let message = "a callback or the __array__ of an argument calls the function that called it, without end";
         return Err(PyRecursionError::new_err(message));
     }
     DEPTH.set(DEPTH.get() + 1);
@@ -84,8 +94,8 @@ pub(crate) fn nested<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     call()
 }
 
-/// Runs a long call without holding the interpreter. The call is handed a question whether to go on, which tells
-/// `progress` the share that is done, and whose answer is no after Ctrl-C or an exception of `progress`.
+/// Runs a long call with the interpreter released. The call reports its stage and completed fraction to a function,
+/// which passes them to `progress` and returns [`Error::Interrupted`] after Ctrl-C or an exception of `progress`.
 pub(crate) fn detached<S, T: Send>(
     py: Python<'_>,
     progress: impl Fn(Python<'_>, S, f64) -> PyResult<()> + Sync,
@@ -105,7 +115,7 @@ pub(crate) fn detached<S, T: Send>(
     })
 }
 
-/// [`detached`] for a call whose progress nobody follows.
+/// Runs a long call as [`detached`] does, without reports of progress.
 pub(crate) fn interruptible<T: Send>(
     py: Python<'_>,
     call: impl FnOnce(&mut dyn FnMut(f64) -> Result<(), Error>) -> Result<T, Error> + Send,

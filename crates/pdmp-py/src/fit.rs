@@ -1,4 +1,4 @@
-//! Learning, called from Python.
+//! Fits, and the conversion of their options.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -15,86 +15,93 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyList, PyMapping};
 
-use crate::basis::{Gp, NGnet};
-use crate::convert::{count, items, matrix, numbers};
-use crate::demo::{Demonstration, Source, Trajectory};
+use crate::convert::{items, matrix, numbers, quoted};
+use crate::demonstration::{Demonstration, Source, Trajectory};
 use crate::error::{detached, raise};
 use crate::model::Model;
+use crate::regression::{Gp, NGnet};
+use crate::scalar::{Scalar, optional_count, optional_number};
 use crate::warp::TimeWarp;
 
-/// Learn one movement primitive from several demonstrations.
+/// Fit a movement primitive to demonstrations.
 ///
-/// The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets
-/// f = τẏ − z exactly, factorise F ≈ S·F_basis (Eq. 7), and regress the landscape on the phase.
+/// The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets f = τẏ − z exactly,
+/// factorise them, F ≈ S·F_basis (Eq. 7), and regress the attractor landscape on the phase.
 ///
 /// Parameters
 /// ----------
-/// demos : sequence or mapping of Demonstration, of Trajectory or of (T, D) array_like, or (M, T, D) array_like
-///     Demonstrations of one skill; if rhythmic, each is one cycle without its end point. Of a mapping, such as the
-///     readers return, the values count. Data frames name their degrees of freedom by their columns.
+/// demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D)
+///     Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
+///     readers return, the values are used. The columns of data frames name the degrees of freedom.
 /// kind : {"discrete", "rhythmic"}
-///     From a start to a goal, or around an anchor.
+///     Movement from a start to a goal, or around an anchor.
 /// dt : float, optional
-///     Sampling interval in s of the demonstrations that carry none.
-/// period : float or (M,) array_like, optional
+///     Sampling interval in s of demonstrations without one.
+/// period : float or array_like, (M,), optional
 ///     Periods in s of time-stamped cycles.
-/// contexts : (M, Q) array_like, or M lists of Q numbers and labels, optional
-///     The condition of each demonstration; otherwise those that they carry.
+/// contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
+///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
 /// map : {"auto", "stacked", "gp", "linear", "polynomial"}
-///     Map from contexts to movements: a Gaussian process and a penalised line, weighted by their errors at contexts
-///     left out, outside of the contexts of the demonstrations together with the mean ("stacked"); the process alone;
-///     least squares as in the paper; or ridge regression on polynomials of second degree. "auto" is "stacked", and
-///     "linear" for labels alone, which get the mean of their demonstrations each, for two different contexts and for
-///     more than 1024. The repr of `model.map` has the weights.
+///     Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
+///     regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
+///     process alone, "linear" least squares as in the paper, "polynomial" ridge regression of second degree. "auto" is
+///     "stacked"; it is "linear" for labels alone, each of which then has the mean of its demonstrations, for two
+///     different contexts and for more than 1024. The repr of `model.map` states the weights.
 /// n_styles : int or "auto", optional
 ///     Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular
-///     values, at least five (or half of the demonstrations) and as many as the contexts explain (F-test), but none
-///     that measurement noise alone would give (parallel analysis). "auto" is cross-validation over contexts by the
-///     one-standard-error rule, in at most ten folds.
+///     values, at least five (or half of the demonstrations) and those that the contexts explain (F-test), without
+///     those that measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to
+///     the error of cross-validation over contexts, in at most ten folds.
 /// singular_value_share : float, optional
-///     The paper's rule instead: the fewest singular values whose sum exceeds this share of the sum of all, such as 0.9.
+///     Share in (0, 1], the paper's rule: J is the smallest number of singular values whose sum exceeds this share of
+///     the sum of all, for example 0.9.
 /// basis : {"gp", "ngnet"}, GP or NGnet
-///     Function approximator of the landscape.
+///     Regression of the landscape.
 /// smoothing : "auto", float or None
-///     Smooth each degree of freedom by generalised cross-validation over all demonstrations, which leaves clean ones as
-///     they are; or with this cut-off in Hz; or interpolate every sample. `model.noise` and `model.cut_offs` hold what
-///     was found.
+///     Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom,
+///     which leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
+///     `model.noise` and `model.cut_offs` hold the result.
 /// nominal : int, optional
-///     Index of the nominal demonstration; otherwise the one of median duration.
+///     Index of the nominal demonstration; by default the one of median duration.
 /// n_samples : int, optional
-///     Samples C after alignment; otherwise as many as the nominal demonstration has, and more where these are fewer
-///     than 150.
-/// transport : {"learnt", "immediate"}
-///     How the way from start to goal is spread over a discrete movement: along the profile by which the demonstrations
-///     cover theirs (:meth:`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path.
-///     Past its end a movement brakes (:attr:`Model.braking`), or its forcing fades with the phase as in the paper.
-/// dof_scale : None, "unit", "range" or (D,) array_like
-///     Unit of each degree of freedom in the factorisation. By default as recorded ("unit") where all units are equal or
-///     unknown; otherwise the degrees of freedom of each unit are scaled together by the largest range among them.
-///     "range" scales each by its own range. If given as numbers, in a warp of time too.
+///     Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
+///     that has fewer than 150.
+/// transport : {"learnt", "immediate"}, optional
+///     Motion of the frame of a discrete movement from start to goal: by default along the learnt profile of the
+///     demonstrations (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past
+///     its end the movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as
+///     in the paper.
+/// dof_scale : None, "unit", "range" or array_like, (D,)
+///     Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
+///     units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
+///     them. "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and
+///     also apply to a time warp.
 /// alignment : {"linear", "warp"} or TimeWarp
-///     How time is scaled to that of the nominal demonstration: linearly, or by the monotone warp that brings the
-///     demonstrations closest to each other, where they pause or hurry in different places. A `TimeWarp` is applied as given;
-///     "warp" has eight segments, fewer where a demonstration has fewer than 16 samples, and with at least three
-///     different contexts is applied only if it lowers the error at contexts held out by more than its standard error;
-///     `model.segment_durations` has one column where it is not.
-/// events : (M, E) array_like, optional
-///     Times in s of E landmarks in each demonstration, from its first sample or of its time stamps, in place of a
-///     warp: all are aligned to those of the nominal demonstration.
+///     Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the
+///     demonstrations closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a
+///     demonstration has fewer than 16 samples; with three or more different contexts it is applied only if it lowers
+///     the cross-validation error over contexts by more than its standard error, and `model.segment_durations` has one
+///     column if it is not.
+/// landmarks : array_like, (M, E), optional
+///     Times in s of E landmarks in each demonstration, from its first sample or on the clock of its time stamps. They
+///     are aligned to those of the nominal demonstration, in place of a warp.
 /// tau : float, optional
-///     Time constant in s, discrete; otherwise the nominal duration.
-/// alpha_z, beta_z : float
-///     Constants of the output system; `beta_z` is `alpha_z / 4` (critical damping) unless given.
+///     Time constant τ in s of a discrete primitive; by default the nominal duration.
+/// alpha_z : float
+///     Rate α_z of the output system, from 1e-6 to 1e6, without unit.
+/// beta_z : float, optional
+///     Stiffness β_z of the output system, from 1e-6 to 1e6, without unit; by default `alpha_z / 4` (critical damping).
 /// alpha_x : float, optional
-///     Constant of the discrete canonical system; otherwise x = 0.01 at the end. Where transport is immediate the
-///     forcing fades with x past the end of the demonstrations: if a movement drifts off its goal there before it
-///     settles, `alpha_x = alpha_z` keeps it closest.
-/// mu : float
-///     Constant of the rhythmic canonical system.
+///     Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With
+///     "immediate" transport the forcing fades with x past the end: if a movement leaves its goal there before it
+///     settles, `alpha_x = alpha_z` reduces the deviation most.
+/// mu : float, optional
+///     Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit; 1 by default.
 /// threads : int, optional
-///     How many threads may work on it; otherwise as many as the system allows. The model does not depend on it.
+///     Largest number of threads; by default all that the system offers. The model does not depend on it.
 /// progress : callable, optional
-///     Called with the stage and the share of it that is done; an exception it raises ends the fit.
+///     Called as `progress(stage, fraction)` with the name of a stage and its completed fraction. An exception that it
+///     raises cancels the fit.
 ///
 /// Returns
 /// -------
@@ -103,86 +110,104 @@ use crate::warp::TimeWarp;
 /// Warns
 /// -----
 /// UserWarning
-///     Samples that no movement makes, with their place: time stamps far closer than the others, dropouts written as
-///     zeros, padding, counters and time stamps among the columns, wrapped angles, angles of different demonstrations
-///     whole turns apart (taken off where units say that they are angles), and an `alpha_z` too high for the samples.
+///     Implausible samples, with their positions: time stamps much closer than the others, dropouts recorded as zeros,
+///     padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole
+///     turns apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Demonstrations or options that do not fit together.
+///     Demonstrations or options are invalid or do not fit together.
 /// FitError
-///     Well-formed demonstrations from which nothing could be learnt.
+///     The numerical problem of well-formed demonstrations has no solution.
+/// MemoryError
+///     The targets do not fit into memory.
 ///
 /// References
 /// ----------
 /// Matsubara, Hyon, Morimoto, Neural Networks 24 (2011), https://doi.org/10.1016/j.neunet.2011.02.004
+///
+/// Examples
+/// --------
+/// >>> s = np.linspace(0.0, 1.0, 61)
+/// >>> reach = s**3 * (10 - 15 * s + 6 * s**2)
+/// >>> demos = [np.column_stack([reach, height * np.sin(np.pi * s) ** 2]) for height in (0.1, 0.2, 0.3)]
+/// >>> fitted = pdmp.fit(demos, dt=0.02, contexts=[[0.1], [0.2], [0.3]], n_styles=1)
+/// >>> fitted.n_demos, fitted.n_dofs, fitted.n_styles
+/// (3, 2, 1)
 #[pyfunction]
-#[pyo3(signature = (
-    demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, singular_value_share=None, basis=None,
-    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, transport=None, dof_scale=None,
-    alignment=None, events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=None, threads=None, progress=None
-), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, singular_value_share=None, \
-    basis='gp', smoothing='auto', nominal=None, n_samples=None, transport=None, dof_scale=None, \
-    alignment='linear', events=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=None, threads=None, progress=None)")]
+#[pyo3(
+    signature = (
+        demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None,
+        singular_value_share=None, basis=None, smoothing=SmoothingArgument(Smoothing::Auto), nominal=None,
+        n_samples=None, transport=None, dof_scale=None, alignment=None, landmarks=None, tau=None,
+        alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None, mu=None, threads=None, progress=None
+    ),
+    text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, \
+                      singular_value_share=None, basis='gp', smoothing='auto', nominal=None, n_samples=None, \
+                      transport=None, dof_scale=None, alignment='linear', landmarks=None, tau=None, alpha_z=25.0, \
+                      beta_z=None, alpha_x=None, mu=None, threads=None, progress=None)"
+)]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
     demos: &Bound<'_, PyAny>,
     kind: &str,
-    dt: Option<f64>,
+    dt: Option<Scalar<'_>>,
     period: Option<&Bound<'_, PyAny>>,
     contexts: Option<&Bound<'_, PyAny>>,
     map: &str,
     n_styles: Option<&Bound<'_, PyAny>>,
-    singular_value_share: Option<f64>,
+    singular_value_share: Option<Scalar<'_>>,
     basis: Option<&Bound<'_, PyAny>>,
     smoothing: SmoothingArgument,
-    nominal: Option<isize>,
-    n_samples: Option<isize>,
+    nominal: Option<Scalar<'_>>,
+    n_samples: Option<Scalar<'_>>,
     transport: Option<&str>,
     dof_scale: Option<&Bound<'_, PyAny>>,
     alignment: Option<&Bound<'_, PyAny>>,
-    events: Option<&Bound<'_, PyAny>>,
-    tau: Option<f64>,
-    alpha_z: f64,
-    beta_z: Option<f64>,
-    alpha_x: Option<f64>,
-    mu: Option<f64>,
-    threads: Option<isize>,
+    landmarks: Option<&Bound<'_, PyAny>>,
+    tau: Option<Scalar<'_>>,
+    alpha_z: Scalar<'_>,
+    beta_z: Option<Scalar<'_>>,
+    alpha_x: Option<Scalar<'_>>,
+    mu: Option<Scalar<'_>>,
+    threads: Option<Scalar<'_>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
     let demos = demonstrations("demos", demos)?;
-    let canonical = canonical_of(kind_of(kind)?, (tau, alpha_x, transport), (mu, period))?;
-    let mut options = FitOptions::new(canonical);
-    options.dt = dt;
+    let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
+    let rhythmic = (optional_number("mu", mu)?, period);
+    let mut options = FitOptions::new(canonical_of(kind_of(kind)?, discrete, rhythmic)?);
+    options.dt = optional_number("dt", dt)?;
     options.smoothing = smoothing.0;
-    options.nominal = nominal.map(|n| count("nominal", n)).transpose()?;
-    options.n_samples = n_samples.map(|n| count("n_samples", n)).transpose()?;
-    options.time_scaling = time_scaling_of(alignment, events)?;
+    options.nominal = optional_count("nominal", nominal)?;
+    options.n_samples = optional_count("n_samples", n_samples)?;
+    options.time_scaling = time_scaling_of(alignment, landmarks)?;
     options.contexts = contexts.map(crate::convert::contexts).transpose()?;
     options.map = map_of(map)?;
-    options.n_styles = style_choice(n_styles, singular_value_share)?;
+    options.n_styles = n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?;
     options.basis = basis_of(basis)?;
     options.dof_scale = dof_scale_of(dof_scale)?;
-    (options.alpha_z, options.beta_z) = (alpha_z, beta_z);
+    options.alpha_z = alpha_z.number("alpha_z")?;
+    options.beta_z = optional_number("beta_z", beta_z)?;
     options.threads = crate::convert::threads(threads)?;
-    let show = |py: Python<'_>, stage: Stage, share| match &progress {
-        Some(progress) => progress.call1(py, (stage.name(), share)).map(drop),
+    let report = |py: Python<'_>, stage: Stage, fraction| match &progress {
+        Some(progress) => progress.call1(py, (stage.name(), fraction)).map(drop),
         None => Ok(()),
     };
-    let model = detached(py, show, |progress| fit_with(&demos, &options, progress))?;
+    let model = detached(py, report, |progress| fit_with(&demos, &options, progress))?;
     crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
 }
 
-/// Returns the canonical system, and rejects arguments of the other kind.
+/// Returns the options of the canonical system. Rejects arguments of the other kind.
 fn canonical_of(
     kind: Kind,
     (tau, alpha_x, transport): (Option<f64>, Option<f64>, Option<&str>),
     (mu, period): (Option<f64>, Option<&Bound<'_, PyAny>>),
 ) -> PyResult<CanonicalOptions> {
-    let reject = |name, given: bool| match given {
+    let reject = |name, is_present: bool| match is_present {
         true => Err(raise(pdmp_core::Error::Kind { name, kind, instead: ": leave it out" })),
         false => Ok(()),
     };
@@ -201,33 +226,21 @@ fn canonical_of(
     }
 }
 
-fn style_choice(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {
+fn n_styles_of(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {
     let Some(n_styles) = n_styles else {
         return Ok(singular_value_share.map_or(NStyles::AboveNoise, |share| Truncation::Share(share).into()));
     };
     if singular_value_share.is_some() {
         return Err(PyValueError::new_err("n_styles and singular_value_share: pass one of them"));
     }
-    if let Ok(name) = n_styles.extract::<String>() {
-        let wanted = "must be a number, \"auto\" or None";
-        return if name == "auto" {
-            Ok(NStyles::CrossValidated)
-        } else {
-            Err(PyValueError::new_err(format!("n_styles = {name:?}: {wanted}")))
-        };
-    }
-    count("n_styles", n_styles.extract()?).map(|n_styles| Truncation::Rank(n_styles).into())
-}
-
-/// J as given, or from a share of the spectrum.
-pub(crate) fn style_count(n_styles: Option<isize>, singular_value_share: f64) -> PyResult<Truncation> {
-    match n_styles {
-        Some(n_styles) => count("n_styles", n_styles).map(Truncation::Rank),
-        None => Ok(Truncation::Share(singular_value_share)),
+    match n_styles.extract::<String>().as_deref() {
+        Ok("auto") => Ok(NStyles::CrossValidated),
+        Ok(name) => Err(PyValueError::new_err(format!("n_styles = {name:?}: must be a number, \"auto\" or None"))),
+        Err(_) => Ok(Truncation::Rank(Scalar::Object(n_styles.clone()).count("n_styles")?).into()),
     }
 }
 
-/// Demonstrations from a list of them or of arrays, a mapping of names to them, or a stack of arrays.
+/// Converts a list of demonstrations or arrays, a mapping with such values, or an array (M, T, D).
 pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResult<Vec<pdmp_core::Demonstration>> {
     if demos.is_instance_of::<Demonstration>() || demos.is_instance_of::<Trajectory>() {
         return Err(PyValueError::new_err(format!("{argument} is a single demonstration: put it into a list")));
@@ -236,8 +249,8 @@ pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResu
     if demos.hasattr("ndim")? {
         let shape: Vec<usize> = demos.getattr("shape")?.extract()?;
         if shape.len() != 3 {
-            let wanted = "expected (M, T, D): put a single (T, D) array into a list";
-            return Err(PyValueError::new_err(format!("{argument} has shape {shape:?}, {wanted}")));
+            let expected = "expected (M, T, D): put a single (T, D) array into a list";
+            return Err(PyValueError::new_err(format!("{argument} has shape {shape:?}, {expected}")));
         }
     }
     if demos.try_iter().is_err() {
@@ -264,9 +277,9 @@ pub(crate) fn map_of(map: &str) -> PyResult<MapSelection> {
     if map == "auto" {
         return Ok(MapSelection::Auto);
     }
-    let found = ContextMapKind::ALL.into_iter().find(|kind| kind.name() == map);
-    let wanted = "must be \"auto\", \"stacked\", \"gp\", \"linear\" or \"polynomial\"";
-    found.map(MapSelection::Given).ok_or_else(|| PyValueError::new_err(format!("map = {map:?}: {wanted}")))
+    let kind = ContextMapKind::ALL.into_iter().find(|kind| kind.name() == map);
+    let allowed = "must be \"auto\", \"stacked\", \"gp\", \"linear\" or \"polynomial\"";
+    kind.map(MapSelection::Given).ok_or_else(|| PyValueError::new_err(format!("map = {map:?}: {allowed}")))
 }
 
 pub(crate) fn kind_of(kind: &str) -> PyResult<Kind> {
@@ -289,20 +302,22 @@ fn basis_of(basis: Option<&Bound<'_, PyAny>>) -> PyResult<Basis> {
         Ok("gp") => Ok(Basis::Gp(Default::default())),
         Ok("ngnet") => Ok(Basis::NGnet(Default::default())),
         _ => {
-            let wanted = "must be \"gp\", \"ngnet\", pdmp.GP(...) or pdmp.NGnet(...)";
-            Err(PyValueError::new_err(format!("basis = {}: {wanted}", basis.repr()?)))
+            let allowed = "must be \"gp\", \"ngnet\", pdmp.GP(...) or pdmp.NGnet(...)";
+            Err(PyValueError::new_err(format!("basis = {}: {allowed}", quoted(basis))))
         }
     }
 }
 
-fn time_scaling_of(alignment: Option<&Bound<'_, PyAny>>, events: Option<&Bound<'_, PyAny>>) -> PyResult<TimeScaling> {
+fn time_scaling_of(
+    alignment: Option<&Bound<'_, PyAny>>,
+    landmarks: Option<&Bound<'_, PyAny>>,
+) -> PyResult<TimeScaling> {
     let alignment = alignment.map_or(Ok(TimeScaling::Linear), alignment_of)?;
-    let events: Option<Array2<f64>> = events.map(|events| matrix("events", "(M, E)", events)).transpose()?;
-    match (alignment, events) {
-        (TimeScaling::Linear, Some(events)) => Ok(TimeScaling::Events(events)),
-        (_, Some(_)) => {
-            Err(PyValueError::new_err("pass a warp as alignment or events, not both: events align by themselves"))
-        }
+    let landmarks: Option<Array2<f64>> =
+        landmarks.map(|landmarks| matrix("landmarks", "(M, E)", landmarks)).transpose()?;
+    match (alignment, landmarks) {
+        (TimeScaling::Linear, Some(landmarks)) => Ok(TimeScaling::Landmarks(landmarks)),
+        (_, Some(_)) => Err(PyValueError::new_err("alignment and landmarks: pass a warp or landmarks, not both")),
         (alignment, None) => Ok(alignment),
     }
 }
@@ -315,13 +330,13 @@ fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
         Ok("linear") => Ok(TimeScaling::Linear),
         Ok("warp") => Ok(TimeScaling::WarpIfBetter),
         _ => {
-            let wanted = "must be \"linear\", \"warp\" or pdmp.TimeWarp(...)";
-            Err(PyValueError::new_err(format!("alignment = {}: {wanted}", alignment.repr()?)))
+            let allowed = "must be \"linear\", \"warp\" or pdmp.TimeWarp(...)";
+            Err(PyValueError::new_err(format!("alignment = {}: {allowed}", quoted(alignment))))
         }
     }
 }
 
-/// `smoothing=`: None, "auto" or a cut-off in Hz.
+/// Argument `smoothing`: None, "auto" or a cut-off in Hz.
 pub(crate) struct SmoothingArgument(Smoothing);
 
 impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
@@ -331,7 +346,7 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
         if smoothing.is_none() {
             return Ok(Self(Smoothing::Interpolate));
         }
-        // True would be a cut-off of 1 Hz.
+        // True converts to 1.0, but is no cut-off.
         if let Ok(hz) = smoothing.extract::<f64>()
             && !smoothing.is_instance_of::<PyBool>()
         {
@@ -340,8 +355,8 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
         match smoothing.extract::<String>().as_deref() {
             Ok("auto") => Ok(Self(Smoothing::Auto)),
             _ => {
-                let wanted = "must be None, \"auto\" or a cut-off in Hz";
-                Err(PyValueError::new_err(format!("smoothing = {}: {wanted}", smoothing.repr()?)))
+                let allowed = "must be None, \"auto\" or a cut-off in Hz";
+                Err(PyValueError::new_err(format!("smoothing = {}: {allowed}", quoted(&smoothing))))
             }
         }
     }

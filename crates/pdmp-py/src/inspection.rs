@@ -1,4 +1,4 @@
-//! What an inspection of demonstrations finds, as warnings of Python.
+//! Warnings about implausible samples of demonstrations.
 
 use std::ffi::CString;
 
@@ -6,9 +6,10 @@ use pdmp_core::preprocessing::inspection::{Finding, inspect, unwound};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
-use crate::demo::Demonstration;
+use crate::demonstration::Demonstration;
+use crate::scalar::{Scalar, optional_number};
 
-/// Warns of every finding, at the line that called the library.
+/// Issues a `UserWarning` for each finding, at the line that called the library.
 pub(crate) fn warn(py: Python<'_>, findings: &[Finding]) -> PyResult<()> {
     let category = py.get_type::<PyUserWarning>();
     for finding in findings {
@@ -24,24 +25,30 @@ pub(crate) fn warn(py: Python<'_>, findings: &[Finding]) -> PyResult<()> {
 /// demos : list of Demonstration
 ///     Demonstrations of one skill.
 /// dt : float, optional
-///     Sampling interval in s of those that carry none.
+///     Sampling interval in s of demonstrations without one.
 ///
 /// Returns
 /// -------
-/// list of Demonstration
-///     The same, without the whole turns by which angles lie apart, as `fit` learns from them.
-/// list of str
-///     What is implausible about them, with its place.
+/// demos : list of Demonstration
+///     The demonstrations as `fit` learns from them, without whole turns between their angles.
+/// findings : list of str
+///     Descriptions of implausible samples, with their positions.
+///
+/// Raises
+/// ------
+/// ValueError
+///     `dt` is not a number.
 #[pyfunction]
 #[pyo3(signature = (demos, *, dt=None))]
 pub(crate) fn inspected(
     py: Python<'_>,
     demos: Vec<Demonstration>,
-    dt: Option<f64>,
-) -> (Vec<Demonstration>, Vec<String>) {
-    py.detach(|| {
+    dt: Option<Scalar<'_>>,
+) -> PyResult<(Vec<Demonstration>, Vec<String>)> {
+    let dt = optional_number("dt", dt)?;
+    Ok(py.detach(|| {
         let demos: Vec<_> = demos.into_iter().map(|demo| demo.0).collect();
         let findings = inspect(&demos, dt).iter().map(ToString::to_string).collect();
         (unwound(&demos).iter().cloned().map(Demonstration).collect(), findings)
-    })
+    }))
 }

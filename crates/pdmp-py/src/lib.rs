@@ -1,26 +1,30 @@
-//! Python bindings: every function converts, detaches where it is long, calls the core, and converts back.
+//! Python bindings of pdmp-core. Each function converts its arguments, releases the interpreter if the call is long,
+//! calls the core and converts the result.
 
-mod basis;
 mod batch;
 mod conditions;
 mod context;
 mod controller;
 mod convert;
-mod demo;
+mod demonstration;
+mod display;
 mod error;
-mod factor;
+mod factorization;
 mod fit;
 mod inspection;
-mod jacobian;
-mod learnt;
 mod model;
+mod model_getters;
+mod motion;
+mod output;
 mod prediction;
-mod recording;
+mod preprocessing;
+mod regression;
+mod scalar;
 mod warp;
 
 use pyo3::prelude::*;
 
-/// The compiled half of pdmp.
+/// Compiled part of pdmp.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
@@ -28,14 +32,14 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PdmpError", py.get_type::<error::PdmpError>())?;
     module.add("FitError", py.get_type::<error::FitError>())?;
     module.add("ModelFileError", py.get_type::<error::ModelFileError>())?;
-    module.add_class::<demo::Demonstration>()?;
-    module.add_class::<demo::Trajectory>()?;
-    module.add_class::<basis::Gp>()?;
-    module.add_class::<basis::GpRegression>()?;
-    module.add_class::<basis::NGnet>()?;
-    module.add_class::<basis::NGnetRegression>()?;
+    module.add_class::<demonstration::Demonstration>()?;
+    module.add_class::<demonstration::Trajectory>()?;
+    module.add_class::<regression::Gp>()?;
+    module.add_class::<regression::GpRegression>()?;
+    module.add_class::<regression::NGnet>()?;
+    module.add_class::<regression::NGnetRegression>()?;
     module.add_class::<warp::TimeWarp>()?;
-    module.add_class::<factor::Factors>()?;
+    module.add_class::<factorization::Factors>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<batch::RolloutChunks>()?;
     module.add_class::<context::ContextMap>()?;
@@ -45,16 +49,16 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<controller::Controller>()?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
     module.add_function(wrap_pyfunction!(conditions::blend, module)?)?;
-    module.add_function(wrap_pyfunction!(factor::factorise, module)?)?;
+    module.add_function(wrap_pyfunction!(factorization::factorise, module)?)?;
     module.add_function(wrap_pyfunction!(inspection::inspected, module)?)?;
     module.add_function(wrap_pyfunction!(model::load, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::resample, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::trim, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::cut, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::lowpass, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::residuals, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::period, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::fill, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::cycles, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::resample, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::trim, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::cut, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::lowpass, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::residuals, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::period, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::fill, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::cycles, module)?)?;
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The model in Python, and how it moves.
+//! Models: conditions, styles, predictions and files.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -6,21 +6,21 @@ use std::sync::Arc;
 use ndarray::Array3;
 use numpy::IntoPyArray;
 use pdmp_core::learning::style_of;
-use pdmp_core::motion::{TimeGrid, prediction_band, rollout_with};
+use pdmp_core::motion::{TimeGrid, prediction_band};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyString};
+use pyo3::types::{PyBytes, PyString};
 
-use crate::conditions::{Conditions, conditions_of};
-use crate::controller::Controller;
-use crate::convert::{Cube, Matrix, Reduced, Vector, optional, to_numpy, vector};
-use crate::demo::{Demonstration, Trajectory};
-use crate::error::{ascii, interruptible, raise};
+use crate::conditions::Conditions;
+use crate::convert::{Cube, Matrix, Reduced, Vector, optional, quoted, to_numpy, vector};
+use crate::demonstration::Demonstration;
+use crate::error::raise;
 use crate::prediction::Prediction;
+use crate::scalar::{Scalar, optional_number};
 
-/// A parametric dynamic movement primitive: immutable, picklable, saved by `save`.
+/// Parametric dynamic movement primitive, returned by `fit` and `load`.
 ///
-/// Made by `fit` and `load`.
+/// Models are immutable and can be pickled.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
 
@@ -29,9 +29,9 @@ pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
 /// Parameters
 /// ----------
 /// path : path-like
-///     A `.safetensors` file written by `Model.save`. A file from elsewhere is data: it runs no code and names no other
-///     file, takes memory and time in proportion to its size, and moves in finite numbers or not at all. Its checksum
-///     finds damage, not intent: the movement itself, and all texts in it, are whatever its author wrote.
+///     A `.safetensors` file that `Model.save` wrote. Files of unknown origin are safe to load: a file contains no code
+///     and no reference to other files, needs memory and time in proportion to its size, and generates finite numbers
+///     or an error. The checksum detects damage, not intent: the author of a file decides its movements and texts.
 ///
 /// Returns
 /// -------
@@ -40,9 +40,18 @@ pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
 /// Raises
 /// ------
 /// OSError
-///     A file that cannot be read.
+///     The file cannot be read.
 /// ModelFileError
-///     A file that is damaged, not a model, or of another version.
+///     The file is damaged, not a model, or of another version.
+///
+/// Examples
+/// --------
+/// >>> import tempfile, pathlib
+/// >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
+/// >>> model.save(path)
+/// >>> loaded = pdmp.load(path)
+/// >>> np.array_equal(loaded.styles, model.styles)
+/// True
 #[pyfunction]
 pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
     py.detach(|| pdmp_core::Model::load(&path)).map(|model| Model(Arc::new(model))).map_err(raise)
@@ -50,61 +59,6 @@ pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
 
 #[pymethods]
 impl Model {
-    /// Compute the movement under constant conditions.
-    ///
-    /// Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c, with w = x·sᵀb (discrete) or r·sᵀb (rhythmic),
-    /// exactly. Conditions that are not given are those of the nominal demonstration.
-    ///
-    /// Parameters
-    /// ----------
-    /// conditions : Conditions, optional
-    ///     Conditions at the start.
-    /// dt : float
-    ///     Interval between samples in s.
-    /// duration : float, optional
-    ///     Length in s; otherwise the demonstrated duration scaled by `tau`, or the sum of `segment_durations`; one period if
-    ///     rhythmic.
-    /// context : array_like, (Q,), optional
-    ///     Context whose prediction supplies style, goal, start or anchor, and duration where they are not given.
-    /// **changes
-    ///     Single conditions by name (see `Conditions`), in place of those of `conditions`.
-    ///
-    /// Returns
-    /// -------
-    /// Trajectory
-    ///     n + 1 samples, n = duration / dt rounded down.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     A wrong length, a number that is not finite, or a condition that this kind of primitive does not have.
-    /// TypeError
-    ///     An unknown keyword, or conditions of another type.
-    ///
-    /// Examples
-    /// --------
-    /// >>> model.rollout(goal=[0.4, 0.1], tau=2.0, dt=0.001).position.shape
-    /// (2001, 2)
-    #[pyo3(
-        signature = (conditions=None, *, dt=0.01, duration=None, context=None, **changes),
-        text_signature = "($self, conditions=None, *, dt=0.01, duration=None, context=None, **changes)"
-    )]
-    fn rollout(
-        &self,
-        py: Python<'_>,
-        conditions: Option<&Bound<'_, PyAny>>,
-        dt: f64,
-        duration: Option<f64>,
-        context: Option<&Bound<'_, PyAny>>,
-        changes: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Trajectory> {
-        let conditions = conditions_of(&self.0, conditions, context, changes)?;
-        let trajectory = interruptible(py, |progress| {
-            rollout_with(self.0.primitive(), &conditions, TimeGrid { dt, duration }, progress)
-        })?;
-        Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
-    }
-
     /// Return the conditions of one demonstration, or the mean of several.
     ///
     /// Parameters
@@ -120,11 +74,13 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     No index, one that is no whole number, or one outside the demonstrations.
+    ///     `demos` is empty, not a whole number, or out of range.
     ///
     /// Examples
     /// --------
-    /// >>> trajectory = model.rollout(model.conditions(3))
+    /// >>> trajectory = model.rollout(model.conditions(2))
+    /// >>> np.allclose(trajectory.position[0], model.starts[2])
+    /// True
     fn conditions(&self, demos: &Bound<'_, PyAny>) -> PyResult<Conditions> {
         let whole = |item: &Bound<'_, PyAny>| {
             item.extract::<isize>()
@@ -137,7 +93,7 @@ impl Model {
             None => demos.try_iter().ok().and_then(|items| items.map(|item| whole(&item.ok()?)).collect()),
         };
         let Some(indices) = indices else {
-            let text = format!("demos = {}: pass the index of a demonstration, or a list of them", demos.repr()?);
+            let text = format!("demos = {}: pass the index of a demonstration, or a list of them", quoted(demos));
             return Err(PyValueError::new_err(text));
         };
         let last = self.0.n_demos() - 1;
@@ -149,59 +105,78 @@ impl Model {
         self.0.conditions(&indices).map(Conditions).map_err(raise)
     }
 
-    /// The style (J,) of a new demonstration: the likeliest given its target.
+    /// Estimate the style of a new demonstration.
     ///
-    /// Minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with A the forcing of the styles, σ² what least squares leave of the target f
-    /// and v_j the largest square of the demonstrations' styles. A cycle that begins in another phase than those of the
-    /// model is turned to theirs first. The demonstration is inspected as in `fit`, with the same warnings.
+    /// The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of
+    /// the styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A
+    /// cycle with another initial phase is first shifted to that of the model's. The demonstration is inspected as in
+    /// `fit`, with the same warnings. A model with a time warp warps the demonstration too.
     ///
     /// Parameters
     /// ----------
     /// demonstration : Demonstration
     ///     A movement of the same degrees of freedom.
-    /// dt, period : float, optional
-    ///     As in `fit`.
-    /// events : array_like, (E,), optional
-    ///     Times of its events in s, if the model was fitted with events; where time was warped, its own is too.
+    /// dt : float, optional
+    ///     Sampling interval in s of a demonstration without one.
+    /// period : float, optional
+    ///     Period in s of a time-stamped cycle.
+    /// landmarks : array_like, (E,), optional
+    ///     Times in s of its landmarks; required if the model was fitted with landmarks.
     ///
     /// Returns
     /// -------
     /// ndarray, (J,)
+    ///     Style s.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     Names or units other than those of the model; a demonstration that it does not describe, where the movement of
-    ///     the closest style deviates by more than half of the demonstration's own and its forcing by more than three times
-    ///     what is left out of those fitted, or where the style is more than ten times as large as any of theirs.
-    #[pyo3(signature = (demonstration, *, dt=None, period=None, events=None))]
+    ///     Names or units differ from those of the model, or the model does not describe the demonstration: its closest
+    ///     movement deviates by more than half of the demonstration's deviation from its mean while the forcing left
+    ///     out exceeds three times that of the fitted demonstrations, or its style is more than ten times as large as
+    ///     theirs.
+    ///
+    /// Examples
+    /// --------
+    /// >>> new = pdmp.Demonstration(model.rollout(model.conditions(1), dt=0.02))
+    /// >>> np.allclose(model.style_of(new), model.styles[1], atol=0.01)
+    /// True
+    #[pyo3(signature = (demonstration, *, dt=None, period=None, landmarks=None))]
     fn style_of<'py>(
         &self,
         py: Python<'py>,
         demonstration: &Demonstration,
-        dt: Option<f64>,
-        period: Option<f64>,
-        events: Option<&Bound<'py, PyAny>>,
+        dt: Option<Scalar<'py>>,
+        period: Option<Scalar<'py>>,
+        landmarks: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
-        let events = optional("events", events)?;
+        let (dt, period) = (optional_number("dt", dt)?, optional_number("period", period)?);
+        let landmarks = optional("landmarks", landmarks)?;
         crate::inspection::warn(
             py,
             &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(&demonstration.0), dt),
         )?;
-        let style = py.detach(|| style_of(&self.0, &demonstration.0, dt, period, events.as_deref())).map_err(raise)?;
+        let style =
+            py.detach(|| style_of(&self.0, &demonstration.0, dt, period, landmarks.as_deref())).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
 
-    /// The attractor landscape b(u) of each style dimension and degree of freedom.
+    /// Compute the attractor landscape b(u) of each style dimension and degree of freedom.
     ///
     /// Parameters
     /// ----------
     /// u : array_like, (n,)
-    ///     Clock: t / tau where discrete, the phase in rad where rhythmic.
+    ///     Clock: t / tau of a discrete movement, phase in rad of a rhythmic one.
     ///
     /// Returns
     /// -------
     /// ndarray, (n, J, D)
+    ///     In the unit of each degree of freedom.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A clock value is not finite, or negative for a discrete movement.
     fn landscape<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<Cube<'py>> {
         let u = vector("u", u)?;
         let mut landscape = Array3::zeros((u.len(), self.0.n_styles(), self.0.n_dofs()));
@@ -214,56 +189,62 @@ impl Model {
         Ok(landscape.into_pyarray(py))
     }
 
-    /// Share m(u) of the way from start to goal that a discrete movement has covered, from 0 at the start to 1 from
-    /// the end on.
+    /// Compute the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
     ///
-    /// The output system moves about the frame c(u) = y₀ + (g − y₀)·m(u); m ≡ 1 where the model was fitted with
-    /// ``transport="immediate"``.
+    /// The frame of the output system is c(u) = y₀ + (g − y₀)·m(u). m increases from 0 at the start to 1 at the end and
+    /// stays 1; with `transport="immediate"`, m = 1 everywhere.
     ///
     /// Parameters
     /// ----------
     /// u : array_like, (n,)
-    ///     Clock: t / tau.
+    ///     Clock t / tau.
     ///
     /// Returns
     /// -------
     /// ndarray, (n,)
+    ///     Shares from 0 to 1.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     A rhythmic primitive, or a clock that is negative or not finite.
+    ///     The primitive is rhythmic, or a clock value is negative or not finite.
     fn transport<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<Vector<'py>> {
-        let share: PyResult<Vec<f64>> = vector("u", u)?.iter().map(|&u| self.0.transport(u).map_err(raise)).collect();
-        Ok(share?.into_pyarray(py))
+        let shares: PyResult<Vec<f64>> = vector("u", u)?.iter().map(|&u| self.0.transport(u).map_err(raise)).collect();
+        Ok(shares?.into_pyarray(py))
     }
 
-    /// The time constant in s at a phase of a movement with the given timing.
+    /// Compute the time constant τ at a phase for given segment durations.
     ///
-    /// A control loop that sets it at every tick follows the timing, as `rollout` does:
-    /// `controller.tau = model.tau_at(controller.phase, grid)`, with `transition=0`.
+    /// A control loop follows segment durations, as `rollout` does, if it sets
+    /// `controller.tau = model.tau_at(controller.phase, segment_durations)` before each tick, with `transition=0`.
     ///
     /// Parameters
     /// ----------
     /// phase : float
-    ///     Phase of a controller: x in (0, 1] where discrete, φ in rad where rhythmic.
-    /// timing : array_like, (K,)
+    ///     Phase of a controller: x in (0, 1] of a discrete movement, φ in rad of a rhythmic one.
+    /// segment_durations : array_like, (K,)
     ///     Time in s in each segment between `breaks`.
+    ///
+    /// Returns
+    /// -------
+    /// float
+    ///     Time constant τ in s.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     A timing that does not fit the model, or a phase out of range.
-    fn tau_at(&self, phase: f64, segment_durations: &Bound<'_, PyAny>) -> PyResult<f64> {
+    ///     `segment_durations` has a wrong length or is not positive, or `phase` is out of range.
+    fn tau_at(&self, phase: Scalar<'_>, segment_durations: &Bound<'_, PyAny>) -> PyResult<f64> {
+        let phase = phase.number("phase")?;
         self.0.tau_at(phase, &vector("segment_durations", segment_durations)?).map_err(raise)
     }
 
-    /// The movement for a condition, as in Section 4.1.2.
+    /// Predict the movement for a context (Section 4.1.2).
     ///
     /// Parameters
     /// ----------
     /// context : array_like or list, (Q,)
-    ///     The condition.
+    ///     Numbers and labels, in the units of the demonstrations' contexts.
     ///
     /// Returns
     /// -------
@@ -272,110 +253,108 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     A model fitted without contexts, a wrong length, a label never shown, or a number that is not finite.
+    ///     The model was fitted without contexts, or `context` has a wrong length, an unknown label, or a number that
+    ///     is not finite.
+    ///
+    /// Examples
+    /// --------
+    /// >>> prediction = model.predict([0.05])
+    /// >>> trajectory = model.rollout(prediction.conditions)
+    /// >>> np.allclose(trajectory.position, model.rollout(context=[0.05]).position)
+    /// True
     fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
         let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
         Prediction::new(py, prediction)
     }
 
-    /// Bounds within which a new movement of a condition lies, for each sample of `rollout(context=context, dt=dt)`.
+    /// Compute the prediction band of a new movement for a context.
     ///
-    /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to what is
-    /// predicted, the variance v that the styles leave out of the demonstrations, and Student's quantile t for the
-    /// degrees of freedom. Movements are compared at equal shares of their durations: how these vary is in the
-    /// prediction.
+    /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
+    /// conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
+    /// band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
     ///
     /// Parameters
     /// ----------
     /// context : array_like or list, (Q,)
-    ///     The condition.
+    ///     Numbers and labels, in the units of the demonstrations' contexts.
     /// level : float
-    ///     Probability that a number lies within its bounds.
+    ///     Probability in (0, 1) that a position of the new movement lies within its bounds.
     /// dt : float
     ///     Interval between samples in s.
     ///
     /// Returns
     /// -------
-    /// lower, upper : (T, D) ndarray
-    ///     In the unit of each degree of freedom.
+    /// lower, upper : ndarray, (T, D)
+    ///     Bounds at the samples of `rollout(context=context, dt=dt)`, in the unit of each degree of freedom.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     A level that is no probability, what `predict` refuses, or demonstrations too few to tell a band.
-    #[pyo3(signature = (context, *, level=0.9, dt=0.01))]
+    ///     `level` is not in (0, 1), `predict` rejects `context`, or the demonstrations are too few for a covariance.
+    #[pyo3(
+        signature = (context, *, level=Scalar::Number(0.9), dt=Scalar::Number(0.01)),
+        text_signature = "($self, context, *, level=0.9, dt=0.01)"
+    )]
     fn band<'py>(
         &self,
         py: Python<'py>,
         context: &Bound<'_, PyAny>,
-        level: f64,
-        dt: f64,
+        level: Scalar<'py>,
+        dt: Scalar<'py>,
     ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
+        let (level, dt) = (level.number("level")?, dt.number("dt")?);
         let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
         let grid = TimeGrid { dt, duration: None };
         let [lower, upper] = py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 
-    /// Write a model file. It appears whole or not at all, whatever interrupts the writing; a process that is killed
-    /// meanwhile leaves a draft `.pdmp-*.draft` beside it.
+    /// Write a model file.
+    ///
+    /// The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary
+    /// file `.pdmp-*.draft` beside it.
     ///
     /// Parameters
     /// ----------
     /// path : path-like
-    ///     Where to, by custom with the suffix `.safetensors`.
+    ///     File to write, conventionally with the suffix `.safetensors`.
     ///
     /// Raises
     /// ------
     /// OSError
-    ///     A path that cannot be written.
+    ///     The file cannot be written.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import tempfile, pathlib
+    /// >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
+    /// >>> model.save(path)
+    /// >>> path.exists()
+    /// True
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.0.save(&path)).map_err(raise)
     }
 
-    /// Start a control loop.
-    ///
-    /// Parameters
-    /// ----------
-    /// dt : float
-    ///     Length of a tick in s.
-    /// conditions : Conditions, optional
-    ///     Conditions at the start. Of segment durations the loop takes the total, and follows them where `tau_at` sets
-    ///     its τ.
-    /// transition : float, optional
-    ///     Time in s to 99 % of a changed style, goal, anchor, amplitude, tau or speed, at the model's own tau; 0 is the
-    ///     paper's immediate switch. By default a tenth of the nominal duration (discrete) or a quarter of the period
-    ///     (rhythmic). A goal takes the remaining time of the movement if that is longer, unless transport is immediate.
-    /// context, **changes
-    ///     As in `rollout`.
-    ///
-    /// Returns
-    /// -------
-    /// Controller
-    #[pyo3(
-        signature = (dt=0.001, conditions=None, *, transition=None, context=None, **changes),
-        text_signature = "($self, dt=0.001, conditions=None, *, transition=None, context=None, **changes)"
-    )]
-    fn controller(
-        &self,
-        py: Python<'_>,
-        dt: f64,
-        conditions: Option<&Bound<'_, PyAny>>,
-        transition: Option<f64>,
-        context: Option<&Bound<'_, PyAny>>,
-        changes: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Controller> {
-        let conditions = conditions_of(&self.0, conditions, context, changes)?;
-        let controller = pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
-        Controller::new(py, Arc::clone(&self.0), controller)
-    }
-
-    /// The bytes of a model file.
+    /// Return the contents of a model file as bytes.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &py.detach(|| self.0.to_bytes()).map_err(raise)?))
     }
 
-    /// A model from the bytes of a model file.
+    /// Read a model from the contents of a model file.
+    ///
+    /// Parameters
+    /// ----------
+    /// data : bytes
+    ///     Result of `to_bytes`, or the contents of a file that `save` wrote.
+    ///
+    /// Returns
+    /// -------
+    /// Model
+    ///
+    /// Raises
+    /// ------
+    /// ModelFileError
+    ///     The data are damaged, not a model, or of another version.
     #[staticmethod]
     fn from_bytes(py: Python<'_>, data: &[u8]) -> PyResult<Self> {
         py.detach(|| pdmp_core::Model::from_bytes(data)).map(|model| Self(Arc::new(model))).map_err(raise)
@@ -384,33 +363,4 @@ impl Model {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         Ok((py.get_type::<Self>().getattr("from_bytes")?, (self.to_bytes(py)?,).into_pyobject(py)?))
     }
-
-    fn __repr__(&self) -> String {
-        let model = &self.0;
-        ascii(&format!(
-            "<pdmp.Model: {}, {} demonstrations, {} DoFs, {} styles, tau {:.4} s{}; {}>",
-            model.kind(),
-            model.n_demos(),
-            model.n_dofs(),
-            model.n_styles(),
-            model.tau(),
-            noise(model),
-            model.learnt().regression
-        ))
-    }
-}
-
-/// The noise of the degree of freedom that has most for its range, where any has.
-fn noise(model: &pdmp_core::Model) -> String {
-    let share = |d: usize| model.learnt().noise.levels()[d] / model.ranges()[d].max(f64::MIN_POSITIVE);
-    let noisiest = (0..model.n_dofs()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
-    noisiest.filter(|&d| share(d) > 0.0).map_or_else(String::new, |d| {
-        let (level, unit) = (model.learnt().noise.levels()[d], &model.units()[d]);
-        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-        format!(
-            "; measurement noise {level:.2e}{unit}, {:.2} % of the range, in {}",
-            100.0 * share(d),
-            model.names()[d]
-        )
-    })
 }

@@ -1,4 +1,4 @@
-//! The prediction of a context map in Python.
+//! Movements predicted for a context.
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -6,20 +6,20 @@ use pyo3::prelude::*;
 use crate::conditions::Conditions;
 use crate::convert::{Reduced, to_numpy};
 
-/// Movement predicted for a context.
+/// Movement predicted for a context, returned by `Model.predict`.
 #[pyclass(frozen, get_all, module = "pdmp")]
 pub(crate) struct Prediction {
-    /// Style, goal and start or anchor, and segment durations.
+    /// Predicted style, goal and start or anchor, and segment durations.
     conditions: Py<Conditions>,
-    /// Duration or period in s.
+    /// Predicted duration or period in s.
     duration: f64,
-    /// Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order; None
-    /// where the demonstrations leave no degree of freedom to estimate it.
+    /// Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order;
+    /// None if the demonstrations leave no degree of freedom to estimate it.
     covariance: Option<Py<PyArray2<f64>>>,
-    /// Degrees of freedom of the covariance.
+    /// Degrees of freedom of the covariance estimate.
     degrees_of_freedom: usize,
-    /// Distance of each context value from the demonstrated ones, in their range (Q,): 0 inside and for labels, infinite
-    /// where a value that never varied differs.
+    /// Distance (Q,) of each context value from the demonstrated range, relative to that range: 0 inside and for
+    /// labels, inf for a value that differs from a constant one.
     extrapolation: Py<PyArray1<f64>>,
 }
 

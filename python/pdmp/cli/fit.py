@@ -7,9 +7,15 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import pdmp
-from pdmp.cli import _options
-from pdmp.cli._console import say
-from pdmp.cli._progress import progress
+from pdmp.cli.console import say
+from pdmp.cli.options import (
+    add_fit_options,
+    add_reader_options,
+    file_path,
+    fit_arguments,
+    reader_arguments,
+)
+from pdmp.cli.progress import progress
 from pdmp.io import read
 
 
@@ -17,32 +23,32 @@ def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
     parser.add_argument(
         "paths",
-        type=_options.path,
+        type=file_path,
         nargs="+",
         metavar="PATH",
         help="CSV or BVH file (one demonstration), NPZ file (several) or folder with an index.csv",
     )
     parser.add_argument(
-        "-o", "--output", type=_options.path, required=True, metavar="FILE", help="model to write"
+        "-o", "--output", type=file_path, required=True, metavar="FILE", help="model to write"
     )
-    _options.add_reading(parser)
-    _options.add_learning(parser)
+    add_reader_options(parser)
+    add_fit_options(parser)
 
 
 def run(options: Namespace) -> None:
-    """Reads demonstrations, fits a model and writes it."""
+    """Reads demonstrations, fits a model and saves it."""
     output = Path(options.output).absolute()
     if not output.parent.is_dir():
-        raise FileNotFoundError(f"{output.parent}: no such folder; make it first")
+        raise FileNotFoundError(f"{output.parent}: no such folder; create it first")
     if output.is_dir():
-        raise IsADirectoryError(f"{output}: a folder; name a file in it")
-    recordings = read(options.paths, context=options.context, **_options.reading(options))
+        raise IsADirectoryError(f"{output}: is a folder; name a file in it")
+    recordings = read(options.paths, context=options.context, **reader_arguments(options))
     with progress() as show:
         model = pdmp.fit(
             recordings,
             kind=options.kind,
             period=options.period,
-            **_options.settings(options),
+            **fit_arguments(options),
             progress=show,
         )
     model.save(options.output)

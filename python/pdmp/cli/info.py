@@ -10,15 +10,15 @@ import numpy as np
 
 import pdmp
 from pdmp._messages import printable
-from pdmp.cli._console import say
-from pdmp.cli._options import path
+from pdmp.cli.console import say
+from pdmp.cli.options import file_path
 
-MOST = 40  # singular values that are printed
+MAX_VALUES = 40  # singular values to print
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=path, metavar="MODEL", help="model file")
+    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
 
 
 def run(options: Namespace) -> None:
@@ -52,7 +52,7 @@ def run(options: Namespace) -> None:
 
 
 def _labels(model: pdmp.Model) -> list[str]:
-    """Returns the names of the degrees of freedom, with the unit where it is known."""
+    """Returns the names of the degrees of freedom with their units."""
     return [
         f"{name} [{unit}]" if unit else name
         for name, unit in zip(model.names, model.units, strict=True)
@@ -60,24 +60,24 @@ def _labels(model: pdmp.Model) -> list[str]:
 
 
 def _noise(model: pdmp.Model) -> str:
-    """Returns the standard deviation of the measurement noise and the cut-off that removes it."""
+    """Returns the standard deviation of the measurement noise and the cut-off, per DoF, as text."""
     labels = _labels(model)
     noisy = zip(labels, model.noise, model.cut_offs, strict=True)
-    found = [
+    levels = [
         f"{label}: {level:.2g}, smoothed at {hz:.3g} Hz" for label, level, hz in noisy if level
     ]
-    return "; ".join(found) or "none found"
+    return "; ".join(levels) or "none found"
 
 
 def _extent(values: Sequence[float | str]) -> str:
-    """Returns the labels, or the range of the numbers, of a value of the contexts."""
+    """Returns the labels, or the range of the numbers, of one column of the contexts."""
     labels = sorted({value for value in values if isinstance(value, str)})
     numbers = [value for value in values if not isinstance(value, str)]
     return " ".join(labels) or f"{min(numbers):g} to {max(numbers):g}"
 
 
 def _several(values: np.ndarray) -> str:
-    """Returns the first numbers of a long list as text."""
-    left = len(values) - MOST
-    more = f" and {left} more" if left > 0 else ""
-    return " ".join(f"{value:.4g}" for value in values[:MOST]) + more
+    """Returns up to `MAX_VALUES` numbers as text."""
+    n_omitted = len(values) - MAX_VALUES
+    more = f" and {n_omitted} more" if n_omitted > 0 else ""
+    return " ".join(f"{value:.4g}" for value in values[:MAX_VALUES]) + more

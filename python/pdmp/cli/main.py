@@ -9,16 +9,9 @@ from collections.abc import Sequence
 from pdmp._messages import printable
 from pdmp._native import PdmpError, __version__
 from pdmp.cli import evaluate, fit, info, plot, rollout
-from pdmp.cli._console import console
+from pdmp.cli.console import console, one_line
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
-_OPTIONS = {
-    "contexts": "--context",
-    "dt": "--dt",
-    "max_gap": "--max-gap",
-    "period": "--period",
-    "time": "--time",
-}
 COMMANDS = {
     "fit": fit,
     "rollout": rollout,
@@ -60,11 +53,11 @@ def _run(options: Namespace) -> int:
         print("pdmp: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # Whoever read the output has gone; what is left of it must not raise at exit.
+        # The reader of the output has closed it; flushing the rest must not raise an error at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (PdmpError, ValueError, OSError, ImportError, MemoryError) as error:
-        print(f"pdmp: error: {_in_one_line(error)}", file=sys.stderr)
+        print(f"pdmp: error: {_error_text(error)}", file=sys.stderr)
         return 1
     return 0
 
@@ -81,16 +74,15 @@ def _parser() -> ArgumentParser:
             description=description,
             formatter_class=RawDescriptionHelpFormatter,
         )
-        # Before Python 3.14 argparse takes -1e-3 for an option.
+        # Before Python 3.14 argparse parses -1e-3 as an option.
         command_parser._negative_number_matcher = _NEGATIVE_NUMBER
         command.arguments(command_parser)
         command_parser.set_defaults(run=command.run)
     return parser
 
 
-def _in_one_line(error: Exception) -> str:
-    """Returns the text of an error, with options in place of the arguments of Python."""
+def _error_text(error: Exception) -> str:
+    """Returns an error in one line, with command-line options for arguments of Python."""
     if isinstance(error, OSError) and error.filename is not None:
         return printable(f"{error.filename}: {error.strerror}")
-    text = printable(" ".join(str(error).split()))
-    return re.sub(rf"\b({'|'.join(_OPTIONS)})=", lambda found: _OPTIONS[found[1]], text)
+    return one_line(error)

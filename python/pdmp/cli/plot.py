@@ -1,6 +1,6 @@
-"""Draws a model into a folder.
+"""Writes figures of a model into a folder.
 
-Given its demonstrations, it draws them beside their reproductions too.
+If its demonstrations are given, they are drawn with their reproductions too.
 
 example: pdmp plot reach.safetensors recordings/ --columns q1 q2 q3 -o figures
 """
@@ -10,34 +10,34 @@ from pathlib import Path
 
 import pdmp
 from pdmp import plot
-from pdmp.cli import _options
-from pdmp.cli._console import say
+from pdmp.cli.console import say
+from pdmp.cli.options import add_reader_options, file_path, reader_arguments
 from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=_options.path, metavar="MODEL", help="model file")
+    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
     parser.add_argument(
         "paths",
         nargs="*",
-        type=_options.path,
+        type=file_path,
         metavar="PATH",
-        help="its demonstrations, as for fit",
+        help="its demonstrations, as for pdmp fit",
     )
     parser.add_argument(
         "-o",
         "--output",
-        type=_options.path,
+        type=file_path,
         required=True,
         metavar="FOLDER",
-        help="where to write",
+        help="folder for the figures",
     )
-    _options.add_reading(parser)
+    add_reader_options(parser)
 
 
 def run(options: Namespace) -> None:
-    """Loads a model, draws it and writes the figures."""
+    """Loads a model and writes its figures."""
     model = pdmp.load(options.model)
     first = model.styles[:, 0]
     ends = [int(first.argmin()), int(first.argmax())]
@@ -53,7 +53,7 @@ def run(options: Namespace) -> None:
     if model.kind == "rhythmic":
         figures["phase_portrait"] = plot.phase_portrait(model)
     if options.paths:
-        recordings = read(options.paths, **_options.reading(options))
+        recordings = read(options.paths, **reader_arguments(options))
         figures["demonstrations"] = plot.demonstrations(model, recordings)
     for name, figure in figures.items():
         path = Path(options.output, f"{name}.png")

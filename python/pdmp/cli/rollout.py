@@ -1,6 +1,6 @@
 """Writes a movement as CSV.
 
-The style is that of the nominal demonstration unless one of --style, --context and --demo is given.
+The style is that of the nominal demonstration unless --style, --context or --demo is given.
 
 example: pdmp rollout reach.safetensors --context 1.45 --goal 0.4 -0.2 0.9 -o reach.csv
 """
@@ -9,28 +9,32 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 import pdmp
-from pdmp.cli._console import say
-from pdmp.cli._options import path
+from pdmp.cli.console import say
+from pdmp.cli.options import file_path
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=path, metavar="MODEL", help="model file")
+    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
     parser.add_argument(
-        "-o", "--output", type=path, required=True, metavar="FILE", help="CSV to write"
+        "-o", "--output", type=file_path, required=True, metavar="FILE", help="CSV to write"
     )
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument("--style", nargs="+", type=float, metavar="S", help="style parameters")
-    which.add_argument("--context", nargs="+", type=_value, metavar="C", help="context to meet")
-    which.add_argument("--demo", type=int, metavar="M", help="demonstration to repeat, from 0")
+    source = parser.add_mutually_exclusive_group()
+    source.add_argument("--style", nargs="+", type=float, metavar="S", help="style parameters")
+    source.add_argument(
+        "--context", nargs="+", type=_value, metavar="C", help="context to predict the movement for"
+    )
+    source.add_argument(
+        "--demo", type=int, metavar="M", help="demonstration to reproduce, counted from 0"
+    )
     for name, text in (
-        ("goal", "where a discrete movement ends"),
-        ("start", "where it starts"),
+        ("goal", "goal of a discrete movement"),
+        ("start", "start position"),
         ("anchor", "centre of a rhythmic movement"),
     ):
         parser.add_argument(f"--{name}", nargs="+", type=float, metavar="Y", help=text)
     for name, metavar, text in (
-        ("amplitude", "R", "amplitude of a rhythmic movement, 1 as demonstrated"),
+        ("amplitude", "R", "amplitude of a rhythmic movement, relative to the demonstrations"),
         ("tau", "S", "time constant [s]"),
         ("dt", "S", "sampling interval [s]; default: 0.01"),
         ("duration", "S", "duration [s]; default: as demonstrated, or one period"),
@@ -39,14 +43,14 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Loads a model, rolls it out and writes the movement."""
+    """Loads a model, computes a rollout and writes it."""
     model = pdmp.load(options.model)
     conditions = None if options.demo is None else model.conditions(options.demo)
     names = ("style", "context", "goal", "start", "anchor", "amplitude", "tau", "dt", "duration")
-    given = {name: value for name in names if (value := getattr(options, name)) is not None}
-    trajectory = model.rollout(conditions, **given)
+    arguments = {name: value for name in names if (value := getattr(options, name)) is not None}
+    trajectory = model.rollout(conditions, **arguments)
     if options.context is not None and model.predict(options.context).extrapolation.any():
-        print("pdmp: the context lies outside of those demonstrated", file=sys.stderr)
+        print("pdmp: the context lies outside the demonstrated ones", file=sys.stderr)
     trajectory.to_csv(options.output)
     say(f"{options.output}: {len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
 

@@ -1,8 +1,8 @@
 """Recordings of people and robots, and a registry of their sources.
 
-`handwriting` reads human handwriting from an installed package. Licences forbid a copy of the
-other sets in this package: `REGISTRY` gives source, licence and contents of each, and `folder`
-finds it in the folder that the environment variable `PDMP_DATA` names::
+`handwriting` reads human handwriting from an installed package. The licences of
+the other sets do not allow a copy in this package: `REGISTRY` gives source, licence and contents of
+each, and `folder` its path below the folder in the environment variable `PDMP_DATA`::
 
     demos = pdmp.io.read_folder(
         pdmp.datasets.folder("raise_hand_bandai"), context=["hold_height_m"]

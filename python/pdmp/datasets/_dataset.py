@@ -1,4 +1,4 @@
-"""Description of a set of recordings."""
+"""Descriptions of sets of recordings."""
 
 from dataclasses import dataclass
 from typing import Literal

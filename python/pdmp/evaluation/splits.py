@@ -1,4 +1,4 @@
-"""Which demonstrations are learnt from, and which are held out."""
+"""Splits of demonstrations into training and test sets."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from pdmp.evaluation.recordings import Array
 
 Reach: TypeAlias = Literal["interpolation", "extrapolation"]
 Rows: TypeAlias = NDArray[np.intp]
-STEPS = 2000  # of the search for a convex combination
-NEAR = 1e-6  # distance, in ranges of the contexts, at which a context counts as inside
+MAX_STEPS = 2000  # of the search for a convex combination
+TOLERANCE = 1e-6  # distance from the hull, in ranges of the contexts, that counts as inside
 
 
 class Split(NamedTuple):
-    """Demonstrations to learn from and to predict.
+    """Training and test demonstrations.
 
     Attributes
     ----------
     train, test : ndarray of int
-        Their indices.
+        Indices of the demonstrations.
     reach : str
-        "interpolation" or "extrapolation": where the contexts of `test` lie.
+        "interpolation" if the contexts of `test` lie in the convex hull of those of `train`,
+        otherwise "extrapolation".
     """
 
     train: Rows
@@ -34,10 +35,10 @@ class Split(NamedTuple):
 
 
 def held_out(contexts: Array, max_folds: int) -> list[Split]:
-    """Holds out each condition in turn, or, where they are many, each fold of neighbours.
+    """Returns splits that hold out each condition, or each of `max_folds` folds of neighbours.
 
-    What lies outside the convex hull of the contexts learnt from is extrapolation. A fold with
-    conditions of both sorts gives two splits.
+    Contexts outside the convex hull of the training contexts are extrapolation. A fold with
+    conditions of both reaches gives two splits.
     """
     conditions, member = np.unique(contexts, axis=0, return_inverse=True)
     member = member.reshape(-1)
@@ -50,9 +51,9 @@ def held_out(contexts: Array, max_folds: int) -> list[Split]:
         raise value_error(f"max_folds = {max_folds}: must be at least 2")
     splits = []
     for fold in neighbours(conditions, max_folds):
-        learnt = np.delete(conditions, fold, axis=0)
+        training = np.delete(conditions, fold, axis=0)
         train = np.flatnonzero(~np.isin(member, fold))
-        inside = np.array([within_hull(conditions[row], learnt) for row in fold])
+        inside = np.array([within_hull(conditions[row], training) for row in fold])
         for rows, reach in ((fold[inside], "interpolation"), (fold[~inside], "extrapolation")):
             if rows.size:
                 splits.append(Split(train, np.flatnonzero(np.isin(member, rows)), reach))  # type: ignore[arg-type]
@@ -60,9 +61,9 @@ def held_out(contexts: Array, max_folds: int) -> list[Split]:
 
 
 def neighbours(conditions: Array, max_folds: int) -> list[Rows]:
-    """Parts conditions (K, Q) into at most so many folds of neighbours.
+    """Partitions conditions (K, Q) into at most `max_folds` folds of neighbours.
 
-    The fold of most conditions is halved along its longest side, until there are enough.
+    The fold with the most conditions is halved projection its longest side until there are enough.
     """
     unit = _unit(conditions)
     folds: list[Rows] = [np.arange(len(conditions))]
@@ -76,42 +77,46 @@ def neighbours(conditions: Array, max_folds: int) -> list[Rows]:
 
 
 def within_hull(point: Array, points: Array) -> bool:
-    """Returns whether a point (Q,) is a convex combination of others (K, Q).
+    """Returns True if a point (Q,) is a convex combination of others (K, Q).
 
-    Weight moves between two points at a time, from the one farthest against the way to the one
-    farthest along it, until the combination is there or a plane parts it from the point. One so
-    near the surface that neither is found counts as inside.
+    Pairwise Frank-Wolfe steps minimise the distance of the combination from the point: each moves
+    weight from the active point with the largest projection on the residual to the point with the
+    smallest. A separating plane ends the search. A point for which `MAX_STEPS` find neither, which
+    is near the surface, counts as inside.
     """
     spread = np.ptp(points, axis=0)
     offset = (points - point) / np.where(spread > 0, spread, 1)
     weights = np.zeros(len(points))
     weights[np.argmin((offset**2).sum(axis=1))] = 1
-    for _ in range(STEPS):
-        left = weights @ offset
-        if left @ left <= NEAR**2:
+    for _ in range(MAX_STEPS):
+        residual = weights @ offset
+        if residual @ residual <= TOLERANCE**2:
             return True
-        along = offset @ left
-        to, source = np.argmin(along), np.argmax(np.where(weights > 0, along, -np.inf))
-        if along[to] > 0:
+        projection = offset @ residual
+        target, source = (
+            np.argmin(projection),
+            np.argmax(np.where(weights > 0, projection, -np.inf)),
+        )
+        if projection[target] > 0:
             return False
-        way = offset[to] - offset[source]
-        step = min(weights[source], -(left @ way) / (way @ way))
-        weights[to] += step
+        direction = offset[target] - offset[source]
+        step = min(weights[source], -(residual @ direction) / (direction @ direction))
+        weights[target] += step
         weights[source] -= step
     return True
 
 
 def checked(splits: Iterable[Sequence[object]], n_demos: int) -> list[Split]:
-    """Returns a user's splits, each (train, test, "interpolation" or "extrapolation")."""
-    found = []
+    """Returns the checked splits of a user, each (train, test, reach)."""
+    valid = []
     for k, split in enumerate(splits):
         if len(split) != 3 or split[2] not in ("interpolation", "extrapolation"):
             raise value_error(
                 f'splits[{k}]: must be (train, test, "interpolation" or "extrapolation")'
             )
         rows = []
-        for name, given in zip(("train", "test"), split, strict=False):
-            indices = np.asarray(given)
+        for name, values in zip(("train", "test"), split, strict=False):
+            indices = np.asarray(values)
             if indices.ndim != 1 or indices.size == 0 or indices.dtype.kind not in "iu":
                 raise value_error(f"splits[{k}]: {name} must be one or more indices")
             for index in indices[(indices < 0) | (indices >= n_demos)]:
@@ -119,15 +124,15 @@ def checked(splits: Iterable[Sequence[object]], n_demos: int) -> list[Split]:
                     f"splits[{k}]: {name} index {index} must lie between 0 and {n_demos - 1}"
                 )
             rows.append(indices.astype(np.intp))
-        if both := sorted(set(rows[0].tolist()) & set(rows[1].tolist())):
-            raise value_error(f"splits[{k}]: demonstration {both[0]} is in train and in test")
-        found.append(Split(rows[0], rows[1], split[2]))
-    if not found:
+        if shared := sorted(set(rows[0].tolist()) & set(rows[1].tolist())):
+            raise value_error(f"splits[{k}]: demonstration {shared[0]} is in train and in test")
+        valid.append(Split(rows[0], rows[1], split[2]))
+    if not valid:
         raise ValueError("splits is empty: pass at least one")
-    return found
+    return valid
 
 
 def _unit(conditions: Array) -> Array:
-    """Returns conditions over their ranges."""
+    """Returns conditions divided by their ranges."""
     spread = np.ptp(conditions, axis=0)
     return conditions / np.where(spread > 0, spread, 1)

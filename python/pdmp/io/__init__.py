@@ -1,25 +1,24 @@
 """Readers of recordings, and a writer of trajectories.
 
-A CSV file is one demonstration: a header row with names, then one sample a row. By default the
-column `t` holds the time in s and every other column is a degree of freedom. A header such as
-`knee [rad]`, or a row of units below it, gives name and unit. The forms that spreadsheets and
-pandas write are read too: semicolons or tabs with decimal commas, an index column, comments before
-the header.
+A CSV file is one demonstration: a header row with names, then one sample per row. By default the
+column `t` is the time in s and every other column a degree of freedom. A header such as
+`knee [rad]`, or a row of units below it, gives name and unit. The formats of spreadsheets and
+pandas are read too: semicolons or tabs with decimal commas, an index column, comments before the
+header.
 
-An NPZ file holds one demonstration or several, in one of three layouts, without pickled objects:
+An NPZ file has one or several demonstrations, in one of three layouts without pickled objects:
 
-- `position` (T, D), or (M, T, D) of M demonstrations, and its time stamps `time` (T,), if any;
-- an array (T, D) per demonstration under its own name, and its time stamps (T,), if any, under the
-  same name followed by `.t`;
-- `y` (ΣT, D) with all samples one demonstration after another, `start` (M + 1,) with the row where
-  each begins and the last ends, and the time stamps `t` (ΣT,), if any.
+- `position` (T, D), or (M, T, D) for M demonstrations, and optional time stamps `time` (T,);
+- an array `NAME` (T, D) per demonstration, and its optional time stamps `NAME.t` (T,);
+- the concatenated samples `y` (ΣT, D) of all demonstrations, `start` (M + 1,) with the row where
+  each begins and the last ends, and optional time stamps `t` (ΣT,).
 
-Each may have `names` (D,) and `units` (D,) of the degrees of freedom.
+Each layout may have `names` (D,) and `units` (D,) of the degrees of freedom.
 
 A BVH file is one demonstration, whose degrees of freedom are the channels of its skeleton.
 
-A folder holds an `index.csv`, one row per demonstration with its name under `id` and more columns
-for its context, beside `demos/<id>.csv` or `demos/<id>.bvh` files or a `demos.npz` in the order of
+A folder has an `index.csv`, with a row per demonstration, its name in the column `id` and its
+context in others, and files `demos/<id>.csv` or `demos/<id>.bvh` or a `demos.npz` in the order of
 the index. Without an index, all CSV and BVH files in the folder are read.
 
 `pdmp.preprocessing` prepares raw recordings for `pdmp.fit`.

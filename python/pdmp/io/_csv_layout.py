@@ -17,14 +17,14 @@ from pdmp._messages import value_error
 from pdmp.io import _fields
 
 MAX_PREAMBLE = 200
-"""Rows from which the layout is found; lines before the header must end among them."""
+"""Number of first rows that determine the layout; they must include the header."""
 MAX_UNIT = 40
-"""Characters of a unit; matching takes too long for longer texts."""
+"""Largest number of characters of a unit; matching is too slow for longer texts."""
 UNIT = re.compile(
     r"[munµμkMG]?(s|m|rad|N|Nm|g|V|A|Hz|W|J|Pa|T)|deg|°|°C|sec|min|h|cm|dm|deg|turns?|rev|px|%|1|"
     r"counts?|quat"
 )
-"""Units, with their prefixes, as they stand alone or in products and quotients."""
+"""Units with their prefixes, alone or as factors of products and quotients."""
 Row = tuple[int, list[str]]
 
 
@@ -41,9 +41,9 @@ class CsvTable:
     text: str = field(default="", repr=False)
 
     def rows(self, *, blank: bool = False) -> Iterator[Row]:
-        """Yields line number and fields of each sample; with `blank`, those that have none too.
+        """Yields line number and fields of each sample, with `blank` also rows of empty fields.
 
-        Rows without any field, and empty rows at the end, are left out.
+        Blank lines, and rows of empty fields at the end, are skipped.
         """
         skipped: list[Row] = []
         for line, fields in _parse(self.path, self.text, self.separator):
@@ -52,7 +52,7 @@ class CsvTable:
             if len(fields) != len(self.fields) and any(fields):
                 hint = ""
                 if len(fields) > len(self.fields) and self.separator == ",":
-                    hint = "; where commas are decimal, separate fields by semicolons"
+                    hint = "; with decimal commas, separate fields by semicolons"
                 raise value_error(
                     f"{self.path}, line {line}: {len(fields)} fields, "
                     f"expected {len(self.fields)} as in the header{hint}"
@@ -70,22 +70,23 @@ def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False
     """Finds separator, header and units of a CSV file.
 
     Comments, which begin with #, a line such as `sep=;` and other lines before the header are
-    skipped. The header is the row with as many fields as the samples have that names the
-    columns; if there is a choice, the one with a name among `times`. It may stand in a comment.
-    A row of units may follow it. The header of an index, whose rows may be words, is
-    its first row.
+    skipped. The header is the row of names with the number of fields of the samples; among several,
+    the one with a name in `times`. It may be in a comment. A row of units may follow it. The header
+    of an index, whose rows may be words, is its first row.
     """
     raw = path.read_bytes()
     try:
-        # Spreadsheets write UTF-16 with a mark, and call it Unicode.
+        # Spreadsheets write UTF-16 with a byte order mark as "Unicode".
         text = raw.decode("utf-16" if raw[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8-sig")
     except UnicodeDecodeError:
         raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
     separator = _separator(path, text)
     sample = [row for row in islice(_parse(path, text, separator), MAX_PREAMBLE) if any(row[1])]
-    sample = [row for row in sample if not _separating(separator.join(row[1]))]
+    sample = [row for row in sample if not _declared_separator(separator.join(row[1]))]
     if not sample:
-        raise value_error(f"{path}: empty: expected a header row with names, then one sample a row")
+        raise value_error(
+            f"{path}: empty: expected a header row with names, then one sample per row"
+        )
     width = _width([fields for _, fields in sample])
     line, fields = sample[0]
     if not index:
@@ -99,7 +100,7 @@ def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False
 
 
 def _parse(path: Path, text: str, separator: str) -> Iterator[Row]:
-    """Yields line number and fields of each row; comments are blank ones."""
+    """Yields line number and fields of each row; comments are blank rows."""
     lines = ("\n" if _is_comment(line) else line for line in io.StringIO(text, newline=""))
     if separator == " ":
         lines = (line.strip() + "\n" for line in lines)
@@ -119,26 +120,26 @@ def _separator(path: Path, text: str) -> str:
     """Returns the separator that gives most of the first rows the same number of fields."""
     head = "".join(islice(io.StringIO(text, newline=""), MAX_PREAMBLE))
     for line in head.splitlines():
-        if separator := _separating(line):
+        if separator := _declared_separator(line):
             return separator
         if line.strip():
             break
-    alike = {",": 1}  # rows with as many fields; of equals, the first separator is taken
+    n_equal = {",": 1}  # rows with the same number of fields, by separator; the first wins a tie
     for separator in ",;\t ":
         rows = [fields for _, fields in _parse(path, head, separator) if len(fields) > 1]
         counts = Counter(len(fields) for fields in rows if any(fields))
-        alike[separator] = max(alike.get(separator, 0), *counts.values(), 0)
-    return max(alike, key=lambda separator: alike[separator])
+        n_equal[separator] = max(n_equal.get(separator, 0), *counts.values(), 0)
+    return max(n_equal, key=lambda separator: n_equal[separator])
 
 
-def _separating(line: str) -> str:
-    """Returns the separator that a line such as `sep=;` names, or none."""
-    found = re.fullmatch(r'"?sep=(.|\\t)"?', line.strip("\r\n"), re.IGNORECASE)
-    return found[1].replace("\\t", "\t") if found else ""
+def _declared_separator(line: str) -> str:
+    """Returns the separator of a line such as `sep=;`, or ""."""
+    match = re.fullmatch(r'"?sep=(.|\\t)"?', line.strip("\r\n"), re.IGNORECASE)
+    return match[1].replace("\\t", "\t") if match else ""
 
 
 def _width(rows: list[list[str]]) -> int:
-    """Returns the number of fields that most rows have; words before the header have one."""
+    """Returns the most frequent number of fields, above one if possible: lines of text have one."""
     counts = Counter(len(fields) for fields in rows)
     wide = {n: count for n, count in counts.items() if n > 1} or counts
     return max(wide, key=lambda n: (wide[n], n))
@@ -147,37 +148,37 @@ def _width(rows: list[list[str]]) -> int:
 def _header(
     path: Path, text: str, separator: str, sample: list[Row], width: int, times: Collection[str]
 ) -> Row:
-    """Returns the row that names the columns; the first one if there is none."""
+    """Returns the row that names the columns, or the first row."""
     named: list[Row] = []
-    before: list[str] = []
+    previous: list[str] = []
     for line, fields in sample:
         if len(fields) == width and _are_numbers(fields):
             break
-        units = named and before is named[-1][1] and _are_units(fields)
+        units = named and previous is named[-1][1] and _are_units(fields)
         if len(fields) == width and not units and _are_names(fields):
             named.append((line, fields))
-        before = fields
+        previous = fields
     timed = [row for row in named if any(split_label(cell)[0] in times for cell in row[1])]
     if len(timed or named) > 1 and not timed:
         raise value_error(
-            f"{path}: lines {named[0][0]} and {named[1][0]} may both name the columns: delete what "
-            "stands before the header"
+            f"{path}: lines {named[0][0]} and {named[1][0]} may both name the columns: delete the "
+            "lines before the header"
         )
     if named:
         return (timed or named)[0]
-    found = sample[0]
+    header = sample[0]
     for number, comment in enumerate(io.StringIO(text), 1):
         if number >= sample[0][0]:
             break
         if _is_comment(comment):
             for _, fields in _parse(path, comment.lstrip(" #%"), separator):
                 if len(fields) == width and _are_names(fields):
-                    found = number, fields
-    return found
+                    header = number, fields
+    return header
 
 
 def _are_names(fields: list[str]) -> bool:
-    """Returns whether a row may name the columns; the first may have no name, nor the last."""
+    """Returns True if a row can name the columns; the first and the last may be empty."""
     inner = fields[1:-1] if len(fields) > 2 else [cell for cell in fields if cell]
     return (
         any(fields)
@@ -187,17 +188,17 @@ def _are_names(fields: list[str]) -> bool:
 
 
 def _are_numbers(fields: list[str]) -> bool:
-    """Returns whether a row is a sample."""
+    """Returns True if a row is a sample."""
     values = [cell for cell in fields if not _fields.is_gap(cell)]
     return bool(values) and all(_fields.is_number(cell.replace(",", ".", 1)) for cell in values)
 
 
 def _are_units(fields: list[str]) -> bool:
-    """Returns whether a row gives units: each in brackets, or one that is known."""
-    said = [cell for cell in fields if cell.strip("-") and not _fields.is_number(cell)]
-    # By itself, a word above the samples is rather a name.
-    lone = len(fields) == 1 and not fields[0].startswith(("[", "("))
-    return bool(said) and not lone and all(map(_is_unit, fields))
+    """Returns True if a row gives units, each in brackets or a unit of `UNIT`."""
+    texts = [cell for cell in fields if cell.strip("-") and not _fields.is_number(cell)]
+    # A single word above the samples is a name rather than a unit.
+    is_word = len(fields) == 1 and not fields[0].startswith(("[", "("))
+    return bool(texts) and not is_word and all(map(_is_unit, fields))
 
 
 def _is_unit(cell: str) -> bool:

@@ -1,4 +1,4 @@
-"""Demonstrations from the contents of files, with errors that name the file."""
+"""Construction of demonstrations from files, with errors that name the file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,7 +23,7 @@ def make_demonstration(
     max_gap: float,
     context: Sequence[float | str] | None = None,
 ) -> Demonstration:
-    """Returns a demonstration with its gaps filled, and `source` before the text of its errors."""
+    """Returns a demonstration with its gaps filled; `source` precedes the texts of errors."""
     n_samples, n_dofs = position.shape
     columns = [f"y{d}" for d in range(n_dofs)] if names is None else names
     turns = [FULL_TURN.get(unit, 0.0) if unit else np.nan for unit in units or [""] * n_dofs]

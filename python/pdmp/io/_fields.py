@@ -1,4 +1,4 @@
-"""Names and numbers of a CSV file, with the place of each error."""
+"""Names and numbers in the fields of a CSV file, with errors that give file, line and column."""
 
 import math
 from collections.abc import Sequence
@@ -7,16 +7,16 @@ from pathlib import Path
 from pdmp._messages import value_error
 
 MAX_QUOTED = 80
-"""Characters of a field that an error quotes."""
+"""Largest number of characters of a field in an error."""
 GAPS = frozenset([
     "na", "n/a", "#n/a", "#na", "<na>", "null", "none", "nan", "+nan", "-nan", "nan(ind)",
     "-nan(ind)", "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind",
 ])  # fmt: skip
-"""Texts that mark a missing number, besides the empty one."""
+"""Texts, besides the empty one, that mark a missing number."""
 
 
 def check_names(path: Path, line: int, names: Sequence[str]) -> None:
-    """Checks that the first row names the columns, each by a name of its own."""
+    """Rejects a header with a number, an empty field or the same name twice."""
     seen: set[str] = set()
     for name in names:
         if not is_name(name):
@@ -32,32 +32,32 @@ def check_names(path: Path, line: int, names: Sequence[str]) -> None:
 
 
 def is_name(field: str) -> bool:
-    """Returns whether a field may head a column."""
+    """Returns True if a field can be the name of a column."""
     return bool(field.strip()) and parse_number(field.replace(",", ".", 1)) is None
 
 
 def column_indices(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]:
     """Returns the index of the column of each name."""
-    where = {name: k for k, name in enumerate(header)}
+    indices = {name: k for k, name in enumerate(header)}
     for name in names:
-        if name not in where:
-            known = ", ".join(header) if len(header) <= 40 else f"{len(header)} columns"
-            raise value_error(f"{path}: no column '{name}' among {known}")
-    return [where[name] for name in names]
+        if name not in indices:
+            available = ", ".join(header) if len(header) <= 40 else f"{len(header)} columns"
+            raise value_error(f"{path}: no column '{name}' among {available}")
+    return [indices[name] for name in names]
 
 
 def read_number(path: Path, line: int, name: str, field: str, *, gaps: bool = False) -> float:
-    """Returns the finite number in a field of the column called `name`, or NaN for a gap."""
+    """Returns the finite number in a field of column `name`, or NaN for a gap if `gaps` is True."""
     value = parse_number(field)
     field = short(field)
     place = f"{path}, line {line}, column '{name}'"
     if is_gap(field):
         if gaps:
             return math.nan
-        found = f"{field} is not finite" if value is not None else f"'{field}' marks a gap"
+        reason = f"{field} is not finite" if value is not None else f"'{field}' marks a gap"
         raise value_error(
-            f"{place}: {found if field else 'empty'}: pass max_gap= to interpolate what is "
-            "missing, or cut the row out"
+            f"{place}: {reason if field else 'empty'}: pass max_gap= to interpolate "
+            "gaps, or delete the row"
         )
     if value is None:
         hint = ""
@@ -65,29 +65,29 @@ def read_number(path: Path, line: int, name: str, field: str, *, gaps: bool = Fa
             hint = ": decimal commas are read where semicolons or tabs separate the fields"
         raise value_error(f"{place}: '{field}' is not a number{hint}")
     if not math.isfinite(value):
-        raise value_error(f"{place}: {field} is not finite: cut the row out")
+        raise value_error(f"{place}: {field} is not finite: delete the row")
     return value
 
 
 def short(field: str) -> str:
-    """Returns a field, or its beginning where it is long."""
+    """Returns a field, or the beginning of a long one."""
     return field if len(field) <= MAX_QUOTED else field[:MAX_QUOTED] + "..."
 
 
 def is_gap(field: str) -> bool:
-    """Returns whether a field marks a missing number."""
+    """Returns True if a field marks a missing number."""
     return not field or field.lower() in GAPS
 
 
 def is_number(field: str) -> bool:
-    """Returns whether a field holds a number, finite or not."""
+    """Returns True if a field is a number, finite or not."""
     return parse_number(field) is not None
 
 
 def parse_number(field: str) -> float | None:
-    """Returns the number in a field, if it is one."""
+    """Returns the number in a field, or None."""
     try:
-        # Python takes 1_000 for a thousand.
+        # Python parses 1_000 as 1000.
         return None if "_" in field else float(field)
     except ValueError:
         return None

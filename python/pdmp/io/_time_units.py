@@ -16,26 +16,27 @@ ALIASES = {
     "μs": "us", "second": "s", "seconds": "s", "milliseconds": "ms", "msec": "ms",
     "microseconds": "us", "usec": "us", "nanoseconds": "ns", "nsec": "ns",
 }  # fmt: skip
-"""Other spellings; the first one has the Greek letter."""
-MAX_STEP = 5.0  # s: no movement is sampled more rarely
+"""Other spellings of units; the first has the Greek letter μ instead of the micro sign µ."""
+MAX_STEP = 5.0  # s, largest plausible sampling interval of a movement
 EPOCH = (6e8, 4.2e9)  # s since 1970, from 1989 to 2103
 MAX_STAMP = 1e11  # s, as for Demonstration
 
 
 def unit_of(source: object, name: str, unit: str) -> str:
-    """Returns the unit of a time column, which may stand in parentheses too, or be missing."""
+    """Returns the unit of a time column: `unit`, or that in parentheses in its name, or ""."""
     unit = unit or split_label(re.sub(r"\((.*)\)$", r"[\1]", name))[1]
     unit = ALIASES.get(unit.lower(), unit)
     if unit not in SECONDS:
-        known = ", ".join(filter(None, SECONDS))
-        raise value_error(f"{source}, column '{name}': its unit is '{unit}': expected {known}")
+        allowed = ", ".join(filter(None, SECONDS))
+        raise value_error(f"{source}, column '{name}': its unit is '{unit}': expected {allowed}")
     return unit
 
 
 def to_seconds(source: str, time: NDArray[Any], unit: str, remedy: str) -> NDArray[Any]:
-    """Returns time stamps (T,) in s; those since 1970 in ms, µs or ns count from the first.
+    """Returns time stamps (T,) in s; those since 1970 are relative to the first.
 
-    `remedy` says how a unit, in place of {unit}, is given.
+    Unless a unit is given, stamps in ms, µs or ns since 1970 are recognised, with a warning.
+    `remedy` is the advice in messages, with a placeholder {unit}.
     """
     if time.dtype.kind not in "iuf" or time.ndim != 1 or len(time) < 2:
         return time

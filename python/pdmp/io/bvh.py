@@ -1,4 +1,4 @@
-"""BVH files: the channels of a skeleton, as motion capture exports them."""
+"""Reader of BVH files, the channels of a skeleton in motion capture."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ def read_bvh(
 ) -> Demonstration:
     """Reads one demonstration from a BVH file; needs the extra `bvh`.
 
-    Each channel is a degree of freedom, called after joint and channel, such as
-    `LeftLeg.Xrotation`. Rotations, in degrees in the file, come in rad; positions keep the unit of
-    the file, which the format does not give.
+    Each channel is a degree of freedom, named after joint and channel, such as `LeftLeg.Xrotation`.
+    Rotations are converted from degrees to rad. Positions are in the unit of the file, which the
+    format does not state.
 
     Parameters
     ----------
     path : path
-        A BVH file. Its joints may have any channels in any order.
+        A BVH file, whose joints may have any channels in any order.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
     dt : float, optional
-        Sampling interval [s], in place of the file's frame time.
+        Sampling interval [s], instead of the file's frame time.
     max_gap : float
-        Longest gap [s], of NaN, that is interpolated; by default none is.
+        Longest gap [s], a run of NaN, to interpolate; by default 0, none.
     context : sequence of float or str, optional
         Context (Q,) of the demonstration.
 
@@ -51,42 +51,42 @@ def read_bvh(
     ImportError
         The package bvh is not installed.
     ValueError
-        A file that is not BVH, or not whole, a channel that is missing, or what `Demonstration`
-        refuses.
+        A file that is not BVH or incomplete, a missing channel, or data that `Demonstration`
+        rejects.
     OSError
         A file that cannot be read.
     """
     path = Path(path)
     motion = _parsed(path)
     try:
-        found = [
+        channels = [
             f"{' '.join(joint.value[1:])}.{channel}"
             for joint in motion.get_joints()
             for channel in joint["CHANNELS"][1:]
         ]
         n_frames, interval = motion.nframes, motion.frame_time
     except Exception:
-        # The parser has no errors of its own.
+        # The parser raises various built-in errors.
         raise value_error(
-            f"{path}: not a whole BVH file: joints, channels or frames lack"
+            f"{path}: an incomplete BVH file: joints, channels or frames are missing"
         ) from None
     if len(motion.frames) != n_frames:
         raise value_error(
-            f"{path}: holds {len(motion.frames)} frames, but announces {n_frames}: export it anew"
+            f"{path}: has {len(motion.frames)} frames, but states {n_frames}: export it again"
         )
-    names = found if columns is None else name_list("columns", columns)
-    where = _fields.column_indices(path, found, names)
-    position = np.array([_frame(path, k, row, found) for k, row in enumerate(motion.frames)])
-    position = position.reshape(n_frames, len(found))[:, where]
-    turning = [name.endswith("rotation") for name in names]
-    position[:, turning] = np.deg2rad(position[:, turning])
+    names = channels if columns is None else name_list("columns", columns)
+    indices = _fields.column_indices(path, channels, names)
+    position = np.array([_frame(path, k, row, channels) for k, row in enumerate(motion.frames)])
+    position = position.reshape(n_frames, len(channels))[:, indices]
+    rotational = [name.endswith("rotation") for name in names]
+    position[:, rotational] = np.deg2rad(position[:, rotational])
     return make_demonstration(
         path,
         position,
         dt=interval if dt is None else dt,
         time=None,
         names=names,
-        units=["rad" if turns else "" for turns in turning],
+        units=["rad" if rotation else "" for rotation in rotational],
         max_gap=max_gap,
         context=context,
     )
@@ -102,7 +102,7 @@ def _parsed(path: Path) -> Bvh:
     except UnicodeDecodeError:
         raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
     try:
-        # The parser takes a blank line for a joint, and the last line only with its end.
+        # The parser reads a blank line as a joint, and needs a line break after the last frame.
         return Bvh("\n".join(line for line in lines if line.strip()) + "\n")
     except Exception:
         raise value_error(f"{path}: not a BVH file: its braces do not match") from None

@@ -1,4 +1,4 @@
-"""CSV files: one demonstration in, one trajectory out."""
+"""Reader of demonstrations and writer of trajectories in CSV files."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._atomic_write import atomic_write
 from pdmp._labels import DERIVATIVES, name_list, split_label
 from pdmp._messages import value_error
 from pdmp._native import Demonstration, Trajectory
+from pdmp.files import atomic_write
 from pdmp.io import _fields, _time_units
 from pdmp.io._csv_layout import CsvTable, parse_layout
 from pdmp.io._demonstration import make_demonstration
 
 THOUSANDS = re.compile(r"[^,]*|[-+]?[1-9]\d{0,2}(,\d{3})+")
 CLOCKS = ("t", "time", "Time", "TIME")
-"""Names of a column of time stamps, if none is given; the first is the default."""
+"""Default names of the column of time stamps; the first is the default of `time`."""
 
 
 def read_csv(
@@ -37,28 +37,27 @@ def read_csv(
 ) -> Demonstration:
     """Reads one demonstration from a CSV file.
 
-    A column headed `knee [rad]` is called `knee`, and its unit is rad; units may stand in a row of
-    their own below the header too. Fields are separated by commas, semicolons, tabs or spaces;
-    where not by commas, these may be decimal. Lines before the header, comments, which begin with
-    #, and the unnamed index column that pandas writes are skipped.
+    A header field `knee [rad]` gives the name `knee` and the unit rad; a row of units below the
+    header is read too. Fields are separated by commas, semicolons, tabs or spaces; unless by
+    commas, decimal commas are allowed. Lines before the header, comments, which begin with #, and
+    the unnamed index column of pandas are skipped.
 
     Parameters
     ----------
     path : path
-        UTF-8 text with a row of names, then one sample a row.
+        UTF-8 or UTF-16 text with a row of names, then one sample per row.
     columns : sequence of str, optional
-        Names of the degrees of freedom to keep, in this order; by default all but `time`, and but
-        `<name>_velocity` and `<name>_acceleration` of a column `<name>`, as `write_csv` writes.
+        Names of the degrees of freedom to keep, in this order; by default all columns except `time`
+        and the derivatives `<name>_velocity` and `<name>_acceleration`, which `write_csv` writes.
     time : str
-        Column of the time stamps, by default `t` or `time`, in s unless its header, or this name,
-        has ms, µs or ns in brackets. Stamps in ms, µs or ns since 1970 are recognised, with a
-        warning, and count from the first.
+        Column of the time stamps, by default `t` or `time`, in s unless its header or this
+        argument has ms, µs or ns in brackets. Stamps in ms, µs or ns since 1970 are recognised,
+        with a warning, and are relative to the first.
     dt : float, optional
-        Sampling interval [s], in place of time stamps.
+        Sampling interval [s], instead of time stamps.
     max_gap : float
-        Longest gap [s] that is interpolated, from the sample before to the one after; by default
-        none is. A gap is an empty field, NaN, NA or null; rows that are missing altogether are
-        none.
+        Longest gap [s] to interpolate, from the sample before to the sample after it; by default 0,
+        none. A gap is an empty field, NaN, NA or null, not a missing row.
     context : sequence of float or str, optional
         Context (Q,) of the demonstration.
 
@@ -66,8 +65,8 @@ def read_csv(
     ------
     ValueError
         A field that is not a finite number, a gap that is longer than `max_gap` or at an end, a
-        column that is missing, time stamps in an unknown unit, or what `Demonstration` refuses;
-        names file, column, and line or time.
+        missing column, time stamps in an unknown unit, or data that `Demonstration` rejects; the
+        text gives file, column, and line or time.
     OSError
         A file that cannot be read.
     """
@@ -88,14 +87,14 @@ def read_csv(
         names = [name for name in names if name != stamped and name not in derived]
     else:
         names = name_list("columns", columns)
-    where = _fields.column_indices(path, header, names)
+    indices = _fields.column_indices(path, header, names)
     clock = header.index(stamped) if dt is None and stamped is not None else None
-    position, stamps = _numbers(table, header, where, clock, gaps=max_gap > 0)
+    position, stamps = _numbers(table, header, indices, clock, gaps=max_gap > 0)
     if clock is not None and stamps is not None:
         name = header[clock]
-        given = units[clock] or ("" if name == time else split_label(time)[1])
+        declared = units[clock] or ("" if name == time else split_label(time)[1])
         remedy = f"write '{name} [{{unit}}]' in the header or as time="
-        unit = _time_units.unit_of(path, name, given)
+        unit = _time_units.unit_of(path, name, declared)
         stamps = _time_units.to_seconds(f"{path}, column '{name}'", stamps, unit, remedy)
     return make_demonstration(
         path,
@@ -103,14 +102,14 @@ def read_csv(
         dt=dt,
         time=stamps,
         names=names,
-        units=[units[k] for k in where] if any(units[k] for k in where) else None,
+        units=[units[k] for k in indices] if any(units[k] for k in indices) else None,
         max_gap=max_gap,
         context=context,
     )
 
 
 def _labels(table: CsvTable) -> tuple[list[str], list[str]]:
-    """Returns names and units of the columns; those of the header go before those below it."""
+    """Returns names and units of the columns; units in the header take precedence."""
     header, units = map(list, zip(*map(split_label, table.fields), strict=True))
     if table.units is not None:
         units = [unit or below for unit, below in zip(units, table.units, strict=True)]
@@ -118,43 +117,43 @@ def _labels(table: CsvTable) -> tuple[list[str], list[str]]:
 
 
 def _numbers(
-    table: CsvTable, header: list[str], where: list[int], clock: int | None, *, gaps: bool
+    table: CsvTable, header: list[str], indices: list[int], clock: int | None, *, gaps: bool
 ) -> tuple[NDArray[Any], NDArray[Any] | None]:
-    """Returns positions (T, D), NaN in gaps, and time stamps (T,) as they are written."""
+    """Returns positions (T, D), NaN in gaps, and time stamps (T,) in the unit of the file."""
     path = table.path
     numbers: list[list[float]] = []
     stamps: list[float] = []
-    names = [header[k] for k in where]
+    names = [header[k] for k in indices]
     unnamed = [k for k, name in enumerate(header) if not name]
-    decimal = {True: 0, False: 0}  # line where a number has a decimal comma, or a point
-    thousands = True  # whether the commas may separate thousands
+    decimal = {True: 0, False: 0}  # last line with a decimal comma, and with a decimal point
+    thousands = True  # True while all commas may separate thousands
     for line, row in table.rows(blank=clock is None):
         _check_unnamed(path, line, row, unnamed, len(numbers))
-        kept = [row[k] for k in where]
+        cells = [row[k] for k in indices]
         stamp = "0" if clock is None else row[clock]
-        text = "".join((*kept, stamp))
+        text = "".join((*cells, stamp))
         if table.separator != "," and "," in text:
             decimal[True] = line
-            thousands = thousands and all(map(THOUSANDS.fullmatch, (*kept, stamp)))
-            kept, stamp = [cell.replace(",", ".") for cell in kept], stamp.replace(",", ".")
+            thousands = thousands and all(map(THOUSANDS.fullmatch, (*cells, stamp)))
+            cells, stamp = [cell.replace(",", ".") for cell in cells], stamp.replace(",", ".")
         if "." in text:
             decimal[False] = line
         if table.separator != "," and all(decimal.values()):
             raise value_error(
-                f"{path}, line {line}: numbers have decimal commas and decimal points: write all "
-                "of them with one of the two, and no separators of thousands"
+                f"{path}, line {line}: numbers have decimal commas and decimal points: use one of "
+                "them throughout, without separators of thousands"
             )
         if clock is not None:
             value = _fields.read_number(path, line, header[clock], stamp)
-            # ns since 1970 have more digits than a double, and fewer than an integer.
+            # ns since 1970 exceed the precision of a double, and fit into 64 bits.
             stamps.append(int(stamp) if stamp.isdecimal() and value < 2**63 else value)
-        numbers.append(_row(path, line, kept, names, gaps=gaps))
+        numbers.append(_row(path, line, cells, names, gaps=gaps))
     if decimal[True] and thousands:
         raise value_error(
-            f"{path}, line {decimal[True]}: commas may be decimal or separate thousands: write "
+            f"{path}, line {decimal[True]}: commas are decimal or separate thousands: write "
             "decimal points"
         )
-    positions = np.array(numbers, float).reshape(len(numbers), len(where))
+    positions = np.array(numbers, float).reshape(len(numbers), len(indices))
     return positions, None if clock is None else np.array(stamps)
 
 
@@ -173,11 +172,11 @@ def _row(path: Path, line: int, cells: list[str], names: list[str], *, gaps: boo
 
 
 def _check_unnamed(path: Path, line: int, row: list[str], unnamed: list[int], sample: int) -> None:
-    """Checks that a column without a name is empty or the index that pandas writes."""
+    """Rejects a column without a name unless it is empty or the index of pandas."""
     for k in unnamed:
         if row[k] and not (k == 0 and row[k] == str(sample)):
             raise value_error(
-                f"{path}, line {line}: '{row[k]}' stands in column {k + 1}, which has no name: "
+                f"{path}, line {line}: '{row[k]}' is in column {k + 1}, which has no name: "
                 "the first row must name the columns"
             )
 
@@ -190,25 +189,25 @@ def write_csv(
 ) -> None:
     """Writes a trajectory as CSV; `read_csv` reads its positions back.
 
-    The columns are `t` [s], then the position of each degree of freedom under its name, then
-    velocities under `<name>_velocity` and accelerations under `<name>_acceleration`, with the units
-    that are known in brackets. Numbers keep every bit. The file appears when it is complete.
+    The columns are `t` [s], then the positions `<name>`, velocities `<name>_velocity` and
+    accelerations `<name>_acceleration` of all degrees of freedom, with units in brackets. Numbers
+    are exact. The file is written atomically.
 
     Parameters
     ----------
     path : path
-        Where to write.
+        File to write.
     trajectory : Trajectory
         A rollout.
     names : sequence of str, optional
-        Names of the D degrees of freedom, in place of the trajectory's.
+        Names of the D degrees of freedom, instead of the trajectory's.
     units : sequence of str, optional
-        Their units, in place of the trajectory's; "" where one is not known.
+        Their units, instead of the trajectory's; "" for none.
 
     Raises
     ------
     ValueError
-        A number of names or units other than D, or names that would not be read back.
+        A number of names or units other than D, or names that would be read differently.
     OSError
         A file that cannot be written.
     """
@@ -216,10 +215,10 @@ def write_csv(
     names = trajectory.names if names is None else name_list("names", names)
     units = trajectory.units if units is None else name_list("units", units)
     n_dofs = trajectory.position.shape[1]
-    for kind, given in (("name", names), ("unit", units)):
-        if len(given) != n_dofs:
+    for kind, labels in (("name", names), ("unit", units)):
+        if len(labels) != n_dofs:
             raise ValueError(
-                f"{kind}s has length {len(given)}, expected {n_dofs}: one {kind} per DoF"
+                f"{kind}s has length {len(labels)}, expected {n_dofs}: one {kind} per DoF"
             )
     header = [f"{name}{suffix}" for suffix, _ in DERIVATIVES for name in names]
     _fields.check_names(path, 1, ["t", *header])
@@ -229,7 +228,7 @@ def write_csv(
     ]
     for name, unit, field in zip(header, units, fields, strict=True):
         if split_label(field) != (name, unit):
-            raise value_error(f"{path}: '{field}' would not be read back as '{name}' in '{unit}'")
+            raise value_error(f"{path}: '{field}' would not be read as '{name}' in '{unit}'")
     columns = (trajectory.time, trajectory.position, trajectory.velocity, trajectory.acceleration)
     with atomic_write(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

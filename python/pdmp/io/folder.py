@@ -1,4 +1,4 @@
-"""Folders with an index, and several files and folders together."""
+"""Readers of folders with an index, and of several files and folders together."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -16,11 +16,11 @@ from pdmp.io.bvh import read_bvh
 from pdmp.io.csv import read_csv
 from pdmp.io.npz import read_npz, read_recordings
 
-SINGLE = (".csv", ".bvh")
-"""Formats with one demonstration a file."""
+SINGLE_DEMO_SUFFIXES = (".csv", ".bvh")
+"""Suffixes of formats with one demonstration per file."""
 FORMAT = (
-    "expected an index.csv with a row per demonstration, its name under 'id', beside "
-    "demos/<id>.csv or demos/<id>.bvh files or a demos.npz"
+    "expected an index.csv with a row per demonstration and its name in the column 'id', and "
+    "files demos/<id>.csv or demos/<id>.bvh or a demos.npz"
 )
 
 
@@ -44,16 +44,16 @@ def read(
     time : str
         Column of the time stamps in CSV files.
     dt : float, optional
-        Sampling interval [s], in place of time stamps.
+        Sampling interval [s], instead of time stamps.
     max_gap : float
-        Longest gap [s] that is interpolated; by default none is.
+        Longest gap [s] to interpolate; by default 0, none.
     context : sequence of str, optional
-        Columns of the folders' index whose numbers or labels make the context (Q,).
+        Columns of the index.csv whose numbers or labels form the context (Q,).
 
     Raises
     ------
     ValueError
-        A file of another format, or what the readers of each format refuse.
+        A file of another format, or data that the reader of its format rejects.
     OSError
         A file that cannot be read.
     """
@@ -65,7 +65,7 @@ def read(
             demos += read_folder(path, time=time, context=context, **options).values()
         elif context is not None:
             raise value_error(f"{path}: a context is read from the index.csv of a folder: pass one")
-        elif path.suffix.lower() in SINGLE:
+        elif path.suffix.lower() in SINGLE_DEMO_SUFFIXES:
             demos.append(_read_single(path, time, **options))
         elif path.suffix.lower() == ".npz":
             demos += read_npz(path, **options).values()
@@ -85,30 +85,30 @@ def read_folder(
 ) -> dict[str, Demonstration]:
     """Reads the demonstrations that a folder's `index.csv` lists, by their ids.
 
-    Of a folder without an index, all CSV and BVH files are read, or all in its folder `demos`, or
-    its `demos.npz`, by their names in natural order; they have no context.
+    Without an index, all CSV and BVH files of the folder, or of its subfolder `demos`, or the file
+    `demos.npz` are read, in natural order of their names and without context.
 
     Parameters
     ----------
     path : path
-        A folder as `pdmp.io` describes.
+        A folder with the layout of `pdmp.io`.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
     time : str
         Column of the time stamps in CSV files.
     dt : float, optional
-        Sampling interval [s], in place of time stamps.
+        Sampling interval [s], instead of time stamps.
     max_gap : float
-        Longest gap [s] that is interpolated; by default none is.
+        Longest gap [s] to interpolate; by default 0, none.
     context : sequence of str, optional
-        Columns of the index whose numbers or labels make the context (Q,) of each demonstration.
+        Columns of the index whose numbers or labels form the context (Q,) of each demonstration.
 
     Raises
     ------
     ValueError
-        A folder with nothing to read, an index without `id`, or with one twice, an id that is no
-        name of a file, a context that is not a finite number, or what `read_csv`, `read_bvh` and
-        `read_npz` refuse.
+        A folder without demonstrations, an index without the column `id`, a repeated id, an id that
+        is not a file name, a context that is not finite, or data that `read_csv`, `read_bvh` or
+        `read_npz` rejects.
     OSError
         A file that cannot be read.
     """
@@ -127,13 +127,13 @@ def read_folder(
     found = list(read_recordings(archive, columns, dt))
     if len(found) != len(contexts):
         raise value_error(
-            f"{archive}: holds {len(found)} demonstrations, but index.csv lists {len(contexts)}"
+            f"{archive}: has {len(found)} demonstrations, but index.csv lists {len(contexts)}"
         )
     return {
         name: make_demonstration(
-            f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **given
+            f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **arguments
         )
-        for (name, values), (_, position, given) in zip(contexts.items(), found, strict=True)
+        for (name, values), (_, position, arguments) in zip(contexts.items(), found, strict=True)
     }
 
 
@@ -144,7 +144,7 @@ def _read_unlisted(
     if context is None and (path / "demos.npz").exists():
         return read_npz(path / "demos.npz", **options)
     for folder in (path, path / "demos"):
-        files = [file for suffix in SINGLE for file in folder.glob(f"*{suffix}")]
+        files = [file for suffix in SINGLE_DEMO_SUFFIXES for file in folder.glob(f"*{suffix}")]
         if files and context is None:
             files.sort(key=lambda file: _natural(file.name))
             return {file.stem: _read_single(file, time, **options) for file in files}
@@ -157,42 +157,39 @@ def _natural(name: str) -> list[tuple[int, str]]:
 
 
 def _file(path: Path, name: str) -> Path:
-    """Returns the one file of that name, a CSV file where there is none."""
+    """Returns the path of the file of a demonstration, or of a CSV file if none exists."""
     if not name or re.search(r"[/\\:\x00-\x1f]", name) or name in (".", ".."):
-        raise value_error(f"{path / 'index.csv'}: id '{name}' is no name of a file: {FORMAT}")
+        raise value_error(f"{path / 'index.csv'}: id '{name}' is not a file name: {FORMAT}")
     folder = path / "demos"
-    paths = [folder / f"{name}{suffix}" for suffix in SINGLE]
-    if name.lower().endswith(SINGLE):
+    paths = [folder / f"{name}{suffix}" for suffix in SINGLE_DEMO_SUFFIXES]
+    if name.lower().endswith(SINGLE_DEMO_SUFFIXES):
         paths.append(folder / name)
     return next((path for path in paths if path.exists()), paths[0])
 
 
 def _read_single(path: Path, time: str, **options: Any) -> Demonstration:
-    """Reads a file of one demonstration; BVH files hold their interval and need no column."""
+    """Reads a file of one demonstration; BVH files have no column of time stamps."""
     if path.suffix.lower() == ".bvh":
         return read_bvh(path, **options)
     return read_csv(path, time=time, **options)
 
 
 def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str] | None]:
-    """Reads the ids in an index, each with its context.
-
-    A column without any number holds labels.
-    """
+    """Returns the context of each id in an index; a column without numbers has labels."""
     table = parse_layout(path, index=True)
     header, lines = [split_label(field)[0] for field in table.fields], list(table.rows())
     if table.separator != ",":
-        lines = [(line, list(map(_pointed, fields))) for line, fields in lines]
+        lines = [(line, list(map(_with_point, fields))) for line, fields in lines]
     _fields.check_names(path, table.line, header if header[0] else header[1:])
-    name, *where = _fields.column_indices(path, header, ["id", *name_list("context", columns)])
+    name, *indices = _fields.column_indices(path, header, ["id", *name_list("context", columns)])
     if not lines:
         raise value_error(f"{path}: lists no demonstrations: {FORMAT}")
-    labels = {k for k in where if not any(_fields.is_number(fields[k]) for _, fields in lines)}
+    labels = {k for k in indices if not any(_fields.is_number(fields[k]) for _, fields in lines)}
     contexts: dict[str, list[float | str] | None] = {}
     for line, fields in lines:
         if fields[name] in contexts:
             raise value_error(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
-        for k in where:
+        for k in indices:
             if not fields[k] or (k not in labels and _fields.is_gap(fields[k])):
                 kind = "label" if k in labels else "number"
                 raise value_error(
@@ -200,13 +197,13 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
                 )
         values = [
             fields[k] if k in labels else _fields.read_number(path, line, header[k], fields[k])
-            for k in where
+            for k in indices
         ]
         contexts[fields[name]] = values or None
     return contexts
 
 
-def _pointed(field: str) -> str:
-    """Returns a number with a decimal point, in place of a comma, and texts as they are."""
-    pointed = field.replace(",", ".")
-    return pointed if _fields.is_number(pointed) else field
+def _with_point(field: str) -> str:
+    """Returns a number with its decimal comma replaced by a point, or a text unchanged."""
+    number = field.replace(",", ".")
+    return number if _fields.is_number(number) else field

@@ -1,4 +1,4 @@
-"""NPZ files: one demonstration or several."""
+"""Reader of NPZ files with one or several demonstrations."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -15,7 +15,7 @@ from pdmp._native import Demonstration
 from pdmp.io import _fields, _npz_arrays, _time_units
 from pdmp.io._demonstration import make_demonstration
 
-LAYOUT = "store time (T,) and position (T, D), or each demonstration beside its time stamps NAME.t"
+LAYOUT = "store time (T,) and position (T, D), or arrays NAME (T, D) and NAME.t (T,)"
 
 
 def read_npz(
@@ -25,31 +25,31 @@ def read_npz(
     dt: float | None = None,
     max_gap: float = 0.0,
 ) -> dict[str, Demonstration]:
-    """Reads the demonstrations in an NPZ file, by name ("0", "1", … where they have none).
+    """Reads the demonstrations in an NPZ file, by name ("0", "1", … without names).
 
     Parameters
     ----------
     path : path
-        An NPZ file in one of the layouts that `pdmp.io` describes.
+        An NPZ file in one of the layouts of `pdmp.io`.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
     dt : float, optional
-        Sampling interval [s], in place of time stamps.
+        Sampling interval [s], instead of time stamps.
     max_gap : float
-        Longest gap [s] that is interpolated, from the sample before to the one after; by default
-        none is. A gap is NaN.
+        Longest gap [s] to interpolate, from the sample before to the sample after it; by default 0,
+        none. A gap is NaN.
 
     Raises
     ------
     ValueError
-        A layout other than these, a name that is missing, neither time stamps nor `dt`, a gap that
-        is longer than `max_gap` or at an end, or what `Demonstration` refuses.
+        Another layout, a missing name, neither time stamps nor `dt`, a gap that is longer than
+        `max_gap` or at an end, or data that `Demonstration` rejects.
     OSError
         A file that cannot be read.
     """
     return {
-        name: make_demonstration(f"{path}, '{name}'", position, max_gap=max_gap, **given)
-        for name, position, given in read_recordings(Path(path), columns, dt)
+        name: make_demonstration(f"{path}, '{name}'", position, max_gap=max_gap, **arguments)
+        for name, position, arguments in read_recordings(Path(path), columns, dt)
     }
 
 
@@ -60,9 +60,7 @@ def read_recordings(
     arrays = _npz_arrays.read_arrays(path)
     names, units = _labels(path, arrays, "names"), _labels(path, arrays, "units")
     if columns is not None and names is None:
-        raise value_error(
-            f"{path}: no array 'names' that would give the columns {', '.join(columns)}"
-        )
+        raise value_error(f"{path}: no array 'names' to select the columns {', '.join(columns)}")
     for name, position, time in _demonstrations(path, arrays):
         source = f"{path}, '{name}'"
         for labels in (names, units):
@@ -73,18 +71,22 @@ def read_recordings(
                 )
         if dt is None and time is None:
             raise value_error(f"{source}: no time stamps: pass dt=")
-        kept = list(range(position.shape[1]))
+        indices = list(range(position.shape[1]))
         if columns is not None and names is not None:
-            kept = _fields.column_indices(path, names, name_list("columns", columns))
+            indices = _fields.column_indices(path, names, name_list("columns", columns))
         if dt is None and time is not None:
             time = _time_units.to_seconds(
                 source, time, "", "store them in s instead of {unit}, or pass dt="
             )
-        given = {
-            kind: None if labels is None else [labels[k] for k in kept]
+        selected = {
+            kind: None if labels is None else [labels[k] for k in indices]
             for kind, labels in (("names", names), ("units", units))
         }
-        yield name, position[:, kept], {"dt": dt, "time": time if dt is None else None, **given}
+        yield (
+            name,
+            position[:, indices],
+            {"dt": dt, "time": time if dt is None else None, **selected},
+        )
 
 
 def _labels(path: Path, arrays: dict[str, NDArray[Any]], kind: str) -> list[str] | None:
@@ -98,8 +100,8 @@ def _labels(path: Path, arrays: dict[str, NDArray[Any]], kind: str) -> list[str]
         texts = [label.decode() if isinstance(label, bytes) else label for label in labels.tolist()]
         "".join(texts).encode()
     except (SystemError, ValueError):
-        # numpy checks no letters before it makes texts of them.
-        raise value_error(f"{path}: '{kind}' holds letters that there are none of") from None
+        # numpy does not validate code points when it reads texts.
+        raise value_error(f"{path}: '{kind}' has invalid code points") from None
     return texts
 
 
@@ -114,33 +116,32 @@ def _demonstrations(
         position = arrays["position"]
         position = position[:, None] if position.ndim == 1 else position
         stack = position if position.ndim == 3 else [position]
-        own = position.ndim == 3 and time is not None and time.shape[:-1] == position.shape[:1]
+        has_rows = position.ndim == 3 and time is not None and time.shape[:-1] == position.shape[:1]
         for m, each in enumerate(stack):
-            yield str(m), each, time[m] if own and time is not None else time
+            yield str(m), each, time[m] if has_rows and time is not None else time
     else:
         for name, position in arrays.items():
             if not name.endswith(".t"):
                 yield name, position, arrays.get(f"{name}.t")
             elif name.removesuffix(".t") not in arrays:
-                raise value_error(f"{path}: '{name}' has time stamps of nothing")
+                raise value_error(f"{path}: '{name}' has no positions '{name.removesuffix('.t')}'")
 
 
 def _concatenated(
-    path: Path, position: NDArray[Any], time: NDArray[Any] | None, given: NDArray[Any]
+    path: Path, position: NDArray[Any], time: NDArray[Any] | None, start: NDArray[Any]
 ) -> Iterator[tuple[str, NDArray[Any], NDArray[Any] | None]]:
-    """Yields the demonstrations that lie one after another."""
+    """Yields the demonstrations of concatenated arrays."""
     n_samples = len(position) if position.ndim else 0
-    given = np.atleast_1d(given)
-    whole = given.dtype.kind in "iuf" and given.ndim == 1 and np.isfinite(given).all()
-    start = given.tolist() if whole and (given == np.floor(given)).all() else []
-    rises = all(before < after for before, after in pairwise(start))
-    if len(start) < 2 or not rises or (start[0], start[-1]) != (0, n_samples):
+    start = np.atleast_1d(start)
+    finite = start.dtype.kind in "iuf" and start.ndim == 1 and np.isfinite(start).all()
+    rows = start.tolist() if finite and (start == np.floor(start)).all() else []
+    rises = all(before < after for before, after in pairwise(rows))
+    if len(rows) < 2 or not rises or (rows[0], rows[-1]) != (0, n_samples):
         raise value_error(
-            f"{path}: 'start' must rise from 0 to {n_samples}, where the last demonstration "
-            f"ends, in whole numbers, "
-            f"got {np.array2string(given, threshold=9) if whole else given.dtype}"
+            f"{path}: 'start' must be whole numbers that rise from 0 to {n_samples}, the number of "
+            f"samples, got {np.array2string(start, threshold=9) if finite else start.dtype}"
         )
     if time is not None and time.shape != (n_samples,):
         raise value_error(f"{path}: 't' has shape {time.shape}, expected ({n_samples},)")
-    for demo, (begin, end) in enumerate(pairwise(map(int, start))):
+    for demo, (begin, end) in enumerate(pairwise(map(int, rows))):
         yield str(demo), position[begin:end], None if time is None else time[begin:end]

@@ -1,4 +1,4 @@
-"""Figures of movements: demonstrations against reproductions, and a fan between two styles."""
+"""Figures of movements: demonstrations and their reproductions, and blends of two conditions."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pdmp._native import Conditions, Demonstration, Model, blend
-from pdmp.plot._canvas import BLUE, GREY, draw_movement, gradient, legend, movement_panels
+from pdmp.plot.canvas import BLUE, GREY, colormap, draw_movement, legend, movement_panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SAMPLES = 500
+N_SAMPLES = 500
 
 
 def demonstrations(
@@ -23,9 +23,9 @@ def demonstrations(
     labels: Sequence[str] | None = None,
     figure: Figure | None = None,
 ) -> Figure:
-    """Draws the demonstrations and what the model makes of them, one column per label.
+    """Draws the demonstrations and their reproductions by the model, with a column per label.
 
-    Rows are the degrees of freedom over time, below the path itself where there are two.
+    Rows are the degrees of freedom over time; with two of them, the first row is the path.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ def demonstrations(
     demos : sequence or mapping of Demonstration
         The M demonstrations, in the order of the fit.
     labels : sequence of str, optional
-        What each of the M demonstrations shows.
+        Label of each of the M demonstrations.
     figure : matplotlib.figure.Figure, optional
-        Where to draw.
+        Figure to draw on; by default a new one.
 
     Raises
     ------
@@ -61,31 +61,31 @@ def demonstrations(
     for m, (demo, label) in enumerate(zip(demos, labels, strict=True)):
         panels = columns[titles.index(label)]
         duration = model.durations[m]
-        made = model.rollout(model.conditions(m), dt=duration / SAMPLES)
+        rollout = model.rollout(model.conditions(m), dt=duration / N_SAMPLES)
         if demo.time is not None:
             time = demo.time - demo.time[0]
         else:
             time = np.linspace(0, duration, demo.n_samples, endpoint=model.kind == "discrete")
         draw_movement(panels, time, demo.position, color=GREY, linewidth=3, label="demonstration")
         draw_movement(
-            panels, made.time, made.position, color=BLUE, linewidth=0.9, label="reproduction"
+            panels, rollout.time, rollout.position, color=BLUE, linewidth=0.9, label="reproduction"
         )
     legend(figure, columns[0][0])
     return figure
 
 
 def _check(model: Model, m: int, demo: Demonstration) -> None:
-    """Checks that a demonstration has the degrees of freedom of the model."""
+    """Rejects a demonstration with other degrees of freedom than the model's."""
     if not isinstance(demo, Demonstration):
         raise ValueError(f"demo {m}: expected a pdmp.Demonstration, got {type(demo).__name__}")
     if demo.n_dofs != model.n_dofs:
         raise ValueError(f"demo {m}: expected {model.n_dofs} DoFs, found {demo.n_dofs}")
-    for kind, found, own in (
+    for kind, actual, expected in (
         ("names", demo.names, model.names),
         ("units", demo.units, model.units),
     ):
-        if found is not None and list(found) != list(own):
-            raise ValueError(f"demo {m}: {kind} {found}, expected those of the model, {own}")
+        if actual is not None and list(actual) != list(expected):
+            raise ValueError(f"demo {m}: {kind} {actual}, expected those of the model, {expected}")
 
 
 def fan(
@@ -97,21 +97,20 @@ def fan(
     ends: tuple[str, str] = ("a", "b"),
     figure: Figure | None = None,
 ) -> Figure:
-    """Draws the movements from one style to another.
+    """Draws movements whose conditions are blended from `a` to `b`.
 
     Parameters
     ----------
     model : Model
         The primitive.
     a, b : Conditions
-        Conditions of the first and last movement, such as two of `Model.conditions`; those in
-        between are blended.
+        Conditions of the first and the last movement, such as two of `Model.conditions`.
     n : int
         Number of movements, at least 2.
     ends : tuple of str
-        Names of `a` and `b`.
+        Labels of `a` and `b`.
     figure : matplotlib.figure.Figure, optional
-        Where to draw.
+        Figure to draw on; by default a new one.
 
     Raises
     ------
@@ -123,24 +122,24 @@ def fan(
     if n < 2:
         raise ValueError(f"n = {n}: must be at least 2, the two ends")
     shares = np.linspace(0, 1, n)
-    dt = model.durations.min() / SAMPLES
+    dt = model.durations.min() / N_SAMPLES
     rollouts = [model.rollout(blend(a, b, share), dt=dt) for share in shares]
     figure, (panels,) = movement_panels(model, [""], figure)
     from matplotlib.cm import ScalarMappable
 
-    shade = ScalarMappable(cmap=gradient())
-    shade.set_clim(0, 1)
-    for share, made in zip(shares, rollouts, strict=True):
+    mapping = ScalarMappable(cmap=colormap())
+    mapping.set_clim(0, 1)
+    for share, rollout in zip(shares, rollouts, strict=True):
         draw_movement(
             panels,
-            made.time,
-            made.position,
-            color=shade.to_rgba(share),
+            rollout.time,
+            rollout.position,
+            color=mapping.to_rgba(share),
             linewidth=2.4 if share in (0, 1) else 1.2,
             marker="o",
             markevery=[0],
             markersize=4,
         )
-    bar = figure.colorbar(shade, ax=panels, ticks=[0, 0.5, 1], aspect=40)
+    bar = figure.colorbar(mapping, ax=panels, ticks=[0, 0.5, 1], aspect=40)
     bar.ax.set_yticklabels([ends[0], "half way", ends[1]])
     return figure

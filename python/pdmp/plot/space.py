@@ -1,4 +1,4 @@
-"""Figures of the style space: how many dimensions it needs, and where the demonstrations lie."""
+"""Figures of the style space: its dimension, and the styles of the demonstrations."""
 
 from __future__ import annotations
 
@@ -8,45 +8,54 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pdmp._native import Model
-from pdmp.plot._canvas import BLUE, GREY, MARKERS, ORANGE, PALETTE, canvas, dress, gradient
+from pdmp.plot.canvas import (
+    BLUE,
+    GREY,
+    MARKERS,
+    ORANGE,
+    PALETTE,
+    colormap,
+    ensure_figure,
+    label_axes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 def spectrum(model: Model, *, figure: Figure | None = None) -> Figure:
-    """Draws the share of each singular value in their sum, and how many were kept.
+    """Draws the share of each singular value in their sum, and the number J of styles.
 
     Parameters
     ----------
     model : Model
         The primitive.
     figure : matplotlib.figure.Figure, optional
-        Where to draw.
+        Figure to draw on; by default a new one.
 
     Raises
     ------
     ImportError
         matplotlib is not installed.
     """
-    figure = canvas(figure, 7.0, 4.0)
+    figure = ensure_figure(figure, 7.0, 4.0)
     from matplotlib.ticker import MaxNLocator
 
     total = model.singular_values.sum() or 1.0
     share = 100 * model.singular_values / total
     number = np.arange(1, len(share) + 1)
-    kept = model.n_styles
+    n_kept = model.n_styles
     axes = figure.subplots()
-    axes.bar(number[:kept], share[:kept], color=BLUE, label=f"kept: J = {kept}")
-    if kept < len(share):
-        axes.bar(number[kept:], share[kept:], color=GREY, label="left out")
+    axes.bar(number[:n_kept], share[:n_kept], color=BLUE, label=f"kept: J = {n_kept}")
+    if n_kept < len(share):
+        axes.bar(number[n_kept:], share[n_kept:], color=GREY, label="left out")
     axes.plot(number, share.cumsum(), "o-", color=ORANGE, markersize=4, label="sum so far")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set_xlim(0.4, len(share) + 0.6)
     axes.set_ylim(0, 105)
     truncated = f"{100 * model.truncation_error:.2g} % of the targets' RMS left out"
-    title = f"J = {kept} of {model.n_demos}: {truncated}"
-    dress(axes, "singular value, of those computed", "share of their sum [%]", title)
+    title = f"J = {n_kept} of {model.n_demos}: {truncated}"
+    label_axes(axes, "singular value, of those computed", "share of their sum [%]", title)
     axes.legend(frameon=False, loc="center right")
     return figure
 
@@ -56,17 +65,17 @@ def styles(
 ) -> Figure:
     """Draws the style of each demonstration, in the planes of the first three style parameters.
 
-    Without labels, the context serves where that is a single one, or the colour tells it where
-    it is a single number.
+    Without labels, a context of a single label labels the demonstrations, and a context of a single
+    number is their colour.
 
     Parameters
     ----------
     model : Model
         The primitive.
     labels : sequence of str, optional
-        What each of the M demonstrations shows.
+        Label of each of the M demonstrations.
     figure : matplotlib.figure.Figure, optional
-        Where to draw.
+        Figure to draw on; by default a new one.
 
     Raises
     ------
@@ -82,11 +91,11 @@ def styles(
     context = model.contexts if labels is None else None
     if isinstance(context, list) and len(context[0]) == 1:
         labels = [str(value) for (value,) in context]
-    # The index of the demonstration takes the place of a second style parameter.
+    # With a single style parameter, the second axis is the index of the demonstration.
     points = np.column_stack([model.styles, np.arange(model.n_demos)])
     names = [f"style $s_{{{j + 1}}}$" for j in range(model.n_styles)] + ["demonstration"]
     others = [1, 2] if model.n_styles > 2 else [1]
-    figure = canvas(figure, 1.0 + 4.5 * len(others), 4.2)
+    figure = ensure_figure(figure, 1.0 + 4.5 * len(others), 4.2)
     groups = list(dict.fromkeys(labels or [""]))
     values = None
     if isinstance(context, np.ndarray) and context.shape[1] == 1:
@@ -94,17 +103,17 @@ def styles(
     panels = figure.subplots(1, len(others), squeeze=False)[0]
     for axes, other in zip(panels, others, strict=True):
         for k, group in enumerate(groups):
-            chosen = [m for m in range(model.n_demos) if labels is None or labels[m] == group]
+            members = [m for m in range(model.n_demos) if labels is None or labels[m] == group]
             dots = axes.scatter(
-                points[chosen, 0],
-                points[chosen, other],
+                points[members, 0],
+                points[members, other],
                 c=PALETTE[k % len(PALETTE)] if values is None else values,
-                cmap=None if values is None else gradient(),
+                cmap=None if values is None else colormap(),
                 marker=MARKERS[(k + k // len(PALETTE)) % len(MARKERS)],
                 s=36,
                 label=group,
             )
-        dress(axes, names[0], names[other])
+        label_axes(axes, names[0], names[other])
     if values is not None:
         figure.colorbar(dots, ax=list(panels), label="context")
     elif labels is not None:

@@ -1,9 +1,9 @@
 """Preparation of raw recordings for `pdmp.fit`.
 
-`unwrap` removes jumps of angles, `lowpass` noise, `trim` the rests at both ends; `resample` gives a
-constant interval, `cut` the parts between given times. Each takes one demonstration, a sequence or
-a mapping as a reader returns it, and returns as many results. `cycles` turns cyclic recordings into
-demonstrations of a rhythmic primitive::
+`unwrap` removes jumps of angles, `lowpass` noise, `trim` periods of rest at both ends; `resample`
+gives a constant interval, `cut` the parts between given times. Each takes one demonstration, or a
+sequence or mapping of them as the readers return, and returns a result for each. `cycles` converts
+cyclic recordings to demonstrations of a rhythmic primitive::
 
     cycles = pdmp.preprocessing.cycles(pdmp.io.read_csv("walk.csv"))
     model = pdmp.fit(cycles, kind="rhythmic")

@@ -1,4 +1,4 @@
-"""Functions of one demonstration, applied to each of several."""
+"""Vectorisation of functions of one demonstration."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
@@ -13,7 +13,7 @@ Name = TypeVar("Name")
 
 
 class Vectorized(Protocol[P, R]):
-    """A function of one demonstration, or of each of several, which gives as many results."""
+    """Function of one demonstration, or of each of a sequence or mapping of them."""
 
     @overload
     def __call__(self, demo: Demonstration, *args: P.args, **kwargs: P.kwargs) -> R: ...
@@ -33,12 +33,12 @@ def vectorized(function: Callable[Concatenate[Demonstration, P], R]) -> Vectoriz
     @wraps(function)
     def for_each(demo: Any, *args: Any, **kwargs: Any) -> Any:
         if isinstance(demo, Mapping):
-            return {name: _named(name, one, args, kwargs) for name, one in demo.items()}
+            return {name: _apply(name, one, args, kwargs) for name, one in demo.items()}
         if isinstance(demo, Sequence) and not isinstance(demo, str):
-            return [_named(f"demo {m}", one, args, kwargs) for m, one in enumerate(demo)]
+            return [_apply(f"demo {m}", one, args, kwargs) for m, one in enumerate(demo)]
         return function(demo, *args, **kwargs)
 
-    def _named(name: object, demo: Demonstration, args: Any, kwargs: Any) -> Any:
+    def _apply(name: object, demo: Demonstration, args: Any, kwargs: Any) -> Any:
         try:
             return function(demo, *args, **kwargs)
         except ValueError as error:

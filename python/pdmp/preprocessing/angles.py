@@ -7,21 +7,21 @@ from pdmp._native import Demonstration
 
 
 def unwrap(demo: Demonstration) -> Demonstration:
-    """Removes jumps by a full turn from the angles of a recording.
+    """Removes jumps by full turns from the angles of a recording.
 
-    Where an angle jumps by more than half a turn from one sample to the next, the full turns that
-    bring it nearest are added from there on. A goal is moved by as many turns as the last sample.
+    After a jump by more than half a turn between two samples, the full turns that minimise the jump
+    are added to all later samples. The goal moves by the turns of the last sample.
 
     Parameters
     ----------
     demo : Demonstration
-        A recording. Degrees of freedom whose unit is "rad", "deg" or "°" are angles; all are, in
-        radians, where no units are known.
+        A recording. Degrees of freedom with unit "rad", "deg" or "°" are angles; without units,
+        all are angles in rad.
 
     Returns
     -------
     Demonstration
-        At the same times, with its names, units and context.
+        Unwrapped recording at the same times, with its names, units and context.
     """
     (position,), rest = demo.__getnewargs_ex__()
     units = demo.units or ["rad"] * demo.n_dofs

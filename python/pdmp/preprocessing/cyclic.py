@@ -25,34 +25,33 @@ class Rejected(NamedTuple):
 
 
 class Growth(NamedTuple):
-    """Gain of a degree of freedom per cycle of a recording, which closed cycles lack."""
+    """Gain of a degree of freedom per cycle of a recording, which is removed from closed cycles."""
 
     recording: int
     """Index of the recording."""
     dof: int
     """Index of the degree of freedom."""
     gain: float
-    """Gain in a cycle, the median one by size, in the unit of the degree of freedom."""
+    """Gain per cycle of median magnitude, in the unit of the degree of freedom."""
     turns: int
     """Full turns of an angle per cycle; 0 for other quantities."""
 
 
 class Cycles(Sequence[Demonstration]):
-    """Closed cycles, in one phase, for `fit(kind="rhythmic")`.
+    """Closed cycles that begin at a common phase, for `fit(kind="rhythmic")`.
 
     Attributes
     ----------
     periods : (K,) array
-        Period of each in s: its number of samples times its dt.
+        Period of each cycle in s: its number of samples times its dt.
     recordings : list of int
-        Index of the recording that each is from.
+        Index of the recording of each cycle.
     rejected : list of Rejected
         Rejected cycles, and recordings without a period, with the reasons.
     gains : (K, D) array
-        Gain of each degree of freedom from the beginning to the end of a cycle, before its
-        distribution over the cycle.
+        Gain of each degree of freedom over each cycle, before its removal.
     growths : list of Growth
-        Degrees of freedom that turn, or gain more per cycle than they move within it.
+        Degrees of freedom that turn, or whose gain per cycle exceeds their range within it.
     """
 
     def __init__(
@@ -80,7 +79,7 @@ class Cycles(Sequence[Demonstration]):
     @overload
     def __getitem__(self, index: slice) -> list[Demonstration]: ...
     def __getitem__(self, index: Any) -> Any:
-        """Returns a cycle, or a list of several."""
+        """Returns a cycle, or a list of cycles for a slice."""
         return self._demos[index]
 
     def __repr__(self) -> str:
@@ -92,81 +91,86 @@ class Cycles(Sequence[Demonstration]):
 def cycles(
     recordings: Demonstration | Sequence[Demonstration] | Mapping[str, Demonstration],
     *,
-    events: ArrayLike | Sequence[ArrayLike] | Mapping[str, ArrayLike] | None = None,
+    onsets: ArrayLike | Sequence[ArrayLike] | Mapping[str, ArrayLike] | None = None,
     average: bool = False,
 ) -> Cycles:
-    """Cuts cyclic recordings into closed cycles that begin in the same phase.
+    """Cuts cyclic recordings into closed cycles that begin at the same phase.
 
-    Without events, `period` finds the period of each recording, and a template of its mean cycle
-    when each cycle begins: in the phase of the first recording's first sample, to which the others
-    are turned by circular cross-correlation with its mean cycle.
+    Without onsets, `period` estimates the period of each recording, and matching with a template,
+    its mean cycle, finds the beginnings of the cycles. They have the phase of the first sample of
+    the first recording; circular cross-correlation of the mean cycles aligns the other recordings.
 
-    A cycle is C samples, as many as its recording has in a period, of the cubic smoothing spline
-    that generalised cross-validation chooses, with what that takes off the nearest recorded
-    samples: noise stays white, and a fit can still smooth it. The gain from f(0) to f(T) of the
-    spline f is distributed over the cycle, so that it joins itself without a jump and keeps its
-    mean::
+    A cycle has C samples, the number of samples of its recording in a period. They are those of a
+    cubic smoothing spline f, selected by generalised cross-validation, plus its residuals at the
+    nearest recorded samples: noise stays white, so that a fit can smooth it. The gain f(T) - f(0)
+    is distributed over the cycle, which makes it continuous and keeps its mean::
 
         y_c = y(c T / C) - (c / C - 1/2) (f(T) - f(0))
 
-    The angle of a wheel or a crank gains full turns per cycle; they are taken off each cycle and
-    all that follow. A unit of angle marks what turns; without units, a gain of one turn in radians
-    or degrees to a hundredth does. Of anything else that gains more per cycle than it moves within
-    it, such as the way walked, a warning gives the gain: a model of closed cycles stays in place.
+    The angle of a wheel or a crank gains full turns per cycle; they are subtracted from each cycle.
+    Angles are degrees of freedom with a unit of angle; without units, those that gain one turn, in
+    rad or degrees, to a hundredth. For other quantities whose gain per cycle exceeds their range
+    within it, such as the distance walked, a warning reports the gain: a model of closed cycles
+    stays in place.
 
     A cycle is rejected if its period differs from the median of its recording by more than 3.5
-    robust standard deviations and 10 %, or its shape from the median cycle by 3.5 robust standard
-    deviations more than usual, twice what is usual, and a quarter of the movement's standard
-    deviation. A recording among several that does not repeat itself is rejected with a warning.
+    robust standard deviations and 10 %, or if the distance of its shape from the median cycle
+    exceeds the median distance by 3.5 robust standard deviations and by a factor of two, and
+    exceeds a quarter of the movement's standard deviation. A recording among several without a
+    period is rejected with a warning.
 
     Parameters
     ----------
     recordings : Demonstration, or sequence or mapping of Demonstration
         Recordings of at least one cycle and a half, with `dt` or `time`.
-    events : (K,) array_like, or one for each recording, optional
+    onsets : (K,) array_like, or one for each recording, optional
         Times in s at which cycles begin, such as foot strikes, on the clock of the recording; the
-        last ends the last cycle. Of a mapping of recordings, they may be a mapping too.
+        last ends the last cycle. For a mapping of recordings, a mapping is possible too.
     average : bool
-        Make one mean cycle of each recording, instead of keeping each.
+        Return the mean cycle of each recording instead of all cycles.
 
     Returns
     -------
     Cycles
-        Demonstrations with `dt`, such that T · dt is the period; names, units and context go along.
+        Demonstrations with `dt`, such that T · dt is the period, and with names, units and context.
 
     Raises
     ------
     ValueError
-        No recording with a period, with the correlation of the first with itself; a recording
-        without times, or with other degrees of freedom than the first; events that do not increase
-        or lie outside.
+        No recording with a period (the text gives the autocorrelation of the first); a recording
+        without times, or with other degrees of freedom than the first; onsets that do not increase
+        or lie outside the recording.
 
     Warns
     -----
     UserWarning
-        A recording that does not repeat itself; degrees of freedom that gain more per cycle than
-        they move within it and are no angles of full turns.
+        A recording without a period; degrees of freedom, other than angles of full turns, whose
+        gain per cycle exceeds their range within it.
 
     References
     ----------
     B. Iglewicz, D. C. Hoaglin, How to detect and handle outliers, ASQC Quality Press 1993
     """
-    if isinstance(recordings, Mapping) and isinstance(events, Mapping):
-        if lone := sorted(map(str, recordings.keys() ^ events.keys())):
-            raise value_error(f"events: '{lone[0]}' is among the recordings or the events alone")
-        events = [events[name] for name in recordings]
-    begins = cast("Sequence[ArrayLike] | None", events)
+    if isinstance(recordings, Mapping) and isinstance(onsets, Mapping):
+        if unpaired := sorted(map(str, recordings.keys() ^ onsets.keys())):
+            raise value_error(
+                f"onsets: '{unpaired[0]}' is among the recordings or the onsets alone"
+            )
+        onsets = [onsets[name] for name in recordings]
+    per_recording = cast("Sequence[ArrayLike] | None", onsets)
     if isinstance(recordings, Demonstration):
         recordings = [recordings]
-        begins = None if events is None else [cast(ArrayLike, events)]
-    demos, periods, gains, sources, odd, grown = _native.cycles(recordings, begins, average)
-    for recording, _, _, reason, whole in odd:
+        per_recording = None if onsets is None else [cast(ArrayLike, onsets)]
+    demos, periods, gains, sources, outliers, gained = _native.cycles(
+        recordings, per_recording, average
+    )
+    for recording, _, _, reason, whole in outliers:
         if whole:
             warn(f"recording {recording} is left out: {reason}")
-    growths = [Growth(*growth) for growth in grown]
+    growths = [Growth(*growth) for growth in gained]
     if gaining := [growth for growth in growths if not growth.turns]:
         warn(_gains(gaining, demos))
-    rejected = [Rejected(*cycle[:4]) for cycle in odd]
+    rejected = [Rejected(*cycle[:4]) for cycle in outliers]
     return Cycles(demos, periods, sources, rejected, np.array(gains), growths)
 
 

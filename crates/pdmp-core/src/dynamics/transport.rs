@@ -37,16 +37,16 @@ pub(crate) struct Transport {
 
 /// Interval of the clock on which ℓ is one cubic. A control loop keeps it and seldom needs the next one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stretch {
+pub(crate) struct TransportSegment {
     from: f64,
     to: f64,
     /// Coefficients in powers of u − `from`.
     cubic: [f64; 4],
 }
 
-/// Lag ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
+/// TransportSample ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Lag {
+pub(crate) struct TransportSample {
     pub(crate) value: f64,
     pub(crate) slope: f64,
     pub(crate) bend: f64,
@@ -104,23 +104,23 @@ impl Transport {
     }
 
     /// Returns the interval that contains clock `u`.
-    pub(crate) fn stretch(&self, u: f64) -> Stretch {
+    pub(crate) fn stretch(&self, u: f64) -> TransportSegment {
         // The cast saturates: a negative clock is evaluated in the first cell.
         let cell = (u * self.cells_per_clock) as usize;
         let at = |knot: usize| self.width * knot as f64;
         match self.cubics.get(cell) {
-            Some(&cubic) => Stretch { from: at(cell), to: at(cell + 1), cubic },
-            None => Stretch { from: at(self.cubics.len()), to: f64::INFINITY, cubic: [0.0; 4] },
+            Some(&cubic) => TransportSegment { from: at(cell), to: at(cell + 1), cubic },
+            None => TransportSegment { from: at(self.cubics.len()), to: f64::INFINITY, cubic: [0.0; 4] },
         }
     }
 
     /// Returns the lag ℓ at clock `u`.
-    pub(crate) fn lag(&self, u: f64) -> Lag {
+    pub(crate) fn lag(&self, u: f64) -> TransportSample {
         self.stretch(u).lag(u)
     }
 }
 
-impl Stretch {
+impl TransportSegment {
     /// Returns whether the interval still contains a clock that has advanced to `u`.
     #[inline(always)]
     pub(crate) fn reaches(&self, u: f64) -> bool {
@@ -129,11 +129,15 @@ impl Stretch {
 
     /// Returns the lag ℓ at clock `u`.
     #[inline(always)]
-    pub(crate) fn lag(&self, u: f64) -> Lag {
+    pub(crate) fn lag(&self, u: f64) -> TransportSample {
         let ([value, slope, square, cube], t) = (self.cubic, u - self.from);
         let rest = cube * t;
         let bend = square + rest;
         let twice = bend + bend;
-        Lag { value: value + t * (slope + t * bend), slope: slope + t * (twice + rest), bend: twice + 4.0 * rest }
+        TransportSample {
+            value: value + t * (slope + t * bend),
+            slope: slope + t * (twice + rest),
+            bend: twice + 4.0 * rest,
+        }
     }
 }

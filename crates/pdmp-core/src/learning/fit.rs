@@ -226,7 +226,7 @@ impl Training<'_> {
                 ))?;
                 let all = Factors::of(forcing, Truncation::Share(1.0), &mut |share| progress(0.5 * share))?;
                 let selection =
-                    StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical)?;
+                    StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical);
                 let mut validating = |share: f64| progress(0.5 + 0.5 * share);
                 let n_styles = selection.n_styles(columns, numbers, options.map, &mut validating)?;
                 Ok(all.leading(n_styles))

@@ -110,7 +110,7 @@ impl From<Kind> for CanonicalOptions {
 /// use pdmp_core::learning::Truncation;
 /// use pdmp_core::numerics::Smoothing;
 ///
-/// let options = FitOptions::discrete().n_styles(Truncation::Rank(3)).smoothing(Smoothing::CutOff(6.0));
+/// let options = FitOptions::discrete().n_styles(Truncation::Rank(3)).smoothing(Smoothing::CutOff { hz: 6.0 });
 /// assert_eq!(options.alpha_z, 25.0);
 /// ```
 #[derive(Clone, Debug)]

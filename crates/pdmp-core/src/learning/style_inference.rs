@@ -28,12 +28,12 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 
 /// Estimates the style (J,) of a demonstration outside the training set.
 ///
-/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals, and a prior as wide as the
-/// styles of the demonstrations. A rhythmic demonstration that begins in another phase than those of the model is first
-/// shifted to their phase.
+/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals and a zero-mean Gaussian prior
+/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that
+/// begins in another phase than those of the model is first shifted to their phase.
 ///
 /// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
-/// same warp, or by landmarks, for which `events` (E,) are the times in seconds.
+/// same warp, or by landmarks, whose times `landmarks` (E,) are in seconds.
 ///
 /// # Errors
 /// A demonstration that does not match the model, one that no style describes, or landmarks where the model has none.
@@ -41,15 +41,14 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 /// ```
 /// # use ndarray::Array2;
 /// use pdmp_core::learning::{Truncation, style_of};
-/// use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
+/// use pdmp_core::{Demonstration, FitOptions, Sampling, fit};
 ///
 /// # let arch = |h: f64| {
 /// #     let position = Array2::from_shape_fn((101, 1), |(c, _)| h * (0.0314 * c as f64).sin().powi(3));
 /// #     Demonstration::new(position, Sampling::Uniform { dt: 0.01 })
 /// # };
 /// let demonstrations = [arch(1.0)?, arch(2.0)?];
-/// let options = FitOptions { n_styles: Truncation::Rank(1).into(), ..FitOptions::new(Kind::Discrete) };
-/// let model = fit(&demonstrations, &options)?;
+/// let model = fit(&demonstrations, &FitOptions::discrete().n_styles(Truncation::Rank(1)))?;
 /// let style = style_of(&model, &arch(1.5)?, None, None, None)?;
 /// let styles = &model.demonstrated().styles;
 /// assert!(styles[[0, 0]] < style[0] && style[0] < styles[[1, 0]]);
@@ -60,7 +59,7 @@ pub fn style_of(
     demo: &Demonstration,
     dt: Option<f64>,
     period: Option<f64>,
-    events: Option<&[f64]>,
+    landmarks: Option<&[f64]>,
 ) -> Result<Vec<f64>> {
     let n_dofs = model.n_dofs();
     if demo.n_dofs() != n_dofs {
@@ -85,16 +84,18 @@ pub fn style_of(
     };
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
-    let by_events = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
-    match (&model.learnt.template, events) {
-        (None, Some(events)) if by_events => aligned.register_to(model.breaks(), events)?,
-        (None, None) if by_events => {
-            return Err(Error::Arguments("the model was fitted with events: pass events= of this demonstration too"));
+    let by_landmarks = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
+    match (&model.learnt.template, landmarks) {
+        (None, Some(landmarks)) if by_landmarks => aligned.register_to(model.breaks(), landmarks)?,
+        (None, None) if by_landmarks => {
+            return Err(Error::Arguments(
+                "the model was fitted with landmarks: pass the landmarks of this demonstration too",
+            ));
         }
         (_, Some(_)) => {
-            return Err(Error::Arguments("the model was fitted without events: leave out events="));
+            return Err(Error::Arguments("the model was fitted without landmarks: leave out the landmarks"));
         }
-        (Some(template), None) => aligned.warp_to(template)?,
+        (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}
     }
     let mut targets = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;

@@ -150,7 +150,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::dynamics::transport::Lag;
+    use crate::dynamics::transport::TransportSample;
 
     const CANONICAL: Canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 2.0 };
 
@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn movements_at_rest_have_a_profile() {
         let transport = transport_profile(Array3::zeros((2, 4, 3)), Array2::zeros((2, 3)), CANONICAL).unwrap();
-        assert!(transport.lag(0.0).value == -1.0 && transport.lag(2.0) == Lag::default());
+        assert!(transport.lag(0.0).value == -1.0 && transport.lag(2.0) == TransportSample::default());
     }
 
     proptest! {
@@ -204,10 +204,10 @@ mod tests {
             let displacements = Array3::from_shape_vec((3, 40, 2), numbers).unwrap();
             let reaches = Array2::from_shape_vec((3, 2), reaches).unwrap();
             let transport = transport_profile(displacements, reaches.clone(), CANONICAL).unwrap();
-            let lags: Vec<Lag> = (0..=1000).map(|k| transport.lag(0.002 * f64::from(k))).collect();
+            let lags: Vec<TransportSample> = (0..=1000).map(|k| transport.lag(0.002 * f64::from(k))).collect();
             prop_assert!(lags.windows(2).all(|pair| pair[0].value <= pair[1].value + 1e-15));
             prop_assert!(lags.iter().all(|lag| lag.slope >= -1e-12));
-            let start = Lag { value: -1.0, ..Lag::default() };
+            let start = TransportSample { value: -1.0, ..TransportSample::default() };
             prop_assert_eq!(lags[0], start);
             let last = transport.lag(2.0 - 1e-9);
             prop_assert!(last.value.abs() < 1e-15 && last.slope.abs() < 1e-12 && last.bend.abs() < 1e-4);
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn immediate_transport_has_no_lag() {
         for u in [-1.0, 0.0, 0.5, 1e300] {
-            assert_eq!(Transport::immediate().lag(u), Lag::default());
+            assert_eq!(Transport::immediate().lag(u), TransportSample::default());
         }
     }
 

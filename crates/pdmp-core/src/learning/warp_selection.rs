@@ -42,7 +42,7 @@ impl WarpSelection<'_> {
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<bool> {
         let Some(folds) = folds(self.numbers) else { return Ok(true) };
-        let recorded = positions(linear, kind)?;
+        let recorded = positions(linear, kind);
         let mut share = 0.0;
         let mut errors = |aligned: &Aligned| {
             let errors = self.errors(&folds, aligned, &recorded, kind, &mut |done| progress(share + 0.5 * done));
@@ -64,7 +64,7 @@ impl WarpSelection<'_> {
         kind: Kind,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Vec<f64>> {
-        let positions = positions(aligned, kind)?;
+        let positions = positions(aligned, kind);
         let n_styles = (self.n_styles)(aligned)?;
         let mut errors = Vec::new();
         for (k, Fold { training, held_out }) in folds.iter().enumerate() {
@@ -86,14 +86,14 @@ impl WarpSelection<'_> {
 }
 
 /// Returns the positions (M, S·D) over the phase.
-fn positions(aligned: &Aligned, kind: Kind) -> Result<Array2<f64>> {
+fn positions(aligned: &Aligned, kind: Kind) -> Array2<f64> {
     let n_samples = kind.samples(STEPS);
     let sampled = aligned.clone().resampled(n_samples);
     let mut positions = Array2::zeros((aligned.n_demos(), n_samples * aligned.demo(0).n_dofs()));
     for (m, mut row) in positions.rows_mut().into_iter().enumerate() {
         sampled.sample(m, crate::validate::row_major_mut(&mut row));
     }
-    Ok(positions)
+    positions
 }
 
 /// Returns the outputs of the map, which are the component scores and the logarithms of the segment durations, and the

@@ -59,9 +59,9 @@ pub struct Rejected {
 
 /// Segments cyclic recordings into cycles.
 ///
-/// Without `events`, [`super::period`] estimates the period of each recording, and template matching the onsets of its
-/// cycles, which begin in the phase of the first sample of the first recording. With `events`, one list of times in seconds
-/// per recording, cycles extend from each event to the next.
+/// Without `onsets`, [`super::period`] estimates the period of each recording, and template matching the onsets of its
+/// cycles, which begin in the phase of the first sample of the first recording. With `onsets`, one list of times in seconds
+/// per recording, cycles extend from each onset to the next.
 ///
 /// A cycle has C samples at the sampling rate of the recording, with the noise of the nearest recorded samples, which stays
 /// white. The gain of the smoothed recording over the cycle, from f(0) to f(T), is removed linearly, which preserves the
@@ -94,12 +94,12 @@ pub struct Rejected {
 /// ```
 ///
 /// # Errors
-/// No recording, no recording with a period, a recording without times, events that do not increase or lie outside their
+/// No recording, no recording with a period, a recording without times, onsets that do not increase or lie outside their
 /// recording.
-pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: CycleOutput) -> Result<Cycles> {
+pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: CycleOutput) -> Result<Cycles> {
     let n_dofs = recordings.first().ok_or(Error::NoDemonstrations)?.n_dofs();
-    if let Some(found) = events.map(<[_]>::len).filter(|&found| found != recordings.len()) {
-        return Err(Error::Length { name: "events", expected: recordings.len(), found, per: "recording" });
+    if let Some(found) = onsets.map(<[_]>::len).filter(|&found| found != recordings.len()) {
+        return Err(Error::Length { name: "onsets", expected: recordings.len(), found, per: "recording" });
     }
     let mut cycles = Cycles { kept: Vec::new(), rejected: Vec::new(), growths: Vec::new() };
     let (mut nominal, mut errors) = (None, Vec::new());
@@ -109,8 +109,8 @@ pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: C
                 return Err(Error::Dofs { expected: n_dofs, found: demo.n_dofs() });
             }
             let curve = Curve::of(demo)?;
-            let bounds = match events {
-                Some(events) => bounds_at_events(&curve, &events[recording]),
+            let bounds = match onsets {
+                Some(onsets) => bounds_at_onsets(&curve, &onsets[recording]),
                 None => find_bounds(&curve, &mut nominal),
             };
             match bounds {
@@ -129,10 +129,10 @@ pub fn cycles(recordings: &[Demonstration], events: Option<&[Vec<f64>]>, keep: C
     if errors.len() == recordings.len() { Err(errors.swap_remove(0)) } else { Ok(cycles) }
 }
 
-/// Returns the median period and the bounds of the cycles between events, in seconds.
-fn bounds_at_events(curve: &Curve, events: &[f64]) -> Result<(f64, Vec<f64>)> {
-    check_times("events", events, curve)?;
-    Ok((median(&intervals(events)), events.to_vec()))
+/// Returns the median period and the bounds of the cycles between onsets, in seconds.
+fn bounds_at_onsets(curve: &Curve, onsets: &[f64]) -> Result<(f64, Vec<f64>)> {
+    check_times("onsets", onsets, curve)?;
+    Ok((median(&intervals(onsets)), onsets.to_vec()))
 }
 
 /// Returns the period and the bounds of the cycles, in seconds, in phase with the `nominal` mean cycle, which the first

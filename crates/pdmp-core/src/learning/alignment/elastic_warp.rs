@@ -55,7 +55,10 @@ impl Aligned<'_> {
         threads.try_for_each_told(
             shapes.axis_iter_mut(Axis(0)).enumerate().collect(),
             || (),
-            |(), (m, mut shape)| aligned.shape(m, &unit, crate::validate::row_major_mut(&mut shape)),
+            |(), (m, mut shape)| {
+                aligned.shape(m, &unit, crate::validate::row_major_mut(&mut shape));
+                Ok(())
+            },
             &mut |share| progress(share / 3.0),
         )?;
         let nominal = self.nominal;
@@ -95,24 +98,20 @@ impl Aligned<'_> {
     }
 
     /// Warps the only demonstration to a template.
-    ///
-    /// # Errors
-    /// As for reading its samples.
-    pub(crate) fn warp_to(&mut self, template: &WarpTemplate) -> Result<()> {
+    pub(crate) fn warp_to(&mut self, template: &WarpTemplate) {
         let (cells, n_dofs) = template.shape.dim();
         let search = Search::new(cells / STEPS, template.slope, n_dofs);
         let (mut shape, mut path) = (vec![0.0; cells * n_dofs], vec![STEPS; search.segments]);
-        self.shape(0, &template.unit, &mut shape)?;
+        self.shape(0, &template.unit, &mut shape);
         let onto = crate::validate::row_major(&template.shape);
         search.run(onto, &shape, &mut path, &mut Scratch::new(&search));
         let segment_durations: Vec<f64> =
             path.iter().map(|&steps| search.seconds(steps, self.clocks[0].duration)).collect();
         self.warps[0] = Some(WarpingFunction::new(self.kind, &search.breaks(), &segment_durations));
-        Ok(())
     }
 
     /// Writes the square-root velocities (N·D) of demonstration `m` in N equal cells of its time, with unit norm.
-    fn shape(&self, m: usize, unit: &[f64], shape: &mut [f64]) -> Result<()> {
+    fn shape(&self, m: usize, unit: &[f64], shape: &mut [f64]) {
         let n_dofs = unit.len();
         let cells = shape.len() / n_dofs;
         let mut edges = vec![0.0; shape.len() + n_dofs];
@@ -132,7 +131,6 @@ impl Aligned<'_> {
             }
             normalise(shape, cells);
         }
-        Ok(())
     }
 }
 
@@ -151,6 +149,7 @@ fn ranges(aligned: &Aligned) -> Vec<f64> {
     (0..aligned.demo(0).n_dofs()).map(range).collect()
 }
 
+/// Returns the Euclidean norm.
 fn norm(vector: &[f64]) -> f64 {
     vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
@@ -210,9 +209,9 @@ impl Scratch {
 impl Search {
     fn new(segments: usize, slope: f64, n_dofs: usize) -> Self {
         // The tolerance includes a bound on the grid despite rounding.
-        let lowest_slope = (STEPS as f64 / slope - 1e-9).ceil() as usize;
-        let highest_slope = (STEPS as f64 * slope + 1e-9).floor() as usize;
-        let slopes = (lowest_slope..=highest_slope)
+        let fewest_steps = (STEPS as f64 / slope - 1e-9).ceil() as usize;
+        let most_steps = (STEPS as f64 * slope + 1e-9).floor() as usize;
+        let slopes = (fewest_steps..=most_steps)
             .map(|steps| {
                 let slope = steps as f64 / STEPS as f64;
                 let cells = std::array::from_fn(|i| {
@@ -243,11 +242,11 @@ impl Search {
 
     /// Returns the first and last time step at which segment `k` can start so that the warp ends with the demonstration.
     fn starts(&self, k: usize) -> [usize; 2] {
-        let [lowest_slope, highest_slope] = [0, self.slopes.len() - 1].map(|i| self.slopes[i].steps);
+        let [fewest_steps, most_steps] = [0, self.slopes.len() - 1].map(|i| self.slopes[i].steps);
         let (n, remaining) = (self.cells(), self.segments - k);
         [
-            (k * lowest_slope).max(n.saturating_sub(remaining * highest_slope)),
-            (k * highest_slope).min(n - remaining * lowest_slope),
+            (k * fewest_steps).max(n.saturating_sub(remaining * most_steps)),
+            (k * most_steps).min(n - remaining * fewest_steps),
         ]
     }
 
@@ -295,10 +294,9 @@ impl Search {
     /// Writes the products of the phase cells of a template segment (10·D) with all time cells of a shape (N·D).
     fn multiply(&self, template: &[f64], shape: &[f64], products: &mut [f64]) {
         let cells = self.cells();
-        for (cell_of_template, products) in template.chunks_exact(self.n_dofs).zip(products.chunks_exact_mut(cells + 2))
-        {
+        for (phase_cell, products) in template.chunks_exact(self.n_dofs).zip(products.chunks_exact_mut(cells + 2)) {
             for (product, cell) in products[1..].iter_mut().zip(shape.chunks_exact(self.n_dofs)) {
-                *product = cell_of_template.iter().zip(cell).map(|(a, b)| a * b).sum();
+                *product = phase_cell.iter().zip(cell).map(|(a, b)| a * b).sum();
             }
             (products[0], products[cells + 1]) = (products[1], products[cells]);
         }

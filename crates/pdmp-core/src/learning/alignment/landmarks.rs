@@ -15,22 +15,23 @@ const MIN_SEGMENT: f64 = 1e-6;
 impl Aligned<'_> {
     /// Divides the phase axis at the landmarks of the nominal demonstration, and registers all demonstrations to it.
     ///
-    /// `events` (M, E) are the times of the landmarks in seconds.
+    /// `landmarks` (M, E) are the times of the landmarks in seconds.
     ///
     /// # Errors
     /// Another number of rows than demonstrations, no column, landmarks out of order or outside a demonstration.
-    pub(super) fn register(&mut self, events: ArrayView2<f64>) -> Result<()> {
-        let (found, expected) = (events.nrows(), self.n_demos());
+    pub(super) fn register(&mut self, landmarks: ArrayView2<f64>) -> Result<()> {
+        let (found, expected) = (landmarks.nrows(), self.n_demos());
         if found != expected {
-            return Err(Error::Length { name: "events", expected, found, per: "demonstration" });
+            return Err(Error::Length { name: "landmarks", expected, found, per: "demonstration" });
         }
-        if events.ncols() == 0 {
+        if landmarks.ncols() == 0 {
             return Err(Error::Arguments(
-                "events is empty: pass an array of shape (M, E) with E of at least 1, in seconds",
+                "landmarks has no columns: pass their times (M, E) in seconds, with E of at least 1",
             ));
         }
-        let mut segment_durations = Array2::zeros((expected, events.ncols() + 1));
-        for (m, (row, mut segment_durations)) in events.rows().into_iter().zip(segment_durations.rows_mut()).enumerate()
+        let mut segment_durations = Array2::zeros((expected, landmarks.ncols() + 1));
+        for (m, (row, mut segment_durations)) in
+            landmarks.rows().into_iter().zip(segment_durations.rows_mut()).enumerate()
         {
             segment_durations.assign(&ArrayView1::from(
                 &self.segment_durations(m, &row.to_vec()).map_err(|error| error.in_demo(m))?,
@@ -52,15 +53,15 @@ impl Aligned<'_> {
     ///
     /// # Errors
     /// Another number of landmarks than breaks between segments, landmarks out of order or outside the demonstration.
-    pub(crate) fn register_to(&mut self, breaks: &[f64], events: &[f64]) -> Result<()> {
-        check_vector("events", events, breaks.len() - 2, "break between segments")?;
-        let segment_durations = self.segment_durations(0, events)?;
+    pub(crate) fn register_to(&mut self, breaks: &[f64], landmarks: &[f64]) -> Result<()> {
+        check_vector("landmarks", landmarks, breaks.len() - 2, "break between segments")?;
+        let segment_durations = self.segment_durations(0, landmarks)?;
         self.warps[0] = Some(WarpingFunction::new(self.kind, breaks, &segment_durations));
         Ok(())
     }
 
     /// Returns the segment durations (E+1,) of demonstration `m` in seconds.
-    fn segment_durations(&self, m: usize, events: &[f64]) -> Result<Vec<f64>> {
+    fn segment_durations(&self, m: usize, landmarks: &[f64]) -> Result<Vec<f64>> {
         let clock = self.clocks[m];
         let start = match clock.ticks {
             Ticks::Even { .. } => 0.0,
@@ -68,12 +69,12 @@ impl Aligned<'_> {
         };
         let end = start + clock.duration;
         let mut previous = start;
-        let mut segment_durations = Vec::with_capacity(events.len() + 1);
-        for (index, &time) in events.iter().enumerate() {
+        let mut segment_durations = Vec::with_capacity(landmarks.len() + 1);
+        for (index, &time) in landmarks.iter().enumerate() {
             // NaN compares as out of order.
             let in_order = time - previous > MIN_SEGMENT * clock.duration && end - time > MIN_SEGMENT * clock.duration;
             if !in_order {
-                return Err(Error::Event { index, time, before: previous, end });
+                return Err(Error::Landmark { index, time, before: previous, end });
             }
             segment_durations.push(time - previous);
             previous = time;

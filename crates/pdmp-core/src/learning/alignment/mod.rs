@@ -59,7 +59,7 @@ pub enum TimeScaling {
     WarpIfBetter,
     /// Landmark registration: piecewise linear scaling between landmarks. Their times (M, E) are in seconds, from the
     /// first sample or on the clock of the time stamps.
-    Events(Array2<f64>),
+    Landmarks(Array2<f64>),
 }
 
 /// Demonstrations on a common phase axis, each of which is resampled on demand.
@@ -173,7 +173,7 @@ impl TimeScaling {
                 let segments = warp.n_segments.min(aligned.max_segments());
                 aligned.warp(&TimeWarp { n_segments: segments, ..warp }, unit, threads, progress).map(Some)
             }
-            Self::Events(events) => aligned.register(events.view()).map(|()| None),
+            Self::Landmarks(landmarks) => aligned.register(landmarks.view()).map(|()| None),
         }
     }
 }

@@ -44,11 +44,11 @@ impl<'a> Clock<'a> {
             }
             (Sampling::Unknown, None) => {
                 return Err(Error::Arguments(
-                    "no sampling interval: pass dt= in seconds, or demonstrations with time=",
+                    "no sampling interval: pass dt in seconds, or demonstrations with time stamps",
                 ));
             }
             (Sampling::Stamped { .. }, _) if alignment.kind == Kind::Rhythmic && period.is_none() => {
-                return Err(Error::Arguments("a time-stamped cycle has no known period: pass period= in seconds"));
+                return Err(Error::Arguments("a time-stamped cycle has no known period: pass period in seconds"));
             }
             (Sampling::Stamped { time }, _) => {
                 let duration = time[n - 1] - time[0];

@@ -170,7 +170,7 @@ fn few_leading_factors_are_those_of_all() {
     }
 }
 
-/// Where the spectrum decays slowly or has no gap after J, a slower method is used and the error stays correct.
+/// For spectra that decay slowly or have no gap after J, a slower method is used and the error stays correct.
 #[test]
 fn slow_and_clustered_spectra_are_factorised() {
     let (rows, columns) = (300, 400);

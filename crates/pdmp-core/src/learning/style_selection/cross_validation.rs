@@ -42,7 +42,7 @@ impl<'a> StyleSelection<'a> {
         transport: &Transport,
         attractor: Attractor,
         canonical: Canonical,
-    ) -> Result<Self> {
+    ) -> Self {
         let kind = canonical.kind();
         let n_samples = kind.samples(STEPS);
         let step = attractor.propagator(canonical.extent() / STEPS as f64).transition;
@@ -69,7 +69,7 @@ impl<'a> StyleSelection<'a> {
             let mut residual = selection.residuals.index_axis_mut(Axis(0), m);
             residual -= &frame;
         }
-        Ok(selection)
+        selection
     }
 
     /// Returns the smallest number of styles within one standard error of the lowest cross-validation error.
@@ -165,9 +165,9 @@ fn one_standard_error_rule(errors: &[Vec<f64>]) -> usize {
     let errors = Array2::from_shape_fn((errors.len(), most), |(i, j)| errors[i][j]);
     let means = errors.mean_axis(Axis(0)).unwrap_or_default();
     let best = (0..most).min_by(|&i, &j| means[i].total_cmp(&means[j])).unwrap_or(0);
-    let close = |j: &usize| {
+    let within = |j: &usize| {
         let excess = &errors.slice(s![.., *j]) - &errors.slice(s![.., best]);
         excess.mean().unwrap_or(0.0) <= excess.std(1.0) / n.sqrt()
     };
-    1 + (0..best).find(close).unwrap_or(best)
+    1 + (0..best).find(within).unwrap_or(best)
 }

@@ -13,8 +13,8 @@ from pathlib import Path
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yields a temporary path, whose file replaces `path` when the block ends without an error.
 
-    An error or an interruption leaves what was at `path` before, and nothing beside it. What a link
-    leads to is replaced, not the link; a pipe or a device is written to.
+    After an error or an interruption the former file is unchanged and the temporary one is removed.
+    Symbolic links are followed. A pipe or a device is written directly.
     """
     path = Path(path)
     if path.is_dir():
@@ -23,14 +23,14 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     if path.exists() and not path.is_file():
         yield path
         return
-    place = path.resolve()
-    # No two threads share a draft, and a long name stays short enough for the file system.
-    draft = place.with_name(f".pdmp-{os.getpid()}-{threading.get_ident()}.draft")
+    target = path.resolve()
+    # The name is unique to a thread, and short: a suffix could exceed the limit of the file system.
+    draft = target.with_name(f".pdmp-{os.getpid()}-{threading.get_ident()}.draft")
     try:
         yield draft
-        if place.exists():
-            shutil.copymode(place, draft)
-        os.replace(draft, place)
+        if target.exists():
+            shutil.copymode(target, draft)
+        os.replace(draft, target)
     except OSError as error:
         if error.filename == str(draft):
             error.filename = str(path)

@@ -1,4 +1,4 @@
-//! Demonstrations and trajectories.
+//! Demonstrations, trajectories, and objects that are read as either.
 
 use ndarray::{Array2, ArrayD};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, ToPyArray};
@@ -8,34 +8,42 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::convert::{
-    Matrix, Reduced, Vector, array, optional, plain, shown_context, texts, to_numpy, two_axes, vector,
+    Matrix, Reduced, Vector, array, context_to_python, optional, plain, quoted, texts, to_numpy, two_axes, vector,
 };
-use crate::error::{printable, raise};
+use crate::error::raise;
+use crate::scalar::{Scalar, optional_number};
 
-/// One recorded movement.
+/// Recorded movement.
 ///
 /// Parameters
 /// ----------
-/// position : array_like (T, D) or Trajectory
-///     Positions in the unit of each degree of freedom; at least four samples. A data frame gives names too, those of
-///     its columns, and a trajectory time stamps, names and units, where they are not given.
+/// position : array_like, (T, D), or Trajectory
+///     Positions in the unit of each degree of freedom; at least four samples. The columns of a data frame supply
+///     names, and a trajectory supplies time stamps, names and units, unless they are given.
 /// dt : float, optional
-///     Sampling interval in s. Without `dt` and `time`, the fit is told.
+///     Sampling interval in s. Without `dt` and `time`, `fit` needs it.
 /// time : array_like, (T,), optional
-///     Strictly increasing time stamps in s, or dates of numpy, which count from the first.
+///     Strictly increasing time stamps in s, or datetimes of numpy, counted from the first.
 /// goal : array_like, (D,), optional
-///     Point attractor; the last sample serves otherwise.
+///     Goal g in the unit of each degree of freedom; by default the last sample.
 /// context : array_like or list, (Q,), optional
-///     The condition under which the movement was made, such as an obstacle's height.
-/// names : sequence of str, optional
-///     One name per degree of freedom.
-/// units : sequence of str, optional
-///     One unit per degree of freedom, such as "rad" or "m"; "" where it is not known.
+///     Numbers and labels that describe the task, such as the height of an obstacle, in any unit.
+/// names : sequence of str, (D,), optional
+///     Names of the degrees of freedom, all different.
+/// units : sequence of str, (D,), optional
+///     Units of the degrees of freedom, such as "rad" or "m"; "" if unknown.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Too few samples, numbers that are not finite, times that do not increase, or lengths that do not agree.
+///     Samples are too few, a number is not finite, times do not increase, or lengths differ.
+///
+/// Examples
+/// --------
+/// >>> s = np.linspace(0.0, 1.0, 61)
+/// >>> reach = np.column_stack([s**3 * (10 - 15 * s + 6 * s**2), 0.2 * np.sin(np.pi * s) ** 2])
+/// >>> pdmp.Demonstration(reach, dt=0.02, names=["x", "y"], units=["m", "m"])
+/// <pdmp.Demonstration: 61 samples x 2 DoFs, dt 0.02 s>
 #[pyclass(frozen, module = "pdmp", from_py_object)]
 #[derive(Clone)]
 pub(crate) struct Demonstration(pub(crate) pdmp_core::Demonstration);
@@ -46,14 +54,15 @@ impl Demonstration {
     #[pyo3(signature = (position, *, dt=None, time=None, goal=None, context=None, names=None, units=None))]
     fn new(
         position: &Bound<'_, PyAny>,
-        dt: Option<f64>,
+        dt: Option<Scalar<'_>>,
         time: Option<&Bound<'_, PyAny>>,
         goal: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
         names: Option<&Bound<'_, PyAny>>,
         units: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let stamps = time.map(clock).transpose()?;
+        let dt = optional_number("dt", dt)?;
+        let stamps = time.map(time_stamps).transpose()?;
         let source = Source::of("position", position)?;
         let stamps = stamps.or(source.time.filter(|_| dt.is_none()));
         let sampling = match (dt, stamps) {
@@ -70,23 +79,23 @@ impl Demonstration {
         if let Some(values) = context {
             demo = demo.with_context(crate::convert::context("context", values)?).map_err(raise)?;
         }
-        let given = |name, value: Option<&Bound<'_, PyAny>>| value.map(|value| texts(name, value)).transpose();
-        if let Some(names) = given("names", names)?.or(source.names) {
+        let labels = |name, value: Option<&Bound<'_, PyAny>>| value.map(|value| texts(name, value)).transpose();
+        if let Some(names) = labels("names", names)?.or(source.names) {
             demo = demo.with_names(names).map_err(raise)?;
         }
-        if let Some(units) = given("units", units)?.or(source.units) {
+        if let Some(units) = labels("units", units)?.or(source.units) {
             demo = demo.with_units(units).map_err(raise)?;
         }
         Ok(Self(demo))
     }
 
-    /// Positions (T, D).
+    /// Positions (T, D) in the unit of each degree of freedom.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.position().to_pyarray(py)
     }
 
-    /// Times of the samples (T,) in s; None while the rate is unknown.
+    /// Times of the samples (T,) in s; None if unknown.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
         match self.0.sampling() {
@@ -99,7 +108,7 @@ impl Demonstration {
         }
     }
 
-    /// Sampling interval in s; None unless it was given.
+    /// Sampling interval in s; None if not given.
     #[getter]
     fn dt(&self) -> Option<f64> {
         match self.0.sampling() {
@@ -108,25 +117,25 @@ impl Demonstration {
         }
     }
 
-    /// Point attractor (D,), if one was given.
+    /// Goal g (D,); None if not given.
     #[getter]
     fn goal<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
         self.0.goal().map(|goal| to_numpy(py, goal))
     }
 
-    /// Condition (Q,), if one was given: an array, or a list where there are labels.
+    /// Context (Q,), an array of numbers or a list with labels; None if not given.
     #[getter]
     fn context<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        self.0.context().map(|context| shown_context(py, context)).transpose()
+        self.0.context().map(|context| context_to_python(py, context)).transpose()
     }
 
-    /// Names of the degrees of freedom, if they were given.
+    /// Names of the degrees of freedom (D,); None if not given.
     #[getter]
     fn names(&self) -> Option<Vec<String>> {
         self.0.names().map(<[String]>::to_vec)
     }
 
-    /// Units of the degrees of freedom, if they were given.
+    /// Units of the degrees of freedom (D,); None if not given.
     #[getter]
     fn units(&self) -> Option<Vec<String>> {
         self.0.units().map(<[String]>::to_vec)
@@ -144,7 +153,7 @@ impl Demonstration {
         self.0.n_dofs()
     }
 
-    /// Arguments that make the same demonstration again.
+    /// Return the arguments that rebuild the demonstration.
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((Matrix<'py>,), Bound<'py, PyDict>)> {
         let options = PyDict::new(py);
         match self.0.sampling() {
@@ -168,7 +177,7 @@ impl Demonstration {
             None => String::new(),
             Some(context) => {
                 let values = context.call_method0("tolist").unwrap_or(context);
-                format!(", context {}", printable(&values.repr()?.to_string()))
+                format!(", context {}", quoted(&values))
             }
         };
         let (n_samples, n_dofs) = (self.0.n_samples(), self.0.n_dofs());
@@ -176,11 +185,11 @@ impl Demonstration {
     }
 }
 
-/// Latest time stamp [s] that is taken for one, in the year 5138: later ones are in ms, µs or ns.
+/// Largest time stamp in s, which is in the year 5138. Larger ones are most likely in ms, µs or ns.
 const MAX_STAMP: f64 = 1e11;
 
-/// Time stamps (T,) in s; dates count from the first.
-fn clock(value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+/// Converts time stamps (T,) in s, and datetimes to seconds since the first.
+fn time_stamps(value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let array = if value.is_instance_of::<PyUntypedArray>() { None } else { Some(plain("time", value)?.into_any()) };
     let array = array.as_ref().unwrap_or(value);
     let dated = array.cast::<PyUntypedArray>().is_ok_and(|array| matches!(array.dtype().kind(), b'M' | b'm'));
@@ -191,13 +200,14 @@ fn clock(value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let time = vector("time", array)?;
     match time.first() {
         Some(first) if first.abs() > MAX_STAMP => Err(PyValueError::new_err(format!(
-            "time[0] = {first:e} s is later than the year 5000: pass seconds, (time - time[0]) * 1e-9 where these are ns"
+            "time[0] = {first:e} s is later than the year 5000: pass seconds, such as (time - time[0]) * 1e-9 \
+             for ns"
         ))),
         _ => Ok(time),
     }
 }
 
-/// Positions as they come, and what the object that holds them knows beside.
+/// Positions and the metadata of the object that holds them.
 pub(crate) struct Source {
     position: ArrayD<f64>,
     time: Option<Vec<f64>>,
@@ -206,6 +216,7 @@ pub(crate) struct Source {
 }
 
 impl Source {
+    /// Reads a trajectory, a data frame, a labelled array or bare positions.
     pub(crate) fn of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = value.py();
         if let Ok(trajectory) = value.cast::<Trajectory>() {
@@ -226,7 +237,7 @@ impl Source {
         Ok(Self { position: array(name, value)?, time: None, names, units })
     }
 
-    /// Demonstration `m` of a fit, with what is known of it.
+    /// Returns demonstration `m` of a fit.
     pub(crate) fn demonstration(self, m: usize) -> PyResult<pdmp_core::Demonstration> {
         let sampling = self.time.map_or(Sampling::Unknown, |time| Sampling::Stamped { time });
         let position = two_axes(&format!("demo {m}: position"), self.position)?;
@@ -241,23 +252,23 @@ impl Source {
     }
 }
 
-/// A generated movement: row k of each array is the state at `time[k]`.
+/// Generated movement, returned by `Model.rollout`. Row k of each array is the state at `time[k]`.
 ///
-/// `Demonstration(trajectory)` is the movement as a demonstration, as is a trajectory in a list for `fit`.
+/// `Demonstration(trajectory)` makes a demonstration of it, and `fit` takes trajectories as demonstrations.
 #[pyclass(frozen, get_all, module = "pdmp")]
 pub(crate) struct Trajectory {
-    /// Times (T,) in s, from 0.
-    time: Py<PyArray1<f64>>,
-    /// Positions (T, D), in the unit of each degree of freedom.
-    position: Py<PyArray2<f64>>,
-    /// Velocities (T, D), per s.
+    /// Times (T,) in s, starting at 0.
+    pub(crate) time: Py<PyArray1<f64>>,
+    /// Positions (T, D) in the unit of each degree of freedom.
+    pub(crate) position: Py<PyArray2<f64>>,
+    /// Velocities (T, D) per s.
     velocity: Py<PyArray2<f64>>,
-    /// Accelerations (T, D), per s².
+    /// Accelerations (T, D) per s².
     acceleration: Py<PyArray2<f64>>,
-    /// Names of the degrees of freedom.
-    names: Vec<String>,
-    /// Units of the degrees of freedom; "" where one is not known.
-    units: Vec<String>,
+    /// Names of the degrees of freedom (D,).
+    pub(crate) names: Vec<String>,
+    /// Units of the degrees of freedom (D,); "" if unknown.
+    pub(crate) units: Vec<String>,
 }
 
 impl Trajectory {
@@ -281,7 +292,7 @@ impl Trajectory {
 
 #[pymethods]
 impl Trajectory {
-    /// One of arrays as they were.
+    /// Rebuild a pickled trajectory.
     #[staticmethod]
     fn _of(
         time: Py<PyArray1<f64>>,
@@ -300,8 +311,14 @@ impl Trajectory {
         Ok((py.get_type::<Self>().getattr("_of")?, arguments))
     }
 
-    /// Returns arrays, names and units by their names; `numpy.savez(path, **trajectory.to_dict())` writes what
-    /// `io.read_npz` reads.
+    /// Return the arrays, names and units in a dictionary.
+    ///
+    /// `io.read_npz` reads the file that `numpy.savez(path, **trajectory.to_dict())` writes.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     Keys are the names of the attributes.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
         values.set_item("time", &self.time)?;
@@ -313,11 +330,15 @@ impl Trajectory {
         Ok(values)
     }
 
-    /// Returns a pandas.DataFrame.
+    /// Return a data frame of positions, velocities and accelerations.
     ///
-    /// Its index is the time `t` in s. Its columns are the position of each degree of freedom under its name, then
-    /// velocities under `<name>_velocity` and accelerations under `<name>_acceleration`; `attrs["units"]` has the unit
-    /// of each column. `Demonstration(frame[names], time=frame.index)` is the movement as a demonstration.
+    /// `Demonstration(frame[names], time=frame.index)` makes a demonstration of it.
+    ///
+    /// Returns
+    /// -------
+    /// pandas.DataFrame
+    ///     The index is the time `t` in s. Columns are positions `<name>`, velocities `<name>_velocity` and
+    ///     accelerations `<name>_acceleration`; `attrs["units"]` maps each column to its unit.
     ///
     /// Raises
     /// ------
@@ -327,25 +348,20 @@ impl Trajectory {
         slf.py().import("pdmp._labels")?.call_method1("to_dataframe", (slf,))
     }
 
-    /// Writes a CSV file, whose positions `io.read_csv` reads back: `io.write_csv` describes it.
+    /// Write a CSV file as `io.write_csv` does.
     ///
     /// Parameters
     /// ----------
     /// path : path-like
-    ///     Where to write.
+    ///     File to write.
     ///
     /// Raises
     /// ------
     /// OSError
-    ///     A file that cannot be written.
+    ///     The file cannot be written.
     /// ValueError
-    ///     Names that would not be read back.
+    ///     A name could not be read back by `io.read_csv`.
     fn to_csv(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         slf.py().import("pdmp.io")?.call_method1("write_csv", (path, slf)).map(drop)
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let shape = self.position.bind(py).getattr("shape")?;
-        Ok(format!("<pdmp.Trajectory: (samples, DoFs) = {shape}>"))
     }
 }

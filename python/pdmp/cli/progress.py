@@ -7,9 +7,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, float], None]]:
-    """Yields a function that shows the stage of a fit and its completed fraction.
+    """Yields a function that prints the stage of a fit and its completed fraction.
 
-    A terminal shows both in place, for as long as the fit lasts; elsewhere each stage is a line.
+    On a terminal both are updated in place until the fit ends; elsewhere each stage is one line.
     """
     live = sys.stderr.isatty()
     stages: list[str] = []

@@ -1,4 +1,4 @@
-//! What a model in Python tells of what was learnt.
+//! Properties of a model.
 
 use numpy::ToPyArray;
 use pdmp_core::context::ContextColumn;
@@ -7,13 +7,13 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 
 use crate::context::ContextMap;
-use crate::convert::{Matrix, Vector, shown_context, to_numpy};
+use crate::convert::{Matrix, Vector, context_to_python, to_numpy};
 use crate::error::raise;
 use crate::model::Model;
 
 #[pymethods]
 impl Model {
-    /// "discrete" or "rhythmic".
+    /// Kind of the primitive, "discrete" or "rhythmic".
     #[getter]
     fn kind(&self) -> &'static str {
         self.0.kind().name()
@@ -31,38 +31,39 @@ impl Model {
         self.0.n_dofs()
     }
 
-    /// Dimension J of the style parameter.
+    /// Style dimension J.
     #[getter]
     fn n_styles(&self) -> usize {
         self.0.n_styles()
     }
 
-    /// Time constant of the nominal demonstration in s.
+    /// Time constant τ of the nominal demonstration in s: its duration if discrete, its period over 2π if rhythmic.
     #[getter]
     fn tau(&self) -> f64 {
         self.0.tau()
     }
 
-    /// Rate of the output system.
+    /// Rate α_z of the output system, without unit.
     #[getter]
     fn alpha_z(&self) -> f64 {
         self.0.attractor().alpha_z
     }
 
-    /// Stiffness of the output system.
+    /// Stiffness β_z of the output system, without unit.
     #[getter]
     fn beta_z(&self) -> f64 {
         self.0.attractor().beta_z
     }
 
-    /// Rate per unit of the clock at which a discrete movement brakes past its end; None if rhythmic, or if transport
-    /// is immediate, where the forcing fades with the phase.
+    /// Braking rate of a discrete movement past its end, per unit of the clock.
+    ///
+    /// None if the primitive is rhythmic, or if transport is immediate, so that the forcing fades with the phase.
     #[getter]
     fn braking(&self) -> Option<f64> {
         self.0.braking()
     }
 
-    /// Rate of the discrete canonical system; None if rhythmic.
+    /// Rate α_x of the discrete canonical system, without unit; None if rhythmic.
     #[getter]
     fn alpha_x(&self) -> Option<f64> {
         match self.0.canonical() {
@@ -71,7 +72,7 @@ impl Model {
         }
     }
 
-    /// Rate of the amplitude; None if discrete.
+    /// Rate μ of the amplitude, without unit; None if discrete.
     #[getter]
     fn mu(&self) -> Option<f64> {
         match self.0.canonical() {
@@ -80,13 +81,13 @@ impl Model {
         }
     }
 
-    /// Names of the degrees of freedom.
+    /// Names of the degrees of freedom (D,).
     #[getter]
     fn names(&self) -> Vec<String> {
         self.0.names().to_vec()
     }
 
-    /// Units of the degrees of freedom; "" where one is not known.
+    /// Units of the degrees of freedom (D,); "" if unknown.
     #[getter]
     fn units(&self) -> Vec<String> {
         self.0.units().to_vec()
@@ -98,33 +99,36 @@ impl Model {
         self.0.demonstrated().nominal
     }
 
-    /// Styles S of the demonstrations (M, J).
+    /// Styles S (M, J) of the demonstrations, without unit.
     #[getter]
     fn styles<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().styles.to_pyarray(py)
     }
 
-    /// Singular values of the targets, in decreasing order: all min(M, C·D) of them, or the first J alone, where
-    /// n_styles was given and is so small beside the library that the others were not computed.
+    /// Singular values of the targets in decreasing order.
+    ///
+    /// All min(M, C·D), or the first J if a small `n_styles` was given and the others were not computed.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, &self.0.learnt().singular_values)
     }
 
-    /// Share of the targets F, by root mean square, that the J styles leave out: ‖F − S·F_basis‖/‖F‖.
+    /// Truncation error ‖F − S·F_basis‖/‖F‖ of the targets F in the Frobenius norm.
     #[getter]
     fn truncation_error(&self) -> f64 {
         self.0.learnt().truncation_error
     }
 
-    /// Standard deviation of the measurement noise of each degree of freedom (D,), in its unit, by generalised
-    /// cross-validation: 0 where none was found, or none was looked for (`smoothing=None`).
+    /// Standard deviation (D,) of the measurement noise in the unit of each degree of freedom, by generalised
+    /// cross-validation.
+    ///
+    /// 0 if no noise was found, or with `smoothing=None`.
     #[getter]
     fn noise<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, self.0.learnt().noise.levels())
     }
 
-    /// Cut-offs of the smoothing (D,) in Hz, at which a sine keeps half of its amplitude; inf where every sample is met.
+    /// Cut-off frequencies (D,) of the smoothing in Hz, at a gain of one half; inf without smoothing.
     #[getter]
     fn cut_offs<'py>(&self, py: Python<'py>) -> Vector<'py> {
         let cut_offs: Vec<f64> =
@@ -132,49 +136,49 @@ impl Model {
         to_numpy(py, &cut_offs)
     }
 
-    /// Unit of each degree of freedom in the factorisation (D,).
+    /// Scale (D,) of each degree of freedom in the factorisation, in its unit.
     #[getter]
     fn dof_scale<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, &self.0.learnt().dof_scale)
     }
 
-    /// Goals of the demonstrations (M, D).
+    /// Goals (M, D) of the demonstrations in the unit of each degree of freedom.
     #[getter]
     fn goals<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().goals.to_pyarray(py)
     }
 
-    /// First positions of the demonstrations (M, D).
+    /// First positions (M, D) of the demonstrations in the unit of each degree of freedom.
     #[getter]
     fn starts<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().starts.to_pyarray(py)
     }
 
-    /// Mean positions of the demonstrations (M, D), the anchors of cycles.
+    /// Mean positions (M, D) of the demonstrations, the anchors of cycles, in the unit of each degree of freedom.
     #[getter]
     fn anchors<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().anchors.to_pyarray(py)
     }
 
-    /// Phases (K+1,) from 0 to 1 that divide the movement into segments; K = 1 where time is scaled linearly.
+    /// Bounds (K+1,) of the segments as shares of the movement, from 0 to 1; K = 1 with linear scaling of time.
     #[getter]
     fn breaks<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, self.0.breaks())
     }
 
-    /// Timings of the demonstrations (M, K): the time in s that each spends in each segment.
+    /// Time (M, K) in s of each demonstration in each segment between `breaks`.
     #[getter]
     fn segment_durations<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         self.0.demonstrated().segment_durations.to_pyarray(py)
     }
 
-    /// Durations or periods of the demonstrations (M,) in s: the sums of their segment_durations.
+    /// Durations or periods (M,) of the demonstrations in s, the sums of their segment durations.
     #[getter]
     fn durations<'py>(&self, py: Python<'py>) -> Vector<'py> {
         to_numpy(py, &self.0.demonstrated().durations)
     }
 
-    /// Contexts of the demonstrations (M, Q), if they had any: an array, or lists where there are labels.
+    /// Contexts (M, Q) of the demonstrations, an array of numbers or lists with labels; None without contexts.
     #[getter]
     fn contexts<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let (Some(contexts), Some(map)) = (&self.0.demonstrated().contexts, self.0.map()) else { return Ok(None) };
@@ -183,24 +187,24 @@ impl Model {
         }
         let rows = contexts.rows().into_iter().map(|row| {
             let context = map.context(&row.to_vec()).map_err(raise)?;
-            shown_context(py, &context)
+            context_to_python(py, &context)
         });
         Ok(Some(PyList::new(py, rows.collect::<PyResult<Vec<_>>>()?)?.into_any()))
     }
 
-    /// What leads from contexts to movements, if there are any.
+    /// Map from contexts to style, goal, start or anchor, and duration; None without contexts.
     #[getter]
     fn map(&self) -> Option<ContextMap> {
         self.0.map().cloned().map(ContextMap)
     }
 
-    /// What was chosen for the basis functions, in one line.
+    /// Description of the regression of the landscape.
     #[getter]
     fn regression(&self) -> &str {
         &self.0.learnt().regression
     }
 
-    /// Estimated error of the compiled landscape, relative to its largest value.
+    /// Estimated interpolation error of the tabulated landscape, relative to its largest value.
     #[getter]
     fn table_error(&self) -> f64 {
         self.0.forcing_table().error()

@@ -1,5 +1,6 @@
-"""What commands write to the terminal."""
+"""Output to the terminal."""
 
+import re
 import sys
 import warnings
 from collections.abc import Iterator
@@ -7,6 +8,16 @@ from contextlib import contextmanager
 from typing import TextIO
 
 from pdmp._messages import printable
+
+# Arguments of Python that a message asks for, and those that it reports, at its beginning or behind
+# a file or demonstration.
+_ARGUMENT = re.compile(
+    r"\b(contexts|dt|max_gap|period|time)="
+    r"|(?:^|(?<=: ))(dt|max_gap|period|smoothing)(?= = | does not )"
+    r"|(?:^|(?<=^n_styles and ))(amplitude|anchor|context|demos|duration|goal|n_styles"
+    r"|singular_value_share|start|style|tau)(?= = | and |\[| has |: | does not )"
+)
+_RENAMED = {"contexts": "context", "demos": "demo", "n_styles": "styles"}
 
 
 def say(text: object, *, file: TextIO | None = None) -> None:
@@ -19,9 +30,19 @@ def report(text: str) -> None:
     print(printable(text, keep="\n"))
 
 
+def one_line(message: object) -> str:
+    """Returns a message in one line, with command-line options for arguments of Python."""
+    return _ARGUMENT.sub(_option, printable(" ".join(str(message).split())))
+
+
+def _option(match: re.Match[str]) -> str:
+    name = "".join(filter(None, match.groups()))
+    return "--" + _RENAMED.get(name, name).replace("_", "-")
+
+
 @contextmanager
 def console() -> Iterator[None]:
-    """Writes warnings in one line, and ? in place of characters that the console lacks."""
+    """Writes warnings in one line, and ? for characters that the console cannot encode."""
     with warnings.catch_warnings():
         warnings.showwarning = _warning
         changed = []
@@ -41,4 +62,4 @@ def console() -> Iterator[None]:
 
 
 def _warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"pdmp: warning: {printable(' '.join(str(message).split()))}", file=sys.stderr)
+    print(f"pdmp: warning: {one_line(message)}", file=sys.stderr)

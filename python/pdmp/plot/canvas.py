@@ -1,4 +1,4 @@
-"""What all figures share: a canvas, colours that the colour-blind tell apart, labelled axes."""
+"""Elements of all figures: a palette for colour-blind readers, panels, labelled axes, legends."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from pdmp._atomic_write import atomic_write
 from pdmp._native import Model
+from pdmp.files import atomic_write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, those that read best on white first.
+# Palette of Okabe and Ito, ordered by contrast on white.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-WIDEST = 20
-"""Characters of an axis label in one line."""
+MAX_LABEL = 20
+"""Largest number of characters of an axis label in one line."""
 BLUE, ORANGE, GREY = PALETTE[0], PALETTE[1], "#B8B8B8"
 
 
-def canvas(figure: Figure | None, width: float, height: float) -> Figure:
+def ensure_figure(figure: Figure | None, width: float, height: float) -> Figure:
     """Returns `figure`, or a new one of this size [inches]."""
     if figure is not None:
         return figure
@@ -38,14 +38,14 @@ def canvas(figure: Figure | None, width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained", dpi=150)
 
 
-def gradient() -> Colormap:
-    """Returns colours from blue to orange, none of them too pale on white."""
+def colormap() -> Colormap:
+    """Returns a colour map from blue to orange without colours that are pale on white."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("pdmp", [BLUE, PALETTE[3], ORANGE])
 
 
-def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
+def label_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
     """Labels the axes, and removes lines without information."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
@@ -56,12 +56,9 @@ def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
 
 
 def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Returns the names of the degrees of freedom, with the unit where it is known.
-
-    Long ones take two lines.
-    """
+    """Returns the names of the degrees of freedom with their units; long ones take two lines."""
     labels = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
-    return [fill(label, WIDEST) for label in labels]
+    return [fill(label, MAX_LABEL) for label in labels]
 
 
 def movement_panels(
@@ -69,8 +66,8 @@ def movement_panels(
 ) -> tuple[Figure, list[list[Axes]]]:
     """Returns a figure and, per title, a column of panels for `draw_movement`.
 
-    The path comes first where there are two degrees of freedom; then each of them over time, in a
-    grid where they are many.
+    With two degrees of freedom, the first panel is for the path. The others are for each degree of
+    freedom over time, in a grid if one column has more than four.
     """
     labels = dof_labels(model.names, model.units)
     if len(titles) == 1 and model.n_dofs > 4:
@@ -80,26 +77,26 @@ def movement_panels(
         return figure, [panels]
     has_path = model.n_dofs == 2
     heights = [3.6] * has_path + [1.7] * model.n_dofs
-    figure = canvas(figure, max(3.2 * len(titles), 5.5), sum(heights) + 0.5)
+    figure = ensure_figure(figure, max(3.2 * len(titles), 5.5), sum(heights) + 0.5)
     grid = figure.subplots(len(heights), len(titles), squeeze=False, height_ratios=heights)
     for column, title in zip(grid.T, titles, strict=True):
         if has_path:
-            dress(column[0], *labels)
+            label_axes(column[0], *labels)
             column[0].set_aspect("equal", adjustable="datalim")
         for axes, label in zip(column[has_path:], labels, strict=True):
-            dress(axes, "time [s]", label)
+            label_axes(axes, "time [s]", label)
         column[0].set_title(title)
     return figure, [list(column) for column in grid.T]
 
 
 def grid_panels(labels: Sequence[str], x: str, figure: Figure | None) -> tuple[Figure, list[Axes]]:
-    """Returns a figure and a panel per degree of freedom over `x`, laid out as a grid."""
+    """Returns a figure and a grid with a panel per label, over `x`."""
     n_columns = min(len(labels), 3 if len(labels) < 13 else 5)
     n_rows = ceil(len(labels) / n_columns)
-    figure = canvas(figure, max(3.2 * n_columns, 5.5), 1.9 * n_rows + 0.5)
+    figure = ensure_figure(figure, max(3.2 * n_columns, 5.5), 1.9 * n_rows + 0.5)
     panels = figure.subplots(n_rows, n_columns, sharex=True, squeeze=False).ravel()
     for axes, label in zip(panels, labels, strict=False):
-        dress(axes, "", label)
+        label_axes(axes, "", label)
     for axes in panels[len(labels) - n_columns : len(labels)]:
         axes.set_xlabel(x)
         axes.xaxis.set_tick_params(labelbottom=True)
@@ -109,18 +106,18 @@ def grid_panels(labels: Sequence[str], x: str, figure: Figure | None) -> tuple[F
 
 
 def draw_movement(
-    panels: Sequence[Axes], time: NDArray[Any], position: NDArray[Any], **look: Any
+    panels: Sequence[Axes], time: NDArray[Any], position: NDArray[Any], **style: Any
 ) -> None:
     """Draws positions (T, D) in a column of `movement_panels`."""
     n_dofs = position.shape[1]
     if len(panels) > n_dofs:
-        panels[0].plot(*position.T, **look)
+        panels[0].plot(*position.T, **style)
     for axes, trace in zip(panels[-n_dofs:], position.T, strict=True):
-        axes.plot(time, trace, **look)
+        axes.plot(time, trace, **style)
 
 
 def legend(figure: Figure, axes: Axes) -> None:
-    """Puts one entry per label of `axes` below the figure."""
+    """Adds a legend below the figure, with one entry per label of `axes`."""
     handles, labels = axes.get_legend_handles_labels()
     entries = dict(zip(labels, handles, strict=True))
     figure.legend(
@@ -133,14 +130,12 @@ def legend(figure: Figure, axes: Axes) -> None:
 
 
 def save(figure: Figure, path: str | PathLike[str]) -> None:
-    """Writes a figure in the format of the suffix, PNG without one.
-
-    The file appears when it is complete.
+    """Writes a figure in the format of the suffix of its path, PNG without one, atomically.
 
     Raises
     ------
     ValueError
-        A suffix that matplotlib does not know.
+        A suffix that matplotlib does not support.
     OSError
         A file that cannot be written.
     """

@@ -1,4 +1,4 @@
-"""Figures of an evaluation: how well movements held out are foreseen."""
+"""Figures of an evaluation: prediction errors, and predictions of held-out demonstrations."""
 
 from __future__ import annotations
 
@@ -7,32 +7,32 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pdmp.plot._canvas import BLUE, GREY, PALETTE, canvas, dof_labels, dress, legend
+from pdmp.plot.canvas import BLUE, GREY, PALETTE, dof_labels, ensure_figure, label_axes, legend
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pdmp.evaluation import Evaluation
 
-MOST_DOFS = 6
+MAX_DOFS = 6
 
 
 def prediction_error(
     evaluation: Evaluation, *, unit: str = "", figure: Figure | None = None
 ) -> Figure:
-    """Draws E over the number of style parameters J, interpolation and extrapolation apart.
+    """Draws E over the number of style parameters J, with a panel per reach.
 
     Every `PDMP` with `n_styles` among the predictors is a point: mean and standard deviation over
-    the folds, as in Fig. 4a of the paper. Other predictors are levels.
+    the folds, as in Fig. 4a of the paper. Other predictors are horizontal lines.
 
     Parameters
     ----------
     evaluation : Evaluation
-        What `pdmp.evaluate` returned, such as for the predictors of `evaluation.over_styles`.
+        Result of `pdmp.evaluate`, such as for the predictors of `evaluation.over_styles`.
     unit : str
         Unit of the positions, such as "rad".
     figure : matplotlib.figure.Figure, optional
-        Where to draw.
+        Figure to draw on; by default a new one.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def prediction_error(
     ImportError
         matplotlib is not installed.
     """
-    # Who draws no evaluation does not import it.
+    # Other figures do not import the evaluation.
     from pdmp.evaluation import PDMP
 
     styles = {}
@@ -54,16 +54,16 @@ def prediction_error(
             "evaluate those of over_styles(J)"
         )
     reaches = evaluation.reaches()
-    figure = canvas(figure, 4.6 * len(reaches), 3.8)
+    figure = ensure_figure(figure, 4.6 * len(reaches), 3.8)
     from matplotlib.ticker import MaxNLocator
 
     panels = figure.subplots(1, len(reaches), squeeze=False, sharey=True)[0]
     for axes, reach in zip(panels, reaches, strict=True):
-        found = [evaluation.summary(name, reach) for name in styles]
-        deviation = np.nan_to_num([each.deviation for each in found])
+        means = [evaluation.summary(name, reach) for name in styles]
+        deviation = np.nan_to_num([mean.deviation for mean in means])
         axes.errorbar(
             list(styles.values()),
-            [each.error for each in found],
+            [mean.error for mean in means],
             deviation,
             color=BLUE,
             marker="o",
@@ -76,7 +76,7 @@ def prediction_error(
             level = evaluation.summary(name, reach).error
             axes.axhline(level, color=color, linestyle="--", linewidth=1, label=name)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        dress(axes, "number of style parameters J", "", reach)
+        label_axes(axes, "number of style parameters J", "", reach)
     panels[0].set_ylim(bottom=0)
     panels[0].set_ylabel(f"E [{unit}²]" if unit else "E")
     legend(figure, panels[0])
@@ -86,61 +86,61 @@ def prediction_error(
 def held_out(
     evaluation: Evaluation, predictor: str, *, unit: str = "", figure: Figure | None = None
 ) -> Figure:
-    """Draws predictions with their 90 % band, and the demonstrations held out.
+    """Draws predictions with their 90 % band, and the held-out demonstrations.
 
-    One column for interpolation and one for extrapolation, each with the first condition of the
-    fold of median E; one row per degree of freedom, of more than six those that vary most.
+    A column per reach has the first condition of the fold of median E; a row per degree of freedom,
+    at most the six that vary most.
 
     Parameters
     ----------
     evaluation : Evaluation
-        What `pdmp.evaluate` returned.
+        Result of `pdmp.evaluate`.
     predictor : str
-        Whose forecasts.
+        Name of the predictor.
     unit : str
-        Unit of the positions, such as "rad", in place of those of the demonstrations.
+        Unit of the positions, such as "rad", instead of those of the demonstrations.
     figure : matplotlib.figure.Figure, optional
-        Where to draw.
+        Figure to draw on; by default a new one.
 
     Raises
     ------
     ValueError
-        A predictor that was not evaluated.
+        A predictor that is not in the evaluation.
     ImportError
         matplotlib is not installed.
     """
-    # Who draws no evaluation does not import it.
-    from pdmp.evaluation.predictors import BAND, WIDTH
+    # Other figures do not import the evaluation.
+    from pdmp.evaluation.predictors import BAND, HALF_WIDTH
 
     score = evaluation.score(predictor)
     recordings = evaluation.recordings
     units = [unit] * len(recordings.names) if unit else recordings.units
     labels = dof_labels(recordings.names, units)
     spread = np.ptp(recordings.sampled, axis=(0, 1))
-    dofs = np.sort(np.argsort(-spread, kind="stable")[:MOST_DOFS])
+    dofs = np.sort(np.argsort(-spread, kind="stable")[:MAX_DOFS])
     whole = "duration" if recordings.kind == "discrete" else "period"
     reaches = evaluation.reaches()
-    figure = canvas(figure, 4.2 * len(reaches), 1.7 * len(dofs) + 0.8)
+    figure = ensure_figure(figure, 4.2 * len(reaches), 1.7 * len(dofs) + 0.8)
     grid = figure.subplots(len(dofs), len(reaches), squeeze=False, sharex=True, sharey="row")
-    at = np.linspace(0, 1, recordings.n_samples, endpoint=recordings.kind == "discrete")
+    phase = np.linspace(0, 1, recordings.n_samples, endpoint=recordings.kind == "discrete")
     for column, reach in zip(grid.T, reaches, strict=True):
         rows = [k for k, split in enumerate(evaluation.splits) if split.reach == reach]
-        middle = rows[int(np.argsort(score.error[rows], kind="stable")[(len(rows) - 1) // 2])]
-        test, made = evaluation.splits[middle].test, evaluation.forecasts[predictor][middle][0]
+        median = rows[int(np.argsort(score.error[rows], kind="stable")[(len(rows) - 1) // 2])]
+        test, forecast = evaluation.splits[median].test, evaluation.forecasts[predictor][median][0]
         context = recordings.contexts[test[0]]
-        shown = test[(recordings.contexts[test] == context).all(axis=1)]
+        repeated = test[(recordings.contexts[test] == context).all(axis=1)]
         for axes, dof in zip(column, dofs, strict=True):
-            for trace in recordings.sampled[shown, :, dof]:
-                axes.plot(at, trace, color=GREY, linewidth=1.5, label="held out")
-            mean = made.position[:, dof]
-            if made.variance is not None:
-                half = WIDTH * np.sqrt(made.variance[:, dof])
+            for trace in recordings.sampled[repeated, :, dof]:
+                axes.plot(phase, trace, color=GREY, linewidth=1.5, label="held out")
+            mean = forecast.position[:, dof]
+            if forecast.variance is not None:
+                half = HALF_WIDTH * np.sqrt(forecast.variance[:, dof])
                 band = {"color": BLUE, "alpha": 0.15, "linewidth": 0}
-                axes.fill_between(at, mean - half, mean + half, label=f"{BAND:.0%} band", **band)
-            axes.plot(at, mean, color=BLUE, linewidth=1.2, label="foreseen")
-            dress(axes, "", labels[dof])
-        shown_as = (v if isinstance(v, str) else f"{v:.3g}" for v in context)
-        column[0].set_title(f"{reach}, context {' '.join(shown_as)}")
+                axes.fill_between(phase, mean - half, mean + half, label=f"{BAND:.0%} band", **band)
+            axes.plot(phase, mean, color=BLUE, linewidth=1.2, label="predicted")
+            label_axes(axes, "", labels[dof])
+        values = (v if isinstance(v, str) else f"{v:.3g}" for v in context)
+        column[0].set_title(f"{reach}, context {' '.join(values)}")
         column[-1].set_xlabel(f"share of the {whole}")
     legend(figure, grid[0, 0])
     return figure

@@ -1,33 +1,35 @@
-//! The regressors of the landscape: choices for a fit, and functions to try by themselves.
+//! Regressors of the attractor landscape: options of a fit, and stand-alone regression on the clock.
 
 use numpy::IntoPyArray;
 use pdmp_core::learning::regression::{self, Domain, GpPosterior, Kernel, Regression};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::convert::{Matrix, count, matrix, vector};
+use crate::convert::{Matrix, matrix, vector};
 use crate::error::{ascii, raise};
+use crate::scalar::{Scalar, optional_number};
 
 /// Gaussian process regression, the paper's choice of basis functions.
 ///
-/// All outputs share kernel, length and noise ratio. What is not given is found by maximising the marginal likelihood
-/// (Rasmussen and Williams 2006, Section 5.4.1): `regress` by itself searches noise ratios from 1e-10 to 1e4. As a basis
-/// of `fit`, noise that is not given is at most 1e-6 of the signal's variance and of the targets' mean square: what the
-/// landscape takes for noise no style brings back, and noise on demonstrations is what smoothing is for.
+/// All outputs share kernel, length scale and noise ratio. Hyperparameters that are not given maximise the marginal
+/// likelihood (Rasmussen and Williams 2006, Section 5.4.1). `regress` searches noise ratios from 1e-10 to 1e4. In
+/// `fit`, a noise ratio that is not given is at most 1e-6, and the noise variance at most 1e-6 of the targets' mean
+/// square: no style can restore a signal that the landscape takes for noise, and `smoothing` removes the noise of
+/// demonstrations.
 ///
 /// Parameters
 /// ----------
 /// kernel : {"matern52", "matern32"}
-///     Covariance function of the clock; wrapped around the circle where the movement is rhythmic.
+///     Covariance function over the clock u; periodic for rhythmic movements.
 /// length : float, optional
-///     Length scale, in units of the clock u = t / tau.
+///     Length scale, in units of the clock u = t / tau; positive. Estimated if not given.
 /// noise : float, optional
-///     Ratio of noise variance to signal variance, at least 1e-10.
+///     Ratio of noise variance to signal variance, from 1e-10 to 1e6. Estimated if not given.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     An unknown kernel, or a number out of range.
+///     `kernel` is unknown, or `length` or `noise` is out of range.
 #[pyclass(frozen, name = "GP", module = "pdmp", from_py_object)]
 #[derive(Clone)]
 pub(crate) struct Gp(pub(crate) regression::Gp);
@@ -36,7 +38,8 @@ pub(crate) struct Gp(pub(crate) regression::Gp);
 impl Gp {
     #[new]
     #[pyo3(signature = (kernel="matern52", length=None, noise=None))]
-    fn new(kernel: &str, length: Option<f64>, noise: Option<f64>) -> PyResult<Self> {
+    fn new(kernel: &str, length: Option<Scalar<'_>>, noise: Option<Scalar<'_>>) -> PyResult<Self> {
+        let (length, noise) = (optional_number("length", length)?, optional_number("noise", noise)?);
         let kernel = Kernel::from_name(kernel).ok_or_else(|| {
             PyValueError::new_err(format!("kernel = {kernel:?}: must be \"matern32\" or \"matern52\""))
         })?;
@@ -49,32 +52,37 @@ impl Gp {
         self.0.kernel.name()
     }
 
-    /// Length scale, if one was given.
+    /// Length scale in units of the clock; None if it is estimated.
     #[getter]
     fn length(&self) -> Option<f64> {
         self.0.length
     }
 
-    /// Noise ratio, if one was given.
+    /// Ratio of noise variance to signal variance; None if it is estimated.
     #[getter]
     fn noise(&self) -> Option<f64> {
         self.0.noise
     }
 
-    /// Regress targets on the clock.
+    /// Condition the process on targets over the clock.
     ///
     /// Parameters
     /// ----------
     /// u : array_like, (C,)
-    ///     Increasing inputs from 0; within [0, 2π) if periodic.
+    ///     Increasing clock values, from 0; in rad and within [0, 2π) if periodic.
     /// targets : array_like, (C, P)
-    ///     Outputs.
+    ///     Values of the P outputs, in any unit.
     /// periodic : bool
-    ///     Whether 2π and 0 are one.
+    ///     Identify u = 2π with u = 0.
     ///
     /// Returns
     /// -------
     /// GPRegression
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     `u` does not increase from 0, lengths differ, or a number is not finite.
     #[pyo3(signature = (u, targets, *, periodic=false))]
     fn regress(
         &self,
@@ -99,7 +107,9 @@ impl Gp {
     }
 }
 
-/// A Gaussian process given data, f(u) ~ N(0, σ̂²K) for each of P outputs, with K = k(u, u′) + νI.
+/// Gaussian process conditioned on data: f(u) ~ N(0, σ̂²K) for each of P outputs, with K = k(u, u′) + νI.
+///
+/// Returned by `GP.regress`.
 #[pyclass(frozen, name = "GPRegression", module = "pdmp")]
 pub(crate) struct GpRegression(GpPosterior);
 
@@ -111,21 +121,21 @@ impl GpRegression {
         self.0.kernel().name()
     }
 
-    /// Length scale that was used, in units of the clock.
+    /// Length scale in units of the clock, as given or estimated.
     #[getter]
     fn length(&self) -> f64 {
         self.0.length()
     }
 
-    /// Ratio ν of noise to signal variance that was used.
+    /// Ratio ν of noise variance to signal variance, as given or estimated.
     #[getter]
     fn noise(&self) -> f64 {
         self.0.noise()
     }
 
-    /// Signal variance σ̂² = Σ fᵀK⁻¹f/(CP), its likeliest value, in the squared unit of the outputs.
+    /// Maximum-likelihood signal variance σ̂² = Σ fᵀK⁻¹f/(CP), in the squared unit of the outputs.
     ///
-    /// All outputs share it. The variance of the noise is noise * signal_variance.
+    /// All outputs share it. The noise variance is `noise * signal_variance`.
     #[getter]
     fn signal_variance(&self) -> f64 {
         self.0.signal_variance()
@@ -133,15 +143,30 @@ impl GpRegression {
 
     /// Log marginal likelihood of the data, −CP/2·(ln 2πσ̂² + 1) − P/2·ln|K|, summed over the outputs.
     ///
-    /// Of densities in the unit of the outputs; 0 where all of them are zero.
+    /// Densities are in the unit of the outputs. It is 0 if all outputs are zero.
     #[getter]
     fn log_likelihood(&self) -> f64 {
         self.0.log_likelihood()
     }
 
-    /// Mean and variance (n, P) of the outputs, without their noise, at u (n,).
+    /// Compute the posterior mean and variance of the outputs without noise.
     ///
-    /// The variance, σ̂²(1 − kᵀK⁻¹k), is the same for all outputs.
+    /// Parameters
+    /// ----------
+    /// u : array_like, (n,)
+    ///     Clock values.
+    ///
+    /// Returns
+    /// -------
+    /// mean : ndarray, (n, P)
+    ///     In the unit of the outputs.
+    /// variance : ndarray, (n, P)
+    ///     σ̂²(1 − kᵀK⁻¹k), equal for all outputs, in their squared unit.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A clock value is not finite.
     fn predict<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let u = clock(u)?;
         let (mean, variance) = self.0.predict(&u);
@@ -153,24 +178,23 @@ impl GpRegression {
     }
 }
 
-/// Normalised Gaussian network: weighted bell functions on the clock, over their sum.
+/// Normalised Gaussian network, a weighted mean of radial basis functions over the clock.
 ///
-/// b(u) = Σ wₖψₖ(u) / Σ ψₖ(u) with ψₖ = exp(−(u − cₖ)²/2s²), or exp((cos(u − cₖ) − 1)/s²) where the movement is
-/// rhythmic. The centres cₖ lie at equal distances h, for discrete movements up to 2h beyond the ends, and
-/// s = overlap·h.
+/// b(u) = Σ wₖψₖ(u) / Σ ψₖ(u) with ψₖ = exp(−(u − cₖ)²/2s²), or ψₖ = exp((cos(u − cₖ) − 1)/s²) for rhythmic movements.
+/// The centres cₖ have equal distances h and extend up to 2h beyond the ends of discrete movements; s = overlap·h.
 ///
 /// Parameters
 /// ----------
 /// n_basis : int
-///     Number of functions N, from 2 to 1000.
+///     Number N of basis functions, from 2 to 1000.
 /// overlap : float
-///     Width s of a function in centre spacings h, from 0.3 to 3. Narrow functions ripple between their centres, wide
-///     ones are nearly dependent.
+///     Width s of a basis function in units of the spacing h, from 0.3 to 3. Narrow functions ripple between their
+///     centres; wide functions are nearly linearly dependent.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A number out of range.
+///     `n_basis` or `overlap` is out of range.
 ///
 /// References
 /// ----------
@@ -183,26 +207,47 @@ pub(crate) struct NGnet(pub(crate) regression::NGnet);
 impl NGnet {
     #[new]
     #[pyo3(
-        signature = (n_basis=regression::NGnet::default().n_basis as isize, overlap=regression::NGnet::default().overlap),
+        signature = (
+            n_basis=Scalar::Count(regression::NGnet::default().n_basis),
+            overlap=Scalar::Number(regression::NGnet::default().overlap)
+        ),
         text_signature = "(n_basis=50, overlap=1.2)"
     )]
-    fn new(n_basis: isize, overlap: f64) -> PyResult<Self> {
-        regression::NGnet::new(count("n_basis", n_basis)?, overlap).map(Self).map_err(raise)
+    fn new(n_basis: Scalar<'_>, overlap: Scalar<'_>) -> PyResult<Self> {
+        regression::NGnet::new(n_basis.count("n_basis")?, overlap.number("overlap")?).map(Self).map_err(raise)
     }
 
-    /// Number of functions N.
+    /// Number N of basis functions.
     #[getter]
     fn n_basis(&self) -> usize {
         self.0.n_basis
     }
 
-    /// Width of a function in centre spacings.
+    /// Width of a basis function in units of the centre spacing.
     #[getter]
     fn overlap(&self) -> f64 {
         self.0.overlap
     }
 
-    /// Regress targets (C, P) on the clock u (C,), from 0; within [0, 2π) if periodic.
+    /// Fit the network to targets over the clock by least squares.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, (C,)
+    ///     Increasing clock values, from 0; in rad and within [0, 2π) if periodic.
+    /// targets : array_like, (C, P)
+    ///     Values of the P outputs, in any unit.
+    /// periodic : bool
+    ///     Identify u = 2π with u = 0.
+    ///
+    /// Returns
+    /// -------
+    /// NGnetRegression
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     `u` does not increase from 0, lengths differ, or a number is not finite.
     #[pyo3(signature = (u, targets, *, periodic=false))]
     fn regress(&self, u: &Bound<'_, PyAny>, targets: &Bound<'_, PyAny>, periodic: bool) -> PyResult<NGnetRegression> {
         let (u, targets) = (vector("u", u)?, matrix("targets", "(C, P)", targets)?);
@@ -220,7 +265,7 @@ impl NGnet {
     }
 }
 
-/// A normalised Gaussian network given data.
+/// Normalised Gaussian network fitted to data, returned by `NGnet.regress`.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct NGnetRegression {
     regression: regression::NGnetRegression,
@@ -229,7 +274,24 @@ pub(crate) struct NGnetRegression {
 
 #[pymethods]
 impl NGnetRegression {
-    /// The outputs (n, P) at u (n,), and None: the network knows no variance.
+    /// Compute the outputs.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, (n,)
+    ///     Clock values.
+    ///
+    /// Returns
+    /// -------
+    /// mean : ndarray, (n, P)
+    ///     In the unit of the outputs.
+    /// variance : None
+    ///     The network has no variance; `GPRegression.predict` returns one in this place.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A clock value is not finite.
     fn predict<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<(Matrix<'py>, Option<Matrix<'py>>)> {
         let u = clock(u)?;
         let mut values = ndarray::Array2::zeros((u.len(), self.n_outputs));
@@ -242,7 +304,7 @@ impl NGnetRegression {
     }
 }
 
-/// Finite clock values.
+/// Converts clock values, which must be finite.
 fn clock(u: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let u = vector("u", u)?;
     match u.iter().position(|u| !u.is_finite()) {
@@ -251,7 +313,7 @@ fn clock(u: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     }
 }
 
-/// The stretch of the clock that the inputs cover; the regressors check the inputs themselves.
+/// Returns the domain of the inputs, unchecked: the regressors check them.
 fn domain(u: &[f64], periodic: bool) -> Domain {
     if periodic { Domain::Circle } else { Domain::Interval { end: u.last().copied().unwrap_or(0.0) } }
 }

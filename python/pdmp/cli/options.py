@@ -1,0 +1,110 @@
+"""Options shared by several commands."""
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable
+from typing import Any
+
+
+def file_path(text: str) -> str:
+    """Returns the path of a file or folder; rejects -, which stands for a stream elsewhere."""
+    if text == "-":
+        raise ArgumentTypeError("- is not a file: name one, or write ./- for a file called -")
+    return text
+
+
+def add_reader_options(parser: ArgumentParser) -> None:
+    """Adds the options of the readers of recordings."""
+    parser.add_argument(
+        "--columns", nargs="+", metavar="NAME", help="degrees of freedom to keep; default: all"
+    )
+    parser.add_argument(
+        "--time",
+        default="t",
+        metavar="NAME",
+        help="CSV column of the time stamps, followed by [ms], [us] or [ns] if its header gives no "
+        "unit; default: t or time",
+    )
+    parser.add_argument(
+        "--dt", type=float, metavar="S", help="sampling interval [s], in place of time stamps"
+    )
+    parser.add_argument(
+        "--max-gap",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="longest gap [s] to interpolate; default: 0, none",
+    )
+
+
+def reader_arguments(options: Namespace) -> dict[str, Any]:
+    """Returns the arguments of `pdmp.io.read`, other than the context."""
+    return {name: getattr(options, name) for name in ("columns", "time", "dt", "max_gap")}
+
+
+def add_fit_options(parser: ArgumentParser) -> None:
+    """Adds the options of a fit."""
+    parser.add_argument(
+        "--context", nargs="+", metavar="NAME", help="columns of index.csv that form the context"
+    )
+    for name, choices, text in (
+        (
+            "map",
+            ("auto", "stacked", "gp", "linear", "polynomial"),
+            "map from contexts to movements",
+        ),
+        ("kind", ("discrete", "rhythmic"), "from start to goal, or one cycle per demonstration"),
+        ("alignment", ("linear", "warp"), "alignment in time with the nominal demonstration"),
+        ("basis", ("gp", "ngnet"), "Gaussian process or normalised Gaussian network"),
+        ("transport", ("learnt", "immediate"), "distribution of changes of start or goal in time"),
+    ):
+        text = f"{text}; default: %(default)s"
+        parser.add_argument(f"--{name}", choices=choices, default=choices[0], help=text)
+    parser.add_argument(
+        "--period", type=float, metavar="S", help="period of rhythmic demonstrations [s]"
+    )
+    parser.add_argument(
+        "--styles",
+        type=_or_named(int, "whole number", auto="auto"),
+        metavar="J",
+        help="number of style parameters J, or auto: selected by cross-validation over contexts",
+    )
+    parser.add_argument(
+        "--singular-value-share",
+        type=float,
+        metavar="SHARE",
+        help="without --styles: smallest J whose share of the sum of singular values exceeds this, "
+        "0.9 in the paper; default: the systematic styles, those above the measurement noise",
+    )
+    parser.add_argument(
+        "--smoothing",
+        type=_or_named(float, "frequency [Hz]", auto="auto", none=None),
+        default="auto",
+        metavar="HZ",
+        help="cut-off [Hz], auto (default: by cross-validation), or none",
+    )
+
+
+def fit_arguments(options: Namespace) -> dict[str, Any]:
+    """Returns the arguments of `pdmp.fit` other than kind and period."""
+    return {
+        "map": options.map,
+        "alignment": options.alignment,
+        "n_styles": options.styles,
+        "singular_value_share": options.singular_value_share,
+        "basis": options.basis,
+        "smoothing": options.smoothing,
+        "transport": options.transport,
+    }
+
+
+def _or_named(read: Callable[[str], Any], kind: str, **named: str | None) -> Callable[[str], Any]:
+    """Returns a parser of an argument that is a value of this kind or one of the names."""
+
+    def value(text: str) -> Any:
+        try:
+            return named[text] if text in named else read(text)
+        except ValueError:
+            names = " or ".join(named)
+            raise ArgumentTypeError(f'"{text}" is neither a {kind} nor {names}') from None
+
+    return value
