@@ -22,7 +22,7 @@ pub use encoding::ContextColumn;
 pub(crate) use encoding::tabulate;
 pub(crate) use kernel::Kernel;
 pub use model_selection::{ContextMapKind, MapSelection};
-pub(crate) use outputs::{outputs, relative_changes};
+pub(crate) use outputs::{log_duration_jacobian, outputs};
 pub(crate) use stacking::StackingWeights;
 pub(crate) use training_data::group_equal_contexts;
 
@@ -39,9 +39,10 @@ use crate::validate::check_matrix;
 
 /// Degrees of freedom that the estimated signal-to-noise ratio leaves at least; with fewer, it costs none.
 ///
-/// In simulations of lines, curves and constants with much noise, 90 % bands between 5 to 12 contexts cover 81 to 89 % of
-/// new values if the ratio costs no degree of freedom, 85 to 93 % if it costs one and 88 to 97 % if it costs two. Between
-/// 3 contexts they cover 82 to 96 % with none, and 97 to 99 % with one, where they are three times as wide.
+/// In simulations of lines, curves and constants with much noise, 90 % bands within the range of 5 to 12 contexts cover 81 to
+/// 89 % of new values if the ratio costs no degree of freedom, 85 to 93 % if it costs one and 88 to 97 % if it costs two.
+/// Within the range of 3 contexts they cover 82 to 96 % with none, and 97 to 99 % with one, where they are three times as
+/// wide.
 const MIN_DEGREES_OF_FREEDOM: usize = 2;
 
 /// Map from contexts of Q values to P outputs, with the covariance of its predictions.

@@ -28,7 +28,7 @@ pub(crate) fn outputs(
 }
 
 /// Computes the Jacobian (K, K) ∂ln T_k/∂o_i of the K segment durations by the outputs o of time.
-pub(crate) fn relative_changes(segment_durations: &[f64]) -> Array2<f64> {
+pub(crate) fn log_duration_jacobian(segment_durations: &[f64]) -> Array2<f64> {
     let duration: f64 = segment_durations.iter().sum();
     Array2::from_shape_fn((segment_durations.len(), segment_durations.len()), |(k, output)| match output {
         0 => 1.0,

@@ -220,7 +220,8 @@ fn white_noise(mut state: u64) -> impl FnMut() -> f64 {
     move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
-/// The 90 % bands between five contexts cover 85 to 95 % of new values; without a degree of freedom for the ratio, 78 %.
+/// 90 % bands within the range of five contexts cover 85 to 95 % of new values; without a degree of freedom for the ratio,
+/// they would cover 78 %.
 #[test]
 fn bands_of_few_contexts_have_their_nominal_coverage() {
     let mut noise = white_noise(3);

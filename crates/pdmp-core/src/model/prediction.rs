@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use ndarray::Array2;
 
 use super::conditions::Conditions;
-use crate::context::{ContextPrediction, relative_changes};
+use crate::context::{ContextPrediction, log_duration_jacobian};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 
@@ -47,7 +47,7 @@ impl Prediction {
         let sum: f64 = weights.iter().sum();
         let segment_durations: Vec<f64> = weights.iter().map(|weight| duration * weight / sum).collect();
         if let Some(covariance) = &mut covariance {
-            let changes = relative_changes(&segment_durations);
+            let changes = log_duration_jacobian(&segment_durations);
             // Jacobian of the segment durations in seconds with respect to the outputs.
             let mut jacobian = Array2::eye(mean.len());
             for ((k, i), change) in changes.indexed_iter() {

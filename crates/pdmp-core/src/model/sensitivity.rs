@@ -5,7 +5,7 @@
 
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis, s};
 
-use crate::context::relative_changes;
+use crate::context::log_duration_jacobian;
 use crate::kind::Kind;
 use crate::model::responses::Curves;
 
@@ -68,7 +68,7 @@ impl<'a> Sensitivity<'a> {
             }
         }
         let mean = |rows: ArrayView2<f64>| rows.mean_axis(Axis(0)).unwrap_or_default();
-        let changes = relative_changes(&mean(segment_durations).to_vec());
+        let changes = log_duration_jacobian(&mean(segment_durations).to_vec());
         let variation = self.positions(mean(outputs).view()).var_axis(Axis(0), 0.0).sum();
         let first = outputs.ncols() - changes.nrows();
         let duration_metric = changes.t().dot(&changes) * (variation / changes.nrows() as f64);

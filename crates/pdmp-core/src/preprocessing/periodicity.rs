@@ -106,7 +106,7 @@ pub(super) fn traits(curve: &Curve) -> Result<Array2<f64>> {
     Ok(traits)
 }
 
-/// Subtracts the linear trend by least squares, and scales to unit standard deviation. Returns the previous one.
+/// Subtracts the linear trend by least squares, and scales to unit standard deviation. Returns the deviation before scaling.
 ///
 /// A constant or linear column becomes zero.
 fn standardise(mut column: ArrayViewMut1<f64>) -> f64 {

@@ -16,6 +16,7 @@
 //! - M. F. Hutchinson, F. R. de Hoog, Smoothing noisy data with spline functions, Numerische Mathematik 47, 1985,
 //!   doi:10.1007/BF01389878 (the trace in O(n)).
 
+mod cross_validation;
 mod noise;
 mod roughness;
 #[cfg(test)]
@@ -29,12 +30,22 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::numerics::simd::{F64x4, WIDTH};
 use crate::numerics::threads::Threads;
-use crate::validate::check_positive;
+use crate::validate::{check_positive, row_major, row_major_mut};
 pub use noise::Noise;
 pub(crate) use noise::{MIN_DECIMATED, pooled};
 use roughness::Roughness;
 
 /// Treatment of measurement noise before demonstrations are differentiated.
+///
+/// ```
+/// # #[cfg(feature = "learning")] {
+/// use pdmp_core::FitOptions;
+/// use pdmp_core::numerics::Smoothing;
+///
+/// let options = FitOptions::discrete().smoothing(Smoothing::CutOff { hz: 6.0 });
+/// assert_eq!(options.smoothing, Smoothing::CutOff { hz: 6.0 });
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Smoothing {
@@ -111,7 +122,7 @@ impl Samples<'_> {
     /// Unused lanes repeat the last column.
     fn deviations(&self, columns: &[usize]) -> (Vec<F64x4>, F64x4) {
         let rows = self.values.as_standard_layout();
-        let rows = rows.as_slice().unwrap_or_default();
+        let rows = row_major(&rows);
         let columns: [usize; WIDTH] = std::array::from_fn(|lane| columns[lane.min(columns.len() - 1)]);
         let at = |row: &[f64]| F64x4::new(columns.map(|d| row[d]));
         let (first, mut largest) = (at(rows), F64x4::ZERO);
@@ -142,7 +153,7 @@ impl Samples<'_> {
             extend_periodically(&mut scaled, pad);
             roughness.second_differences(&mut scaled);
             roughness.factorize(lambda).solve(&mut scaled);
-            let rows = smoothed.as_slice_mut().unwrap_or_default().chunks_exact_mut(self.values.ncols());
+            let rows = row_major_mut(&mut smoothed).chunks_exact_mut(self.values.ncols());
             for (row, residual) in rows.zip(roughness.residuals(&scaled).skip(pad)) {
                 let noise = (residual * lambda * scale).to_array();
                 columns.iter().zip(noise).for_each(|(&d, noise)| row[d] -= noise);

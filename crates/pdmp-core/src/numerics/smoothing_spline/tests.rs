@@ -1,3 +1,4 @@
+use super::cross_validation::{Decimated, Scores};
 use super::*;
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{DMatrix, DVector};
@@ -95,8 +96,8 @@ fn dense(knots: &[f64], y: &[f64], lambda: f64) -> (DVector<f64>, f64) {
 }
 
 /// Computes the scores of one recording with all samples.
-fn scores(samples: &Samples, cut_offs: &[f64]) -> noise::Scores {
-    noise::Scores::compute(&[noise::Decimated::new(samples, usize::MAX)], &[0], cut_offs, Threads::ONE).unwrap()
+fn scores(samples: &Samples, cut_offs: &[f64]) -> Scores {
+    Scores::compute(&[Decimated::new(samples, usize::MAX)], &[0], cut_offs, Threads::ONE).unwrap()
 }
 
 #[test]
@@ -106,7 +107,7 @@ fn values_and_scores_are_those_of_the_dense_formulas() {
     let samples = Samples { time: &time, period: None, values: y.view() };
     let knots: Vec<f64> = time.iter().map(|t| t / samples.interval()).collect();
     let grid = [0.8, 3.0, 20.0, 60.0];
-    let found = scores(&samples, &grid);
+    let scores = scores(&samples, &grid);
     let mut constant = None;
     for (k, hz) in grid.into_iter().enumerate() {
         let (f, score) = dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval()));
@@ -115,11 +116,11 @@ fn values_and_scores_are_those_of_the_dense_formulas() {
             assert_abs_diff_eq!(smoothed[[i, 0]], f[i], epsilon = 1e-10);
         }
         // Logarithmic scores are defined up to a constant.
-        let offset = found.logarithms[[0, k]] - score.ln();
+        let offset = scores.logarithms[[0, k]] - score.ln();
         assert_abs_diff_eq!(offset, *constant.get_or_insert(offset), epsilon = 1e-8);
         let squares = (0..40).map(|i| (y[[i, 0]] - f[i]).powi(2)).sum::<f64>();
-        assert_relative_eq!(found.squares[[0, k]], squares, max_relative = 1e-8);
-        assert_relative_eq!(found.traces[[0, k]], (40.0 * squares / score).sqrt(), max_relative = 1e-8);
+        assert_relative_eq!(scores.squares[[0, k]], squares, max_relative = 1e-8);
+        assert_relative_eq!(scores.traces[[0, k]], (40.0 * squares / score).sqrt(), max_relative = 1e-8);
     }
     let of = |hz: f64| dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval())).1;
     let least = (0..400).map(|k| of(0.5 * 10f64.powf(k as f64 / 160.0))).fold(f64::MAX, f64::min);
@@ -136,7 +137,7 @@ fn scores_of_a_cycle_are_those_of_its_fourier_components() {
     let period = Some(n as f64 * 0.02);
     let samples = Samples { time: &time, period, values: y.view() };
     let grid = [4.0, 8.0, 15.0, 24.0];
-    let found = scores(&samples, &grid);
+    let scores = scores(&samples, &grid);
     for (k, hz) in grid.into_iter().enumerate() {
         let (mut squares, mut trace) = (0.0, 0.0);
         for j in 0..n {
@@ -149,8 +150,8 @@ fn scores_of_a_cycle_are_those_of_its_fourier_components() {
             squares += off * off * (re * re + im * im) / n as f64;
             trace += off;
         }
-        assert_relative_eq!(found.squares[[0, k]], squares, max_relative = 1e-6);
-        assert_relative_eq!(found.traces[[0, k]], trace, max_relative = 1e-6);
+        assert_relative_eq!(scores.squares[[0, k]], squares, max_relative = 1e-6);
+        assert_relative_eq!(scores.traces[[0, k]], trace, max_relative = 1e-6);
     }
 }
 
@@ -173,13 +174,13 @@ fn the_level_of_white_noise_is_estimated() {
                 .collect();
             let samples: Vec<Samples> =
                 recordings.iter().map(|y| Samples { time: &time, period, values: y.view() }).collect();
-            let found = Noise::estimate(Smoothing::Auto, &samples, MIN_DECIMATED, Threads::ONE).unwrap();
-            let case = format!("{n} samples, {n_recordings} recordings, periodic {periodic}: {found:?}");
+            let estimate = Noise::estimate(Smoothing::Auto, &samples, MIN_DECIMATED, Threads::ONE).unwrap();
+            let case = format!("{n} samples, {n_recordings} recordings, periodic {periodic}: {estimate:?}");
             // Four standard errors, for the 64 samples that decimated recordings have at least.
             let accuracy = 4.0 / (2.0 * (n.min(64) * n_recordings.min(24)) as f64).sqrt();
-            assert!((found.levels()[0] / 0.01 - 1.0).abs() < accuracy, "{case}");
-            assert!(found.cut_offs()[0].is_some_and(|hz| (1.0..15.0).contains(&hz)), "{case}");
-            assert_eq!((found.levels()[1], found.cut_offs()[1]), (0.0, None), "{case}");
+            assert!((estimate.levels()[0] / 0.01 - 1.0).abs() < accuracy, "{case}");
+            assert!(estimate.cut_offs()[0].is_some_and(|hz| (1.0..15.0).contains(&hz)), "{case}");
+            assert_eq!((estimate.levels()[1], estimate.cut_offs()[1]), (0.0, None), "{case}");
         }
     }
 }
@@ -195,8 +196,8 @@ fn auto_removes_more_than_half_of_white_noise() {
             let mut normal = noise(seed);
             let noisy: Vec<f64> = clean.iter().map(|y| y + 0.01 * normal()).collect();
             let smoothed = smooth_column(Smoothing::Auto, &time, period, &noisy);
-            let left = distance(&smoothed, clean) / distance(&noisy, clean);
-            assert!(left < 0.5, "seed {seed}, period {period:?}: {left}");
+            let remaining = distance(&smoothed, clean) / distance(&noisy, clean);
+            assert!(remaining < 0.5, "seed {seed}, period {period:?}: {remaining}");
         }
     }
 }
@@ -279,9 +280,9 @@ proptest! {
         let expected = smooth_column(of(8.0), &time, period, &y);
         let scaled_time: Vec<f64> = time.iter().map(|t| t * second).collect();
         let scaled: Vec<f64> = y.iter().map(|y| y * unit).collect();
-        let found = smooth_column(of(8.0 / second), &scaled_time, period.map(|p| p * second), &scaled);
-        let found: Vec<f64> = found.iter().map(|y| y / unit).collect();
-        prop_assert!(distance(&found, &expected) < 1e-6);
+        let rescaled = smooth_column(of(8.0 / second), &scaled_time, period.map(|p| p * second), &scaled);
+        let rescaled: Vec<f64> = rescaled.iter().map(|y| y / unit).collect();
+        prop_assert!(distance(&rescaled, &expected) < 1e-6);
     }
 }
 
