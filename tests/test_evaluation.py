@@ -101,9 +101,7 @@ def test_linear_family_is_predicted() -> None:
 
 
 def test_full_primitive_is_principal_components() -> None:
-    """With J = M and a linear map, both are the same linear predictor of positions.
-
-    """
+    """With J = M and a linear map, both are the same linear predictor of positions."""
     contexts = [[height**2] for height in HEIGHTS]
     full = PDMP(map="linear", singular_value_share=1.0, basis=pdmp.GP(noise=1e-10))
     pair = {"PDMP": full, "PCA": LinearWeights(Components(1.0))}

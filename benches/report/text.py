@@ -53,8 +53,8 @@ TIME = """\
 What a time warp makes of the spectrum of all demonstrations: the share of the sum of the singular
 values that the first three have, with time scaled linearly and with time warped; and E of the
 primitive with warped time less that with linear time, on the same folds, ± standard error. Both
-errors are over normalised time, so that a warped movement must match the timing too. A warp aligns the
-pauses of a raised hand and reduces the variation, but the height hardly determines their times:
+errors are over normalised time, so that a warped movement must match the timing too. A warp aligns
+the pauses of a raised hand and reduces the variation, but the height hardly determines their times:
 movements with mean times are closer.
 """
 

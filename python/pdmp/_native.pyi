@@ -190,7 +190,7 @@ def fit(
         "stacked"; it is "linear" for labels alone, each of which then has the mean of its demonstrations, for two
         different contexts and for more than 1024. The repr of `model.map` states the weights.
     n_styles : int or "auto", optional
-        Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular
+        Style dimension J. By default the number that carries nine tenths of the sum of the singular
         values, at least five (or half of the demonstrations) and those that the contexts explain (F-test), without
         those that measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to
         the error of cross-validation over contexts, in at most ten folds.
