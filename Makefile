@@ -25,7 +25,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases report rtsan fuzz asan licences capi header \
+.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases report rtsan fuzz asan licences capi header stubs \
 	clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -36,6 +36,7 @@ reproduce: .venv/with-reproduction  ## The paper's figures, on a simulated robot
 
 test: .venv/with-test  ## Runs every test, Rust and Python
 	cargo test --release --workspace
+	cargo test --release --package pdmp-core --no-default-features --test runtime
 	$(BIN)/pytest
 
 check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, stubs against the module, and licences
@@ -103,6 +104,9 @@ capi: | needs  ## Builds the libraries for C and C++ and puts them and their hea
 
 header: | needs  ## Makes pdmp.h anew from the sources of the C ABI
 	PDMP_WRITE_HEADER=1 cargo test --release --package pdmp-capi --test header
+
+stubs: .venv/with-dev  ## Copies the docstrings of the compiled module into its stub
+	$(BIN)/python .ci/stubs.py --write
 
 clean:  ## Removes what the targets above made
 	cargo clean

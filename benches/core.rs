@@ -1,4 +1,4 @@
-//! Times of learning and of whole trajectories; `step.rs` has those of one tick.
+//! Time of fits, regressions and rollouts; `step.rs` measures one tick.
 #![allow(missing_docs)]
 
 mod movements;
@@ -20,14 +20,14 @@ use pdmp_core::rollout;
 use pdmp_core::{Conditions, FitOptions, Kind, Model, fit};
 
 fn options(basis: Basis, smoothing: Smoothing) -> FitOptions {
-    let mut options = FitOptions { n_styles: Truncation::Rank(3).into(), basis, ..FitOptions::new(Kind::Discrete) };
-    options.alignment.smoothing = smoothing;
+    let mut options = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(3)).basis(basis);
+    options.smoothing = smoothing;
     options
 }
 
 fn learn(n_styles: usize) -> Arc<Model> {
     let options = options(Basis::NGnet(NGnet::default()), Smoothing::Interpolate);
-    let options = FitOptions { n_styles: Truncation::Rank(n_styles).into(), ..options };
+    let options = options.n_styles(Truncation::Rank(n_styles));
     Arc::new(fit(&movements(40, 1001), &options).expect("a fit"))
 }
 
@@ -46,7 +46,7 @@ fn fits(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// P smooth outputs over [0, 1] at C samples.
+/// Returns C samples of P smooth outputs over [0, 1].
 fn targets(n_samples: usize, n_outputs: usize) -> (Vec<f64>, Array2<f64>) {
     let u: Vec<f64> = (0..n_samples).map(|i| i as f64 / (n_samples - 1) as f64).collect();
     let targets = Array2::from_shape_fn((n_samples, n_outputs), |(i, o)| {
@@ -72,23 +72,18 @@ fn processes(criterion: &mut Criterion) {
     let domain = Domain::Interval { end: 1.0 };
     let mut group = criterion.benchmark_group("gaussian process");
     group.sample_size(10);
-    for kernel in [Kernel::Matern32, Kernel::Matern52] {
+    for kernel in Kernel::ALL {
         for (n_samples, n_outputs) in [(1001, 21), (1000, 3), (4000, 3), (16_000, 3), (100_000, 3)] {
             let (u, targets) = targets(n_samples, n_outputs);
-            for (what, length, noise) in [("given", Some(0.2), Some(1e-8)), ("found", None, None)] {
+            for (source, length, noise) in [("given", Some(0.2), Some(1e-8)), ("estimated", None, None)] {
                 let gp = Gp { kernel, length, noise };
-                let name = format!("{kernel} C={n_samples} P={n_outputs}, hyperparameters {what}");
+                let name = format!("{kernel} C={n_samples} P={n_outputs}, hyperparameters {source}");
                 group.bench_function(name, |bench| {
                     bench.iter(|| gp.regress(domain, &u, targets.view(), &mut |_| Ok(())));
                 });
             }
         }
     }
-    let (u, targets) = targets(1000, 3);
-    let gp = Gp { kernel: Kernel::SquaredExponential, length: Some(0.2), noise: Some(1e-8) };
-    group.bench_function("squared exponential C=1000 P=3, hyperparameters given", |bench| {
-        bench.iter(|| gp.regress(domain, &u, targets.view(), &mut |_| Ok(())));
-    });
     group.finish();
 }
 
@@ -122,7 +117,7 @@ fn rollouts(criterion: &mut Criterion) {
         jacobian(model.primitive(), variable, derivative, &Conditions::default(), grid, &mut |_| Ok(()))
     };
     group.bench_function("style Jacobian", |bench| bench.iter(|| jacobian(&model)));
-    group.bench_function("style Jacobian of a model that never moved", |bench| {
+    group.bench_function("style Jacobian without cached responses", |bench| {
         bench.iter_batched(|| Arc::new(Model::clone(&model)), |model| jacobian(&model), BatchSize::SmallInput);
     });
     group.finish();

@@ -1,26 +1,26 @@
-//! How long single ticks take, the rare ones too: ten million of them, each timed by itself.
+//! Latency distribution of ten million ticks, each timed individually.
 //!
-//! The clock's own row is what two readings with nothing between them show: what it costs, and what the machine itself
-//! takes away from whoever runs on it.
+//! The row "empty" is the baseline of two clock readings without a tick between them: the cost of the clock, and the
+//! interruptions of the process by the system.
 #![allow(missing_docs)]
 
 mod control_loop;
 
 use std::time::{Duration, Instant};
 
-use control_loop::{BOUT, ControlLoop, Told, benching, primitive};
+use control_loop::{CommandLoad, ControlLoop, TICKS_PER_BATCH, is_benchmark, model};
 use hdrhistogram::Histogram;
 
 const N_DOFS: usize = 7;
 const N_STYLES: usize = 3;
 
-/// Times of `n` calls, in nanoseconds; `ready` comes before every bout of them and is not timed.
-fn histogram<S>(n: usize, state: &mut S, ready: impl Fn(&mut S), call: impl Fn(&mut S)) -> Histogram<u64> {
-    let longest = Duration::from_secs(10).as_nanos() as u64;
-    let mut times = Histogram::new_with_max(longest, 3).expect("three digits up to ten seconds");
+/// Returns the histogram of the times of `n` calls, in nanoseconds. `prepare` runs before each batch and is not timed.
+fn histogram<S>(n: usize, state: &mut S, prepare: impl Fn(&mut S), call: impl Fn(&mut S)) -> Histogram<u64> {
+    let max_time = Duration::from_secs(10).as_nanos() as u64;
+    let mut times = Histogram::new_with_max(max_time, 3).expect("three digits up to ten seconds");
     for k in 0..n {
-        if k % BOUT == 0 {
-            ready(state);
+        if k % TICKS_PER_BATCH == 0 {
+            prepare(state);
         }
         let begin = Instant::now();
         call(state);
@@ -30,19 +30,19 @@ fn histogram<S>(n: usize, state: &mut S, ready: impl Fn(&mut S), call: impl Fn(&
 }
 
 fn print(name: &str, times: &Histogram<u64>) {
-    let [median, often, rarely] = [0.5, 0.999, 0.999_99].map(|share| times.value_at_quantile(share));
-    println!("| {name:<9} | {median:>6} | {often:>6} | {rarely:>7} | {:>8} |", times.max());
+    let [median, p99_9, p99_999] = [0.5, 0.999, 0.999_99].map(|quantile| times.value_at_quantile(quantile));
+    println!("| {name:<13} | {median:>6} | {p99_9:>6} | {p99_999:>7} | {:>8} |", times.max());
 }
 
 fn main() {
-    let n = if benching() { 10_000_000 } else { 1_000 };
-    let model = primitive(N_DOFS, N_STYLES);
+    let n = if is_benchmark() { 10_000_000 } else { 1_000 };
+    let model = model(N_DOFS, N_STYLES);
     println!("Latency of {n} ticks, D={N_DOFS} J={N_STYLES}, in nanoseconds\n");
-    println!("| ticks     | median |  p99.9 | p99.999 |  maximum |");
-    println!("|-----------|-------:|-------:|--------:|---------:|");
-    print("the clock", &histogram(n, &mut (), |()| (), |()| ()));
-    for told in Told::ALL {
-        let mut control_loop = ControlLoop::new(&model, told);
-        print(told.name(), &histogram(n, &mut control_loop, ControlLoop::renew, ControlLoop::tick));
+    println!("| ticks         | median |  p99.9 | p99.999 |  maximum |");
+    println!("|---------------|-------:|-------:|--------:|---------:|");
+    print("empty", &histogram(n, &mut (), |()| (), |()| ()));
+    for load in CommandLoad::ALL {
+        let mut control_loop = ControlLoop::new(&model, load);
+        print(load.name(), &histogram(n, &mut control_loop, ControlLoop::prepare, ControlLoop::tick));
     }
 }

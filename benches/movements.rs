@@ -1,11 +1,11 @@
-//! The demonstrations that the benches of learning learn from.
+//! Demonstrations for the benches of learning.
 
 use std::f64::consts::PI;
 
 use ndarray::Array2;
 use pdmp_core::{Demonstration, Sampling};
 
-/// M movements of D = 7 that span a few dimensions, `n_samples` in one second.
+/// Returns M movements of one second with D = 7 and a style space of low dimension.
 pub(crate) fn movements(n_demos: usize, n_samples: usize) -> Vec<Demonstration> {
     let shape = |m: usize, d: usize, s: f64| {
         let reach = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);

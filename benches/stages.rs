@@ -1,4 +1,4 @@
-//! Where the time of a fit goes, stage by stage as the fit itself tells them, and the memory that a large one takes.
+//! Time of each stage of a fit, as its progress callback reports them, and peak memory of a large fit.
 #![allow(missing_docs)]
 
 mod movements;
@@ -17,8 +17,8 @@ use pdmp_core::{Demonstration, FitOptions, Kind};
 
 const STAGES: [Stage; 5] = [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile];
 
-/// Time of each stage of one fit: from when it is first told of to the next; the first from the call, the last to the
-/// model.
+/// Returns the time of each stage of one fit, from its first report to that of the next stage. The first stage begins
+/// with the call, and the last ends with its return.
 fn stages(demos: &[Demonstration], options: &FitOptions) -> [Duration; 5] {
     let mut marks = vec![Instant::now()];
     let mut progress = |stage, _| {
@@ -33,26 +33,27 @@ fn stages(demos: &[Demonstration], options: &FitOptions) -> [Duration; 5] {
     std::array::from_fn(|stage| marks[stage + 1] - marks[stage])
 }
 
-/// A row of the table: the median of each stage over `n` fits, and that of their sums.
-fn row(name: &str, n: usize, demos: &[Demonstration], options: &FitOptions) {
+/// Prints the median time of each stage over `n` fits, and the median of their sum.
+fn print_row(name: &str, n: usize, demos: &[Demonstration], options: &FitOptions) {
     let runs: Vec<[Duration; 5]> = (0..n).map(|_| stages(demos, options)).collect();
     let median = |of: &dyn Fn(&[Duration; 5]) -> Duration| {
         let mut times: Vec<Duration> = runs.iter().map(of).collect();
         times.sort();
         format!("{:>9.3}", 1e3 * times[n / 2].as_secs_f64())
     };
-    let each: Vec<String> = (0..STAGES.len()).map(|stage| median(&|times| times[stage])).collect();
-    println!("| {name:<21} | {} | {} |", each.join(" | "), median(&|times| times.iter().sum()));
+    let columns: Vec<String> = (0..STAGES.len()).map(|stage| median(&|times| times[stage])).collect();
+    println!("| {name:<21} | {} | {} |", columns.join(" | "), median(&|times| times.iter().sum()));
 }
 
-fn heading(title: &str) {
+/// Prints a title and the head of a table.
+fn print_heading(title: &str) {
     println!("\n{title}\n");
-    println!("|                       |     align |   targets | factorise |   regress |   compile |       all |");
+    println!("|                       |     align |   targets | factorise |   regress |   compile |     total |");
     println!("|-----------------------|----------:|----------:|----------:|----------:|----------:|----------:|");
 }
 
-/// The most memory that this process has held so far, where the system tells it.
-fn most_memory() -> Option<String> {
+/// Returns the peak resident memory of this process, on Linux.
+fn peak_memory() -> Option<String> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kilobytes: f64 = peak.trim().trim_end_matches(" kB").parse().ok()?;
@@ -60,34 +61,30 @@ fn most_memory() -> Option<String> {
 }
 
 fn main() {
-    // The test harness runs benches to see that they start.
+    // `cargo test --benches` only checks that the bench starts.
     if !env::args().any(|argument| argument == "--bench") {
         return;
     }
-    let network = FitOptions {
-        n_styles: Truncation::Rank(3).into(),
-        basis: Basis::NGnet(NGnet::default()),
-        ..FitOptions::new(Kind::Discrete)
-    };
+    let network = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(3)).basis(Basis::NGnet(NGnet::default()));
     let mut smoothed = network.clone();
-    smoothed.alignment.smoothing = Smoothing::Auto;
+    smoothed.smoothing = Smoothing::Auto;
     let mut warped = network.clone();
-    warped.alignment.time_scaling = TimeScaling::Warp(TimeWarp::default());
-    let process = FitOptions { n_styles: Truncation::Rank(3).into(), ..FitOptions::new(Kind::Discrete) };
+    warped.time_scaling = TimeScaling::Warp(TimeWarp::default());
+    let process = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(3));
 
     let demos = movements(20, 1001);
-    heading("Milliseconds of a fit, M = 20, C = 1001, D = 7, J = 3");
-    row("NGnet", 101, &demos, &network);
-    row("NGnet, auto smoothing", 21, &demos, &smoothed);
-    row("NGnet, time warp", 21, &demos, &warped);
-    row("GP", 11, &demos, &process);
+    print_heading("Milliseconds of a fit, M = 20, C = 1001, D = 7, J = 3");
+    print_row("NGnet", 101, &demos, &network);
+    print_row("NGnet, auto smoothing", 21, &demos, &smoothed);
+    print_row("NGnet, time warp", 21, &demos, &warped);
+    print_row("GP", 11, &demos, &process);
 
     let demos = movements(5000, 200);
-    let before = most_memory();
-    heading("Milliseconds of a fit, M = 5000, C = 200, D = 7");
-    row("NGnet, J = 5", 3, &demos, &FitOptions { n_styles: Truncation::Rank(5).into(), ..network.clone() });
-    row("NGnet, J by spectrum", 3, &demos, &FitOptions { n_styles: Truncation::Share(0.9).into(), ..network });
-    if let (Some(before), Some(after)) = (before, most_memory()) {
-        println!("\nMost memory: {after}, of which {before} before the first of these fits.");
+    let before = peak_memory();
+    print_heading("Milliseconds of a fit, M = 5000, C = 200, D = 7");
+    print_row("NGnet, J = 5", 3, &demos, &network.clone().n_styles(Truncation::Rank(5)));
+    print_row("NGnet, J from spectrum", 3, &demos, &network.n_styles(Truncation::Share(0.9)));
+    if let (Some(before), Some(after)) = (before, peak_memory()) {
+        println!("\nPeak memory: {after}; {before} before these fits.");
     }
 }

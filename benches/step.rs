@@ -1,26 +1,26 @@
-//! Times of one tick, from one degree of freedom to two arms and more.
+//! Time of one tick, for 1 to 32 degrees of freedom.
 //!
-//! `cargo bench --bench step -- 'live/D=7'` runs those whose name contains what stands in quotes.
+//! `cargo bench --bench step -- 'settled/D=7'` runs the benches whose names contain the quoted text.
 #![allow(missing_docs)]
 
 mod control_loop;
 
 use std::time::{Duration, Instant};
 
-use control_loop::{BOUT, ControlLoop, N_DOFS, N_STYLES, Told, primitive};
+use control_loop::{CommandLoad, ControlLoop, N_DOFS, N_STYLES, TICKS_PER_BATCH, model};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 
-/// Time of `n` ticks.
+/// Returns the time of `n` ticks.
 fn time(control_loop: &mut ControlLoop, n: u64) -> Duration {
     let mut time = Duration::ZERO;
-    let mut left = n;
-    while left > 0 {
-        let bout = left.min(BOUT as u64);
-        control_loop.renew();
+    let mut remaining = n;
+    while remaining > 0 {
+        let batch = remaining.min(TICKS_PER_BATCH as u64);
+        control_loop.prepare();
         let begin = Instant::now();
-        (0..bout).for_each(|_| control_loop.tick());
+        (0..batch).for_each(|_| control_loop.tick());
         time += begin.elapsed();
-        left -= bout;
+        remaining -= batch;
     }
     time
 }
@@ -30,10 +30,10 @@ fn steps(criterion: &mut Criterion) {
     group.sample_size(20).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(1));
     for n_dofs in N_DOFS {
         for n_styles in N_STYLES {
-            let model = primitive(n_dofs, n_styles);
-            for told in Told::ALL {
-                let mut control_loop = ControlLoop::new(&model, told);
-                let id = BenchmarkId::new(told.name(), format!("D={n_dofs} J={n_styles}"));
+            let model = model(n_dofs, n_styles);
+            for load in CommandLoad::ALL {
+                let mut control_loop = ControlLoop::new(&model, load);
+                let id = BenchmarkId::new(load.name(), format!("D={n_dofs} J={n_styles}"));
                 group.bench_function(id, |bench| bench.iter_custom(|n| time(&mut control_loop, n)));
             }
         }

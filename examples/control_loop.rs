@@ -1,8 +1,8 @@
-//! A control loop at 1 kHz on the clock, with a new goal half way.
+//! Control loop at 1 kHz in real time, with a new goal half-way through the movement.
 //!
 //!     cargo run --release --example control_loop -- reach.safetensors
 //!
-//! Without a model file it learns a small model and writes one first.
+//! Without an argument, a small model is learnt and saved first.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -17,19 +17,19 @@ use pdmp_core::{
 };
 
 const PERIOD: Duration = Duration::from_millis(1);
-/// The loop's vectors live on the stack: room for as many degrees of freedom.
-const MOST_DOFS: usize = 16;
+/// Largest number of degrees of freedom, for the arrays of the loop are on the stack.
+const MAX_DOFS: usize = 16;
 
-/// What a loop did.
+/// Statistics of a loop, and its goal and last position.
 struct Report {
     ticks: u32,
-    missed: u32,
-    worst: Duration,
+    missed_deadlines: u32,
+    max_delay: Duration,
     goal: Vec<f64>,
     position: Vec<f64>,
 }
 
-/// Reaches over two obstacles, learnt and saved.
+/// Fits a model to reaches over obstacles of two heights, and saves it.
 fn learn(path: &Path) -> Result<()> {
     let reach = |height: f64| {
         let position = Array2::from_shape_fn((101, 2), |(c, d)| {
@@ -38,42 +38,43 @@ fn learn(path: &Path) -> Result<()> {
         });
         Demonstration::new(position, Sampling::Uniform { dt: 0.003 })
     };
-    let options = FitOptions { basis: Basis::NGnet(NGnet::default()), ..FitOptions::new(Kind::Discrete) };
+    let options = FitOptions::new(Kind::Discrete).basis(Basis::NGnet(NGnet::default()));
     fit(&[reach(0.2)?, reach(0.5)?], &options)?.save(path)
 }
 
-/// Runs the model's nominal movement until it has settled: tick k is due at start + k periods. One that comes whole
-/// periods late has missed deadlines, and makes good for them at once.
+/// Runs the nominal movement of the model until it has settled. Tick k is due at start + k periods. A tick that is late
+/// by one or more periods counts them as missed deadlines, and advances the movement by their time too.
 fn run(path: &Path) -> Result<Report> {
     let model = Arc::new(Model::load(path)?);
     let n_dofs = model.n_dofs();
-    assert!(n_dofs <= MOST_DOFS, "{n_dofs} degrees of freedom: raise MOST_DOFS");
+    assert!(n_dofs <= MAX_DOFS, "{n_dofs} degrees of freedom: raise MAX_DOFS");
     let dt = PERIOD.as_secs_f64();
     let mut controller = Controller::new(model.primitive(), dt, &Conditions::default(), None)?;
-    let mut vectors = [[0.0; MOST_DOFS]; 4];
+    let mut vectors = [[0.0; MAX_DOFS]; 4];
     let [goal, position, velocity, acceleration] = vectors.each_mut().map(|vector| &mut vector[..n_dofs]);
     goal.copy_from_slice(controller.centre());
     goal[0] += 0.1;
     let mut motion = Motion { position, velocity, acceleration };
 
-    let half_way = 0.5 * model.duration();
-    let (mut ticks, mut periods, mut worst, mut status) = (0, 0, Duration::ZERO, Status::Working);
+    let half_time = 0.5 * model.duration();
+    let (mut ticks, mut periods, mut max_delay, mut status) = (0, 0, Duration::ZERO, Status::Working);
     let start = Instant::now();
     while status == Status::Working {
         let due = start + (periods + 1) * PERIOD;
         sleep(due.saturating_duration_since(Instant::now()));
-        let late = due.elapsed();
-        let passed = 1 + late.div_duration_f64(PERIOD) as u32;
+        let delay = due.elapsed();
+        let elapsed = 1 + delay.div_duration_f64(PERIOD) as u32;
         let command = Command {
-            dt: Some(f64::from(passed) * dt),
-            goal: (controller.time() >= half_way).then_some(goal),
+            dt: Some(f64::from(elapsed) * dt),
+            goal: (controller.time() >= half_time).then_some(goal),
             ..Command::default()
         };
         status = controller.update(&command, &mut motion)?;
-        // A robot would be sent motion.position and motion.velocity here.
-        (ticks, periods, worst) = (ticks + 1, periods + passed, worst.max(late));
+        // Here motion.position and motion.velocity would be sent to the robot.
+        (ticks, periods, max_delay) = (ticks + 1, periods + elapsed, max_delay.max(delay));
     }
-    Ok(Report { ticks, missed: periods - ticks, worst, goal: goal.to_vec(), position: motion.position.to_vec() })
+    let (goal, position) = (goal.to_vec(), motion.position.to_vec());
+    Ok(Report { ticks, missed_deadlines: periods - ticks, max_delay, goal, position })
 }
 
 fn main() -> Result<()> {
@@ -85,21 +86,24 @@ fn main() -> Result<()> {
             path
         }
     };
-    let Report { ticks, missed, worst, goal, position } = run(&path)?;
-    println!("{ticks} ticks at 1 kHz, {missed} deadlines missed, at worst {worst:.1?} late");
-    println!("from {}: to {goal:.3?}, at {position:.3?}", path.display());
+    let Report { ticks, missed_deadlines, max_delay, goal, position } = run(&path)?;
+    println!(
+        "{}: {ticks} ticks at 1 kHz, {missed_deadlines} missed deadlines, maximum delay {max_delay:.1?}",
+        path.display()
+    );
+    println!("goal {goal:.3?}, final position {position:.3?}");
     Ok(())
 }
 
 #[test]
-fn arrives_at_the_new_goal_on_time() {
+fn the_movement_reaches_the_new_goal_in_real_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.safetensors");
     learn(&path).expect("a model");
     let begin = Instant::now();
     let report = run(&path).expect("a movement");
-    let moved = (report.ticks + report.missed) * PERIOD;
-    assert!(moved > Duration::from_millis(300) && moved <= begin.elapsed());
+    let duration = (report.ticks + report.missed_deadlines) * PERIOD;
+    assert!(duration > Duration::from_millis(300) && duration <= begin.elapsed());
     assert!((report.goal[0] - 1.1).abs() < 1e-3);
     assert!(report.position.iter().zip(&report.goal).all(|(y, g)| (y - g).abs() < 2e-3));
 }

@@ -242,7 +242,7 @@ class Search:
         self.executions = 0
 
     def run(self, seconds: float, path: Path) -> None:
-        """Changes files for so many seconds."""
+        """Changes files for `seconds`."""
         rng = random.Random(zlib.crc32(self.target.encode()))
         start = time.monotonic()
         for data in seeds(self.target):

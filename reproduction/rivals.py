@@ -1,7 +1,7 @@
 """Comparison with the other methods that the paper discusses, on the same task and robot.
 
 - a DMP of one demonstration, of which only goal and time constant can change;
-- principal components of the joint trajectories about their mean, as many as style parameters,
+- principal components of the joint trajectories about their mean, J of them,
   replayed in time, in place of the models of trajectories that the paper mentions;
 - a library of demonstrations from which a new DMP is fitted for every height, by locally weighted
   regression (Gams, Ude, IEEE-RAS International Conference on Humanoid Robots, 2009, 28-33).

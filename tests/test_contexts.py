@@ -43,10 +43,10 @@ def test_auto_reports_its_selection() -> None:
     assert set(errors) == {"stacked", "gp", "linear"}
     assert errors["stacked"] <= 1.01 * errors["gp"] < 0.2 * errors["linear"]
     assert "Gaussian process and line" in repr(chosen) and "leave-one-out error" in repr(chosen)
-    assert "weights 1.00 and 0.00 inside the contexts of the demonstrations" in repr(chosen)
+    assert "interpolation weights 1.00 and 0.00" in repr(chosen)
     heights = np.linspace(0, 1, 9)[:, None]
     line = pdmp.ContextMap(heights, heights * [1.0, -2.0])
-    assert "weights 0.00 and 1.00 inside" in repr(line)
+    assert "interpolation weights 0.00 and 1.00" in repr(line)
 
 
 def test_labels_alone_give_the_mean_of_their_demonstrations() -> None:
@@ -303,7 +303,7 @@ def test_styles_are_those_of_cross_validation(kind: str) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"n_styles": "auto"}, "goes by contexts: pass contexts"),
+        ({"n_styles": "auto"}, "needs contexts: pass contexts"),
         ({"n_styles": "auto", "contexts": [[0.0], [0.0], [1.0]]}, "three different contexts"),
         ({"n_styles": "most"}, 'n_styles = "most": must be a number, "auto" or None'),
     ],

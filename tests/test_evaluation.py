@@ -101,15 +101,10 @@ def test_linear_family_is_predicted() -> None:
 
 
 def test_full_primitive_is_principal_components() -> None:
-    """With J = M and a linear map, both are the same linear predictor of positions.
-
-    The remaining difference, 3e-6, is the error of a smooth process as interpolant.
-    """
+    """With J = M and a linear map, both are the same linear predictor of positions."""
     contexts = [[height**2] for height in HEIGHTS]
-    smooth = PDMP(
-        map="linear", singular_value_share=1.0, basis=pdmp.GP("squared_exponential", noise=1e-10)
-    )
-    pair = {"PDMP": smooth, "PCA": LinearWeights(Components(1.0))}
+    full = PDMP(map="linear", singular_value_share=1.0, basis=pdmp.GP(noise=1e-10))
+    pair = {"PDMP": full, "PCA": LinearWeights(Components(1.0))}
     found = pdmp.evaluate(arches(HEIGHTS), dt=0.01, contexts=contexts, predictors=pair)
     for ours, theirs in zip(*(found.forecasts[name] for name in pair), strict=True):
         for a, b in zip(ours, theirs, strict=True):

@@ -19,12 +19,10 @@ MANY = settings(max_examples=200)
 THEIRS = {
     "matern32": lambda length, **bounds: kernels.Matern(length, nu=1.5, **bounds),
     "matern52": lambda length, **bounds: kernels.Matern(length, nu=2.5, **bounds),
-    "squared_exponential": lambda length, **bounds: kernels.RBF(length, **bounds),
 }
 TEXTBOOK = {
     "matern32": lambda x: (1 + np.sqrt(3) * x) * np.exp(-np.sqrt(3) * x),
     "matern52": lambda x: (1 + np.sqrt(5) * x + 5 / 3 * x**2) * np.exp(-np.sqrt(5) * x),
-    "squared_exponential": lambda x: np.exp(-(x**2) / 2),
 }
 
 
@@ -214,6 +212,6 @@ def test_a_process_states_its_hyperparameters(kernel: Any) -> None:
     """Kernel, length and noise are properties and part of the repr."""
     regression = pdmp.GP(kernel, 0.25, 1e-3).regress([0.0, 1.0], [[0.0], [1.0]])
     assert (regression.kernel, regression.length, regression.noise) == (kernel, 0.25, 1e-3)
-    name = {"matern32": "Matern-3/2", "matern52": "Matern-5/2"}.get(kernel, "squared exponential")
+    name = {"matern32": "Matern-3/2", "matern52": "Matern-5/2"}[kernel]
     text = f"<pdmp.GPRegression: Gaussian process, {name}, length 0.25, noise 1e-3>"
     assert repr(regression) == text

@@ -41,8 +41,12 @@ KINDS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], slice, str]] = {
         slice(2, 3),
         r'demo 2: "y0", "y1" are exactly 0 from sample 40 \(t = 0.4 s\) to',
     ),
-    "padded": (padded, slice(1, 2), r"demo 1: ends in 21 rows exactly like the one before them"),
-    "counted": (counted, slice(0, 5), r'"y0" grows by exactly 1 a sample in every demonstration'),
+    "padded": (padded, slice(1, 2), r"demo 1: ends in 21 copies of the row before them"),
+    "counted": (
+        counted,
+        slice(0, 5),
+        r'"y0" increases by exactly 1 per sample in every demonstration',
+    ),
     "turned": (lambda y: y + 2 * np.pi, slice(3, 4), r'demo 3: "y0" lies 1 full turns of 6.283'),
 }
 
@@ -87,7 +91,7 @@ def test_turns_between_recordings_of_an_angle_are_removed() -> None:
         )
         for k, h in enumerate(HEIGHTS)
     ]
-    with pytest.warns(UserWarning, match="they were taken off"):
+    with pytest.warns(UserWarning, match="the turns were subtracted"):
         model = pdmp.fit(demos)
     np.testing.assert_allclose(model.goals[:, 0], 1.5, atol=1e-9)
     with pytest.warns(UserWarning):

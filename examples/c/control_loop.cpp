@@ -1,9 +1,9 @@
-// A control loop in C++: a cycle moves to another place, then becomes slower and smaller.
+// Control loop in C++ with commands for the anchor, the time constant and the amplitude of a rhythmic movement.
 //
 //     control_loop cycle.safetensors
 //
-// repeats the first demonstration of a rhythmic model for three seconds and prints a line per tick: status, position,
-// velocity and acceleration, in hexadecimal, which loses nothing.
+// reproduces the first demonstration of a rhythmic model for three seconds, and prints a line per tick: status,
+// position, velocity and acceleration, in hexadecimal notation, which is exact.
 
 #include <cstdio>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-//! Input bytes read as choices and numbers, and the models that both targets start from.
+//! Decoder from input bytes to choices and numbers, and the initial models of both targets.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -11,8 +11,8 @@ use pdmp_core::learning::{TimeScaling, Truncation};
 use pdmp_core::model::TimeWarp;
 use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
 
-/// Numbers at which formulas and checks of ranges tend to fail.
-const ODD: [f64; 32] = [
+/// Edge cases of floating-point arithmetic and of range checks.
+const EDGE_CASES: [f64; 32] = [
     0.0,
     -0.0,
     1.0,
@@ -47,49 +47,51 @@ const ODD: [f64; 32] = [
     f64::NAN,
 ];
 
-/// Bytes of an input, read from the front; zeros follow the last.
+/// Reader of the bytes of an input, which yields zeros past the end.
 pub struct Input<'a> {
     rest: &'a [u8],
 }
 
 impl<'a> Input<'a> {
+    /// Creates a reader of all bytes.
     pub fn new(rest: &'a [u8]) -> Self {
         Self { rest }
     }
 
-    /// The next byte, while there is one.
+    /// Returns the next byte, or `None` at the end.
     pub fn next(&mut self) -> Option<u8> {
         let (&first, rest) = self.rest.split_first()?;
         self.rest = rest;
         Some(first)
     }
 
+    /// Returns the next byte, or 0 at the end.
     pub fn byte(&mut self) -> u8 {
         self.next().unwrap_or(0)
     }
 
-    /// A choice among `n`.
-    pub fn choice(&mut self, n: usize) -> usize {
+    /// Returns a number below `n`, from one byte.
+    pub fn below(&mut self, n: usize) -> usize {
         usize::from(self.byte()) % n.max(1)
     }
 
-    /// An index below `n`, of two bytes.
+    /// Returns an index below `n`, from two bytes.
     pub fn index(&mut self, n: usize) -> usize {
         usize::from(u16::from_le_bytes([self.byte(), self.byte()])) % n.max(1)
     }
 
-    /// A number: mostly small ones, often odd ones, now and then one of any bits.
+    /// Returns a small number, an edge case or arbitrary bits, with weights 96, 144 and 16.
     pub fn number(&mut self) -> f64 {
         let kind = self.byte();
         match kind {
             0..96 => (f64::from(kind) - 32.0) / 16.0,
-            96..240 => ODD[usize::from(kind) % ODD.len()],
+            96..240 => EDGE_CASES[usize::from(kind) % EDGE_CASES.len()],
             _ => f64::from_le_bytes(std::array::from_fn(|_| self.byte())),
         }
     }
 }
 
-/// The bytes of small model files: with labels and warped time, rhythmic, and with a context and each kind of map.
+/// Small model files: discrete with labels and a time warp, rhythmic, and one with each kind of context map.
 pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     let reaches = [0.0, 0.1, 0.2, 0.4, 0.5, 0.7, 0.8, 1.0].map(|h| reach(h).with_context(vec![h]).unwrap());
     let labelled = |h: f64| {
@@ -97,27 +99,23 @@ pub static MODELS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
         reach(h).with_context(vec![label, ContextValue::Number(h)]).unwrap()
     };
     let mut warped = options(Kind::Discrete);
-    warped.alignment.time_scaling = TimeScaling::Warp(TimeWarp { n_segments: 4, max_slope: 1.5 });
+    warped.time_scaling = TimeScaling::Warp(TimeWarp { n_segments: 4, max_slope: 1.5 });
     let maps = ContextMapKind::ALL
         .into_iter()
-        .map(|kind| (reaches.to_vec(), FitOptions { map: MapSelection::Given(kind), ..options(Kind::Discrete) }));
+        .map(|kind| (reaches.to_vec(), options(Kind::Discrete).map(MapSelection::Given(kind))));
     let others = [
         ([0.1, 0.3, 0.4, 0.6, 0.8, 1.0].map(labelled).to_vec(), warped),
         ([0.0, 0.1, 0.25, 0.4].map(cycle).to_vec(), options(Kind::Rhythmic)),
     ];
-    // The others first: a new kind of map does not renumber them.
+    // In this order, a new kind of map does not change the indices in the corpus.
     others.into_iter().chain(maps).map(|(demos, options)| fit(&demos, &options).unwrap().to_bytes().unwrap()).collect()
 });
 
 fn options(kind: Kind) -> FitOptions {
-    FitOptions {
-        n_styles: Truncation::Rank(2).into(),
-        basis: Basis::NGnet(NGnet { n_basis: 10, ..NGnet::default() }),
-        ..FitOptions::new(kind)
-    }
+    FitOptions::new(kind).n_styles(Truncation::Rank(2)).basis(Basis::NGnet(NGnet { n_basis: 10, ..NGnet::default() }))
 }
 
-/// A reach of D = 2 over an obstacle of height `h`.
+/// Returns a reach with D = 2 over an obstacle of height `h`.
 fn reach(h: f64) -> Demonstration {
     let position = Array2::from_shape_fn((41, 2), |(c, d)| {
         let s = c as f64 / 40.0;
@@ -127,7 +125,7 @@ fn reach(h: f64) -> Demonstration {
     Demonstration::new(position, Sampling::Uniform { dt: 0.02 + 0.005 * h }).unwrap()
 }
 
-/// A cycle of D = 2.
+/// Returns a cycle with D = 2.
 fn cycle(style: f64) -> Demonstration {
     let position = Array2::from_shape_fn((40, 2), |(c, d)| {
         let phi = TAU * c as f64 / 40.0;

@@ -1,4 +1,4 @@
-//! Bodies of the fuzz targets, which the tests replay over `corpus/` too.
+//! Checks of the fuzz targets, which the tests also replay over `corpus/`.
 
 pub mod c_abi;
 pub mod input;

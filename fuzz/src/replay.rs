@@ -1,27 +1,27 @@
-//! The replay of a corpus by the tests, and a search by chance where there is no libFuzzer.
+//! Replay of a corpus in the tests, and random search in the absence of libFuzzer.
 
 use std::fs;
 use std::panic::catch_unwind;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Longest time of one input; a hundred times what the slowest takes on a free machine.
+/// Time limit of one input: a hundred times that of the slowest input on an idle machine.
 const MAX_TIME: Duration = Duration::from_secs(10);
-/// Longest input of a search, in bytes.
+/// Maximum length of an input of a search, in bytes.
 const MAX_LENGTH: u64 = 160;
 
-/// Checks every input of a target's corpus, and names those that fail. With PDMP_FUZZ_SECONDS it then searches for as
-/// long, and writes what fails to `fuzz/found/`.
+/// Checks every input in the corpus of a target. If PDMP_FUZZ_SECONDS is set, then checks random inputs for that time,
+/// and writes those that fail to `fuzz/found/`.
 ///
 /// # Panics
-/// An input fails or takes too long, or there is none.
+/// Panics if an input fails or exceeds the time limit, or if the corpus is empty.
 pub fn corpus(target: &str, check: fn(&[u8])) {
     let fuzz = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz");
     let folder = fuzz.join("corpus").join(target);
     let mut paths: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     assert!(!paths.is_empty(), "{} holds no inputs", folder.display());
-    // The models are learnt outside of the time of the first input.
+    // The models are fitted before the time of the first input is measured.
     check(&[]);
     let failed: Vec<_> = paths.iter().filter(|path| fails(check, &fs::read(path).unwrap())).collect();
     assert!(failed.is_empty(), "{} of {} inputs fail: {failed:?}", failed.len(), paths.len());
@@ -30,11 +30,16 @@ pub fn corpus(target: &str, check: fn(&[u8])) {
     }
 }
 
+/// Returns true if the check panics or exceeds the time limit.
 fn fails(check: fn(&[u8]), bytes: &[u8]) -> bool {
     let start = Instant::now();
     catch_unwind(|| check(bytes)).is_err() || start.elapsed() > MAX_TIME
 }
 
+/// Checks random inputs for a time, and writes those that fail to a folder.
+///
+/// # Panics
+/// Panics if an input fails.
 fn search(check: fn(&[u8]), time: Duration, found: &Path) {
     // xorshift64 (Marsaglia 2003).
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
@@ -46,21 +51,21 @@ fn search(check: fn(&[u8]), time: Duration, found: &Path) {
     };
     let (start, mut executions, mut failures) = (Instant::now(), 0_usize, 0_usize);
     while start.elapsed() < time {
-        // Few edits are accepted more often than many.
+        // Short inputs make few edits, which are accepted more often.
         let length = random() % [8, 20, MAX_LENGTH][executions % 3];
         let bytes: Vec<u8> = (0..length).map(|_| (random() >> 32) as u8).collect();
         executions += 1;
         if fails(check, &bytes) {
             failures += 1;
             fs::create_dir_all(found).unwrap();
-            fs::write(found.join(format!("{:08x}", name(&bytes))), &bytes).unwrap();
+            fs::write(found.join(format!("{:08x}", hash(&bytes))), &bytes).unwrap();
         }
     }
-    println!("{executions} inputs in {} s, {failures} of them fail", time.as_secs());
-    assert_eq!(failures, 0, "inputs that fail are in {}", found.display());
+    println!("{executions} inputs in {} s, {failures} failures", time.as_secs());
+    assert_eq!(failures, 0, "failing inputs are in {}", found.display());
 }
 
-/// A name for an input: FNV-1a of 32 bits.
-fn name(bytes: &[u8]) -> u32 {
+/// Returns the 32-bit FNV-1a hash of an input, which names its file.
+fn hash(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
 }

@@ -1,8 +1,8 @@
-# Types of the compiled half. Its documentation lives with the code in crates/pdmp-py: see help().
+# Types of the compiled module, and copies of its docstrings, which `.ci/stubs.py --write` writes.
 #
-# Shapes: M demonstrations, T samples, D degrees of freedom, J style parameters, Q context values,
-# B trajectories, C samples of a regression with P outputs. Times are in s, positions in the unit of
-# each degree of freedom. Whatever numpy can turn into float64 is accepted; float64 comes back.
+# Shapes: M demonstrations, T samples, D degrees of freedom, J style parameters, Q context values, B movements of a batch,
+# C samples of a regression with P outputs. Times are in s, positions in the unit of each degree of freedom. Arguments are
+# any objects that numpy converts to float64; results are float64.
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
@@ -18,7 +18,7 @@ _Context: TypeAlias = ArrayLike | Sequence[float | str]
 _Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
 _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
-_Kernel: TypeAlias = Literal["matern32", "matern52", "squared_exponential"]
+_Kernel: TypeAlias = Literal["matern32", "matern52"]
 
 __all__ = [
     "Conditions",
@@ -72,8 +72,8 @@ class Demonstration:
     Parameters
     ----------
     position : array_like, (T, D), or Trajectory
-        Positions in the unit of each degree of freedom; at least four samples. The columns of a data frame supply names,
-        and a trajectory supplies time stamps, names and units, unless they are given.
+        Positions in the unit of each degree of freedom; at least four samples. The columns of a data frame supply
+        names, and a trajectory supplies time stamps, names and units, unless they are given.
     dt : float, optional
         Sampling interval in s. Without `dt` and `time`, `fit` needs it.
     time : array_like, (T,), optional
@@ -153,7 +153,7 @@ def fit(
     smoothing: Literal["auto"] | float | None = "auto",
     nominal: int | None = None,
     n_samples: int | None = None,
-    transport: Literal["learnt", "immediate"] = "learnt",
+    transport: Literal["learnt", "immediate"] | None = None,
     dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
     alignment: Literal["linear", "warp"] | TimeWarp = "linear",
     landmarks: ArrayLike | None = None,  # (M, E)
@@ -161,7 +161,7 @@ def fit(
     alpha_z: float = 25.0,
     beta_z: float | None = None,
     alpha_x: float | None = None,
-    mu: float = 1.0,
+    mu: float | None = None,
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model:
@@ -173,8 +173,8 @@ def fit(
     Parameters
     ----------
     demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D)
-        Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the readers
-        return, the values are used. The columns of data frames name the degrees of freedom.
+        Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
+        readers return, the values are used. The columns of data frames name the degrees of freedom.
     kind : {"discrete", "rhythmic"}
         Movement from a start to a goal, or around an anchor.
     dt : float, optional
@@ -184,47 +184,49 @@ def fit(
     contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
         Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
     map : {"auto", "stacked", "gp", "linear", "polynomial"}
-        Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge regression by
-        their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the process alone,
-        "linear" least squares as in the paper, "polynomial" ridge regression of second degree. "auto" is "stacked"; it is
-        "linear" for labels alone, each of which then has the mean of its demonstrations, for two different contexts and
-        for more than 1024. The repr of `model.map` states the weights.
+        Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
+        regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
+        process alone, "linear" least squares as in the paper, "polynomial" ridge regression of second degree. "auto" is
+        "stacked"; it is "linear" for labels alone, each of which then has the mean of its demonstrations, for two
+        different contexts and for more than 1024. The repr of `model.map` states the weights.
     n_styles : int or "auto", optional
-        Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular values,
-        at least five (or half of the demonstrations) and those that the contexts explain (F-test), without those that
-        measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to the error of
-        cross-validation over contexts, in at most ten folds.
+        Style dimension J. By default the number that carries nine tenths of the sum of the singular
+        values, at least five (or half of the demonstrations) and those that the contexts explain (F-test), without
+        those that measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to
+        the error of cross-validation over contexts, in at most ten folds.
     singular_value_share : float, optional
-        Share in (0, 1], the paper's rule: J is the smallest number of singular values whose sum exceeds this share of the
-        sum of all, for example 0.9.
+        Share in (0, 1], the paper's rule: J is the smallest number of singular values whose sum exceeds this share of
+        the sum of all, for example 0.9.
     basis : {"gp", "ngnet"}, GP or NGnet
         Regression of the landscape.
     smoothing : "auto", float or None
-        Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom, which
-        leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
+        Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom,
+        which leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
         `model.noise` and `model.cut_offs` hold the result.
     nominal : int, optional
         Index of the nominal demonstration; by default the one of median duration.
     n_samples : int, optional
-        Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if that
-        has fewer than 150.
-    transport : {"learnt", "immediate"}
-        Motion of the frame of a discrete movement from start to goal: along the learnt profile of the demonstrations
-        (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the movement
-        brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
+        Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
+        that has fewer than 150.
+    transport : {"learnt", "immediate"}, optional
+        Motion of the frame of a discrete movement from start to goal: by default along the learnt profile of the
+        demonstrations (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past
+        its end the movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as
+        in the paper.
     dof_scale : None, "unit", "range" or array_like, (D,)
-        Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all units are
-        equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among them.
-        "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and also apply to
-        a time warp.
+        Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
+        units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
+        them. "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and
+        also apply to a time warp.
     alignment : {"linear", "warp"} or TimeWarp
-        Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the demonstrations
-        closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a demonstration has
-        fewer than 16 samples; with three or more different contexts it is applied only if it lowers the cross-validation
-        error over contexts by more than its standard error, and `model.segment_durations` has one column if it is not.
+        Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the
+        demonstrations closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a
+        demonstration has fewer than 16 samples; with three or more different contexts it is applied only if it lowers
+        the cross-validation error over contexts by more than its standard error, and `model.segment_durations` has one
+        column if it is not.
     landmarks : array_like, (M, E), optional
-        Times in s of E landmarks in each demonstration, from its first sample or on the clock of its time stamps. They are
-        aligned to those of the nominal demonstration, in place of a warp.
+        Times in s of E landmarks in each demonstration, from its first sample or on the clock of its time stamps. They
+        are aligned to those of the nominal demonstration, in place of a warp.
     tau : float, optional
         Time constant τ in s of a discrete primitive; by default the nominal duration.
     alpha_z : float
@@ -232,11 +234,11 @@ def fit(
     beta_z : float, optional
         Stiffness β_z of the output system, from 1e-6 to 1e6, without unit; by default `alpha_z / 4` (critical damping).
     alpha_x : float, optional
-        Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With "immediate"
-        transport the forcing fades with x past the end: if a movement leaves its goal there before it settles,
-        `alpha_x = alpha_z` reduces the deviation most.
-    mu : float
-        Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit.
+        Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With
+        "immediate" transport the forcing fades with x past the end: if a movement leaves its goal there before it
+        settles, `alpha_x = alpha_z` reduces the deviation most.
+    mu : float, optional
+        Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit; 1 by default.
     threads : int, optional
         Largest number of threads; by default all that the system offers. The model does not depend on it.
     progress : callable, optional
@@ -251,8 +253,8 @@ def fit(
     -----
     UserWarning
         Implausible samples, with their positions: time stamps much closer than the others, dropouts recorded as zeros,
-        padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole turns
-        apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
+        padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole
+        turns apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
 
     Raises
     ------
@@ -344,9 +346,9 @@ def load(path: str | PathLike[str]) -> Model:
     Parameters
     ----------
     path : path-like
-        A `.safetensors` file that `Model.save` wrote. Files of unknown origin are safe to load: a file contains no code and
-        no reference to other files, needs memory and time in proportion to its size, and generates finite numbers or an
-        error. The checksum detects damage, not intent: the author of a file decides its movements and texts.
+        A `.safetensors` file that `Model.save` wrote. Files of unknown origin are safe to load: a file contains no code
+        and no reference to other files, needs memory and time in proportion to its size, and generates finite numbers
+        or an error. The checksum detects damage, not intent: the author of a file decides its movements and texts.
 
     Returns
     -------
@@ -372,10 +374,10 @@ def load(path: str | PathLike[str]) -> Model:
 def resample(demo: Demonstration, dt: float) -> Demonstration:
     """Resample a recording at even intervals.
 
-    The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no denser
-    than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the residuals
-    of the nearest recorded samples: noise stays white, so that a fit can still smooth it. A denser grid samples the spline
-    through all samples. Remove frequencies above 1/(2 dt) with `lowpass` first.
+    The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no
+    denser than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the
+    residuals of the nearest recorded samples: noise stays white, so that a fit can still smooth it. A denser grid
+    samples the spline through all samples. Remove frequencies above 1/(2 dt) with `lowpass` first.
 
     Parameters
     ----------
@@ -398,9 +400,10 @@ def resample(demo: Demonstration, dt: float) -> Demonstration:
 def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration:
     """Trim the rests before and after the movement of a recording.
 
-    The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed, where
-    v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise exceeds the
-    threshold, only stretches above the threshold that also exceed the noise count. The samples remain as recorded.
+    The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed,
+    where v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise
+    exceeds the threshold, only stretches above the threshold that also exceed the noise count. The samples remain as
+    recorded.
 
     Parameters
     ----------
@@ -423,8 +426,8 @@ def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration:
 def cut(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fewer than times
     """Cut a recording at given times.
 
-    Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the recording.
-    As with `resample`, noise stays white.
+    Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the
+    recording. As with `resample`, noise stays white.
 
     Parameters
     ----------
@@ -497,11 +500,11 @@ def residuals(demo: Demonstration, cut_offs: ArrayLike) -> _Array:  # (K, D)
 def period(demo: Demonstration) -> float:
     """Estimate the period of a cyclic recording by autocorrelation.
 
-    A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal of
-    linear trends. The period is the first peak of A that equals the highest peak within the variation between cycles, at
-    the vertex of the parabola through three samples; peaks at half a cycle and at periods of harmonics are lower. A peak
-    must exceed the significance level for noise of the same autocorrelation, which rises as fewer independent samples
-    overlap.
+    A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal
+    of linear trends. The period is the first peak of A that equals the highest peak within the variation between
+    cycles, at the vertex of the parabola through three samples; peaks at half a cycle and at periods of harmonics are
+    lower. A peak must exceed the significance level for noise of the same autocorrelation, which rises as fewer
+    independent samples overlap.
 
     Parameters
     ----------
@@ -707,8 +710,8 @@ class Model:
     ) -> Trajectory:
         """Compute the movement under constant conditions.
 
-        Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb (discrete)
-        or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
+        Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb
+        (discrete) or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
 
         Parameters
         ----------
@@ -717,8 +720,8 @@ class Model:
         dt : float
             Interval between samples in s.
         duration : float, optional
-            Length in s. By default the demonstrated duration scaled by `tau`, the sum of `segment_durations`, or one period
-            of a rhythmic movement.
+            Length in s. By default the demonstrated duration scaled by `tau`, the sum of `segment_durations`, or one
+            period of a rhythmic movement.
         context : array_like or list, (Q,), optional
             Context whose prediction supplies absent conditions: style, goal, start or anchor, and duration.
         **changes
@@ -787,8 +790,8 @@ class Model:
         """Compute the movements of many styles.
 
         A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
-        response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout` to
-        rounding.
+        response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
+        to rounding.
 
         Parameters
         ----------
@@ -901,7 +904,8 @@ class Model:
         """Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
 
         A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
-        Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start` and `velocity`.
+        Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start` and
+        `velocity`.
 
         Parameters
         ----------
@@ -948,10 +952,10 @@ class Model:
     ) -> _Array:  # (J,)
         """Estimate the style of a new demonstration.
 
-        The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of the
-        styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A cycle with
-        another initial phase is first shifted to that of the model's. The demonstration is inspected as in `fit`, with the
-        same warnings. A model with a time warp warps the demonstration too.
+        The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of
+        the styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A
+        cycle with another initial phase is first shifted to that of the model's. The demonstration is inspected as in
+        `fit`, with the same warnings. A model with a time warp warps the demonstration too.
 
         Parameters
         ----------
@@ -973,8 +977,9 @@ class Model:
         ------
         ValueError
             Names or units differ from those of the model, or the model does not describe the demonstration: its closest
-            movement deviates by more than half of the demonstration's deviation from its mean while the forcing left out
-            exceeds three times that of the fitted demonstrations, or its style is more than ten times as large as theirs.
+            movement deviates by more than half of the demonstration's deviation from its mean while the forcing left
+            out exceeds three times that of the fitted demonstrations, or its style is more than ten times as large as
+            theirs.
 
         Examples
         --------
@@ -1059,8 +1064,8 @@ class Model:
         Raises
         ------
         ValueError
-            The model was fitted without contexts, or `context` has a wrong length, an unknown label, or a number that is
-            not finite.
+            The model was fitted without contexts, or `context` has a wrong length, an unknown label, or a number that
+            is not finite.
 
         Examples
         --------
@@ -1079,8 +1084,8 @@ class Model:
         """Compute the prediction band of a new movement for a context.
 
         y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
-        conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The band
-        compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
+        conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
+        band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
 
         Parameters
         ----------
@@ -1143,10 +1148,10 @@ class Model:
         conditions : Conditions, optional
             Conditions at the start. The controller takes the sum of segment durations; see `tau_at` to follow them.
         transition : float, optional
-            Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0 switches
-            immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of the period
-            (rhythmic). A new goal takes the remaining time of the movement if that is longer, unless transport is
-            immediate.
+            Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0
+            switches immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of
+            the period (rhythmic). A new goal takes the remaining time of the movement if that is longer, unless
+            transport is immediate.
         context : array_like or list, (Q,), optional
             Context whose prediction supplies absent conditions.
         **changes
@@ -1233,9 +1238,9 @@ class _Changes(TypedDict, total=False):
 class Conditions:
     """Conditions of a movement.
 
-    A condition that is None is that of the nominal demonstration. `Model.rollout`, `Model.controller` and `Model.jacobian`
-    take conditions, and keywords of the same names that replace single ones; `Model.conditions`, `Model.predict` and
-    `blend` return conditions.
+    A condition that is None is that of the nominal demonstration. `Model.rollout`, `Model.controller` and
+    `Model.jacobian` take conditions, and keywords of the same names that replace single ones; `Model.conditions`,
+    `Model.predict` and `blend` return conditions.
 
     Parameters
     ----------
@@ -1244,7 +1249,8 @@ class Conditions:
     goal : array_like, (D,), optional
         Goal g in the unit of each degree of freedom; discrete.
     start : array_like, (D,), optional
-        Start position y₀ in the unit of each degree of freedom. A rhythmic movement starts on its limit cycle by default.
+        Start position y₀ in the unit of each degree of freedom. A rhythmic movement starts on its limit cycle by
+        default.
     velocity : array_like, (D,), optional
         Start velocity per s; by default that of the demonstrations.
     anchor : array_like, (D,), optional
@@ -1254,15 +1260,17 @@ class Conditions:
     tau : float, optional
         Time constant τ in s: the duration of a discrete movement, the period over 2π of a rhythmic one.
     segment_durations : array_like, (K,), optional
-        Time in s in each segment between `Model.breaks`, in place of `tau`. Time over phase is the monotone cubic through
-        their sums. A rollout follows it; a controller takes the total, and `Model.tau_at` returns τ at each phase.
+        Time in s in each segment between `Model.breaks`, in place of `tau`. Time over phase is the monotone cubic
+        through their sums. A rollout follows it; a controller takes the total, and `Model.tau_at` returns τ at each
+        phase.
     phase : float, optional
         Phase φ in rad at which a rhythmic movement starts on its limit cycle; 0 by default.
 
     Raises
     ------
     ValueError
-        A condition is not a number or a vector of numbers. Models check lengths and finiteness when they take conditions.
+        A condition is not a number or a vector of numbers. Models check lengths and finiteness when they take
+        conditions.
     TypeError
         A keyword is unknown.
 
@@ -1280,8 +1288,8 @@ class Conditions:
         Parameters
         ----------
         **changes
-            Conditions by name; None stands for that of the nominal demonstration. `tau` replaces `segment_durations` and
-            vice versa.
+            Conditions by name; None stands for that of the nominal demonstration. `tau` replaces `segment_durations`
+            and vice versa.
 
         Returns
         -------
@@ -1360,32 +1368,32 @@ class Prediction:
         """Predicted duration or period in s."""
     @property
     def covariance(self) -> _Array | None:  # of all conditions in this order, (P, P)
-        """Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order; None if
-        the demonstrations leave no degree of freedom to estimate it.
+        """Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order;
+        None if the demonstrations leave no degree of freedom to estimate it.
         """
     @property
     def degrees_of_freedom(self) -> int:
         """Degrees of freedom of the covariance estimate."""
     @property
     def extrapolation(self) -> _Array:  # (Q,), in ranges of the demonstrated contexts
-        """Distance (Q,) of each context value from the demonstrated range, relative to that range: 0 inside and for labels, inf
-        for a value that differs from a constant one.
+        """Distance (Q,) of each context value from the demonstrated range, relative to that range: 0 inside and for
+        labels, inf for a value that differs from a constant one.
         """
 
 @final
 class ContextMap:
     """Regression from contexts to outputs with predictive covariance.
 
-    `fit` uses it from contexts to style, goal, start and duration (Section 4.1.2 of the paper); here outputs are arbitrary.
-    Each principal component of the outputs is modelled as y = φ(h)ᵀβ + f(h) + ε:
+    `fit` uses it from contexts to style, goal, start and duration (Section 4.1.2 of the paper); here outputs are
+    arbitrary. Each principal component of the outputs is modelled as y = φ(h)ᵀβ + f(h) + ε:
 
     - "linear" is least squares with φ = (1, h) and f = 0.
-    - "gp" and "polynomial" have φ = 1 and a Gaussian process f, whose kernel is Matérn-5/2 or that of polynomials of second
-      degree. Restricted maximum likelihood estimates the ratio of f to the noise for each component; leave-one-out error
-      decides the length scale.
+    - "gp" and "polynomial" have φ = 1 and a Gaussian process f, whose kernel is Matérn-5/2 or that of polynomials of
+      second degree. Restricted maximum likelihood estimates the ratio of f to the noise for each component;
+      leave-one-out error decides the length scale.
     - "stacked" is the mean plus w_g·g + w_l·l, with the deviations g of "gp" and l of a ridge regression. The weights
-      minimise the leave-one-out error under w_g + w_l = 1 inside the range of the contexts, and under w_g + w_l ≤ 1 beyond
-      a tenth of their range outside.
+      minimise the leave-one-out error under w_g + w_l = 1 inside the range of the contexts, and under w_g + w_l ≤ 1
+      beyond a tenth of their range outside.
 
     Numbers are scaled by their spread; labels are equal or not. Repetitions of a context are averaged and count once.
 
@@ -1488,8 +1496,8 @@ class Trajectory:
         Returns
         -------
         pandas.DataFrame
-            The index is the time `t` in s. Columns are positions `<name>`, velocities `<name>_velocity` and accelerations
-            `<name>_acceleration`; `attrs["units"]` maps each column to its unit.
+            The index is the time `t` in s. Columns are positions `<name>`, velocities `<name>_velocity` and
+            accelerations `<name>_acceleration`; `attrs["units"]` maps each column to its unit.
 
         Raises
         ------
@@ -1528,9 +1536,9 @@ class Status:
 class Controller:
     """Running movement, returned by `Model.controller`.
 
-    `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain valid.
-    `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that is rejected
-    leaves the present one in force.
+    `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
+    valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
+    is rejected leaves the present one in force.
     """
     def __copy__(self) -> Controller: ...
     def __deepcopy__(self, _memo: Any, /) -> Controller: ...
@@ -1550,20 +1558,21 @@ class Controller:
             tau u' = k = 1 / (1 + k_s |d / range|**2)
             tau o' = 5 k (e - o) / extent
 
-        with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the tracking
-        error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All terms are
-        evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than m. A robot
-        that is blocked thus holds the movement and nearly stops its phase; released, it continues from there. A robot with
-        a constant tracking error ends no further from the goal than that error, and the movement finishes.
+        with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
+        tracking error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All
+        terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
+        m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
+        there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
+        finishes.
 
         Parameters
         ----------
         dt : float, optional
             Length of this tick in s; by default that of the controller. A tick of length zero changes nothing.
         measured : array_like, (D,), optional
-            Measured position m in the unit of each degree of freedom. Errors of angles (rad, deg, °) are wrapped to half a
-            turn. None means no new measurement: the last error m - y stays in force until the next one or `release`, so
-            that a sensor may be slower than the loop.
+            Measured position m in the unit of each degree of freedom. Errors of angles (rad, deg, °) are wrapped to
+            half a turn. None means no new measurement: the last error m - y stays in force until the next one or
+            `release`, so that a sensor may be slower than the loop.
         coupling : tuple of two array_like, (D,), optional
             Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
 
@@ -1685,13 +1694,14 @@ class GP:
     """Gaussian process regression, the paper's choice of basis functions.
 
     All outputs share kernel, length scale and noise ratio. Hyperparameters that are not given maximise the marginal
-    likelihood (Rasmussen and Williams 2006, Section 5.4.1). `regress` searches noise ratios from 1e-10 to 1e4. In `fit`,
-    a noise ratio that is not given is at most 1e-6, and the noise variance at most 1e-6 of the targets' mean square: no
-    style can restore a signal that the landscape takes for noise, and `smoothing` removes the noise of demonstrations.
+    likelihood (Rasmussen and Williams 2006, Section 5.4.1). `regress` searches noise ratios from 1e-10 to 1e4. In
+    `fit`, a noise ratio that is not given is at most 1e-6, and the noise variance at most 1e-6 of the targets' mean
+    square: no style can restore a signal that the landscape takes for noise, and `smoothing` removes the noise of
+    demonstrations.
 
     Parameters
     ----------
-    kernel : {"matern52", "matern32", "squared_exponential"}
+    kernel : {"matern52", "matern32"}
         Covariance function over the clock u; periodic for rhythmic movements.
     length : float, optional
         Length scale, in units of the clock u = t / tau; positive. Estimated if not given.
@@ -1798,17 +1808,17 @@ class GPRegression:
 class TimeWarp:
     """Monotone time warp of the demonstrations to the nominal one.
 
-    Movements are compared by their square-root velocity q = ẏ/√|ẏ|, scaled to unit norm. The warp γ minimises
-    ∫|q₀ − (q∘γ)√γ̇|² + λ ln²γ̇ dp over the phase p, exactly among warps that are linear in each segment with ends on a grid
-    of a tenth of a segment.
+    Movements are compared by their square-root velocity q = ẏ/√|ẏ|, scaled to unit norm. Over the phase p the warp γ
+    minimises ∫|q₀ − (q∘γ)√γ̇|² + λ ln²γ̇ dp, exactly among warps that are linear in each segment with ends on a
+    grid of a tenth of a segment.
 
     Parameters
     ----------
     n_segments : int
         Number K of segments of equal phase, from 1 (linear scaling) to 1000 and half the samples of each demonstration.
     max_slope : float
-        Bound of the slope of the warp, from 1 to 10: the duration of a segment is at most `max_slope` times that of linear
-        scaling and at least 1 / `max_slope` of it.
+        Bound of the slope of the warp, from 1 to 10: the duration of a segment is at most `max_slope` times that of
+        linear scaling and at least 1 / `max_slope` of it.
 
     Raises
     ------
@@ -1817,8 +1827,9 @@ class TimeWarp:
 
     References
     ----------
-    Srivastava, Klassen, Joshi, Jermyn, IEEE TPAMI 33 (2011), https://doi.org/10.1109/TPAMI.2010.184; Nielsen, Carstensen,
-    Smedsgaard, J. Chromatography A 805 (1998), https://doi.org/10.1016/S0021-9673(98)00021-1
+    Srivastava, Klassen, Joshi, Jermyn, IEEE TPAMI 33 (2011), https://doi.org/10.1109/TPAMI.2010.184
+
+    Nielsen, Carstensen, Smedsgaard, J. Chromatography A 805 (1998), https://doi.org/10.1016/S0021-9673(98)00021-1
     """
     def __new__(cls, n_segments: int = 8, max_slope: float = 2.5) -> TimeWarp: ...
     @property

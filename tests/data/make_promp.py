@@ -2,7 +2,7 @@
 
 Usage: `pip install movement_primitives numpy`, then `python tests/data/make_promp.py`. `sampled`
 (M, C, D) are movements that are linear in their `heights`, `weights` (M, K) the library's for them,
-`trajectories` (K, C, D) the library's for each weight by itself. `forecasts` are trajectories of
+`trajectories` (K, C, D) those for each unit weight. `forecasts` are trajectories of
 the library for weights at the heights `at`, linear in the height by least squares in numpy.
 """
 

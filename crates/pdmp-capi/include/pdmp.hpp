@@ -1,7 +1,8 @@
-// The C++17 face of pdmp.h: ownership, vectors and exceptions, and nothing of its own.
+// C++17 wrapper of pdmp.h with RAII, std::vector and exceptions.
 //
-// Making and resetting throw pdmp::Error. What runs in the loop is noexcept and answers a pdmp_status: below zero it
-// was refused, nothing has changed, and Controller::error tells why. Lengths, units and equations are those of pdmp.h.
+// Loading, prediction, construction and reset throw pdmp::Error. The functions of the control loop are noexcept and
+// return a pdmp_status: negative values are errors, after which the controller is unchanged and Controller::error
+// returns the message. Lengths, units, equations and thread safety are those of pdmp.h.
 
 #ifndef PDMP_HPP
 #define PDMP_HPP
@@ -18,18 +19,19 @@
 
 namespace pdmp {
 
-/// A call that was refused, and why.
+/// Error status and message of a call.
 class Error : public std::runtime_error {
 public:
     Error(pdmp_status status, const std::string &text) : std::runtime_error(text), status_(status) {}
 
+    /// Returns the status, which is negative.
     pdmp_status status() const noexcept { return status_; }
 
 private:
     pdmp_status status_;
 };
 
-/// The numbers of a vector, an array or the like, which must outlive what is told of them.
+/// Returns a non-owning view of a contiguous container of double, which must outlive the view.
 template <class Numbers>
 pdmp_vector view(const Numbers &numbers) noexcept {
     return {std::data(numbers), static_cast<std::size_t>(std::size(numbers))};
@@ -38,14 +40,15 @@ pdmp_vector view(const Numbers &numbers) noexcept {
 template <class Numbers>
 pdmp_vector view(const Numbers &&) = delete;
 
-/// What a movement starts with; what is empty is that of the nominal demonstration.
+/// Conditions of a movement, see pdmp_conditions. An empty member takes the value of the nominal demonstration.
 struct Conditions {
     std::vector<double> style, goal, anchor, start, velocity;
     std::optional<double> amplitude, tau, phase;
 };
 
-/// A motion, one number per DoF.
+/// Motion with n_dofs elements in each vector, see pdmp_motion.
 struct Motion {
+    /// Allocates the vectors.
     explicit Motion(std::size_t n_dofs) : position(n_dofs), velocity(n_dofs), acceleration(n_dofs) {}
 
     std::vector<double> position, velocity, acceleration;
@@ -53,7 +56,7 @@ struct Motion {
 
 namespace detail {
 
-/// Makes a call that tells its reason, and throws it if the call is refused.
+/// Executes a call that writes an error message, and throws pdmp::Error if its status is negative.
 template <class Call>
 void check(Call call) {
     char text[512] = "";
@@ -61,74 +64,76 @@ void check(Call call) {
     if (status < 0) throw Error(status, text);
 }
 
-inline pdmp_vector told(const std::vector<double> &numbers) noexcept {
+inline pdmp_vector to_c(const std::vector<double> &numbers) noexcept {
     return numbers.empty() ? pdmp_vector{} : view(numbers);
 }
 
-inline const double *told(const std::optional<double> &number) noexcept { return number ? &*number : nullptr; }
+inline const double *to_c(const std::optional<double> &number) noexcept { return number ? &*number : nullptr; }
 
-inline pdmp_conditions told(const Conditions &c) noexcept {
-    return {told(c.style),    told(c.goal),      told(c.anchor), told(c.start),
-            told(c.velocity), told(c.amplitude), told(c.tau),    told(c.phase)};
+inline pdmp_conditions to_c(const Conditions &c) noexcept {
+    return {to_c(c.style),    to_c(c.goal),      to_c(c.anchor), to_c(c.start),
+            to_c(c.velocity), to_c(c.amplitude), to_c(c.tau),    to_c(c.phase)};
 }
 
 inline std::vector<double> copy(pdmp_vector numbers) { return {numbers.data, numbers.data + numbers.length}; }
 
-inline pdmp_motion room(Motion &motion) noexcept {
-    const auto room = [](std::vector<double> &numbers) { return pdmp_buffer{numbers.data(), numbers.size()}; };
-    return {room(motion.position), room(motion.velocity), room(motion.acceleration)};
+inline pdmp_buffer buffer(std::vector<double> &numbers) noexcept { return {numbers.data(), numbers.size()}; }
+
+inline pdmp_motion to_c(Motion &motion) noexcept {
+    return {buffer(motion.position), buffer(motion.velocity), buffer(motion.acceleration)};
 }
 
 }  // namespace detail
 
-/// A learnt primitive. It never changes; threads and controllers share it.
+/// Learnt primitive. It is immutable, and threads may share it.
 class Model {
 public:
-    /// Reads a model file from a path in UTF-8.
+    /// Loads a model file. `path` is a UTF-8 string.
     static Model load(const std::string &path) {
         return Model([&](pdmp_model **model, pdmp_text error) { return pdmp_model_load(path.c_str(), model, error); });
     }
 
-    /// Reads a model from the bytes of a file.
+    /// Loads a model from the `size` bytes of a model file in memory.
     static Model from_bytes(const void *bytes, std::size_t size) {
         return Model([&](pdmp_model **model, pdmp_text error) {
             return pdmp_model_from_bytes(bytes, size, model, error);
         });
     }
 
-    /// Kind, sizes and times.
+    /// Returns the properties of the model.
     pdmp_info info() const noexcept {
         pdmp_info info{};
         pdmp_model_describe(get(), &info);
         return info;
     }
 
-    /// Name of a degree of freedom, counted from 0; empty if there is none such.
+    /// Returns the name of degree of freedom `dof`, counted from 0, or an empty string if `dof` >= n_dofs.
     std::string name(std::size_t dof) const {
         const char *name = pdmp_model_name(get(), dof);
         return name ? name : "";
     }
 
-    /// A label that a value of the contexts may be, both counted from 0; empty past the last, and where it is a number.
-    std::string label(std::size_t value, std::size_t label) const {
-        const char *found = pdmp_model_label(get(), value, label);
-        return found ? found : "";
+    /// Returns label `label` of context column `column`, both counted from 0, or an empty string if there is none.
+    std::string label(std::size_t column, std::size_t label) const {
+        const char *text = pdmp_model_label(get(), column, label);
+        return text ? text : "";
     }
 
-    /// Conditions that repeat a demonstration, counted from 0.
+    /// Returns the conditions that reproduce demonstration `demonstration`, counted from 0.
     Conditions demonstration(std::size_t demonstration) const {
-        return conditions([&](pdmp_conditions *told, pdmp_buffer numbers, pdmp_text error) {
-            return pdmp_model_demonstration(get(), demonstration, told, numbers, error);
+        return conditions([&](pdmp_conditions *conditions, pdmp_buffer storage, pdmp_text error) {
+            return pdmp_model_demonstration(get(), demonstration, conditions, storage, error);
         });
     }
 
-    /// Conditions of the movement predicted for a context (n_contexts).
+    /// Predicts the conditions of a movement for a context (n_contexts).
     Conditions predict(const std::vector<double> &context) const {
-        return conditions([&](pdmp_conditions *told, pdmp_buffer numbers, pdmp_text error) {
-            return pdmp_model_predict(get(), view(context), told, numbers, error);
+        return conditions([&](pdmp_conditions *conditions, pdmp_buffer storage, pdmp_text error) {
+            return pdmp_model_predict(get(), view(context), conditions, storage, error);
         });
     }
 
+    /// Returns the handle, which the model owns; NULL after a move.
     const pdmp_model *get() const noexcept { return model_.get(); }
 
 private:
@@ -142,11 +147,11 @@ private:
     template <class Call>
     Conditions conditions(Call call) const {
         std::vector<double> numbers(info().n_conditions);
-        pdmp_conditions told{};
-        detail::check([&](pdmp_text error) { return call(&told, {numbers.data(), numbers.size()}, error); });
+        pdmp_conditions c{};
+        detail::check([&](pdmp_text error) { return call(&c, detail::buffer(numbers), error); });
         using detail::copy;
-        return {copy(told.style),    copy(told.goal), copy(told.anchor), copy(told.start),
-                copy(told.velocity), std::nullopt,    *told.tau,          std::nullopt};
+        return {copy(c.style),    copy(c.goal), copy(c.anchor), copy(c.start),
+                copy(c.velocity), std::nullopt, *c.tau,         std::nullopt};
     }
 
     struct Free {
@@ -156,28 +161,30 @@ private:
     std::unique_ptr<pdmp_model, Free> model_;
 };
 
-/// A running primitive. One thread at a time uses it; it may outlive its model.
+/// Controller of one movement. One thread at a time may use it; it may outlive its model.
 class Controller {
 public:
-    /// Starts a movement with ticks of dt seconds; transition is the time to 99 % of what is commanded.
+    /// Starts a movement with ticks of `dt` seconds. `transition` is the time, in seconds, after which 99 % of a
+    /// commanded change has taken effect, see pdmp_settings.
     Controller(const Model &model, double dt, const Conditions &conditions = {},
                const std::optional<double> &transition = {}) {
-        const pdmp_settings settings{dt, detail::told(transition), {}};
-        const pdmp_conditions told = detail::told(conditions);
+        const pdmp_settings settings{dt, detail::to_c(transition), {}};
+        const pdmp_conditions c = detail::to_c(conditions);
         pdmp_controller *controller = nullptr;
         detail::check([&](pdmp_text error) {
-            return pdmp_controller_new(model.get(), &settings, &told, &controller, error);
+            return pdmp_controller_new(model.get(), &settings, &c, &controller, error);
         });
         controller_.reset(controller);
     }
 
-    /// Starts again under other conditions.
+    /// Starts a new movement, see pdmp_controller_reset.
     void reset(const Conditions &conditions = {}) {
-        const pdmp_conditions told = detail::told(conditions);
-        const pdmp_status status = pdmp_controller_reset(get(), &told);
+        const pdmp_conditions c = detail::to_c(conditions);
+        const pdmp_status status = pdmp_controller_reset(get(), &c);
         if (status < 0) throw Error(status, error());
     }
 
+    // Commands, see the functions pdmp_controller_set_... and pdmp_controller_release.
     pdmp_status set_style(pdmp_vector style) noexcept { return pdmp_controller_set_style(get(), style); }
     pdmp_status set_goal(pdmp_vector goal) noexcept { return pdmp_controller_set_goal(get(), goal); }
     pdmp_status set_anchor(pdmp_vector anchor) noexcept { return pdmp_controller_set_anchor(get(), anchor); }
@@ -190,33 +197,34 @@ public:
     pdmp_status set_speed(double speed) noexcept { return pdmp_controller_set_speed(get(), speed); }
     pdmp_status release() noexcept { return pdmp_controller_release(get()); }
 
-    /// One tick with nothing new commanded.
+    /// Advances the movement by one tick without a new command.
     pdmp_status step() noexcept { return pdmp_controller_step(get()); }
 
-    /// One tick under a command, with the motion after it.
+    /// Applies a command, advances the movement by one tick, and writes the motion.
     pdmp_status update(const pdmp_command &command, Motion &motion) noexcept {
-        const pdmp_motion room = detail::room(motion);
-        return pdmp_controller_update(get(), &command, &room);
+        const pdmp_motion outputs = detail::to_c(motion);
+        return pdmp_controller_update(get(), &command, &outputs);
     }
 
-    /// The motion as it is now.
+    /// Writes the present motion.
     pdmp_status read(Motion &motion) noexcept {
-        const pdmp_motion room = detail::room(motion);
-        return pdmp_controller_read(get(), &room);
+        const pdmp_motion outputs = detail::to_c(motion);
+        return pdmp_controller_read(get(), &outputs);
     }
 
-    /// Whether the movement goes on, with the seconds since its start and its phase.
+    /// Writes the time since the start, in seconds, and the phase; returns PDMP_WORKING or PDMP_FINISHED.
     pdmp_status progress(double *time = nullptr, double *phase = nullptr) const noexcept {
         return pdmp_controller_progress(get(), time, phase);
     }
 
-    /// Why the last call that was refused was refused; empty before the first.
+    /// Returns the message of the last call that failed; empty before the first error.
     std::string error() const {
         char text[512];
         pdmp_controller_error(get(), {text, sizeof text});
         return text;
     }
 
+    /// Returns the handle, which the controller owns; NULL after a move.
     pdmp_controller *get() const noexcept { return controller_.get(); }
 
 private:

@@ -1,4 +1,4 @@
-//! Pointers with the length they reach.
+//! Pointers paired with the length of the memory that they point to.
 
 use std::ffi::{c_char, c_void};
 use std::fmt::{self, Display, Write};
@@ -6,150 +6,153 @@ use std::ptr;
 
 use pdmp_core::Error;
 
-use crate::status::Fault;
+use crate::fault::Fault;
 
-/// Numbers to read; `{NULL, 0}` is nothing told.
+/// Read-only array of numbers, owned by the caller; `{NULL, 0}` if it is not given.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_vector {
-    /// The first number.
+    /// Pointer to the first number.
     pub data: *const f64,
-    /// How many there are.
+    /// Number of elements.
     pub length: usize,
 }
 
-/// Room for numbers; `{NULL, 0}` if they are not wanted. More room than needed is left as it is.
+/// Writable array of numbers, owned by the caller; `{NULL, 0}` if the output is not needed. Elements beyond those that
+/// are written keep their value.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_buffer {
-    /// Where the first number goes.
+    /// Pointer to the first number.
     pub data: *mut f64,
-    /// How many there is room for, at least as many as are written.
+    /// Number of elements; at least the number of elements that are written.
     pub length: usize,
 }
 
-/// Room for a text in UTF-8 with its closing zero; `{NULL, 0}` if it is not wanted. A longer text is cut to fit.
+/// Writable buffer for a UTF-8 string, owned by the caller; `{NULL, 0}` if the string is not needed. A longer string is
+/// truncated between characters; the result ends in a zero byte whenever `size` > 0.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_text {
-    /// Where the first byte goes.
+    /// Pointer to the first byte.
     pub data: *mut c_char,
-    /// Bytes there is room for.
+    /// Size in bytes, terminating zero included.
     pub size: usize,
 }
 
-/// Memory of the caller's; `{NULL, 0}` to have it allocated.
+/// Writable memory, owned by the caller; `{NULL, 0}` if the library allocates.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_memory {
-    /// The first byte.
+    /// Pointer to the first byte.
     pub data: *mut c_void,
-    /// How many there are.
+    /// Size in bytes.
     pub size: usize,
 }
 
-/// Whether a pair is given: `Some` length, or none for `{NULL, 0}`.
-fn given<T>(data: *const T, length: usize, name: &'static str) -> Result<Option<usize>, Fault> {
+/// Returns the length of an array, or `None` for `{NULL, 0}`.
+fn length_of<T>(data: *const T, length: usize, name: &'static str) -> Result<Option<usize>, Fault> {
     match (data.is_null(), length) {
         (true, 0) => Ok(None),
         (true, _) => Err(Fault::Null(name)),
-        (false, found) => Ok(Some(found)),
+        (false, length) => Ok(Some(length)),
     }
 }
 
 impl pdmp_vector {
     pub(crate) const NONE: Self = Self { data: ptr::null(), length: 0 };
 
-    /// The numbers, one per `per`, if they are told.
+    /// Returns the numbers, one per `per`, or `None` if they are not given.
     ///
     /// # Safety
-    /// `data` is NULL or points to `length` numbers, which outlive `'a`.
+    /// `data` is NULL or points to `length` numbers that stay valid and unchanged for `'a`.
     pub(crate) unsafe fn get<'a>(
         self,
         name: &'static str,
         expected: usize,
         per: &'static str,
     ) -> Result<Option<&'a [f64]>, Fault> {
-        // Checked before anything is read: a wrong length reaches memory that is not the caller's.
-        match given(self.data, self.length, name)? {
+        // Checked before any number is read: a wrong length may reach past the caller's memory.
+        match length_of(self.data, self.length, name)? {
             None => Ok(None),
             Some(found) if found != expected => Err(Error::Length { name, expected, found, per }.into()),
-            // SAFETY: it is not NULL, and the caller promises the rest.
+            // SAFETY: `data` is not NULL, so the caller guarantees `length` readable numbers for `'a`.
             Some(length) => Ok(Some(unsafe { std::slice::from_raw_parts(self.data, length) })),
         }
     }
 
-    /// The numbers, which must be told.
+    /// Returns the numbers, which are required.
     ///
     /// # Safety
     /// As for [`pdmp_vector::get`].
-    pub(crate) unsafe fn need<'a>(
+    pub(crate) unsafe fn require<'a>(
         self,
         name: &'static str,
         expected: usize,
         per: &'static str,
     ) -> Result<&'a [f64], Fault> {
-        // SAFETY: the caller's promise is the same.
+        // SAFETY: this function has the same contract as `get`.
         unsafe { self.get(name, expected, per) }?.ok_or(Fault::Null(name))
     }
 }
 
 impl pdmp_buffer {
-    /// Checks that there is room for one number per `per`, if they are wanted.
+    /// Checks that a given buffer holds at least one number per `per`.
     pub(crate) fn check(self, name: &'static str, expected: usize, per: &'static str) -> Result<(), Fault> {
-        match given(self.data, self.length, name)? {
+        match length_of(self.data, self.length, name)? {
             Some(found) if found < expected => Err(Error::Length { name, expected, found, per }.into()),
             _ => Ok(()),
         }
     }
 
-    /// Writes the numbers, if they are wanted.
+    /// Writes the numbers if the buffer is given.
     ///
     /// # Safety
-    /// `data` is NULL or has room for the numbers.
-    pub(crate) unsafe fn put(self, numbers: &[f64]) {
+    /// `data` is NULL or points to at least `numbers.len()` writable numbers, disjoint from `numbers`.
+    pub(crate) unsafe fn write(self, numbers: &[f64]) {
         if !self.data.is_null() {
-            // SAFETY: there is room, and the numbers are the library's own.
+            // SAFETY: `data` is not NULL, so the caller guarantees the length and that the ranges do not overlap.
             unsafe { self.data.copy_from_nonoverlapping(numbers.as_ptr(), numbers.len()) };
         }
     }
 }
 
 impl pdmp_text {
-    /// Writes a text, cut to fit, and returns the length of the whole, without its closing zero.
+    /// Writes a string, truncated to fit, and returns the full length without the terminating zero.
     ///
     /// # Safety
-    /// `data` is NULL or has room for `size` bytes.
-    pub(crate) unsafe fn put(self, text: &impl Display) -> usize {
-        let mut writer = Writer { room: self, written: 0, length: 0 };
-        // Its own `write_str` does not fail, nor does a text of ours.
+    /// `data` is NULL or points to at least `size` writable bytes.
+    pub(crate) unsafe fn write(self, text: &impl Display) -> usize {
+        let mut writer = TruncatingWriter { buffer: self, written: 0, length: 0 };
+        // Neither `write_str` below nor the `Display` of an error fails.
         let _ = write!(writer, "{text}");
         if !self.data.is_null() && self.size > 0 {
-            // SAFETY: a place was left for it.
+            // SAFETY: `write_str` keeps `written` below `size`, so this byte lies within the buffer.
             unsafe { self.data.add(writer.written).write(0) };
         }
         writer.length
     }
 }
 
-/// Fills a text from its start, without allocating.
-struct Writer {
-    room: pdmp_text,
+/// Writer that fills a buffer without allocating and counts the bytes of the whole string.
+struct TruncatingWriter {
+    buffer: pdmp_text,
     written: usize,
     length: usize,
 }
 
-impl Write for Writer {
+impl Write for TruncatingWriter {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        // After a cut nothing follows.
-        let whole = self.written == self.length && !self.room.data.is_null();
-        let left = if whole { self.room.size.saturating_sub(self.written + 1) } else { 0 };
-        let cut = (0..=text.len().min(left)).rev().find(|&cut| text.is_char_boundary(cut)).unwrap_or(0);
-        if cut > 0 {
-            // SAFETY: `cut` bytes and the closing zero still fit.
-            unsafe { self.room.data.add(self.written).cast::<u8>().copy_from_nonoverlapping(text.as_ptr(), cut) };
+        // Nothing is written after a truncation.
+        let complete = self.written == self.length && !self.buffer.data.is_null();
+        let free = if complete { self.buffer.size.saturating_sub(self.written + 1) } else { 0 };
+        let end = (0..=text.len().min(free)).rev().find(|&end| text.is_char_boundary(end)).unwrap_or(0);
+        if end > 0 {
+            // SAFETY: `written + end + 1 <= size`, so `end` bytes and the terminating zero lie within the buffer, which
+            // is the caller's and cannot overlap a string of the library.
+            unsafe { self.buffer.data.add(self.written).cast::<u8>().copy_from_nonoverlapping(text.as_ptr(), end) };
         }
-        self.written += cut;
+        self.written += end;
         self.length += text.len();
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! What a movement and a tick are told, and where the motion goes: the core's structs as C writes them.
+//! Conditions, commands and motions: the core's structs in the layout of C.
 
 use std::ptr;
 
@@ -6,84 +6,85 @@ use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Conditions, Controller, Primitive};
 
 use crate::buffers::{pdmp_buffer, pdmp_vector};
-use crate::status::Fault;
+use crate::fault::Fault;
 
-/// What a movement starts with; what is not told is that of the nominal demonstration.
+/// Conditions of a movement. A member that is `{NULL, 0}` or NULL takes the value of the nominal demonstration.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_conditions {
-    /// Style s (n_styles).
+    /// Style parameter s (n_styles).
     pub style: pdmp_vector,
-    /// Goal g (n_dofs), discrete.
+    /// Goal g (n_dofs), in the unit of each DoF; discrete models only.
     pub goal: pdmp_vector,
-    /// Anchor y_a (n_dofs), rhythmic.
+    /// Anchor y_a (n_dofs), in the unit of each DoF; rhythmic models only.
     pub anchor: pdmp_vector,
-    /// Start position (n_dofs); a rhythmic movement otherwise starts on its cycle.
+    /// Start position y_0 (n_dofs), in the unit of each DoF. A rhythmic movement starts on its limit cycle by default.
     pub start: pdmp_vector,
-    /// Start velocity (n_dofs), per second; otherwise that of the demonstrations.
+    /// Start velocity (n_dofs), in the unit of each DoF per second; that of the demonstrations by default.
     pub velocity: pdmp_vector,
-    /// Amplitude r_0, rhythmic; otherwise 1.
+    /// Amplitude r_0 >= 0; 1 by default, the only value that a discrete model accepts.
     pub amplitude: *const f64,
-    /// Time constant tau, in seconds.
+    /// Time constant tau > 0, in seconds.
     pub tau: *const f64,
-    /// Phase phi at which a rhythmic movement starts, in rad, on its limit cycle; otherwise 0.
+    /// Phase phi, in rad, at which the movement starts on its limit cycle; 0 by default; rhythmic models only.
     pub phase: *const f64,
 }
 
-/// Terms of the user's own, constant over a tick: both or none.
+/// Coupling terms, constant over a tick; both or neither.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_coupling {
-    /// c_v (n_dofs), added to the velocity, per second.
+    /// c_v (n_dofs), added to the velocity, in the unit of each DoF per second.
     pub velocity: pdmp_vector,
-    /// c_a (n_dofs), added to the acceleration, per second squared.
+    /// c_a (n_dofs), added to the acceleration, in the unit of each DoF per second squared.
     pub acceleration: pdmp_vector,
 }
 
-/// All that one tick is told; what is not told stays as it was.
+/// Command of one tick. A member that is `{NULL, 0}` or NULL leaves the present value unchanged.
 ///
-/// Style, goal, anchor, tau and amplitude stay in force until they are commanded again, measured until it is measured
-/// again or pdmp_controller_release; dt and coupling hold for this tick alone.
+/// Style, goal, anchor, tau and amplitude stay in force until the next command, and a measurement until the next one or
+/// until pdmp_controller_release. dt and the coupling terms hold for this tick only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_command {
-    /// Style s (n_styles) to go to.
+    /// Style parameter s (n_styles).
     pub style: pdmp_vector,
-    /// Goal g (n_dofs) to go to, discrete.
+    /// Goal g (n_dofs), in the unit of each DoF; discrete models only.
     pub goal: pdmp_vector,
-    /// Anchor y_a (n_dofs) to go to, rhythmic.
+    /// Anchor y_a (n_dofs), in the unit of each DoF; rhythmic models only.
     pub anchor: pdmp_vector,
-    /// Time constant tau to go to, in seconds.
+    /// Time constant tau > 0, in seconds.
     pub tau: *const f64,
-    /// Amplitude r_0 to go to, rhythmic.
+    /// Amplitude r_0 >= 0; rhythmic models only.
     pub amplitude: *const f64,
-    /// Length of this tick, in seconds, if it differs from the controller's.
+    /// Length of this tick, in seconds, at least 0; pdmp_settings.dt by default.
     pub dt: *const f64,
-    /// Position (n_dofs) at which the robot is now, in the unit of each DoF; NULL if it was not measured anew.
+    /// Measured position of the robot (n_dofs), in the unit of each DoF; not given if there is no new measurement.
     pub measured: pdmp_vector,
-    /// The user's own terms.
+    /// Coupling terms.
     pub coupling: pdmp_coupling,
 }
 
-/// Where a motion is written, as far as it is wanted. It may overlap with what the tick is told.
+/// Outputs of a motion. A member that is `{NULL, 0}` is not written. The buffers may overlap with the arrays of the
+/// command.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_motion {
     /// Position y (n_dofs), in the unit of each DoF.
     pub position: pdmp_buffer,
-    /// Velocity (n_dofs), per second.
+    /// Velocity (n_dofs), in the unit of each DoF per second.
     pub velocity: pdmp_buffer,
-    /// Acceleration (n_dofs), per second squared.
+    /// Acceleration (n_dofs), in the unit of each DoF per second squared.
     pub acceleration: pdmp_buffer,
 }
 
 impl pdmp_conditions {
-    /// The conditions as the core takes them.
+    /// Returns the conditions as the core takes them.
     ///
     /// # Safety
-    /// Every pointer is NULL or valid, each vector's over its length.
+    /// Every pointer is NULL or valid for reads, a vector's over its length.
     pub(crate) unsafe fn get(&self, primitive: &Primitive) -> Result<Conditions, Fault> {
-        // SAFETY: the caller's promise is the same.
+        // SAFETY: this function has the same contract for every vector.
         let owned = |name, vector: pdmp_vector, expected, per| unsafe {
             vector.get(name, expected, per).map(|numbers| numbers.map(<[f64]>::to_vec))
         };
@@ -94,53 +95,53 @@ impl pdmp_conditions {
             anchor: per_dof("anchor", self.anchor)?,
             start: per_dof("start", self.start)?,
             velocity: per_dof("velocity", self.velocity)?,
-            // SAFETY: NULL or valid.
+            // SAFETY: the caller guarantees that the pointer is NULL or valid.
             amplitude: unsafe { self.amplitude.as_ref() }.copied(),
-            // SAFETY: NULL or valid.
+            // SAFETY: the caller guarantees that the pointer is NULL or valid.
             tau: unsafe { self.tau.as_ref() }.copied(),
             segment_durations: None,
-            // SAFETY: NULL or valid.
+            // SAFETY: the caller guarantees that the pointer is NULL or valid.
             phase: unsafe { self.phase.as_ref() }.copied(),
         })
     }
 
-    /// Conditions whose numbers are laid down in `numbers`, one vector behind the other.
+    /// Copies the numbers of the conditions to `storage`, one vector after the other, and returns pointers to them.
     ///
     /// # Safety
-    /// `numbers` has room for all of them.
-    pub(crate) unsafe fn put(conditions: &Conditions, numbers: *mut f64) -> Self {
-        let mut next = numbers;
-        let mut lay = |vector: &[f64]| {
+    /// `storage` is valid for writes of all numbers.
+    pub(crate) unsafe fn store(conditions: &Conditions, storage: *mut f64) -> Self {
+        let mut next = storage;
+        let mut append = |vector: &[f64]| {
             let (data, length) = (next, vector.len());
-            // SAFETY: there is room for this vector and those that follow.
+            // SAFETY: the caller guarantees that this vector and the remaining ones fit.
             unsafe { data.copy_from_nonoverlapping(vector.as_ptr(), length) };
-            // SAFETY: at most one past the end.
+            // SAFETY: the result lies within `storage` or one past its end.
             next = unsafe { data.add(length) };
             pdmp_vector { data, length }
         };
-        let mut told = |vector: &Option<Vec<f64>>| vector.as_deref().map_or(pdmp_vector::NONE, &mut lay);
+        let mut optional = |vector: &Option<Vec<f64>>| vector.as_deref().map_or(pdmp_vector::NONE, &mut append);
         Self {
-            style: told(&conditions.style),
-            goal: told(&conditions.goal),
-            anchor: told(&conditions.anchor),
-            start: told(&conditions.start),
-            velocity: told(&conditions.velocity),
+            style: optional(&conditions.style),
+            goal: optional(&conditions.goal),
+            anchor: optional(&conditions.anchor),
+            start: optional(&conditions.start),
+            velocity: optional(&conditions.velocity),
             amplitude: ptr::null(),
-            tau: conditions.tau.map_or(ptr::null(), |tau| lay(&[tau]).data),
+            tau: conditions.tau.map_or(ptr::null(), |tau| append(&[tau]).data),
             phase: ptr::null(),
         }
     }
 }
 
 impl pdmp_command {
-    /// The command as the core takes it.
+    /// Returns the command as the core takes it.
     ///
     /// # Safety
-    /// Every pointer is NULL or valid, each vector's over its length, for as long as the command.
+    /// Every pointer is NULL or valid for reads, a vector's over its length, for the lifetime of the result.
     pub(crate) unsafe fn get(&self, primitive: &Primitive) -> Result<Command<'_>, Fault> {
-        // SAFETY: the caller's promise is the same.
+        // SAFETY: this function has the same contract for every vector.
         let vector = |name, vector: pdmp_vector, expected, per| unsafe { vector.get(name, expected, per) };
-        let per_dof = |name, told| vector(name, told, primitive.n_dofs(), "DoF");
+        let per_dof = |name, numbers| vector(name, numbers, primitive.n_dofs(), "DoF");
         let coupling = match (
             per_dof("coupling velocity", self.coupling.velocity)?,
             per_dof("coupling acceleration", self.coupling.acceleration)?,
@@ -150,7 +151,7 @@ impl pdmp_command {
             (None, Some(_)) => return Err(Fault::Null("coupling velocity")),
             (Some(_), None) => return Err(Fault::Null("coupling acceleration")),
         };
-        // SAFETY: NULL or valid.
+        // SAFETY: the caller guarantees that the pointer is NULL or valid.
         let [dt, tau, amplitude] =
             [self.dt, self.tau, self.amplitude].map(|number| unsafe { number.as_ref() }.copied());
         Ok(Command {
@@ -167,23 +168,23 @@ impl pdmp_command {
 }
 
 impl pdmp_motion {
-    /// Checks that there is room for what is wanted.
+    /// Checks that each given buffer holds at least one number per DoF.
     pub(crate) fn check(&self, n_dofs: usize) -> Result<(), Fault> {
         self.position.check("position", n_dofs, "DoF")?;
         self.velocity.check("velocity", n_dofs, "DoF")?;
         self.acceleration.check("acceleration", n_dofs, "DoF")
     }
 
-    /// Writes where a controller is.
+    /// Writes the present motion of a controller.
     ///
     /// # Safety
-    /// Every pointer is NULL or has room for a number per DoF.
-    pub(crate) unsafe fn put(&self, controller: &Controller) {
-        // SAFETY: the caller's promise is the same.
+    /// Every pointer is NULL or valid for writes of one number per DoF.
+    pub(crate) unsafe fn write(&self, controller: &Controller) {
+        // SAFETY: this function has the same contract, and a controller's arrays are its own.
         unsafe {
-            self.position.put(controller.position());
-            self.velocity.put(controller.velocity());
-            self.acceleration.put(controller.acceleration());
+            self.position.write(controller.position());
+            self.velocity.write(controller.velocity());
+            self.acceleration.write(controller.acceleration());
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Controllers: made, commanded, stepped and read.
+//! Controllers: creation, commands, ticks and outputs.
 
 use std::mem::{MaybeUninit, align_of, size_of};
 use std::ptr;
@@ -7,53 +7,57 @@ use pdmp_core::{Command, Controller};
 
 use crate::buffers::{pdmp_memory, pdmp_text, pdmp_vector};
 use crate::command::{pdmp_command, pdmp_conditions, pdmp_motion};
+use crate::fault::Fault;
+use crate::guard::{guard, guard_with_text};
 use crate::model::pdmp_model;
-use crate::status::{Fault, answer, answer_in, pdmp_status};
+use crate::status::pdmp_status;
 
 use pdmp_status::PDMP_OK;
 
-/// A running primitive: a model, its commands and its state. One thread at a time uses it.
+/// Controller of one movement: a primitive, its commands and its state. One thread at a time may use it.
 pub struct pdmp_controller {
     inner: Controller,
-    /// Why the last call that was refused was.
+    /// Error of the last call that failed.
     fault: Option<Fault>,
-    /// Whether its memory is the library's.
+    /// True if the library allocated the memory.
     owned: bool,
 }
 
-/// What a controller is made with.
+/// Settings of a controller.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_settings {
-    /// Length of a tick, in seconds.
+    /// Length of a tick, in seconds; positive.
     pub dt: f64,
-    /// Time to 99 % of a changed style, tau, goal or anchor, in seconds; 0 is the paper's immediate switch, and without
-    /// it a tenth of the nominal duration (discrete) or a quarter of the nominal period (rhythmic) serves. A goal takes
-    /// what remains of the movement if that is longer, unless transport is immediate.
+    /// Time, in seconds, after which 99 % of a commanded change of style, tau, goal, anchor or amplitude has taken
+    /// effect; 0 is the immediate switch of the paper. NULL for the default: a tenth of the nominal duration (discrete)
+    /// or a quarter of the nominal period (rhythmic). A goal takes the remaining time of the movement if that is
+    /// longer, unless the transport of the model is immediate.
     pub transition: *const f64,
-    /// Where the controller is put, pdmp_controller_size bytes aligned to pdmp_controller_alignment; its vectors, whose
-    /// lengths are the model's, are allocated even so.
+    /// Memory for the controller: pdmp_controller_size bytes, aligned to pdmp_controller_alignment, that nothing else
+    /// uses until pdmp_controller_free. The arrays of the controller are allocated by the library in any case.
     pub memory: pdmp_memory,
 }
 
-/// Bytes of a controller in memory of the caller's.
+/// Returns the size of a controller in bytes, for pdmp_settings.memory.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_size() -> usize {
     size_of::<pdmp_controller>()
 }
 
-/// Alignment of a controller in memory of the caller's, in bytes.
+/// Returns the alignment of a controller in bytes, for pdmp_settings.memory.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_alignment() -> usize {
     align_of::<pdmp_controller>()
 }
 
-/// Makes a controller and starts its movement; NULL conditions are those of the nominal demonstration. The controller
-/// is NULL if it is refused. The model may be freed before it.
+/// Creates a controller and starts a movement. `conditions` may be NULL: those of the nominal demonstration.
 ///
-/// # Safety
-/// What `settings` and `conditions` point to is valid, their memory is used by nothing else, and `error` has the room
-/// that it tells.
+/// `*controller` is set to the new controller, which the caller frees with pdmp_controller_free, or to NULL on error.
+/// The model may be freed before the controller.
+///
+/// Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE, PDMP_MEMORY; PDMP_ABSENT if a condition does not apply to the kind of
+/// model.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_new(
     model: Option<&pdmp_model>,
@@ -63,25 +67,25 @@ pub unsafe extern "C" fn pdmp_controller_new(
     error: pdmp_text,
 ) -> pdmp_status {
     let call = || {
-        let place = controller.ok_or(Fault::Null("controller"))?.write(ptr::null_mut());
+        let handle = controller.ok_or(Fault::Null("controller"))?.write(ptr::null_mut());
         let model = &model.ok_or(Fault::Null("model"))?.inner;
         let &pdmp_settings { dt, transition, memory } = settings.ok_or(Fault::Null("settings"))?;
-        let given = place_in(memory)?;
-        // SAFETY: NULL or valid.
+        let memory = aligned(memory)?;
+        // SAFETY: the contract of the C ABI guarantees that the pointer is NULL or valid.
         let transition = unsafe { transition.as_ref() }.copied();
-        // SAFETY: the caller's promise is the same.
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
         let conditions = conditions.map(|conditions| unsafe { conditions.get(model) }).transpose()?.unwrap_or_default();
         let inner = Controller::new(model.primitive(), dt, &conditions, transition)?;
-        // SAFETY: it comes from place_in, and the caller's promise is that nothing else uses it.
-        *place = unsafe { put(inner, given) };
+        // SAFETY: `aligned` has checked the memory, and the contract of the C ABI guarantees that nothing else uses it.
+        *handle = unsafe { emplace(inner, memory) };
         Ok(PDMP_OK)
     };
-    // SAFETY: the caller's promise is the same.
-    unsafe { answer_in(error, call) }
+    // SAFETY: the contract of the C ABI covers `error`.
+    unsafe { guard_with_text(error, call) }
 }
 
-/// The caller's memory, if it is given, as the place of a controller.
-fn place_in(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> {
+/// Checks size and alignment of the caller's memory, and returns it, or `None` if it is not given.
+fn aligned(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> {
     let (needed, alignment) = (size_of::<pdmp_controller>(), align_of::<pdmp_controller>());
     let (address, size) = (memory.data.addr(), memory.size);
     match (address, size) {
@@ -92,27 +96,29 @@ fn place_in(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> 
     }
 }
 
-/// Puts a controller into memory of the caller's, or allocates it.
+/// Moves a controller to the caller's memory, or to the heap if there is none.
 ///
 /// # Safety
-/// The memory comes from [`place_in`] and is used by nothing else.
-unsafe fn put(inner: Controller, memory: Option<*mut pdmp_controller>) -> *mut pdmp_controller {
-    let made = pdmp_controller { inner, fault: None, owned: memory.is_none() };
+/// The memory comes from [`aligned`], and nothing else uses it.
+unsafe fn emplace(inner: Controller, memory: Option<*mut pdmp_controller>) -> *mut pdmp_controller {
+    let controller = pdmp_controller { inner, fault: None, owned: memory.is_none() };
     match memory {
-        // SAFETY: large enough and aligned, as place_in has seen, and used by nothing else.
+        // SAFETY: `aligned` has checked size and alignment, and the contract of this function excludes other users.
         Some(memory) => unsafe {
-            memory.write(made);
+            memory.write(controller);
             memory
         },
-        None => Box::into_raw(Box::new(made)),
+        None => Box::into_raw(Box::new(controller)),
     }
 }
 
-/// Makes a controller that goes on bit for bit as another would, to look ahead from where that is; it is made like the
-/// other in memory of the caller's, or allocated. The copy is NULL if it is refused.
+/// Copies a controller with its state, for example to simulate the movement ahead. Under the same commands, copy and
+/// original move identically to the bit.
 ///
-/// # Safety
-/// `memory` is used by nothing else, and `error` has the room that it tells.
+/// `memory` is memory for the copy as in pdmp_settings.memory, or `{NULL, 0}`. `*copy` is set to the new controller,
+/// which the caller frees with pdmp_controller_free, or to NULL on error.
+///
+/// Errors: PDMP_NULL, PDMP_MEMORY.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_clone(
     controller: Option<&pdmp_controller>,
@@ -121,223 +127,214 @@ pub unsafe extern "C" fn pdmp_controller_clone(
     error: pdmp_text,
 ) -> pdmp_status {
     let call = || {
-        let place = copy.ok_or(Fault::Null("copy"))?.write(ptr::null_mut());
+        let handle = copy.ok_or(Fault::Null("copy"))?.write(ptr::null_mut());
         let inner = controller.ok_or(Fault::Null("controller"))?.inner.clone();
-        let given = place_in(memory)?;
-        // SAFETY: it comes from place_in, and the caller's promise is that nothing else uses it.
-        *place = unsafe { put(inner, given) };
+        let memory = aligned(memory)?;
+        // SAFETY: `aligned` has checked the memory, and the contract of the C ABI guarantees that nothing else uses it.
+        *handle = unsafe { emplace(inner, memory) };
         Ok(PDMP_OK)
     };
-    // SAFETY: the caller's promise is the same.
-    unsafe { answer_in(error, call) }
+    // SAFETY: the contract of the C ABI covers `error`.
+    unsafe { guard_with_text(error, call) }
 }
 
-/// Frees a controller. Memory of the caller's is the caller's again. With NULL it does nothing.
-///
-/// # Safety
-/// `controller` is NULL or was made by pdmp_controller_new, and is not used again.
+/// Frees a controller; NULL is ignored. Memory that the caller provided may then be reused.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_free(controller: *mut pdmp_controller) {
-    // SAFETY: NULL or a controller.
+    // SAFETY: the contract of the C ABI guarantees NULL or a live controller.
     match unsafe { controller.as_ref() } {
-        // SAFETY: it was boxed, and is not used again.
+        // SAFETY: `emplace` boxed this controller, and the caller does not use it again.
         Some(pdmp_controller { owned: true, .. }) => drop(unsafe { Box::from_raw(controller) }),
-        // SAFETY: it is not used again.
+        // SAFETY: the controller lives in memory of the caller, who does not use it again.
         Some(_) => unsafe { controller.drop_in_place() },
         None => {}
     }
 }
 
-/// A call on a controller, which keeps the reason of a refusal.
-fn on(
+/// Executes a call on a controller, and stores its error, if any, in the controller.
+fn call_on(
     controller: Option<&mut pdmp_controller>,
     call: impl FnOnce(&mut pdmp_controller) -> Result<pdmp_status, Fault>,
 ) -> pdmp_status {
     let Some(controller) = controller else { return pdmp_status::PDMP_NULL };
-    let mut refused = None;
-    let status = answer(|| call(controller), |fault| refused = Some(fault));
-    if refused.is_some() {
-        controller.fault = refused;
+    let mut reported = None;
+    let status = guard(|| call(controller), |fault| reported = Some(fault));
+    if reported.is_some() {
+        controller.fault = reported;
     }
     status
 }
 
-/// Starts again under other conditions; NULL are those of the nominal demonstration.
+/// Starts a new movement. `conditions` may be NULL: those of the nominal demonstration. On error the present movement
+/// continues unchanged.
 ///
-/// # Safety
-/// What `conditions` points to is valid.
+/// This function allocates. Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE, PDMP_ABSENT.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_reset(
     controller: Option<&mut pdmp_controller>,
     conditions: Option<&pdmp_conditions>,
 ) -> pdmp_status {
-    on(controller, |controller| {
+    call_on(controller, |controller| {
         let model = controller.inner.primitive();
-        // SAFETY: the caller's promise is the same.
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
         let conditions = conditions.map(|conditions| unsafe { conditions.get(model) }).transpose()?.unwrap_or_default();
         controller.inner.reset(&conditions)?;
         Ok(PDMP_OK)
     })
 }
 
-/// Sets the style s (n_styles) to go to.
-///
-/// # Safety
-/// `style` points to the numbers that it tells.
+/// Sets the style parameter s (n_styles). Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_set_style(
     controller: Option<&mut pdmp_controller>,
     style: pdmp_vector,
 ) -> pdmp_status {
-    on(controller, |controller| {
-        // SAFETY: the caller's promise is the same.
-        let style = unsafe { style.need("style", controller.inner.primitive().n_styles(), "style dimension") }?;
+    call_on(controller, |controller| {
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
+        let style = unsafe { style.require("style", controller.inner.primitive().n_styles(), "style dimension") }?;
         controller.inner.set_style(style)?;
         Ok(PDMP_OK)
     })
 }
 
-/// Sets the goal g (n_dofs) of a discrete movement.
-///
-/// # Safety
-/// `goal` points to the numbers that it tells.
+/// Sets the goal g (n_dofs) of a discrete movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
+/// PDMP_RANGE, PDMP_ABSENT.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_set_goal(
     controller: Option<&mut pdmp_controller>,
     goal: pdmp_vector,
 ) -> pdmp_status {
-    on(controller, |controller| {
-        // SAFETY: the caller's promise is the same.
-        let goal = unsafe { goal.need("goal", controller.inner.primitive().n_dofs(), "DoF") }?;
+    call_on(controller, |controller| {
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
+        let goal = unsafe { goal.require("goal", controller.inner.primitive().n_dofs(), "DoF") }?;
         controller.inner.set_goal(goal)?;
         Ok(PDMP_OK)
     })
 }
 
-/// Sets the anchor y_a (n_dofs) of a rhythmic movement.
-///
-/// # Safety
-/// `anchor` points to the numbers that it tells.
+/// Sets the anchor y_a (n_dofs) of a rhythmic movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
+/// PDMP_RANGE, PDMP_ABSENT.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_set_anchor(
     controller: Option<&mut pdmp_controller>,
     anchor: pdmp_vector,
 ) -> pdmp_status {
-    on(controller, |controller| {
-        // SAFETY: the caller's promise is the same.
-        let anchor = unsafe { anchor.need("anchor", controller.inner.primitive().n_dofs(), "DoF") }?;
+    call_on(controller, |controller| {
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
+        let anchor = unsafe { anchor.require("anchor", controller.inner.primitive().n_dofs(), "DoF") }?;
         controller.inner.set_anchor(anchor)?;
         Ok(PDMP_OK)
     })
 }
 
-/// Sets the time constant tau, in seconds; the rate 1/tau is what passes the filter.
+/// Sets the time constant tau > 0, in seconds. The rate 1/tau is filtered, over pdmp_settings.transition. Errors:
+/// PDMP_NULL, PDMP_RANGE.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_set_tau(controller: Option<&mut pdmp_controller>, tau: f64) -> pdmp_status {
-    on(controller, |controller| Ok(controller.inner.set_tau(tau).map(|()| PDMP_OK)?))
+    call_on(controller, |controller| Ok(controller.inner.set_tau(tau).map(|()| PDMP_OK)?))
 }
 
-/// Sets the amplitude r_0 of a rhythmic movement; r follows by Eq. (4).
+/// Sets the amplitude r_0 >= 0 of a rhythmic movement. r follows by Eq. (4) of the paper. Errors: PDMP_NULL,
+/// PDMP_RANGE, PDMP_ABSENT.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_set_amplitude(
     controller: Option<&mut pdmp_controller>,
     amplitude: f64,
 ) -> pdmp_status {
-    on(controller, |controller| Ok(controller.inner.set_amplitude(amplitude).map(|()| PDMP_OK)?))
+    call_on(controller, |controller| Ok(controller.inner.set_amplitude(amplitude).map(|()| PDMP_OK)?))
 }
 
-/// Sets the speed, the share of the rate 1/tau at which the path is followed: 0 pauses on the path, 1 goes on. A change
-/// passes the filter of tau, and stays in force over pdmp_controller_reset.
+/// Sets the speed in [0, 1e6], a factor of the rate 1/tau: 0 pauses the movement on its path, 1 is the default. The
+/// change is filtered like tau, and persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_set_speed(controller: Option<&mut pdmp_controller>, speed: f64) -> pdmp_status {
-    on(controller, |controller| Ok(controller.inner.set_speed(speed).map(|()| PDMP_OK)?))
+    call_on(controller, |controller| Ok(controller.inner.set_speed(speed).map(|()| PDMP_OK)?))
 }
 
-/// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
+/// Sets the gains of the response to a measured position, see pdmp_controller_update: `stopping` k_s of phase stopping
+/// and `tracking` k_t of the pull towards the measurement, per unit of the clock u; both at least 0.
 ///
-/// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 over the
-/// demonstrated stretch of the clock, T/tau or 2 pi; 0 is without.
+/// By default k_s = 1000, so that a tracking error of a tenth of the range slows the phase by a factor of 11, and k_t =
+/// 10 / extent, where the extent of the clock is T/tau (discrete) or 2 pi (rhythmic). 0 disables a term. Errors:
+/// PDMP_NULL, PDMP_RANGE.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_set_compliance(
     controller: Option<&mut pdmp_controller>,
     stopping: f64,
     tracking: f64,
 ) -> pdmp_status {
-    on(controller, |controller| Ok(controller.inner.set_compliance(stopping, tracking).map(|()| PDMP_OK)?))
+    call_on(controller, |controller| Ok(controller.inner.set_compliance(stopping, tracking).map(|()| PDMP_OK)?))
 }
 
-/// Forgets the measured position: no robot follows any more, until the next one is measured.
+/// Discards the measured position; the movement is unperturbed until the next measurement. Errors: PDMP_NULL.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_release(controller: Option<&mut pdmp_controller>) -> pdmp_status {
-    on(controller, |controller| {
+    call_on(controller, |controller| {
         controller.inner.release();
         Ok(PDMP_OK)
     })
 }
 
-/// One tick with nothing new commanded. Answers whether the movement goes on.
+/// Advances the movement by one tick without a new command. Returns PDMP_WORKING, PDMP_FINISHED or an error.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_step(controller: Option<&mut pdmp_controller>) -> pdmp_status {
-    on(controller, |controller| Ok(controller.inner.step()?.into()))
+    call_on(controller, |controller| Ok(controller.inner.step()?.into()))
 }
 
-/// One tick under a command, with the motion written where the caller wants it; NULL is nothing told, or not wanted.
-/// Answers whether the movement goes on.
+/// Applies a command, advances the movement by one tick, and writes the motion. `command` and `motion` may be NULL.
+/// Returns PDMP_WORKING, PDMP_FINISHED or an error.
 ///
-/// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is
-/// held over the tick:
+/// A command takes effect as a whole or, on error, not at all, and then no time passes. The perturbation terms are
+/// constant over the tick:
 ///
 ///     tau y' = z + w(u) + k_t d + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
 ///     tau u' = k = 1 / (1 + k_s |d / range|^2)
 ///     tau o' = 5 k (e - o) / extent
 ///
-/// with the coupling terms c_v and c_a, and d, what of the error e = m - y at the measured position m lies beyond the
-/// error o that is expected by now. The last e stays in force until the next measurement or pdmp_controller_release.
+/// with the coupling terms c_v and c_a, the tracking error e = m - y at the measured position m, the expected error o,
+/// and d, the part of e beyond o: d = e - min(max(o, min(e, 0)), max(e, 0)) for each DoF. The last e stays in force
+/// until the next measurement or pdmp_controller_release.
 ///
-/// # Safety
-/// What `command` and `motion` point to is valid.
+/// Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE; PDMP_ABSENT if a command does not apply to the kind of model.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_update(
     controller: Option<&mut pdmp_controller>,
     command: Option<&pdmp_command>,
     motion: Option<&pdmp_motion>,
 ) -> pdmp_status {
-    on(controller, |controller| {
+    call_on(controller, |controller| {
         let inner = &mut controller.inner;
         motion.map_or(Ok(()), |motion| motion.check(inner.primitive().n_dofs()))?;
-        // SAFETY: the caller's promise is the same.
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
         let command = command.map_or(Ok(Command::default()), |command| unsafe { command.get(inner.primitive()) })?;
         let status = inner.step_with(&command)?;
         if let Some(motion) = motion {
-            // SAFETY: the caller's promise is the same, and the room was checked. The command, whose vectors may overlap
-            // with these, has been read.
-            unsafe { motion.put(inner) };
+            // SAFETY: `check` has verified the lengths, and the contract of the C ABI guarantees the pointers. The
+            // command, whose arrays may overlap with these, is no longer read.
+            unsafe { motion.write(inner) };
         }
         Ok(status.into())
     })
 }
 
-/// Reads the motion as it is now. Answers whether it goes on.
-///
-/// # Safety
-/// What `motion` points to is valid.
+/// Writes the present motion. Returns PDMP_WORKING, PDMP_FINISHED or an error: PDMP_NULL, PDMP_LENGTH.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_read(
     controller: Option<&mut pdmp_controller>,
     motion: Option<&pdmp_motion>,
 ) -> pdmp_status {
-    on(controller, |controller| {
+    call_on(controller, |controller| {
         let motion = motion.ok_or(Fault::Null("motion"))?;
         motion.check(controller.inner.primitive().n_dofs())?;
-        // SAFETY: the caller's promise is the same, and the room was checked.
-        unsafe { motion.put(&controller.inner) };
+        // SAFETY: `check` has verified the lengths, and the contract of the C ABI guarantees the pointers.
+        unsafe { motion.write(&controller.inner) };
         Ok(controller.inner.status().into())
     })
 }
 
-/// Tells the seconds since the start, and the phase: x in (0, 1] where discrete, phi in [0, 2 pi) where rhythmic; NULL
-/// is not wanted. Answers whether the movement goes on.
+/// Writes the time since the start, in seconds, and the phase: x in (0, 1] (discrete) or phi in [0, 2 pi) (rhythmic).
+/// `time` and `phase` may be NULL. Returns PDMP_WORKING, PDMP_FINISHED or, if `controller` is NULL, PDMP_NULL.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_progress(
     controller: Option<&pdmp_controller>,
@@ -350,17 +347,15 @@ pub extern "C" fn pdmp_controller_progress(
     inner.status().into()
 }
 
-/// Tells why the last call that this controller refused was refused, and returns the length of that text without its
-/// closing zero. There is none, of length 0, before the first.
-///
-/// # Safety
-/// `text` has the room that it tells.
+/// Writes the error message of the last call on this controller that failed, and returns its length in bytes without
+/// the terminating zero, also if `text` is too short for it. The message is empty before the first error. The message
+/// of a NULL controller is empty.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_error(controller: Option<&pdmp_controller>, text: pdmp_text) -> usize {
     match controller.and_then(|controller| controller.fault.as_ref()) {
-        // SAFETY: the caller's promise is the same.
-        Some(fault) => unsafe { text.put(fault) },
-        // SAFETY: the caller's promise is the same.
-        None => unsafe { text.put(&"") },
+        // SAFETY: the contract of the C ABI covers `text`.
+        Some(fault) => unsafe { text.write(fault) },
+        // SAFETY: as above.
+        None => unsafe { text.write(&"") },
     }
 }

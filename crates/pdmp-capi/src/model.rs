@@ -1,4 +1,4 @@
-//! Models: read, looked at, asked for the conditions of a movement.
+//! Models: loading, properties, and conditions of demonstrated and predicted movements.
 
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::io::ErrorKind;
@@ -12,43 +12,46 @@ use pdmp_core::{Conditions, Error, Kind, Model};
 
 use crate::buffers::{pdmp_buffer, pdmp_text, pdmp_vector};
 use crate::command::pdmp_conditions;
-use crate::status::{Fault, answer, answer_in, pdmp_status};
+use crate::fault::Fault;
+use crate::guard::{guard, guard_with_text};
+use crate::status::pdmp_status;
 
 use pdmp_kind::*;
 use pdmp_status::PDMP_OK;
 
-/// A learnt primitive. It never changes, and threads can share it.
+/// Learnt primitive. It is immutable, and threads may share it.
 pub struct pdmp_model {
     pub(crate) inner: Arc<Model>,
     names: Vec<CString>,
     labels: Vec<Vec<CString>>,
 }
 
-/// The kind of movement.
+/// Kind of a movement.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum pdmp_kind {
-    /// From a start to a goal.
+    /// Point-to-point movement from a start to a goal.
     PDMP_DISCRETE,
-    /// Around an anchor, periodically.
+    /// Periodic movement around an anchor.
     PDMP_RHYTHMIC,
 }
 
-/// What there is to know of a model before it moves.
+/// Properties of a model.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct pdmp_info {
-    /// Discrete or rhythmic.
+    /// Kind of the movement.
     pub kind: pdmp_kind,
     /// Number of degrees of freedom D.
     pub n_dofs: usize,
-    /// Dimension J of the style parameter.
+    /// Number of style dimensions J.
     pub n_styles: usize,
     /// Number of demonstrations M.
     pub n_demos: usize,
-    /// Length Q of a context; 0 if the model was learnt without.
+    /// Number of context values Q; 0 if the model was fitted without contexts.
     pub n_contexts: usize,
-    /// Numbers that pdmp_model_demonstration and pdmp_model_predict write at most: n_styles + 2 n_dofs + 1.
+    /// Number of elements that pdmp_model_demonstration and pdmp_model_predict need in `storage`: n_styles + 2 n_dofs +
+    /// 1.
     pub n_conditions: usize,
     /// Time constant tau of the nominal demonstration, in seconds.
     pub tau: f64,
@@ -56,41 +59,42 @@ pub struct pdmp_info {
     pub duration: f64,
 }
 
-/// Puts a new model where the caller wants it, or NULL.
+/// Writes a pointer to a new model to `model`, or NULL on error.
 ///
 /// # Safety
-/// `error` has the room that it tells.
-unsafe fn deliver(
+/// `error.data` is NULL or points to at least `error.size` writable bytes.
+unsafe fn create(
     model: Option<&mut MaybeUninit<*mut pdmp_model>>,
     error: pdmp_text,
     load: impl FnOnce() -> Result<Model, Fault>,
 ) -> pdmp_status {
     let call = || {
-        let place = model.ok_or(Fault::Null("model"))?.write(ptr::null_mut());
+        let handle = model.ok_or(Fault::Null("model"))?.write(ptr::null_mut());
         let inner = load()?;
-        // In C a name ends at its first zero byte.
-        let texts = |texts: &[String]| {
+        // A C string ends at its first zero byte.
+        let c_strings = |texts: &[String]| {
             let texts = texts.iter().map(|text| CString::new(text.split('\0').next().unwrap_or_default()));
             texts.collect::<Result<Vec<_>, _>>().map_err(|_| Fault::Internal)
         };
-        let names = texts(inner.names())?;
+        let names = c_strings(inner.names())?;
         let columns = inner.map().map(ContextMap::columns).unwrap_or_default();
         let labels = columns.iter().map(|column| match column {
-            ContextColumn::Label(labels) => texts(labels),
+            ContextColumn::Label(labels) => c_strings(labels),
             ContextColumn::Number => Ok(Vec::new()),
         });
         let labels = labels.collect::<Result<_, _>>()?;
-        *place = Box::into_raw(Box::new(pdmp_model { inner: Arc::new(inner), names, labels }));
+        *handle = Box::into_raw(Box::new(pdmp_model { inner: Arc::new(inner), names, labels }));
         Ok(PDMP_OK)
     };
-    // SAFETY: the caller's promise is the same.
-    unsafe { answer_in(error, call) }
+    // SAFETY: this function has the same contract for `error`.
+    unsafe { guard_with_text(error, call) }
 }
 
-/// Reads a model file from a path in UTF-8. The model is NULL if it is refused.
+/// Loads a model file. `path` is a UTF-8 string.
 ///
-/// # Safety
-/// `path` is NULL or ends in a zero byte, and `error` has the room that it tells.
+/// `*model` is set to the new model, which the caller frees with pdmp_model_free, or to NULL on error.
+///
+/// Errors: PDMP_NULL, PDMP_IO, PDMP_FILE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_model_load(
     path: *const c_char,
@@ -101,7 +105,7 @@ pub unsafe extern "C" fn pdmp_model_load(
         if path.is_null() {
             return Err(Fault::Null("path"));
         }
-        // SAFETY: it is not NULL, and the caller promises the zero byte.
+        // SAFETY: `path` is not NULL, so the contract of the C ABI guarantees a zero-terminated string.
         let path = unsafe { CStr::from_ptr(path) };
         let path = path.to_str().map_err(|_| Error::Io {
             path: path.to_string_lossy().into_owned().into(),
@@ -109,14 +113,15 @@ pub unsafe extern "C" fn pdmp_model_load(
         });
         Ok(Model::load(Path::new(path?))?)
     };
-    // SAFETY: the caller's promise is the same.
-    unsafe { deliver(model, error, load) }
+    // SAFETY: the contract of the C ABI covers `error`.
+    unsafe { create(model, error, load) }
 }
 
-/// Reads a model from the bytes of a file. The model is NULL if it is refused.
+/// Loads a model from the `size` bytes of a model file in memory, which may be freed afterwards.
 ///
-/// # Safety
-/// `bytes` is NULL or points to `size` bytes, and `error` has the room that it tells.
+/// `*model` is set to the new model, which the caller frees with pdmp_model_free, or to NULL on error.
+///
+/// Errors: PDMP_NULL, PDMP_FILE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_model_from_bytes(
     bytes: *const c_void,
@@ -124,25 +129,27 @@ pub unsafe extern "C" fn pdmp_model_from_bytes(
     model: Option<&mut MaybeUninit<*mut pdmp_model>>,
     error: pdmp_text,
 ) -> pdmp_status {
-    let read = || {
+    let load = || {
         if bytes.is_null() {
             return Err(Fault::Null("bytes"));
         }
-        // SAFETY: it is not NULL, and the caller promises the size.
+        // SAFETY: `bytes` is not NULL, so the contract of the C ABI guarantees `size` readable bytes.
         let bytes = unsafe { std::slice::from_raw_parts(bytes.cast(), size) };
         Ok(Model::from_bytes(bytes)?)
     };
-    // SAFETY: the caller's promise is the same.
-    unsafe { deliver(model, error, read) }
+    // SAFETY: the contract of the C ABI covers `error`.
+    unsafe { create(model, error, load) }
 }
 
-/// Frees a model. Its controllers go on: what they need of it stays. With NULL it does nothing.
+/// Frees a model; NULL is ignored. Controllers of the model remain valid.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_model_free(model: Option<Box<pdmp_model>>) {
     drop(model);
 }
 
-/// Tells kind, sizes and times of a model.
+/// Writes the properties of a model to `info`.
+///
+/// Errors: PDMP_NULL.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_model_describe(
     model: Option<&pdmp_model>,
@@ -165,109 +172,110 @@ pub extern "C" fn pdmp_model_describe(
         });
         Ok(PDMP_OK)
     };
-    answer(call, drop)
+    guard(call, drop)
 }
 
-/// Name of a degree of freedom, counted from 0, in UTF-8. It lives as long as the model, and is NULL past the last.
+/// Returns the name of degree of freedom `dof`, counted from 0, as a UTF-8 string that the model owns. Returns NULL if
+/// `model` is NULL or `dof` >= n_dofs.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_model_name(model: Option<&pdmp_model>, dof: usize) -> *const c_char {
     model.and_then(|model| model.names.get(dof)).map_or(ptr::null(), |name| name.as_ptr())
 }
 
-/// Conditions that repeat a demonstration, counted from 0: its style, goal and start or anchor, and tau.
+/// Writes the conditions that reproduce demonstration `demonstration`, counted from 0: style, goal and start (discrete)
+/// or anchor (rhythmic), and tau.
 ///
-/// Of a model whose time was warped or has landmarks, tau is that of the whole duration: within it the movement hurries and
-/// pauses as the nominal one does.
+/// If the model was fitted with time warping or with landmarks, tau matches the duration of the demonstration, and the
+/// relative timing within the movement is that of the nominal demonstration.
 ///
-/// They are written to `numbers`, which has room for pdmp_info.n_conditions of them, and `conditions` points there.
+/// The numbers are written to `storage`, of at least pdmp_info.n_conditions elements, and the members of `*conditions`
+/// point into it: `storage` must outlive their use.
 ///
-/// # Safety
-/// `numbers` and `error` have the room that they tell.
+/// Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_model_demonstration(
     model: Option<&pdmp_model>,
     demonstration: usize,
     conditions: Option<&mut MaybeUninit<pdmp_conditions>>,
-    numbers: pdmp_buffer,
+    storage: pdmp_buffer,
     error: pdmp_text,
 ) -> pdmp_status {
-    let demonstrated = |model: &Model| Ok(model.conditions(&[demonstration])?);
-    // SAFETY: the caller's promise is the same.
-    unsafe { lay_down(model, conditions, numbers, error, demonstrated) }
+    let select = |model: &Model| Ok(model.conditions(&[demonstration])?);
+    // SAFETY: the contract of the C ABI covers `storage` and `error`.
+    unsafe { write_conditions(model, conditions, storage, error, select) }
 }
 
-/// A label that a value of the contexts may be, both counted from 0, in UTF-8. It lives as long as the model, and is NULL
-/// past the last, and where the value is a number. In a context a label is given by its index.
+/// Returns label `label` of context column `column`, both counted from 0, as a UTF-8 string that the model owns. In a
+/// context, a label is represented by its index. Returns NULL if `model` is NULL, if an index is out of range, or if
+/// the column is numeric.
 #[unsafe(no_mangle)]
-pub extern "C" fn pdmp_model_label(model: Option<&pdmp_model>, value: usize, label: usize) -> *const c_char {
-    let found = model.and_then(|model| model.labels.get(value)?.get(label));
+pub extern "C" fn pdmp_model_label(model: Option<&pdmp_model>, column: usize, label: usize) -> *const c_char {
+    let found = model.and_then(|model| model.labels.get(column)?.get(label));
     found.map_or(ptr::null(), |label| label.as_ptr())
 }
 
-/// Conditions of the movement predicted for a context (n_contexts), as in Section 4.1.2: style, goal and start or anchor,
-/// and tau, that of the whole duration. A label is given by its index, see pdmp_model_label.
+/// Predicts the conditions of a movement for a context (n_contexts), as in Section 4.1.2 of the paper: style, goal and
+/// start (discrete) or anchor (rhythmic), and tau, which matches the predicted duration. A label is represented by its
+/// index, see pdmp_model_label.
 ///
-/// They are written to `numbers`, which has room for pdmp_info.n_conditions of them, and `conditions` points there.
+/// The numbers are written to `storage`, of at least pdmp_info.n_conditions elements, and the members of `*conditions`
+/// point into it: `storage` must outlive their use.
 ///
-/// # Safety
-/// `context` points to the numbers that it tells, and `numbers` and `error` have the room that they tell.
+/// Errors: PDMP_NULL; PDMP_LENGTH; PDMP_ABSENT if the model was fitted without contexts; PDMP_RANGE if a value is not
+/// finite or no index of a label, or if the context is so far from the demonstrations that the prediction overflows.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_model_predict(
     model: Option<&pdmp_model>,
     context: pdmp_vector,
     conditions: Option<&mut MaybeUninit<pdmp_conditions>>,
-    numbers: pdmp_buffer,
+    storage: pdmp_buffer,
     error: pdmp_text,
 ) -> pdmp_status {
     let predict = |model: &Model| {
-        let context = match n_contexts(model) {
-            // Whatever the context: the model says what it lacks.
-            0 => &[],
-            // SAFETY: the caller's promise is the same.
-            expected => unsafe { context.need("context", expected, "context value") }?,
-        };
-        Ok(match model.map() {
-            Some(map) => model.predict(&map.context(context)?)?,
-            None => model.predict(context)?,
-        }
-        .conditions)
+        let map = model.map().ok_or(Fault::NoContexts)?;
+        // SAFETY: the contract of the C ABI covers `context`.
+        let context = unsafe { context.require("context", n_contexts(model), "context value") }?;
+        Ok(model.predict(&map.context(context)?)?.conditions)
     };
-    // SAFETY: the caller's promise is the same.
-    unsafe { lay_down(model, conditions, numbers, error, predict) }
+    // SAFETY: the contract of the C ABI covers `storage` and `error`.
+    unsafe { write_conditions(model, conditions, storage, error, predict) }
 }
 
 fn n_contexts(model: &Model) -> usize {
     model.demonstrated().contexts.as_ref().map_or(0, |contexts| contexts.ncols())
 }
 
-/// Numbers of a prediction's conditions, at most.
+/// Returns the largest number of elements that the conditions of a movement take.
 fn n_conditions(model: &Model) -> usize {
     model.n_styles() + 2 * model.n_dofs() + 1
 }
 
+/// Writes the selected conditions, with tau in place of the durations of segments, to `storage` and `conditions`.
+///
 /// # Safety
-/// `numbers` and `error` have the room that they tell.
-unsafe fn lay_down(
+/// `storage.data` is NULL or points to at least `storage.length` writable numbers; `error.data` is NULL or points to at
+/// least `error.size` writable bytes.
+unsafe fn write_conditions(
     model: Option<&pdmp_model>,
     conditions: Option<&mut MaybeUninit<pdmp_conditions>>,
-    numbers: pdmp_buffer,
+    storage: pdmp_buffer,
     error: pdmp_text,
     select: impl FnOnce(&Model) -> Result<Conditions, Fault>,
 ) -> pdmp_status {
     let call = || {
         let model = &model.ok_or(Fault::Null("model"))?.inner;
         let conditions = conditions.ok_or(Fault::Null("conditions"))?;
-        if numbers.data.is_null() {
-            return Err(Fault::Null("numbers"));
+        if storage.data.is_null() {
+            return Err(Fault::Null("storage"));
         }
-        numbers.check("numbers", n_conditions(model), "style dimension, two per DoF and one for tau")?;
+        storage.check("storage", n_conditions(model), "style dimension, two per DoF and one for tau")?;
         let selected = select(model)?;
         let tau = Some(selected.time_constant(model)?);
         let selected = Conditions { tau, segment_durations: None, ..selected };
-        // SAFETY: style, at most two vectors of the DoFs and tau fit.
-        conditions.write(unsafe { pdmp_conditions::put(&selected, numbers.data) });
+        // SAFETY: `storage` was checked to hold the style, two vectors of n_dofs and tau, the most that is selected.
+        conditions.write(unsafe { pdmp_conditions::store(&selected, storage.data) });
         Ok(PDMP_OK)
     };
-    // SAFETY: the caller's promise is the same.
-    unsafe { answer_in(error, call) }
+    // SAFETY: this function has the same contract for `error`.
+    unsafe { guard_with_text(error, call) }
 }

@@ -1,38 +1,38 @@
-//! What a call answers, and why it refuses.
+//! Status codes and the version of the library.
 
 use std::ffi::c_char;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use pdmp_core::{Error, Status};
+use pdmp_core::{Error, ErrorKind, Status};
 
-use crate::buffers::pdmp_text;
-
-/// What a call came to; below zero it was refused.
+/// Status code that a call returns; negative values are errors.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum pdmp_status {
-    /// Done.
+    /// Success.
     PDMP_OK = 0,
-    /// The movement goes on; a rhythmic one always does.
+    /// Success; the movement is in progress. A rhythmic movement never finishes.
     PDMP_WORKING = 1,
-    /// The demonstrated time is over, and position and velocity have settled on the goal.
+    /// Success; the demonstrated duration has passed, and position and velocity have settled at the goal.
     PDMP_FINISHED = 2,
-    /// NULL where a pointer is needed.
+    /// A required pointer is NULL.
     PDMP_NULL = -1,
-    /// A wrong length.
+    /// An array has the wrong length, or a buffer is too short.
     PDMP_LENGTH = -2,
-    /// A number that is not finite, or outside its range.
+    /// A value is not finite, lies outside its range or contradicts another argument.
     PDMP_RANGE = -3,
-    /// What this model does not have: an anchor if it moves to a goal, or contexts if it was learnt without.
+    /// The model does not have this property: a discrete model has no anchor, a rhythmic one no goal, and a model that
+    /// was fitted without contexts predicts nothing.
     PDMP_ABSENT = -4,
-    /// A file that cannot be read.
+    /// A file cannot be opened or read.
     PDMP_IO = -5,
-    /// A model file that is damaged, foreign or of another version.
+    /// A model file is damaged, of another format or of another format version.
     PDMP_FILE = -6,
-    /// Memory that is too small or not aligned.
+    /// Memory cannot be allocated, or the caller's memory is too small or misaligned.
     PDMP_MEMORY = -7,
-    /// A defect of this library. A controller that answers so must be reset or freed.
+    /// A bug in the library. A controller that returns this code must be reset or freed.
     PDMP_INTERNAL = -8,
+    /// A computation did not converge.
+    PDMP_NUMERICAL = -9,
 }
 
 use pdmp_status::*;
@@ -46,72 +46,33 @@ impl From<Status> for pdmp_status {
     }
 }
 
-/// Why a call is refused. Its text is made when it is asked for: what can arise in a loop holds nothing that allocates.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum Fault {
-    #[error("{0} is NULL")]
-    Null(&'static str),
-    #[error("memory has {size} bytes at {address:#x}: a controller takes {needed}, aligned to {alignment}")]
-    Memory { size: usize, address: usize, needed: usize, alignment: usize },
-    #[error(transparent)]
-    Core(#[from] Error),
-    #[error("a defect of this library: please report it")]
-    Internal,
-}
-
-impl Fault {
-    fn status(&self) -> pdmp_status {
-        match self {
-            Fault::Null(_) => PDMP_NULL,
-            Fault::Memory { .. } => PDMP_MEMORY,
-            Fault::Internal => PDMP_INTERNAL,
-            Fault::Core(error) => match error {
-                Error::Length { .. } => PDMP_LENGTH,
-                Error::Kind { .. } | Error::Arguments(_) => PDMP_ABSENT,
-                Error::Io { .. } => PDMP_IO,
-                Error::File(_) => PDMP_FILE,
-                _ => PDMP_RANGE,
-            },
+/// The kinds of errors are mapped without a wildcard arm: a new kind needs a decision here.
+impl From<&Error> for pdmp_status {
+    fn from(error: &Error) -> Self {
+        match (error, error.kind()) {
+            (Error::Demo { source, .. }, _) => Self::from(&**source),
+            (
+                Error::Length { .. }
+                | Error::Rows { .. }
+                | Error::Samples { .. }
+                | Error::NoDemonstrations
+                | Error::Dofs { .. },
+                _,
+            ) => PDMP_LENGTH,
+            (Error::Kind { .. }, _) => PDMP_ABSENT,
+            (_, ErrorKind::Argument | ErrorKind::Data) => PDMP_RANGE,
+            (_, ErrorKind::Numerical) => PDMP_NUMERICAL,
+            (_, ErrorKind::Memory) => PDMP_MEMORY,
+            (_, ErrorKind::ModelFile) => PDMP_FILE,
+            (_, ErrorKind::Io) => PDMP_IO,
+            // No call of the C ABI has a callback that could interrupt it.
+            (_, ErrorKind::Interrupted) => PDMP_INTERNAL,
         }
     }
 }
 
-/// Makes a call, and hands the reason to `tell` if it refuses. A panic ends here, as an answer.
-pub(crate) fn answer(call: impl FnOnce() -> Result<pdmp_status, Fault>, tell: impl FnOnce(Fault)) -> pdmp_status {
-    let result = catch_unwind(AssertUnwindSafe(call)).unwrap_or(Err(Fault::Internal));
-    result.unwrap_or_else(|fault| {
-        let status = fault.status();
-        tell(fault);
-        status
-    })
-}
-
-/// Makes a call, and writes the reason into `error` if it refuses.
-///
-/// # Safety
-/// `error` has the room that it tells.
-pub(crate) unsafe fn answer_in(error: pdmp_text, call: impl FnOnce() -> Result<pdmp_status, Fault>) -> pdmp_status {
-    answer(call, |fault| {
-        // SAFETY: the caller's promise is the same.
-        unsafe { error.put(&fault) };
-    })
-}
-
-/// Version of the library, such as "0.1.0".
+/// Returns the version of the library as a static string, such as "0.1.0".
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_version() -> *const c_char {
     concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_panic_becomes_a_status() {
-        let mut told = None;
-        let status = answer(|| panic!("a test"), |fault| told = Some(fault));
-        assert_eq!(status, PDMP_INTERNAL);
-        assert!(matches!(told, Some(Fault::Internal)));
-    }
 }

@@ -1,4 +1,4 @@
-//! Inputs that the fuzz target of the C ABI found keep its claim.
+//! Replay of the corpus of the fuzz target for the C ABI.
 #![allow(missing_docs, unreachable_pub, dead_code, unsafe_code)]
 
 #[path = "../../../fuzz/src/c_abi.rs"]
@@ -8,8 +8,7 @@ mod input;
 #[path = "../../../fuzz/src/replay.rs"]
 mod replay;
 
-/// No sequence of calls panics, reaches past a buffer, or makes a motion that is not finite.
 #[test]
-fn odd_calls_are_answered_and_every_motion_is_finite() {
+fn no_sequence_of_calls_panics_or_writes_numbers_that_are_not_finite() {
     replay::corpus("c_abi", c_abi::check);
 }

@@ -1,4 +1,4 @@
-//! The committed header is the one that cbindgen makes of the sources.
+//! The committed header is the one that cbindgen generates from the sources.
 #![allow(missing_docs)]
 
 use std::fs;

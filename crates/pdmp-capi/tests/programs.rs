@@ -1,4 +1,5 @@
-//! Programs in C and C++, built with the system's compilers against both libraries, move as Rust does, to the bit.
+//! C and C++ programs, built with the system's compilers against the static and the shared library, produce the motion
+//! of Rust to the bit.
 #![cfg(unix)]
 #![allow(missing_docs)]
 
@@ -26,27 +27,27 @@ fn run(process: &mut Process) -> Output {
     process.output().unwrap_or_else(|error| panic!("{:?} is needed for this test: {error}", process.get_program()))
 }
 
-/// The version of the interface: before 1.0 every minor version has its own.
-fn interface() -> String {
+/// Returns the version of the ABI, which before 1.0 changes with each minor version.
+fn abi_version() -> String {
     match env!("CARGO_PKG_VERSION_MAJOR") {
         "0" => format!("0.{}", env!("CARGO_PKG_VERSION_MINOR")),
         major => major.to_string(),
     }
 }
 
-/// Builds a program with either library, runs both in `folder`, and returns what they print.
-fn prints(compiler: [&str; 2], source: &Path, folder: &Path, arguments: &[&str]) -> [String; 2] {
-    // Cargo puts the libraries beside the tests that it builds.
+/// Builds a program with each library, runs both in `folder`, and returns their outputs.
+fn outputs(compiler: [&str; 2], source: &Path, folder: &Path, arguments: &[&str]) -> [String; 2] {
+    // Cargo builds the libraries into the folder of the tests.
     let libraries = std::env::current_exe().unwrap().parent().unwrap().to_path_buf();
-    // A program asks for the library by the version of its interface.
-    let link = folder.join(format!("libpdmp.so.{}", interface()));
+    // The SONAME of the shared library has the version of the ABI.
+    let link = folder.join(format!("libpdmp.so.{}", abi_version()));
     if !link.exists() {
         std::os::unix::fs::symlink(libraries.join("libpdmp.so"), &link).unwrap();
     }
     let search = format!("-L{}", libraries.display());
-    let found_at_run_time = format!("-Wl,-rpath,{}", folder.canonicalize().unwrap().display());
+    let rpath = format!("-Wl,-rpath,{}", folder.canonicalize().unwrap().display());
     let archive = libraries.join("libpdmp.a").display().to_string();
-    let links: [&[&str]; 2] = [&[&archive, "-lpthread", "-ldl", "-lm"], &[&search, "-lpdmp", &found_at_run_time]];
+    let links: [&[&str]; 2] = [&[&archive, "-lpthread", "-ldl", "-lm"], &[&search, "-lpdmp", &rpath]];
     links.map(|link| {
         let program = folder.join("program");
         let [compiler, standard] = compiler;
@@ -64,24 +65,24 @@ fn prints(compiler: [&str; 2], source: &Path, folder: &Path, arguments: &[&str])
     })
 }
 
-/// A number that C printed with `%a`: ±0xh.hhhp±d.
-fn hexadecimal(text: &str) -> f64 {
+/// Parses a number that C printed with `%a`: ±0xh.hhhp±d.
+fn parse_hexadecimal(text: &str) -> f64 {
     let (sign, digits) = text.strip_prefix('-').map_or((1.0, text), |digits| (-1.0, digits));
     let (mantissa, exponent) = digits.strip_prefix("0x").unwrap().split_once('p').unwrap();
     let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
     let digits = u64::from_str_radix(&format!("{whole}{fraction}"), 16).unwrap();
-    // Both factors are powers of two or fit a mantissa, and halving twice keeps a subnormal's scale in range.
+    // All factors are exact. The power of two is split in half, for the exponent of a subnormal number is out of range.
     let exponent: i32 = exponent.parse::<i32>().unwrap() - 4 * fraction.len() as i32;
     sign * digits as f64 * 2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)
 }
 
-/// The bits of what a program printed, a line per tick.
+/// Returns the bits of the numbers in each line, without the first `skip` words.
 fn bits(printed: &str, skip: usize) -> Vec<Vec<u64>> {
-    let line = |line: &str| line.split_whitespace().skip(skip).map(|text| hexadecimal(text).to_bits()).collect();
+    let line = |line: &str| line.split_whitespace().skip(skip).map(|text| parse_hexadecimal(text).to_bits()).collect();
     printed.lines().map(line).collect()
 }
 
-/// The bits of the motion that a controller is in.
+/// Returns the bits of position, velocity and acceleration.
 fn motion(controller: &Controller) -> Vec<u64> {
     let vectors = [controller.position(), controller.velocity(), controller.acceleration()];
     vectors.concat().iter().map(|number| number.to_bits()).collect()
@@ -94,14 +95,14 @@ fn saved(model: &Model, name: &str) -> TempDir {
 }
 
 #[test]
-fn hexadecimal_numbers_are_read_exactly() {
+fn hexadecimal_numbers_are_parsed_exactly() {
     for (text, number) in [("0x1.999999999999ap-4", 0.1), ("-0x1p+1", -2.0), ("0x0p+0", 0.0), ("0x1.8p-1", 0.75)] {
-        assert_eq!(hexadecimal(text).to_bits(), f64::to_bits(number));
+        assert_eq!(parse_hexadecimal(text).to_bits(), f64::to_bits(number));
     }
 }
 
 #[test]
-fn the_c_example_moves_as_rust() {
+fn the_c_example_matches_rust_to_the_bit() {
     let model = learn(&reaches(), &options(Kind::Discrete));
     let conditions = conditions_of(&model, model.n_demos() - 1);
     let goal: Vec<f64> = conditions.goal.as_ref().unwrap().iter().map(|g| g + 0.125).collect();
@@ -124,7 +125,7 @@ fn the_c_example_moves_as_rust() {
 
     let folder = saved(&model, "reach.safetensors");
     let source = root().join("examples/c/control_loop.c");
-    for printed in prints(C, &source, folder.path(), &["reach.safetensors"]) {
+    for printed in outputs(C, &source, folder.path(), &["reach.safetensors"]) {
         assert_eq!(bits(&printed, 1), expected);
         let statuses: String = printed.lines().map(|line| &line[..1]).collect();
         assert_eq!(statuses, "1".repeat(expected.len() - 1) + "2");
@@ -132,7 +133,7 @@ fn the_c_example_moves_as_rust() {
 }
 
 #[test]
-fn the_cpp_example_moves_as_rust() {
+fn the_cpp_example_matches_rust_to_the_bit() {
     let model = learn(&cycles(), &options(Kind::Rhythmic));
     let conditions = conditions_of(&model, 0);
     let anchor: Vec<f64> = conditions.anchor.as_ref().unwrap().iter().map(|y_a| y_a + 0.25).collect();
@@ -153,13 +154,13 @@ fn the_cpp_example_moves_as_rust() {
 
     let folder = saved(&model, "cycle.safetensors");
     let source = root().join("examples/c/control_loop.cpp");
-    for printed in prints(CPP, &source, folder.path(), &["cycle.safetensors"]) {
+    for printed in outputs(CPP, &source, folder.path(), &["cycle.safetensors"]) {
         assert_eq!(bits(&printed, 1), expected);
     }
 }
 
 #[test]
-fn the_snippet_of_the_readme_moves_as_rust() {
+fn the_snippet_of_the_readme_matches_rust_to_the_bit() {
     let demos: Vec<_> = [0.0, 0.15, 0.3, 0.45, 0.6].map(bend).into();
     let model = learn(&demos, &options(Kind::Discrete));
     let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
@@ -180,12 +181,12 @@ fn the_snippet_of_the_readme_moves_as_rust() {
     let folder = saved(&model, "reach.safetensors");
     let source = folder.path().join("snippet.c");
     fs::write(&source, program).unwrap();
-    for printed in prints(C, &source, folder.path(), &[]) {
+    for printed in outputs(C, &source, folder.path(), &[]) {
         assert_eq!(bits(&printed, 0), expected);
     }
 }
 
-/// The reach of the README.
+/// Returns a demonstration of the README.
 fn bend(h: f64) -> Demonstration {
     let position = Array2::from_shape_fn((101, 2), |(c, d)| {
         let s = c as f64 / 100.0;
@@ -195,7 +196,7 @@ fn bend(h: f64) -> Demonstration {
 }
 
 #[test]
-fn every_member_of_the_cpp_wrapper_does_as_rust() {
+fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
     let model = learn(&reaches(), &options(Kind::Discrete));
     let mut conditions = model.predict(&[0.2]).unwrap().conditions;
     conditions.velocity = Some(vec![0.0; 3]);
@@ -210,11 +211,11 @@ fn every_member_of_the_cpp_wrapper_does_as_rust() {
                 250 => controller.set_compliance(100.0, 5.0).unwrap(),
                 _ => {}
             }
-            // Only every other tick of the program has a command.
-            let told = |from, to| tick % 2 == 0 && (from..to).contains(&tick);
+            // The program sends commands at even ticks.
+            let commanded = |from, to| tick % 2 == 0 && (from..to).contains(&tick);
             let command = Command {
-                measured: told(300, 350).then_some(&measured),
-                coupling: told(400, 500).then_some(Coupling { velocity: &measured, acceleration: &goal }),
+                measured: commanded(300, 350).then_some(&measured),
+                coupling: commanded(400, 500).then_some(Coupling { velocity: &measured, acceleration: &goal }),
                 ..Command::default()
             };
             common::tick(&mut controller, &command).unwrap();
@@ -224,7 +225,7 @@ fn every_member_of_the_cpp_wrapper_does_as_rust() {
 
     let folder = saved(&model, "reach.safetensors");
     let source = root().join("crates/pdmp-capi/tests/wrapper.cpp");
-    for printed in prints(CPP, &source, folder.path(), &["reach.safetensors"]) {
+    for printed in outputs(CPP, &source, folder.path(), &["reach.safetensors"]) {
         assert_eq!(bits(&printed, 0), expected);
     }
 }

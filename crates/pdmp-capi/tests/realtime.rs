@@ -1,4 +1,4 @@
-//! The loop through the C ABI is that of Rust, to the bit, and allocates nothing: a counting allocator watches.
+//! A control loop through the C ABI matches Rust to the bit and allocates nothing, as counted by the allocator.
 #![allow(missing_docs, unsafe_code)]
 
 #[path = "../../pdmp-core/tests/common/mod.rs"]
@@ -15,23 +15,23 @@ use pdmp::*;
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
-fn vector(told: Option<&[f64]>) -> pdmp_vector {
-    told.map_or(pdmp_vector { data: ptr::null(), length: 0 }, |v| pdmp_vector { data: v.as_ptr(), length: v.len() })
+fn vector(numbers: Option<&[f64]>) -> pdmp_vector {
+    numbers.map_or(pdmp_vector { data: ptr::null(), length: 0 }, |v| pdmp_vector { data: v.as_ptr(), length: v.len() })
 }
 
-fn number(told: &Option<f64>) -> *const f64 {
-    told.as_ref().map_or(ptr::null(), ptr::from_ref)
+fn pointer(number: &Option<f64>) -> *const f64 {
+    number.as_ref().map_or(ptr::null(), ptr::from_ref)
 }
 
-/// A command as C writes it.
-fn in_c(command: &Command) -> pdmp_command {
+/// Returns the command in the layout of C.
+fn to_c(command: &Command) -> pdmp_command {
     pdmp_command {
         style: vector(command.style),
         goal: vector(command.goal),
         anchor: vector(command.anchor),
-        tau: number(&command.tau),
-        amplitude: number(&command.amplitude),
-        dt: number(&command.dt),
+        tau: pointer(&command.tau),
+        amplitude: pointer(&command.amplitude),
+        dt: pointer(&command.dt),
         measured: vector(command.measured),
         coupling: pdmp_coupling {
             velocity: vector(command.coupling.map(|terms| terms.velocity)),
@@ -45,7 +45,7 @@ fn bits(numbers: &[f64]) -> impl Iterator<Item = u64> {
 }
 
 #[test]
-fn random_commands_move_c_as_rust_and_allocate_nothing() {
+fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
         let model = learn(&demos, &options(kind));
         let (n_dofs, n_styles, own) = (model.n_dofs(), model.n_styles(), model.tau());
@@ -67,33 +67,33 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
         let mut values = vec![0.0; n_dofs.max(n_styles)];
         let zeros = || vec![0.0; n_dofs];
         let (mut position, mut velocity, mut acceleration) = (zeros(), zeros(), zeros());
-        let mut ours = [zeros(), zeros(), zeros()];
-        let places = ours.each_mut().map(|place| pdmp_buffer { data: place.as_mut_ptr(), length: n_dofs });
-        let out = pdmp_motion { position: places[0], velocity: places[1], acceleration: places[2] };
-        let mut reason = [0; 256];
+        let mut written = [zeros(), zeros(), zeros()];
+        let buffers = written.each_mut().map(|output| pdmp_buffer { data: output.as_mut_ptr(), length: n_dofs });
+        let out = pdmp_motion { position: buffers[0], velocity: buffers[1], acceleration: buffers[2] };
+        let mut message = [0; 256];
         let (mut accepted, before) = (0, allocations());
         for _ in 0..200_000 {
             values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
-            // Refused commands are part of a loop too.
+            // Errors must not allocate either.
             if random.next() < 0.01 {
                 values[0] = f64::NAN;
             }
-            let given = &values[..n_dofs];
+            let per_dof = &values[..n_dofs];
             let command = Command {
                 dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
                 style: random.rarely().then_some(&values[..n_styles]),
-                goal: (random.rarely() && kind == Kind::Discrete).then_some(given),
-                anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(given),
+                goal: (random.rarely() && kind == Kind::Discrete).then_some(per_dof),
+                anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(per_dof),
                 tau: random.rarely().then_some(own * (0.5 + random.next())),
                 amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(values[0].abs()),
-                measured: random.rarely().then_some(given),
-                coupling: random.rarely().then_some(Coupling { velocity: given, acceleration: given }),
+                measured: random.rarely().then_some(per_dof),
+                coupling: random.rarely().then_some(Coupling { velocity: per_dof, acceleration: per_dof }),
             };
             let mut motion =
                 Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
             let expected = rust.update(&command, &mut motion);
             // SAFETY: the controller is alive, and the command and the motion are valid.
-            let status = unsafe { pdmp_controller_update(c.as_mut(), Some(&in_c(&command)), Some(&out)) };
+            let status = unsafe { pdmp_controller_update(c.as_mut(), Some(&to_c(&command)), Some(&out)) };
             let updated = expected.is_ok();
             assert_eq!(status, expected.map_or(pdmp_status::PDMP_RANGE, pdmp_status::from));
             let (style, tau) = (&values[..n_styles], own * (0.5 + random.next()));
@@ -101,8 +101,8 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
             let (expected, status) = unsafe {
                 match (random.next() * 20.0) as u8 {
                     0 => (rust.set_style(style), pdmp_controller_set_style(c.as_mut(), vector(Some(style)))),
-                    1 => (rust.set_goal(given), pdmp_controller_set_goal(c.as_mut(), vector(Some(given)))),
-                    2 => (rust.set_anchor(given), pdmp_controller_set_anchor(c.as_mut(), vector(Some(given)))),
+                    1 => (rust.set_goal(per_dof), pdmp_controller_set_goal(c.as_mut(), vector(Some(per_dof)))),
+                    2 => (rust.set_anchor(per_dof), pdmp_controller_set_anchor(c.as_mut(), vector(Some(per_dof)))),
                     3 => (rust.set_tau(tau), pdmp_controller_set_tau(c.as_mut(), tau)),
                     4 => (rust.set_amplitude(tau), pdmp_controller_set_amplitude(c.as_mut(), tau)),
                     5 => (rust.set_compliance(tau, tau), pdmp_controller_set_compliance(c.as_mut(), tau, tau)),
@@ -112,17 +112,17 @@ fn random_commands_move_c_as_rust_and_allocate_nothing() {
             assert_eq!(expected.is_ok(), status == pdmp_status::PDMP_OK);
             accepted += usize::from(updated && expected.is_ok());
             if expected.is_err() {
-                let text = pdmp_text { data: reason.as_mut_ptr(), size: reason.len() };
-                // SAFETY: the text has the room that it tells.
+                let text = pdmp_text { data: message.as_mut_ptr(), size: message.len() };
+                // SAFETY: the text is valid over its size.
                 assert!(unsafe { pdmp_controller_error(c.as_ref(), text) } > 0);
             }
-            let pairs = [(&position, &ours[0]), (&velocity, &ours[1]), (&acceleration, &ours[2])];
+            let pairs = [(&position, &written[0]), (&velocity, &written[1]), (&acceleration, &written[2])];
             assert!(pairs.into_iter().all(|(rust, c)| bits(rust).eq(bits(c))));
         }
         assert_eq!(allocations() - before, 0);
         println!("{kind}: {accepted} of 200000 commands accepted");
         assert!(accepted >= 100_000, "{kind}: {accepted} of 200000 commands accepted");
-        // SAFETY: it is not used again.
+        // SAFETY: the controller is alive and not used again.
         unsafe { pdmp_controller_free(c) };
     }
 }

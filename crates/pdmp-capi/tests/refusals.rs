@@ -1,4 +1,4 @@
-//! What C can get wrong is answered with a status and a text, and changes nothing.
+//! Invalid calls return an error status and a message, and change nothing.
 #![allow(missing_docs, unsafe_code)]
 
 #[path = "../../pdmp-core/tests/common/mod.rs"]
@@ -11,30 +11,33 @@ use std::ptr;
 use common::*;
 use pdmp::pdmp_status::*;
 use pdmp::*;
-use pdmp_core::Kind;
+use pdmp_core::context::{ContextMapKind, MapSelection};
+use pdmp_core::learning::TimeScaling;
+use pdmp_core::model::TimeWarp;
+use pdmp_core::{Error, Kind};
 
-const NOTHING: pdmp_vector = pdmp_vector { data: ptr::null(), length: 0 };
-const UNWANTED: pdmp_text = pdmp_text { data: ptr::null_mut(), size: 0 };
-const NO_ROOM: pdmp_buffer = pdmp_buffer { data: ptr::null_mut(), length: 0 };
+const NO_VECTOR: pdmp_vector = pdmp_vector { data: ptr::null(), length: 0 };
+const NO_TEXT: pdmp_text = pdmp_text { data: ptr::null_mut(), size: 0 };
+const NO_BUFFER: pdmp_buffer = pdmp_buffer { data: ptr::null_mut(), length: 0 };
 const NO_COMMAND: pdmp_command = pdmp_command {
-    style: NOTHING,
-    goal: NOTHING,
-    anchor: NOTHING,
+    style: NO_VECTOR,
+    goal: NO_VECTOR,
+    anchor: NO_VECTOR,
     tau: ptr::null(),
     amplitude: ptr::null(),
     dt: ptr::null(),
-    measured: NOTHING,
-    coupling: pdmp_coupling { velocity: NOTHING, acceleration: NOTHING },
+    measured: NO_VECTOR,
+    coupling: pdmp_coupling { velocity: NO_VECTOR, acceleration: NO_VECTOR },
 };
 const NO_CONDITIONS: pdmp_conditions = pdmp_conditions {
-    style: NOTHING,
-    goal: NOTHING,
-    anchor: NOTHING,
-    start: NOTHING,
-    velocity: NOTHING,
+    style: NO_VECTOR,
+    goal: NO_VECTOR,
+    anchor: NO_VECTOR,
+    start: NO_VECTOR,
+    velocity: NO_VECTOR,
     amplitude: ptr::null(),
     tau: ptr::null(),
-    phase: std::ptr::null(),
+    phase: ptr::null(),
 };
 const SETTINGS: pdmp_settings =
     pdmp_settings { dt: 1e-3, transition: ptr::null(), memory: pdmp_memory { data: ptr::null_mut(), size: 0 } };
@@ -47,26 +50,26 @@ fn buffer(numbers: &mut [f64]) -> pdmp_buffer {
     pdmp_buffer { data: numbers.as_mut_ptr(), length: numbers.len() }
 }
 
-/// What a call writes into a text of `size` bytes, and what it answers.
-fn told<T>(size: usize, call: impl FnOnce(pdmp_text) -> T) -> (T, String) {
-    // Bytes that a text must not leave standing.
+/// Returns the result of a call, and the string that it writes to a text of `size` bytes.
+fn with_text<T>(size: usize, call: impl FnOnce(pdmp_text) -> T) -> (T, String) {
+    // Bytes that are not zero, so that a missing terminator is detected.
     let mut text = vec![b'?' as c_char; size];
-    let answer = call(pdmp_text { data: text.as_mut_ptr(), size });
-    // SAFETY: a text ends in a zero byte, or is not written at all; the check below sees to that.
+    let result = call(pdmp_text { data: text.as_mut_ptr(), size });
     let text = match text.contains(&0) {
+        // SAFETY: the text contains a zero byte.
         true => unsafe { CStr::from_ptr(text.as_ptr()) }.to_str().unwrap().to_string(),
         false => String::new(),
     };
-    (answer, text)
+    (result, text)
 }
 
 fn load(bytes: &[u8]) -> (pdmp_status, *mut pdmp_model, String) {
     let mut model = MaybeUninit::uninit();
-    let (status, text) = told(256, |error| {
+    let (status, text) = with_text(256, |error| {
         // SAFETY: every pointer is valid.
         unsafe { pdmp_model_from_bytes(bytes.as_ptr().cast(), bytes.len(), Some(&mut model), error) }
     });
-    // SAFETY: the model is written whatever the answer.
+    // SAFETY: the model is written on success and on error.
     (status, unsafe { model.assume_init() }, text)
 }
 
@@ -74,14 +77,14 @@ fn loaded(kind: Kind) -> Box<pdmp_model> {
     let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
     let (status, model, _) = load(&learn(&demos, &options(kind)).to_bytes().unwrap());
     assert_eq!(status, PDMP_OK);
-    // SAFETY: it was just made, and `Box` is what `pdmp_model_free` takes.
+    // SAFETY: the model is new, and the library allocates it as a `Box`.
     unsafe { Box::from_raw(model) }
 }
 
 fn info(model: &pdmp_model) -> pdmp_info {
     let mut info = MaybeUninit::uninit();
     assert_eq!(pdmp_model_describe(Some(model), Some(&mut info)), PDMP_OK);
-    // SAFETY: it is written where the answer is good.
+    // SAFETY: the call has succeeded, so it is written.
     unsafe { info.assume_init() }
 }
 
@@ -91,15 +94,15 @@ fn start(
     conditions: Option<&pdmp_conditions>,
 ) -> (pdmp_status, *mut pdmp_controller, String) {
     let mut controller = MaybeUninit::uninit();
-    let (status, text) = told(256, |error| {
+    let (status, text) = with_text(256, |error| {
         // SAFETY: every pointer is NULL or valid.
         unsafe { pdmp_controller_new(Some(model), Some(settings), conditions, Some(&mut controller), error) }
     });
-    // SAFETY: the controller is written whatever the answer.
+    // SAFETY: the controller is written on success and on error.
     (status, unsafe { controller.assume_init() }, text)
 }
 
-/// A controller that ends with the test.
+/// A controller that is freed at the end of the test.
 struct Running(*mut pdmp_controller);
 
 impl Running {
@@ -110,30 +113,30 @@ impl Running {
     }
 
     fn handle(&mut self) -> Option<&mut pdmp_controller> {
-        // SAFETY: it is alive until it is dropped.
+        // SAFETY: the controller is alive until `self` is dropped.
         unsafe { self.0.as_mut() }
     }
 
     fn update(&mut self, command: &pdmp_command) -> pdmp_status {
-        // SAFETY: what the tests command is NULL or valid.
+        // SAFETY: the pointers of the tests' commands are NULL or valid.
         unsafe { pdmp_controller_update(self.handle(), Some(command), None) }
     }
 
     fn error(&mut self) -> String {
-        // SAFETY: the text is valid.
-        told(256, |text| unsafe { pdmp_controller_error(self.handle().as_deref(), text) }).1
+        // SAFETY: the text is valid over its size.
+        with_text(256, |text| unsafe { pdmp_controller_error(self.handle().as_deref(), text) }).1
     }
 
-    /// Time, phase and motion.
+    /// Returns position, velocity, acceleration, time and phase.
     fn state(&mut self, n_dofs: usize) -> Vec<f64> {
         let mut motion = vec![f64::NAN; 3 * n_dofs];
-        let places: Vec<_> = motion.chunks_mut(n_dofs).map(buffer).collect();
-        let places = pdmp_motion { position: places[0], velocity: places[1], acceleration: places[2] };
+        let buffers: Vec<_> = motion.chunks_mut(n_dofs).map(buffer).collect();
+        let outputs = pdmp_motion { position: buffers[0], velocity: buffers[1], acceleration: buffers[2] };
         let (mut time, mut phase) = (MaybeUninit::uninit(), MaybeUninit::uninit());
         pdmp_controller_progress(self.handle().as_deref(), Some(&mut time), Some(&mut phase));
-        // SAFETY: the motion has room, and time and phase were just written.
+        // SAFETY: the buffers hold n_dofs numbers each, and time and phase have been written.
         unsafe {
-            assert!(pdmp_controller_read(self.handle(), Some(&places)) as i32 > 0);
+            assert!(pdmp_controller_read(self.handle(), Some(&outputs)) as i32 > 0);
             motion.extend([time.assume_init(), phase.assume_init()]);
         }
         motion
@@ -142,48 +145,52 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // SAFETY: it is not used again.
+        // SAFETY: the controller is alive and not used again.
         unsafe { pdmp_controller_free(self.0) };
     }
 }
 
 #[test]
-fn null_is_a_status_everywhere() {
+fn null_for_a_required_argument_is_an_error() {
     let model = loaded(Kind::Discrete);
     let (mut made, mut out) = (MaybeUninit::uninit(), MaybeUninit::uninit());
     let mut conditions = MaybeUninit::uninit();
     let mut numbers = vec![0.0; info(&model).n_conditions];
-    let room = buffer(&mut numbers);
+    let storage = buffer(&mut numbers);
     let mut running = Running::new(&model);
-    // SAFETY: NULL is what is tried; all else is valid.
+    // SAFETY: every pointer is NULL or valid.
     unsafe {
         for status in [
-            pdmp_model_load(ptr::null(), Some(&mut made), UNWANTED),
-            pdmp_model_load(c"absent".as_ptr(), None, UNWANTED),
-            pdmp_model_from_bytes(ptr::null(), 0, Some(&mut made), UNWANTED),
-            pdmp_model_from_bytes(ptr::null(), 8, Some(&mut made), UNWANTED),
-            pdmp_model_from_bytes([0u8; 8].as_ptr().cast(), 8, None, UNWANTED),
+            pdmp_model_load(ptr::null(), Some(&mut made), NO_TEXT),
+            pdmp_model_load(c"absent".as_ptr(), None, NO_TEXT),
+            pdmp_model_from_bytes(ptr::null(), 0, Some(&mut made), NO_TEXT),
+            pdmp_model_from_bytes(ptr::null(), 8, Some(&mut made), NO_TEXT),
+            pdmp_model_from_bytes([0u8; 8].as_ptr().cast(), 8, None, NO_TEXT),
             pdmp_model_describe(None, None),
             pdmp_model_describe(Some(&model), None),
-            pdmp_model_demonstration(None, 0, Some(&mut conditions), room, UNWANTED),
-            pdmp_model_demonstration(Some(&model), 0, None, room, UNWANTED),
-            pdmp_model_demonstration(Some(&model), 0, Some(&mut conditions), NO_ROOM, UNWANTED),
-            pdmp_model_predict(None, NOTHING, Some(&mut conditions), room, UNWANTED),
-            pdmp_model_predict(Some(&model), NOTHING, Some(&mut conditions), room, UNWANTED),
-            pdmp_model_predict(Some(&model), vector(&[0.2]), None, room, UNWANTED),
-            pdmp_model_predict(Some(&model), vector(&[0.2]), Some(&mut conditions), NO_ROOM, UNWANTED),
-            pdmp_controller_new(None, Some(&SETTINGS), None, Some(&mut out), UNWANTED),
-            pdmp_controller_new(Some(&model), None, None, Some(&mut out), UNWANTED),
-            pdmp_controller_new(Some(&model), Some(&SETTINGS), None, None, UNWANTED),
+            pdmp_model_demonstration(None, 0, Some(&mut conditions), storage, NO_TEXT),
+            pdmp_model_demonstration(Some(&model), 0, None, storage, NO_TEXT),
+            pdmp_model_demonstration(Some(&model), 0, Some(&mut conditions), NO_BUFFER, NO_TEXT),
+            pdmp_model_predict(None, NO_VECTOR, Some(&mut conditions), storage, NO_TEXT),
+            pdmp_model_predict(Some(&model), NO_VECTOR, Some(&mut conditions), storage, NO_TEXT),
+            pdmp_model_predict(Some(&model), vector(&[0.2]), None, storage, NO_TEXT),
+            pdmp_model_predict(Some(&model), vector(&[0.2]), Some(&mut conditions), NO_BUFFER, NO_TEXT),
+            pdmp_controller_new(None, Some(&SETTINGS), None, Some(&mut out), NO_TEXT),
+            pdmp_controller_new(Some(&model), None, None, Some(&mut out), NO_TEXT),
+            pdmp_controller_new(Some(&model), Some(&SETTINGS), None, None, NO_TEXT),
             pdmp_controller_reset(None, None),
-            pdmp_controller_set_style(None, NOTHING),
-            pdmp_controller_set_goal(None, NOTHING),
-            pdmp_controller_set_anchor(None, NOTHING),
+            pdmp_controller_set_style(None, NO_VECTOR),
+            pdmp_controller_set_goal(None, NO_VECTOR),
+            pdmp_controller_set_anchor(None, NO_VECTOR),
             pdmp_controller_set_tau(None, 1.0),
             pdmp_controller_set_amplitude(None, 1.0),
             pdmp_controller_set_compliance(None, 1.0, 1.0),
-            pdmp_controller_set_style(running.handle(), NOTHING),
-            pdmp_controller_set_goal(running.handle(), NOTHING),
+            pdmp_controller_set_speed(None, 1.0),
+            pdmp_controller_release(None),
+            pdmp_controller_clone(None, SETTINGS.memory, Some(&mut out), NO_TEXT),
+            pdmp_controller_clone(running.handle().as_deref(), SETTINGS.memory, None, NO_TEXT),
+            pdmp_controller_set_style(running.handle(), NO_VECTOR),
+            pdmp_controller_set_goal(running.handle(), NO_VECTOR),
             pdmp_controller_set_goal(running.handle(), pdmp_vector { data: ptr::null(), length: 3 }),
             pdmp_controller_step(None),
             pdmp_controller_update(None, None, None),
@@ -193,7 +200,7 @@ fn null_is_a_status_everywhere() {
         ] {
             assert_eq!(status, PDMP_NULL);
         }
-        assert_eq!(pdmp_controller_error(None, UNWANTED), 0);
+        assert_eq!(pdmp_controller_error(None, NO_TEXT), 0);
         assert!(pdmp_model_name(None, 0).is_null());
         pdmp_controller_free(ptr::null_mut());
     }
@@ -202,11 +209,11 @@ fn null_is_a_status_everywhere() {
 }
 
 #[test]
-fn null_is_nothing_told_where_nothing_must_be() {
+fn null_for_an_optional_argument_is_its_default() {
     let model = loaded(Kind::Discrete);
     let (mut a, mut b) = (Running::new(&model), Running::new(&model));
     assert_eq!(pdmp_controller_step(a.handle()), PDMP_WORKING);
-    // SAFETY: NULL is nothing told, and not wanted.
+    // SAFETY: both pointers are NULL.
     assert_eq!(unsafe { pdmp_controller_update(b.handle(), None, None) }, PDMP_WORKING);
     assert_eq!(a.state(3), b.state(3));
     // SAFETY: as above.
@@ -216,15 +223,15 @@ fn null_is_nothing_told_where_nothing_must_be() {
 }
 
 #[test]
-fn a_refused_command_changes_nothing_and_says_why() {
+fn an_invalid_command_changes_nothing_and_leaves_a_message() {
     let model = loaded(Kind::Discrete);
     let mut running = Running::new(&model);
     assert_eq!(pdmp_controller_step(running.handle()), PDMP_WORKING);
     let before = running.state(3);
     let (three, two, nan) = ([0.5; 3], [0.5; 2], [0.5, f64::NAN, 0.5]);
-    let (huge, before_now) = (usize::MAX, -1e-3);
+    let (huge, negative) = (usize::MAX, -1e-3);
     let none = NO_COMMAND;
-    let half = pdmp_coupling { velocity: vector(&three), acceleration: NOTHING };
+    let half = pdmp_coupling { velocity: vector(&three), acceleration: NO_VECTOR };
     for (command, status, text) in [
         (pdmp_command { goal: vector(&two), ..none }, PDMP_LENGTH, "goal has length 2, expected 3: one value per DoF"),
         (
@@ -238,14 +245,14 @@ fn a_refused_command_changes_nothing_and_says_why() {
             &format!("style has length 9, expected {}: one value per style dimension", info(&model).n_styles),
         ),
         (pdmp_command { goal: vector(&nan), ..none }, PDMP_RANGE, "goal[1] = NaN: every number must be finite"),
-        (pdmp_command { dt: &before_now, ..none }, PDMP_RANGE, "dt = -0.001: must be finite and not negative"),
+        (pdmp_command { dt: &negative, ..none }, PDMP_RANGE, "dt = -0.001: must be finite and not negative"),
         (
             pdmp_command { anchor: vector(&three), ..none },
             PDMP_ABSENT,
             "anchor does not apply to a discrete primitive: it moves to a goal; set goal",
         ),
         (pdmp_command { coupling: half, ..none }, PDMP_NULL, "coupling acceleration is NULL"),
-        // What is right beside what is wrong takes no effect.
+        // The valid part of an invalid command takes no effect either.
         (
             pdmp_command { goal: vector(&three), tau: &f64::NAN, ..none },
             PDMP_RANGE,
@@ -257,8 +264,8 @@ fn a_refused_command_changes_nothing_and_says_why() {
         assert_eq!(running.state(3), before);
     }
     let mut two = [0.0; 2];
-    let short = pdmp_motion { position: buffer(&mut two), velocity: NO_ROOM, acceleration: NO_ROOM };
-    // SAFETY: the room is as long as it tells.
+    let short = pdmp_motion { position: buffer(&mut two), velocity: NO_BUFFER, acceleration: NO_BUFFER };
+    // SAFETY: every pointer is NULL or valid over its length.
     unsafe {
         assert_eq!(pdmp_controller_update(running.handle(), None, Some(&short)), PDMP_LENGTH);
         assert_eq!(pdmp_controller_read(running.handle(), Some(&short)), PDMP_LENGTH);
@@ -273,18 +280,18 @@ fn a_refused_command_changes_nothing_and_says_why() {
 }
 
 #[test]
-fn a_command_may_lie_where_the_motion_goes() {
+fn outputs_may_overlap_with_the_command() {
     let model = loaded(Kind::Discrete);
     let (mut apart, mut same) = (Running::new(&model), Running::new(&model));
     let (mut from, mut to) = (vec![0.3; 3], vec![0.0; 3]);
     for _ in 0..100 {
-        let motion = pdmp_motion { position: buffer(&mut to), velocity: NO_ROOM, acceleration: NO_ROOM };
+        let motion = pdmp_motion { position: buffer(&mut to), velocity: NO_BUFFER, acceleration: NO_BUFFER };
         let command = pdmp_command { measured: vector(&from), ..NO_COMMAND };
-        // SAFETY: both have three numbers.
+        // SAFETY: both arrays have three numbers.
         assert_eq!(unsafe { pdmp_controller_update(apart.handle(), Some(&command), Some(&motion)) }, PDMP_WORKING);
-        let place = buffer(&mut from);
-        let command = pdmp_command { measured: pdmp_vector { data: place.data, length: 3 }, ..NO_COMMAND };
-        let motion = pdmp_motion { position: place, velocity: NO_ROOM, acceleration: NO_ROOM };
+        let shared = buffer(&mut from);
+        let command = pdmp_command { measured: pdmp_vector { data: shared.data, length: 3 }, ..NO_COMMAND };
+        let motion = pdmp_motion { position: shared, velocity: NO_BUFFER, acceleration: NO_BUFFER };
         // SAFETY: as above.
         assert_eq!(unsafe { pdmp_controller_update(same.handle(), Some(&command), Some(&motion)) }, PDMP_WORKING);
         assert_eq!(from, to);
@@ -292,7 +299,7 @@ fn a_command_may_lie_where_the_motion_goes() {
 }
 
 #[test]
-fn memory_of_the_callers_serves_if_it_is_large_enough_and_aligned() {
+fn a_controller_accepts_memory_that_is_large_enough_and_aligned() {
     let model = loaded(Kind::Rhythmic);
     let (size, alignment) = (pdmp_controller_size(), pdmp_controller_alignment());
     let mut bytes = vec![0u8; size + 2 * alignment];
@@ -306,21 +313,21 @@ fn memory_of_the_callers_serves_if_it_is_large_enough_and_aligned() {
         assert_eq!((status, controller), (PDMP_MEMORY, ptr::null_mut()));
         assert!(text.starts_with(&format!("memory has {size} bytes at 0x")), "{text}");
     }
-    let nowhere = pdmp_memory { data: ptr::null_mut(), size };
-    assert_eq!(start(&model, &pdmp_settings { memory: nowhere, ..SETTINGS }, None).0, PDMP_NULL);
+    let null = pdmp_memory { data: ptr::null_mut(), size };
+    assert_eq!(start(&model, &pdmp_settings { memory: null, ..SETTINGS }, None).0, PDMP_NULL);
 
     let (status, controller, _) = attempt(0, size);
     assert_eq!(status, PDMP_OK);
-    let (mut given, mut own) = (Running(controller), Running::new(&model));
+    let (mut in_place, mut allocated) = (Running(controller), Running::new(&model));
     for _ in 0..100 {
-        assert_eq!(pdmp_controller_step(given.handle()), PDMP_WORKING);
-        pdmp_controller_step(own.handle());
+        assert_eq!(pdmp_controller_step(in_place.handle()), PDMP_WORKING);
+        pdmp_controller_step(allocated.handle());
     }
-    assert_eq!(given.state(2), own.state(2));
+    assert_eq!(in_place.state(2), allocated.state(2));
 }
 
 #[test]
-fn damaged_bytes_and_wrong_settings_leave_null_and_a_text() {
+fn damaged_files_and_invalid_settings_leave_null_and_a_message() {
     let bytes = learn(&reaches(), &options(Kind::Discrete)).to_bytes().unwrap();
     let mut flipped = bytes.clone();
     *flipped.last_mut().unwrap() ^= 1;
@@ -331,7 +338,7 @@ fn damaged_bytes_and_wrong_settings_leave_null_and_a_text() {
     }
     let mut made = MaybeUninit::uninit();
     // SAFETY: the path ends in a zero byte.
-    assert_eq!(unsafe { pdmp_model_load(c"absent/\xff".as_ptr(), Some(&mut made), UNWANTED) }, PDMP_IO);
+    assert_eq!(unsafe { pdmp_model_load(c"absent/\xff".as_ptr(), Some(&mut made), NO_TEXT) }, PDMP_IO);
 
     let model = loaded(Kind::Discrete);
     for settings in [
@@ -348,21 +355,22 @@ fn damaged_bytes_and_wrong_settings_leave_null_and_a_text() {
 }
 
 #[test]
-fn a_text_is_cut_to_fit_and_its_whole_length_told() {
+fn a_message_is_truncated_to_fit_and_its_full_length_returned() {
     let model = loaded(Kind::Discrete);
     let mut running = Running::new(&model);
     assert_eq!(pdmp_controller_set_tau(running.handle(), -1.0), PDMP_RANGE);
     let whole = "tau = -1: must be positive and finite";
     for size in 0..2 * whole.len() {
         // SAFETY: the text has `size` bytes.
-        let (length, text) = told(size, |text| unsafe { pdmp_controller_error(running.handle().as_deref(), text) });
+        let (length, text) =
+            with_text(size, |text| unsafe { pdmp_controller_error(running.handle().as_deref(), text) });
         assert_eq!((length, text.as_str()), (whole.len(), &whole[..size.saturating_sub(1).min(whole.len())]));
     }
-    // A character that does not fit is left out whole.
+    // Truncation does not split a character.
     let mut made = MaybeUninit::uninit();
     // SAFETY: the path ends in a zero byte.
     let texts =
-        (1..6).map(|size| told(size, |text| unsafe { pdmp_model_load(c"aßb".as_ptr(), Some(&mut made), text) }).1);
+        (1..6).map(|size| with_text(size, |text| unsafe { pdmp_model_load(c"aßb".as_ptr(), Some(&mut made), text) }).1);
     assert_eq!(texts.collect::<Vec<_>>(), ["", "a", "a", "aß", "aßb"]);
 }
 
@@ -371,59 +379,62 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
         let (rust, model) = (learn(&demos, &options(kind)), loaded(kind));
         let mut numbers = vec![f64::NAN; info(&model).n_conditions];
-        let room = buffer(&mut numbers);
+        let storage = buffer(&mut numbers);
         let read = |vector: pdmp_vector| {
-            // SAFETY: vectors that are told lie in `numbers`.
+            // SAFETY: a vector that is not NULL lies in `numbers`.
             (!vector.data.is_null()).then(|| unsafe { std::slice::from_raw_parts(vector.data, vector.length) }.to_vec())
         };
-        let read = |told: pdmp_conditions| pdmp_core::Conditions {
-            style: read(told.style),
-            goal: read(told.goal),
-            anchor: read(told.anchor),
-            start: read(told.start),
-            velocity: read(told.velocity),
+        let conditions_in = |c: pdmp_conditions| pdmp_core::Conditions {
+            style: read(c.style),
+            goal: read(c.goal),
+            anchor: read(c.anchor),
+            start: read(c.start),
+            velocity: read(c.velocity),
             // SAFETY: NULL or in `numbers`.
-            amplitude: unsafe { told.amplitude.as_ref() }.copied(),
+            amplitude: unsafe { c.amplitude.as_ref() }.copied(),
             // SAFETY: as above.
-            tau: unsafe { told.tau.as_ref() }.copied(),
+            tau: unsafe { c.tau.as_ref() }.copied(),
             segment_durations: None,
             // SAFETY: as above.
-            phase: unsafe { told.phase.as_ref() }.copied(),
+            phase: unsafe { c.phase.as_ref() }.copied(),
         };
-        // In C a movement has one time constant.
+        // Conditions in C have a time constant in place of durations of segments.
         let by_tau = |conditions: pdmp_core::Conditions| {
             let tau = Some(conditions.time_constant(&rust).unwrap());
             pdmp_core::Conditions { tau, segment_durations: None, ..conditions }
         };
         for m in 0..demos.len() {
-            let mut told = MaybeUninit::uninit();
-            // SAFETY: the room is as long as it tells, and what is told is written where the answer is good.
-            let told = unsafe {
-                assert_eq!(pdmp_model_demonstration(Some(&model), m, Some(&mut told), room, UNWANTED), PDMP_OK);
-                told.assume_init()
+            let mut written = MaybeUninit::uninit();
+            // SAFETY: every pointer is valid over its length, and the conditions are written on success.
+            let written = unsafe {
+                assert_eq!(pdmp_model_demonstration(Some(&model), m, Some(&mut written), storage, NO_TEXT), PDMP_OK);
+                written.assume_init()
             };
-            assert_eq!(read(told), by_tau(conditions_of(&rust, m)));
+            assert_eq!(conditions_in(written), by_tau(conditions_of(&rust, m)));
         }
-        let mut told = MaybeUninit::uninit();
+        let mut written = MaybeUninit::uninit();
         // SAFETY: as above.
         unsafe {
-            let place = Some(&mut told);
-            assert_eq!(pdmp_model_demonstration(Some(&model), demos.len(), place, room, UNWANTED), PDMP_RANGE);
-            let mut more = vec![f64::NAN; room.length + 3];
+            let output = Some(&mut written);
+            assert_eq!(pdmp_model_demonstration(Some(&model), demos.len(), output, storage, NO_TEXT), PDMP_RANGE);
+            let mut more = vec![f64::NAN; storage.length + 3];
             assert_eq!(
-                pdmp_model_demonstration(Some(&model), 0, Some(&mut told), buffer(&mut more), UNWANTED),
+                pdmp_model_demonstration(Some(&model), 0, Some(&mut written), buffer(&mut more), NO_TEXT),
                 PDMP_OK
             );
-            assert!(more[room.length..].iter().all(|number| number.is_nan()));
-            let short = pdmp_buffer { length: room.length - 1, ..room };
-            assert_eq!(pdmp_model_demonstration(Some(&model), 0, Some(&mut told), short, UNWANTED), PDMP_LENGTH);
-            let predicted = pdmp_model_predict(Some(&model), vector(&[0.2]), Some(&mut told), room, UNWANTED);
+            assert!(more[storage.length..].iter().all(|number| number.is_nan()));
+            let short = pdmp_buffer { length: storage.length - 1, ..storage };
+            assert_eq!(pdmp_model_demonstration(Some(&model), 0, Some(&mut written), short, NO_TEXT), PDMP_LENGTH);
+            let predicted = pdmp_model_predict(Some(&model), vector(&[0.2]), Some(&mut written), storage, NO_TEXT);
             match rust.predict(&[0.2]) {
                 Ok(prediction) => {
                     assert_eq!(predicted, PDMP_OK);
-                    assert_eq!(read(told.assume_init()), by_tau(prediction.conditions));
+                    assert_eq!(conditions_in(written.assume_init()), by_tau(prediction.conditions));
                     let two = vector(&[0.2, 0.2]);
-                    assert_eq!(pdmp_model_predict(Some(&model), two, Some(&mut told), room, UNWANTED), PDMP_LENGTH);
+                    assert_eq!(
+                        pdmp_model_predict(Some(&model), two, Some(&mut written), storage, NO_TEXT),
+                        PDMP_LENGTH
+                    );
                 }
                 Err(_) => assert_eq!(predicted, PDMP_ABSENT),
             }
@@ -431,19 +442,19 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
     }
 }
 
-/// Labels are told in order, and stand in a context by their index.
+/// Labels are listed in order, and a context refers to them by index.
 #[test]
-fn labels_of_contexts_are_told_and_taken_by_index() {
+fn labels_of_contexts_are_listed_and_accepted_by_index() {
     let manners = ["shy", "proud", "shy", "tired", "proud"];
     let contexts = manners.iter().zip([0.0, 0.1, 0.2, 0.3, 0.4]).map(|(&m, h)| vec![m.into(), h.into()]).collect();
-    let rust = learn(&reaches(), &pdmp_core::FitOptions { contexts: Some(contexts), ..options(Kind::Discrete) });
+    let rust = learn(&reaches(), &options(Kind::Discrete).contexts(contexts));
     let (status, model, _) = load(&rust.to_bytes().unwrap());
     assert_eq!(status, PDMP_OK);
-    // SAFETY: it was just made, and `Box` is what `pdmp_model_free` takes.
+    // SAFETY: the model is new, and the library allocates it as a `Box`.
     let model = unsafe { Box::from_raw(model) };
     let label = |value, label| {
         let text = pdmp_model_label(Some(&model), value, label);
-        // SAFETY: NULL, or a text that lives as long as the model.
+        // SAFETY: NULL, or a string that lives as long as the model.
         (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_str().unwrap())
     };
     assert_eq!([0, 1, 2, 3].map(|k| label(0, k)), [Some("proud"), Some("shy"), Some("tired"), None]);
@@ -451,10 +462,11 @@ fn labels_of_contexts_are_told_and_taken_by_index() {
     assert!(pdmp_model_label(None, 0, 0).is_null());
 
     let mut numbers = vec![f64::NAN; info(&model).n_conditions];
-    let (room, mut told) = (buffer(&mut numbers), MaybeUninit::uninit());
+    let (storage, mut written) = (buffer(&mut numbers), MaybeUninit::uninit());
     let context = vector(&[2.0, 0.25]);
-    // SAFETY: the room is as long as it tells.
-    let mut predict = |context| unsafe { pdmp_model_predict(Some(&model), context, Some(&mut told), room, UNWANTED) };
+    // SAFETY: every pointer is valid over its length.
+    let mut predict =
+        |context| unsafe { pdmp_model_predict(Some(&model), context, Some(&mut written), storage, NO_TEXT) };
     assert_eq!(predict(vector(&[3.0, 0.25])), PDMP_RANGE);
     assert_eq!(predict(context), PDMP_OK);
     let expected = rust.predict(&["tired".into(), pdmp_core::demonstration::ContextValue::from(0.25)]).unwrap();
@@ -480,11 +492,56 @@ fn a_model_is_described_and_its_controllers_outlive_it() {
     let names: Vec<_> = (0..3).map(|d| unsafe { CStr::from_ptr(pdmp_model_name(Some(&model), d)) }).collect();
     assert!(names.iter().zip(rust.names()).all(|(c, rust)| c.to_str() == Ok(rust)));
     assert!(pdmp_model_name(Some(&model), 3).is_null());
-    // SAFETY: a constant that ends in a zero byte.
+    // SAFETY: a static string that ends in a zero byte.
     assert_eq!(unsafe { CStr::from_ptr(pdmp_version()) }.to_str(), Ok(env!("CARGO_PKG_VERSION")));
 
     let mut running = Running::new(&model);
     pdmp_model_free(Some(model));
     while pdmp_controller_step(running.handle()) == PDMP_WORKING {}
     assert_eq!(pdmp_controller_progress(running.handle().as_deref(), None, None), PDMP_FINISHED);
+}
+
+/// The shares of the segments in the duration are normalised exponentials, which underflow far from the demonstrations.
+#[test]
+fn a_prediction_that_overflows_is_out_of_range() {
+    let warped = options(Kind::Discrete)
+        .map(MapSelection::Given(ContextMapKind::Linear))
+        .time_scaling(TimeScaling::Warp(TimeWarp { n_segments: 4, max_slope: 1.5 }));
+    let (status, model, _) = load(&learn(&reaches(), &warped).to_bytes().unwrap());
+    assert_eq!(status, PDMP_OK);
+    // SAFETY: the model is new, and the library allocates it as a `Box`.
+    let model = unsafe { Box::from_raw(model) };
+    let mut numbers = vec![0.0; info(&model).n_conditions];
+    let storage = buffer(&mut numbers);
+    for context in [1e149, 1e6, 1e3] {
+        let (status, text) = with_text(256, |error| {
+            // SAFETY: every pointer is valid over its length.
+            unsafe {
+                let mut written = MaybeUninit::uninit();
+                pdmp_model_predict(Some(&model), vector(&[context]), Some(&mut written), storage, error)
+            }
+        });
+        assert_eq!(status, PDMP_RANGE, "{text}");
+        assert!(text.contains("the prediction overflows"), "{text}");
+    }
+}
+
+#[test]
+fn every_kind_of_core_error_has_its_status() {
+    let io = || std::io::ErrorKind::NotFound.into();
+    for (error, status) in [
+        (Error::Length { name: "goal", expected: 3, found: 2, per: "DoF" }, PDMP_LENGTH),
+        (Error::Range { name: "tau", value: -1.0, allowed: "must be positive" }, PDMP_RANGE),
+        (Error::NotFinite { name: "goal", index: 0, value: f64::NAN }, PDMP_RANGE),
+        (Error::Arguments("pass one or the other"), PDMP_RANGE),
+        (Error::Kind { name: "anchor", kind: Kind::Discrete, instead: "" }, PDMP_ABSENT),
+        (Error::Memory { name: "outputs", numbers: 1e18 }, PDMP_MEMORY),
+        (Error::Io { path: "absent".into(), source: io() }, PDMP_IO),
+        (Error::File("damaged".into()), PDMP_FILE),
+        (Error::Fit("did not converge".into()), PDMP_NUMERICAL),
+        (Error::Interrupted, PDMP_INTERNAL),
+    ] {
+        assert_eq!(pdmp_status::from(&error), status, "{error}");
+        assert_eq!(pdmp_status::from(&error.in_demo(1)), status);
+    }
 }

@@ -1,4 +1,4 @@
-// Uses every member of pdmp.hpp on a discrete model of three DoFs, and prints the motion after each tick.
+// Calls every member of pdmp.hpp on a discrete model of three DoFs, and prints the motion after each tick.
 
 #include <array>
 #include <cstdio>
@@ -8,14 +8,14 @@
 
 #include "pdmp.hpp"
 
-static void require(bool claim, int line) {
-    if (!claim) throw std::logic_error("line " + std::to_string(line));
+static void require(bool condition, int line) {
+    if (!condition) throw std::logic_error("line " + std::to_string(line));
 }
 
-#define REQUIRE(claim) require(claim, __LINE__)
+#define REQUIRE(condition) require(condition, __LINE__)
 
 template <class Call>
-static pdmp_status thrown(Call call) {
+static pdmp_status status_thrown_by(Call call) {
     try {
         call();
     } catch (const pdmp::Error &error) {
@@ -26,8 +26,8 @@ static pdmp_status thrown(Call call) {
 }
 
 int main(int, char **argv) try {
-    REQUIRE(thrown([] { pdmp::Model::load("absent"); }) == PDMP_IO);
-    REQUIRE(thrown([] { pdmp::Model::from_bytes("damaged", 7); }) == PDMP_FILE);
+    REQUIRE(status_thrown_by([] { pdmp::Model::load("absent"); }) == PDMP_IO);
+    REQUIRE(status_thrown_by([] { pdmp::Model::from_bytes("damaged", 7); }) == PDMP_FILE);
 
     std::ifstream file(argv[1], std::ios::binary);
     const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
@@ -35,8 +35,8 @@ int main(int, char **argv) try {
     REQUIRE(model.info().n_dofs == 3 && model.info().kind == PDMP_DISCRETE);
     REQUIRE(model.name(0) == pdmp::Model::load(argv[1]).name(0) && model.name(3).empty());
     REQUIRE(model.label(0, 0).empty());
-    REQUIRE(thrown([&] { model.demonstration(5); }) == PDMP_RANGE);
-    REQUIRE(thrown([&] { model.predict({}); }) == PDMP_NULL);
+    REQUIRE(status_thrown_by([&] { model.demonstration(5); }) == PDMP_RANGE);
+    REQUIRE(status_thrown_by([&] { model.predict({}); }) == PDMP_NULL);
 
     auto conditions = model.predict({0.2});
     conditions.velocity = {0.0, 0.0, 0.0};
@@ -46,8 +46,8 @@ int main(int, char **argv) try {
     REQUIRE(controller.error().empty());
     controller.reset(conditions);
     conditions.amplitude = 2.0;
-    REQUIRE(thrown([&] { controller.reset(conditions); }) == PDMP_ABSENT);
-    REQUIRE(thrown([&] { pdmp::Controller refused(model, 0.0); }) == PDMP_RANGE);
+    REQUIRE(status_thrown_by([&] { controller.reset(conditions); }) == PDMP_ABSENT);
+    REQUIRE(status_thrown_by([&] { pdmp::Controller invalid(model, 0.0); }) == PDMP_RANGE);
     REQUIRE(first.step() == PDMP_NULL);
 
     pdmp::Motion motion(3);
@@ -71,6 +71,7 @@ int main(int, char **argv) try {
             for (const double number : *numbers) std::printf("%a ", number);
         std::printf("\n");
     }
+    REQUIRE(controller.set_speed(1.0) == PDMP_OK && controller.release() == PDMP_OK);
     REQUIRE(controller.set_anchor(pdmp::view(goal)) == PDMP_ABSENT);
     REQUIRE(controller.set_amplitude(0.5) == PDMP_ABSENT);
     REQUIRE(controller.error() == "amplitude does not apply to a discrete primitive");

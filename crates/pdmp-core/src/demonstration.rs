@@ -1,4 +1,4 @@
-//! Demonstrations: recorded movements with checked shapes.
+//! Demonstrations: recorded movements whose shapes and numbers are checked.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -6,23 +6,23 @@ use crate::error::{Error, Result};
 pub use crate::validate::LARGEST;
 use crate::validate::{check_matrix, check_number, check_positive, check_time, check_vector};
 
-/// Fewest samples that carry a cubic spline with not-a-knot ends.
+/// Minimum number of samples of a demonstration: a cubic spline with not-a-knot ends needs four.
 pub const MIN_SAMPLES_PER_DEMONSTRATION: usize = 4;
 
-/// Longest name or unit of a DoF, in bytes.
+/// Maximum length of the name or unit of a DoF, in bytes: it bounds the header of a model file.
 const MAX_NAME_LENGTH: usize = 1000;
 
-/// When the samples of a demonstration were taken.
+/// Sampling times of a demonstration.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sampling {
-    /// At equal intervals, whose length the fit is told.
+    /// Equal intervals of unknown length; the fit options state it.
     Unknown,
-    /// At equal intervals of `dt` seconds.
+    /// Equal intervals.
     Uniform {
         /// Sampling interval in seconds.
         dt: f64,
     },
-    /// At the given times in seconds.
+    /// Individual times.
     Stamped {
         /// Strictly increasing time stamps, in seconds.
         time: Vec<f64>,
@@ -30,11 +30,18 @@ pub enum Sampling {
 }
 
 /// One value of a context.
+///
+/// ```
+/// use pdmp_core::demonstration::ContextValue;
+///
+/// assert_eq!(ContextValue::from(0.3), ContextValue::Number(0.3));
+/// assert_eq!(ContextValue::from("cup"), ContextValue::Label("cup".to_string()));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum ContextValue {
     /// A quantity, such as a height.
     Number(f64),
-    /// A name, such as that of a style; no label is nearer to one than to another.
+    /// A category, such as the kind of an object; all labels are equally distant from each other.
     Label(String),
 }
 
@@ -57,6 +64,21 @@ impl From<String> for ContextValue {
 }
 
 /// One recorded movement.
+///
+/// ```
+/// use ndarray::Array2;
+/// use pdmp_core::{Demonstration, Sampling};
+///
+/// # fn main() -> pdmp_core::Result<()> {
+/// let position = Array2::from_shape_fn((101, 1), |(c, _)| (c as f64 / 100.0).powi(2));
+/// let demo = Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?
+///     .with_context(vec![0.3])?
+///     .with_names(vec!["height".to_string()])?
+///     .with_units(vec!["m".to_string()])?;
+/// assert_eq!((demo.n_samples(), demo.n_dofs()), (101, 1));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Demonstration {
     position: Array2<f64>,
@@ -68,11 +90,11 @@ pub struct Demonstration {
 }
 
 impl Demonstration {
-    /// A movement of positions (T, D), in the unit of each degree of freedom.
+    /// Creates a demonstration from positions (T, D), in the unit of each degree of freedom.
     ///
     /// # Errors
-    /// Fewer than four samples, no DoF, a number that is not finite or too large to be squared, an interval that is not
-    /// positive, time stamps that do not increase or are not one per sample.
+    /// Fewer than [`MIN_SAMPLES_PER_DEMONSTRATION`] samples, no DoF, a number that is not finite or exceeds [`LARGEST`],
+    /// an interval that is not positive, time stamps that do not increase, or a number of time stamps other than T.
     pub fn new(position: Array2<f64>, sampling: Sampling) -> Result<Self> {
         check_matrix("position", position.view())?;
         let (found, n_dofs) = position.dim();
@@ -90,20 +112,20 @@ impl Demonstration {
         Ok(Self { position, sampling, goal: None, context: None, names: None, units: None })
     }
 
-    /// Sets the point attractor of this movement (D,); without it, the last sample serves.
+    /// Sets the goal of this movement (D,). The default is the last sample.
     ///
     /// # Errors
-    /// A length other than D, or a number that is not finite.
+    /// A length other than D, or a number that is not finite or exceeds [`LARGEST`].
     pub fn with_goal(mut self, goal: Vec<f64>) -> Result<Self> {
         check_vector("goal", &goal, self.n_dofs(), "DoF")?;
         self.goal = Some(goal);
         Ok(self)
     }
 
-    /// Sets the condition under which this movement was made (Q,), such as an obstacle's height.
+    /// Sets the context in which this movement was recorded (Q,), such as the height of an obstacle.
     ///
     /// # Errors
-    /// No value, or a number that is not finite.
+    /// No value, or a number that is not finite or exceeds [`LARGEST`].
     pub fn with_context<V: Into<ContextValue>>(mut self, context: Vec<V>) -> Result<Self> {
         let context: Vec<ContextValue> = context.into_iter().map(Into::into).collect();
         check_context(&context)?;
@@ -111,10 +133,10 @@ impl Demonstration {
         Ok(self)
     }
 
-    /// Names the degrees of freedom (D,).
+    /// Sets the names of the degrees of freedom (D,).
     ///
     /// # Errors
-    /// A number of names other than D, a name given twice, or one longer than 1000 bytes.
+    /// A number of names other than D, a repeated name, or one longer than 1000 bytes.
     pub fn with_names(mut self, names: Vec<String>) -> Result<Self> {
         if names.len() != self.n_dofs() {
             let (expected, found) = (self.n_dofs(), names.len());
@@ -127,7 +149,7 @@ impl Demonstration {
         Ok(self)
     }
 
-    /// Sets the units of the degrees of freedom (D,), such as "rad"; "" where one is not known.
+    /// Sets the units of the degrees of freedom (D,), such as "rad"; an unknown unit is "".
     ///
     /// # Errors
     /// A number of units other than D, or one longer than 1000 bytes.
@@ -143,7 +165,7 @@ impl Demonstration {
         Ok(self)
     }
 
-    /// The same movement with other samples: its labels, goal and context stay.
+    /// Returns the movement with other samples; goal, context, names and units are kept.
     ///
     /// # Errors
     /// As for [`Demonstration::new`].
@@ -152,64 +174,64 @@ impl Demonstration {
         Ok(Self { goal, context, names, units, ..Self::new(position, sampling)? })
     }
 
-    /// A part of the movement, which ends elsewhere: without the goal.
+    /// Returns a part of the movement, without the goal, which is the end of the whole.
     pub(crate) fn part(&self, position: Array2<f64>, sampling: Sampling) -> Result<Self> {
         Ok(Self { goal: None, ..self.sampled(position, sampling)? })
     }
 
-    /// Moves a degree of freedom, goal included, as when whole turns are taken off an angle.
-    pub(crate) fn shift(&mut self, dof: usize, by: f64) {
-        self.position.column_mut(dof).iter_mut().for_each(|y| *y += by);
+    /// Adds an offset to the positions and the goal of a degree of freedom.
+    pub(crate) fn shift(&mut self, dof: usize, offset: f64) {
+        self.position.column_mut(dof).iter_mut().for_each(|y| *y += offset);
         if let Some(goal) = &mut self.goal {
-            goal[dof] += by;
+            goal[dof] += offset;
         }
     }
 
-    /// Positions (T, D).
+    /// Returns the positions (T, D), in the unit of each degree of freedom.
     pub fn position(&self) -> ArrayView2<'_, f64> {
         self.position.view()
     }
 
-    /// When the samples were taken.
+    /// Returns the sampling times.
     pub fn sampling(&self) -> &Sampling {
         &self.sampling
     }
 
-    /// The point attractor given for this movement (D,).
+    /// Returns the goal (D,), if one was set.
     pub fn goal(&self) -> Option<&[f64]> {
         self.goal.as_deref()
     }
 
-    /// The condition given for this movement (Q,).
+    /// Returns the context (Q,), if one was set.
     pub fn context(&self) -> Option<&[ContextValue]> {
         self.context.as_deref()
     }
 
-    /// The names given to the degrees of freedom (D,).
+    /// Returns the names of the degrees of freedom (D,), if they were set.
     pub fn names(&self) -> Option<&[String]> {
         self.names.as_deref()
     }
 
-    /// The units given to the degrees of freedom (D,).
+    /// Returns the units of the degrees of freedom (D,), if they were set.
     pub fn units(&self) -> Option<&[String]> {
         self.units.as_deref()
     }
 
-    /// Number of samples T.
+    /// Returns the number of samples T.
     pub fn n_samples(&self) -> usize {
         self.position.nrows()
     }
 
-    /// Number of degrees of freedom D.
+    /// Returns the number of degrees of freedom D.
     pub fn n_dofs(&self) -> usize {
         self.position.ncols()
     }
 }
 
-/// Checks that there are values, and that the numbers among them are finite.
+/// Checks that a context has a value and that its numbers are finite.
 pub(crate) fn check_context(context: &[ContextValue]) -> Result<()> {
     if context.is_empty() {
-        return Err(Error::Arguments("context is empty: pass at least one value, or none at all"));
+        return Err(Error::Arguments("context is empty: pass at least one value, or omit it"));
     }
     context.iter().enumerate().try_for_each(|(index, value)| match value {
         ContextValue::Number(number) => check_number("context", index, *number),

@@ -1,21 +1,28 @@
-//! The kind of movement.
+//! Kinds of movement.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// The kind of movement.
+/// Kind of a movement, which decides its canonical system.
+///
+/// ```
+/// use pdmp_core::Kind;
+///
+/// assert_eq!(Kind::Rhythmic.name(), "rhythmic");
+/// assert_eq!(Kind::Discrete.to_string(), "discrete");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// From a start to a goal.
+    /// A movement from a start to a goal.
     Discrete,
-    /// Around an anchor, periodically.
+    /// A periodic movement about an anchor.
     Rhythmic,
 }
 
 impl Kind {
-    /// The name used in files and in Python.
+    /// Returns the name used in model files and in Python.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Discrete => "discrete",
@@ -23,7 +30,8 @@ impl Kind {
         }
     }
 
-    /// Samples that make so many intervals from the start to the end of the movement, or to the next cycle.
+    /// Returns the number of samples that span `n_steps` sampling intervals: a rhythmic movement lacks the last sample,
+    /// which is the first one of the next cycle.
     pub(crate) fn samples(self, n_steps: usize) -> usize {
         match self {
             Kind::Discrete => n_steps + 1,
@@ -31,7 +39,8 @@ impl Kind {
         }
     }
 
-    /// Intervals from the first of `n_samples` to the end of the movement, or to the next cycle.
+    /// Returns the number of sampling intervals from the first of `n_samples` to the end of the movement or cycle, the
+    /// inverse of [`Self::samples`].
     pub(crate) fn steps(self, n_samples: usize) -> usize {
         match self {
             Kind::Discrete => n_samples - 1,

@@ -1,13 +1,13 @@
-//! Checks of arguments that several modules share.
+//! Argument checks and array helpers that several modules share.
 
-use ndarray::{Array, ArrayView2, Dimension, IntoDimension};
+use ndarray::{Array, ArrayBase, ArrayView2, Data, DataMut, Dimension, IntoDimension};
 
 use crate::error::{Error, Result};
 
-/// Largest magnitude whose square, summed over a recording, stays finite.
+/// Largest magnitude of a position: its square, summed over a recording, stays finite.
 pub const LARGEST: f64 = 1e150;
 
-/// Checks that `value` has one finite number per `per`.
+/// Checks that `value` has `expected` elements, one per `per`, and passes [`check_finite`].
 pub(crate) fn check_vector(name: &'static str, value: &[f64], expected: usize, per: &'static str) -> Result<()> {
     if value.len() != expected {
         return Err(Error::Length { name, expected, found: value.len(), per });
@@ -38,23 +38,46 @@ pub(crate) fn check_positive(name: &'static str, value: f64) -> Result<()> {
     }
 }
 
-/// An array of zeros, or an error where memory does not hold it.
+/// Returns an array of zeros, or [`Error::Memory`] if the allocation fails.
 pub(crate) fn zeros<D: IntoDimension>(name: &'static str, shape: D) -> Result<Array<f64, D::Dim>> {
     let shape = shape.into_dimension();
     let numbers: f64 = shape.slice().iter().map(|&n| n as f64).product();
-    let none = || Error::Memory { name, numbers };
-    // An allocation may hold isize::MAX bytes. The system's memory is zero as it comes.
+    let out_of_memory = || Error::Memory { name, numbers };
+    // Rust limits an allocation to isize::MAX bytes.
     if numbers * 8.0 >= isize::MAX as f64 {
-        return Err(none());
+        return Err(out_of_memory());
     }
-    let data = bytemuck::allocation::try_zeroed_vec(numbers as usize).map_err(|()| none())?;
-    Array::from_shape_vec(shape, data).map_err(|_| none())
+    // The operating system hands out zeroed pages, so that large arrays need no pass over their memory.
+    let data = bytemuck::allocation::try_zeroed_vec(numbers as usize).map_err(|()| out_of_memory())?;
+    Array::from_shape_vec(shape, data).map_err(|_| out_of_memory())
+}
+
+/// Message of the panic on an array that breaks the invariant of [`row_major`].
+const NOT_ROW_MAJOR: &str = "arrays that this crate allocates are contiguous in row-major order";
+
+/// Returns the elements of an array by rows.
+///
+/// # Panics
+/// If the array is not contiguous in row-major order. Every array passed here was allocated by this crate in that order,
+/// so that a violation is a defect of the crate, which must not turn into an empty slice.
+#[track_caller]
+pub(crate) fn row_major<S: Data, D: Dimension>(array: &ArrayBase<S, D>) -> &[S::Elem] {
+    array.as_slice().expect(NOT_ROW_MAJOR)
+}
+
+/// Returns the elements of an array by rows, mutably.
+///
+/// # Panics
+/// As for [`row_major`].
+#[track_caller]
+pub(crate) fn row_major_mut<S: DataMut, D: Dimension>(array: &mut ArrayBase<S, D>) -> &mut [S::Elem] {
+    array.as_slice_mut().expect(NOT_ROW_MAJOR)
 }
 
 /// Checks that every element of a matrix is finite and no larger than [`LARGEST`].
 pub(crate) fn check_matrix(name: &'static str, matrix: ArrayView2<f64>) -> Result<()> {
-    // Without a branch for each: the bad one is looked for where there is one.
-    if matrix.fold(true, |sound, value| sound & (value.abs() <= LARGEST)) {
+    // A pass without branches runs in vector registers; the bad element is located only if there is one.
+    if matrix.fold(true, |valid, value| valid & (value.abs() <= LARGEST)) {
         return Ok(());
     }
     for ((row, column), &value) in matrix.indexed_iter() {
@@ -68,19 +91,20 @@ pub(crate) fn check_matrix(name: &'static str, matrix: ArrayView2<f64>) -> Resul
     Ok(())
 }
 
+/// Checks `n_samples` time stamps in seconds: they must increase by more than 1e-12 of the duration.
 pub(crate) fn check_time(time: &[f64], n_samples: usize) -> Result<()> {
     check_vector("time", time, n_samples, "sample")?;
-    // Stamps closer than this are one instant to a spline: slopes between them would leave the range of numbers.
-    let least = 1e-12 * (time[n_samples - 1] - time[0]).max(0.0);
+    // The slope of a spline between two closer stamps may overflow.
+    let min_interval = 1e-12 * (time[n_samples - 1] - time[0]).max(0.0);
     for (index, pair) in time.windows(2).enumerate() {
-        if pair[1] - pair[0] <= least {
+        if pair[1] - pair[0] <= min_interval {
             return Err(Error::Time { index: index + 1, time: pair[1], previous: pair[0] });
         }
     }
     Ok(())
 }
 
-/// Checks a duration in seconds: far outside, squares of rates would leave the range of numbers.
+/// Checks that a duration in seconds lies within 1e-9 to 1e9, where the squares of rates stay finite.
 pub(crate) fn check_duration(value: f64) -> Result<()> {
     if (1e-9..=1e9).contains(&value) {
         return Ok(());

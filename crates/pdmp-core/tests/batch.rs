@@ -1,4 +1,5 @@
-//! What many movements at once, and the derivatives of a movement, must be.
+//! Batches of movements and Jacobians agree with the control loop and with rollouts.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;
@@ -33,18 +34,18 @@ fn of(trajectory: &Trajectory, order: Derivative) -> &Array2<f64> {
     }
 }
 
-/// Largest difference, and largest magnitude.
+/// Largest difference of two arrays, and largest magnitude of the second.
 fn difference(a: &Array2<f64>, b: &Array2<f64>) -> (f64, f64) {
     let largest = |a: &Array2<f64>| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     (largest(&(a - b)), largest(b))
 }
 
-/// A vector for each of three movements.
+/// Vectors (3, n), one for each of three movements.
 fn each(n: usize) -> impl Strategy<Value = Array2<f64>> {
     prop::collection::vec(-3.0..3.0f64, 3 * n).prop_map(move |v| Array2::from_shape_vec((3, n), v).unwrap())
 }
 
-/// None, one for all, or one for each.
+/// No vector, one for all movements, or one for each.
 fn rows(n: usize) -> impl Strategy<Value = Option<PerMovement>> {
     prop_oneof![
         Just(None),
@@ -61,7 +62,7 @@ fn row(rows: &Option<PerMovement>, b: usize) -> Option<Vec<f64>> {
 }
 
 proptest! {
-    /// Every movement of a batch is what the control loop makes of its conditions, within and past the end.
+    /// Every movement of a batch agrees with the control loop under its conditions, within and past the end.
     #[test]
     fn batch_is_the_loop(
         styles in each(2),
@@ -115,16 +116,16 @@ proptest! {
                     }
                 }
                 for (order, (made, stepped)) in made.iter().zip(&stepped).enumerate() {
-                    let (off, size) = difference(&made.index_axis(Axis(0), b).to_owned(), stepped);
-                    prop_assert!(off < 1e-11 * size.max(1.0), "{kind} {order}: {off:e} of {size:e}");
+                    let (error, size) = difference(&made.index_axis(Axis(0), b).to_owned(), stepped);
+                    prop_assert!(error < 1e-11 * size.max(1.0), "{kind} {order}: {error:e} of {size:e}");
                 }
             }
         }
     }
 
-    /// Whatever the pieces and the threads, every number is the same to the last bit.
+    /// Results are bitwise equal for all sizes of chunks and numbers of threads.
     #[test]
-    fn division_of_the_work_leaves_the_bits(size in 1usize..50, n_threads in 1usize..5, samples in 1usize..900) {
+    fn results_do_not_depend_on_the_division_of_the_work(size in 1usize..50, n_threads in 1usize..5, samples in 1usize..900) {
         let styles = Array2::from_shape_fn((41, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
         let velocities = Some(PerMovement::Each(Array2::from_shape_fn((41, 3), |(b, d)| (b * d) as f64 * 0.01)));
         let conditions = BatchConditions { styles, velocities, ..BatchConditions::default() };
@@ -147,7 +148,7 @@ proptest! {
     }
 }
 
-/// Blocks of a large batch go to several threads, and to outputs of any layout, with the same bits.
+/// Large batches are bitwise equal on several threads and in strided outputs.
 #[test]
 fn large_batches_are_the_same_on_several_threads() {
     let styles = Array2::from_shape_fn((2000, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
@@ -169,7 +170,7 @@ fn large_batches_are_the_same_on_several_threads() {
     assert!(shares[0] == 0.0 && shares.is_sorted() && shares.iter().all(|share| (0.0..1.0).contains(share)));
 }
 
-/// Between blocks a batch asks whether to go on, and stops when told so.
+/// An error of `progress` cancels a batch between blocks.
 #[test]
 fn batches_can_be_interrupted() {
     let styles = Array2::zeros((3000, 2));
@@ -180,8 +181,8 @@ fn batches_can_be_interrupted() {
         &mut |_| Ok(()),
     )
     .unwrap();
-    let mut stop_later = |share: f64| if share < 0.3 { Ok(()) } else { Err(Error::Interrupted) };
-    let stopped = batch.rollouts(0..3000, Derivative::Position, Threads::ONE, &mut stop_later);
+    let mut cancel_later = |share: f64| if share < 0.3 { Ok(()) } else { Err(Error::Interrupted) };
+    let stopped = batch.rollouts(0..3000, Derivative::Position, Threads::ONE, &mut cancel_later);
     assert!(matches!(stopped, Err(Error::Interrupted)));
     let new = Model::from_bytes(&REACH.to_bytes().unwrap()).unwrap();
     let stopped = motion::batch(
@@ -193,9 +194,9 @@ fn batches_can_be_interrupted() {
     assert!(matches!(stopped, Err(Error::Interrupted)));
 }
 
-/// What is remembered has the bits of what is computed anew, whatever else has been asked for meanwhile.
+/// Cached responses are bitwise equal to newly computed ones, also after other keys have evicted them.
 #[test]
-fn remembered_responses_have_the_same_bits() {
+fn cached_responses_are_bitwise_equal_to_new_ones() {
     let styles = array![[0.4, -1.0], [0.0, 2.0]];
     for (model, other) in [(&*REACH, 0.7), (&*CYCLE, 1.3)] {
         let conditions = BatchConditions { styles: styles.clone(), ..Default::default() };
@@ -211,20 +212,22 @@ fn remembered_responses_have_the_same_bits() {
     }
 }
 
-/// The Jacobians are the differences of rollouts, for every way to start: a movement is linear in its conditions.
+/// Jacobians are differences of rollouts, with and without a given start and start velocity: a movement is linear in its
+/// conditions.
 #[test]
 fn jacobians_are_differences_of_rollouts() {
     for model in [&*REACH, &*CYCLE] {
         let (n, discrete) = (model.n_dofs(), model.kind() == Kind::Discrete);
-        let given = |x: f64| Some((0..n).map(|d| x + d as f64).collect::<Vec<_>>());
-        for (start, velocity) in [(None, None), (given(0.4), None), (None, given(-0.3)), (given(0.4), given(-0.3))] {
+        let vector = |x: f64| Some((0..n).map(|d| x + d as f64).collect::<Vec<_>>());
+        for (start, velocity) in [(None, None), (vector(0.4), None), (None, vector(-0.3)), (vector(0.4), vector(-0.3))]
+        {
             let base = Conditions {
                 style: Some(vec![0.2, -0.3]),
-                goal: given(0.1).filter(|_| discrete),
-                anchor: given(0.1).filter(|_| !discrete),
+                goal: vector(0.1).filter(|_| discrete),
+                anchor: vector(0.1).filter(|_| !discrete),
                 start,
                 velocity,
-                amplitude: Some(if discrete { 1.0 } else { 0.7 }),
+                amplitude: (!discrete).then_some(0.7),
                 tau: Some(1.4 * model.tau()),
                 segment_durations: None,
                 phase: None,
@@ -238,20 +241,20 @@ fn jacobians_are_differences_of_rollouts() {
                 let entries = if variable == WithRespectTo::Style { 2 } else { n };
                 for entry in 0..entries {
                     let mut moved = base.clone();
-                    let vector = match variable {
+                    let condition = match variable {
                         WithRespectTo::Style => &mut moved.style,
                         WithRespectTo::Goal => &mut moved.goal,
                         WithRespectTo::Anchor => &mut moved.anchor,
                         WithRespectTo::Start => &mut moved.start,
                     };
                     let nominal = || model.demonstrated().starts.row(model.demonstrated().nominal).to_vec();
-                    vector.get_or_insert_with(nominal)[entry] += 0.5;
+                    condition.get_or_insert_with(nominal)[entry] += 0.5;
                     let (ahead, behind) = (rollout(&moved), rollout(&base));
                     for order in Derivative::ALL {
                         let slope = (of(&ahead, order) - of(&behind, order)) / 0.5;
                         let found = jacobian(variable, order, model, &base).index_axis(Axis(2), entry).to_owned();
-                        let (off, size) = difference(&found, &slope);
-                        assert!(off < 1e-10 * size.max(1.0), "{variable:?} {order:?} {entry}: {off:e} of {size:e}");
+                        let (error, size) = difference(&found, &slope);
+                        assert!(error < 1e-10 * size.max(1.0), "{variable:?} {order:?} {entry}: {error:e} of {size:e}");
                     }
                 }
             }
@@ -259,10 +262,10 @@ fn jacobians_are_differences_of_rollouts() {
     }
 }
 
-/// A goal belongs to a discrete primitive, an anchor to a rhythmic one.
+/// A rhythmic primitive has no goal, and a discrete one no anchor.
 #[test]
-fn variables_of_the_other_kind_are_refused() {
-    let ask = |model: &Arc<Model>, variable| {
+fn variables_of_the_other_kind_are_rejected() {
+    let jacobian = |model: &Arc<Model>, variable| {
         motion::jacobian(
             model.primitive(),
             variable,
@@ -272,57 +275,57 @@ fn variables_of_the_other_kind_are_refused() {
             &mut |_| Ok(()),
         )
     };
-    assert!(matches!(ask(&REACH, WithRespectTo::Anchor), Err(Error::Kind { name: "anchor", .. })));
-    assert!(matches!(ask(&CYCLE, WithRespectTo::Goal), Err(Error::Kind { name: "goal", .. })));
+    assert!(matches!(jacobian(&REACH, WithRespectTo::Anchor), Err(Error::Kind { name: "anchor", .. })));
+    assert!(matches!(jacobian(&CYCLE, WithRespectTo::Goal), Err(Error::Kind { name: "goal", .. })));
     assert!(matches!(Derivative::of_order("derivative", 3), Err(Error::Range { name: "derivative", .. })));
 }
 
-/// What does not fit is refused with the argument's name and its numbers.
+/// Invalid conditions are rejected with the name of the argument and its numbers.
 #[test]
-fn bad_batches_are_refused() {
-    let good = || BatchConditions { styles: Array2::zeros((4, 2)), ..Default::default() };
-    let refused = |model: &Arc<Model>, conditions| {
+fn invalid_batches_are_rejected() {
+    let valid = || BatchConditions { styles: Array2::zeros((4, 2)), ..Default::default() };
+    let error_of = |model: &Arc<Model>, conditions| {
         batch(model.primitive(), conditions, grid(0.1, 1.0), &mut |_| Ok(())).unwrap_err().to_string()
     };
     let mut nan = Array2::zeros((4, 3));
     nan[[2, 1]] = f64::NAN;
     for (conditions, message) in [
-        (BatchConditions { styles: Array2::zeros((4, 3)), ..good() }, "styles has length 3, expected 2"),
-        (BatchConditions { styles: array![[0.0, 1e101]], ..good() }, "styles[0, 1] = 1e101"),
+        (BatchConditions { styles: Array2::zeros((4, 3)), ..valid() }, "styles has length 3, expected 2"),
+        (BatchConditions { styles: array![[0.0, 1e101]], ..valid() }, "styles[0, 1] = 1e101"),
         (
-            BatchConditions { goals: Some(PerMovement::Each(Array2::zeros((3, 3)))), ..good() },
+            BatchConditions { goals: Some(PerMovement::Each(Array2::zeros((3, 3)))), ..valid() },
             "goals has 3 rows, but there are 4",
         ),
         (
-            BatchConditions { starts: Some(PerMovement::Each(Array2::zeros((4, 2)))), ..good() },
+            BatchConditions { starts: Some(PerMovement::Each(Array2::zeros((4, 2)))), ..valid() },
             "starts has length 2, expected 3",
         ),
-        (BatchConditions { velocities: Some(PerMovement::Each(nan)), ..good() }, "velocities[2, 1] = NaN"),
+        (BatchConditions { velocities: Some(PerMovement::Each(nan)), ..valid() }, "velocities[2, 1] = NaN"),
         (
-            BatchConditions { velocities: Some(PerMovement::All(vec![0.0; 4])), ..good() },
+            BatchConditions { velocities: Some(PerMovement::All(vec![0.0; 4])), ..valid() },
             "velocities has length 4, expected 3",
         ),
         (
-            BatchConditions { anchors: Some(PerMovement::All(vec![0.0; 3])), ..good() },
+            BatchConditions { anchors: Some(PerMovement::All(vec![0.0; 3])), ..valid() },
             "anchors does not apply to a discrete",
         ),
-        (BatchConditions { amplitude: Some(2.0), ..good() }, "amplitude does not apply"),
-        (BatchConditions { tau: Some(-1.0), ..good() }, "tau = -1"),
+        (BatchConditions { amplitude: Some(2.0), ..valid() }, "amplitude does not apply"),
+        (BatchConditions { tau: Some(-1.0), ..valid() }, "tau = -1"),
     ] {
-        let found = refused(&REACH, conditions);
+        let found = error_of(&REACH, conditions);
         assert!(found.starts_with(message), "{found}");
     }
     let goals = Some(PerMovement::All(vec![0.0; 2]));
-    assert!(refused(&CYCLE, BatchConditions { goals, ..good() }).ends_with("they move about anchors; set anchors"));
-    let batch = batch(REACH.primitive(), good(), grid(0.1, 1.0), &mut |_| Ok(())).unwrap();
+    assert!(error_of(&CYCLE, BatchConditions { goals, ..valid() }).ends_with("they move about anchors; set anchors"));
+    let batch = batch(REACH.primitive(), valid(), grid(0.1, 1.0), &mut |_| Ok(())).unwrap();
     assert!(matches!(batch.chunks(0), Err(Error::Range { name: "size", .. })));
-    let (mut narrow, mut good) = (Array3::zeros((4, 11, 2)), Array3::zeros((4, 11, 3)));
-    for (movements, output) in [(0..4, narrow.view_mut()), (1..5, good.view_mut())] {
+    let (mut narrow, mut valid) = (Array3::zeros((4, 11, 2)), Array3::zeros((4, 11, 3)));
+    for (movements, output) in [(0..4, narrow.view_mut()), (1..5, valid.view_mut())] {
         assert!(batch.write(movements, vec![output], Threads::ONE, &mut |_| Ok(())).is_err());
     }
 }
 
-/// Numbers at the edge of their range stay numbers.
+/// Conditions at the limits of their ranges give finite movements.
 #[test]
 fn extreme_batches_are_finite() {
     for model in [&*REACH, &*CYCLE] {
@@ -331,7 +334,7 @@ fn extreme_batches_are_finite() {
             styles: array![[1e100, -1e100], [0.0, 0.0]],
             starts: huge.clone(),
             velocities: huge,
-            amplitude: Some(if model.kind() == Kind::Discrete { 1.0 } else { 1e150 }),
+            amplitude: (model.kind() == Kind::Rhythmic).then_some(1e150),
             ..Default::default()
         };
         assert!(all(&conditions, model, grid(0.01, 2.0)).iter().flatten().all(|x| x.is_finite()));

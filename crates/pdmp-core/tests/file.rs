@@ -1,4 +1,5 @@
-//! The model file gives back what was saved, and nothing else.
+//! Model files restore the saved model, and other files are rejected.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;
@@ -13,9 +14,9 @@ use proptest::prelude::*;
 
 static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| learn(&reaches(), &options(Kind::Discrete)).to_bytes().unwrap());
 
-/// Save, load: the same trajectory to the last bit, for both kinds, with contexts and without.
+/// A loaded model is bitwise the saved one, for both kinds, with and without contexts.
 #[test]
-fn a_saved_model_moves_alike() {
+fn a_loaded_model_moves_like_the_saved_one() {
     let folder = tempfile::tempdir().unwrap();
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
         let model = learn(&demos, &options(kind));
@@ -42,40 +43,40 @@ fn a_saved_model_moves_alike() {
 }
 
 proptest! {
-    /// One flipped bit, anywhere, is noticed.
+    /// A flipped bit is detected at any place.
     #[test]
-    fn a_flipped_bit_is_refused(place in any::<prop::sample::Index>(), bit in 0..8u8) {
+    fn a_flipped_bit_is_rejected(place in any::<prop::sample::Index>(), bit in 0..8u8) {
         let mut bytes = BYTES.clone();
         let place = place.index(bytes.len());
         bytes[place] ^= 1 << bit;
         prop_assert!(matches!(Model::from_bytes(&bytes), Err(Error::File(_))), "byte {place}, bit {bit}");
     }
 
-    /// In the header too, where every byte means something.
+    /// A flipped bit is detected in the header, too.
     #[test]
-    fn a_flipped_bit_in_the_header_is_refused(place in 0..2000usize, bit in 0..8u8) {
+    fn a_flipped_bit_in_the_header_is_rejected(place in 0..2000usize, bit in 0..8u8) {
         let mut bytes = BYTES.clone();
         bytes[place] ^= 1 << bit;
         prop_assert!(matches!(Model::from_bytes(&bytes), Err(Error::File(_))), "byte {place}, bit {bit}");
     }
 
-    /// A truncated file is refused, wherever it was cut.
+    /// A file that is truncated at any place is rejected.
     #[test]
-    fn a_truncated_file_is_refused(place in any::<prop::sample::Index>()) {
+    fn a_truncated_file_is_rejected(place in any::<prop::sample::Index>()) {
         let place = place.index(BYTES.len());
         prop_assert!(matches!(Model::from_bytes(&BYTES[..place]), Err(Error::File(_))));
     }
 
-    /// Noise is not a model.
+    /// Random bytes are rejected.
     #[test]
-    fn noise_is_refused(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+    fn random_bytes_are_rejected(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
         prop_assert!(matches!(Model::from_bytes(&bytes), Err(Error::File(_))));
     }
 }
 
-/// A header that announces more than any model holds is refused before it is read.
+/// A header that announces more bytes than a model can have is rejected before it is read.
 #[test]
-fn a_bomb_of_a_header_is_refused() {
+fn an_oversized_header_is_rejected() {
     for size in [u64::MAX, 1 << 40, (1 << 26) + 1] {
         let mut bytes = BYTES.clone();
         bytes[..8].copy_from_slice(&size.to_le_bytes());
@@ -84,9 +85,9 @@ fn a_bomb_of_a_header_is_refused() {
     }
 }
 
-/// Another version is refused by its number.
+/// Another version is rejected with its number.
 #[test]
-fn another_version_is_refused_by_number() {
+fn another_version_is_rejected_with_its_number() {
     let schema = br#"schema\":"#;
     let place = BYTES.windows(schema.len()).position(|text| text == schema).unwrap();
     let mut bytes = BYTES.clone();
@@ -95,7 +96,7 @@ fn another_version_is_refused_by_number() {
     assert!(message.contains("version 8") && message.contains("reads version 6"), "{message}");
 }
 
-/// What cannot be written or read is told with its path, and an older file survives.
+/// Errors of writing and reading name the path.
 #[test]
 fn unusable_paths_are_named() {
     let model = learn(&reaches(), &options(Kind::Discrete));

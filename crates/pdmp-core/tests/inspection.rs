@@ -1,13 +1,15 @@
-//! Samples that no movement makes are found, each with its place; what people record is not.
+//! Inspection finds implausible samples with their location, and nothing in plausible movements.
+
+#![cfg(feature = "learning")]
 
 use std::f64::consts::TAU;
 
 use ndarray::{Array2, s};
-use pdmp_core::learning::TransportSelection;
+use pdmp_core::learning::{CanonicalOptions, TransportSelection};
 use pdmp_core::preprocessing::inspection::{Finding, Padding, inspect, unwound};
 use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
 
-/// Five reaches over bumps of different height, in two degrees of freedom away from zero.
+/// Five reaches over bumps of different height, with two degrees of freedom that stay away from zero.
 fn reaches() -> Vec<Array2<f64>> {
     let reach = |h: f64| {
         Array2::from_shape_fn((101, 2), |(c, d)| {
@@ -31,7 +33,7 @@ fn with_units(demos: Vec<Demonstration>, units: &[&str]) -> Vec<Demonstration> {
     demos.into_iter().map(|demo| demo.with_units(units.clone()).unwrap()).collect()
 }
 
-/// Uniform numbers in [-1, 1], the same at every call.
+/// Uniform random numbers in [−1, 1), reproducible.
 fn noise(n: usize) -> impl Iterator<Item = f64> {
     let mut state = n as u64 + 1;
     std::iter::repeat_with(move || {
@@ -49,7 +51,7 @@ fn nothing_is_found_in_movements_clean_noisy_or_at_rest() {
         });
         assert_eq!(inspect(&demos(noisy.collect()), None), []);
     }
-    // From and through zero, with a joint at rest, a gripper that closes, and a dwell at the end of every one.
+    // Movements from and through zero, with a joint at rest, a gripper that closes, and rest at the end.
     let through = reaches().into_iter().map(|y| {
         let dwell = |c: usize| c.min(80);
         Array2::from_shape_fn((101, 4), |(c, d)| match d {
@@ -89,7 +91,7 @@ fn rows_that_pad_a_stack_are_found() {
     for zeros in [true, false] {
         let mut positions = reaches();
         for (m, from) in [(1, 80), (3, 95)] {
-            // A movement sampled faster ends earlier, and is brought to the length of the others.
+            // A shorter movement that is padded to the length of the others.
             let whole = positions[m].clone();
             let last = whole.row(100).to_owned();
             for c in 0..101 {
@@ -153,7 +155,7 @@ fn stamps_far_closer_than_the_others_are_found_where_noise_makes_them_steep() {
 }
 
 #[test]
-fn angles_whole_turns_apart_are_brought_together_where_units_say_that_they_are_angles() {
+fn whole_turns_between_demonstrations_are_subtracted_if_the_unit_is_one_of_angles() {
     for (unit, turn) in [("rad", TAU), ("deg", 360.0), ("°", 360.0)] {
         let angles = |turns: [f64; 5]| {
             let positions = reaches().into_iter().zip(turns).map(|(mut y, turns)| {
@@ -179,7 +181,7 @@ fn angles_whole_turns_apart_are_brought_together_where_units_say_that_they_are_a
         let model = fit(&apart, &FitOptions::new(Kind::Discrete)).unwrap();
         assert!(model.demonstrated().goals.column(0).iter().all(|goal| (goal - 1.5 * turn / TAU).abs() < 1e-9 * turn));
         assert_eq!(model.learnt().findings, found);
-        // Without units they are reported, and learnt as they are; in metres they are what they are.
+        // Without units the offsets are only reported; lengths in metres are accepted.
         let unknown = inspect(&angles([0.0, 1.0, 0.0, -2.0, 0.0]), None);
         assert!(
             matches!(unknown[..], [Finding::TurnsApart { mended: false, .. }, Finding::TurnsApart { .. }]),
@@ -189,9 +191,9 @@ fn angles_whole_turns_apart_are_brought_together_where_units_say_that_they_are_a
     }
 }
 
-/// A joint without stops that turns once more in some demonstrations is no joint whole turns apart.
+/// A joint that turns further in some demonstrations is not offset by whole turns.
 #[test]
-fn movements_that_turn_further_stay_as_they_are() {
+fn movements_that_turn_further_are_unchanged() {
     let spins = [0.0, 1.0, 2.0].map(|turns| reaches()[0].mapv(|y| y * TAU * turns)).to_vec();
     let spins = with_units(demos(spins), &["rad", "rad"]);
     assert_eq!(unwound(&spins).as_ref(), &spins[..]);
@@ -205,12 +207,12 @@ fn angles_that_wrap_are_found() {
             let angle = turn * (0.3 + 0.6 * (c as f64 / 199.0));
             angle - turn * (angle / turn).round()
         });
-        // All of the circle but the place of the wrap, where the unit is not known.
-        let all = Array2::from_shape_fn((200, 1), |(c, _)| {
+        // An angle of unknown unit that covers nearly the full circle.
+        let full_circle = Array2::from_shape_fn((200, 1), |(c, _)| {
             let angle = turn * (0.2 + 1.1 * (c as f64 / 199.0));
             angle - turn * (angle / turn).round()
         });
-        let mut demo = demos(vec![if units.is_some() { wrapped } else { all }]);
+        let mut demo = demos(vec![if units.is_some() { wrapped } else { full_circle }]);
         if let Some(unit) = units {
             demo = with_units(demo, &[unit]);
         }
@@ -222,10 +224,11 @@ fn angles_that_wrap_are_found() {
 #[test]
 fn gains_whose_transients_the_samples_do_not_resolve_are_found() {
     let found = |alpha_z: f64, n_samples: Option<usize>| {
-        // Where the goal acts at once a movement starts with a transient of the gains' rate.
+        // With immediate transport a movement starts with a transient at the rate of the gains.
         let transport = TransportSelection::Immediate;
-        let mut options = FitOptions { alpha_z, transport, ..FitOptions::new(Kind::Discrete) };
-        options.alignment.n_samples = n_samples;
+        let canonical = CanonicalOptions::Discrete { tau: None, alpha_x: None, transport };
+        let mut options = FitOptions::new(canonical).alpha_z(alpha_z);
+        options.n_samples = n_samples;
         fit(&demos(reaches()), &options).unwrap().learnt().findings.clone()
     };
     assert_eq!(found(25.0, None), []);

@@ -1,4 +1,5 @@
-//! What learning from demonstrations must achieve.
+//! Claims about learning from demonstrations: reproduction, defaults, styles of new demonstrations, errors.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;
@@ -12,15 +13,12 @@ use pdmp_core::motion::TimeGrid;
 use pdmp_core::rollout;
 use pdmp_core::{Error, Kind, Sampling, fit};
 
-/// Targets followed by generation give every demonstration back, at its own duration, J = M.
+/// With J = M every demonstration is reproduced at its own duration.
 #[test]
 fn every_reach_is_reproduced() {
     let demos = reaches();
     for basis in [options(Kind::Discrete).basis, gp()] {
-        let model = learn(
-            &demos,
-            &pdmp_core::FitOptions { basis, n_styles: Truncation::Rank(5).into(), ..options(Kind::Discrete) },
-        );
+        let model = learn(&demos, &options(Kind::Discrete).basis(basis).n_styles(Truncation::Rank(5)));
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
             assert!(error <= 1e-4, "{}: {error:e}", model.learnt().regression);
@@ -28,15 +26,12 @@ fn every_reach_is_reproduced() {
     }
 }
 
-/// The limit cycle of every demonstration is that demonstration, and a rollout starts on it.
+/// With J = M the limit cycle is the demonstration, and a rollout starts on it.
 #[test]
 fn every_cycle_is_reproduced_without_a_transient() {
     let demos = cycles();
     for basis in [options(Kind::Rhythmic).basis, gp()] {
-        let model = learn(
-            &demos,
-            &pdmp_core::FitOptions { basis, n_styles: Truncation::Rank(4).into(), ..options(Kind::Rhythmic) },
-        );
+        let model = learn(&demos, &options(Kind::Rhythmic).basis(basis).n_styles(Truncation::Rank(4)));
         for m in 0..demos.len() {
             let error = reproduction_error(&model, &demos, m);
             assert!(error <= 1e-4, "{}: {error:e}", model.learnt().regression);
@@ -44,17 +39,16 @@ fn every_cycle_is_reproduced_without_a_transient() {
     }
 }
 
-/// Reaches that differ by one height span few dimensions, and the spectrum rule finds them.
+/// Singular values of reaches that differ by one height vanish beyond their intrinsic dimension.
 #[test]
-fn spectrum_rule_finds_the_intrinsic_dimension() {
-    // y is affine in (h, h²): three dimensions at the most.
-    let model =
-        learn(&reaches(), &pdmp_core::FitOptions { n_styles: Truncation::Rank(5).into(), ..options(Kind::Discrete) });
+fn singular_values_vanish_beyond_the_intrinsic_dimension() {
+    // y is affine in (h, h²): at most three dimensions.
+    let model = learn(&reaches(), &options(Kind::Discrete).n_styles(Truncation::Rank(5)));
     let sigma = &model.learnt().singular_values;
     assert!(sigma[2] > 1e-6 * sigma[0] && sigma[3] < 1e-6 * sigma[0], "{sigma:?}");
 }
 
-/// The defaults: critical damping, x = 0.01 at the end, τ the nominal duration or the period over 2π.
+/// Defaults are critical damping, x = 0.01 at the end, τ the nominal duration or the period over 2π.
 #[test]
 fn defaults_follow_from_the_nominal_demonstration() {
     let model = learn(&reaches(), &options(Kind::Discrete));
@@ -68,9 +62,9 @@ fn defaults_follow_from_the_nominal_demonstration() {
     assert_eq!(model.canonical(), Canonical::Rhythmic { mu: 1.0 });
 }
 
-/// A demonstration in other units, elsewhere, has the same styles.
+/// Translated and uniformly scaled demonstrations have the same styles.
 #[test]
-fn styles_do_not_depend_on_place_and_unit() {
+fn styles_are_invariant_to_translation_and_scaling() {
     let model = learn(&reaches(), &options(Kind::Discrete));
     let moved: Vec<_> = reaches()
         .iter()
@@ -84,9 +78,9 @@ fn styles_do_not_depend_on_place_and_unit() {
     assert!(difference.iter().all(|d| d.abs() < 1e-9));
 }
 
-/// Time stamps, however irregular, lead to the same movement as an even rate.
+/// Samples at irregular time stamps yield the same movement as samples at equal intervals.
 #[test]
-fn own_time_stamps_are_respected() {
+fn irregular_time_stamps_yield_the_same_movement() {
     let even = [reach(0.3, 1.0, 0.005)];
     let time: Vec<f64> = (0..201).map(|c| f64::from(c) / 200.0).map(|t| t + 0.1 * t * (1.0 - t)).collect();
     let position = ndarray::Array2::from_shape_fn((201, 3), |(c, d)| {
@@ -105,13 +99,11 @@ fn own_time_stamps_are_respected() {
     assert!((a.position - b.position).iter().all(|d| d.abs() < 1e-5));
 }
 
-/// A new movement lies where its style says: style_of finds the styles of the demonstrations themselves, and a movement
-/// between two lies between them.
+/// The styles of the demonstrations themselves are recovered.
 #[test]
-fn style_of_finds_demonstrations_again() {
+fn style_of_recovers_the_styles_of_demonstrations() {
     let demos = reaches();
-    let model =
-        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(3).into(), ..options(Kind::Discrete) });
+    let model = learn(&demos, &options(Kind::Discrete).n_styles(Truncation::Rank(3)));
     for (m, demo) in demos.iter().enumerate() {
         let style = style_of(&model, demo, None, None, None).unwrap();
         for (j, s) in style.iter().enumerate() {
@@ -120,12 +112,11 @@ fn style_of_finds_demonstrations_again() {
     }
 }
 
-/// A cycle that begins elsewhere is turned to the phase of the model: it has the style that it has from there.
+/// A cycle recorded from another phase is shifted to the phase of the model and has the same style.
 #[test]
-fn style_of_finds_a_cycle_in_any_phase() {
+fn style_of_recovers_the_style_of_a_cycle_in_any_phase() {
     let demos = cycles();
-    let model =
-        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Rhythmic) });
+    let model = learn(&demos, &options(Kind::Rhythmic).n_styles(Truncation::Rank(2)));
     for (m, demo) in demos.iter().enumerate() {
         let expected = style_of(&model, demo, None, None, None).unwrap();
         let n = demo.n_samples();
@@ -140,13 +131,12 @@ fn style_of_finds_a_cycle_in_any_phase() {
     }
 }
 
-/// What no style describes is refused with the size of the deviation: other movements, other units. Styles without
-/// effect, of equal demonstrations, come out as they were, not as quotients of rounding.
+/// Other movements and other units are rejected with the size of the deviation. Style components without effect, of
+/// equal demonstrations, stay bounded and are not quotients of rounding errors.
 #[test]
-fn style_of_refuses_what_the_model_does_not_describe() {
+fn style_of_rejects_demonstrations_that_no_style_describes() {
     let demos = reaches();
-    let model =
-        learn(&demos, &pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Discrete) });
+    let model = learn(&demos, &options(Kind::Discrete).n_styles(Truncation::Rank(2)));
     let changed = |change: &dyn Fn(usize, f64) -> f64| {
         let position =
             Array2::from_shape_fn(demos[1].position().dim(), |(c, d)| change(c, demos[1].position()[[c, d]]));
@@ -159,15 +149,14 @@ fn style_of_refuses_what_the_model_does_not_describe() {
     assert!(matches!(other, Err(Error::Undescribed { off, times }) if off > 0.5 && times > 3.0), "{other:?}");
 
     let equal = vec![demos[1].clone(); 4];
-    let model =
-        learn(&equal, &pdmp_core::FitOptions { n_styles: Truncation::Rank(3).into(), ..options(Kind::Discrete) });
+    let model = learn(&equal, &options(Kind::Discrete).n_styles(Truncation::Rank(3)));
     let style = style_of(&model, &equal[0], None, None, None).unwrap();
     assert!(style.iter().all(|s| s.abs() <= 1.0), "{style:?}");
     let style = style_of(&model, &demos[2], None, None, None);
     assert!(style.is_err() || style.unwrap().iter().all(|s| s.abs() < 10.0));
 }
 
-/// Without noise, a goal given for a demonstration takes the place of its last sample.
+/// The goal of a demonstration replaces its last sample.
 #[test]
 fn given_goals_are_kept() {
     let demos: Vec<_> = reaches().into_iter().map(|demo| demo.with_goal(vec![0.8, 0.55, 0.1]).unwrap()).collect();
@@ -175,33 +164,32 @@ fn given_goals_are_kept() {
     assert_eq!(model.demonstrated().goals.row(3).to_vec(), [0.8, 0.55, 0.1]);
 }
 
-/// A fit is reproducible bit for bit.
+/// Two fits of the same demonstrations are equal bit for bit.
 #[test]
 fn fits_are_reproducible() {
     for kind in [Kind::Discrete, Kind::Rhythmic] {
         let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
-        let bytes = || learn(&demos, &pdmp_core::FitOptions { basis: gp(), ..options(kind) }).to_bytes().unwrap();
+        let bytes = || learn(&demos, &options(kind).basis(gp())).to_bytes().unwrap();
         assert_eq!(bytes(), bytes());
     }
 }
 
-/// The interruption that a caller asks for reaches it, from every stage.
+/// An error of the progress callback in any stage is returned.
 #[test]
-fn a_fit_can_be_interrupted() {
+fn a_fit_can_be_cancelled_in_every_stage() {
     use pdmp_core::learning::Stage;
 
     for stop in [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile] {
         let mut progress = |stage, _| if stage == stop { Err(Error::Interrupted) } else { Ok(()) };
-        let mut options = pdmp_core::FitOptions { basis: gp(), ..options(Kind::Discrete) };
+        let mut options = options(Kind::Discrete).basis(gp());
         if stop == Stage::Align {
-            options.alignment.time_scaling =
-                pdmp_core::learning::TimeScaling::Warp(pdmp_core::model::TimeWarp::default());
+            options.time_scaling = pdmp_core::learning::TimeScaling::Warp(pdmp_core::model::TimeWarp::default());
         }
         assert!(matches!(fit_with(&reaches(), &options, &mut progress), Err(Error::Interrupted)));
     }
 }
 
-/// One demonstration, constant DoFs, all constant, identical, and tiny ones are learnt without a NaN.
+/// A single demonstration, constant DoFs, identical demonstrations, and tiny and huge ones are reproduced.
 #[test]
 fn degenerate_demonstrations_are_learnt() {
     let still = |value: f64| {
@@ -221,16 +209,16 @@ fn degenerate_demonstrations_are_learnt() {
     ];
     for demos in &sets {
         for basis in [options(Kind::Discrete).basis, gp()] {
-            let options = pdmp_core::FitOptions { basis, ..options(Kind::Discrete) };
+            let options = options(Kind::Discrete).basis(basis);
             let model = learn(demos, &options);
             for (m, demo) in demos.iter().enumerate() {
                 let grid = TimeGrid { dt: 0.01, duration: None };
                 let found = rollout(model.primitive(), &conditions_of(&model, m), grid).unwrap().position;
-                let shown = demo.position();
-                let size = shown.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+                let recorded = demo.position();
+                let size = recorded.iter().fold(0.0f64, |a, b| a.max(b.abs()));
                 for d in 0..found.ncols() {
-                    for c in 0..found.nrows().min(shown.nrows()) {
-                        assert!((found[[c, d]] - shown[[c, d]]).abs() <= 2e-4 * size, "{m} {c} {d}");
+                    for c in 0..found.nrows().min(recorded.nrows()) {
+                        assert!((found[[c, d]] - recorded[[c, d]]).abs() <= 2e-4 * size, "{m} {c} {d}");
                     }
                 }
             }
@@ -238,12 +226,12 @@ fn degenerate_demonstrations_are_learnt() {
     }
     let model = learn(&[still(0.7)], &options(Kind::Discrete));
     let found = rollout(model.primitive(), &Default::default(), TimeGrid { dt: 0.01, duration: Some(3.0) }).unwrap();
-    assert!(found.position.rows().into_iter().all(|y| y.to_vec() == [0.7, 1.7]), "the model holds still");
+    assert!(found.position.rows().into_iter().all(|y| y.to_vec() == [0.7, 1.7]), "the model stays at rest");
 }
 
-/// A scale per DoF makes the factorisation see millimetres and radians alike, and leaves reproduction as it was.
+/// Scaling by range preserves the reproduction of a DoF that is a million times smaller than another.
 #[test]
-fn dof_scale_weighs_units_and_keeps_the_movement() {
+fn range_scaling_reproduces_dofs_of_different_units() {
     let demos: Vec<_> = reaches()
         .iter()
         .map(|demo| {
@@ -252,11 +240,7 @@ fn dof_scale_weighs_units_and_keeps_the_movement() {
             pdmp_core::Demonstration::new(position, demo.sampling().clone()).unwrap()
         })
         .collect();
-    let scaled = pdmp_core::FitOptions {
-        dof_scale: DofScaling::Range,
-        n_styles: Truncation::Rank(5).into(),
-        ..options(Kind::Discrete)
-    };
+    let scaled = options(Kind::Discrete).dof_scale(DofScaling::Range).n_styles(Truncation::Rank(5));
     let model = learn(&demos, &scaled);
     for (m, demo) in demos.iter().enumerate() {
         let grid = TimeGrid { dt: 0.01, duration: None };
@@ -270,7 +254,7 @@ fn dof_scale_weighs_units_and_keeps_the_movement() {
 
 /// Errors name the demonstration, the argument and the numbers.
 #[test]
-fn bad_demonstrations_are_refused_by_name() {
+fn invalid_demonstrations_are_rejected_by_name() {
     let demos = vec![
         reach(0.0, 1.0, 0.01),
         pdmp_core::Demonstration::new(ndarray::Array2::zeros((9, 2)), Sampling::Unknown).unwrap(),
@@ -279,7 +263,7 @@ fn bad_demonstrations_are_refused_by_name() {
     let options = options(Kind::Discrete);
     assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
     assert!(message(&[], &options).contains("at least one demonstration"));
-    assert!(message(&demos[1..], &options).contains("pass dt="));
-    let options = pdmp_core::FitOptions { n_styles: Truncation::Rank(2).into(), ..options };
+    assert!(message(&demos[1..], &options).contains("pass dt in seconds"));
+    let options = options.n_styles(Truncation::Rank(2));
     assert!(message(&demos[..1], &options).contains("n_styles = 2: must lie between 1 and 1"));
 }

@@ -1,8 +1,8 @@
-//! The control loop keeps its time: a million ticks of random commands allocate nothing, and do nothing else that a
-//! real-time thread must not do.
+//! Real-time safety of the control loop: no allocation, lock or blocking system call in a million ticks of random commands.
 //!
-//! A counting allocator watches everywhere. `make rtsan` compiles the same ticks with the real-time sanitizer of a
-//! nightly compiler, which ends the process at an allocation, a lock or any other system call that may wait.
+//! A counting allocator detects allocations. `make rtsan` compiles the same ticks with the real-time sanitizer of a nightly
+//! compiler, which ends the process at an allocation, a lock or any other system call that may block.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 #![cfg_attr(rtsan, feature(sanitize))]
 
@@ -17,7 +17,7 @@ use counting::{Random, allocations};
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
-/// A controller and all that its caller owns.
+/// A controller with the memory of its caller.
 struct Loop {
     controller: Controller,
     random: Random,
@@ -42,24 +42,24 @@ impl Loop {
         }
     }
 
-    /// One command by a setter, good or refused, and one tick under another.
+    /// Sends one valid or invalid command by a setter, and performs one tick under another.
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     fn tick(&mut self) {
         let Self { controller, random, values, position, velocity, acceleration } = self;
         let (n_dofs, n_styles) = (controller.primitive().n_dofs(), controller.primitive().n_styles());
-        let (kind, own) = (controller.primitive().kind(), controller.primitive().tau());
+        let (kind, nominal_tau) = (controller.primitive().kind(), controller.primitive().tau());
         values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
-        // Refused commands are part of a loop too.
-        let refused = random.next() < 0.01;
-        if refused {
+        // Rejected commands must be real-time safe too.
+        let invalid = random.next() < 0.01;
+        if invalid {
             values[0] = f64::NAN;
         }
-        let (given, style, size) = (&values[..n_dofs], &values[..n_styles], values[0].abs());
-        let tau = own * (0.5 + random.next());
+        let (vector, style, size) = (&values[..n_dofs], &values[..n_styles], values[0].abs());
+        let tau = nominal_tau * (0.5 + random.next());
         let _ = black_box(match (random.next() * 10.0) as u8 {
             0 => controller.set_style(style),
-            1 => controller.set_goal(given),
-            2 => controller.set_anchor(given),
+            1 => controller.set_goal(vector),
+            2 => controller.set_anchor(vector),
             3 => controller.set_tau(tau),
             4 => controller.set_amplitude(size),
             5 => controller.set_compliance(1e3 * size, 10.0 * size),
@@ -69,20 +69,22 @@ impl Loop {
         let command = Command {
             dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
             style: random.rarely().then_some(style),
-            goal: (random.rarely() && kind == Kind::Discrete).then_some(given),
-            anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(given),
+            goal: (random.rarely() && kind == Kind::Discrete).then_some(vector),
+            anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(vector),
             tau: random.rarely().then_some(tau),
             amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(size),
-            measured: random.rarely().then_some(given),
-            coupling: random.rarely().then_some(Coupling { velocity: given, acceleration: given }),
+            measured: random.rarely().then_some(vector),
+            coupling: random.rarely().then_some(Coupling { velocity: vector, acceleration: vector }),
         };
         let vectors = [command.style, command.goal, command.anchor, command.measured];
-        let told = vectors.iter().any(Option::is_some) || command.amplitude.is_some() || command.coupling.is_some();
+        let uses_values =
+            vectors.iter().any(Option::is_some) || command.amplitude.is_some() || command.coupling.is_some();
         let mut motion = Motion { position, velocity, acceleration };
-        assert_eq!(black_box(controller.update(&command, &mut motion)).is_err(), told && refused);
+        assert_eq!(black_box(controller.update(&command, &mut motion)).is_err(), uses_values && invalid);
     }
 }
 
+/// A million ticks of random commands allocate nothing, and the motion stays finite.
 #[test]
 fn a_million_ticks_of_random_commands_allocate_nothing() {
     for kind in [Kind::Discrete, Kind::Rhythmic] {
@@ -96,27 +98,27 @@ fn a_million_ticks_of_random_commands_allocate_nothing() {
     }
 }
 
-/// Whatever double arrives in whatever place, it is refused and nothing changes, or the motion stays finite.
+/// Extreme numbers in any field of a command are rejected without effect, or the motion stays finite.
 #[test]
-fn numbers_at_the_edge_are_refused_or_bounded() {
-    const EDGES: [f64; 12] =
+fn extreme_numbers_are_rejected_or_bounded() {
+    const EXTREMES: [f64; 12] =
         [f64::NAN, f64::INFINITY, -f64::INFINITY, f64::MAX, -1e200, 1e150, 1e-150, 1e-300, 5e-324, -5e-324, 0.0, -0.0];
     for kind in [Kind::Discrete, Kind::Rhythmic] {
         let Loop { controller: fresh, .. } = Loop::new(kind);
-        for (what, &edge) in (0..8).flat_map(|what| EDGES.iter().map(move |edge| (what, edge))) {
+        for (field, &value) in (0..8).flat_map(|field| EXTREMES.iter().map(move |value| (field, value))) {
             let mut controller = fresh.clone();
-            let values = [edge; 8];
-            let (given, style) = (&values[..fresh.primitive().n_dofs()], &values[..fresh.primitive().n_styles()]);
+            let values = [value; 8];
+            let (vector, style) = (&values[..fresh.primitive().n_dofs()], &values[..fresh.primitive().n_styles()]);
             let none = Command::default();
-            let command = match what {
-                0 => Command { dt: Some(edge), ..none },
-                1 => Command { tau: Some(edge), ..none },
-                2 => Command { amplitude: Some(edge), ..none },
+            let command = match field {
+                0 => Command { dt: Some(value), ..none },
+                1 => Command { tau: Some(value), ..none },
+                2 => Command { amplitude: Some(value), ..none },
                 3 => Command { style: Some(style), ..none },
-                4 => Command { goal: Some(given), ..none },
-                5 => Command { anchor: Some(given), ..none },
-                6 => Command { measured: Some(given), ..none },
-                _ => Command { coupling: Some(Coupling { velocity: given, acceleration: given }), ..none },
+                4 => Command { goal: Some(vector), ..none },
+                5 => Command { anchor: Some(vector), ..none },
+                6 => Command { measured: Some(vector), ..none },
+                _ => Command { coupling: Some(Coupling { velocity: vector, acceleration: vector }), ..none },
             };
             controller.step().unwrap();
             let before = controller.clone();
@@ -127,34 +129,34 @@ fn numbers_at_the_edge_are_refused_or_bounded() {
                 }
             }
             let motion = [controller.position(), controller.velocity(), controller.acceleration()];
-            assert!(motion.into_iter().flatten().all(|x| x.is_finite()), "{kind} {what} {edge:e}: {motion:?}");
-            assert!(edge.is_finite() || controller.time() == before.time());
+            assert!(motion.into_iter().flatten().all(|x| x.is_finite()), "{kind} {field} {value:e}: {motion:?}");
+            assert!(value.is_finite() || controller.time() == before.time());
         }
     }
 }
 
-/// Denormals take tens of times as long: what fades away ends at zero.
+/// Decaying states are flushed to zero: arithmetic on subnormal numbers takes tens of times as long.
 #[test]
-fn rest_has_no_denormals() {
+fn motion_at_rest_has_no_subnormal_numbers() {
     for kind in [Kind::Discrete, Kind::Rhythmic] {
         let Loop { mut controller, .. } = Loop::new(kind);
         if kind == Kind::Rhythmic {
             controller.set_amplitude(0.0).unwrap();
         }
-        let whole = |x: &f64| *x == 0.0 || x.is_normal();
+        let normal = |x: &f64| *x == 0.0 || x.is_normal();
         for dt in [1e-3, 0.1, 10.0] {
             for _ in 0..20_000 {
                 let command = Command { dt: Some(dt), ..Command::default() };
                 tick(&mut controller, &command).unwrap();
                 let motion = [controller.position(), controller.velocity(), controller.acceleration()];
-                assert!(motion.into_iter().flatten().all(whole), "{kind} at {}: {motion:?}", controller.time());
-                assert!(whole(&controller.phase()), "{kind} at {}: {:e}", controller.time(), controller.phase());
+                assert!(motion.into_iter().flatten().all(normal), "{kind} at {}: {motion:?}", controller.time());
+                assert!(normal(&controller.phase()), "{kind} at {}: {:e}", controller.time(), controller.phase());
             }
         }
     }
 }
 
-/// Controls of the sanitizer itself: it would pass over anything if it were not at work.
+/// Controls of the sanitizer: an inactive one would accept every loop.
 #[cfg(rtsan)]
 mod sanitizer {
     use std::hint::black_box;
@@ -169,10 +171,10 @@ mod sanitizer {
 
     #[test]
     fn ends_a_loop_that_allocates() {
-        let itself = std::env::current_exe().unwrap();
-        let ended = Command::new(itself).args(["--exact", "--ignored", "sanitizer::allocates"]).output().unwrap();
-        let said = String::from_utf8_lossy(&ended.stderr);
-        assert!(!ended.status.success());
-        assert!(said.contains("RealtimeSanitizer: unsafe-library-call"), "{said}");
+        let test = std::env::current_exe().unwrap();
+        let output = Command::new(test).args(["--exact", "--ignored", "sanitizer::allocates"]).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success());
+        assert!(message.contains("RealtimeSanitizer: unsafe-library-call"), "{message}");
     }
 }

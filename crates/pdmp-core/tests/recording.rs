@@ -1,4 +1,6 @@
-//! What is done to recordings before a primitive is learnt from them.
+//! Preprocessing of recordings.
+
+#![cfg(feature = "learning")]
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,7 +13,7 @@ use proptest::prelude::*;
 
 const DT: f64 = 0.01;
 
-/// Evenly distributed numbers in [−1, 1), of Knuth's linear congruential generator.
+/// Uniform random numbers in [−1, 1) by Knuth's linear congruential generator.
 fn noise(mut state: u64) -> impl FnMut() -> f64 {
     move || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -19,13 +21,13 @@ fn noise(mut state: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Standard normal numbers: Box and Muller's from those.
+/// Standard normal random numbers by the Box–Muller transform.
 fn normal(seed: u64) -> impl FnMut() -> f64 {
-    let mut even = noise(seed);
-    move || (-2.0 * (0.5 - 0.5 * even()).ln()).sqrt() * (PI * even()).cos()
+    let mut uniform = noise(seed);
+    move || (-2.0 * (0.5 - 0.5 * uniform()).ln()).sqrt() * (PI * uniform()).cos()
 }
 
-/// `position` with white noise of so many times the range of each DoF.
+/// `position` with white noise whose standard deviation is the fraction `share` of the range of each DoF.
 fn noisy(mut position: Array2<f64>, share: f64, seed: u64) -> Array2<f64> {
     let mut normal = normal(seed);
     for mut column in position.columns_mut() {
@@ -35,20 +37,20 @@ fn noisy(mut position: Array2<f64>, share: f64, seed: u64) -> Array2<f64> {
     position
 }
 
-/// Correlation of the second differences of a column with themselves one sample later: −2/3 of white noise.
+/// Lag-one autocorrelation of the second differences of a column; −2/3 for white noise.
 fn roughness(column: &[f64]) -> f64 {
     let bends: Vec<f64> = column.windows(3).map(|y| y[0] - 2.0 * y[1] + y[2]).collect();
     bends.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / bends.iter().map(|b| b * b).sum::<f64>()
 }
 
-/// Styles that a smoothed fit finds.
+/// Number of styles of a fit with smoothing.
 fn n_styles(kind: Kind, demos: &[Demonstration]) -> usize {
     let mut options = FitOptions::new(kind);
-    options.alignment.smoothing = Smoothing::Auto;
+    options.smoothing = Smoothing::Auto;
     pdmp_core::fit(demos, &options).unwrap().n_styles()
 }
 
-/// Both hips, a knee and the pelvis' height at a phase of a walk, in rad and m.
+/// Angles of both hips and a knee in rad, and height of the pelvis in m, at a phase of a walk.
 fn pose(phi: f64) -> [f64; 4] {
     let knee = 0.5 - 0.4 * phi.cos() + 0.3 * (2.0 * phi + 1.0).sin();
     [0.4 * phi.sin(), -0.4 * phi.sin(), knee, 0.9 + 0.02 * (2.0 * phi).cos()]
@@ -71,7 +73,7 @@ fn one(recording: Demonstration) -> Result<Cycles> {
     preprocessing::cycles(&[recording], None, CycleOutput::Each)
 }
 
-/// Largest jump from the last sample of a cycle to the first, over the largest between neighbours.
+/// Step from the last sample of a cycle to the first, relative to the largest step within the cycle.
 fn seam(cycle: &Demonstration) -> f64 {
     let y = cycle.position();
     let step = |a: usize, b: usize| (&y.row(b) - &y.row(a)).iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -79,16 +81,16 @@ fn seam(cycle: &Demonstration) -> f64 {
     step(n - 1, 0) / (1..n).map(|c| step(c - 1, c)).fold(0.0, f64::max)
 }
 
-/// Both legs together repeat after a stride, though the pelvis does after each step.
+/// Both legs together repeat after a stride, although the pelvis repeats after each step.
 #[test]
-fn the_period_of_a_walk_is_a_stride_and_no_step() {
+fn the_period_of_a_walk_is_a_stride_rather_than_a_step() {
     for period in [0.713, 1.0, 1.377] {
         let recording = recorded(walk(&even(400), |t| TAU * t / period + 1.0));
         assert_relative_eq!(preprocessing::period(&recording).unwrap(), period, max_relative = 1e-3);
     }
 }
 
-/// A harmonic much larger than the fundamental is not taken for it.
+/// A harmonic much larger than the fundamental does not determine the period.
 #[test]
 fn the_period_is_not_that_of_a_harmonic() {
     for harmonic in [2.0, 3.0, 5.0] {
@@ -98,7 +100,7 @@ fn the_period_is_not_that_of_a_harmonic() {
     }
 }
 
-/// Neither noise at a high rate nor irregular stamps nor drift hide the period.
+/// High-frequency noise, irregular time stamps and drift do not affect the period.
 #[test]
 fn the_period_is_found_through_noise_drift_and_irregular_stamps() {
     let (n, mut random) = (2000, noise(3));
@@ -111,9 +113,9 @@ fn the_period_is_found_through_noise_drift_and_irregular_stamps() {
     assert_relative_eq!(preprocessing::period(&recording).unwrap(), 1.1, max_relative = 5e-3);
 }
 
-/// A reach repeats nothing, and the error tells how little.
+/// Recordings without a period are rejected with the largest autocorrelation.
 #[test]
-fn what_has_no_period_is_refused_with_the_figure() {
+fn aperiodic_recordings_are_rejected_with_their_autocorrelation() {
     let mut random = noise(1);
     let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
     let reaching = Array2::from_shape_fn((200, 2), |(c, d)| reach(c as f64 / 199.0) * [1.0, -0.3][d]);
@@ -126,32 +128,32 @@ fn what_has_no_period_is_refused_with_the_figure() {
     assert!(message.contains("stands still"), "{message}");
 }
 
-/// Noise repeats itself by chance alone, whatever it remembers: at most two of fifty recordings have a period.
+/// At most two of fifty recordings of white or coloured noise have a period.
 #[test]
 fn noise_has_no_period() {
-    // A first-order filter of this share, twice, and then summed so many times.
-    for (keep, n_sums) in [(0.0, 0), (0.5, 0), (0.8, 0), (0.9, 0), (0.97, 0), (0.0, 1), (0.0, 2)] {
-        let found = (0..50).filter(|&seed| {
+    // White noise, filtered twice by a first-order filter with this pole, and then summed `n_sums` times.
+    for (pole, n_sums) in [(0.0, 0), (0.5, 0), (0.8, 0), (0.9, 0), (0.97, 0), (0.0, 1), (0.0, 2)] {
+        let periodic = (0..50).filter(|&seed| {
             let (mut normal, n, n_dofs) =
                 (normal(seed + 1), [60, 100, 200, 400][seed as usize % 4], 1 + seed as usize % 3);
             let mut position = Array2::from_shape_fn((n, n_dofs), |_| normal());
             for mut column in position.columns_mut() {
-                for share in [keep, keep, 1.0, 1.0].into_iter().take(2).chain(vec![1.0; n_sums]) {
+                for pole in [pole, pole].into_iter().chain(vec![1.0; n_sums]) {
                     let mut last = 0.0;
                     column.mapv_inplace(|y| {
-                        last = share * last + y;
+                        last = pole * last + y;
                         last
                     });
                 }
             }
             preprocessing::period(&recorded(position)).is_ok()
         });
-        let found = found.count();
-        assert!(found <= 2, "filter {keep}, {n_sums} sums: {found} of 50");
+        let n_periodic = periodic.count();
+        assert!(n_periodic <= 2, "filter {pole}, {n_sums} sums: {n_periodic} of 50");
     }
 }
 
-/// A movement that repeats itself is found in two periods, through noise, and in many periods through much noise.
+/// Two periods suffice with little noise, and many periods with much noise.
 #[test]
 fn short_and_noisy_recordings_have_their_period() {
     for (n, share) in [(200, 0.0), (200, 0.02), (200, 0.05), (250, 0.1), (300, 0.2), (3000, 0.4)] {
@@ -163,10 +165,10 @@ fn short_and_noisy_recordings_have_their_period() {
     }
 }
 
-/// Strides whose cadence swings by 7 % are cut where they end, to 2 % of a stride; even ones would miss by a fifth.
+/// Bounds of strides whose cadence varies by 7 % are accurate to 2 % of a stride; equal cycles would be off by a fifth.
 #[test]
-fn cycles_end_where_they_end_however_the_cadence_varies() {
-    // The phase of a cadence that swings by 7 % over seventeen strides.
+fn bounds_of_cycles_follow_a_varying_cadence() {
+    // Phase of a cadence that varies by 7 % over seventeen strides.
     let phi = |t: f64| TAU * t + 1.2 * (TAU * t / 17.0).sin();
     let found = one(recorded(walk(&even(1000), phi))).unwrap();
     assert_eq!((found.kept.len(), found.rejected.len()), (9, 0));
@@ -178,9 +180,9 @@ fn cycles_end_where_they_end_however_the_cadence_varies() {
     }
 }
 
-/// A recording that ends with its last cycle loses none of it.
+/// A recording that ends with its last cycle loses none of its cycles.
 #[test]
-fn a_recording_of_whole_cycles_is_used_up() {
+fn a_recording_of_whole_cycles_loses_none() {
     let found = one(recorded(walk(&even(301), |t| TAU * t))).unwrap();
     assert_eq!(found.kept.len(), 3);
     for cycle in found.kept {
@@ -190,7 +192,7 @@ fn a_recording_of_whole_cycles_is_used_up() {
     }
 }
 
-/// Drift of half the range in a cycle is distributed: neither a jump nor a change of the mean is left.
+/// A drift of half the range per cycle is removed without a jump or a change of the mean.
 #[test]
 fn drifting_cycles_are_closed_without_a_jump() {
     let mut position = walk(&even(500), |t| TAU * t);
@@ -206,9 +208,9 @@ fn drifting_cycles_are_closed_without_a_jump() {
     }
 }
 
-/// Recordings that begin anywhere give cycles that begin where those of the first do.
+/// Cycles of recordings that begin in different phases begin in the phase of the first recording.
 #[test]
-fn cycles_of_all_recordings_begin_in_one_phase() {
+fn cycles_of_all_recordings_begin_in_the_same_phase() {
     let recordings: Vec<_> = [(1.0, 0.4), (1.2, 3.0), (0.9, 5.5)]
         .map(|(period, phase)| recorded(walk(&even(450), |t| TAU * t / period + phase)))
         .into();
@@ -221,9 +223,9 @@ fn cycles_of_all_recordings_begin_in_one_phase() {
     }
 }
 
-/// Cycles of noisy strides are learnt as the one stride that they are: their noise is as white as it was recorded.
+/// Cycles of noisy equal strides have one style, because their noise is as white as it was recorded.
 #[test]
-fn noise_of_cycles_stays_white_and_is_no_style() {
+fn noise_of_cycles_stays_white_and_adds_no_style() {
     for (period, share) in [(1.035, 0.005), (1.0037, 0.005), (2.002, 0.01)] {
         let n = (20.5 * period / DT) as usize;
         let position = noisy(walk(&even(n), |t| TAU * t / period), share, 7);
@@ -235,7 +237,7 @@ fn noise_of_cycles_stays_white_and_is_no_style() {
     }
 }
 
-/// Each recording is cut at the rate at which it was recorded, not at that of the first.
+/// Cycles have the sampling rate of their own recording.
 #[test]
 fn cycles_are_no_denser_than_their_recording() {
     let fast = recorded(walk(&even(450), |t| TAU * t));
@@ -248,7 +250,7 @@ fn cycles_are_no_denser_than_their_recording() {
     assert!(found.kept.iter().any(|cycle| cycle.recording == 1));
 }
 
-/// A reach and a rest among walks are rejected as wholes; alone, they are errors.
+/// A reach and a recording at rest are rejected among walks; alone, they are errors.
 #[test]
 fn recordings_without_a_period_are_rejected_among_others() {
     let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
@@ -271,9 +273,9 @@ fn recordings_without_a_period_are_rejected_among_others() {
     );
 }
 
-/// A crank turns on by a turn per cycle: all its closed cycles are about one mean, and the turns are reported.
+/// The angle of a crank gains turns per cycle: all its closed cycles have a common mean, and the turns are reported.
 #[test]
-fn turns_are_taken_off_from_cycle_to_cycle() {
+fn turns_per_cycle_are_subtracted_and_reported() {
     for (unit, turn) in [("rad", TAU), ("deg", -360.0), ("", TAU), ("rad", -2.0 * TAU)] {
         let crank = |t: f64| turn * (t + 0.02 * (TAU * t).sin());
         let position = concatenate![
@@ -289,16 +291,16 @@ fn turns_are_taken_off_from_cycle_to_cycle() {
         assert_eq!((growth.dof, f64::from(growth.turns)), (4, turns));
         for cycle in &found.kept {
             assert_relative_eq!(cycle.gain[4], turn, max_relative = 1e-2);
-            let away = &cycle.demo.position().column(4) - 0.5 * turn;
-            assert!(away.iter().all(|y| y.abs() < 0.05 * turn.abs()), "{unit}: {away}");
+            let deviation = &cycle.demo.position().column(4) - 0.5 * turn;
+            assert!(deviation.iter().all(|y| y.abs() < 0.05 * turn.abs()), "{unit}: {deviation}");
             assert!(seam(&cycle.demo) < 1.1);
         }
     }
 }
 
-/// What gains more in each cycle than it moves is reported with the gain, unless it is little.
+/// Gains per cycle are reported if they exceed the movement within a cycle.
 #[test]
-fn gains_that_surpass_the_movement_are_reported() {
+fn gains_that_exceed_the_movement_are_reported() {
     for (gain, reported) in [(0.5, false), (1.4, true), (5.0, true)] {
         let mut position = walk(&even(500), |t| TAU * t);
         position.column_mut(0).iter_mut().zip(even(500)).for_each(|(y, t)| *y += gain * t);
@@ -313,9 +315,9 @@ fn gains_that_surpass_the_movement_are_reported() {
     }
 }
 
-/// One stride of another shape and one of another duration are rejected, each with its reason.
+/// A stride of different shape and one of different duration are rejected, each with its reason.
 #[test]
-fn odd_cycles_are_rejected_with_a_reason() {
+fn outliers_among_the_cycles_are_rejected_with_a_reason() {
     let limp = |t: f64| if (3.0..4.0).contains(&t) { 0.5 * (TAU * t).sin().powi(3) } else { 0.0 };
     let mut position = walk(&even(801), |t| TAU * t);
     position.column_mut(2).iter_mut().zip(even(801)).for_each(|(y, t)| *y += limp(t));
@@ -350,7 +352,7 @@ fn cycles_begin_at_given_onsets() {
     }
 }
 
-/// The cycles of a raw recording are what a rhythmic primitive is learnt from, with a mean goal and units left out.
+/// A rhythmic primitive can be learnt from the cycles of a raw recording, which keep units and context.
 #[test]
 fn a_rhythmic_primitive_is_learnt_from_a_raw_recording() {
     let labels = |of: [&str; 4]| of.map(String::from).to_vec();
@@ -369,7 +371,7 @@ fn a_rhythmic_primitive_is_learnt_from_a_raw_recording() {
     assert_eq!(loaded.units(), model.units());
 }
 
-/// A cubic is resampled exactly, whatever the stamps, and the first and last times stay where dt divides the duration.
+/// A cubic with irregular time stamps is resampled exactly, up to the last time if dt divides the duration.
 #[test]
 fn resampling_is_exact_for_cubics_at_irregular_stamps() {
     let time: Vec<f64> =
@@ -388,9 +390,9 @@ fn resampling_is_exact_for_cubics_at_irregular_stamps() {
     }
 }
 
-/// Noisy reaches at twice the rate, at half of it and cut between samples need the one style that the clean ones do.
+/// Noisy reaches at a higher or lower rate, or split between samples, have one style, as the clean ones.
 #[test]
-fn reaches_sampled_anew_are_learnt_as_easily_as_recorded() {
+fn resampling_of_noisy_reaches_adds_no_style() {
     let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
     for share in [0.0, 0.001, 0.003] {
         let demos: Vec<_> = (0..40)
@@ -399,53 +401,53 @@ fn reaches_sampled_anew_are_learnt_as_easily_as_recorded() {
                 recorded(noisy(Array2::from_shape_fn((101, 2), path), share, seed + 1))
             })
             .collect();
-        let anew = |f: &dyn Fn(&Demonstration) -> Demonstration| demos.iter().map(f).collect::<Vec<_>>();
+        let resampled = |f: &dyn Fn(&Demonstration) -> Demonstration| demos.iter().map(f).collect::<Vec<_>>();
         for demos in [
-            anew(&|demo| preprocessing::resample(demo, 0.5 * DT).unwrap()),
-            anew(&|demo| preprocessing::resample(demo, 0.3 * DT).unwrap()),
-            anew(&|demo| preprocessing::resample(demo, 2.0 * DT).unwrap()),
-            anew(&|demo| preprocessing::cut(demo, &[0.0037, 0.9962]).unwrap().remove(0)),
+            resampled(&|demo| preprocessing::resample(demo, 0.5 * DT).unwrap()),
+            resampled(&|demo| preprocessing::resample(demo, 0.3 * DT).unwrap()),
+            resampled(&|demo| preprocessing::resample(demo, 2.0 * DT).unwrap()),
+            resampled(&|demo| preprocessing::split_at(demo, &[0.0037, 0.9962]).unwrap().remove(0)),
         ] {
             assert_eq!(n_styles(Kind::Discrete, &demos), 1, "noise {share}, {} samples", demos[0].n_samples());
         }
     }
 }
 
-/// At the times of the recording nothing changes, noise or not; between them clean samples are met to 1e-6.
+/// Resampling preserves the samples at the times of the recording, and interpolates clean samples to 1e-6.
 #[test]
-fn resampling_keeps_what_was_recorded() {
+fn resampling_preserves_recorded_samples() {
     let clean = walk(&even(301), |t| TAU * t / 1.3);
     let rough = noisy(clean.clone(), 0.02, 3);
     let same = preprocessing::resample(&recorded(rough.clone()), DT).unwrap();
     let every = preprocessing::resample(&recorded(clean), 0.5 * DT).unwrap();
     let finer: Vec<f64> = (0..601).map(|c| 0.5 * DT * f64::from(c)).collect();
-    for (made, meant, tolerance) in [(same, rough, 1e-12), (every, walk(&finer, |t| TAU * t / 1.3), 1e-6)] {
-        assert_eq!(made.n_samples(), meant.nrows());
-        for (a, b) in made.position().iter().zip(&meant) {
+    for (found, expected, tolerance) in [(same, rough, 1e-12), (every, walk(&finer, |t| TAU * t / 1.3), 1e-6)] {
+        assert_eq!(found.n_samples(), expected.nrows());
+        for (a, b) in found.position().iter().zip(&expected) {
             assert_abs_diff_eq!(a, b, epsilon = tolerance);
         }
     }
 }
 
-/// Parts begin and end at the times given, and meet there.
+/// Parts begin and end at the given times, where their samples are equal.
 #[test]
-fn parts_meet_at_the_times_that_cut_them() {
+fn parts_meet_at_the_times_of_the_split() {
     let recording = recorded(walk(&even(300), |t| TAU * t)).with_goal(vec![0.0; 4]).unwrap();
-    let parts = preprocessing::cut(&recording, &[0.333, 1.0, 2.7]).unwrap();
+    let parts = preprocessing::split_at(&recording, &[0.333, 1.0, 2.7]).unwrap();
     let [first, second] = &parts[..] else { panic!("{} parts", parts.len()) };
     assert_abs_diff_eq!(first.position().row(0)[0], 0.4 * (TAU * 0.333).sin(), epsilon = 1e-6);
     assert_eq!(first.position().row(first.n_samples() - 1), second.position().row(0));
     assert_eq!(first.goal(), None);
-    let message = preprocessing::cut(&recording, &[0.5, 0.51]).unwrap_err().to_string();
+    let message = preprocessing::split_at(&recording, &[0.5, 0.51]).unwrap_err().to_string();
     assert!(message.contains("times = 0.51: a part must last"), "{message}");
 }
 
-/// Rest before and after a reach is cut off, to the sample in which the threshold is passed.
+/// Rest before and after a reach is removed up to the sample at which the speed reaches the threshold.
 #[test]
-fn trimming_leaves_the_movement() {
+fn trimming_removes_rest() {
     let share = |t: f64| ((t - 1.0) / 1.5).clamp(0.0, 1.0);
     let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
-    // Both DoFs move alike: the threshold is that of each, whatever their units.
+    // Both DoFs move equally relative to their ranges, so that the threshold is that of each.
     let position = Array2::from_shape_fn((400, 2), |(c, d)| [1.0, 1e-3][d] * reach(share(c as f64 * DT)));
     let trimmed = preprocessing::trim(&recorded(position.clone()), 0.05).unwrap();
     // Speed 30 s²(1 − s)² is at 5 % of its peak 1.875 where s(1 − s) = √0.003125.
@@ -461,9 +463,9 @@ fn trimming_leaves_the_movement() {
     );
 }
 
-/// Noise of up to 2 % of the range takes no rest for movement and no movement for rest, nor does a jump.
+/// Noise of up to 2 % of the range, or a jump, hardly changes the ends of the movement.
 #[test]
-fn trimming_is_not_misled_by_noise_or_a_jump() {
+fn trimming_is_robust_to_noise_and_jumps() {
     let share = |t: f64| ((t - 0.8) / 1.0).clamp(0.0, 1.0);
     let reach = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
     let clean = Array2::from_shape_fn((261, 2), |(c, d)| [1.0, -0.4][d] * reach(share(c as f64 * DT)));
@@ -485,7 +487,7 @@ fn trimming_is_not_misled_by_noise_or_a_jump() {
     assert_abs_diff_eq!(&ends(jumping)[..], &[first, last][..], epsilon = 0.02);
 }
 
-/// A sine at the cut-off keeps half its amplitude, where it was: without lag.
+/// A sine at the cut-off frequency keeps half of its amplitude and its phase.
 #[test]
 fn the_low_pass_halves_a_sine_at_the_cut_off_without_lag() {
     let sine = |t: f64| (TAU * 5.0 * t).sin();
@@ -502,41 +504,41 @@ fn the_low_pass_halves_a_sine_at_the_cut_off_without_lag() {
     assert_eq!(message, "cut_off = 80: must lie below half the sampling rate");
 }
 
-/// Gaps up to the length are interpolated, and what was there stays as it was.
+/// Gaps up to `max_gap` are interpolated, and other samples are unchanged.
 #[test]
-fn short_gaps_are_interpolated_and_nothing_else_changes() {
+fn short_gaps_are_interpolated_and_other_samples_unchanged() {
     let time = even(100);
     let whole = walk(&time, |t| TAU * t);
     let mut holed = whole.clone();
     holed.slice_mut(s![40..44, 0]).fill(f64::NAN);
     holed[[70, 2]] = f64::NAN;
     let names = ["a", "b", "c", "d"].map(String::from);
-    let filled = preprocessing::fill(holed.clone(), &time, &names, &[0.0; 4], 0.05).unwrap();
-    for (place, y) in filled.indexed_iter() {
-        let tolerance = if holed[place].is_nan() { 1e-4 } else { 0.0 };
-        assert_abs_diff_eq!(*y, whole[place], epsilon = tolerance);
+    let filled = preprocessing::fill_gaps(holed.clone(), &time, &names, &[0.0; 4], 0.05).unwrap();
+    for (index, y) in filled.indexed_iter() {
+        let tolerance = if holed[index].is_nan() { 1e-4 } else { 0.0 };
+        assert_abs_diff_eq!(*y, whole[index], epsilon = tolerance);
     }
-    let message = preprocessing::fill(holed, &time, &names, &[0.0; 4], 0.04).unwrap_err().to_string();
+    let message = preprocessing::fill_gaps(holed, &time, &names, &[0.0; 4], 0.04).unwrap_err().to_string();
     assert!(message.contains("column 'a': no sample between t = 0.39 s and t = 0.44 s"), "{message}");
 }
 
-/// What cannot be interpolated is refused: gaps at an end, columns of nothing, lengths that are none.
+/// Gaps at an end, empty columns and an invalid `max_gap` are rejected.
 #[test]
-fn gaps_that_cannot_be_filled_are_refused() {
+fn gaps_that_cannot_be_filled_are_rejected() {
     let (time, names) = (even(10), [String::from("knee")]);
-    let refusal = |gap: std::ops::Range<usize>, max_gap: f64| {
+    let error_of = |gap: std::ops::Range<usize>, max_gap: f64| {
         let mut position = Array2::zeros((10, 1));
         position.slice_mut(s![gap, 0]).fill(f64::NAN);
-        preprocessing::fill(position, &time, &names, &[0.0], max_gap).unwrap_err().to_string()
+        preprocessing::fill_gaps(position, &time, &names, &[0.0], max_gap).unwrap_err().to_string()
     };
-    assert!(refusal(0..2, 1.0).contains("'knee': no sample before t = 0.02 s"));
-    assert!(refusal(7..10, 1.0).contains("'knee': no sample after t = 0.06 s"));
-    assert!(refusal(0..10, 1.0).contains("'knee': no sample at all"));
-    assert!(refusal(1..8, 1.0).contains("3 samples"));
-    assert!(refusal(4..5, f64::NAN).contains("max_gap"));
+    assert!(error_of(0..2, 1.0).contains("'knee': no sample before t = 0.02 s"));
+    assert!(error_of(7..10, 1.0).contains("'knee': no sample after t = 0.06 s"));
+    assert!(error_of(0..10, 1.0).contains("'knee': no sample at all"));
+    assert!(error_of(1..8, 1.0).contains("3 samples"));
+    assert!(error_of(4..5, f64::NAN).contains("max_gap"));
 }
 
-/// A gap through which an angle wraps is filled with the way that goes on, not with the way back.
+/// A gap through which an angle wraps is filled in the direction of the movement.
 #[test]
 fn angles_are_filled_across_the_wrap() {
     let time = even(60);
@@ -544,7 +546,7 @@ fn angles_are_filled_across_the_wrap() {
     let wrapped = |c: usize| (angle(c) + PI).rem_euclid(TAU) - PI;
     let mut position = Array2::from_shape_fn((60, 1), |(c, _)| wrapped(c));
     position.slice_mut(s![29..34, 0]).fill(f64::NAN);
-    let filled = preprocessing::fill(position, &time, &[String::from("yaw")], &[TAU], 0.1).unwrap();
+    let filled = preprocessing::fill_gaps(position, &time, &[String::from("yaw")], &[TAU], 0.1).unwrap();
     for c in 29..34 {
         let turns = (filled[[c, 0]] - angle(c)) / TAU;
         assert_abs_diff_eq!(turns, turns.round(), epsilon = 1e-9);
@@ -554,7 +556,7 @@ fn angles_are_filled_across_the_wrap() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Whatever the period, the phase, the units and the drift, cycles are closed, of the period, and of finite numbers.
+    /// Cycles are closed and have the right period for all periods, phases, units and drifts.
     #[test]
     fn cycles_are_closed_and_as_long_as_the_period(
         period in 0.4f64..1.6, phase in 0.0f64..TAU, unit in -6..6, drift in -1.0f64..1.0,
@@ -568,16 +570,16 @@ proptest! {
         prop_assert!(found.kept.len() >= 2);
         let last = found.kept.len() - 1;
         for (k, cycle) in found.kept.into_iter().enumerate() {
-            // What lies beyond the ends can only be guessed.
-            let close = if k == 0 || k == last { 0.05 } else { 0.01 };
-            prop_assert!((cycle.period / period - 1.0).abs() < close, "{} of {period}", cycle.period);
+            // Bounds at the ends of the recording are less certain.
+            let tolerance = if k == 0 || k == last { 0.05 } else { 0.01 };
+            prop_assert!((cycle.period / period - 1.0).abs() < tolerance, "{} of {period}", cycle.period);
             prop_assert!(seam(&cycle.demo) < 1.5, "{}", seam(&cycle.demo));
         }
     }
 
-    /// What is trimmed, cut or resampled is made of finite numbers, whatever the stamps.
+    /// Trimmed, split, filtered and resampled recordings are finite for arbitrary time stamps.
     #[test]
-    fn nothing_but_finite_numbers_comes_out(
+    fn results_of_preprocessing_are_finite(
         steps in prop::collection::vec(1e-3..1.0, 8..40), seed: u64, exponent in -100..100,
     ) {
         let mut random = noise(seed);
@@ -588,7 +590,7 @@ proptest! {
         let recording = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
         let mut made = vec![preprocessing::resample(&recording, (last - first) / 20.0).unwrap()];
         made.extend(preprocessing::trim(&recording, 0.05));
-        made.extend(preprocessing::cut(&recording, &[first, last]).unwrap());
+        made.extend(preprocessing::split_at(&recording, &[first, last]).unwrap());
         made.extend(preprocessing::lowpass(&recording, 0.3 / ((last - first) / steps.len() as f64)));
         for demo in made {
             prop_assert!(demo.position().iter().all(|y| y.is_finite()));
@@ -596,9 +598,9 @@ proptest! {
     }
 }
 
-/// Degrees of freedom at rest neither repeat nor fail to.
+/// Degrees of freedom at rest do not affect the period.
 #[test]
-fn columns_at_rest_have_no_say() {
+fn columns_at_rest_do_not_affect_the_period() {
     let moving = walk(&even(400), |t| TAU * t / 1.3);
     let resting = Array2::from_elem((400, 3), 7.25);
     let position = concatenate![Axis(1), moving, resting];

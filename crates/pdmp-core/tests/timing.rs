@@ -1,4 +1,5 @@
-//! Time beyond linear scaling: warps and landmarks are found, kept and played back.
+//! Claims about time warps and landmarks: estimation, reproduction in time, prediction, files, errors.
+#![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
 mod common;
@@ -17,7 +18,7 @@ use pdmp_core::rollout;
 use pdmp_core::{Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Sampling, Status, fit};
 use proptest::prelude::*;
 
-/// A movement with much to tell its phase by, of amplitude `a`, at the phase `p`; it closes where it is a cycle.
+/// Returns the position at phase `p` of a movement of amplitude `a` with distinct phases; a cycle is periodic.
 fn shape(kind: Kind, a: f64, p: f64) -> [f64; 2] {
     match kind {
         Kind::Discrete => [a * minimum_jerk(p) + a * 0.3 * (9.0 * p).sin(), 0.5 * a * (5.0 * p).cos()],
@@ -25,7 +26,7 @@ fn shape(kind: Kind, a: f64, p: f64) -> [f64; 2] {
     }
 }
 
-/// The phase at a share of the time, in the unit of the phase: K segments of slopes that average to one.
+/// Returns the phase at a share of the duration, for K segments with slopes of mean one.
 fn phase_at(slopes: &[f64], share: f64) -> f64 {
     let n = slopes.len() as f64;
     let mut start = 0.0;
@@ -38,7 +39,7 @@ fn phase_at(slopes: &[f64], share: f64) -> f64 {
     share
 }
 
-/// A demonstration that spends `slopes` times the linear time in each segment.
+/// Returns a demonstration that spends `slopes` times the linear duration in each segment.
 fn warped(kind: Kind, a: f64, slopes: &[f64], duration: f64) -> Demonstration {
     let n = 201;
     let steps = if kind == Kind::Discrete { n - 1 } else { n };
@@ -48,8 +49,8 @@ fn warped(kind: Kind, a: f64, slopes: &[f64], duration: f64) -> Demonstration {
 
 fn with(kind: Kind, time_scaling: TimeScaling) -> FitOptions {
     let mut options = options(kind);
-    options.alignment.nominal = Some(0);
-    options.alignment.time_scaling = time_scaling;
+    options.nominal = Some(0);
+    options.time_scaling = time_scaling;
     options
 }
 
@@ -62,9 +63,9 @@ const EVEN: [f64; 8] = [1.0; 8];
 const UNEVEN: [f64; 8] = [1.4, 0.7, 0.5, 0.6, 1.9, 1.4, 0.9, 0.6];
 const SLOWER: [f64; 8] = [0.6, 0.8, 1.5, 1.6, 1.2, 0.7, 0.6, 1.0];
 
-/// Warps within the bounds are found back to within a step of the grid, whatever the amplitude and the duration.
+/// Warps within the bounds are recovered to a step of the grid for any amplitude and duration.
 #[test]
-fn known_warps_are_found_back() {
+fn known_warps_are_recovered() {
     for kind in KINDS {
         for a in [1.0, 0.3, 2.5] {
             let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, a, &UNEVEN, 1.3), warped(kind, a, &SLOWER, 0.8)];
@@ -82,9 +83,9 @@ fn known_warps_are_found_back() {
     }
 }
 
-/// Demonstrations that are alike, however long and large, are not warped: the model is the linear one, but for its breaks.
+/// Demonstrations of equal shape but different duration and size are not warped.
 #[test]
-fn demonstrations_that_are_alike_are_not_warped() {
+fn demonstrations_of_equal_shape_are_not_warped() {
     for kind in KINDS {
         let demos: Vec<_> = [1.0, 0.5, 2.0].iter().map(|&a| warped(kind, a, &EVEN, 1.0 + a)).collect();
         let (model, linear) = (learn(&demos, &by_warp(kind)), learn(&demos, &with(kind, TimeScaling::Linear)));
@@ -102,9 +103,9 @@ fn demonstrations_that_are_alike_are_not_warped() {
     }
 }
 
-/// One segment is linear scaling, to the last bit of the model.
+/// A warp of one segment equals linear scaling bit for bit.
 #[test]
-fn one_segment_is_linear() {
+fn a_warp_of_one_segment_is_linear_scaling() {
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
         let one = learn(&demos, &with(kind, TimeScaling::Warp(TimeWarp::new(1, 2.5).unwrap())));
         let linear = learn(&demos, &with(kind, TimeScaling::Linear));
@@ -126,11 +127,11 @@ fn one_segment_is_linear() {
     }
 }
 
-/// Played back in its own timing, every demonstration is given back, as it is with linear scaling.
+/// With its own segment durations every demonstration is reproduced as accurately as with linear scaling.
 #[test]
-fn every_demonstration_is_given_back_in_its_own_timing() {
+fn every_demonstration_is_reproduced_in_its_own_timing() {
     for kind in KINDS {
-        // Smooth in time, as recordings are: the corners of the warps above are no movement's.
+        // Smooth warps, as of recordings; the piecewise linear ones above have corners.
         let demos: Vec<_> = [(1.0, 0.0), (0.8, 0.08), (1.3, -0.1), (0.9, 0.05)]
             .iter()
             .map(|&(a, bend)| {
@@ -146,7 +147,7 @@ fn every_demonstration_is_given_back_in_its_own_timing() {
             duration * [0.3 + 0.02 * m as f64, 0.7 - 0.05 * m as f64][e]
         });
         let error = |time_scaling| {
-            let model = learn(&demos, &FitOptions { n_styles: Truncation::Rank(4).into(), ..with(kind, time_scaling) });
+            let model = learn(&demos, &with(kind, time_scaling).n_styles(Truncation::Rank(4)));
             (0..demos.len()).map(|m| reproduction_error(&model, &demos, m)).fold(0.0, f64::max)
         };
         let (linear, warp) = (error(TimeScaling::Linear), error(TimeScaling::Warp(TimeWarp::default())));
@@ -155,9 +156,9 @@ fn every_demonstration_is_given_back_in_its_own_timing() {
     }
 }
 
-/// Landmarks of all demonstrations fall on the breaks, which are where the nominal one has them.
+/// The landmarks of all demonstrations coincide with the breaks, which are those of the nominal one.
 #[test]
-fn events_fall_on_their_breaks() {
+fn landmarks_coincide_with_the_breaks() {
     for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
         let linear = learn(&demos, &with(kind, TimeScaling::Linear));
         let durations = &linear.demonstrated().durations;
@@ -176,7 +177,7 @@ fn events_fall_on_their_breaks() {
                     < 1e-14
             );
             assert!((model.demonstrated().durations[m] - durations[m]).abs() < 1e-14);
-            // The landmark is an instant of the recording and a phase of the movement, where all demonstrations have theirs.
+            // The landmark is at its time in the recording, and at the phase of the break in the movement.
             let at = TimeGrid { dt: landmarks[[m, 0]], duration: Some(landmarks[[m, 0]]) };
             let conditions = conditions_of(&model, m);
             let there = rollout(model.primitive(), &conditions, at).unwrap().position.row(1).to_vec();
@@ -192,9 +193,9 @@ fn events_fall_on_their_breaks() {
     }
 }
 
-/// A rollout in a timing is the linear one read along it, and its velocity and acceleration are those of its position.
+/// Velocity and acceleration of a rollout with segment durations are the derivatives of its position.
 #[test]
-fn a_timed_rollout_is_the_movement_along_its_timing() {
+fn derivatives_of_a_warped_rollout_are_consistent() {
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3), warped(kind, 1.1, &SLOWER, 0.8)];
         let model = learn(&demos, &by_warp(kind));
@@ -207,7 +208,7 @@ fn a_timed_rollout_is_the_movement_along_its_timing() {
                 start,
                 ..Default::default()
             };
-            // Past the end, too, but for the instants at which acceleration jumps: it is smooth in between.
+            // Also past the end; except at the breaks, where the acceleration jumps.
             let dt = 1e-3;
             let made = rollout(model.primitive(), &timed, TimeGrid { dt, duration: Some(1.9) }).unwrap();
             let scale = made.acceleration.iter().fold(0.0f64, |most, a| most.max(a.abs()));
@@ -233,15 +234,15 @@ fn a_timed_rollout_is_the_movement_along_its_timing() {
                 assert!((made.velocity[[0, 1]] - velocity[1]).abs() < 1e-12);
             }
         }
-        // As long as the timing, unless told otherwise.
+        // The default duration is the sum of the segment durations.
         let timed = Conditions { segment_durations: Some(segment_durations.clone()), ..Default::default() };
         assert_eq!(rollout(model.primitive(), &timed, TimeGrid { dt: 0.01, duration: None }).unwrap().time.len(), 161);
     }
 }
 
-/// A timing in the proportions of the nominal one is a τ.
+/// Segment durations in the proportions of the nominal ones are equivalent to a τ.
 #[test]
-fn a_nominal_timing_is_linear_time() {
+fn nominal_proportions_are_linear_time() {
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3)];
         let model = learn(&demos, &by_warp(kind));
@@ -255,9 +256,9 @@ fn a_nominal_timing_is_linear_time() {
     }
 }
 
-/// A loop whose τ is that of the timing at every tick plays the demonstration back in its timing.
+/// A controller whose τ is set from the segment durations at every step reproduces the warped movement.
 #[test]
-fn a_loop_follows_a_timing_by_its_tau() {
+fn a_controller_follows_segment_durations_by_its_tau() {
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.9, &UNEVEN, 1.3)];
         let model = learn(&demos, &by_warp(kind));
@@ -277,15 +278,15 @@ fn a_loop_follows_a_timing_by_its_tau() {
     }
 }
 
-/// The timing is predicted with the rest, and a controller takes its sum.
+/// Segment durations are predicted from contexts; a controller uses their sum.
 #[test]
-fn timings_are_predicted_from_contexts() {
+fn segment_durations_are_predicted_from_contexts() {
     let kind = Kind::Discrete;
     let slow = |h: f64| (0..8).map(|k| if k < 4 { 1.0 + h } else { 1.0 - h }).collect::<Vec<f64>>();
     let heights = [0.0, 0.1, 0.2, 0.3, 0.4];
     let demos: Vec<_> = heights.iter().map(|&h| warped(kind, 1.0, &slow(h), 1.0 + h)).collect();
-    let contexts = Some(heights.iter().map(|&h| vec![h.into()]).collect());
-    let model = learn(&demos, &FitOptions { contexts, ..by_warp(kind) });
+    let contexts = heights.iter().map(|&h| vec![h.into()]).collect();
+    let model = learn(&demos, &by_warp(kind).contexts(contexts));
     let found = model.predict(&[0.25]).unwrap();
     let segment_durations = found.conditions.segment_durations.as_ref().unwrap();
     let first: f64 = segment_durations[..4].iter().sum();
@@ -298,15 +299,15 @@ fn timings_are_predicted_from_contexts() {
     assert!((controller.tau() / model.tau() - found.duration / model.duration()).abs() < 1e-12);
 }
 
-/// A new demonstration is timed as the others were: by the template, or by its own landmarks.
+/// A new demonstration is aligned as in the fit, by the template or by its own landmarks.
 #[test]
-fn style_of_finds_warped_demonstrations_again() {
+fn style_of_recovers_the_styles_of_warped_demonstrations() {
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.7, &UNEVEN, 1.3), warped(kind, 1.4, &SLOWER, 0.8)];
         let landmarks = array![[0.4], [0.5], [0.3]];
         for time_scaling in [TimeScaling::Warp(TimeWarp::default()), TimeScaling::Landmarks(landmarks.clone())] {
             let by_landmarks = matches!(time_scaling, TimeScaling::Landmarks(_));
-            let model = learn(&demos, &FitOptions { n_styles: Truncation::Rank(3).into(), ..with(kind, time_scaling) });
+            let model = learn(&demos, &with(kind, time_scaling).n_styles(Truncation::Rank(3)));
             for (m, demo) in demos.iter().enumerate() {
                 let own = landmarks.row(m).to_vec();
                 let style = style_of(&model, demo, None, None, by_landmarks.then_some(&own)).unwrap();
@@ -320,9 +321,9 @@ fn style_of_finds_warped_demonstrations_again() {
     }
 }
 
-/// The model file keeps breaks, segment_durations and the template; the number of threads changes no bit of it.
+/// A warped model is saved completely, and does not depend on the number of threads bit for bit.
 #[test]
-fn a_warped_model_is_saved_and_does_not_depend_on_threads() {
+fn a_warped_model_is_saved_and_independent_of_threads() {
     for kind in KINDS {
         let demos: Vec<_> = (0..7)
             .map(|m| {
@@ -333,7 +334,7 @@ fn a_warped_model_is_saved_and_does_not_depend_on_threads() {
             .collect();
         let bytes = |n| {
             let threads = Threads::new(n).unwrap();
-            learn(&demos, &FitOptions { threads, ..by_warp(kind) }).to_bytes().unwrap()
+            learn(&demos, &by_warp(kind).threads(threads)).to_bytes().unwrap()
         };
         let one = bytes(1);
         assert!([2, 3, 8].iter().all(|&n| bytes(n) == one));
@@ -348,7 +349,7 @@ fn a_warped_model_is_saved_and_does_not_depend_on_threads() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever the demonstrations, slopes stay within their bounds, and times add up to the durations.
+    /// For any demonstrations the slopes of the warp stay within their bounds, and rollouts are finite.
     #[test]
     fn slopes_stay_within_their_bounds(
         noise in prop::collection::vec(-1.0..1.0f64, 240), segments in 1..12usize, slope in 1.0..10.0f64,
@@ -363,9 +364,9 @@ proptest! {
         let demos = [demo(&noise[..60], scale), demo(&noise[60..140], 0.0), demo(&noise[140..], scale)];
         let warp = TimeWarp::new(segments, slope).unwrap();
         let model = learn(&demos, &with(kind, TimeScaling::Warp(warp)));
-        let shown = model.demonstrated();
-        prop_assert_eq!(shown.segment_durations.dim(), (3, segments));
-        for (segment_durations, duration) in shown.segment_durations.rows().into_iter().zip(&shown.durations) {
+        let demonstrated = model.demonstrated();
+        prop_assert_eq!(demonstrated.segment_durations.dim(), (3, segments));
+        for (segment_durations, duration) in demonstrated.segment_durations.rows().into_iter().zip(&demonstrated.durations) {
             let linear = duration / segments as f64;
             for seconds in segment_durations {
                 prop_assert!((1.0 / slope - 1e-9..=slope + 1e-9).contains(&(seconds / linear)), "{}", seconds / linear);
@@ -376,10 +377,9 @@ proptest! {
     }
 }
 
-/// What cannot be a warp, landmarks or a timing is refused with its numbers and the mend.
-/// A Jacobian is of linear time: one of another movement is not handed out.
+/// Jacobians are those of linear time; conditions with segment durations are rejected.
 #[test]
-fn jacobian_of_a_timing_is_refused() {
+fn the_jacobian_of_a_warped_movement_is_rejected() {
     let demos = [EVEN, UNEVEN].map(|slopes| warped(Kind::Discrete, 1.0, &slopes, 2.0));
     let model = Arc::new(fit(&demos, &by_warp(Kind::Discrete)).unwrap());
     let conditions = Conditions {
@@ -398,15 +398,16 @@ fn jacobian_of_a_timing_is_refused() {
     assert!(matches!(found, Err(Error::Arguments(_))));
 }
 
+/// Invalid warps, landmarks and segment durations are rejected with their numbers and the remedy.
 #[test]
-fn bad_timings_are_refused() {
+fn invalid_timings_are_rejected() {
     let demos = reaches();
     let refused = |time_scaling| fit(&demos, &with(Kind::Discrete, time_scaling)).unwrap_err().to_string();
     for (segments, slope, message) in [
-        (0, 2.5, "segments = 0: must be at least 1, which is linear"),
-        (46, 2.5, "segments = 46: must lie between 1 and 45, half the fewest samples of a demonstration or 1000"),
-        (8, 0.9, "slope = 0.9: must lie between 1, which is linear, and 10"),
-        (8, f64::NAN, "slope = NaN: must lie between 1, which is linear, and 10"),
+        (0, 2.5, "n_segments = 0: must be at least 1, which is linear"),
+        (46, 2.5, "n_segments = 46: must lie between 1 and 45, half the fewest samples of a demonstration or 1000"),
+        (8, 0.9, "max_slope = 0.9: must lie between 1, which is linear, and 10"),
+        (8, f64::NAN, "max_slope = NaN: must lie between 1, which is linear, and 10"),
     ] {
         assert_eq!(refused(TimeScaling::Warp(TimeWarp { n_segments: segments, max_slope: slope })), message);
     }
@@ -422,7 +423,7 @@ fn bad_timings_are_refused() {
     assert!(landmarks([good, [0.1, f64::NAN], good, good, good]).starts_with("demo 1: landmarks[1] = NaN s"));
     let wrong = |shape: (usize, usize)| refused(TimeScaling::Landmarks(Array2::from_elem(shape, 0.5)));
     assert_eq!(wrong((4, 1)), "landmarks has length 4, expected 5: one value per demonstration");
-    assert!(wrong((5, 0)).contains("pass an array of shape (M, E)"));
+    assert!(wrong((5, 0)).contains("pass their times (M, E)"));
 
     let model = learn(&demos, &by_warp(Kind::Discrete));
     let refused = |conditions: Conditions| {
@@ -446,6 +447,6 @@ fn bad_timings_are_refused() {
     assert!(refused(both).starts_with("pass tau or segment_durations, not both"));
     assert!(model.tau_at(0.0, &[0.1; 8]).unwrap() > 0.0, "long after the end");
     for phase in [-0.1, 1.1, f64::NAN] {
-        assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] where discrete"));
+        assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] for a discrete"));
     }
 }

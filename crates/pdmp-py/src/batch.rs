@@ -23,8 +23,8 @@ impl Model {
     /// Compute the movements of many styles.
     ///
     /// A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
-    /// response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout` to
-    /// rounding.
+    /// response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
+    /// to rounding.
     ///
     /// Parameters
     /// ----------
@@ -225,9 +225,9 @@ impl PreparedBatch {
 
     /// Checks the number and the shapes of given output arrays.
     fn check<'py>(&self, movements: &Range<usize>, out: &[Bound<'py, PyAny>]) -> PyResult<Vec<Cube<'py>>> {
-        let (found, expected, shape) = (out.len(), self.n_outputs(), self.shape(movements));
-        if found != expected {
-            let message = format!("out: {found} arrays; expected {expected} float64 arrays {shape:?}");
+        let (n_arrays, expected, shape) = (out.len(), self.n_outputs(), self.shape(movements));
+        if n_arrays != expected {
+            let message = format!("out: {n_arrays} arrays; expected {expected} float64 arrays {shape:?}");
             return Err(PyValueError::new_err(message));
         }
         out.iter().map(|out| writable(out, &shape)).collect()

@@ -16,9 +16,9 @@ const NAMES: [&str; 9] =
 
 /// Conditions of a movement.
 ///
-/// A condition that is None is that of the nominal demonstration. `Model.rollout`, `Model.controller` and `Model.jacobian`
-/// take conditions, and keywords of the same names that replace single ones; `Model.conditions`, `Model.predict` and
-/// `blend` return conditions.
+/// A condition that is None is that of the nominal demonstration. `Model.rollout`, `Model.controller` and
+/// `Model.jacobian` take conditions, and keywords of the same names that replace single ones; `Model.conditions`,
+/// `Model.predict` and `blend` return conditions.
 ///
 /// Parameters
 /// ----------
@@ -27,7 +27,8 @@ const NAMES: [&str; 9] =
 /// goal : array_like, (D,), optional
 ///     Goal g in the unit of each degree of freedom; discrete.
 /// start : array_like, (D,), optional
-///     Start position y₀ in the unit of each degree of freedom. A rhythmic movement starts on its limit cycle by default.
+///     Start position y₀ in the unit of each degree of freedom. A rhythmic movement starts on its limit cycle by
+///     default.
 /// velocity : array_like, (D,), optional
 ///     Start velocity per s; by default that of the demonstrations.
 /// anchor : array_like, (D,), optional
@@ -37,15 +38,17 @@ const NAMES: [&str; 9] =
 /// tau : float, optional
 ///     Time constant τ in s: the duration of a discrete movement, the period over 2π of a rhythmic one.
 /// segment_durations : array_like, (K,), optional
-///     Time in s in each segment between `Model.breaks`, in place of `tau`. Time over phase is the monotone cubic through
-///     their sums. A rollout follows it; a controller takes the total, and `Model.tau_at` returns τ at each phase.
+///     Time in s in each segment between `Model.breaks`, in place of `tau`. Time over phase is the monotone cubic
+///     through their sums. A rollout follows it; a controller takes the total, and `Model.tau_at` returns τ at each
+///     phase.
 /// phase : float, optional
 ///     Phase φ in rad at which a rhythmic movement starts on its limit cycle; 0 by default.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A condition is not a number or a vector of numbers. Models check lengths and finiteness when they take conditions.
+///     A condition is not a number or a vector of numbers. Models check lengths and finiteness when they take
+///     conditions.
 /// TypeError
 ///     A keyword is unknown.
 ///
@@ -76,8 +79,8 @@ impl Conditions {
     /// Parameters
     /// ----------
     /// **changes
-    ///     Conditions by name; None stands for that of the nominal demonstration. `tau` replaces `segment_durations` and
-    ///     vice versa.
+    ///     Conditions by name; None stands for that of the nominal demonstration. `tau` replaces `segment_durations`
+    ///     and vice versa.
     ///
     /// Returns
     /// -------
@@ -147,7 +150,7 @@ impl Conditions {
     }
 
     fn __getnewargs_ex__<'py>(slf: &Bound<'py, Self>) -> PyResult<((), Bound<'py, PyDict>)> {
-        Ok(((), given(slf)?))
+        Ok(((), present(slf)?))
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
@@ -155,7 +158,7 @@ impl Conditions {
             let list = value.call_method0("tolist").unwrap_or(value);
             Ok(format!("{name}={}", list.repr()?))
         };
-        let parts = given(slf)?.iter().map(text).collect::<PyResult<Vec<_>>>()?;
+        let parts = present(slf)?.iter().map(text).collect::<PyResult<Vec<_>>>()?;
         Ok(format!("pdmp.Conditions({})", parts.join(", ")))
     }
 }
@@ -188,8 +191,8 @@ pub(crate) fn blend(a: &Conditions, b: &Conditions, share: Scalar<'_>) -> PyResu
     a.0.blend(&b.0, share.number("share")?).map(Conditions).map_err(raise)
 }
 
-/// Returns the conditions of a call: `conditions`, single ones replaced by `changes`, those absent from both predicted for
-/// `context`.
+/// Returns the conditions of a call: `conditions`, single ones replaced by `changes`, those absent from both predicted
+/// for `context`.
 pub(crate) fn conditions_of(
     model: &pdmp_core::Model,
     conditions: Option<&Bound<'_, PyAny>>,
@@ -198,12 +201,12 @@ pub(crate) fn conditions_of(
 ) -> PyResult<Inner> {
     let base = match conditions {
         None => Inner::default(),
-        Some(given) => match given.cast::<Conditions>() {
+        Some(object) => match object.cast::<Conditions>() {
             Ok(conditions) => conditions.get().0.clone(),
             Err(_) => {
                 let text = format!(
                     "conditions = {}: expected pdmp.Conditions; pass single ones by name, such as style=",
-                    quoted(given)
+                    quoted(object)
                 );
                 return Err(PyTypeError::new_err(text));
             }
@@ -256,15 +259,15 @@ fn is_absent(changes: &Bound<'_, PyDict>, name: &str) -> bool {
 }
 
 /// Returns the conditions that are not None, by name.
-fn given<'py>(conditions: &Bound<'py, Conditions>) -> PyResult<Bound<'py, PyDict>> {
-    let found = PyDict::new(conditions.py());
+fn present<'py>(conditions: &Bound<'py, Conditions>) -> PyResult<Bound<'py, PyDict>> {
+    let present = PyDict::new(conditions.py());
     for name in NAMES {
         let value = conditions.getattr(name)?;
         if !value.is_none() {
-            found.set_item(name, value)?;
+            present.set_item(name, value)?;
         }
     }
-    Ok(found)
+    Ok(present)
 }
 
 fn array<'py>(py: Python<'py>, values: &Option<Vec<f64>>) -> Option<Bound<'py, PyArray1<f64>>> {

@@ -11,16 +11,16 @@ use crate::fit::map_of;
 
 /// Regression from contexts to outputs with predictive covariance.
 ///
-/// `fit` uses it from contexts to style, goal, start and duration (Section 4.1.2 of the paper); here outputs are arbitrary.
-/// Each principal component of the outputs is modelled as y = φ(h)ᵀβ + f(h) + ε:
+/// `fit` uses it from contexts to style, goal, start and duration (Section 4.1.2 of the paper); here outputs are
+/// arbitrary. Each principal component of the outputs is modelled as y = φ(h)ᵀβ + f(h) + ε:
 ///
 /// - "linear" is least squares with φ = (1, h) and f = 0.
-/// - "gp" and "polynomial" have φ = 1 and a Gaussian process f, whose kernel is Matérn-5/2 or that of polynomials of second
-///   degree. Restricted maximum likelihood estimates the ratio of f to the noise for each component; leave-one-out error
-///   decides the length scale.
+/// - "gp" and "polynomial" have φ = 1 and a Gaussian process f, whose kernel is Matérn-5/2 or that of polynomials of
+///   second degree. Restricted maximum likelihood estimates the ratio of f to the noise for each component;
+///   leave-one-out error decides the length scale.
 /// - "stacked" is the mean plus w_g·g + w_l·l, with the deviations g of "gp" and l of a ridge regression. The weights
-///   minimise the leave-one-out error under w_g + w_l = 1 inside the range of the contexts, and under w_g + w_l ≤ 1 beyond
-///   a tenth of their range outside.
+///   minimise the leave-one-out error under w_g + w_l = 1 inside the range of the contexts, and under w_g + w_l ≤ 1
+///   beyond a tenth of their range outside.
 ///
 /// Numbers are scaled by their spread; labels are equal or not. Repetitions of a context are averaged and count once.
 ///

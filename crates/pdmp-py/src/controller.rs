@@ -1,11 +1,7 @@
 //! Control loops.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use ndarray::ArrayView1;
-use numpy::PyArray1;
-use numpy::npyffi::{_PyArray_GET_ITEM_DATA, NPY_ARRAY_WRITEABLE};
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Kind};
 use pyo3::exceptions::PyValueError;
@@ -15,6 +11,7 @@ use pyo3::types::PyDict;
 use crate::conditions::conditions_of;
 use crate::convert::{Reduced, Vector, items, quoted, read_only, refill};
 use crate::error::raise;
+use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
 
 /// State of a movement: in progress (`WORKING`, 1, true) or settled on its goal (`FINISHED`, 2, false).
@@ -43,41 +40,6 @@ impl Status {
     }
 }
 
-/// Bits of the outputs, which the loop may write while arrays over them are read.
-#[pyclass(frozen, module = "pdmp._native")]
-struct Memory(Box<[AtomicU64]>);
-
-/// Vector that the loop writes and Python reads without a copy. Each access returns a new read-only array, so that a
-/// change of its shape affects no other reader. numpy does not own the memory, so that it can neither make the array
-/// writable nor resize it.
-struct Output(Py<Memory>);
-
-impl Output {
-    fn new(py: Python<'_>, length: usize) -> PyResult<Self> {
-        Py::new(py, Memory((0..length).map(|_| AtomicU64::new(0)).collect())).map(Self)
-    }
-
-    fn write(&self, values: &[f64]) {
-        for (bits, value) in self.0.get().0.iter().zip(values) {
-            bits.store(value.to_bits(), Relaxed);
-        }
-    }
-
-    #[allow(unsafe_code)]
-    fn view<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        let memory = &self.0.get().0;
-        // SAFETY: the pointer and the length are those of the boxed slice, which is neither moved nor freed while the array
-        // refers to its owner as base. `AtomicU64` has the size and alignment of `f64`, and every bit pattern is an `f64`.
-        // The writable flag of the new array is cleared before any other code sees it.
-        unsafe {
-            let numbers = ArrayView1::from_shape_ptr(memory.len(), memory.as_ptr().cast::<f64>());
-            let array = PyArray1::borrow_from_array(&numbers, self.0.bind(py).clone().into_any());
-            (*_PyArray_GET_ITEM_DATA(array.as_ptr().cast())).flags &= !NPY_ARRAY_WRITEABLE;
-            array
-        }
-    }
-}
-
 /// Buffers for vector arguments, which may be lists, strided arrays or the controller's own outputs.
 #[derive(Default)]
 struct Arguments {
@@ -91,9 +53,9 @@ struct Arguments {
 
 /// Running movement, returned by `Model.controller`.
 ///
-/// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain valid.
-/// `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that is rejected
-/// leaves the present one in force.
+/// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
+/// valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
+/// is rejected leaves the present one in force.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,
@@ -149,20 +111,21 @@ impl Controller {
     ///     tau u' = k = 1 / (1 + k_s |d / range|**2)
     ///     tau o' = 5 k (e - o) / extent
     ///
-    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the tracking
-    /// error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All terms are
-    /// evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than m. A robot
-    /// that is blocked thus holds the movement and nearly stops its phase; released, it continues from there. A robot with
-    /// a constant tracking error ends no further from the goal than that error, and the movement finishes.
+    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
+    /// tracking error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All
+    /// terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
+    /// m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
+    /// there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
+    /// finishes.
     ///
     /// Parameters
     /// ----------
     /// dt : float, optional
     ///     Length of this tick in s; by default that of the controller. A tick of length zero changes nothing.
     /// measured : array_like, (D,), optional
-    ///     Measured position m in the unit of each degree of freedom. Errors of angles (rad, deg, °) are wrapped to half a
-    ///     turn. None means no new measurement: the last error m - y stays in force until the next one or `release`, so
-    ///     that a sensor may be slower than the loop.
+    ///     Measured position m in the unit of each degree of freedom. Errors of angles (rad, deg, °) are wrapped to
+    ///     half a turn. None means no new measurement: the last error m - y stays in force until the next one or
+    ///     `release`, so that a sensor may be slower than the loop.
     /// coupling : tuple of two array_like, (D,), optional
     ///     Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
     ///

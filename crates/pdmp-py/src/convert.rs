@@ -334,8 +334,8 @@ pub(crate) fn writable<'py>(out: &Bound<'py, PyAny>, shape: &[usize]) -> PyResul
     Ok(array.clone())
 }
 
-/// Returns whether elements of an array may share memory: in order of their strides, each axis must step over the extent
-/// of the one before.
+/// Returns whether elements of an array may share memory: in order of their strides, each axis must step over the
+/// extent of the one before.
 fn overlaps(shape: &[usize], strides: &[isize]) -> bool {
     if shape.contains(&0) {
         return false;

@@ -18,8 +18,8 @@ use crate::scalar::{Scalar, optional_number};
 /// Parameters
 /// ----------
 /// position : array_like, (T, D), or Trajectory
-///     Positions in the unit of each degree of freedom; at least four samples. The columns of a data frame supply names,
-///     and a trajectory supplies time stamps, names and units, unless they are given.
+///     Positions in the unit of each degree of freedom; at least four samples. The columns of a data frame supply
+///     names, and a trajectory supplies time stamps, names and units, unless they are given.
 /// dt : float, optional
 ///     Sampling interval in s. Without `dt` and `time`, `fit` needs it.
 /// time : array_like, (T,), optional
@@ -200,7 +200,8 @@ fn time_stamps(value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let time = vector("time", array)?;
     match time.first() {
         Some(first) if first.abs() > MAX_STAMP => Err(PyValueError::new_err(format!(
-            "time[0] = {first:e} s is later than the year 5000: pass seconds, (time - time[0]) * 1e-9 where these are ns"
+            "time[0] = {first:e} s is later than the year 5000: pass seconds, such as (time - time[0]) * 1e-9 \
+             for ns"
         ))),
         _ => Ok(time),
     }
@@ -336,8 +337,8 @@ impl Trajectory {
     /// Returns
     /// -------
     /// pandas.DataFrame
-    ///     The index is the time `t` in s. Columns are positions `<name>`, velocities `<name>_velocity` and accelerations
-    ///     `<name>_acceleration`; `attrs["units"]` maps each column to its unit.
+    ///     The index is the time `t` in s. Columns are positions `<name>`, velocities `<name>_velocity` and
+    ///     accelerations `<name>_acceleration`; `attrs["units"]` maps each column to its unit.
     ///
     /// Raises
     /// ------

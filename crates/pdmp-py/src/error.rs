@@ -53,8 +53,8 @@ fn system_error(path: &Path, source: &std::io::Error) -> PyErr {
     }
 }
 
-/// Escapes control characters, among them line breaks and marks of the writing direction: names and labels come from files
-/// and are printed on terminals.
+/// Escapes control characters, among them line breaks and marks of the writing direction: names and labels come from
+/// files and are printed on terminals.
 pub(crate) fn printable(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -94,8 +94,8 @@ pub(crate) fn nested<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     call()
 }
 
-/// Runs a long call with the interpreter released. The call reports its stage and completed fraction to a function, which
-/// passes them to `progress` and returns [`Error::Interrupted`] after Ctrl-C or an exception of `progress`.
+/// Runs a long call with the interpreter released. The call reports its stage and completed fraction to a function,
+/// which passes them to `progress` and returns [`Error::Interrupted`] after Ctrl-C or an exception of `progress`.
 pub(crate) fn detached<S, T: Send>(
     py: Python<'_>,
     progress: impl Fn(Python<'_>, S, f64) -> PyResult<()> + Sync,

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::regression::Basis;
 use pdmp_core::learning::{
-    Alignment, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
+    CanonicalOptions, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
 };
 use pdmp_core::numerics::Smoothing;
 use pdmp_core::{FitOptions, Kind};
@@ -17,7 +17,7 @@ use pyo3::types::{PyBool, PyList, PyMapping};
 
 use crate::convert::{items, matrix, numbers, quoted};
 use crate::demonstration::{Demonstration, Source, Trajectory};
-use crate::error::detached;
+use crate::error::{detached, raise};
 use crate::model::Model;
 use crate::regression::{Gp, NGnet};
 use crate::scalar::{Scalar, optional_count, optional_number};
@@ -31,8 +31,8 @@ use crate::warp::TimeWarp;
 /// Parameters
 /// ----------
 /// demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D)
-///     Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the readers
-///     return, the values are used. The columns of data frames name the degrees of freedom.
+///     Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
+///     readers return, the values are used. The columns of data frames name the degrees of freedom.
 /// kind : {"discrete", "rhythmic"}
 ///     Movement from a start to a goal, or around an anchor.
 /// dt : float, optional
@@ -42,47 +42,49 @@ use crate::warp::TimeWarp;
 /// contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
 ///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
 /// map : {"auto", "stacked", "gp", "linear", "polynomial"}
-///     Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge regression by
-///     their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the process alone,
-///     "linear" least squares as in the paper, "polynomial" ridge regression of second degree. "auto" is "stacked"; it is
-///     "linear" for labels alone, each of which then has the mean of its demonstrations, for two different contexts and
-///     for more than 1024. The repr of `model.map` states the weights.
+///     Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
+///     regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
+///     process alone, "linear" least squares as in the paper, "polynomial" ridge regression of second degree. "auto" is
+///     "stacked"; it is "linear" for labels alone, each of which then has the mean of its demonstrations, for two
+///     different contexts and for more than 1024. The repr of `model.map` states the weights.
 /// n_styles : int or "auto", optional
-///     Style dimension J. By default the systematic styles: as many as carry nine tenths of the sum of the singular values,
-///     at least five (or half of the demonstrations) and those that the contexts explain (F-test), without those that
-///     measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to the error of
-///     cross-validation over contexts, in at most ten folds.
+///     Style dimension J. By default the number that carries nine tenths of the sum of the singular
+///     values, at least five (or half of the demonstrations) and those that the contexts explain (F-test), without
+///     those that measurement noise alone would give (parallel analysis). "auto" applies the one-standard-error rule to
+///     the error of cross-validation over contexts, in at most ten folds.
 /// singular_value_share : float, optional
-///     Share in (0, 1], the paper's rule: J is the smallest number of singular values whose sum exceeds this share of the
-///     sum of all, for example 0.9.
+///     Share in (0, 1], the paper's rule: J is the smallest number of singular values whose sum exceeds this share of
+///     the sum of all, for example 0.9.
 /// basis : {"gp", "ngnet"}, GP or NGnet
 ///     Regression of the landscape.
 /// smoothing : "auto", float or None
-///     Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom, which
-///     leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
+///     Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom,
+///     which leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
 ///     `model.noise` and `model.cut_offs` hold the result.
 /// nominal : int, optional
 ///     Index of the nominal demonstration; by default the one of median duration.
 /// n_samples : int, optional
-///     Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if that
-///     has fewer than 150.
-/// transport : {"learnt", "immediate"}
-///     Motion of the frame of a discrete movement from start to goal: along the learnt profile of the demonstrations
-///     (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past its end the movement
-///     brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as in the paper.
+///     Number C of samples after alignment, from 4 to 1e6; by default that of the nominal demonstration, and more if
+///     that has fewer than 150.
+/// transport : {"learnt", "immediate"}, optional
+///     Motion of the frame of a discrete movement from start to goal: by default along the learnt profile of the
+///     demonstrations (`Model.transport`), or at once as in the paper, where a moved goal shifts the whole path. Past
+///     its end the movement brakes (`Model.braking`); with "immediate" transport the forcing fades with the phase, as
+///     in the paper.
 /// dof_scale : None, "unit", "range" or array_like, (D,)
-///     Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all units are
-///     equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among them.
-///     "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and also apply to
-///     a time warp.
+///     Scale of each degree of freedom in the factorisation. "unit" keeps the data as recorded, the default if all
+///     units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
+///     them. "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and
+///     also apply to a time warp.
 /// alignment : {"linear", "warp"} or TimeWarp
-///     Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the demonstrations
-///     closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a demonstration has
-///     fewer than 16 samples; with three or more different contexts it is applied only if it lowers the cross-validation
-///     error over contexts by more than its standard error, and `model.segment_durations` has one column if it is not.
+///     Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the
+///     demonstrations closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a
+///     demonstration has fewer than 16 samples; with three or more different contexts it is applied only if it lowers
+///     the cross-validation error over contexts by more than its standard error, and `model.segment_durations` has one
+///     column if it is not.
 /// landmarks : array_like, (M, E), optional
-///     Times in s of E landmarks in each demonstration, from its first sample or on the clock of its time stamps. They are
-///     aligned to those of the nominal demonstration, in place of a warp.
+///     Times in s of E landmarks in each demonstration, from its first sample or on the clock of its time stamps. They
+///     are aligned to those of the nominal demonstration, in place of a warp.
 /// tau : float, optional
 ///     Time constant τ in s of a discrete primitive; by default the nominal duration.
 /// alpha_z : float
@@ -90,11 +92,11 @@ use crate::warp::TimeWarp;
 /// beta_z : float, optional
 ///     Stiffness β_z of the output system, from 1e-6 to 1e6, without unit; by default `alpha_z / 4` (critical damping).
 /// alpha_x : float, optional
-///     Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With "immediate"
-///     transport the forcing fades with x past the end: if a movement leaves its goal there before it settles,
-///     `alpha_x = alpha_z` reduces the deviation most.
-/// mu : float
-///     Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit.
+///     Rate α_x of the discrete canonical system, without unit; by default such that x = 0.01 at the end. With
+///     "immediate" transport the forcing fades with x past the end: if a movement leaves its goal there before it
+///     settles, `alpha_x = alpha_z` reduces the deviation most.
+/// mu : float, optional
+///     Rate μ of the amplitude of a rhythmic primitive, from 1e-6 to 1e6, without unit; 1 by default.
 /// threads : int, optional
 ///     Largest number of threads; by default all that the system offers. The model does not depend on it.
 /// progress : callable, optional
@@ -109,8 +111,8 @@ use crate::warp::TimeWarp;
 /// -----
 /// UserWarning
 ///     Implausible samples, with their positions: time stamps much closer than the others, dropouts recorded as zeros,
-///     padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole turns
-///     apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
+///     padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole
+///     turns apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
 ///
 /// Raises
 /// ------
@@ -134,14 +136,18 @@ use crate::warp::TimeWarp;
 /// >>> fitted.n_demos, fitted.n_dofs, fitted.n_styles
 /// (3, 2, 1)
 #[pyfunction]
-#[pyo3(signature = (
-    demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None, singular_value_share=None, basis=None,
-    smoothing=SmoothingArgument(Smoothing::Auto), nominal=None, n_samples=None, transport="learnt", dof_scale=None,
-    alignment=None, landmarks=None, tau=None, alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None,
-    mu=Scalar::Number(1.0), threads=None, progress=None
-), text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, singular_value_share=None, \
-    basis='gp', smoothing='auto', nominal=None, n_samples=None, transport='learnt', dof_scale=None, \
-    alignment='linear', landmarks=None, tau=None, alpha_z=25.0, beta_z=None, alpha_x=None, mu=1.0, threads=None, progress=None)")]
+#[pyo3(
+    signature = (
+        demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None,
+        singular_value_share=None, basis=None, smoothing=SmoothingArgument(Smoothing::Auto), nominal=None,
+        n_samples=None, transport=None, dof_scale=None, alignment=None, landmarks=None, tau=None,
+        alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None, mu=None, threads=None, progress=None
+    ),
+    text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, \
+                      singular_value_share=None, basis='gp', smoothing='auto', nominal=None, n_samples=None, \
+                      transport=None, dof_scale=None, alignment='linear', landmarks=None, tau=None, alpha_z=25.0, \
+                      beta_z=None, alpha_x=None, mu=None, threads=None, progress=None)"
+)]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -157,7 +163,7 @@ pub(crate) fn fit(
     smoothing: SmoothingArgument,
     nominal: Option<Scalar<'_>>,
     n_samples: Option<Scalar<'_>>,
-    transport: &str,
+    transport: Option<&str>,
     dof_scale: Option<&Bound<'_, PyAny>>,
     alignment: Option<&Bound<'_, PyAny>>,
     landmarks: Option<&Bound<'_, PyAny>>,
@@ -165,34 +171,27 @@ pub(crate) fn fit(
     alpha_z: Scalar<'_>,
     beta_z: Option<Scalar<'_>>,
     alpha_x: Option<Scalar<'_>>,
-    mu: Scalar<'_>,
+    mu: Option<Scalar<'_>>,
     threads: Option<Scalar<'_>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
     let demos = demonstrations("demos", demos)?;
-    let options = FitOptions {
-        alignment: Alignment {
-            kind: kind_of(kind)?,
-            dt: optional_number("dt", dt)?,
-            period: numbers("period", period)?,
-            smoothing: smoothing.0,
-            nominal: optional_count("nominal", nominal)?,
-            n_samples: optional_count("n_samples", n_samples)?,
-            time_scaling: time_scaling_of(alignment, landmarks)?,
-        },
-        contexts: contexts.map(crate::convert::contexts).transpose()?,
-        map: map_of(map)?,
-        n_styles: n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?,
-        basis: basis_of(basis)?,
-        transport: transport_of(transport)?,
-        dof_scale: dof_scale_of(dof_scale)?,
-        tau: optional_number("tau", tau)?,
-        alpha_z: alpha_z.number("alpha_z")?,
-        beta_z: optional_number("beta_z", beta_z)?,
-        alpha_x: optional_number("alpha_x", alpha_x)?,
-        mu: mu.number("mu")?,
-        threads: crate::convert::threads(threads)?,
-    };
+    let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
+    let rhythmic = (optional_number("mu", mu)?, period);
+    let mut options = FitOptions::new(canonical_of(kind_of(kind)?, discrete, rhythmic)?);
+    options.dt = optional_number("dt", dt)?;
+    options.smoothing = smoothing.0;
+    options.nominal = optional_count("nominal", nominal)?;
+    options.n_samples = optional_count("n_samples", n_samples)?;
+    options.time_scaling = time_scaling_of(alignment, landmarks)?;
+    options.contexts = contexts.map(crate::convert::contexts).transpose()?;
+    options.map = map_of(map)?;
+    options.n_styles = n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?;
+    options.basis = basis_of(basis)?;
+    options.dof_scale = dof_scale_of(dof_scale)?;
+    options.alpha_z = alpha_z.number("alpha_z")?;
+    options.beta_z = optional_number("beta_z", beta_z)?;
+    options.threads = crate::convert::threads(threads)?;
     let report = |py: Python<'_>, stage: Stage, fraction| match &progress {
         Some(progress) => progress.call1(py, (stage.name(), fraction)).map(drop),
         None => Ok(()),
@@ -200,6 +199,31 @@ pub(crate) fn fit(
     let model = detached(py, report, |progress| fit_with(&demos, &options, progress))?;
     crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
+}
+
+/// Returns the options of the canonical system. Rejects arguments of the other kind.
+fn canonical_of(
+    kind: Kind,
+    (tau, alpha_x, transport): (Option<f64>, Option<f64>, Option<&str>),
+    (mu, period): (Option<f64>, Option<&Bound<'_, PyAny>>),
+) -> PyResult<CanonicalOptions> {
+    let reject = |name, is_present: bool| match is_present {
+        true => Err(raise(pdmp_core::Error::Kind { name, kind, instead: ": leave it out" })),
+        false => Ok(()),
+    };
+    match kind {
+        Kind::Discrete => {
+            reject("mu", mu.is_some())?;
+            reject("period", period.is_some())?;
+            Ok(CanonicalOptions::Discrete { tau, alpha_x, transport: transport_of(transport.unwrap_or("learnt"))? })
+        }
+        Kind::Rhythmic => {
+            reject("tau", tau.is_some())?;
+            reject("alpha_x", alpha_x.is_some())?;
+            reject("transport", transport.is_some())?;
+            Ok(CanonicalOptions::Rhythmic { mu: mu.unwrap_or(1.0), periods: numbers("period", period)? })
+        }
+    }
 }
 
 fn n_styles_of(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {
@@ -340,7 +364,7 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
 
 fn transport_of(transport: &str) -> PyResult<TransportSelection> {
     match transport {
-        "learnt" => Ok(TransportSelection::FitSummary),
+        "learnt" => Ok(TransportSelection::Learnt),
         "immediate" => Ok(TransportSelection::Immediate),
         _ => Err(PyValueError::new_err(format!("transport = {transport:?}: must be \"learnt\" or \"immediate\""))),
     }

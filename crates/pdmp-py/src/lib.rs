@@ -1,5 +1,5 @@
-//! Python bindings of pdmp-core. Each function converts its arguments, releases the interpreter if the call is long, calls
-//! the core and converts the result. Summaries of docstrings are in the imperative mood, as numpydoc asks.
+//! Python bindings of pdmp-core. Each function converts its arguments, releases the interpreter if the call is long,
+//! calls the core and converts the result.
 
 mod batch;
 mod conditions;
@@ -12,9 +12,10 @@ mod error;
 mod factorization;
 mod fit;
 mod inspection;
-mod jacobian;
 mod model;
 mod model_getters;
+mod motion;
+mod output;
 mod prediction;
 mod preprocessing;
 mod regression;

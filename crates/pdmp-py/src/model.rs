@@ -1,4 +1,4 @@
-//! Models: movements, predictions and files.
+//! Models: conditions, styles, predictions and files.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -6,16 +6,15 @@ use std::sync::Arc;
 use ndarray::Array3;
 use numpy::IntoPyArray;
 use pdmp_core::learning::style_of;
-use pdmp_core::motion::{TimeGrid, prediction_band, rollout_with};
+use pdmp_core::motion::{TimeGrid, prediction_band};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyString};
+use pyo3::types::{PyBytes, PyString};
 
-use crate::conditions::{Conditions, conditions_of};
-use crate::controller::Controller;
+use crate::conditions::Conditions;
 use crate::convert::{Cube, Matrix, Reduced, Vector, optional, quoted, to_numpy, vector};
-use crate::demonstration::{Demonstration, Trajectory};
-use crate::error::{interruptible, raise};
+use crate::demonstration::Demonstration;
+use crate::error::raise;
 use crate::prediction::Prediction;
 use crate::scalar::{Scalar, optional_number};
 
@@ -30,9 +29,9 @@ pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
 /// Parameters
 /// ----------
 /// path : path-like
-///     A `.safetensors` file that `Model.save` wrote. Files of unknown origin are safe to load: a file contains no code and
-///     no reference to other files, needs memory and time in proportion to its size, and generates finite numbers or an
-///     error. The checksum detects damage, not intent: the author of a file decides its movements and texts.
+///     A `.safetensors` file that `Model.save` wrote. Files of unknown origin are safe to load: a file contains no code
+///     and no reference to other files, needs memory and time in proportion to its size, and generates finite numbers
+///     or an error. The checksum detects damage, not intent: the author of a file decides its movements and texts.
 ///
 /// Returns
 /// -------
@@ -60,63 +59,6 @@ pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
 
 #[pymethods]
 impl Model {
-    /// Compute the movement under constant conditions.
-    ///
-    /// Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb (discrete)
-    /// or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
-    ///
-    /// Parameters
-    /// ----------
-    /// conditions : Conditions, optional
-    ///     Conditions at the start.
-    /// dt : float
-    ///     Interval between samples in s.
-    /// duration : float, optional
-    ///     Length in s. By default the demonstrated duration scaled by `tau`, the sum of `segment_durations`, or one period
-    ///     of a rhythmic movement.
-    /// context : array_like or list, (Q,), optional
-    ///     Context whose prediction supplies absent conditions: style, goal, start or anchor, and duration.
-    /// **changes
-    ///     Single conditions by name, which replace those of `conditions`; see `Conditions`.
-    ///
-    /// Returns
-    /// -------
-    /// Trajectory
-    ///     n + 1 samples, where n is duration / dt rounded down.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     A length is wrong, a number is not finite, or a condition belongs to the other kind of primitive.
-    /// TypeError
-    ///     A keyword is unknown, or `conditions` has another type.
-    ///
-    /// Examples
-    /// --------
-    /// >>> trajectory = model.rollout(goal=[1.1, 0.0], tau=2.0, dt=0.001)
-    /// >>> trajectory.position.shape
-    /// (2001, 2)
-    /// >>> np.allclose(trajectory.position[-1], [1.1, 0.0], atol=1e-3)
-    /// True
-    #[pyo3(
-        signature = (conditions=None, *, dt=Scalar::Number(0.01), duration=None, context=None, **changes),
-        text_signature = "($self, conditions=None, *, dt=0.01, duration=None, context=None, **changes)"
-    )]
-    fn rollout(
-        &self,
-        py: Python<'_>,
-        conditions: Option<&Bound<'_, PyAny>>,
-        dt: Scalar<'_>,
-        duration: Option<Scalar<'_>>,
-        context: Option<&Bound<'_, PyAny>>,
-        changes: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Trajectory> {
-        let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
-        let conditions = conditions_of(&self.0, conditions, context, changes)?;
-        let trajectory = interruptible(py, |progress| rollout_with(self.0.primitive(), &conditions, grid, progress))?;
-        Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
-    }
-
     /// Return the conditions of one demonstration, or the mean of several.
     ///
     /// Parameters
@@ -165,10 +107,10 @@ impl Model {
 
     /// Estimate the style of a new demonstration.
     ///
-    /// The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of the
-    /// styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A cycle with
-    /// another initial phase is first shifted to that of the model's. The demonstration is inspected as in `fit`, with the
-    /// same warnings. A model with a time warp warps the demonstration too.
+    /// The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of
+    /// the styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A
+    /// cycle with another initial phase is first shifted to that of the model's. The demonstration is inspected as in
+    /// `fit`, with the same warnings. A model with a time warp warps the demonstration too.
     ///
     /// Parameters
     /// ----------
@@ -190,8 +132,9 @@ impl Model {
     /// ------
     /// ValueError
     ///     Names or units differ from those of the model, or the model does not describe the demonstration: its closest
-    ///     movement deviates by more than half of the demonstration's deviation from its mean while the forcing left out
-    ///     exceeds three times that of the fitted demonstrations, or its style is more than ten times as large as theirs.
+    ///     movement deviates by more than half of the demonstration's deviation from its mean while the forcing left
+    ///     out exceeds three times that of the fitted demonstrations, or its style is more than ten times as large as
+    ///     theirs.
     ///
     /// Examples
     /// --------
@@ -310,8 +253,8 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     The model was fitted without contexts, or `context` has a wrong length, an unknown label, or a number that is
-    ///     not finite.
+    ///     The model was fitted without contexts, or `context` has a wrong length, an unknown label, or a number that
+    ///     is not finite.
     ///
     /// Examples
     /// --------
@@ -327,8 +270,8 @@ impl Model {
     /// Compute the prediction band of a new movement for a context.
     ///
     /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
-    /// conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The band
-    /// compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
+    /// conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
+    /// band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
     ///
     /// Parameters
     /// ----------
@@ -390,64 +333,6 @@ impl Model {
     /// True
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.0.save(&path)).map_err(raise)
-    }
-
-    /// Start a movement that is computed tick by tick in a control loop.
-    ///
-    /// Parameters
-    /// ----------
-    /// dt : float
-    ///     Length of a tick in s.
-    /// conditions : Conditions, optional
-    ///     Conditions at the start. The controller takes the sum of segment durations; see `tau_at` to follow them.
-    /// transition : float, optional
-    ///     Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0 switches
-    ///     immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of the period
-    ///     (rhythmic). A new goal takes the remaining time of the movement if that is longer, unless transport is
-    ///     immediate.
-    /// context : array_like or list, (Q,), optional
-    ///     Context whose prediction supplies absent conditions.
-    /// **changes
-    ///     Single conditions by name, as in `rollout`.
-    ///
-    /// Returns
-    /// -------
-    /// Controller
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     `dt` or `transition` is out of range, or `rollout` rejects the conditions.
-    /// TypeError
-    ///     A keyword is unknown, or `conditions` has another type.
-    ///
-    /// Examples
-    /// --------
-    /// >>> controller = model.controller(dt=0.01, goal=[1.0, 0.1])
-    /// >>> controller.step()
-    /// Status.WORKING
-    /// >>> controller.goal = [1.1, 0.0]
-    /// >>> while controller.step():
-    /// ...     pass
-    /// >>> np.allclose(controller.position, [1.1, 0.0], atol=0.01)
-    /// True
-    #[pyo3(
-        signature = (dt=Scalar::Number(0.001), conditions=None, *, transition=None, context=None, **changes),
-        text_signature = "($self, dt=0.001, conditions=None, *, transition=None, context=None, **changes)"
-    )]
-    fn controller(
-        &self,
-        py: Python<'_>,
-        dt: Scalar<'_>,
-        conditions: Option<&Bound<'_, PyAny>>,
-        transition: Option<Scalar<'_>>,
-        context: Option<&Bound<'_, PyAny>>,
-        changes: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Controller> {
-        let (dt, transition) = (dt.number("dt")?, optional_number("transition", transition)?);
-        let conditions = conditions_of(&self.0, conditions, context, changes)?;
-        let controller = pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
-        Controller::new(py, Arc::clone(&self.0), controller)
     }
 
     /// Return the contents of a model file as bytes.

@@ -13,13 +13,13 @@ pub(crate) struct Prediction {
     conditions: Py<Conditions>,
     /// Predicted duration or period in s.
     duration: f64,
-    /// Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order; None if
-    /// the demonstrations leave no degree of freedom to estimate it.
+    /// Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order;
+    /// None if the demonstrations leave no degree of freedom to estimate it.
     covariance: Option<Py<PyArray2<f64>>>,
     /// Degrees of freedom of the covariance estimate.
     degrees_of_freedom: usize,
-    /// Distance (Q,) of each context value from the demonstrated range, relative to that range: 0 inside and for labels, inf
-    /// for a value that differs from a constant one.
+    /// Distance (Q,) of each context value from the demonstrated range, relative to that range: 0 inside and for
+    /// labels, inf for a value that differs from a constant one.
     extrapolation: Py<PyArray1<f64>>,
 }
 

@@ -13,10 +13,10 @@ use crate::scalar::Scalar;
 
 /// Resample a recording at even intervals.
 ///
-/// The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no denser
-/// than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the residuals
-/// of the nearest recorded samples: noise stays white, so that a fit can still smooth it. A denser grid samples the spline
-/// through all samples. Remove frequencies above 1/(2 dt) with `lowpass` first.
+/// The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no
+/// denser than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the
+/// residuals of the nearest recorded samples: noise stays white, so that a fit can still smooth it. A denser grid
+/// samples the spline through all samples. Remove frequencies above 1/(2 dt) with `lowpass` first.
 ///
 /// Parameters
 /// ----------
@@ -42,9 +42,10 @@ pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: Scalar<'_>) -> 
 
 /// Trim the rests before and after the movement of a recording.
 ///
-/// The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed, where
-/// v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise exceeds the
-/// threshold, only stretches above the threshold that also exceed the noise count. The samples remain as recorded.
+/// The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed,
+/// where v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise
+/// exceeds the threshold, only stretches above the threshold that also exceed the noise count. The samples remain as
+/// recorded.
 ///
 /// Parameters
 /// ----------
@@ -71,8 +72,8 @@ pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) 
 
 /// Cut a recording at given times.
 ///
-/// Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the recording.
-/// As with `resample`, noise stays white.
+/// Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the
+/// recording. As with `resample`, noise stays white.
 ///
 /// Parameters
 /// ----------
@@ -94,7 +95,7 @@ pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) 
 #[pyfunction]
 pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>) -> PyResult<Vec<Demonstration>> {
     let times = vector("times", times)?;
-    let parts = py.detach(|| preprocessing::cut(&demo.0, &times)).map_err(raise)?;
+    let parts = py.detach(|| preprocessing::split_at(&demo.0, &times)).map_err(raise)?;
     Ok(parts.into_iter().map(Demonstration).collect())
 }
 
@@ -160,11 +161,11 @@ pub(crate) fn residuals<'py>(
 
 /// Estimate the period of a cyclic recording by autocorrelation.
 ///
-/// A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal of
-/// linear trends. The period is the first peak of A that equals the highest peak within the variation between cycles, at
-/// the vertex of the parabola through three samples; peaks at half a cycle and at periods of harmonics are lower. A peak
-/// must exceed the significance level for noise of the same autocorrelation, which rises as fewer independent samples
-/// overlap.
+/// A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal
+/// of linear trends. The period is the first peak of A that equals the highest peak within the variation between
+/// cycles, at the vertex of the parabola through three samples; peaks at half a cycle and at periods of harmonics are
+/// lower. A peak must exceed the significance level for noise of the same autocorrelation, which rises as fewer
+/// independent samples overlap.
 ///
 /// Parameters
 /// ----------
@@ -225,14 +226,15 @@ pub(crate) fn fill<'py>(
     let (position, time) = (matrix("position", "(T, D)", position)?, vector("time", time)?);
     let (names, turns) = (texts("names", names)?, vector("turns", turns)?);
     let max_gap = max_gap.number("max_gap")?;
-    let filled = preprocessing::fill(position, &time, &names, &turns, max_gap).map_err(raise)?;
+    let filled = preprocessing::fill_gaps(position, &time, &names, &turns, max_gap).map_err(raise)?;
     Ok(filled.into_pyarray(py))
 }
 
 /// Rejected cycle or recording: index of the recording, start and period in s, the reason, and whether it is the whole
 /// recording.
 type Rejected = (usize, f64, f64, String, bool);
-/// Indices of a recording and of a degree of freedom, its gain per cycle, and the number of full turns subtracted from it.
+/// Indices of a recording and of a degree of freedom, its gain per cycle, and the number of full turns subtracted from
+/// it.
 type Growth = (usize, usize, f64, i32);
 /// Cycles, their periods (K,) in s, their gains (K, D), the indices of their recordings, rejections and growths.
 type CutCycles<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, Vec<Rejected>, Vec<Growth>);

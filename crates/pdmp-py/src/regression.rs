@@ -12,13 +12,14 @@ use crate::scalar::{Scalar, optional_number};
 /// Gaussian process regression, the paper's choice of basis functions.
 ///
 /// All outputs share kernel, length scale and noise ratio. Hyperparameters that are not given maximise the marginal
-/// likelihood (Rasmussen and Williams 2006, Section 5.4.1). `regress` searches noise ratios from 1e-10 to 1e4. In `fit`,
-/// a noise ratio that is not given is at most 1e-6, and the noise variance at most 1e-6 of the targets' mean square: no
-/// style can restore a signal that the landscape takes for noise, and `smoothing` removes the noise of demonstrations.
+/// likelihood (Rasmussen and Williams 2006, Section 5.4.1). `regress` searches noise ratios from 1e-10 to 1e4. In
+/// `fit`, a noise ratio that is not given is at most 1e-6, and the noise variance at most 1e-6 of the targets' mean
+/// square: no style can restore a signal that the landscape takes for noise, and `smoothing` removes the noise of
+/// demonstrations.
 ///
 /// Parameters
 /// ----------
-/// kernel : {"matern52", "matern32", "squared_exponential"}
+/// kernel : {"matern52", "matern32"}
 ///     Covariance function over the clock u; periodic for rhythmic movements.
 /// length : float, optional
 ///     Length scale, in units of the clock u = t / tau; positive. Estimated if not given.
@@ -40,9 +41,7 @@ impl Gp {
     fn new(kernel: &str, length: Option<Scalar<'_>>, noise: Option<Scalar<'_>>) -> PyResult<Self> {
         let (length, noise) = (optional_number("length", length)?, optional_number("noise", noise)?);
         let kernel = Kernel::from_name(kernel).ok_or_else(|| {
-            PyValueError::new_err(format!(
-                "kernel = {kernel:?}: must be \"matern32\", \"matern52\" or \"squared_exponential\""
-            ))
+            PyValueError::new_err(format!("kernel = {kernel:?}: must be \"matern32\" or \"matern52\""))
         })?;
         regression::Gp::new(kernel, length, noise).map(Self).map_err(raise)
     }
@@ -208,7 +207,10 @@ pub(crate) struct NGnet(pub(crate) regression::NGnet);
 impl NGnet {
     #[new]
     #[pyo3(
-        signature = (n_basis=Scalar::Count(regression::NGnet::default().n_basis), overlap=Scalar::Number(regression::NGnet::default().overlap)),
+        signature = (
+            n_basis=Scalar::Count(regression::NGnet::default().n_basis),
+            overlap=Scalar::Number(regression::NGnet::default().overlap)
+        ),
         text_signature = "(n_basis=50, overlap=1.2)"
     )]
     fn new(n_basis: Scalar<'_>, overlap: Scalar<'_>) -> PyResult<Self> {

@@ -7,17 +7,17 @@ use crate::scalar::Scalar;
 
 /// Monotone time warp of the demonstrations to the nominal one.
 ///
-/// Movements are compared by their square-root velocity q = ẏ/√|ẏ|, scaled to unit norm. The warp γ minimises
-/// ∫|q₀ − (q∘γ)√γ̇|² + λ ln²γ̇ dp over the phase p, exactly among warps that are linear in each segment with ends on a grid
-/// of a tenth of a segment.
+/// Movements are compared by their square-root velocity q = ẏ/√|ẏ|, scaled to unit norm. Over the phase p the warp γ
+/// minimises ∫|q₀ − (q∘γ)√γ̇|² + λ ln²γ̇ dp, exactly among warps that are linear in each segment with ends on a
+/// grid of a tenth of a segment.
 ///
 /// Parameters
 /// ----------
 /// n_segments : int
 ///     Number K of segments of equal phase, from 1 (linear scaling) to 1000 and half the samples of each demonstration.
 /// max_slope : float
-///     Bound of the slope of the warp, from 1 to 10: the duration of a segment is at most `max_slope` times that of linear
-///     scaling and at least 1 / `max_slope` of it.
+///     Bound of the slope of the warp, from 1 to 10: the duration of a segment is at most `max_slope` times that of
+///     linear scaling and at least 1 / `max_slope` of it.
 ///
 /// Raises
 /// ------
@@ -26,8 +26,9 @@ use crate::scalar::Scalar;
 ///
 /// References
 /// ----------
-/// Srivastava, Klassen, Joshi, Jermyn, IEEE TPAMI 33 (2011), https://doi.org/10.1109/TPAMI.2010.184; Nielsen, Carstensen,
-/// Smedsgaard, J. Chromatography A 805 (1998), https://doi.org/10.1016/S0021-9673(98)00021-1
+/// Srivastava, Klassen, Joshi, Jermyn, IEEE TPAMI 33 (2011), https://doi.org/10.1109/TPAMI.2010.184
+///
+/// Nielsen, Carstensen, Smedsgaard, J. Chromatography A 805 (1998), https://doi.org/10.1016/S0021-9673(98)00021-1
 #[pyclass(frozen, module = "pdmp", from_py_object)]
 #[derive(Clone)]
 pub(crate) struct TimeWarp(pub(crate) pdmp_core::model::TimeWarp);

@@ -55,10 +55,15 @@ def add_fit_options(parser: ArgumentParser) -> None:
         ("kind", ("discrete", "rhythmic"), "from start to goal, or one cycle per demonstration"),
         ("alignment", ("linear", "warp"), "alignment in time with the nominal demonstration"),
         ("basis", ("gp", "ngnet"), "Gaussian process or normalised Gaussian network"),
-        ("transport", ("learnt", "immediate"), "distribution of changes of start or goal in time"),
     ):
         text = f"{text}; default: %(default)s"
         parser.add_argument(f"--{name}", choices=choices, default=choices[0], help=text)
+    parser.add_argument(
+        "--transport",
+        choices=("learnt", "immediate"),
+        help="distribution of changes of start or goal in time, of discrete movements; "
+        "default: learnt",
+    )
     parser.add_argument(
         "--period", type=float, metavar="S", help="period of rhythmic demonstrations [s]"
     )

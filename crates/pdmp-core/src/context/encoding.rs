@@ -1,4 +1,4 @@
-//! What a condition is described by: numbers, and labels such as the name of a style.
+//! Encoding of contexts, which consist of numbers and labels, as features.
 
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use crate::demonstration::check_context;
 use crate::error::{Error, Result};
 use crate::validate::check_finite;
 
-/// What one value of every context means.
+/// Type of one context value, common to all contexts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ContextColumn {
@@ -19,8 +19,8 @@ pub enum ContextColumn {
 }
 
 impl ContextColumn {
-    /// Reads one value of all contexts.
-    fn of(column: usize, values: &[&ContextValue]) -> Result<Self> {
+    /// Infers the type of a column from its values.
+    fn infer(column: usize, values: &[&ContextValue]) -> Result<Self> {
         let mut labels: Vec<String> = values
             .iter()
             .filter_map(|value| if let ContextValue::Label(label) = value { Some(label.clone()) } else { None })
@@ -36,44 +36,47 @@ impl ContextColumn {
         }
     }
 
-    /// A value as a number: labels as their index.
+    /// Returns a value as a number; a label becomes its index.
     fn number(&self, column: usize, value: &ContextValue) -> Result<f64> {
         match (self, value) {
             (Self::Number, ContextValue::Number(number)) => Ok(*number),
-            (Self::Label(known), ContextValue::Label(label)) => {
-                let found = known.binary_search(label).ok();
-                found.map(|index| index as f64).ok_or_else(|| unknown(column, format!("{label:?}"), known))
+            (Self::Label(labels), ContextValue::Label(label)) => match labels.binary_search(label) {
+                Ok(index) => Ok(index as f64),
+                Err(_) => Err(unknown_label(column, format!("{label:?}"), labels)),
+            },
+            (Self::Label(labels), ContextValue::Number(number)) => {
+                Err(unknown_label(column, number.to_string(), labels))
             }
-            (Self::Label(known), ContextValue::Number(number)) => Err(unknown(column, number.to_string(), known)),
             (Self::Number, ContextValue::Label(label)) => Err(Error::NoNumber { column, label: label.clone() }),
         }
     }
 
-    /// Number of features that it gives: one, or one per label.
-    pub(crate) fn n_features(&self) -> usize {
+    /// Returns the number of features: one for a number, one per label otherwise.
+    pub(super) fn n_features(&self) -> usize {
         match self {
             Self::Number => 1,
             Self::Label(labels) => labels.len(),
         }
     }
 
-    /// The value that a number stands for.
+    /// Returns the value that a number encodes, the inverse of `number`.
     pub(crate) fn value(&self, column: usize, number: f64) -> Result<ContextValue> {
         match self {
             Self::Number => Ok(ContextValue::Number(number)),
-            Self::Label(known) => {
-                let label = if number >= 0.0 && number.fract() == 0.0 { known.get(number as usize) } else { None };
-                label.cloned().map(ContextValue::Label).ok_or_else(|| unknown(column, number.to_string(), known))
+            Self::Label(labels) => {
+                let label = if number >= 0.0 && number.fract() == 0.0 { labels.get(number as usize) } else { None };
+                let label = label.cloned().map(ContextValue::Label);
+                label.ok_or_else(|| unknown_label(column, number.to_string(), labels))
             }
         }
     }
 }
 
-fn unknown(column: usize, value: String, known: &[String]) -> Error {
-    Error::Label { column, value, known: known.join(", ") }
+fn unknown_label(column: usize, value: String, labels: &[String]) -> Error {
+    Error::Label { column, value, known: labels.join(", ") }
 }
 
-/// Contexts of demonstrations as numbers (M, Q), labels as their index, with what each column means.
+/// Returns the column types (Q,) of contexts and the contexts as numbers (M, Q), with labels as their indices.
 pub(crate) fn tabulate(contexts: &[&[ContextValue]]) -> Result<(Vec<ContextColumn>, Array2<f64>)> {
     if contexts.is_empty() {
         return Err(Error::Arguments("contexts is empty: pass one row per movement"));
@@ -87,7 +90,7 @@ pub(crate) fn tabulate(contexts: &[&[ContextValue]]) -> Result<(Vec<ContextColum
         check_context(context).map_err(|error| error.in_demo(m))?;
     }
     let columns = (0..width)
-        .map(|q| ContextColumn::of(q, &contexts.iter().map(|context| &context[q]).collect::<Vec<_>>()))
+        .map(|q| ContextColumn::infer(q, &contexts.iter().map(|context| &context[q]).collect::<Vec<_>>()))
         .collect::<Result<Vec<_>>>()?;
     let mut table = Array2::zeros((contexts.len(), width));
     for (context, mut row) in contexts.iter().zip(table.rows_mut()) {
@@ -98,8 +101,8 @@ pub(crate) fn tabulate(contexts: &[&[ContextValue]]) -> Result<(Vec<ContextColum
     Ok((columns, table))
 }
 
-/// One context as numbers (Q,), labels as their index.
-pub(crate) fn numbers(columns: &[ContextColumn], context: &[ContextValue]) -> Result<Vec<f64>> {
+/// Returns one context as numbers (Q,), with labels as their indices.
+pub(super) fn to_numbers(columns: &[ContextColumn], context: &[ContextValue]) -> Result<Vec<f64>> {
     if context.len() != columns.len() {
         let (expected, found) = (columns.len(), context.len());
         return Err(Error::Length { name: "context", expected, found, per: "context value" });
@@ -114,89 +117,86 @@ pub(crate) fn numbers(columns: &[ContextColumn], context: &[ContextValue]) -> Re
     Ok(numbers)
 }
 
-/// The scale on which contexts are compared: every number by its spread, every label by itself.
+/// Encoder of contexts as features: numbers are standardised, labels one-hot.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Scale {
-    columns: Vec<Entry>,
+pub(super) struct Encoder {
+    columns: Vec<ColumnEncoder>,
     n_features: usize,
 }
 
-/// Where the features of a column begin, and how they come about.
+/// Encoder of one column, whose features begin at index `first`.
 #[derive(Clone, Debug, PartialEq)]
-enum Entry {
-    /// (h − centre)/spread, and the range that was shown.
-    Number { first: usize, centre: f64, spread: f64, range: [f64; 2] },
-    /// One of so many: one where the label is, zero elsewhere.
-    Label { first: usize, count: usize },
+enum ColumnEncoder {
+    /// One feature (h − mean)/deviation, and the demonstrated range of h.
+    Standardised { first: usize, mean: f64, deviation: f64, range: [f64; 2] },
+    /// One feature per label, which is 1 for that label and 0 for the others.
+    OneHot { first: usize, n_labels: usize },
 }
 
-impl Scale {
-    /// The scale of distinct contexts (n, Q), each of which counts once.
+impl Encoder {
+    /// Fits the encoder to distinct contexts (n, Q), each with equal weight.
     ///
     /// # Errors
-    /// A number that varies so little or so much that its square leaves the range of numbers.
-    pub(crate) fn of(columns: &[ContextColumn], contexts: &Array2<f64>) -> Result<Self> {
-        let mut first = 0;
-        let entries = columns.iter().zip(contexts.columns()).map(|(column, values)| {
-            let begin = first;
+    /// A number whose variation is so small or so large that its square underflows or overflows.
+    pub(super) fn fit(columns: &[ContextColumn], contexts: &Array2<f64>) -> Result<Self> {
+        let mut n_features = 0;
+        let encoders = columns.iter().zip(contexts.columns()).map(|(column, values)| {
+            let first = n_features;
+            n_features += column.n_features();
             match column {
-                ContextColumn::Label(labels) => {
-                    first += labels.len();
-                    Ok(Entry::Label { first: begin, count: labels.len() })
-                }
+                ContextColumn::Label(labels) => Ok(ColumnEncoder::OneHot { first, n_labels: labels.len() }),
                 ContextColumn::Number => {
-                    first += 1;
-                    let centre = values.mean().unwrap_or(0.0);
-                    let spread = values.fold(0.0f64, |most, value| most.max((value - centre).abs()));
-                    if spread > 0.0 && !(1e-100..=1e100).contains(&spread) {
+                    let mean = values.mean().unwrap_or(0.0);
+                    let largest = values.fold(0.0f64, |max, value| max.max((value - mean).abs()));
+                    if largest > 0.0 && !(1e-100..=1e100).contains(&largest) {
                         let allowed = "each must vary by 1e-100 to 1e100; give them in another unit";
-                        return Err(Error::Range { name: "contexts", value: spread, allowed });
+                        return Err(Error::Range { name: "contexts", value: largest, allowed });
                     }
-                    let deviation = values.map(|value| ((value - centre) / spread.max(1e-100)).powi(2)).mean();
-                    let spread = if spread > 0.0 { spread * deviation.unwrap_or(1.0).sqrt() } else { 1.0 };
+                    let variance = values.map(|value| ((value - mean) / largest.max(1e-100)).powi(2)).mean();
+                    let deviation = if largest > 0.0 { largest * variance.unwrap_or(1.0).sqrt() } else { 1.0 };
                     let range = [f64::INFINITY, f64::NEG_INFINITY];
                     let range = values.iter().fold(range, |[low, high], &value| [low.min(value), high.max(value)]);
-                    Ok(Entry::Number { first: begin, centre, spread, range })
+                    Ok(ColumnEncoder::Standardised { first, mean, deviation, range })
                 }
             }
         });
-        let columns = entries.collect::<Result<_>>()?;
-        Ok(Self { columns, n_features: first })
+        let columns = encoders.collect::<Result<_>>()?;
+        Ok(Self { columns, n_features })
     }
 
-    /// Number of features.
-    pub(crate) fn n_features(&self) -> usize {
-        self.n_features
-    }
-
-    /// Number of context values Q.
-    pub(crate) fn n_inputs(&self) -> usize {
+    /// Returns the number of context values Q.
+    pub(super) fn n_inputs(&self) -> usize {
         self.columns.len()
     }
 
-    /// The features of a context (Q,).
-    pub(crate) fn features(&self, context: &[f64]) -> Vec<f64> {
+    /// Computes the features (F,) of a context (Q,).
+    pub(super) fn features(&self, context: &[f64]) -> Vec<f64> {
         let mut features = vec![0.0; self.n_features];
-        for (entry, &value) in self.columns.iter().zip(context) {
-            match *entry {
-                Entry::Number { first, centre, spread, .. } => features[first] = (value - centre) / spread,
-                Entry::Label { first, count } => features[first + (value as usize).min(count - 1)] = 1.0,
+        for (column, &value) in self.columns.iter().zip(context) {
+            match *column {
+                ColumnEncoder::Standardised { first, mean, deviation, .. } => {
+                    features[first] = (value - mean) / deviation;
+                }
+                ColumnEncoder::OneHot { first, n_labels } => {
+                    features[first + (value as usize).min(n_labels - 1)] = 1.0;
+                }
             }
         }
         features
     }
 
-    /// How far each value lies outside of what was shown, in ranges of what was shown: 0 inside, and for a label;
-    /// infinite where a value that was never varied differs.
-    pub(crate) fn outside(&self, context: &[f64]) -> Vec<f64> {
-        let beyond = |entry: &Entry, value: f64| match *entry {
-            Entry::Label { .. } => 0.0,
-            Entry::Number { range: [low, high], .. } => {
+    /// Computes the distance of each value (Q,) from the demonstrated range, in units of that range.
+    ///
+    /// It is 0 within the range and for labels, and infinite for a new value in a column that did not vary.
+    pub(super) fn extrapolation(&self, context: &[f64]) -> Vec<f64> {
+        let distance = |column: &ColumnEncoder, value: f64| match *column {
+            ColumnEncoder::OneHot { .. } => 0.0,
+            ColumnEncoder::Standardised { range: [low, high], .. } => {
                 let excess = (low - value).max(value - high).max(0.0);
                 if excess > 0.0 { excess / (high - low) } else { 0.0 }
             }
         };
-        self.columns.iter().zip(context).map(|(entry, &value)| beyond(entry, value)).collect()
+        self.columns.iter().zip(context).map(|(column, &value)| distance(column, value)).collect()
     }
 }
 
@@ -208,27 +208,27 @@ mod tests {
         vec![label.into(), number.into()]
     }
 
-    /// Labels are told apart, and a number is compared by its spread.
+    /// Labels are encoded one-hot, and numbers are centred; only numbers extrapolate.
     #[test]
-    fn contexts_become_features() {
-        let shown = [context("old", 1.0), context("young", 3.0), context("old", 5.0)];
-        let (columns, table) = tabulate(&shown.each_ref().map(Vec::as_slice)).unwrap();
-        let scale = Scale::of(&columns, &table).unwrap();
-        let numbers = numbers(&columns, &context("young", 3.0)).unwrap();
-        assert_eq!(scale.features(&numbers), [0.0, 1.0, 0.0]);
-        assert_eq!(scale.outside(&[0.0, 7.0]), [0.0, 0.5]);
-        assert_eq!(scale.outside(&[1.0, 1.0]), [0.0, 0.0]);
+    fn contexts_are_encoded_as_features() {
+        let demonstrated = [context("old", 1.0), context("young", 3.0), context("old", 5.0)];
+        let (columns, table) = tabulate(&demonstrated.each_ref().map(Vec::as_slice)).unwrap();
+        let encoder = Encoder::fit(&columns, &table).unwrap();
+        let numbers = to_numbers(&columns, &context("young", 3.0)).unwrap();
+        assert_eq!(encoder.features(&numbers), [0.0, 1.0, 0.0]);
+        assert_eq!(encoder.extrapolation(&[0.0, 7.0]), [0.0, 0.5]);
+        assert_eq!(encoder.extrapolation(&[1.0, 1.0]), [0.0, 0.0]);
     }
 
-    /// What was never shown is refused, with what was.
+    /// The error for an unknown label lists the known ones.
     #[test]
-    fn strangers_are_refused() {
+    fn contexts_of_another_type_are_rejected() {
         let (columns, _) = tabulate(&[&context("old", 1.0), &context("young", 3.0)]).unwrap();
-        let refusal = |context: &[ContextValue]| numbers(&columns, context).unwrap_err().to_string();
-        assert!(refusal(&context("proud", 1.0)).contains("\"proud\": not demonstrated; the labels are old, young"));
-        assert!(refusal(&[1.0.into(), 1.0.into()]).contains("context[0] = 1: not demonstrated"));
-        assert!(refusal(&["old".into(), "young".into()]).contains("context[1] = \"young\": a number is expected"));
-        assert!(refusal(&["old".into()]).contains("length 1, expected 2"));
+        let message = |context: &[ContextValue]| to_numbers(&columns, context).unwrap_err().to_string();
+        assert!(message(&context("proud", 1.0)).contains("\"proud\": not demonstrated; the labels are old, young"));
+        assert!(message(&[1.0.into(), 1.0.into()]).contains("context[0] = 1: not demonstrated"));
+        assert!(message(&["old".into(), "young".into()]).contains("context[1] = \"young\": a number is expected"));
+        assert!(message(&["old".into()]).contains("length 1, expected 2"));
         let mixed = tabulate(&[&context("old", 1.0), &[1.0.into(), 1.0.into()]]).unwrap_err().to_string();
         assert!(mixed.contains("1 labels and 1 numbers"), "{mixed}");
     }

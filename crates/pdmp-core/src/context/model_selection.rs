@@ -1,45 +1,53 @@
-//! The choice of a map: ratios by evidence, length and weights by the errors at contexts left out.
+//! Model selection: signal-to-noise ratios by restricted maximum likelihood, length scale and stacking weights by
+//! leave-one-out errors.
+//!
+//! H. D. Patterson, R. Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58, 1971,
+//! doi:10.1093/biomet/58.3.545.
 
 use std::fmt;
+use std::iter::once;
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
 use super::kernel::Kernel;
-use super::kriging::{Kriging, Values};
-use super::stacking::Stack;
+use super::kriging::{Kriging, Observations};
+use super::stacking::StackingWeights;
 use crate::error::Result;
 
-/// Lengths that are tried, in units of the contexts' spread.
+/// Length scales of the search, in standard deviations of the contexts. The search begins with the longest, so that equal
+/// errors select the smoothest function.
 const LENGTHS: [f64; 9] = [8.0, 5.2, 3.4, 2.2, 1.4, 0.92, 0.59, 0.39, 0.25];
-/// Grid of ln(ρ·mean λ), and how far the search goes on from its best.
+/// Grid of ln(ρ·mean λ): lowest value, highest value and step.
 const GRID: (f64, f64, f64) = (-7.0, 16.0, 0.5);
-const HALVINGS: usize = 12;
-/// Fewest different contexts of a Gaussian process: through two there is a line.
+/// Halvings of the step from the best grid point on.
+const N_HALVINGS: usize = 12;
+/// Least number of distinct contexts for a Gaussian process; two determine a line.
 const MIN_CONTEXTS: usize = 3;
-/// Most contexts of a map whose cost grows with their cube.
-pub(crate) const MOST: usize = 1024;
+/// Largest number of distinct contexts for a map with a kernel, whose cost grows with its cube.
+pub(super) const MAX_CONTEXTS: usize = 1024;
 
-/// What leads from contexts to movements.
+/// Kind of a context map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ContextMapKind {
     /// Least squares, as in Section 4.1.2 of the paper.
     Linear,
-    /// Ridge regression on polynomials of second degree, the penalty of each output by its evidence.
+    /// Ridge regression on polynomials of second degree, with the penalty of each output by restricted maximum likelihood.
     Polynomial,
-    /// A Gaussian process (Matérn-5/2), the noise of each output by its evidence, the length by the error left out.
+    /// Gaussian process with a Matérn-5/2 kernel: the signal-to-noise ratio of each output by restricted maximum likelihood,
+    /// the length scale by the leave-one-out error.
     Gp,
-    /// The Gaussian process and a line whose slopes are held small by the evidence, weighted by their errors at contexts
-    /// left out: inside of the contexts of the demonstrations the two alone, outside with the mean.
+    /// The Gaussian process and a line with penalised slopes, weighted by their leave-one-out errors. Beyond the
+    /// demonstrated contexts the mean of the outputs has a weight too.
     Stacked,
 }
 
 impl ContextMapKind {
-    /// All of them.
+    /// Every kind, the most general one first.
     pub const ALL: [Self; 4] = [Self::Stacked, Self::Gp, Self::Polynomial, Self::Linear];
 
-    /// The name used in files and in Python.
+    /// Returns the name in files and in bindings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -61,51 +69,50 @@ impl fmt::Display for ContextMapKind {
     }
 }
 
-/// How the map from contexts is chosen.
+/// Selection of the kind of a context map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MapSelection {
-    /// Stacked. Labels alone, two different contexts, or more than 1024: least squares, which gives each label the mean
-    /// of its demonstrations.
+    /// Stacked for 3 to 1024 distinct contexts with a number, otherwise linear. For labels alone, least squares predicts the
+    /// mean of the demonstrations of each label.
     #[default]
     Auto,
-    /// This one.
+    /// The given kind.
     Given(ContextMapKind),
 }
 
-/// A map of one kind, with all its constants.
-#[derive(Clone, Debug)]
-pub(super) struct Candidate {
-    pub(super) kind: ContextMapKind,
-    pub(super) kernel: Option<Kernel>,
-    pub(super) kriging: Kriging,
-    pub(super) values: Values,
-    pub(super) ratios: Vec<f64>,
-}
-
-/// Places (n, F) and what was shown there (n, P).
-pub(super) struct Shown<'a> {
-    pub(super) inputs: ArrayView2<'a, f64>,
+/// Features (n, F) of the distinct contexts, with `n_inputs` values each, and their outputs (n, P).
+pub(super) struct TrainingSet<'a> {
+    pub(super) features: ArrayView2<'a, f64>,
     pub(super) n_inputs: usize,
     pub(super) outputs: ArrayView2<'a, f64>,
 }
 
-impl Candidate {
-    /// The best map of a kind.
-    pub(super) fn of(kind: ContextMapKind, shown: &Shown) -> Result<Self> {
+/// Kriging of a training set with its hyperparameters.
+#[derive(Clone, Debug)]
+pub(super) struct KrigingModel {
+    pub(super) kernel: Option<Kernel>,
+    pub(super) kriging: Kriging,
+    pub(super) observations: Observations,
+    /// Signal-to-noise ratios ρ (P,).
+    pub(super) ratios: Vec<f64>,
+}
+
+impl KrigingModel {
+    /// Fits the model of a kind; of a stacked map, its Gaussian process.
+    fn fit(kind: ContextMapKind, training: &TrainingSet) -> Result<Self> {
         match kind {
-            ContextMapKind::Linear => Self::with(kind, None, shown, |_, _| vec![0.0; shown.outputs.ncols()]),
-            ContextMapKind::Polynomial => Self::with(kind, Some(Kernel::Quadratic), shown, ratios),
+            ContextMapKind::Linear => Self::with_ratios(None, training, vec![0.0; training.outputs.ncols()]),
+            ContextMapKind::Polynomial => Self::with_kernel(Kernel::Quadratic, training),
             ContextMapKind::Gp | ContextMapKind::Stacked => {
                 let of_length = |length| {
-                    let candidate = Self::with(kind, Some(Kernel::Matern { length }), shown, ratios)?;
-                    Ok((candidate.errors().sum(), candidate))
+                    let model = Self::with_kernel(Kernel::Matern { length }, training)?;
+                    Ok((model.squared_errors().sum(), model))
                 };
-                // From the longest down: what few contexts cannot tell is left smooth.
                 let mut best = of_length(LENGTHS[0])?;
                 for &length in &LENGTHS[1..] {
-                    let found = of_length(length)?;
-                    if found.0 < best.0 {
-                        best = found;
+                    let model = of_length(length)?;
+                    if model.0 < best.0 {
+                        best = model;
                     }
                 }
                 Ok(best.1)
@@ -113,152 +120,180 @@ impl Candidate {
         }
     }
 
-    /// The map with a known kernel, and ratios as `ratios` finds them.
-    pub(super) fn with(
-        kind: ContextMapKind,
-        kernel: Option<Kernel>,
-        shown: &Shown,
-        ratios: impl FnOnce(&Kriging, &Values) -> Vec<f64>,
-    ) -> Result<Self> {
-        let kriging = Kriging::new(shown.inputs, shown.n_inputs, kernel.is_none(), kernel)?;
-        let values = kriging.project(shown.outputs);
-        let ratios = ratios(&kriging, &values);
-        Ok(Self { kind, kernel, kriging, values, ratios })
+    /// Fits the ratios of a model with a kernel.
+    fn with_kernel(kernel: Kernel, training: &TrainingSet) -> Result<Self> {
+        let mut model = Self::with_ratios(Some(kernel), training, Vec::new())?;
+        model.ratios = RestrictedLikelihood::new(&model.kriging, &model.observations).maximise();
+        Ok(model)
     }
 
-    /// Squared errors at each context left out (n,).
-    fn errors(&self) -> Array1<f64> {
-        let errors = self.kriging.leave_one_out_errors(&self.values, &self.ratios);
+    /// Returns the model with given hyperparameters; without a kernel it is least squares, and the ratios are unused.
+    pub(super) fn with_ratios(kernel: Option<Kernel>, training: &TrainingSet, ratios: Vec<f64>) -> Result<Self> {
+        let kriging = Kriging::new(training.features, training.n_inputs, kernel.is_none(), kernel)?;
+        let observations = kriging.project(training.outputs);
+        Ok(Self { kernel, kriging, observations, ratios })
+    }
+
+    /// Computes the leave-one-out errors (n, P).
+    pub(super) fn leave_one_out_errors(&self) -> Array2<f64> {
+        self.kriging.leave_one_out_errors(&self.observations, &self.ratios)
+    }
+
+    /// Computes the squared leave-one-out errors (n,), all infinite if one is.
+    fn squared_errors(&self) -> Array1<f64> {
+        let errors = self.leave_one_out_errors();
         if errors.iter().any(|error| !error.is_finite()) {
             return Array1::from_elem(errors.nrows(), f64::INFINITY);
         }
-        errors.map_axis(Axis(1), |row| row.dot(&row))
+        row_squares(&errors)
     }
 }
 
-/// The line of a stacked map, and its weight.
+/// Line of a stacked map, with the weights of the stack.
 #[derive(Clone, Debug)]
-pub(super) struct Trend {
-    pub(super) line: Candidate,
-    pub(super) stack: Stack,
+pub(super) struct StackedLine {
+    pub(super) model: KrigingModel,
+    pub(super) weights: StackingWeights,
 }
 
-/// The map of a choice, its trend if it has one, and the error of each map that was tried at contexts left out.
-pub(super) struct Choice {
-    pub(super) candidate: Candidate,
-    pub(super) trend: Option<Trend>,
+impl StackedLine {
+    /// Fits a line with penalised slopes, and its weights beside a Gaussian process. Returns the mean squared leave-one-out
+    /// error of the stack too.
+    fn fit(process: &KrigingModel, training: &TrainingSet) -> Result<(Self, f64)> {
+        let model = KrigingModel::with_kernel(Kernel::Linear, training)?;
+        let deviations = &training.outputs - &training.outputs.mean_axis(Axis(0)).unwrap_or_default();
+        let (process, line) = (process.leave_one_out_errors(), model.leave_one_out_errors());
+        let weights = StackingWeights::fit(&deviations, &process, &line);
+        let [g, l] = weights.interpolation;
+        let error = mean(&row_squares(&(process * g + line * l)));
+        Ok((Self { model, weights }, error))
+    }
+
+    /// Returns the line with given ratios and weights.
+    pub(super) fn with_ratios(training: &TrainingSet, ratios: Vec<f64>, weights: StackingWeights) -> Result<Self> {
+        Ok(Self { model: KrigingModel::with_ratios(Some(Kernel::Linear), training, ratios)?, weights })
+    }
+}
+
+/// Selected map.
+pub(super) struct SelectedMap {
+    pub(super) kind: ContextMapKind,
+    pub(super) model: KrigingModel,
+    pub(super) line: Option<StackedLine>,
+    /// Mean squared leave-one-out error of the map, and of its members if it is stacked.
     pub(super) errors: Vec<(ContextMapKind, f64)>,
 }
 
-/// Makes a choice.
-pub(super) fn choose(choice: MapSelection, labels_alone: bool, shown: &Shown) -> Result<Choice> {
-    let kind = match choice {
+/// Selects a map for a training set, and fits it. `only_labels` states that no context value is a number.
+pub(super) fn select(selection: MapSelection, only_labels: bool, training: &TrainingSet) -> Result<SelectedMap> {
+    let kind = match selection {
         MapSelection::Given(kind) => kind,
-        MapSelection::Auto if labels_alone || !(MIN_CONTEXTS..=MOST).contains(&shown.inputs.nrows()) => {
+        MapSelection::Auto if only_labels || !(MIN_CONTEXTS..=MAX_CONTEXTS).contains(&training.features.nrows()) => {
             ContextMapKind::Linear
         }
         MapSelection::Auto => ContextMapKind::Stacked,
     };
-    let candidate = Candidate::of(kind, shown)?;
-    let mut tried = vec![(kind, mean(&candidate.errors()))];
-    let trend = match kind {
-        ContextMapKind::Stacked => {
-            let line = Candidate::with(ContextMapKind::Linear, Some(Kernel::Linear), shown, ratios)?;
-            let deviations = &shown.outputs - &shown.outputs.mean_axis(Axis(0)).unwrap_or_default();
-            let missed = |of: &Candidate| of.kriging.leave_one_out_errors(&of.values, &of.ratios);
-            let (process, straight) = (missed(&candidate), missed(&line));
-            let stack = Stack::find(&deviations, &process, &straight);
-            let [g, l] = stack.inside;
-            let errors = (process * g + straight * l).map_axis(Axis(1), |row| row.dot(&row));
-            tried = vec![
-                (kind, mean(&errors)),
-                (ContextMapKind::Gp, tried[0].1),
-                (ContextMapKind::Linear, mean(&line.errors())),
-            ];
-            Some(Trend { line, stack })
-        }
-        _ => None,
-    };
-    Ok(Choice { candidate, trend, errors: tried })
+    let model = KrigingModel::fit(kind, training)?;
+    let error = mean(&model.squared_errors());
+    if kind != ContextMapKind::Stacked {
+        return Ok(SelectedMap { kind, model, line: None, errors: vec![(kind, error)] });
+    }
+    let (line, stacked_error) = StackedLine::fit(&model, training)?;
+    let line_error = mean(&line.model.squared_errors());
+    let errors = vec![(kind, stacked_error), (ContextMapKind::Gp, error), (ContextMapKind::Linear, line_error)];
+    Ok(SelectedMap { kind, model, line: Some(line), errors })
 }
 
-/// The trend of a stacked map with known constants.
-pub(super) fn trend(shown: &Shown, ratios: Vec<f64>, stack: Stack) -> Result<Trend> {
-    let line = Candidate::with(ContextMapKind::Linear, Some(Kernel::Linear), shown, |_, _| ratios)?;
-    Ok(Trend { line, stack })
+fn row_squares(errors: &Array2<f64>) -> Array1<f64> {
+    errors.map_axis(Axis(1), |row| row.dot(&row))
 }
 
 fn mean(values: &Array1<f64>) -> f64 {
     values.mean().unwrap_or(0.0)
 }
 
-/// The ratio ρ of each output, by its evidence.
-fn ratios(kriging: &Kriging, values: &Values) -> Vec<f64> {
-    let evidence = Evidence::new(kriging, values);
-    evidence.best().iter().enumerate().map(|(p, &(at, value))| evidence.refined(p, at, value)).collect()
-}
-
-/// Restricted log likelihood of the ratio ρ, and a weak prior on it (Patterson and Thompson, Biometrika 58, 1971).
-struct Evidence<'a> {
+/// Restricted log likelihood of the ratio ρ of each output, with a weak prior.
+///
+/// With the contrasts b_k and eigenvalues λ_k, k = 1 … r, and the noise variance at its maximum, it is
+///
+/// ```text
+/// −½ (r ln(1/r Σ b_k²/(ρλ_k + 1)) + Σ ln(ρλ_k + 1) + (ln(ρ·mean λ + 10⁻³)/3)²)
+/// ```
+struct RestrictedLikelihood<'a> {
     eigenvalues: &'a [f64],
+    /// Squared contrasts (r, P).
     squares: Array2<f64>,
-    /// Mean of the eigenvalues: of the same size as a ratio's inverse.
-    unit: f64,
+    mean_eigenvalue: f64,
 }
 
-impl<'a> Evidence<'a> {
-    fn new(kriging: &'a Kriging, values: &Values) -> Self {
-        let eigenvalues = kriging.eigenvalues().and_then(|values| values.as_slice()).unwrap_or_default();
-        let unit = (eigenvalues.iter().sum::<f64>() / eigenvalues.len().max(1) as f64).max(f64::MIN_POSITIVE);
-        Self { eigenvalues, squares: values.rest.mapv(|b| b * b), unit }
+/// Value x = ln(ρ·mean λ) and its restricted log likelihood.
+#[derive(Clone, Copy)]
+struct LogRatio {
+    x: f64,
+    likelihood: f64,
+}
+
+impl<'a> RestrictedLikelihood<'a> {
+    fn new(kriging: &'a Kriging, observations: &Observations) -> Self {
+        let eigenvalues = kriging.eigenvalues().map(crate::validate::row_major).unwrap_or_default();
+        let mean_eigenvalue =
+            (eigenvalues.iter().sum::<f64>() / eigenvalues.len().max(1) as f64).max(f64::MIN_POSITIVE);
+        Self { eigenvalues, squares: observations.contrasts.mapv(|b| b * b), mean_eigenvalue }
     }
 
-    fn ratio(&self, at: f64) -> f64 {
-        if at == f64::NEG_INFINITY { 0.0 } else { at.exp() / self.unit }
+    /// Returns the ratios ρ (P,) of maximum likelihood.
+    fn maximise(&self) -> Vec<f64> {
+        self.search_grid().into_iter().enumerate().map(|(p, best)| self.ratio(self.refine(p, best).x)).collect()
     }
 
-    /// The best place of the grid for each output, as ln(ρ·mean λ), and its evidence.
-    fn best(&self) -> Vec<(f64, f64)> {
+    fn ratio(&self, x: f64) -> f64 {
+        if x == f64::NEG_INFINITY { 0.0 } else { x.exp() / self.mean_eigenvalue }
+    }
+
+    /// Returns the best grid point of each output (P,). The grid includes ρ = 0.
+    fn search_grid(&self) -> Vec<LogRatio> {
         let (low, high, step) = GRID;
-        let places = 1 + ((high - low) / step) as usize;
-        let mut best = vec![(f64::NEG_INFINITY, f64::NEG_INFINITY); self.squares.ncols()];
-        for at in std::iter::once(f64::NEG_INFINITY).chain((0..places).map(|k| low + k as f64 * step)) {
-            let ratio = self.ratio(at);
+        let n_steps = ((high - low) / step) as usize;
+        let worst = LogRatio { x: f64::NEG_INFINITY, likelihood: f64::NEG_INFINITY };
+        let mut best = vec![worst; self.squares.ncols()];
+        for x in once(f64::NEG_INFINITY).chain((0..=n_steps).map(|k| low + k as f64 * step)) {
+            let ratio = self.ratio(x);
             let shrinkage: Array1<f64> = self.eigenvalues.iter().map(|l| 1.0 / (ratio * l + 1.0)).collect();
-            let volume: f64 = self.eigenvalues.iter().map(|l| (ratio * l).ln_1p()).sum();
+            let log_determinant: f64 = self.eigenvalues.iter().map(|l| (ratio * l).ln_1p()).sum();
             for (best, sum) in best.iter_mut().zip(shrinkage.dot(&self.squares)) {
-                let value = self.value(at, sum, volume);
-                if value > best.1 {
-                    *best = (at, value);
+                let likelihood = self.likelihood(x, sum, log_determinant);
+                if likelihood > best.likelihood {
+                    *best = LogRatio { x, likelihood };
                 }
             }
         }
         best
     }
 
-    fn value(&self, at: f64, sum: f64, volume: f64) -> f64 {
-        let degrees_of_freedom = self.eigenvalues.len() as f64;
-        let prior = ((at.exp() + 1e-3).ln() / 3.0).powi(2);
-        -0.5 * (degrees_of_freedom * (sum / degrees_of_freedom).max(1e-300).ln() + volume + prior)
+    /// Computes the likelihood from Σ b_k²/(ρλ_k + 1) and Σ ln(ρλ_k + 1).
+    fn likelihood(&self, x: f64, sum: f64, log_determinant: f64) -> f64 {
+        let r = self.eigenvalues.len() as f64;
+        let prior = ((x.exp() + 1e-3).ln() / 3.0).powi(2);
+        -0.5 * (r * (sum / r).max(1e-300).ln() + log_determinant + prior)
     }
 
-    /// The ratio of one output, from the best place of the grid on.
-    fn refined(&self, p: usize, mut at: f64, mut value: f64) -> f64 {
+    /// Refines the best grid point of output `p` by a search with halved steps.
+    fn refine(&self, p: usize, mut best: LogRatio) -> LogRatio {
         let mut step = 0.5 * GRID.2;
-        for _ in 0..if at.is_finite() { HALVINGS } else { 0 } {
-            for side in [at - step, at + step] {
-                let ratio = self.ratio(side);
+        for _ in 0..if best.x.is_finite() { N_HALVINGS } else { 0 } {
+            for x in [best.x - step, best.x + step] {
+                let ratio = self.ratio(x);
                 let terms = self.eigenvalues.iter().zip(self.squares.column(p));
-                let (sum, volume) = terms.fold((0.0, 0.0), |(sum, volume), (l, square)| {
-                    (sum + square / (ratio * l + 1.0), volume + (ratio * l).ln_1p())
+                let (sum, log_determinant) = terms.fold((0.0, 0.0), |(sum, log_determinant), (l, square)| {
+                    (sum + square / (ratio * l + 1.0), log_determinant + (ratio * l).ln_1p())
                 });
-                let found = self.value(side, sum, volume);
-                if found > value {
-                    (at, value) = (side, found);
+                let likelihood = self.likelihood(x, sum, log_determinant);
+                if likelihood > best.likelihood {
+                    best = LogRatio { x, likelihood };
                 }
             }
             step *= 0.5;
         }
-        self.ratio(at)
+        best
     }
 }

@@ -1,11 +1,13 @@
-//! Conditions of movements as outputs of the map.
+//! Outputs of the context map.
 
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
 use crate::kind::Kind;
 
-/// The outputs of the map (M, P): style, goal and start or anchor, and the timing (M, K) as logarithms: that of the
-/// duration, and those of each segment's time relative to the last one's.
+/// Returns the outputs of the context map for each movement (M, P): style, goal and start or anchor, and logarithms of time.
+///
+/// With K segments of durations T_k (M, K) the logarithms are ln ΣT_k, and ln(T_k/T_K) for all k < K. They keep predicted
+/// durations positive.
 pub(crate) fn outputs(
     kind: Kind,
     styles: ArrayView2<f64>,
@@ -25,8 +27,8 @@ pub(crate) fn outputs(
     concatenate(Axis(1), &parts).unwrap_or_default()
 }
 
-/// Relative change of each time (K,) in a timing per unit of the outputs that it is foreseen by (K,).
-pub(crate) fn relative_changes(segment_durations: &[f64]) -> Array2<f64> {
+/// Computes the Jacobian (K, K) ∂ln T_k/∂o_i of the K segment durations by the outputs o of time.
+pub(crate) fn log_duration_jacobian(segment_durations: &[f64]) -> Array2<f64> {
     let duration: f64 = segment_durations.iter().sum();
     Array2::from_shape_fn((segment_durations.len(), segment_durations.len()), |(k, output)| match output {
         0 => 1.0,

@@ -1,69 +1,73 @@
-//! The axes along which outputs are foreseen: those along which movements vary.
+//! Principal axes of the movements, along which the outputs are regressed.
 //!
-//! Each output has a signal and a noise of its own. Styles, goals and starts of a movement are not what should have
-//! them: they say the same thing several times, and styles are ordered by what they force, not by how far they move.
-//! The principal components of the movements themselves vary independently, and the errors of each count alike.
+//! The regression estimates a signal-to-noise ratio for each of its outputs. Styles, goals and starts suit it badly: they
+//! are correlated, and styles are ordered by forcing instead of displacement. The principal components of the movements
+//! are uncorrelated, and their errors have equal weight.
 
 use ndarray::{Array2, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
 use crate::numerics::linear_algebra::{inverse, symmetric_eigen};
 
-/// Least size of a movement per unit of an output, relative to the largest: what moves nothing is foreseen too.
-const FLOOR: f64 = 1e-5;
+/// Least size of a movement per unit of an output, relative to the largest. It gives directions without movement a finite
+/// scale, so that they are predicted too.
+const MIN_RELATIVE_SIZE: f64 = 1e-5;
 
-/// Coordinates in which outputs are a mean and independent components.
+/// Linear coordinates of the outputs.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Axes {
-    /// Outputs per unit of each component, by rows (P, P), and the inverse of that.
+pub(super) struct PrincipalAxes {
+    /// Outputs per unit of each component, as rows (P, P).
     pub(super) directions: Array2<f64>,
+    /// Inverse of the directions (P, P).
     components: Array2<f64>,
 }
 
-impl Axes {
-    /// The principal axes of outputs (n, P), whose errors e count eᵀGe with the `metric` G (P, P).
-    pub(super) fn principal(outputs: ArrayView2<f64>, metric: ArrayView2<f64>) -> Result<Self> {
-        // Styles, goals and times come in units of their own, which may be far apart.
+impl PrincipalAxes {
+    /// Computes the axes of outputs (n, P), where an error e of the outputs displaces the movement by √(eᵀGe) with the
+    /// `metric` G (P, P).
+    pub(super) fn fit(outputs: ArrayView2<f64>, metric: ArrayView2<f64>) -> Result<Self> {
+        // Balances the units of styles, goals and times, which may differ by many orders of magnitude.
         let units = metric.diag().mapv(|g| if g > 0.0 { g.sqrt() } else { 1.0 });
         let balanced = Array2::from_shape_fn(metric.dim(), |(p, q)| metric[[p, q]] / units[p] / units[q]);
         let (sizes, vectors) = symmetric_eigen(balanced.view(), "covariance of the outputs")?;
-        let largest = sizes.iter().fold(f64::MIN_POSITIVE, |most, size| most.max(*size));
-        let sizes: Vec<f64> = sizes.iter().map(|size| size.max(largest * FLOOR * FLOOR).sqrt()).collect();
-        // In these coordinates every error counts alike, and stays so where they are rotated.
+        let largest = sizes.iter().fold(f64::MIN_POSITIVE, |max, size| max.max(*size));
+        let sizes: Vec<f64> =
+            sizes.iter().map(|size| size.max(largest * MIN_RELATIVE_SIZE * MIN_RELATIVE_SIZE).sqrt()).collect();
+        // In these coordinates G is the identity, and remains so under rotation.
         let scaled = |power: i32| {
             Array2::from_shape_fn(vectors.dim(), |(p, k)| vectors[[p, k]] * (units[p] * sizes[k]).powi(power))
         };
         let mut deviations = (&outputs - &outputs.mean_axis(Axis(0)).unwrap_or_default()).dot(&scaled(1));
-        deviations /= deviations.fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
+        deviations /= deviations.fold(f64::MIN_POSITIVE, |max, x| max.max(x.abs()));
         let (_, rotation) = symmetric_eigen(deviations.t().dot(&deviations).view(), "covariance of the outputs")?;
-        // In rows, as a file gives them: sums are then the same to the last bit.
-        Self::new(rotation.t().dot(&scaled(-1).t()).as_standard_layout().into_owned())
+        // Row-major as in a model file, so that a loaded map has bitwise equal sums.
+        Self::from_directions(rotation.t().dot(&scaled(-1).t()).as_standard_layout().into_owned())
     }
 
-    /// The axes of known directions (P, P).
+    /// Returns the axes with given directions (P, P).
     ///
     /// # Errors
-    /// Directions that do not span the outputs.
-    pub(super) fn new(directions: Array2<f64>) -> Result<Self> {
+    /// Directions that are linearly dependent.
+    pub(super) fn from_directions(directions: Array2<f64>) -> Result<Self> {
         let components = inverse(directions.view());
         if components.iter().any(|x| !x.is_finite()) {
-            return Err(Error::Fit("the axes of the map from contexts depend on each other".to_string()));
+            return Err(Error::Fit("the axes of the context map are linearly dependent".to_string()));
         }
         Ok(Self { directions, components })
     }
 
-    /// Components (n, P) of outputs (n, P).
+    /// Transforms outputs (n, P) to components (n, P).
     pub(super) fn components(&self, outputs: &Array2<f64>) -> Array2<f64> {
         outputs.dot(&self.components)
     }
 
-    /// Covariance of the components of outputs whose covariance is known.
-    pub(super) fn scatter(&self, covariance: &Array2<f64>) -> Array2<f64> {
+    /// Transforms a covariance of outputs (P, P) to that of the components.
+    pub(super) fn component_covariance(&self, covariance: &Array2<f64>) -> Array2<f64> {
         self.components.t().dot(covariance).dot(&self.components)
     }
 
-    /// Covariance of the outputs whose components have a known one.
-    pub(super) fn covariance(&self, scatter: &Array2<f64>) -> Array2<f64> {
-        self.directions.t().dot(scatter).dot(&self.directions)
+    /// Transforms a covariance of components (P, P) to that of the outputs.
+    pub(super) fn output_covariance(&self, covariance: &Array2<f64>) -> Array2<f64> {
+        self.directions.t().dot(covariance).dot(&self.directions)
     }
 }

@@ -1,127 +1,98 @@
-//! What maps are learnt from: contexts that differ, with the mean of what was demonstrated in each.
+//! Training data of context maps: distinct contexts, with the mean output of the demonstrations of each.
 
 use std::collections::HashMap;
 
 use ndarray::{Array2, ArrayView2, Axis};
 
-use super::encoding::Scale;
-use super::model_selection::{Choice, MOST, Shown};
-use super::principal_axes::Axes;
-use super::{ContextColumn, ContextMap, Part};
+use super::ContextColumn;
+use super::encoding::Encoder;
+use super::model_selection::{MAX_CONTEXTS, TrainingSet};
+use super::principal_axes::PrincipalAxes;
 use crate::error::{Error, Result};
 
-/// Most multiplications n·f² that a linear map of n contexts with f inputs may take: a second or two.
+/// Most multiplications n·F² of least squares for n contexts with F features, which take one or two seconds.
 const MAX_WORK: f64 = 4e9;
 
-/// Contexts that differ, what was shown in each on average, and how much that scattered.
-pub(super) struct Data {
+/// Demonstrations grouped by equal contexts.
+pub(super) struct GroupedData {
     pub(super) columns: Vec<ContextColumn>,
-    scale: Scale,
-    inputs: Array2<f64>,
+    pub(super) encoder: Encoder,
+    /// Features of the n distinct contexts (n, F).
+    features: Array2<f64>,
+    /// Mean outputs of each context (n, P).
     pub(super) means: Array2<f64>,
-    /// Pooled covariance of demonstrations of one context, with its degrees of freedom; the mean of one over their
-    /// number is the share of it that an average keeps.
-    within: Option<(Array2<f64>, usize)>,
-    kept: f64,
+    /// Covariance (P, P) within contexts, pooled, with its degrees of freedom; `None` without repetitions.
+    pub(super) within: Option<(Array2<f64>, usize)>,
+    /// Mean of 1/n_i over the contexts with n_i demonstrations each, the share of `within` in the variance of a mean.
+    pub(super) averaged_share: f64,
 }
 
-impl Data {
-    pub(super) fn of(columns: Vec<ContextColumn>, contexts: &Array2<f64>, outputs: ArrayView2<f64>) -> Result<Self> {
+impl GroupedData {
+    /// Groups tabulated contexts (M, Q) with their outputs (M, P).
+    ///
+    /// # Errors
+    /// Contexts with too many labels and numbers, or with a number that varies too little or too much.
+    pub(super) fn new(columns: Vec<ContextColumn>, contexts: &Array2<f64>, outputs: ArrayView2<f64>) -> Result<Self> {
         let groups = group_equal_contexts(contexts);
-        // Each label is an input of its own.
-        let n_inputs: usize = columns.iter().map(ContextColumn::n_features).sum();
-        let work = groups.len() as f64 * (n_inputs as f64).powi(2);
-        if work > MAX_WORK {
-            let allowed = "labels and numbers of a context: too many for so many contexts; merge labels";
-            return Err(Error::Range { name: "contexts", value: n_inputs as f64, allowed });
+        let n_features: usize = columns.iter().map(ContextColumn::n_features).sum();
+        if groups.len() as f64 * (n_features as f64).powi(2) > MAX_WORK {
+            let allowed = "labels and numbers per context are too many for this number of contexts; merge labels";
+            return Err(Error::Range { name: "contexts", value: n_features as f64, allowed });
         }
-        let firsts: Vec<usize> = groups.iter().map(|group| group[0]).collect();
-        let distinct = contexts.select(Axis(0), &firsts);
-        let scale = Scale::of(&columns, &distinct)?;
-        let features: Vec<f64> = distinct.rows().into_iter().flat_map(|row| scale.features(&row.to_vec())).collect();
-        let inputs =
-            Array2::from_shape_fn((groups.len(), scale.n_features()), |(i, f)| features[i * scale.n_features() + f]);
+        let first_of_each: Vec<usize> = groups.iter().map(|group| group[0]).collect();
+        let distinct = contexts.select(Axis(0), &first_of_each);
+        let encoder = Encoder::fit(&columns, &distinct)?;
+        let rows: Vec<Vec<f64>> = distinct.rows().into_iter().map(|row| encoder.features(&row.to_vec())).collect();
+        let features = Array2::from_shape_fn((groups.len(), n_features), |(i, f)| rows[i][f]);
         let mut means = Array2::zeros((groups.len(), outputs.ncols()));
         let mut scatter = Array2::zeros((outputs.ncols(), outputs.ncols()));
         for (group, mut mean) in groups.iter().zip(means.rows_mut()) {
-            let shown = outputs.select(Axis(0), group);
-            mean.assign(&shown.mean_axis(Axis(0)).unwrap_or_default());
+            let repetitions = outputs.select(Axis(0), group);
+            mean.assign(&repetitions.mean_axis(Axis(0)).unwrap_or_default());
             if group.len() > 1 {
-                let deviations = &shown - &mean;
+                let deviations = &repetitions - &mean;
                 scatter += &deviations.t().dot(&deviations);
             }
         }
         let degrees_of_freedom = contexts.nrows() - groups.len();
         let within = (degrees_of_freedom > 0).then(|| (scatter / degrees_of_freedom as f64, degrees_of_freedom));
-        let kept = groups.iter().map(|group| 1.0 / group.len() as f64).sum::<f64>() / groups.len() as f64;
-        Ok(Self { columns, scale, inputs, means, within, kept })
+        let averaged_share = groups.iter().map(|group| 1.0 / group.len() as f64).sum::<f64>() / groups.len() as f64;
+        Ok(Self { columns, encoder, features, means, within, averaged_share })
     }
 
-    /// Checks the number of contexts of a map whose cost grows with its cube.
-    pub(super) fn check_count(&self, cubic: bool) -> Result<()> {
-        if cubic && self.inputs.nrows() > MOST {
-            let (name, value) = ("contexts", self.inputs.nrows() as f64);
-            let allowed = "different contexts: at most 1024 for this map; round them, or take map=\"linear\"";
-            return Err(Error::Range { name, value, allowed });
+    /// Checks the number of contexts of a map with a kernel, whose cost grows with its cube.
+    ///
+    /// # Errors
+    /// More than [`MAX_CONTEXTS`].
+    pub(super) fn check_kernel_size(&self) -> Result<()> {
+        let n = self.features.nrows();
+        if n > MAX_CONTEXTS {
+            let allowed = "different contexts: at most 1024 for this map; round them, or select the linear map";
+            return Err(Error::Range { name: "contexts", value: n as f64, allowed });
         }
         Ok(())
     }
 
-    /// The same, of components along axes.
-    pub(super) fn along(self, axes: &Axes) -> Self {
-        let within = self.within.map(|(within, degrees_of_freedom)| (axes.scatter(&within), degrees_of_freedom));
+    /// Returns the data with components along axes for outputs.
+    pub(super) fn along(self, axes: &PrincipalAxes) -> Self {
+        let within = self.within.map(|(within, n)| (axes.component_covariance(&within), n));
         Self { means: axes.components(&self.means), within, ..self }
     }
 
-    pub(super) fn shown(&self) -> Shown<'_> {
-        Shown { inputs: self.inputs.view(), n_inputs: self.scale.n_inputs(), outputs: self.means.view() }
-    }
-
-    pub(super) fn map(self, axes: Axes, choice: Choice) -> ContextMap {
-        let Choice { candidate, trend, errors } = choice;
-        let (kind, kernel, ratios) = (candidate.kind, candidate.kernel, candidate.ratios.clone());
-        let (noise, degrees_of_freedom) = match (candidate.kriging.degrees_of_freedom(), &self.within) {
-            // As many coefficients as contexts: what is left is the noise of the averages.
-            (0, None) => (None, 0),
-            (0, Some((within, degrees_of_freedom))) => (Some(within * self.kept), *degrees_of_freedom),
-            (degrees_of_freedom, _) => {
-                let innovations = candidate.kriging.innovations(&candidate.values, &ratios);
-                (Some(innovations.t().dot(&innovations) / degrees_of_freedom as f64), degrees_of_freedom)
-            }
-        };
-        let within = self.within.map(|(within, _)| within * (1.0 - self.kept));
-        let (columns, scale) = (self.columns, self.scale);
-        let centre = self.means.mean_axis(Axis(0)).unwrap_or_default();
-        let slopes = trend.as_ref().map(|trend| trend.line.ratios.clone()).unwrap_or_default();
-        let trend = trend.map(|trend| (Part::of(trend.line), trend.stack));
-        let process = Part::of(candidate);
-        ContextMap {
-            columns,
-            scale,
-            kind,
-            kernel,
-            axes,
-            ratios,
-            slopes,
-            errors,
-            process,
-            trend,
-            centre,
-            noise,
-            within,
-            degrees_of_freedom,
-        }
+    /// Returns a view for the regression.
+    pub(super) fn training_set(&self) -> TrainingSet<'_> {
+        TrainingSet { features: self.features.view(), n_inputs: self.encoder.n_inputs(), outputs: self.means.view() }
     }
 }
 
-/// Demonstrations of equal contexts (M, Q), in the order of the first of each.
+/// Groups the indices of equal contexts (M, Q), in the order of the first index of each.
 pub(crate) fn group_equal_contexts(contexts: &Array2<f64>) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
-    let mut known = HashMap::new();
+    let mut group_of = HashMap::new();
     for (m, row) in contexts.rows().into_iter().enumerate() {
-        // Zero of either sign is one context.
+        // Adding zero makes −0 and 0 equal.
         let key: Vec<u64> = row.iter().map(|value| (value + 0.0).to_bits()).collect();
-        let group = *known.entry(key).or_insert(groups.len());
+        let group = *group_of.entry(key).or_insert(groups.len());
         if group == groups.len() {
             groups.push(Vec::new());
         }

@@ -1,7 +1,7 @@
-//! The two canonical systems in closed form.
+//! Discrete and rhythmic canonical systems in closed form.
 //!
-//! Both are driven by one clock `u` with u̇ = 1/τ. It is integrated, never computed as t/τ, so that a changed τ bends
-//! the phase and does not make it jump.
+//! Both are driven by a clock `u` with u̇ = 1/τ. The clock is integrated rather than computed as t/τ, so that the phase
+//! stays continuous when τ changes.
 //!
 //! - discrete (Eq. 3): τẋ = −α_x x, x(0) = 1, hence x = exp(−α_x u);
 //! - rhythmic (Eq. 4): τφ̇ = 1, hence φ = u mod 2π, and τṙ = μ(r₀ − r). The paper prints r − r₀, which diverges for
@@ -12,26 +12,35 @@ use std::f64::consts::TAU;
 use crate::kind::Kind;
 use serde::{Deserialize, Serialize};
 
-/// A canonical system.
+/// Canonical system of a movement.
+///
+/// ```
+/// use pdmp_core::dynamics::Canonical;
+///
+/// let discrete = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
+/// assert_eq!(discrete.phase(1.0), (-4.6f64).exp());
+/// let rhythmic = Canonical::Rhythmic { mu: 2.0 };
+/// assert_eq!(rhythmic.phase(rhythmic.extent()), 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Canonical {
-    /// τẋ = −α_x x, demonstrated up to u = `u_end`.
+    /// τẋ = −α_x x, demonstrated for 0 ≤ u ≤ `u_end`.
     Discrete {
-        /// Decay of the phase, per unit of u.
+        /// Decay rate α_x of the phase, per unit of u.
         alpha_x: f64,
-        /// Clock at the end of the demonstrated movement, T/τ.
+        /// Clock u at the end of the demonstrated movement, T/τ.
         u_end: f64,
     },
     /// τφ̇ = 1 and τṙ = μ(r₀ − r).
     Rhythmic {
-        /// Rate at which the amplitude follows its target, per unit of u.
+        /// Rate μ at which the amplitude r converges to its target r₀, per unit of u.
         mu: f64,
     },
 }
 
 impl Canonical {
-    /// Which of the two it is.
+    /// Returns the kind of the movement.
     pub fn kind(&self) -> Kind {
         match self {
             Canonical::Discrete { .. } => Kind::Discrete,
@@ -39,7 +48,7 @@ impl Canonical {
         }
     }
 
-    /// Length of the demonstrated stretch of the clock: T/τ, or one turn.
+    /// Returns the length of the demonstrated clock interval: T/τ for a discrete system, 2π for a rhythmic one.
     pub fn extent(&self) -> f64 {
         match *self {
             Canonical::Discrete { u_end, .. } => u_end,
@@ -47,13 +56,13 @@ impl Canonical {
         }
     }
 
-    /// The clock at each of `n_samples` at equal intervals.
+    /// Returns the clock at each of `n_samples` equidistant samples of the demonstrated movement.
     pub(crate) fn clock(&self, n_samples: usize) -> Vec<f64> {
         let steps = self.kind().steps(n_samples) as f64;
         (0..n_samples).map(|c| self.extent() * (c as f64 / steps)).collect()
     }
 
-    /// The clock at a phase: −ln(x)/α_x where discrete, φ itself where rhythmic.
+    /// Returns the clock at a phase: −ln(x)/α_x for a discrete system, φ for a rhythmic one.
     pub(crate) fn clock_at(&self, phase: f64) -> f64 {
         match *self {
             Canonical::Discrete { alpha_x, .. } => -phase.ln() / alpha_x,
@@ -61,7 +70,7 @@ impl Canonical {
         }
     }
 
-    /// The phase at clock `u`: x in (0, 1], or φ in [0, 2π).
+    /// Returns the phase at clock `u`: x in [0, 1] for a discrete system, φ in [0, 2π) for a rhythmic one.
     pub fn phase(&self, u: f64) -> f64 {
         match *self {
             Canonical::Discrete { alpha_x, .. } => faded((-alpha_x * u).exp()),
@@ -70,51 +79,50 @@ impl Canonical {
     }
 }
 
-/// An angle in [0, 2π).
+/// Wraps an angle to [0, 2π).
 pub(crate) fn turn(phi: f64) -> f64 {
-    // A remainder takes long, and most angles of a control loop are there already. What lies just below 0 rounds to 2π.
+    // The remainder is slow, and most angles of a control loop need none. That of a tiny negative angle rounds to 2π.
     if (0.0..TAU).contains(&phi) { phi } else { phi.rem_euclid(TAU) % TAU }
 }
 
-/// A sum of many small steps that does not drift: what each addition rounds off is carried to the next (Kahan 1965).
+/// Compensated sum of many small steps: the rounding error of each addition is carried to the next (Kahan 1965).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CompensatedSum {
     value: f64,
-    carried: f64,
+    compensation: f64,
 }
 
 impl CompensatedSum {
-    /// A sum that starts at `value`.
+    /// Returns a sum that starts at `value`.
     pub(crate) fn at(value: f64) -> Self {
-        Self { value, carried: 0.0 }
+        Self { value, compensation: 0.0 }
     }
 
-    /// The sum.
+    /// Returns the sum.
     pub(crate) fn value(&self) -> f64 {
         self.value
     }
 
     /// Adds a step.
     pub(crate) fn add(&mut self, step: f64) {
-        let step = step + self.carried;
+        let step = step + self.compensation;
         let sum = self.value + step;
-        self.carried = step - (sum - self.value);
+        self.compensation = step - (sum - self.value);
         self.value = sum;
     }
 
-    /// Brings an angle back into [0, 2π).
+    /// Wraps an angle to [0, 2π).
     pub(crate) fn wrap(&mut self) {
         self.value = turn(self.value);
     }
 }
 
-/// The amplitude r after a stretch `h` of the clock: r₀ + (r − r₀)exp(−μh).
+/// Returns the amplitude r after a clock interval `h`: r₀ + (r − r₀)exp(−μh).
 pub(crate) fn amplitude(mu: f64, r: f64, target: f64, h: f64) -> f64 {
     faded(target + (r - target) * (-mu * h).exp())
 }
 
-/// A number that is not negative, or zero where it has all but faded: what lies below would leave the range of fast
-/// numbers.
+/// Flushes a non-negative number below 1e-200 to zero: products of such numbers become subnormal, which is slow.
 pub(crate) fn faded(x: f64) -> f64 {
     if x < 1e-200 { 0.0 } else { x }
 }

@@ -1,104 +1,124 @@
-//! Critically damped second-order filters: how commands change without a jump in position or velocity.
+//! Critically damped second-order filters of commands, so that a changed command leaves position and velocity continuous.
 //!
-//! The rate 1/τ passes its filter in seconds. Style, goal, anchor and amplitude pass theirs on the clock u, so that the path
-//! does not depend on how fast it is followed. `time` stands for either.
+//! ```text
+//! ẍ = −2ωẋ − ω²(x − target)
+//! ```
 //!
-//! ẍ = −2ωẋ − ω²(x − target), solved in closed form over a tick. Its impulse response is positive, so that a filtered
-//! positive command stays positive, whatever the order and time of its changes.
+//! is solved in closed form over a tick. The rate 1/τ is filtered in seconds; style, goal, anchor and amplitude are filtered
+//! on the clock u, so that the path does not depend on the rate. Below, time t stands for either. The impulse response is
+//! positive, so that a filtered positive command stays positive for any sequence of changes.
 
 use crate::dynamics::output_system::INVERSE_FACTORIAL;
 use crate::numerics::simd::{F64x4, Register, pack, repack};
 
-/// Time to 99 % of a step, times ω: the root of (1 + s)exp(−s) = 0.01.
-const SETTLING: f64 = 6.638_352_067_993_813;
-/// A part of a transition, times ω, within which a cubic is off by some 1e-9 of the step.
-const MAX_CLOCK_STEP: f64 = 0.07;
-/// Most parts of a tick for a transition's sake.
-const MAX_PARTS: f64 = 32.0;
-/// Terms of an exponential of such a part that reach its last digit.
-const TERMS: usize = 10;
-/// Shortest transition, in seconds, that is filtered: a shorter one, whose ω² leaves the range of numbers, is immediate.
+/// ωt at which 99 % of a step are done: the root of (1 + s)exp(−s) = 0.01.
+const SETTLING_TIME: f64 = 6.638_352_067_993_813;
+/// ωt at which the remainder of a step lies far below rounding.
+const DECAY_TIME: f64 = 45.0;
+/// Maximum ωt of a substep: a cubic then deviates from the filter by about 1e-9 of the step.
+const MAX_SUBSTEP: f64 = 0.07;
+/// Maximum number of substeps that a filter asks for.
+const MAX_SUBSTEPS: f64 = 32.0;
+/// Number of terms of the series of an exponential that is exact to the last digit up to [`MAX_SUBSTEP`].
+const N_TERMS: usize = 10;
+/// Minimum transition, in seconds, that is filtered. A shorter one is immediate, since its ω² may overflow.
 const MIN_TRANSITION: f64 = 1e-15;
-/// After so long, times ω, what is left of a step lies far below rounding.
-const FORGOTTEN: f64 = 45.0;
+/// Maximum ωt in exponents: exp(−ωt) is zero, and ωt·exp(−ωt) must not become ∞·0.
+const MAX_EXPONENT: f64 = 1e4;
 
-/// The filter: its constant, common to all commands of a movement.
+/// Gain of the filter, common to all commands that it serves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilterGains {
     /// ω; infinite for an immediate switch.
     omega: f64,
-    /// Time until what is left of a step lies far below rounding.
-    forgets: f64,
+    /// Time after which the remainder of a step lies far below rounding.
+    decay_time: f64,
 }
 
-/// The filter's solution over a tick: what displacement d = x − target and rate v at its start become and add.
+/// Solution of the filter over a tick, as weights of the displacement d = x − target and of the rate v = ẋ at its start.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilterStep {
     dt: f64,
-    /// x − target at the end, of d and v.
+    /// Weights of d and v in x − target at the end.
     value: [f64; 2],
-    /// ẋ at the end, of d and v.
+    /// Weights of d and v in ẋ at the end.
     rate: [f64; 2],
-    /// ∫(x − target) over the tick, of d and v.
+    /// Weights of d and v in ∫(x − target)dt over the tick.
     integral: [f64; 2],
 }
 
 impl FilterGains {
-    /// `transition` is the time to 99 % in seconds, 0 for an immediate switch.
+    /// Returns the gain for a time to 99 % of a step, in seconds; 0 is an immediate switch.
     pub(crate) fn new(transition: f64) -> Self {
         let transition = if transition < MIN_TRANSITION { 0.0 } else { transition };
-        Self { omega: SETTLING / transition, forgets: FORGOTTEN / SETTLING * transition }
+        Self { omega: SETTLING_TIME / transition, decay_time: DECAY_TIME / SETTLING_TIME * transition }
     }
 
-    /// The same on a clock that runs at the rate 1/τ.
+    /// Returns the gain on a clock of rate 1/τ.
     pub(crate) fn on_clock(&self, tau: f64) -> Self {
-        Self { omega: self.omega * tau, forgets: self.forgets / tau }
+        Self { omega: self.omega * tau, decay_time: self.decay_time / tau }
     }
 
-    /// The same with a longer transition, if it is longer.
-    pub(crate) fn lasting(&self, transition: f64) -> Self {
+    /// Returns the gain for the longer of this transition and the given one.
+    pub(crate) fn at_least(&self, transition: f64) -> Self {
         let longer = Self::new(transition.max(0.0));
         if longer.omega < self.omega { longer } else { *self }
     }
 
-    /// Whether commands are switched to at once.
-    pub(crate) fn immediate(&self) -> bool {
+    /// Returns whether commands take effect at once.
+    pub(crate) fn is_immediate(&self) -> bool {
         self.omega.is_infinite()
     }
 
-    /// Parts in which a stretch `dt` of a transition is well described by cubics; what is over within one of many need
-    /// not be.
-    pub(crate) fn parts(&self, dt: f64) -> f64 {
-        (self.omega * dt / MAX_CLOCK_STEP).min(MAX_PARTS)
+    /// Returns the number of substeps, not rounded, in which cubics describe the filtered commands over `dt`.
+    ///
+    /// The number is bounded: a transition that ends within one of many substeps needs no accurate description.
+    pub(crate) fn substeps(&self, dt: f64) -> f64 {
+        (self.omega * dt / MAX_SUBSTEP).min(MAX_SUBSTEPS)
     }
 
-    /// How far a group may still go, at most.
-    pub(crate) fn left(&self, follower: &CommandFilter, group: usize) -> F64x4 {
-        let CommandFilter { value, rate, target, .. } = follower;
+    /// Returns an upper bound of the remaining displacement |x(t) − target| of a group: |x − target| + |ẋ|/ω.
+    pub(crate) fn max_displacement(&self, command: &CommandFilter, group: usize) -> F64x4 {
+        let CommandFilter { value, rate, target, .. } = command;
         (value[group] - target[group]).abs() + rate[group].abs() * (1.0 / self.omega)
     }
 
-    /// The solution over a time `dt` without its integral, which only the rate needs.
-    pub(crate) fn pass(&self, dt: f64) -> FilterStep {
-        let s = (self.omega * dt).min(1e4);
+    /// Returns the solution over a time `dt` without its integral, which only the rate needs.
+    pub(crate) fn step(&self, dt: f64) -> FilterStep {
+        let s = (self.omega * dt).min(MAX_EXPONENT);
         let decay = decay(s);
         let (value, rate) = ([(1.0 + s) * decay, dt * decay], [-self.omega * (s * decay), (1.0 - s) * decay]);
         FilterStep { dt, value, rate, integral: [0.0; 2] }
     }
 
-    /// What follows a filtered command x by q̇ = m(x − q), after a time `dt`: the amplitude r of Eq. (4), or a target of
-    /// its own that is at rest where the filter is immediate.
-    pub(crate) fn lag(&self, follower: &CommandFilter, q: f64, m: f64, dt: f64) -> f64 {
-        let [x, v, target] = [&follower.value, &follower.rate, &follower.target].map(|lanes| lanes[0].as_array()[0]);
+    /// Returns the solution over a time `dt` with its integral.
+    pub(crate) fn step_with_integral(&self, dt: f64) -> FilterStep {
+        let omega = self.omega;
+        let s = (omega * dt).min(MAX_EXPONENT);
+        let decay = (-s).exp();
+        // ω∫exp(−ωt)dt and ω∫ωt·exp(−ωt)dt.
+        let first = -(-s).exp_m1();
+        let second = first - s * decay;
+        FilterStep {
+            dt,
+            value: [(1.0 + s) * decay, dt * decay],
+            rate: [-omega * (s * decay), (1.0 - s) * decay],
+            integral: [(first + second) / omega, second / (omega * omega)],
+        }
+    }
+
+    /// Returns the solution of q̇ = m(x − q) after a time `dt`, from `q`: the response of the amplitude r of Eq. (4) to the
+    /// filtered command x = r₀.
+    pub(crate) fn first_order_response(&self, command: &CommandFilter, q: f64, m: f64, dt: f64) -> f64 {
+        let [x, v, target] = [&command.value, &command.rate, &command.target].map(|lanes| lanes[0].as_array()[0]);
         let (d, decay) = (x - target, (-m * dt).exp());
-        if follower.settled() {
+        if command.is_settled() {
             return target + (q - target) * decay;
         }
-        // q − target = (q₀ − target)e^(−mt) + m∫(d + (v + ωd)s)e^(−ωs)e^(−m(t−s))ds, with x = (m − ω)t. A
-        // filter is over after a few of its own times.
-        let s = (self.omega * dt).min(1e4);
+        // q − target = (q₀ − target)e^(−mt) + m∫(d + (v + ωd)s)e^(−ωs)e^(−m(t−s))ds; below, x = (m − ω)t.
+        let s = (self.omega * dt).min(MAX_EXPONENT);
         let (x, filtered) = (m * dt - s, (-s).exp());
-        let [even, linear] = if x.abs() > 0.1 {
+        let [constant, linear] = if x.abs() > 0.1 {
             [(filtered - decay) / x, (filtered * (x - 1.0) + decay) / (x * x)]
         } else {
             // (e^x − 1)/x and (e^x(x − 1) + 1)/x² by their series: Σ x^k/(k + 1)! and Σ x^k/(k!(k + 2)).
@@ -110,158 +130,138 @@ impl FilterGains {
             }
             sums.map(|sum| sum * decay)
         };
-        target + (q - target) * decay + m * dt * (d * even + (v * dt + s * d) * linear)
-    }
-
-    /// The solution over a time `dt`.
-    pub(crate) fn glide(&self, dt: f64) -> FilterStep {
-        let omega = self.omega;
-        // A step that is over is over, however long since.
-        let s = (omega * dt).min(1e4);
-        let decay = (-s).exp();
-        // ∫exp(−ωt) and ∫ωt·exp(−ωt), times ω.
-        let first = -(-s).exp_m1();
-        let second = first - s * decay;
-        FilterStep {
-            dt,
-            value: [(1.0 + s) * decay, dt * decay],
-            rate: [-omega * (s * decay), (1.0 - s) * decay],
-            integral: [(first + second) / omega, second / (omega * omega)],
-        }
+        target + (q - target) * decay + m * dt * (d * constant + (v * dt + s * d) * linear)
     }
 }
 
-/// exp(−s), by its series over the short times of a loop: a call would take longer than all else that a filter does.
+/// Returns exp(−s), by its series over the short ticks of a loop: a call of `exp` would take longer than the rest of the
+/// filter.
 #[inline(always)]
 fn decay(s: f64) -> f64 {
-    if s > MAX_CLOCK_STEP {
+    if s > MAX_SUBSTEP {
         return (-s).exp();
     }
-    let mut sum = INVERSE_FACTORIAL[TERMS - 1];
-    for k in (0..TERMS - 1).rev() {
+    let mut sum = INVERSE_FACTORIAL[N_TERMS - 1];
+    for k in (0..N_TERMS - 1).rev() {
         sum = INVERSE_FACTORIAL[k] - s * sum;
     }
     sum
 }
 
 impl FilterStep {
-    /// Over no time: what is there stays.
-    pub(crate) const START: Self = Self { dt: 0.0, value: [1.0, 0.0], rate: [0.0, 1.0], integral: [0.0; 2] };
+    /// Solution over a tick of length zero.
+    pub(crate) const IDENTITY: Self = Self { dt: 0.0, value: [1.0, 0.0], rate: [0.0, 1.0], integral: [0.0; 2] };
 
-    /// Length of the tick.
+    /// Returns the length of the tick.
     pub(crate) fn dt(&self) -> f64 {
         self.dt
     }
 }
 
-/// Commands that set out together, in groups of four, padded with zeros.
+/// Filtered commands with a common transition, in groups of four, padded with zeros.
 #[derive(Clone, Debug)]
 pub(crate) struct CommandFilter {
     value: Vec<F64x4>,
     rate: Vec<F64x4>,
     target: Vec<F64x4>,
-    /// Time until the values are their targets.
+    /// Time until the values are set to their targets.
     remaining: f64,
 }
 
 impl CommandFilter {
-    /// At rest on its targets.
+    /// Returns commands at rest on their targets.
     pub(crate) fn new(target: &[f64]) -> Self {
         let target = pack(target);
         Self { value: target.clone(), rate: vec![F64x4::ZERO; target.len()], target, remaining: 0.0 }
     }
 
-    /// Values now.
+    /// Returns the filtered values x.
     pub(crate) fn value(&self) -> &[F64x4] {
         &self.value
     }
 
-    /// Their derivatives with respect to time.
+    /// Returns the derivatives ẋ of the filtered values.
     pub(crate) fn rate(&self) -> &[F64x4] {
         &self.rate
     }
 
-    /// Where they go.
+    /// Returns the targets.
     pub(crate) fn target(&self) -> &[F64x4] {
         &self.target
     }
 
-    /// Whether the values have come to rest on their targets.
-    pub(crate) fn settled(&self) -> bool {
+    /// Returns whether the values rest on their targets.
+    pub(crate) fn is_settled(&self) -> bool {
         self.remaining <= 0.0
     }
 
-    /// Sets out for as many targets.
-    pub(crate) fn follow(&mut self, target: &[f64], filter: &FilterGains) {
-        if filter.immediate() {
-            return self.jump(target);
+    /// Sets the targets and starts a transition.
+    pub(crate) fn set_target(&mut self, target: &[f64], gains: &FilterGains) {
+        if gains.is_immediate() {
+            return self.reset(target);
         }
         repack(&mut self.target, target);
-        self.remaining = filter.forgets;
+        self.remaining = gains.decay_time;
     }
 
-    /// Jumps to as many targets.
-    pub(crate) fn jump(&mut self, target: &[f64]) {
+    /// Sets targets and values.
+    pub(crate) fn reset(&mut self, target: &[f64]) {
         repack(&mut self.target, target);
-        self.settle();
-    }
-
-    fn settle(&mut self) {
         self.value.copy_from_slice(&self.target);
         self.rate.fill(F64x4::ZERO);
         self.remaining = 0.0;
     }
 
-    /// Moves on by a tick.
+    /// Advances all groups by a tick.
     #[inline(always)]
-    pub(crate) fn advance<T: Register>(&mut self, glide: &FilterStep) {
-        if self.elapse(glide) {
+    pub(crate) fn advance<T: Register>(&mut self, step: &FilterStep) {
+        if self.begin_step(step) {
             for group in 0..self.value.len() {
-                self.advance_group::<T>(group, glide);
+                self.advance_group::<T>(group, step);
             }
         }
     }
 
-    /// Takes a tick off the time to come, and tells whether each group is now to be moved on.
-    pub(crate) fn elapse(&mut self, glide: &FilterStep) -> bool {
-        let moving = !self.settled();
+    /// Subtracts a tick from the remaining time. Returns whether each group must now be advanced.
+    pub(crate) fn begin_step(&mut self, step: &FilterStep) -> bool {
+        let moving = !self.is_settled();
         if moving {
-            self.remaining -= glide.dt;
+            self.remaining -= step.dt;
         }
         moving
     }
 
-    /// Moves one group on by a tick, and returns its value and rate.
+    /// Advances one group by a tick. Returns its value and rate.
     #[inline(always)]
-    pub(crate) fn advance_group<T: Register>(&mut self, group: usize, glide: &FilterStep) -> [T; 2] {
-        let settled = self.settled();
+    pub(crate) fn advance_group<T: Register>(&mut self, group: usize, step: &FilterStep) -> [T; 2] {
+        let settled = self.is_settled();
         let (value, rate, target) = (&mut self.value[group], &mut self.rate[group], T::load(&self.target[group]));
         let [x, v] = if settled {
             [target, T::default()]
         } else {
             let (d, v) = (T::load(value) - target, T::load(rate));
-            [target + (d * glide.value[0] + v * glide.value[1]), d * glide.rate[0] + v * glide.rate[1]]
+            [target + (d * step.value[0] + v * step.value[1]), d * step.rate[0] + v * step.rate[1]]
         };
         (*value, *rate) = (x.store(), v.store());
         [x, v]
     }
 
-    /// ∫ of the first value over a tick.
-    pub(crate) fn integral(&self, glide: &FilterStep) -> f64 {
+    /// Returns ∫x dt of the first value over a tick.
+    pub(crate) fn integral(&self, step: &FilterStep) -> f64 {
         let [x, v, target] = [&self.value, &self.rate, &self.target].map(|lanes| lanes[0].as_array()[0]);
-        target * glide.dt + ((x - target) * glide.integral[0] + v * glide.integral[1])
+        target * step.dt + ((x - target) * step.integral[0] + v * step.integral[1])
     }
 
-    /// The time in [0, dt] at which the integral of the first, positive value reaches `area`.
-    pub(crate) fn time_to(&self, area: f64, dt: f64, filter: &FilterGains) -> f64 {
-        if self.settled() {
+    /// Returns the time in [0, dt] at which the integral of the first value, which is positive, reaches `area`.
+    pub(crate) fn integral_time(&self, area: f64, dt: f64, gains: &FilterGains) -> f64 {
+        if self.is_settled() {
             return (area / self.value[0].as_array()[0]).min(dt);
         }
         let (mut low, mut high) = (0.0, dt);
-        // The integral is increasing; fifty halvings exhaust the digits of a double.
+        // The integral is increasing. Fifty bisections exhaust the digits of a double.
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
-            if self.integral(&filter.glide(middle)) < area { low = middle } else { high = middle }
+            if self.integral(&gains.step_with_integral(middle)) < area { low = middle } else { high = middle }
         }
         high
     }
@@ -273,34 +273,34 @@ mod tests {
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
-    fn first(lanes: &[F64x4]) -> f64 {
+    fn first_element(lanes: &[F64x4]) -> f64 {
         lanes[0].as_array()[0]
     }
 
-    /// One command that sets out from 2 for 5, to be there after 0.3 s.
-    fn command() -> (CommandFilter, FilterGains) {
-        let (mut follower, filter) = (CommandFilter::new(&[2.0]), FilterGains::new(0.3));
-        follower.follow(&[5.0], &filter);
-        (follower, filter)
+    /// Returns a command that steps from 2 to 5 with a transition of 0.3 s.
+    fn stepped() -> (CommandFilter, FilterGains) {
+        let (mut command, gains) = (CommandFilter::new(&[2.0]), FilterGains::new(0.3));
+        command.set_target(&[5.0], &gains);
+        (command, gains)
     }
 
-    /// After the transition time 99 % of a step are done, however many ticks it took.
+    /// 99 % of a step are done after the transition time, for any number of ticks.
     #[test]
     fn transition_is_the_time_to_99_percent() {
         for ticks in [1, 7, 1000] {
-            let (mut follower, filter) = command();
-            (0..ticks).for_each(|_| follower.advance::<F64x4>(&filter.glide(0.3 / f64::from(ticks))));
-            assert_relative_eq!(first(follower.value()), 2.0 + 0.99 * 3.0, epsilon = 1e-12);
+            let (mut command, gains) = stepped();
+            (0..ticks).for_each(|_| command.advance::<F64x4>(&gains.step_with_integral(0.3 / f64::from(ticks))));
+            assert_relative_eq!(first_element(command.value()), 2.0 + 0.99 * 3.0, epsilon = 1e-12);
         }
     }
 
-    /// The values solve ẍ = −2ωẋ − ω²(x − target), by RK4.
+    /// The closed form agrees with RK4 on ẍ = −2ωẋ − ω²(x − target).
     #[test]
-    fn values_solve_the_filter() {
-        let (mut follower, filter) = command();
+    fn values_solve_the_filter_equation() {
+        let (mut command, gains) = stepped();
         let (mut x, mut v, n) = (2.0, 0.0, 1000);
         let h = 0.2 / f64::from(n);
-        let f = |x: f64, v: f64| (v, -2.0 * filter.omega * v - filter.omega.powi(2) * (x - 5.0));
+        let f = |x: f64, v: f64| (v, -2.0 * gains.omega * v - gains.omega.powi(2) * (x - 5.0));
         for _ in 0..n {
             let a = f(x, v);
             let b = f(x + h / 2.0 * a.0, v + h / 2.0 * a.1);
@@ -309,40 +309,40 @@ mod tests {
             x += h / 6.0 * (a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0);
             v += h / 6.0 * (a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1);
         }
-        follower.advance::<F64x4>(&filter.glide(0.2));
-        assert_relative_eq!(first(follower.value()), x, max_relative = 1e-9);
-        assert_relative_eq!(first(follower.rate()), v, max_relative = 1e-8);
+        command.advance::<F64x4>(&gains.step_with_integral(0.2));
+        assert_relative_eq!(first_element(command.value()), x, max_relative = 1e-9);
+        assert_relative_eq!(first_element(command.rate()), v, max_relative = 1e-8);
     }
 
-    /// The integral is that of the values, by Simpson's rule, and its inverse finds the time back.
+    /// The integral agrees with Simpson's rule, and its inverse returns the time.
     #[test]
-    fn integral_is_that_of_the_values() {
-        let (mut follower, filter) = command();
-        follower.advance::<F64x4>(&filter.glide(0.02));
+    fn integral_agrees_with_simpsons_rule() {
+        let (mut command, gains) = stepped();
+        command.advance::<F64x4>(&gains.step_with_integral(0.02));
         let at = |t: f64| {
-            let mut follower = follower.clone();
-            follower.advance::<F64x4>(&filter.glide(t));
-            first(follower.value())
+            let mut command = command.clone();
+            command.advance::<F64x4>(&gains.step_with_integral(t));
+            first_element(command.value())
         };
         let n = 1000;
         let h = 0.1 / f64::from(n);
         let simpson: f64 =
             (0..n).map(|k| f64::from(k) * h).map(|t| h / 6.0 * (at(t) + 4.0 * at(t + h / 2.0) + at(t + h))).sum();
-        assert_relative_eq!(follower.integral(&filter.glide(0.1)), simpson, max_relative = 1e-11);
-        assert_relative_eq!(follower.time_to(simpson, 1.0, &filter), 0.1, max_relative = 1e-9);
+        assert_relative_eq!(command.integral(&gains.step_with_integral(0.1)), simpson, max_relative = 1e-11);
+        assert_relative_eq!(command.integral_time(simpson, 1.0, &gains), 0.1, max_relative = 1e-9);
     }
 
-    /// What follows a filtered command solves its equation, by RK4, faster and slower than the filter and alike.
+    /// The first-order response agrees with RK4 for rates m below, near and above ω.
     #[test]
-    fn lag_solves_its_equation() {
-        let (start, filter) = command();
-        for m in [0.3, filter.omega * (1.0 - 1e-9), filter.omega * 1.01, 500.0] {
+    fn first_order_response_solves_its_equation() {
+        let (start, gains) = stepped();
+        for m in [0.3, gains.omega * (1.0 - 1e-9), gains.omega * 1.01, 500.0] {
             let (mut q, n) = (1.0, 2000);
             let h = 0.1 / f64::from(n);
             let x = |t: f64| {
-                let mut follower = start.clone();
-                follower.advance::<F64x4>(&filter.pass(t));
-                first(follower.value())
+                let mut command = start.clone();
+                command.advance::<F64x4>(&gains.step(t));
+                first_element(command.value())
             };
             for k in 0..n {
                 let t = f64::from(k) * h;
@@ -353,30 +353,30 @@ mod tests {
                 let d = f(t + h, q + h * c);
                 q += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
             }
-            assert_relative_eq!(filter.lag(&start, 1.0, m, 0.1), q, max_relative = 1e-9);
+            assert_relative_eq!(gains.first_order_response(&start, 1.0, m, 0.1), q, max_relative = 1e-9);
         }
     }
 
-    /// The series is the exponential as far as it serves.
+    /// The series and the call agree on both sides of the switch between them.
     #[test]
     fn decay_is_the_exponential() {
         for k in 0..=2000 {
-            let s = 1e-3 * MAX_CLOCK_STEP * f64::from(k);
+            let s = 1e-3 * MAX_SUBSTEP * f64::from(k);
             assert_relative_eq!(decay(s), (-s).exp(), max_relative = 4.0 * f64::EPSILON);
         }
     }
 
     proptest! {
-        /// A positive command stays positive under any sequence of changes.
+        /// A positive command stays positive for any sequence of changes.
         #[test]
         fn positive_commands_stay_positive(steps in prop::collection::vec((1e-3..1e3f64, 1e-4..1.0f64), 1..30)) {
-            let (mut follower, filter) = command();
+            let (mut command, gains) = stepped();
             for (target, dt) in steps {
-                follower.follow(&[target], &filter);
-                let glide = filter.glide(dt);
-                let area = follower.integral(&glide);
-                follower.advance::<F64x4>(&glide);
-                prop_assert!(first(follower.value()) > 0.0 && area > 0.0);
+                command.set_target(&[target], &gains);
+                let step = gains.step_with_integral(dt);
+                let area = command.integral(&step);
+                command.advance::<F64x4>(&step);
+                prop_assert!(first_element(command.value()) > 0.0 && area > 0.0);
             }
         }
     }

@@ -1,71 +1,84 @@
-//! The attractor landscape, compiled to a table that is read in constant time.
+//! Table of the forcing term, evaluated in constant time.
 //!
-//! Whatever regression learnt it, the forcing of each style dimension and DoF is stored as a piecewise cubic (Hermite)
-//! on a uniform grid of the clock.
+//! The forcing of each style dimension and DoF is stored as a piecewise cubic Hermite interpolant on a uniform grid of the
+//! clock, independently of the regressor that it was learnt by.
 
 use crate::dynamics::canonical::{Canonical, faded, turn};
 use crate::dynamics::hermite_table::KnotTable;
 use crate::dynamics::output_system::CubicSample;
 use crate::numerics::simd::{F64x4, Real, Register, WIDTH, groups};
 
-/// Forcing w of unit styles over the clock: discrete x·b(x; W), rhythmic b(φ; W).
+/// Forcing w of unit styles over the clock: x·b(x; W) for a discrete movement, b(φ; W) for a rhythmic one.
+///
+/// ```
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let table = model.forcing_table();
+/// let (mut value, mut slope) = (vec![0.0; table.n_outputs()], vec![0.0; table.n_outputs()]);
+/// table.evaluate(0.5 * table.canonical().extent(), &mut value, &mut slope);
+/// assert!(table.error() <= 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForcingTable {
     canonical: Canonical,
     n_styles: usize,
     n_dofs: usize,
-    /// Cubics at a knot, of all groups of DoFs and styles.
-    at_knot: usize,
+    /// Number of cubics at a knot: one for each group of DoFs and style.
+    knot_stride: usize,
     cells: usize,
-    /// Width of a cell, and how many there are per unit of the clock.
-    width: f64,
-    per_clock: f64,
-    /// By knots, groups of DoFs and styles, so that a step reads one stretch of memory from end to end. After the last
-    /// knot comes what follows: a and b of w = r·(a + b·p) past the end.
+    /// Width of a cell on the clock.
+    cell_width: f64,
+    /// Number of cells per unit of the clock.
+    cells_per_clock: f64,
+    /// By knots, groups of DoFs and styles, so that a tick reads contiguous memory. After the last knot, a and b of
+    /// w = r·(a + b·p) past the end.
     cubics: Vec<Cubic>,
-    /// What is past the end of a discrete movement.
+    /// Form of the forcing past the end of a discrete movement.
     ending: Ending,
-    /// Error between the knots, relative to the largest forcing.
+    /// Interpolation error, relative to the largest forcing.
     error: f64,
 }
 
-/// How the forcing goes on at v = u − u_end past the end of a discrete movement.
+/// Form of the forcing at v = u − u_end past the end of a discrete movement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Ending {
-    /// It fades with the phase, w = w_end·exp(−α_x v), as in the paper.
+    /// Decay with the phase, w = w_end·exp(−α_x v), as in the paper.
     Phase,
-    /// w = −z_end·exp(−α_z v) + v_end·exp(−κv): the first part fades as z itself, so that what ends at rest on its goal stays
-    /// there, and the second brakes.
+    /// w = −z_end·exp(−α_z v) + v_end·exp(−κv). The first part decays as z does, so that a movement which ends at rest on
+    /// its goal stays there; the second part brakes.
     Braked { alpha_z: f64, braking: f64 },
 }
 
-/// The forcing past the end, r·(a + b·p): what multiplies it, and its derivatives with respect to the clock.
+/// Factors of the forcing past the end, w = r·(a + b·p), and their derivatives with respect to the clock.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fade {
-    /// r.
-    pub(crate) value: f64,
+    pub(crate) r: f64,
     /// r′.
-    pub(crate) growth: f64,
-    /// p and p′.
-    share: f64,
-    pub(crate) along: f64,
+    pub(crate) r_slope: f64,
+    p: f64,
+    /// p′.
+    pub(crate) p_slope: f64,
     braked: bool,
 }
 
 impl Fade {
-    /// Magnitude of what still pushes where z has settled, for a + b·p as value and b as slope.
-    pub(crate) fn push(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> F64x4 {
-        let push = if self.braked { slope * (self.share * self.value) } else { value * self.value };
-        push.abs()
+    /// Returns |w| without the part that decays as z does, from a + b·p as value and b as slope.
+    pub(crate) fn residual(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> F64x4 {
+        let residual = if self.braked { slope * (self.p * self.r) } else { value * self.r };
+        residual.abs()
     }
 }
 
-/// Coefficients of a cubic from a knot on, over the clock; the first two are value and slope at the knot.
+/// Coefficients of a cubic in powers of the clock since a knot; the first two are value and slope at the knot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(64))]
 struct Cubic([F64x4; 4]);
 
-/// A place on the clock: the first cubic at a knot, and how far beyond it.
+/// Position in the table: the index of the first cubic at a knot, and the clock since that knot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TableIndex {
     first: usize,
@@ -73,9 +86,9 @@ pub(crate) struct TableIndex {
 }
 
 impl Cubic {
-    /// The cubic with given values and slopes at both ends of a cell.
-    fn hermite(from: CubicSample<F64x4>, to: CubicSample<F64x4>, width: f64) -> Self {
-        let scale = 1.0 / width;
+    /// Returns the cubic with given values and slopes at both ends of a cell.
+    fn hermite(from: CubicSample<F64x4>, to: CubicSample<F64x4>, cell_width: f64) -> Self {
+        let scale = 1.0 / cell_width;
         let rise = (to.value - from.value) * scale;
         let square = (rise * 3.0 - from.slope * 2.0 - to.slope) * scale;
         let cube = (from.slope + to.slope - rise * 2.0) * (scale * scale);
@@ -93,19 +106,19 @@ impl Cubic {
     }
 }
 
-/// A cubic of given coefficients.
+/// Evaluates a cubic and its slope.
 #[inline(always)]
 fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> CubicSample<T> {
-    let rest = cube * t;
-    let bend = square + rest;
-    CubicSample { value: value + (slope + bend * t) * t, slope: slope + (bend + bend + rest) * t }
+    let cube = cube * t;
+    let sum = square + cube;
+    CubicSample { value: value + (slope + sum * t) * t, slope: slope + (sum + sum + cube) * t }
 }
 
 impl ForcingTable {
-    /// A table from values and slopes of J·D outputs at its knots, two at least.
+    /// Returns a table from values and slopes of J·D outputs at its knots, two at least.
     pub(crate) fn from_knots(canonical: Canonical, n_dofs: usize, knots: &KnotTable, error: f64) -> Self {
         let (cells, n_styles, extent) = (knots.len() - 1, knots.n_outputs / n_dofs, canonical.extent());
-        let width = extent / cells as f64;
+        let cell_width = extent / cells as f64;
         let mut cubics = Vec::with_capacity((cells + 2) * groups(n_dofs) * n_styles);
         for k in 0..=cells {
             for first in (0..n_dofs).step_by(WIDTH) {
@@ -115,32 +128,21 @@ impl ForcingTable {
                     if k == cells {
                         return Cubic([from.value, from.slope, F64x4::ZERO, F64x4::ZERO]);
                     }
-                    Cubic::hermite(from, knots.jet(k + 1, j * n_dofs + first, n), width)
+                    Cubic::hermite(from, knots.jet(k + 1, j * n_dofs + first, n), cell_width)
                 }));
             }
         }
-        let at_knot = groups(n_dofs) * n_styles;
-        for i in cells * at_knot..(cells + 1) * at_knot {
+        let knot_stride = groups(n_dofs) * n_styles;
+        for i in cells * knot_stride..(cells + 1) * knot_stride {
             cubics.push(Cubic([cubics[i].0[0], F64x4::ZERO, F64x4::ZERO, F64x4::ZERO]));
         }
-        let ending = Ending::Phase;
-        Self {
-            canonical,
-            n_styles,
-            n_dofs,
-            at_knot,
-            cells,
-            width,
-            per_clock: cells as f64 / extent,
-            cubics,
-            ending,
-            error,
-        }
+        let (cells_per_clock, ending) = (cells as f64 / extent, Ending::Phase);
+        Self { canonical, n_styles, n_dofs, knot_stride, cells, cell_width, cells_per_clock, cubics, ending, error }
     }
 
-    /// The same with a forcing that brakes past the end, for `z` of unit styles there, by groups of DoFs and styles.
+    /// Returns the table with [`Ending::Braked`], for the `z` at the end of unit styles, by groups of DoFs and styles.
     pub(crate) fn braked(mut self, alpha_z: f64, braking: f64, z: &[F64x4]) -> Self {
-        let [end, beyond] = [self.cells, self.cells + 1].map(|row| row * self.at_knot);
+        let [end, beyond] = [self.cells, self.cells + 1].map(|row| row * self.knot_stride);
         for (i, z) in z.iter().enumerate() {
             let value = self.cubics[end + i].0[0];
             self.cubics[beyond + i] = Cubic([-*z, value + *z, F64x4::ZERO, F64x4::ZERO]);
@@ -149,18 +151,18 @@ impl ForcingTable {
         self
     }
 
-    /// The canonical system whose clock the table is read at.
+    /// Returns the canonical system of the clock.
     pub fn canonical(&self) -> Canonical {
         self.canonical
     }
 
-    /// Error between the knots, relative to the largest forcing, measured in their middles or estimated from that of a
-    /// table half as fine: 1e-9 at most where 4096 cells suffice.
+    /// Returns the interpolation error relative to the largest forcing, measured at the middles of the cells or estimated
+    /// from that of a table with half the cells. It is at most 1e-9 if 4096 cells suffice.
     pub fn error(&self) -> f64 {
         self.error
     }
 
-    /// Values and slopes at the knots.
+    /// Returns values and slopes at the knots.
     pub(crate) fn knots(&self) -> KnotTable {
         let mut knots = KnotTable::zeros(self.cells + 1, self.n_outputs());
         for (k, (values, slopes)) in knots.rows_mut(1).enumerate() {
@@ -169,108 +171,108 @@ impl ForcingTable {
         knots
     }
 
-    /// The forcing of a style at a knot, for one group of DoFs.
+    /// Returns the forcing of unit style `j` at knot `k`, for one group of DoFs.
     pub(crate) fn knot(&self, k: usize, group: usize, j: usize) -> CubicSample<F64x4> {
-        self.cubics(k * self.at_knot, group)[j].at(0.0)
+        self.cubics(k * self.knot_stride, group)[j].at(0.0)
     }
 
-    /// The cubics of all styles for one group of DoFs, from a knot on whose first cubic is given.
+    /// Returns the cubics of all styles for one group of DoFs at the knot whose first cubic has index `first`.
     #[inline(always)]
     fn cubics(&self, first: usize, group: usize) -> &[Cubic] {
         let start = first + group * self.n_styles;
         &self.cubics[start..start + self.n_styles]
     }
 
-    /// Number of outputs J·D.
+    /// Returns the number of outputs J·D.
     pub fn n_outputs(&self) -> usize {
         self.n_styles * self.n_dofs
     }
 
-    /// Number of cells of the table.
+    /// Returns the number of cells.
     pub fn cells(&self) -> usize {
         self.cells
     }
 
-    /// The forcing of all J·D outputs and its slope with respect to the clock.
+    /// Writes the forcing of all J·D outputs, in the unit of each DoF, and its slope with respect to the clock.
     ///
-    /// Past the end of a discrete movement it brakes, w(u) = −z_end·exp(−α_z(u − u_end)) + v_end·exp(−κ(u − u_end)) with z
-    /// and y′ at the end, or, where transport is immediate, fades with the phase, w(u) = w(u_end)·x(u)/x(u_end). `value`
-    /// and `slope` take as many numbers as there are outputs, (J, D) by rows.
+    /// Past the end of a discrete movement w(u) = −z_end·exp(−α_z(u − u_end)) + v_end·exp(−κ(u − u_end)), with z_end = z
+    /// and v_end = y′ at the end. With immediate transport the forcing decays with the phase, w(u) = w(u_end)·x(u)/x(u_end).
+    /// `value` and `slope` are matrices (J, D) by rows.
     ///
     /// # Panics
-    /// Slices that are longer.
+    /// Slices of more than J·D elements.
     pub fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
-        let place = self.place(u);
-        let jet = |group: usize, j: usize| self.cubics(place.first, group)[j].at(place.t);
-        match self.fading(u) {
-            Some(Fade { value: r, growth, along, .. }) => {
-                let faded = |CubicSample { value, slope }: CubicSample<F64x4>| CubicSample {
+        let index = self.index(u);
+        let sample = |group: usize, j: usize| self.cubics(index.first, group)[j].at(index.t);
+        match self.fade(u) {
+            Some(Fade { r, r_slope, p_slope, .. }) => {
+                let fade = |CubicSample { value, slope }: CubicSample<F64x4>| CubicSample {
                     value: value * r,
-                    slope: value * growth + slope * (r * along),
+                    slope: value * r_slope + slope * (r * p_slope),
                 };
-                self.scatter(|group, j| faded(jet(group, j)), value, slope);
+                self.scatter(|group, j| fade(sample(group, j)), value, slope);
             }
-            None => self.scatter(jet, value, slope),
+            None => self.scatter(sample, value, slope),
         }
     }
 
-    /// Whether clock `u` is past the end of a discrete movement.
+    /// Returns whether clock `u` is past the end of a discrete movement.
     #[inline(always)]
     pub(crate) fn is_past(&self, u: f64) -> bool {
         matches!(self.canonical, Canonical::Discrete { u_end, .. } if u >= u_end)
     }
 
-    /// How the forcing fades past the end of a discrete movement.
+    /// Returns the factors of the forcing past the end of a discrete movement, `None` before it.
     #[inline(always)]
-    pub(crate) fn fading(&self, u: f64) -> Option<Fade> {
+    pub(crate) fn fade(&self, u: f64) -> Option<Fade> {
         match (self.canonical, self.ending) {
             (Canonical::Discrete { u_end, alpha_x }, ending) if u >= u_end => {
-                let (rate, beyond, braked) = match ending {
+                let (r_rate, p_rate, braked) = match ending {
                     Ending::Phase => (alpha_x, 0.0, false),
                     Ending::Braked { alpha_z, braking } => (alpha_z, braking - alpha_z, true),
                 };
-                let [value, share] = [rate, beyond].map(|rate| faded((-rate * (u - u_end)).exp()));
-                Some(Fade { value, growth: -rate * value, share, along: -beyond * share, braked })
+                let [r, p] = [r_rate, p_rate].map(|rate| faded((-rate * (u - u_end)).exp()));
+                Some(Fade { r, r_slope: -r_rate * r, p, p_slope: -p_rate * p, braked })
             }
             _ => None,
         }
     }
 
-    /// Writes what is known by groups and styles as (J, D) by rows.
-    fn scatter(&self, jet: impl Fn(usize, usize) -> CubicSample<F64x4>, value: &mut [f64], slope: &mut [f64]) {
+    /// Writes samples of all groups and styles as (J, D) by rows.
+    fn scatter(&self, sample: impl Fn(usize, usize) -> CubicSample<F64x4>, value: &mut [f64], slope: &mut [f64]) {
         let rows = value.chunks_mut(self.n_dofs).zip(slope.chunks_mut(self.n_dofs));
         for (j, (value, slope)) in rows.enumerate() {
             for (group, (value, slope)) in value.chunks_mut(WIDTH).zip(slope.chunks_mut(WIDTH)).enumerate() {
-                let jet = jet(group, j);
-                value.copy_from_slice(&jet.value.to_array()[..value.len()]);
-                slope.copy_from_slice(&jet.slope.to_array()[..slope.len()]);
+                let sample = sample(group, j);
+                value.copy_from_slice(&sample.value.to_array()[..value.len()]);
+                slope.copy_from_slice(&sample.slope.to_array()[..slope.len()]);
             }
         }
     }
 
-    /// A place on the clock. What lies beyond a discrete movement is faded by the reader.
-    pub(crate) fn place(&self, u: f64) -> TableIndex {
-        match self.fading(u) {
-            Some(Fade { share, .. }) => TableIndex { first: (self.cells + 1) * self.at_knot, t: share },
-            None => self.place_within(u),
+    /// Returns the position of clock `u`. Past the end of a discrete movement the caller applies the [`Fade`].
+    pub(crate) fn index(&self, u: f64) -> TableIndex {
+        match self.fade(u) {
+            Some(Fade { p, .. }) => TableIndex { first: (self.cells + 1) * self.knot_stride, t: p },
+            None => self.demonstrated_index(u),
         }
     }
 
-    /// A place of the demonstrated stretch, its end for all that lies beyond.
+    /// Returns the position of clock `u` in the demonstrated interval, clamped to its end.
     #[inline(always)]
-    pub(crate) fn place_within(&self, u: f64) -> TableIndex {
+    pub(crate) fn demonstrated_index(&self, u: f64) -> TableIndex {
         let u = if let Canonical::Rhythmic { .. } = self.canonical { turn(u) } else { u };
-        let position = u * self.per_clock;
-        // A saturating cast: what lies below the table is read in its first cell.
+        let position = u * self.cells_per_clock;
+        // The cast saturates: a negative clock is evaluated in the first cell.
         let cell = position as u32;
         if cell < self.cells as u32 {
-            TableIndex { first: cell as usize * self.at_knot, t: (position - f64::from(cell)) * self.width }
+            TableIndex { first: cell as usize * self.knot_stride, t: (position - f64::from(cell)) * self.cell_width }
         } else {
-            TableIndex { first: self.cells * self.at_knot, t: 0.0 }
+            TableIndex { first: self.cells * self.knot_stride, t: 0.0 }
         }
     }
 
-    /// Fetches what a tick will read near a clock: a table larger than the nearest cache is slow to come otherwise.
+    /// Prefetches the cubics at clock `u`, since a table may exceed the first-level cache.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub(crate) fn prefetch(&self, u: f64) {
@@ -278,9 +280,10 @@ impl ForcingTable {
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
-            let start = self.place_within(u).first;
-            for Cubic([first, _, third, _]) in &self.cubics[start..start + self.at_knot] {
-                // SAFETY: a hint; every x86-64 processor has it, and nothing is read.
+            let start = self.demonstrated_index(u).first;
+            for Cubic([first, _, third, _]) in &self.cubics[start..start + self.knot_stride] {
+                // SAFETY: SSE is part of x86-64, and a prefetch is a hint that never faults and reads no value. The
+                // addresses are those of elements of `cubics`.
                 unsafe {
                     _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(first).cast());
                     _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(third).cast());
@@ -289,37 +292,37 @@ impl ForcingTable {
         }
     }
 
-    /// Forcing sᵀb at a place, for one group of DoFs, with its slope.
+    /// Returns the forcing Σⱼ sⱼwⱼ of a style and its slope, for one group of DoFs.
     #[inline(always)]
-    pub(crate) fn blend<T: Register>(&self, place: TableIndex, group: usize, style: &[f64]) -> CubicSample<T> {
+    pub(crate) fn sample<T: Register>(&self, index: TableIndex, group: usize, style: &[f64]) -> CubicSample<T> {
         let mut sum = [T::default(); 4];
-        for (s, cubic) in style.iter().zip(self.cubics(place.first, group)) {
+        for (s, cubic) in style.iter().zip(self.cubics(index.first, group)) {
             accumulate(&mut sum, cubic.load(), *s);
         }
-        evaluate(sum, place.t)
+        evaluate(sum, index.t)
     }
 
-    /// Forcings of two styles, which take no more reading than one.
+    /// Returns the forcings of two styles. Each cubic is loaded once for both.
     #[inline(always)]
-    pub(crate) fn blend_both<T: Register>(
+    pub(crate) fn sample_pair<T: Register>(
         &self,
-        place: TableIndex,
+        index: TableIndex,
         group: usize,
         styles: [&[f64]; 2],
     ) -> [CubicSample<T>; 2] {
         let mut sums = [[T::default(); 4]; 2];
-        for ((s, v), cubic) in styles[0].iter().zip(styles[1]).zip(self.cubics(place.first, group)) {
+        for ((s, v), cubic) in styles[0].iter().zip(styles[1]).zip(self.cubics(index.first, group)) {
             let cubic = cubic.load();
             accumulate(&mut sums[0], cubic, *s);
             accumulate(&mut sums[1], cubic, *v);
         }
-        [evaluate(sums[0], place.t), evaluate(sums[1], place.t)]
+        [evaluate(sums[0], index.t), evaluate(sums[1], index.t)]
     }
 }
 
 #[inline(always)]
-fn accumulate<T: Real>(sum: &mut [T; 4], cubic: [T; 4], times: f64) {
+fn accumulate<T: Real>(sum: &mut [T; 4], cubic: [T; 4], weight: f64) {
     for (sum, coefficient) in sum.iter_mut().zip(cubic) {
-        *sum = *sum + coefficient * times;
+        *sum = *sum + coefficient * weight;
     }
 }

@@ -1,14 +1,14 @@
-//! Values and slopes at the knots of a table.
+//! Hermite data of a table of cubics: values and slopes at its knots.
 
 use crate::dynamics::output_system::CubicSample;
 use crate::numerics::simd::{F64x4, padded};
 
-/// Error of the table, relative to the largest forcing, at which cells are halved no more.
+/// Error of the table, relative to the largest forcing, at which the refinement stops.
 pub(crate) const TOLERANCE: f64 = 1e-9;
-/// Cells beyond which a table is not refined.
+/// Maximum number of cells of a table.
 pub(crate) const MAX_CELLS: usize = 8192;
 
-/// Values and slopes of several outputs at increasing places on the clock, each by rows (places, outputs).
+/// Values and slopes of several outputs at equidistant knots of the clock, each by rows (knots, outputs).
 #[derive(Clone, Debug)]
 pub(crate) struct KnotTable {
     pub(crate) n_outputs: usize,
@@ -17,42 +17,42 @@ pub(crate) struct KnotTable {
 }
 
 impl KnotTable {
-    /// Room for `n` places.
+    /// Returns a table of `n` knots, filled with zeros.
     pub(crate) fn zeros(n: usize, n_outputs: usize) -> Self {
         let [values, slopes] = [0, 1].map(|_| vec![0.0; n * n_outputs]);
         Self { n_outputs, values, slopes }
     }
 
-    /// Number of places.
+    /// Returns the number of knots.
     pub(crate) fn len(&self) -> usize {
         self.values.len() / self.n_outputs
     }
 
-    /// Values and slopes of `n` places at a time.
+    /// Returns the values and slopes of consecutive blocks of `n` knots, mutably.
     pub(crate) fn rows_mut(&mut self, n: usize) -> impl Iterator<Item = (&mut [f64], &mut [f64])> {
         let size = n * self.n_outputs;
         self.values.chunks_mut(size).zip(self.slopes.chunks_mut(size))
     }
 
-    /// Up to four outputs at a place.
-    pub(crate) fn jet(&self, place: usize, first: usize, n: usize) -> CubicSample<F64x4> {
+    /// Returns value and slope of the `n` outputs from `first` on at a knot, four at most.
+    pub(crate) fn jet(&self, knot: usize, first: usize, n: usize) -> CubicSample<F64x4> {
         let [value, slope] =
-            [&self.values, &self.slopes].map(|table| padded(&table[place * self.n_outputs + first..][..n]));
+            [&self.values, &self.slopes].map(|table| padded(&table[knot * self.n_outputs + first..][..n]));
         CubicSample { value, slope }
     }
 
-    /// These knots with room for the middles of their cells between them.
+    /// Returns a table with a knot, filled with zeros, inserted in the middle of each cell.
     pub(crate) fn spread(&self) -> Self {
-        let mut spread = Self::zeros(2 * self.len() - 1, self.n_outputs);
-        for (to, from) in [(&mut spread.values, &self.values), (&mut spread.slopes, &self.slopes)] {
+        let mut finer = Self::zeros(2 * self.len() - 1, self.n_outputs);
+        for (to, from) in [(&mut finer.values, &self.values), (&mut finer.slopes, &self.slopes)] {
             let rows = to.chunks_exact_mut(self.n_outputs).step_by(2);
             rows.zip(from.chunks_exact(self.n_outputs)).for_each(|(to, from)| to.copy_from_slice(from));
         }
-        spread
+        finer
     }
 
-    /// Largest distance of the cubics between every second knot from the value at the knot between them, `width` from
-    /// either.
+    /// Returns the largest deviation of the cubics over every second knot from the values at the knots between them;
+    /// `width` is the distance of neighbouring knots.
     pub(crate) fn error_of_every_second(&self, width: f64) -> f64 {
         let n = self.n_outputs;
         let cells = self.values.windows(3 * n).zip(self.slopes.windows(3 * n)).step_by(2 * n);
@@ -66,7 +66,7 @@ impl KnotTable {
         error
     }
 
-    /// Makes the last knot of a turn the first, which they are but for rounding.
+    /// Copies the first knot to the last one, which equals it up to rounding in a periodic table.
     pub(crate) fn close(&mut self) {
         let last = self.values.len() - self.n_outputs;
         for table in [&mut self.values, &mut self.slopes] {

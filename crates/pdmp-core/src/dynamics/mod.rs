@@ -1,4 +1,5 @@
-//! The dynamical systems: canonical system, output system, forcing term, transport and command filters.
+//! Dynamical systems of a primitive: canonical system, output system, forcing term, transport, time warp and command
+//! filters.
 
 pub(crate) mod canonical;
 pub(crate) mod command_filter;

@@ -1,4 +1,4 @@
-//! The output system, propagated exactly, and its inverse.
+//! Exact propagation of the output system, and its inverse.
 //!
 //! With the clock u (u̇ = 1/τ), e = y − g₀ and a forcing w the output system (Eqs. 1, 2 and 5) is linear:
 //!
@@ -6,27 +6,32 @@
 //! d/du [e; z] = A [e; z] + [w(u); α_zβ_z γ(u)],     A = [0, 1; −α_zβ_z, −α_z]
 //! ```
 //!
-//! where γ = g − g₀ is how far the goal has moved since the start of the step. About a moving frame (`transport`) it is the
-//! same system, with e seen from the frame. For cubic w and γ the solution over a step h is a combination of φ-functions of
-//! Ah (Hochbruck and Ostermann, Acta Numerica 19, 2010), so that a step is stable and exact for every h. The inverse drives z alone by a given y, which is the same problem in one dimension.
+//! where γ = g − g₀ is the displacement of the goal since the start of the step. Relative to a moving frame (`transport`),
+//! e obeys the same system. For cubic w and γ the solution over a step h is a combination of φ-functions of Ah (Hochbruck
+//! and Ostermann, Acta Numerica 19, 2010), so that a step is stable and exact for every h. The inverse system drives z by a
+//! given y, which is the same problem in one dimension.
 
 use crate::numerics::simd::Real;
 
-/// Constants of the output system.
+/// Gains of the output system z′ = α_z(β_z(g − y) − z), y′ = z + w.
+///
+/// ```
+/// use pdmp_core::dynamics::Attractor;
+///
+/// let critically_damped = Attractor { alpha_z: 25.0, beta_z: 25.0 / 4.0 };
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attractor {
-    /// Rate α_z, per unit of the clock.
+    /// Gain α_z, per unit of the clock.
     pub alpha_z: f64,
-    /// Stiffness β_z, per unit of the clock; α_z/4 damps critically.
+    /// Gain β_z, per unit of the clock; β_z = α_z/4 is critically damped.
     pub beta_z: f64,
 }
 
-/// A value and its derivative with respect to the clock.
+/// Hermite data of a cubic at one end: its value, and its derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct CubicSample<T = f64> {
-    /// The value.
     pub(crate) value: T,
-    /// Its derivative.
     pub(crate) slope: T,
 }
 
@@ -39,15 +44,16 @@ pub(crate) struct State<T = f64> {
     pub(crate) z: T,
 }
 
-/// Weights of a cubic given by its jets at both ends of a step: of its two values, then of its two slopes.
-type CubicWeights = [f64; 4];
+/// Weights of the Hermite data of a cubic at both ends of a step: of its two values, then of its two slopes.
+type HermiteWeights = [f64; 4];
 
+/// Returns the weighted sum of the Hermite data of a cubic.
 #[inline(always)]
-fn weigh<T: Real>(weights: &CubicWeights, [from, to]: [CubicSample<T>; 2]) -> T {
+fn hermite_dot<T: Real>(weights: &HermiteWeights, [from, to]: [CubicSample<T>; 2]) -> T {
     from.value * weights[0] + to.value * weights[1] + (from.slope * weights[2] + to.slope * weights[3])
 }
 
-/// The solution of the output system over a step of fixed length.
+/// Propagator of the output system over a step of fixed length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Propagator {
     /// Length of the step on the clock.
@@ -55,17 +61,17 @@ pub(crate) struct Propagator {
     /// exp(Ah), by rows.
     pub(crate) transition: [[f64; 2]; 2],
     /// Response of e and z to the forcing w.
-    pub(crate) forcing: [CubicWeights; 2],
+    pub(crate) forcing: [HermiteWeights; 2],
     /// Response of e and z to the goal's displacement γ.
-    pub(crate) goal: [CubicWeights; 2],
+    pub(crate) goal: [HermiteWeights; 2],
 }
 
 impl Attractor {
-    /// The exact solution over a stretch `h` of the clock.
+    /// Returns the propagator over a clock interval `h`.
     pub(crate) fn propagator(&self, h: f64) -> Propagator {
         let stiffness = self.alpha_z * self.beta_z;
         let phi = phi_functions(-self.alpha_z * h, stiffness * h * h);
-        // (a + bAh) applied to the unit vectors: the columns of a 2 × 2 polynomial in A.
+        // Entries of the 2 × 2 matrix a·I + b·Ah.
         let e_to_e = |[a, _]: [f64; 2]| a;
         let e_to_z = |[_, b]: [f64; 2]| -b * (h * stiffness);
         let z_to_e = |[_, b]: [f64; 2]| b * h;
@@ -74,28 +80,28 @@ impl Attractor {
         Propagator {
             h,
             transition: [[e_to_e(phi[0]), z_to_e(phi[0])], [e_to_z(phi[0]), z_to_z(phi[0])]],
-            forcing: [cubic_weights(h, phi.map(e_to_e)), cubic_weights(h, phi.map(e_to_z))],
-            goal: [cubic_weights(h, phi.map(shift).map(z_to_e)), cubic_weights(h, phi.map(shift).map(z_to_z))],
+            forcing: [hermite_weights(h, phi.map(e_to_e)), hermite_weights(h, phi.map(e_to_z))],
+            goal: [hermite_weights(h, phi.map(shift).map(z_to_e)), hermite_weights(h, phi.map(shift).map(z_to_z))],
         }
     }
 
-    /// z′ = α_z(β_z(g − y) − z) at a state relative to the goal.
+    /// Returns z′ = α_z(β_z(g − y) − z) at a state relative to the goal.
     #[inline(always)]
     pub(crate) fn z_slope<T: Real>(&self, State { e, z }: State<T>) -> T {
         (e * self.beta_z + z) * -self.alpha_z
     }
 
-    /// The inverse of the output system for movements that are sampled at intervals `h` of the clock.
+    /// Returns the inverse of the output system for movements sampled at clock intervals `h`.
     pub(crate) fn inverse(&self, h: f64) -> Inverse {
         let m = -self.alpha_z * h;
-        // A scalar argument is a 2 × 2 one whose other eigenvalue is zero.
+        // The scalar m is treated as a 2 × 2 matrix with eigenvalues m and 0.
         let phi = phi_functions(m, 0.0).map(|[a, b]| a + b * m);
         let stiffness = self.alpha_z * self.beta_z;
-        Inverse { m, decay: phi[0], weights: cubic_weights(h, phi).map(|weight| stiffness * weight) }
+        Inverse { m, decay: phi[0], weights: hermite_weights(h, phi).map(|weight| stiffness * weight) }
     }
 }
 
-/// The output system driven by a movement instead of driving it, over steps of fixed length.
+/// Inverse of the output system over steps of fixed length: a given movement y drives z.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inverse {
     /// −α_zh.
@@ -103,29 +109,29 @@ pub(crate) struct Inverse {
     /// exp(−α_zh).
     decay: f64,
     /// Response of z to g − y.
-    weights: CubicWeights,
+    weights: HermiteWeights,
 }
 
 impl Inverse {
-    /// The forcing that makes the output system follow a movement (step 2 of Section 3.2), f = y′ − z, in the place of
-    /// the movement's positions.
+    /// Computes the target f = y′ − z, the forcing under which the output system reproduces a movement (step 2 of Section
+    /// 3.2), and overwrites the positions with it.
     ///
-    /// `position` and `slope` = dy/du (C,) are samples of one cubic spline, and `attractor` is the goal or anchor. z
-    /// solves Eq. (1) driven by that spline, exactly: from z(0) = 0, or, for a `periodic` movement whose C samples make
-    /// one turn, on its periodic steady state.
+    /// `position` and `slope` = dy/du (C,) are samples of one cubic spline, and `attractor` is the goal or anchor. z is the
+    /// exact solution of Eq. (1) driven by that spline, with z(0) = 0 or, for a `periodic` movement of which the C samples
+    /// are one cycle, in the periodic steady state.
     pub(crate) fn target<T: Real>(&self, position: &mut [T], slope: &[T], attractor: T, periodic: bool) {
         let n = position.len();
-        let jet = |y: T, dy: T| CubicSample { value: attractor - y, slope: T::default() - dy };
+        let distance = |y: T, dy: T| CubicSample { value: attractor - y, slope: T::default() - dy };
         let mut z = T::default();
         if periodic {
             for (c, next) in (0..n).zip((1..n).chain([0])) {
-                z = self.step(z, [c, next].map(|c| jet(position[c], slope[c])));
+                z = self.step(z, [c, next].map(|c| distance(position[c], slope[c])));
             }
             z = z * (1.0 / -(self.m * n as f64).exp_m1());
         }
-        let mut from = jet(position[0], slope[0]);
+        let mut from = distance(position[0], slope[0]);
         for c in 1..n {
-            let to = jet(position[c], slope[c]);
+            let to = distance(position[c], slope[c]);
             position[c - 1] = slope[c - 1] - z;
             z = self.step(z, [from, to]);
             from = to;
@@ -133,38 +139,33 @@ impl Inverse {
         position[n - 1] = slope[n - 1] - z;
     }
 
-    /// z one step on, given g − y at both ends of it.
+    /// Returns z after one step, given g − y at both ends of the step.
     #[inline(always)]
-    fn step<T: Real>(&self, z: T, driving: [CubicSample<T>; 2]) -> T {
-        z * self.decay + weigh(&self.weights, driving)
+    fn step<T: Real>(&self, z: T, distances: [CubicSample<T>; 2]) -> T {
+        z * self.decay + hermite_dot(&self.weights, distances)
     }
 }
 
 impl Propagator {
-    /// Length of the step on the clock.
+    /// Returns the length of the step on the clock.
     pub(crate) fn step(&self) -> f64 {
         self.h
     }
 
-    /// exp(Ah), by rows.
-    pub(crate) fn transition(&self) -> [[f64; 2]; 2] {
-        self.transition
-    }
-
-    /// The state after the step under the forcing w.
+    /// Returns the state after the step under the forcing w.
     #[inline(always)]
     pub(crate) fn advance<T: Real>(&self, state: State<T>, forcing: [CubicSample<T>; 2]) -> State<T> {
         let [e, z] = [0, 1].map(|row| {
             let [from_e, from_z] = self.transition[row];
-            (state.e * from_e + state.z * from_z) + weigh(&self.forcing[row], forcing)
+            (state.e * from_e + state.z * from_z) + hermite_dot(&self.forcing[row], forcing)
         });
         State { e, z }
     }
 
-    /// What a goal moving by γ adds to the state, still relative to where the goal was at the start of the step.
+    /// Returns the response of the state to the displacement γ of the goal, relative to the goal at the start of the step.
     #[inline(always)]
     pub(crate) fn follow<T: Real>(&self, goal: [CubicSample<T>; 2]) -> State<T> {
-        let [e, z] = [0, 1].map(|row| weigh(&self.goal[row], goal));
+        let [e, z] = [0, 1].map(|row| hermite_dot(&self.goal[row], goal));
         State { e, z }
     }
 }
@@ -180,10 +181,10 @@ pub(crate) const INVERSE_FACTORIAL: [f64; 19] = {
     inverse
 };
 
-/// φ₀ … φ₄ of a 2 × 2 matrix M, each as [a, b] meaning a·I + b·M; `trace` and `determinant` are those of M.
+/// Returns φ₀ … φ₄ of a 2 × 2 matrix M, each as [a, b] for a·I + b·M; `trace` and `determinant` are those of M.
 ///
-/// By Cayley and Hamilton M² = trace·M − determinant·I, so every power of M is such a pair, whatever its eigenvalues:
-/// complex, repeated (critical damping) or real.
+/// By the Cayley–Hamilton theorem M² = trace·M − determinant·I, so that every power of M has this form, for complex,
+/// repeated (critical damping) and real eigenvalues alike.
 fn phi_functions(trace: f64, determinant: f64) -> [[f64; 2]; 5] {
     let size = trace.abs().max(determinant.abs().sqrt());
     let (mut trace, mut determinant, mut doublings) = (trace, determinant, 0);
@@ -194,7 +195,7 @@ fn phi_functions(trace: f64, determinant: f64) -> [[f64; 2]; 5] {
     }
 
     // φ₄ by its Taylor series Σ Mʲ/(j+4)!, the others by φₖ = Mφₖ₊₁ + I/k!. The eigenvalues are at most 1.62 times the
-    // size, so that what is left off lies below 1e-18.
+    // size, so that the truncation error lies below 1e-18.
     let terms = if size < 0.0625 { 9 } else { 15 };
     let times_m = |[a, b]: [f64; 2]| [-determinant * b, a + trace * b];
     let mut phi = [[0.0; 2]; 5];
@@ -213,13 +214,13 @@ fn phi_functions(trace: f64, determinant: f64) -> [[f64; 2]; 5] {
         let small = phi;
         for k in 0..5 {
             let [c, d] = small[k];
-            let mut double = [a * c - determinant * b * d, a * d + b * c + trace * b * d];
+            let mut doubled = [a * c - determinant * b * d, a * d + b * c + trace * b * d];
             for j in 1..=k {
-                double[0] += small[j][0] * INVERSE_FACTORIAL[k - j];
-                double[1] += small[j][1] * INVERSE_FACTORIAL[k - j];
+                doubled[0] += small[j][0] * INVERSE_FACTORIAL[k - j];
+                doubled[1] += small[j][1] * INVERSE_FACTORIAL[k - j];
             }
             let scale = 0.5f64.powi(k as i32);
-            phi[k] = [double[0] * scale, double[1] * scale / 2.0];
+            phi[k] = [doubled[0] * scale, doubled[1] * scale / 2.0];
         }
         trace *= 2.0;
         determinant *= 4.0;
@@ -227,12 +228,17 @@ fn phi_functions(trace: f64, determinant: f64) -> [[f64; 2]; 5] {
     phi
 }
 
-/// Weights of the Hermite data of a cubic p over a step h in ∫₀ʰ exp(a(h−s)) p(s) ds = h Σₖ cₖ k! φₖ₊₁(ah).
-fn cubic_weights(h: f64, phi: [f64; 5]) -> CubicWeights {
+/// Returns the weights of the Hermite data of a cubic p over a step h in ∫₀ʰ exp(a(h−s)) p(s) ds = h Σₖ cₖ k! φₖ₊₁(ah).
+fn hermite_weights(h: f64, phi: [f64; 5]) -> HermiteWeights {
     let [_, one, two, three, four] = phi;
-    let late = 6.0 * three - 12.0 * four;
+    let end_value = 6.0 * three - 12.0 * four;
     let square = h * h;
-    [h * (one - late), h * late, square * (two - 4.0 * three + 6.0 * four), square * (6.0 * four - 2.0 * three)]
+    [
+        h * (one - end_value),
+        h * end_value,
+        square * (two - 4.0 * three + 6.0 * four),
+        square * (6.0 * four - 2.0 * three),
+    ]
 }
 
 #[cfg(test)]
@@ -266,13 +272,13 @@ mod tests {
         s
     }
 
-    fn jets(c: [f64; 4], h: f64) -> [CubicSample; 2] {
+    fn hermite_data(c: [f64; 4], h: f64) -> [CubicSample; 2] {
         let from = CubicSample { value: c[0], slope: c[1] / h };
         let to = CubicSample { value: c.iter().sum(), slope: (c[1] + 2.0 * c[2] + 3.0 * c[3]) / h };
         [from, to]
     }
 
-    /// A cubic forcing and a cubic goal are followed exactly with repeated, complex and real roots, small steps and large.
+    /// Steps of any length are exact for cubic forcing and a cubic goal, with repeated, complex and real eigenvalues.
     #[test]
     fn propagation_is_exact_for_cubic_forcing() {
         for (alpha_z, beta_z) in [(25.0, 6.25), (1.5, 1.5), (10.0, 0.7)] {
@@ -280,8 +286,8 @@ mod tests {
                 let system = Attractor { alpha_z, beta_z };
                 let (w, g) = ([0.3, -1.0, 2.0, 0.7], [0.0, 0.4, -0.3, 0.2]);
                 let propagator = system.propagator(h);
-                let mut state = propagator.advance(State { e: 0.5, z: -0.2 }, jets(w, h));
-                let moved = propagator.follow(jets(g, h));
+                let mut state = propagator.advance(State { e: 0.5, z: -0.2 }, hermite_data(w, h));
+                let moved = propagator.follow(hermite_data(g, h));
                 state.e += moved.e;
                 state.z += moved.z;
                 let [e, z] = reference(system, [0.5, -0.2], h, w, g);
@@ -292,13 +298,13 @@ mod tests {
     }
 
     proptest! {
-        /// exp(Ah) by doubling equals the matrix exponential of another library.
+        /// exp(Ah) by doubling equals the matrix exponential of nalgebra.
         #[test]
         fn transition_is_the_matrix_exponential(alpha_z in 0.01..60.0f64, ratio in 0.05..2.0f64, h in 1e-6..2.0f64) {
             let system = Attractor { alpha_z, beta_z: alpha_z * ratio };
             let stiffness = system.alpha_z * system.beta_z;
             let expected = (Matrix2::new(0.0, 1.0, -stiffness, -alpha_z) * h).exp();
-            let found = system.propagator(h).transition();
+            let found = system.propagator(h).transition;
             let size = expected.abs().max() + 1e-3;
             for row in 0..2 {
                 for column in 0..2 {
@@ -307,7 +313,7 @@ mod tests {
             }
         }
 
-        /// Without forcing the goal attracts from everywhere, however long the step.
+        /// Without forcing, steps of any length keep the state bounded.
         #[test]
         fn steps_of_any_length_are_stable(h in 1e-6..1e4f64, alpha_z in 0.1..100.0f64) {
             let system = Attractor { alpha_z, beta_z: alpha_z / 4.0 };
@@ -320,7 +326,7 @@ mod tests {
         }
     }
 
-    /// The target, fed back as forcing, gives the movement back: the two are inverse to each other.
+    /// Propagation under the target of a movement reproduces the movement.
     #[test]
     fn target_and_propagation_are_inverse() {
         let system = Attractor { alpha_z: 25.0, beta_z: 6.25 };
@@ -337,15 +343,15 @@ mod tests {
             let (from, to) = (c.saturating_sub(1), (c + 1).min(n - 1));
             (w[to] - w[from]) / ((to - from) as f64 * h)
         };
-        let jet = |c: usize| CubicSample { value: w[c], slope: slope(c) };
+        let sample = |c: usize| CubicSample { value: w[c], slope: slope(c) };
         let mut state = State { e: y[0] - goal, z: 0.0 };
         for c in 0..n - 1 {
-            state = propagator.advance(state, [jet(c), jet(c + 1)]);
+            state = propagator.advance(state, [sample(c), sample(c + 1)]);
             assert_relative_eq!(state.e + goal, y[c + 1], epsilon = 2e-5);
         }
     }
 
-    /// On the periodic steady state a sine has the target y′ − z with z the first-order low-pass of β(g − y).
+    /// In the periodic steady state a sine has the target y′ − z with z the first-order low-pass of β(g − y).
     #[test]
     fn periodic_target_matches_the_frequency_response() {
         let system = Attractor { alpha_z: 8.0, beta_z: 2.0 };

@@ -1,52 +1,53 @@
-//! The output system's solution over short steps, as a power series in their length.
+//! Propagator of the output system over short steps, as a power series in the length of the step.
 //!
-//! While τ is on its way every tick covers another stretch h of the clock, and every tick needs another
-//! [`Propagator`]. All its weights are entire functions of h,
+//! While τ changes, every tick covers another clock interval h and needs another [`Propagator`]. All its weights are
+//! entire functions of h,
 //!
 //! ```text
 //! exp(Ah) = Σ Aⁿhⁿ/n!,     φₖ(Ah) = Σ Aⁿhⁿ/(n + k)!,
 //! ```
 //!
-//! with coefficients that depend on α_z and β_z alone. For the steps of a control loop a dozen of them suffice, which is
-//! faster than scaling and squaring, and as exact.
+//! with coefficients that depend only on α_z and β_z. A dozen of them suffice for the steps of a control loop, which is
+//! faster than scaling and squaring, and as accurate.
 
 use crate::dynamics::output_system::{Attractor, Propagator};
 use crate::numerics::simd::{F64x4, Register};
 
-/// What is left off, relative to what is kept.
+/// Truncation error of the series, relative to its value.
 const TOLERANCE: f64 = 1e-17;
-/// Largest step times the size of A: beyond, large terms would cancel.
-const MAX_STEP: f64 = 1.0;
-/// A size of A up to which its powers stay finite; beyond, no loop has steps short enough for a series.
-const MAX_SIZE: f64 = 1e9;
-/// The weights of a propagator in groups of four: responses of e and z to the forcing, to the goal, and exp(Ah).
+/// Maximum of h times the spectral bound of A; larger terms of the series would cancel.
+const MAX_SCALED_STEP: f64 = 1.0;
+/// Maximum spectral bound of A: its powers stay finite up to here, and no control loop has steps short enough for more.
+const MAX_SPECTRAL_BOUND: f64 = 1e9;
+/// Number of groups of four weights in a propagator: responses of e and z to forcing and to the goal, and exp(Ah).
 const GROUPS: usize = 5;
 
-/// The weights as power series, an even and an odd coefficient at a time.
+/// Power series of the weights of a propagator.
 #[derive(Clone, Debug)]
 pub(crate) struct Series {
     attractor: Attractor,
+    /// Pairs of an even and an odd coefficient for each group.
     coefficients: Vec<[[F64x4; 2]; GROUPS]>,
-    /// Longest step.
-    reach: f64,
+    /// Maximum step of the series.
+    max_step: f64,
 }
 
 impl Series {
-    /// The series for steps up to `reach`, or up to what a series can serve.
-    pub(crate) fn new(attractor: Attractor, reach: f64) -> Self {
+    /// Returns the series for steps up to `max_step`, or up to its radius of accuracy if that is smaller.
+    pub(crate) fn new(attractor: Attractor, max_step: f64) -> Self {
         let Attractor { alpha_z, beta_z } = attractor;
         let stiffness = alpha_z * beta_z;
-        // No eigenvalue is larger. A is not normal, but its powers exceed those of its eigenvalues by a factor of their
-        // number at most, which the factorials make up for within a term or two.
-        let size = 0.5 * (alpha_z + (alpha_z * alpha_z + 4.0 * stiffness).sqrt());
-        let reach = if size < MAX_SIZE { reach.min(MAX_STEP / size) } else { 0.0 };
-        // No weight begins with a higher power of h than the third.
-        let (mut terms, mut left) = (3, 1.0);
-        while left > TOLERANCE {
+        // Bound of the eigenvalues. A is not normal, but the norm of Aⁿ exceeds the bound's n-th power by a factor of n at
+        // most, for which the factorials compensate within a term or two.
+        let bound = 0.5 * (alpha_z + (alpha_z * alpha_z + 4.0 * stiffness).sqrt());
+        let max_step = if bound < MAX_SPECTRAL_BOUND { max_step.min(MAX_SCALED_STEP / bound) } else { 0.0 };
+        // The lowest power of h in a weight is at most the third.
+        let (mut terms, mut remainder) = (3, 1.0);
+        while remainder > TOLERANCE {
             terms += 1;
-            left *= size * reach / f64::from(terms);
+            remainder *= bound * max_step / f64::from(terms);
         }
-        // Aⁿ by its columns, and 1/n!, as far as the last pair of coefficients and φ₄ ask.
+        // Aⁿ by columns and 1/n!, up to the orders that the last pair of coefficients and φ₄ need.
         let mut power = vec![[[1.0, 0.0], [0.0, 1.0]]];
         let mut inverse_factorial = vec![1.0];
         for n in 1..=terms as usize + 6 {
@@ -55,14 +56,14 @@ impl Series {
             inverse_factorial.push(inverse_factorial[n - 1] / n as f64);
         }
         let coefficient = |n: usize| {
-            // Of Aⁿ in h φ₁ − …: the values' weights carry one more power of h than of A, the slopes' two.
+            // Coefficients of hⁿ: the weights of values have one more power of h than of A, those of slopes two more.
             let phi = |k: usize, shift: usize| if n >= shift { inverse_factorial[n - shift + k] } else { 0.0 };
-            let late = 6.0 * phi(3, 1) - 12.0 * phi(4, 1);
-            let values = [phi(1, 1) - late, late];
+            let end_value = 6.0 * phi(3, 1) - 12.0 * phi(4, 1);
+            let values = [phi(1, 1) - end_value, end_value];
             let slopes = [phi(2, 2) - 4.0 * phi(3, 2) + 6.0 * phi(4, 2), 6.0 * phi(4, 2) - 2.0 * phi(3, 2)];
             let cubic = |column: usize, row: usize, scale: f64| {
-                let at = |shift: usize| if n >= shift { scale * power[n - shift][column][row] } else { 0.0 };
-                let (first, second) = (at(1), at(2));
+                let entry = |shift: usize| if n >= shift { scale * power[n - shift][column][row] } else { 0.0 };
+                let (first, second) = (entry(1), entry(2));
                 F64x4::new([values[0] * first, values[1] * first, slopes[0] * second, slopes[1] * second])
             };
             let [e, z] = power[n].map(|column| column.map(|x| x * phi(0, 0)));
@@ -78,13 +79,14 @@ impl Series {
             let (even, odd) = (coefficient(2 * k), coefficient(2 * k + 1));
             std::array::from_fn(|group| [even[group], odd[group]])
         };
-        Self { attractor, coefficients: (0..=terms as usize / 2).map(pair).collect(), reach }
+        Self { attractor, coefficients: (0..=terms as usize / 2).map(pair).collect(), max_step }
     }
 
-    /// The exact solution over a stretch `h` of the clock.
+    /// Returns the propagator over a clock interval `h`; steps beyond the range of the series are computed by scaling and
+    /// squaring.
     #[inline(always)]
     pub(crate) fn propagator<T: Register>(&self, h: f64) -> Propagator {
-        if h > self.reach {
+        if h > self.max_step {
             return self.attractor.propagator(h);
         }
         let square = h * h;
@@ -116,15 +118,17 @@ mod tests {
     }
 
     proptest! {
-        /// The series gives the weights of scaling and squaring, with repeated, complex and real roots.
+        /// The series equals the weights by scaling and squaring, for repeated, complex and real eigenvalues.
         #[test]
-        fn series_is_the_propagator(size in -12.0..12.0f64, ratio in 0.05..2.0f64, share in 0.0..1.0f64, reach in 1e-4..0.1f64) {
-            let alpha_z = 10f64.powf(size);
+        fn series_is_the_propagator(
+            exponent in -12.0..12.0f64, ratio in 0.05..2.0f64, share in 0.0..1.0f64, max_step in 1e-4..0.1f64,
+        ) {
+            let alpha_z = 10f64.powf(exponent);
             let attractor = Attractor { alpha_z, beta_z: alpha_z * ratio };
-            let series = Series::new(attractor, reach);
-            let h = share * reach;
+            let series = Series::new(attractor, max_step);
+            let h = share * max_step;
             let (found, expected) = (series.propagator::<F64x4>(h), attractor.propagator(h));
-            // The weights of two values or of two slopes are of one size, where one of them may pass through zero.
+            // One weight of a pair may pass through zero; the error is relative to the larger one.
             for (found, expected) in weights(&found).chunks(2).zip(weights(&expected).chunks(2)) {
                 let size = expected[0].abs().max(expected[1].abs());
                 for (found, expected) in found.iter().zip(expected) {

@@ -1,18 +1,17 @@
-//! The constants of a primitive, as they are given or follow from the demonstrations.
+//! Constants of a primitive, given or derived from the demonstrations.
 
 use std::f64::consts::TAU;
 
-use super::FitOptions;
+use super::{CanonicalOptions, FitOptions};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::output_system::Attractor;
 use crate::error::{Error, Result};
-use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
 use crate::learning::regression::Domain;
 use crate::model::primitive::{MAX_RATE, MAX_TAU};
 use crate::validate::check_positive;
 
-/// The constants of a primitive, and what follows from them alone.
+/// Constants of a primitive.
 pub(crate) struct Constants {
     pub(super) attractor: Attractor,
     pub(super) canonical: Canonical,
@@ -20,28 +19,25 @@ pub(crate) struct Constants {
 }
 
 impl Constants {
+    /// Returns the constants for the given options and the nominal demonstration.
+    ///
+    /// # Errors
+    /// A constant out of range, or one that the kind of movement does not have.
     pub(super) fn of(options: &FitOptions, aligned: &Aligned) -> Result<Self> {
         let duration = aligned.durations()[aligned.nominal];
         let attractor = Attractor { alpha_z: options.alpha_z, beta_z: options.beta_z.unwrap_or(options.alpha_z / 4.0) };
         check_rate("alpha_z", attractor.alpha_z)?;
         check_rate("beta_z", attractor.beta_z)?;
-        check_rate("mu", options.mu)?;
-        let kind = options.alignment.kind;
-        let given = |name, value: Option<f64>| match value {
-            Some(_) => Err(Error::Kind { name, kind, instead: ": leave it out" }),
-            None => Ok(()),
-        };
-        let (canonical, tau) = match kind {
-            Kind::Discrete => {
-                given("mu", Some(options.mu).filter(|mu| *mu != FitOptions::new(kind).mu))?;
-                let tau = options.tau.unwrap_or(duration);
+        let (canonical, tau) = match options.canonical {
+            CanonicalOptions::Discrete { tau, alpha_x, .. } => {
+                let tau = tau.unwrap_or(duration);
                 check_positive("tau", tau)?;
                 let u_end = duration / tau;
                 if !(1e-3..=1e3).contains(&u_end) {
                     let allowed = "must lie within a thousandfold of the nominal duration";
                     return Err(Error::Range { name: "tau", value: tau, allowed });
                 }
-                let alpha_x = options.alpha_x.unwrap_or(100f64.ln() / u_end);
+                let alpha_x = alpha_x.unwrap_or(100f64.ln() / u_end);
                 check_rate("alpha_x", alpha_x)?;
                 if alpha_x * u_end > 300.0 {
                     let allowed = "must not exceed 300 tau / T, or the phase vanishes before the end";
@@ -49,10 +45,9 @@ impl Constants {
                 }
                 (Canonical::Discrete { alpha_x, u_end }, tau)
             }
-            Kind::Rhythmic => {
-                given("tau", options.tau)?;
-                given("alpha_x", options.alpha_x)?;
-                (Canonical::Rhythmic { mu: options.mu }, duration / TAU)
+            CanonicalOptions::Rhythmic { mu, .. } => {
+                check_rate("mu", mu)?;
+                (Canonical::Rhythmic { mu }, duration / TAU)
             }
         };
         if !(1.0 / MAX_TAU..=MAX_TAU).contains(&tau) {
@@ -62,6 +57,7 @@ impl Constants {
         Ok(Self { attractor, canonical, tau })
     }
 
+    /// Returns the domain of the clock on which the landscape is learnt.
     pub(super) fn domain(&self) -> Domain {
         match self.canonical {
             Canonical::Discrete { u_end, .. } => Domain::Interval { end: u_end },
@@ -70,7 +66,7 @@ impl Constants {
     }
 }
 
-/// Rates of the systems: far enough from the ends of the number range for their products.
+/// Checks a rate; the bounds keep products of rates far from overflow and underflow.
 fn check_rate(name: &'static str, value: f64) -> Result<()> {
     if (1.0 / MAX_RATE..=MAX_RATE).contains(&value) {
         Ok(())

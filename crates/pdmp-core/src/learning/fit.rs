@@ -1,4 +1,4 @@
-//! Learning a primitive from demonstrations: the four steps of Section 3.2, composed.
+//! Learning of a primitive from demonstrations: the four steps of Section 3.2.
 
 use std::sync::Arc;
 
@@ -8,7 +8,6 @@ use crate::context::{ContextColumn, ContextMap, tabulate};
 use crate::demonstration::{ContextValue, Demonstration};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
-use crate::kind::Kind;
 use crate::learning::alignment::{Aligned, TimeScaling};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::options::TransportSelection;
@@ -21,27 +20,53 @@ use crate::preprocessing::inspection::{inspect, unwound};
 
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
-use super::options::{FitOptions, NStyles, Stage};
+use super::noise_findings;
+use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
 use super::stiffness::stiffness;
 use super::style_selection::spectrum;
 use super::tabulation::compile;
-use super::{noise_findings, time_scaling};
+use super::warp_selection::WarpSelection;
 
 /// Fits a model to demonstrations.
 ///
 /// # Errors
-/// Demonstrations or options that do not fit together.
+/// Demonstrations that do not match each other, options out of range, or options that do not suit the demonstrations.
+///
+/// ```
+/// # use ndarray::Array2;
+/// use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
+///
+/// let rise = |s: f64| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+/// let position = Array2::from_shape_fn((101, 1), |(c, _)| rise(c as f64 / 100.0));
+/// let demonstration = Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?;
+/// let model = fit(&[demonstration], &FitOptions::new(Kind::Discrete))?;
+/// assert_eq!((model.n_demos(), model.n_dofs(), model.n_styles()), (1, 1, 1));
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 pub fn fit(demos: &[Demonstration], options: &FitOptions) -> Result<Model> {
     fit_with(demos, options, &mut |_, _| Ok(()))
 }
 
 /// Fits a model as [`fit`] does, and reports its progress.
 ///
-/// `progress` is called periodically with the stage and the completed share of it; an error that it returns, such as
+/// `progress` is called periodically with the stage and its completed fraction; an error that it returns, such as
 /// [`Error::Interrupted`], cancels the fit.
 ///
 /// # Errors
-/// Demonstrations or options that do not fit together, or the error that `progress` returned.
+/// As for [`fit`], or the error that `progress` returned.
+///
+/// ```
+/// # use ndarray::Array2;
+/// use pdmp_core::learning::{Stage, fit_with};
+/// use pdmp_core::{Demonstration, Error, FitOptions, Kind, Sampling};
+///
+/// # let position = Array2::from_shape_fn((50, 1), |(c, _)| (0.1 * c as f64).sin());
+/// let demonstrations = [Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?];
+/// let mut cancel = |stage, _| if stage == Stage::Regress { Err(Error::Interrupted) } else { Ok(()) };
+/// let result = fit_with(&demonstrations, &FitOptions::new(Kind::Discrete), &mut cancel);
+/// assert!(matches!(result, Err(Error::Interrupted)));
+/// # Ok::<(), Error>(())
+/// ```
 pub fn fit_with(
     demos: &[Demonstration],
     options: &FitOptions,
@@ -51,10 +76,10 @@ pub fn fit_with(
         count.check(demos.len(), "demonstrations")?;
     }
     let threads = options.threads;
-    let mut findings = inspect(demos, options.alignment.dt);
+    let mut findings = inspect(demos, options.dt);
     let whole = unwound(demos);
     let demos = &*whole;
-    let mut aligned = options.alignment.align(demos, threads)?;
+    let mut aligned = options.alignment().align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
@@ -64,8 +89,10 @@ pub fn fit_with(
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let ranges = targets.ranges();
     let dof_scale = options.dof_scale.of(&ranges, &units);
-    let transport = match (options.transport, constants.canonical.kind()) {
-        (TransportSelection::FitSummary, Kind::Discrete) => targets.transport(constants.canonical, &dof_scale)?,
+    let transport = match options.canonical {
+        CanonicalOptions::Discrete { transport: TransportSelection::Learnt, .. } => {
+            targets.transport(constants.canonical, &dof_scale)?
+        }
         _ => Transport::immediate(),
     };
     let braking = (!transport.is_immediate()).then(|| targets.braking(constants.attractor));
@@ -73,11 +100,11 @@ pub fn fit_with(
     targets.scale(&dof_scale);
 
     let mut factorising = |share| progress(Stage::Factorise, share);
-    let shown = Shown { aligned: &aligned, targets: &targets, transport: &transport, constants: &constants };
-    let factors = shown.factors(options, &dof_scale, contexts.as_ref(), &mut factorising)?;
+    let training = Training { aligned: &aligned, targets: &targets, transport: &transport, constants: &constants };
+    let factors = training.factors(options, &dof_scale, contexts.as_ref(), &mut factorising)?;
     findings.extend(noise_findings::noisy(&aligned.noise, &ranges, &names));
-    let unknown = units.iter().all(String::is_empty);
-    findings.extend(noise_findings::truncation_error(&targets, &factors, &aligned.noise, &names).filter(|_| unknown));
+    let no_units = units.iter().all(String::is_empty);
+    findings.extend(noise_findings::truncation_error(&targets, &factors, &aligned.noise, &names).filter(|_| no_units));
     let Targets { forcing, goals, starts, anchors, .. } = targets;
     drop(forcing);
 
@@ -130,10 +157,10 @@ pub fn fit_with(
     Ok(Model { primitive, demonstrated, learnt, map })
 }
 
-/// Contexts (M, Q) of the demonstrations, with what their columns mean.
+/// Types of the context columns (Q,), and the contexts (M, Q) as numbers.
 type Contexts = (Vec<ContextColumn>, Array2<f64>);
 
-/// Scales the time of demonstrations, and returns the template of a warp, if one is made and kept.
+/// Scales the time of the demonstrations, and returns the template of the warp that is kept, if any.
 fn scale_time(
     aligned: &mut Aligned,
     options: &FitOptions,
@@ -142,7 +169,7 @@ fn scale_time(
     contexts: Option<&Contexts>,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Option<WarpTemplate>> {
-    let (scaling, threads) = (&options.alignment.time_scaling, options.threads);
+    let (scaling, threads) = (&options.time_scaling, options.threads);
     let unit = options.dof_scale.given(aligned.demo(0).n_dofs())?;
     let Some((columns, numbers)) = contexts.filter(|_| *scaling == TimeScaling::WarpIfBetter) else {
         return scaling.apply(aligned, unit, threads, progress);
@@ -159,24 +186,25 @@ fn scale_time(
         targets.scale(&options.dof_scale.of(&targets.ranges(), units));
         Ok(Factors::of(targets.forcing.view(), count, &mut |_| Ok(()))?.styles.ncols())
     };
-    let contexts = time_scaling::Contexts { columns, numbers, map: options.map, n_styles: &n_styles };
-    if contexts.favour(aligned, &linear, options.alignment.kind, &mut |share| progress(0.5 + 0.5 * share))? {
+    let selection = WarpSelection { columns, numbers, map: options.map, n_styles: &n_styles };
+    let mut validating = |share| progress(0.5 + 0.5 * share);
+    if selection.favours_warp(aligned, &linear, options.canonical.kind(), &mut validating)? {
         return Ok(template);
     }
     *aligned = linear;
     Ok(None)
 }
 
-/// Targets to factorise, and where they come from.
-struct Shown<'a> {
+/// Targets with the demonstrations and constants that they were computed from.
+struct Training<'a> {
     aligned: &'a Aligned<'a>,
     targets: &'a Targets,
     transport: &'a Transport,
     constants: &'a Constants,
 }
 
-impl Shown<'_> {
-    /// The factors of the targets, as many as the options ask for.
+impl Training<'_> {
+    /// Factorises the targets with the number of styles that the options select.
     fn factors(
         &self,
         options: &FitOptions,
@@ -194,20 +222,20 @@ impl Shown<'_> {
             NStyles::Truncated(count) => Factors::of(forcing, count, progress),
             NStyles::CrossValidated => {
                 let (columns, numbers) = contexts.ok_or(Error::Arguments(
-                    "n_styles = \"auto\" goes by contexts: pass contexts, a number, or None to go by the spectrum",
+                    "cross-validation of the number of styles needs contexts: pass contexts, or a number of styles",
                 ))?;
                 let all = Factors::of(forcing, Truncation::Share(1.0), &mut |share| progress(0.5 * share))?;
-                let foresight =
-                    StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical)?;
-                let mut second = |share: f64| progress(0.5 + 0.5 * share);
-                let n_styles = foresight.styles(columns, numbers, options.map, &mut second)?;
+                let selection =
+                    StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical);
+                let mut validating = |share: f64| progress(0.5 + 0.5 * share);
+                let n_styles = selection.n_styles(columns, numbers, options.map, &mut validating)?;
                 Ok(all.leading(n_styles))
             }
         }
     }
 }
 
-/// F_basis (J, C·D) as outputs over the clock (C, J·D), in the unit of each DoF.
+/// Rearranges F_basis (J, C·D) to outputs over the clock (C, J·D), in the unit of each DoF.
 fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
     let n_dofs = dof_scale.len();
     let mut outputs = Array2::zeros((basis.ncols() / n_dofs, basis.nrows() * n_dofs));
@@ -220,7 +248,7 @@ fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
     outputs
 }
 
-/// Contexts (M, Q), with what their columns mean: those given, or those of the demonstrations if they carry any.
+/// Returns the given contexts, or those of the demonstrations; `None` if there are none.
 fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> Result<Option<Contexts>> {
     if let Some(contexts) = given
         && contexts.len() != demos.len()
@@ -236,7 +264,7 @@ fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> 
     contexts.map(|contexts| tabulate(&contexts)).transpose()
 }
 
-/// Names and units of the DoFs: those of the demonstrations if they carry any, which must agree.
+/// Returns names and units of the DoFs; defaults where no demonstration carries any.
 fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
     let n_dofs = demos.first().map_or(0, Demonstration::n_dofs);
     let names = common_labels(demos, Demonstration::names, "names differ from those of the other demonstrations")?;
@@ -247,15 +275,15 @@ fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
     ))
 }
 
-/// What all demonstrations that tell it tell alike.
+/// Returns the labels that all demonstrations which carry any agree on.
 fn common_labels(
     demos: &[Demonstration],
-    told: impl Fn(&Demonstration) -> Option<&[String]>,
-    otherwise: &'static str,
+    labels: impl Fn(&Demonstration) -> Option<&[String]>,
+    conflict: &'static str,
 ) -> Result<Option<Vec<String>>> {
-    let Some(first) = demos.iter().find_map(&told) else { return Ok(None) };
-    match demos.iter().position(|demo| told(demo).is_some_and(|other| other != first)) {
-        Some(m) => Err(Error::Arguments(otherwise).in_demo(m)),
+    let Some(first) = demos.iter().find_map(&labels) else { return Ok(None) };
+    match demos.iter().position(|demo| labels(demo).is_some_and(|other| other != first)) {
+        Some(m) => Err(Error::Arguments(conflict).in_demo(m)),
         None => Ok(Some(first.to_vec())),
     }
 }

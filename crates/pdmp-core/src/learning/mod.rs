@@ -1,7 +1,10 @@
 //! Learning of a model from demonstrations.
+//!
+//! [`fit`] composes the four steps of Section 3.2: alignment, targets, factorisation, regression.
 
 pub(crate) mod alignment;
 mod constants;
+mod context_folds;
 mod cycle_phase;
 pub(crate) mod factorization;
 mod fit;
@@ -14,11 +17,11 @@ mod style_inference;
 pub(crate) mod style_selection;
 mod tabulation;
 mod targets;
-mod time_scaling;
 mod transport_profile;
+mod warp_selection;
 
-pub use alignment::{Alignment, TimeScaling};
+pub use alignment::TimeScaling;
 pub use factorization::{Factors, Truncation};
 pub use fit::{fit, fit_with};
-pub use options::{DofScaling, FitOptions, NStyles, Stage, TransportSelection};
+pub use options::{CanonicalOptions, DofScaling, FitOptions, NStyles, Stage, TransportSelection};
 pub use style_inference::style_of;

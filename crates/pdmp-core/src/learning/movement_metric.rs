@@ -1,4 +1,4 @@
-//! Errors of a movement by its conditions, and what the styles leave out of the demonstrations.
+//! Metric of the context outputs, and residual variance of the demonstrations.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::model::responses::Derivative;
 use crate::model::sensitivity::{STEPS, Sensitivity};
 use crate::motion::unit_responses::phases;
 
-/// The matrix (P, P) that makes errors of the outputs into those of the movement.
+/// Returns the metric (P, P) that converts errors of the outputs to mean squared errors of the movement.
 pub(super) fn metric(
     primitive: &Arc<Primitive>,
     outputs: ArrayView2<f64>,
@@ -22,7 +22,7 @@ pub(super) fn metric(
     Ok(sensitivity.metric(outputs, segment_durations))
 }
 
-/// Variance (S, D) over the phase of what the styles leave out of the demonstrations, measurement noise included.
+/// Returns the residual variance (S, D) of the demonstrations over the phase, measurement noise included.
 pub(super) fn residual_variance(
     primitive: &Arc<Primitive>,
     outputs: ArrayView2<f64>,
@@ -35,11 +35,13 @@ pub(super) fn residual_variance(
     let levels = aligned.noise.levels().to_vec();
     let aligned = aligned.resampled(n_samples);
     let mut sum = Array2::zeros((n_samples, primitive.n_dofs()));
-    let mut shown = Array2::zeros(sum.dim());
+    let mut position = Array2::zeros(sum.dim());
     for (m, outputs) in outputs.rows().into_iter().enumerate() {
-        aligned.sample(m, shown.as_slice_mut().unwrap_or_default());
-        let made = sensitivity.positions(outputs);
-        sum.zip_mut_with(&(&shown - &made.slice(ndarray::s![..n_samples, ..])), |sum, error| *sum += error * error);
+        aligned.sample(m, crate::validate::row_major_mut(&mut position));
+        let reproduced = sensitivity.positions(outputs);
+        sum.zip_mut_with(&(&position - &reproduced.slice(ndarray::s![..n_samples, ..])), |sum, error| {
+            *sum += error * error
+        });
     }
     let noise = levels.iter().map(|level| level * level).collect::<Array1<f64>>();
     Ok(sum / (outputs.nrows() - 1).max(1) as f64 + noise)

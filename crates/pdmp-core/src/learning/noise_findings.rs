@@ -1,35 +1,35 @@
-//! Findings of a fit about noise, and about degrees of freedom that its styles leave out.
+//! Findings of a fit about noise, and about degrees of freedom that its styles truncate.
 
 use crate::learning::factorization::Factors;
 use crate::learning::targets::Targets;
 use crate::model::finding::Finding;
 use crate::numerics::smoothing_spline::Noise;
 
-/// Share of the range from which on noise is reported: smoothing then takes off details of a tenth of the movement.
-const MIN_SHARE: f64 = 0.05;
+/// Smallest reported noise as a share of the range. Smoothing then removes details of up to a tenth of the movement.
+const MIN_NOISE_SHARE: f64 = 0.05;
 
-/// A range is small beside one this many times as large.
-const SMALL: f64 = 10.0;
+/// Smallest ratio of the largest range to a range that counts as small.
+const MIN_RANGE_RATIO: f64 = 10.0;
 
-/// Share of the targets, by root mean square, from which on what styles leave out is reported.
-const MIN_LEFT_OUT: f64 = 0.7;
+/// Smallest reported relative truncation error.
+const MIN_TRUNCATION_ERROR: f64 = 0.7;
 
-/// A range this many times the noise is one of a movement.
-const MOVING: f64 = 20.0;
+/// Smallest ratio of range to noise of a degree of freedom that moves.
+const MIN_SIGNAL_TO_NOISE: f64 = 20.0;
 
-/// Returns the degrees of freedom whose noise is large beside their ranges (D,).
+/// Returns a finding for each degree of freedom whose noise is large relative to its range.
 pub(super) fn noisy(noise: &Noise, ranges: &[f64], names: &[String]) -> Vec<Finding> {
-    let found = noise.levels().iter().zip(noise.cut_offs()).zip(ranges.iter().zip(names));
-    let found = found.filter_map(|((&level, cut_off), (&range, name))| {
+    let levels = noise.levels().iter().zip(noise.cut_offs()).zip(ranges.iter().zip(names));
+    let findings = levels.filter_map(|((&level, cut_off), (&range, name))| {
         let share = level / range.max(f64::MIN_POSITIVE);
-        // The smoothed range of a joint at rest is less than its noise.
+        // The smoothed range of a joint at rest is below its noise.
         let (dof, cut_off) = (name.clone(), (*cut_off)?);
-        (share > MIN_SHARE && range > level).then_some(Finding::Noisy { dof, level, share, cut_off })
+        (share > MIN_NOISE_SHARE && range > level).then_some(Finding::Noisy { dof, level, share, cut_off })
     });
-    found.collect()
+    findings.collect()
 }
 
-/// Returns the degree of freedom of small range of which the styles leave out most.
+/// Returns a finding for the degree of freedom of small range that the styles truncate most.
 ///
 /// S is orthonormal and F_basis = SᵀF, so that ‖F_d − S·F_basis,d‖² = ‖F_d‖² − ‖F_basis,d‖² for each DoF d.
 pub(super) fn truncation_error(
@@ -43,14 +43,15 @@ pub(super) fn truncation_error(
     let squares = |rows: &ndarray::Array2<f64>, d: usize| {
         rows.rows().into_iter().flat_map(|row| row.into_iter().skip(d).step_by(n_dofs)).map(|f| f * f).sum::<f64>()
     };
-    let small = |d: &usize| ranges[*d] * SMALL < largest && ranges[*d] > MOVING * noise.levels()[*d];
+    let small =
+        |d: &usize| ranges[*d] * MIN_RANGE_RATIO < largest && ranges[*d] > MIN_SIGNAL_TO_NOISE * noise.levels()[*d];
     let share = |d: usize| {
         let all = squares(&targets.forcing, d);
         let share = (1.0 - squares(&factors.basis, d) / all.max(f64::MIN_POSITIVE)).max(0.0).sqrt();
         if all > 0.0 { share } else { 0.0 }
     };
-    let found = (0..n_dofs).filter(small).map(|d| (d, share(d))).max_by(|a, b| a.1.total_cmp(&b.1));
-    found.filter(|(_, share)| *share > MIN_LEFT_OUT).map(|(d, share)| Finding::LeftOut {
+    let worst = (0..n_dofs).filter(small).map(|d| (d, share(d))).max_by(|a, b| a.1.total_cmp(&b.1));
+    worst.filter(|(_, share)| *share > MIN_TRUNCATION_ERROR).map(|(d, share)| Finding::LeftOut {
         dof: names[d].clone(),
         range: ranges[d],
         largest,

@@ -1,8 +1,8 @@
-//! Gains whose transients the samples do not resolve.
+//! Detection of gains whose transients the samples do not resolve.
 //!
-//! The target of a discrete movement cancels a transient of rate α_z/2, which follows the start. Where α_z times the
-//! sampling interval is not small, a curve through samples of the target does not, and what is left of the transient
-//! moves with accelerations that nothing recorded.
+//! The target of a discrete movement cancels a transient of rate α_z/2 that follows the start. Where α_z times the
+//! sampling interval is not small, an interpolant of the sampled target cancels it incompletely, and the remaining
+//! transient has accelerations that were not demonstrated.
 
 use std::sync::Arc;
 
@@ -16,15 +16,15 @@ use crate::model::finding::Finding;
 use crate::model::primitive::Primitive;
 use crate::motion::rollout::{TimeGrid, rollout};
 
-/// Accelerations this many times the recorded ones are not of the movement.
+/// Largest accepted ratio of reproduced to demonstrated acceleration.
 const MAX_RATIO: f64 = 3.0;
 
-/// Rate α_z times the interval of the samples, in units of the clock, up to which nothing is examined: that of the defaults,
-/// 25/150. With a reach of 201 samples, accelerations are those recorded at 0.12, 19 times as large at 0.5, 230 times
-/// at 1 and 18 000 times at 4.
+/// Largest α_z times the sampling interval on the clock that is resolved without a check; the defaults have 25/150. For a
+/// reach of 201 samples, accelerations are as demonstrated at 0.12, 19 times as large at 0.5, 230 times at 1 and
+/// 18 000 times at 4.
 const RESOLVED: f64 = 0.17;
 
-/// Compares the accelerations of the nominal demonstration with those of its reproduction.
+/// Compares the accelerations of the nominal demonstration with those of its reproduction, and returns the worst DoF.
 pub(super) fn stiffness(primitive: &Arc<Primitive>, aligned: &Aligned) -> Result<Option<Finding>> {
     let (kind, n_dofs) = (primitive.kind(), primitive.n_dofs());
     let (demo, n_samples) = (aligned.nominal, aligned.n_samples);
@@ -34,20 +34,20 @@ pub(super) fn stiffness(primitive: &Arc<Primitive>, aligned: &Aligned) -> Result
         return Ok(None);
     }
     let mut position = Array2::zeros((n_samples, n_dofs));
-    aligned.sample(demo, position.as_slice_mut().unwrap_or_default());
+    aligned.sample(demo, crate::validate::row_major_mut(&mut position));
     let dt = primitive.duration() / kind.steps(n_samples) as f64;
     let reproduced = rollout(primitive, &Conditions::default(), TimeGrid { dt, duration: None })?.acceleration;
     let mut worst = None;
-    let mut most = MAX_RATIO;
+    let mut largest_ratio = MAX_RATIO;
     for (d, name) in primitive.names().iter().enumerate() {
         let column = position.column(d);
-        let bend = |c: usize| ((column[c + 1] - column[c]) - (column[c] - column[c - 1])).abs() / (dt * dt);
-        let shown = (1..n_samples - 1).map(bend).fold(0.0, f64::max);
+        let acceleration = |c: usize| ((column[c + 1] - column[c]) - (column[c] - column[c - 1])).abs() / (dt * dt);
+        let demonstrated = (1..n_samples - 1).map(acceleration).fold(0.0, f64::max);
         let largest = reproduced.column(d).iter().fold(0.0f64, |most, a| most.max(a.abs()));
-        if largest > most * shown && shown > 0.0 {
-            most = largest / shown;
+        if largest > largest_ratio * demonstrated && demonstrated > 0.0 {
+            largest_ratio = largest / demonstrated;
             let (alpha_z, dof) = (primitive.attractor().alpha_z, name.clone());
-            worst = Some(Finding::Stiff { alpha_z, dof, demo, reproduced: largest, shown, n_samples });
+            worst = Some(Finding::Stiff { alpha_z, dof, demo, reproduced: largest, shown: demonstrated, n_samples });
         }
     }
     Ok(worst)

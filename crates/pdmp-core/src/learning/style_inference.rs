@@ -1,4 +1,4 @@
-//! Where a demonstration lies that a model was not fitted to.
+//! Style of a demonstration outside the training set.
 
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
@@ -8,7 +8,7 @@ use super::cycle_phase;
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::learning::alignment::{Alignment, TimeScaling};
+use crate::learning::alignment::Alignment;
 use crate::learning::targets::Targets;
 use crate::model::Model;
 use crate::model::conditions::Conditions;
@@ -16,25 +16,44 @@ use crate::motion::rollout::{TimeGrid, rollout};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
 
-/// Largest size of a style, over the largest of the demonstrations': beyond, units differ.
+/// Smallest standard deviation σ of the residuals relative to the target.
+const ROUNDING: f64 = 1e-9;
+/// Largest norm of a style relative to the largest of the demonstrations; beyond it, the units probably differ.
 const MAX_STYLE: f64 = 10.0;
-/// Largest deviation from a demonstration, as a share of its movement, by root mean square over time and DoFs, each over
-/// its range. Demonstrations left out of recorded sets are described in 109 of 124 cases, those of other tasks in 39 of 96.
-const MAX_OFF: f64 = 0.5;
-/// Size of the forcing that a style may leave out, over that which is left out of the demonstrations, by root mean square.
-const MAX_LEFT_OUT: f64 = 3.0;
+/// Largest relative deviation from a demonstration, by root mean square over time and DoFs, each scaled by its range. With
+/// this limit 109 of 124 held-out demonstrations of recorded sets are accepted, and 39 of 96 of other tasks.
+const MAX_DEVIATION: f64 = 0.5;
+/// Largest truncation error of the forcing relative to that of the demonstrations, by root mean square.
+const MAX_TRUNCATION_RATIO: f64 = 3.0;
 
-/// The style (J,) of a demonstration that the model was not fitted to: the likeliest given its target, with deviations like
-/// those that are left out and styles as large as those of the demonstrations.
+/// Estimates the style (J,) of a demonstration outside the training set.
 ///
-/// A rhythmic demonstration that begins in another phase than those of the model is turned by as many samples as bring it
-/// closest to what the model makes.
+/// The estimate is the maximum a posteriori style given the target, with Gaussian residuals and a zero-mean Gaussian prior
+/// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that
+/// begins in another phase than those of the model is first shifted to their phase.
 ///
-/// `dt` in seconds and `period` serve as in a fit. Its time is scaled as that of the others was: where theirs was warped
-/// so is this one's, and where they had landmarks it needs its own (E,), in seconds.
+/// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
+/// same warp, or by landmarks, whose times `landmarks` (E,) are in seconds.
 ///
 /// # Errors
-/// A demonstration that does not fit the model or that no style of it describes, or landmarks where the others had none.
+/// A demonstration that does not match the model, one that no style describes, or landmarks where the model has none.
+///
+/// ```
+/// # use ndarray::Array2;
+/// use pdmp_core::learning::{Truncation, style_of};
+/// use pdmp_core::{Demonstration, FitOptions, Sampling, fit};
+///
+/// # let arch = |h: f64| {
+/// #     let position = Array2::from_shape_fn((101, 1), |(c, _)| h * (0.0314 * c as f64).sin().powi(3));
+/// #     Demonstration::new(position, Sampling::Uniform { dt: 0.01 })
+/// # };
+/// let demonstrations = [arch(1.0)?, arch(2.0)?];
+/// let model = fit(&demonstrations, &FitOptions::discrete().n_styles(Truncation::Rank(1)))?;
+/// let style = style_of(&model, &arch(1.5)?, None, None, None)?;
+/// let styles = &model.demonstrated().styles;
+/// assert!(styles[[0, 0]] < style[0] && style[0] < styles[[1, 0]]);
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 pub fn style_of(
     model: &Model,
     demo: &Demonstration,
@@ -47,12 +66,12 @@ pub fn style_of(
         let (expected, found) = (n_dofs, demo.n_dofs());
         return Err(Error::Length { name: "demonstration", expected, found, per: "DoF" });
     }
-    for (told, own, otherwise) in [
+    for (labels, own, conflict) in [
         (demo.names(), model.names(), "names differ from those of the model"),
         (demo.units(), model.units(), "units differ from those of the model"),
     ] {
-        if told.is_some_and(|told| told != own) {
-            return Err(Error::Arguments(otherwise));
+        if labels.is_some_and(|labels| labels != own) {
+            return Err(Error::Arguments(conflict));
         }
     }
     let alignment = Alignment {
@@ -62,7 +81,6 @@ pub fn style_of(
         smoothing: Smoothing::Interpolate,
         nominal: None,
         n_samples: Some(model.learnt.n_samples),
-        time_scaling: TimeScaling::Linear,
     };
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
@@ -77,23 +95,23 @@ pub fn style_of(
         (_, Some(_)) => {
             return Err(Error::Arguments("the model was fitted without landmarks: leave out the landmarks"));
         }
-        (Some(template), None) => aligned.warp_to(template)?,
+        (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}
     }
     let mut targets = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;
     targets.carry(&model.transport, model.attractor, model.canonical());
     targets.scale(&model.learnt.dof_scale);
     let mut position = Array2::zeros((model.learnt.n_samples, n_dofs));
-    aligned.sample(0, position.as_slice_mut().unwrap_or_default());
+    aligned.sample(0, crate::validate::row_major_mut(&mut position));
 
     let design = design(model);
     let mut target = targets.forcing.row(0).to_vec();
     if model.kind() == Kind::Rhythmic {
-        let samples = cycle_phase::lead(&design, &target, model.demonstrated.styles.view(), n_dofs);
+        let samples = cycle_phase::phase_lead(&design, &target, model.demonstrated.styles.view(), n_dofs);
         target.rotate_left(samples * n_dofs);
-        position.as_slice_mut().unwrap_or_default().rotate_left(samples * n_dofs);
+        crate::validate::row_major_mut(&mut position).rotate_left(samples * n_dofs);
     }
-    let (style, truncation_error) = likeliest(&design, &target, &model.demonstrated.styles);
+    let (style, truncation_error) = maximum_a_posteriori(&design, &target, &model.demonstrated.styles);
     check_size(&style, model)?;
     let row = |rows: &Array2<f64>| Some(rows.row(0).to_vec());
     let mut conditions = Conditions { style: Some(style.clone()), ..Conditions::default() };
@@ -101,20 +119,20 @@ pub fn style_of(
         Kind::Discrete => (conditions.goal, conditions.start) = (row(&targets.goals), row(&targets.starts)),
         Kind::Rhythmic => conditions.anchor = row(&targets.anchors),
     }
-    let off = off(model, &conditions, position.view())?;
-    let times = truncation_error / usual_left_out(model, target.len());
-    if off > MAX_OFF && times > MAX_LEFT_OUT { Err(Error::Undescribed { off, times }) } else { Ok(style) }
+    let off = relative_deviation(model, &conditions, position.view())?;
+    let times = truncation_error / training_truncation_error(model, target.len());
+    if off > MAX_DEVIATION && times > MAX_TRUNCATION_RATIO { Err(Error::Undescribed { off, times }) } else { Ok(style) }
 }
 
-/// Root mean square of the forcing that the styles leave out of the demonstrations, in the units of the factorisation.
-fn usual_left_out(model: &Model, n_values: usize) -> f64 {
+/// Returns the root mean square truncation error of the demonstrations, in the units of the factorisation.
+fn training_truncation_error(model: &Model, n_values: usize) -> f64 {
     let kept: f64 = model.learnt.singular_values.iter().take(model.n_styles()).map(|s| s * s).sum();
     let share = model.learnt.truncation_error;
     let all = kept / (1.0 - share * share).max(f64::EPSILON);
     share * (all / (model.n_demos() * n_values) as f64).sqrt()
 }
 
-/// The forcing of unit styles (C·D, J), in the units of the factorisation.
+/// Returns the forcing of unit styles (C·D, J), in the units of the factorisation.
 fn design(model: &Model) -> Mat<f64> {
     let (n_dofs, n_styles) = (model.n_dofs(), model.n_styles());
     let scale = &model.learnt.dof_scale;
@@ -132,17 +150,17 @@ fn design(model: &Model) -> Mat<f64> {
     design
 }
 
-/// The likeliest style (J,), and the root mean square of what it leaves out of the target.
+/// Returns the maximum a posteriori style (J,), and the root mean square residual of the target.
 ///
-/// Minimises ‖f − As‖²/σ² + Σ s_j²/v_j with v_j the largest square of the demonstrations' styles and σ² the mean square
-/// that least squares leave: what the forcing of a style does not determine stays at the size of those demonstrated.
-fn likeliest(design: &Mat<f64>, target: &[f64], styles: &Array2<f64>) -> (Vec<f64>, f64) {
+/// Minimises ‖f − As‖²/σ² + Σ s_j²/v_j, where v_j is the largest square of the demonstrations' styles and σ² the mean
+/// squared residual of least squares. Components that the target does not determine are bounded by the prior.
+fn maximum_a_posteriori(design: &Mat<f64>, target: &[f64], styles: &Array2<f64>) -> (Vec<f64>, f64) {
     let (n_values, n_styles) = (design.nrows(), design.ncols());
     let largest = target.iter().fold(0.0f64, |most, f| most.max(f.abs()));
     if largest == 0.0 {
         return (vec![0.0; n_styles], 0.0);
     }
-    // In units of the target's largest value, and styles in units of the demonstrations'.
+    // The target is scaled by its largest value, styles by the largest of the demonstrations.
     let unit: Vec<f64> = styles.columns().into_iter().map(|s| s.iter().fold(0.0f64, |m, s| m.max(s.abs()))).collect();
     let solve = |weight: f64| {
         let rows = n_values + n_styles;
@@ -166,10 +184,7 @@ fn likeliest(design: &Mat<f64>, target: &[f64], styles: &Array2<f64>) -> (Vec<f6
     (style.iter().zip(&unit).map(|(s, unit)| s * unit).collect(), truncation_error * largest)
 }
 
-/// Deviations of a target that are not known better, as a share of it.
-const ROUNDING: f64 = 1e-9;
-
-/// Checks that a style is of the size of those of the demonstrations.
+/// Checks the norm of a style against those of the demonstrations.
 fn check_size(style: &[f64], model: &Model) -> Result<()> {
     let size = |style: &mut dyn Iterator<Item = &f64>| style.map(|s| s * s).sum::<f64>().sqrt();
     let largest = model.demonstrated.styles.rows().into_iter().map(|row| size(&mut row.iter())).fold(0.0, f64::max);
@@ -177,21 +192,23 @@ fn check_size(style: &[f64], model: &Model) -> Result<()> {
     if found <= MAX_STYLE * largest { Ok(()) } else { Err(Error::StyleSize { ratio: found / largest }) }
 }
 
-/// The deviation of the model's movement from positions (C, D), over their own from their mean, by root mean square, each
-/// DoF over its range.
-fn off(model: &Model, conditions: &Conditions, position: ArrayView2<f64>) -> Result<f64> {
+/// Returns the deviation of the model's movement from positions (C, D), relative to their deviation from their mean.
+///
+/// Both are root mean squares with each DoF scaled by its range.
+fn relative_deviation(model: &Model, conditions: &Conditions, position: ArrayView2<f64>) -> Result<f64> {
     let steps = model.kind().steps(position.nrows());
     let grid = TimeGrid { dt: model.duration() / steps as f64, duration: None };
-    let made = rollout(model.primitive(), conditions, grid)?.position;
+    let reproduced = rollout(model.primitive(), conditions, grid)?.position;
     let widest = model.ranges.iter().fold(0.0f64, |most, range| most.max(*range));
     let [mut deviation, mut movement] = [0.0; 2];
     for (d, range) in model.ranges.iter().enumerate() {
         let unit = if *range > 0.0 { *range } else { widest };
-        let (shown, made) = (position.column(d), made.column(d));
-        let mean = shown.mean().unwrap_or(0.0);
+        let (recorded, reproduced) = (position.column(d), reproduced.column(d));
+        let mean = recorded.mean().unwrap_or(0.0);
         if unit > 0.0 {
-            deviation += shown.iter().zip(made).map(|(y, made)| ((y - made) / unit).powi(2)).sum::<f64>();
-            movement += shown.iter().map(|y| ((y - mean) / unit).powi(2)).sum::<f64>();
+            deviation +=
+                recorded.iter().zip(reproduced).map(|(y, reproduced)| ((y - reproduced) / unit).powi(2)).sum::<f64>();
+            movement += recorded.iter().map(|y| ((y - mean) / unit).powi(2)).sum::<f64>();
         }
     }
     Ok(if movement > 0.0 { (deviation / movement).sqrt() } else { 0.0 })

@@ -1,7 +1,7 @@
-//! A regression read at the knots of a table, as many as a piecewise cubic through them needs.
+//! Adaptive tabulation of a regression for piecewise cubic Hermite interpolation.
 //!
-//! Between knots a cubic is off by h⁴/384·|w⁗| at most, and most in the middle of a cell. A Matérn process is smooth
-//! between its samples and has a kink at each: where all samples are knots, a cell or two from one to the next suffice.
+//! The interpolation error is at most h⁴/384·|w⁗|, and largest at the midpoint of a cell. A Matérn process is smooth
+//! between its samples and has a kink at each: where all samples are knots, one or two cells between samples suffice.
 
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::forcing_table::ForcingTable;
@@ -10,17 +10,19 @@ use crate::error::Result;
 use crate::learning::regression::Regression;
 use crate::numerics::threads::Threads;
 
-/// Fewest cells of the first table.
+/// Smallest number of cells of the first table.
 const MIN_CELLS: usize = 128;
-/// Knots between two questions whether to go on, which one thread reads.
+/// Knots that a thread evaluates between two progress reports.
 const PORTION: usize = 1024;
-/// Knots that are read at once.
+/// Knots that are evaluated together.
 const BLOCK: usize = 64;
 
-/// Compiles a regression of J·D outputs on so many samples.
+/// Compiles a regression with J·D outputs, fitted to `n_samples` samples, to a table.
+///
+/// `progress` is called periodically with the completed fraction of the finest possible table.
 ///
 /// # Errors
-/// Whatever `progress` returns, which is told the share of the finest possible table that is done.
+/// The error that `progress` returned.
 pub(super) fn compile(
     canonical: Canonical,
     (n_styles, n_dofs): (usize, usize),
@@ -37,11 +39,14 @@ pub(super) fn compile(
     Ok(ForcingTable::from_knots(canonical, n_dofs, &knots, error))
 }
 
-/// Values and slopes (cells + 1, outputs) at both ends of cells that are halved until their midpoints agree, and the error
-/// between the knots, relative to the largest forcing. What was learnt from samples at equal `steps` is read there too.
+/// Returns values and slopes (cells + 1, outputs) at the ends of equal cells, and the interpolation error relative to the
+/// largest value.
+///
+/// Cells are halved until interpolation matches the regression at their midpoints. The samples, at the ends of `steps`
+/// equal steps, become knots, if the largest number of cells allows.
 ///
 /// # Errors
-/// Whatever `progress` returns, which is told the share of the finest possible table that is done.
+/// The error that `progress` returned.
 fn tabulate(
     extent: f64,
     steps: usize,
@@ -51,51 +56,51 @@ fn tabulate(
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<(KnotTable, f64)> {
     let mut done = 0;
-    // Reads the rows of `jets` from one to the next in steps, the place of each being a multiple of the width.
-    let mut read = |jets: &mut KnotTable, (first, step): (usize, usize), width: f64| {
-        let n = (jets.len() - first).div_ceil(step);
+    // Evaluates every `step`-th row of the knots from `first` on; row k lies at k times the width.
+    let mut evaluate_rows = |knots: &mut KnotTable, (first, step): (usize, usize), width: f64| {
+        let n = (knots.len() - first).div_ceil(step);
         let scratch = || (Vec::with_capacity(BLOCK), KnotTable::zeros(BLOCK, n_outputs));
-        let evaluate = |(u, jets): &mut (Vec<f64>, KnotTable), (portion, rows): (usize, (&mut [f64], &mut [f64]))| {
+        let evaluate = |(u, buffer): &mut (Vec<f64>, KnotTable), (portion, rows): (usize, (&mut [f64], &mut [f64]))| {
             let size = step * BLOCK * n_outputs;
             let blocks = rows.0.chunks_mut(size).zip(rows.1.chunks_mut(size));
             for (block, (values, slopes)) in blocks.enumerate() {
-                let places = (0..values.len() / n_outputs).skip(first).step_by(step);
+                let rows = (0..values.len() / n_outputs).skip(first).step_by(step);
                 u.clear();
-                u.extend(places.map(|k| width * ((portion * PORTION + block * BLOCK) * step + k) as f64));
+                u.extend(rows.map(|k| width * ((portion * PORTION + block * BLOCK) * step + k) as f64));
                 let size = u.len() * n_outputs;
-                regression.evaluate_all(u, &mut jets.values[..size], &mut jets.slopes[..size]);
-                for (rows, numbers) in [(values, &jets.values), (slopes, &jets.slopes)] {
+                regression.evaluate_all(u, &mut buffer.values[..size], &mut buffer.slopes[..size]);
+                for (rows, numbers) in [(values, &buffer.values), (slopes, &buffer.slopes)] {
                     let rows = rows.chunks_exact_mut(n_outputs).skip(first).step_by(step);
                     rows.zip(numbers.chunks_exact(n_outputs)).for_each(|(row, numbers)| row.copy_from_slice(numbers));
                 }
             }
             Ok(())
         };
-        let mut telling = |share: f64| progress((done as f64 + share * n as f64) / (MAX_CELLS + 1) as f64);
+        let mut reporting = |share: f64| progress((done as f64 + share * n as f64) / (MAX_CELLS + 1) as f64);
         threads.try_for_each_told(
-            jets.rows_mut(step * PORTION).enumerate().collect(),
+            knots.rows_mut(step * PORTION).enumerate().collect(),
             scratch,
             evaluate,
-            &mut telling,
+            &mut reporting,
         )?;
         done += n;
         Ok(())
     };
-    let mut cells = coarsest(steps);
+    let mut cells = first_cells(steps);
     let mut knots = KnotTable::zeros(cells + 1, n_outputs);
-    read(&mut knots, (0, 1), extent / cells as f64)?;
+    evaluate_rows(&mut knots, (0, 1), extent / cells as f64)?;
     loop {
         let largest = knots.values.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
-        // The midpoints are paid for and become knots, unless they are not needed.
+        // The midpoints, once evaluated, become knots unless the coarser table suffices.
         let mut finer = knots.spread();
         cells *= 2;
-        read(&mut finer, (1, 2), extent / cells as f64)?;
+        evaluate_rows(&mut finer, (1, 2), extent / cells as f64)?;
         let error = finer.error_of_every_second(extent / cells as f64) / largest;
         if error <= TOLERANCE {
             return Ok((knots, error));
         }
-        // Halving makes the error 16 times smaller where w is smooth, and 8 times at a kink of w″ as a Matérn-3/2
-        // process has; a quarter is promised.
+        // Halving reduces the error by a factor of 16 where w is smooth, and of 8 at a kink of w″, as a Matérn-3/2 process
+        // has; a factor of 4 is claimed.
         if error <= 4.0 * TOLERANCE {
             return Ok((finer, error / 4.0));
         }
@@ -106,8 +111,8 @@ fn tabulate(
     }
 }
 
-/// Cells of the first table, whose halves have a knot at every sample sooner or later, if a table can.
-fn coarsest(steps: usize) -> usize {
+/// Returns the number of cells of the first table, such that repeated halving puts a knot at every sample if possible.
+fn first_cells(steps: usize) -> usize {
     let mut cells = steps >> steps.trailing_zeros();
     if 2 * cells > MAX_CELLS {
         return MIN_CELLS;
@@ -139,7 +144,7 @@ mod tests {
         }
     }
 
-    /// Nowhere between the knots is the table further from the regression than the error it states.
+    /// The stated error bounds the difference between table and regression everywhere.
     #[test]
     fn stated_error_bounds_the_table() {
         for (canonical, omega) in
@@ -187,9 +192,9 @@ mod tests {
         }
     }
 
-    /// Where the third derivative jumps, wherever that lies in its cell, the table is about as close as it is to be.
+    /// A jump of the third derivative anywhere in a cell does not increase the error beyond twice the tolerance.
     #[test]
-    fn table_is_close_at_a_kink() {
+    fn table_is_accurate_at_a_kink() {
         for k in 0..100 {
             let kink = Kink((0.5f64.sqrt() + f64::from(k) * 0.618_033_988_75).fract());
             let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
@@ -203,7 +208,7 @@ mod tests {
         }
     }
 
-    /// Where it jumps at a sample, as a Matérn process does, the cubics on either side are exact.
+    /// With kinks at samples, as of a Matérn process, the cubics on either side are exact.
     #[test]
     fn table_is_coarse_where_kinks_are_at_samples() {
         let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
@@ -213,9 +218,9 @@ mod tests {
         assert!(cells(11) == 160 && cells(12) > 600, "{} {}", cells(11), cells(12));
     }
 
-    /// Past the demonstrated end the forcing is continuous and fades with the phase.
+    /// After the demonstrated end the forcing is continuous and decays with the phase.
     #[test]
-    fn forcing_fades_with_the_phase_after_the_end() {
+    fn forcing_decays_with_the_phase_after_the_end() {
         let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
         let table = compile(canonical, (1, 1), 2, &Waves(9.0), Threads::ONE, &mut |_| Ok(())).unwrap();
         let at = |u: f64| {

@@ -1,51 +1,51 @@
-//! What an inspection reports.
+//! Findings of an inspection of demonstrations, and of a fit.
 
 use std::fmt;
 
-/// Something implausible about the samples of demonstrations, or about a fit to them.
+/// Implausible property of the samples of demonstrations, or of a fit to them. Its text states the place and the remedy.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Finding {
-    /// Two time stamps so close that a curve through both samples is far steeper than the movement.
+    /// Two time stamps that are so close that a curve through both samples is far steeper than the movement.
     CloseStamps {
         /// Index of the demonstration.
         demo: usize,
         /// Name of the degree of freedom that changes most between them.
         dof: String,
-        /// The later of the two samples.
+        /// Location of the later of the two samples.
         place: SampleLocation,
-        /// Seconds between them.
+        /// Interval between them, in seconds.
         interval: f64,
         /// Median interval of the demonstration, in seconds.
         usual: f64,
-        /// Rate of change between the two samples, over the largest elsewhere.
+        /// Rate of change between the two samples, relative to the largest elsewhere.
         ratio: f64,
     },
-    /// Samples that are exactly zero, far from those beside them.
+    /// Samples that are exactly zero, far from their neighbours.
     Zeros {
         /// Index of the demonstration.
         demo: usize,
         /// Names of the degrees of freedom.
         dofs: Vec<String>,
-        /// First sample.
+        /// Location of the first such sample.
         from: SampleLocation,
-        /// Last sample.
+        /// Location of the last such sample.
         to: SampleLocation,
-        /// The smaller jump beside them, over the largest step elsewhere.
+        /// Smaller one of the jumps at both ends, relative to the largest step elsewhere.
         ratio: f64,
     },
-    /// Rows at the end that pad a demonstration.
+    /// Padding rows at the end of a demonstration.
     Padded {
         /// Index of the demonstration.
         demo: usize,
-        /// First of these rows.
+        /// Location of the first padding row.
         from: SampleLocation,
-        /// How many there are.
+        /// Number of padding rows.
         rows: usize,
-        /// What they are.
+        /// Kind of the padding.
         padding: Padding,
     },
-    /// A column that grows by exactly one a sample in every demonstration.
+    /// A column that increases by exactly one per sample in every demonstration.
     Counter {
         /// Name of the degree of freedom.
         dof: String,
@@ -61,29 +61,29 @@ pub enum Finding {
         demo: usize,
         /// Name of the degree of freedom.
         dof: String,
-        /// The sample after the jump.
+        /// Location of the sample after the jump.
         place: SampleLocation,
-        /// The jump, in the unit of the degree of freedom.
+        /// Size of the jump, in the unit of the degree of freedom.
         jump: f64,
-        /// A full turn in that unit.
+        /// Full turn in that unit.
         turn: f64,
     },
-    /// An angle that lies whole turns from that of the first demonstration.
+    /// An angle that is offset by whole turns from that of most demonstrations.
     TurnsApart {
         /// Index of the demonstration.
         demo: usize,
         /// Name of the degree of freedom.
         dof: String,
-        /// How many turns.
+        /// Number of turns.
         turns: f64,
-        /// A full turn in the unit of the degree of freedom.
+        /// Full turn in the unit of the degree of freedom.
         turn: f64,
-        /// Whether the unit says that it is an angle, so that the turns were taken off.
+        /// True if the turns were subtracted, because the unit is one of angles.
         mended: bool,
     },
-    /// Gains so high that the reproduced demonstration accelerates far harder than the recorded one.
+    /// Gains so high that the accelerations of the reproduction far exceed those of the demonstration.
     Stiff {
-        /// α_z.
+        /// Gain α_z, per unit of the clock.
         alpha_z: f64,
         /// Name of the degree of freedom.
         dof: String,
@@ -91,52 +91,52 @@ pub enum Finding {
         demo: usize,
         /// Largest acceleration of the reproduction, per second squared.
         reproduced: f64,
-        /// Largest acceleration of the demonstration.
+        /// Largest acceleration of the demonstration, per second squared.
         shown: f64,
-        /// Samples C after alignment.
+        /// Number of samples C after alignment.
         n_samples: usize,
     },
-    /// Measurement noise that is large beside the movement.
+    /// Measurement noise that is large relative to the movement.
     Noisy {
         /// Name of the degree of freedom.
         dof: String,
         /// Standard deviation of the noise, in the unit of the degree of freedom.
         level: f64,
-        /// The same as a share of the range.
+        /// Standard deviation of the noise, relative to the range.
         share: f64,
-        /// Cut-off of the smoothing, in Hz.
+        /// Cut-off frequency of the smoothing, in Hz.
         cut_off: f64,
     },
-    /// A degree of freedom of small range whose movement the styles leave out.
+    /// A degree of freedom of small range that the styles do not describe.
     LeftOut {
         /// Name of the degree of freedom.
         dof: String,
-        /// Its range, in its unit.
+        /// Range of the degree of freedom, in its unit.
         range: f64,
-        /// The largest range of all.
+        /// Largest range of all degrees of freedom.
         largest: f64,
-        /// Share of its targets that the styles leave out, by root mean square.
+        /// Truncation error of the targets of this degree of freedom, relative by root mean square.
         share: f64,
         /// Style dimension J.
         n_styles: usize,
     },
 }
 
-/// Where in a demonstration.
+/// Location of a sample in a demonstration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleLocation {
     /// Index of the sample.
     pub sample: usize,
-    /// Its time in seconds, where that is known.
+    /// Time of the sample in seconds, if known.
     pub time: Option<f64>,
 }
 
-/// Rows that pad a demonstration.
+/// Kind of the rows that pad a demonstration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Padding {
-    /// All zero.
+    /// Rows of zeros.
     Zeros,
-    /// All like the last row of the movement.
+    /// Copies of the last row of the movement.
     LastRow,
 }
 
@@ -152,13 +152,13 @@ impl fmt::Display for Finding {
         match self {
             Self::CloseStamps { demo, dof, place, interval, usual, ratio } => write!(
                 f,
-                "demo {demo}: {place} was taken {interval:.2e} s after the one before it, where {usual:.2e} s are usual, and \
-                 {dof:?} changes {ratio:.0} times faster between them than anywhere else: drop one of the two samples, or \
-                 check the time stamps"
+                "demo {demo}: {place} was taken {interval:.2e} s after the sample before it, while the median interval is \
+                 {usual:.2e} s, and {dof:?} changes {ratio:.0} times faster between them than anywhere else: drop one of the \
+                 two samples, or check the time stamps"
             ),
             Self::Zeros { demo, dofs, from, to, ratio } => {
-                let what = if dofs.len() == 1 { "is" } else { "are" };
-                write!(f, "demo {demo}: {} {what} exactly 0 ", Names(dofs))?;
+                let verb = if dofs.len() == 1 { "is" } else { "are" };
+                write!(f, "demo {demo}: {} {verb} exactly 0 ", Names(dofs))?;
                 if from == to {
                     write!(f, "at {from}")?;
                 } else {
@@ -166,33 +166,33 @@ impl fmt::Display for Finding {
                 }
                 write!(
                     f,
-                    ", and the step there is {ratio:.0} times the largest elsewhere: samples that were lost? Replace them by \
-                     NaN, which the readers of pdmp fill, or cut them out"
+                    ", and the step there is {ratio:.0} times the largest elsewhere: lost samples? Replace them by NaN, which \
+                     the readers of pdmp fill, or remove them"
                 )
             }
             Self::Padded { demo, from, rows, padding } => {
-                let like = match padding {
+                let description = match padding {
                     Padding::Zeros => "rows of zeros",
-                    Padding::LastRow => "rows exactly like the one before them",
+                    Padding::LastRow => "copies of the row before them",
                 };
                 write!(
                     f,
-                    "demo {demo}: ends in {rows} {like}, from {from} on: padding? Cut them off, and pass demonstrations of \
-                     different length as a list"
+                    "demo {demo}: ends in {rows} {description}, from {from} on: padding? Remove them, and pass \
+                     demonstrations of different length as a list"
                 )
             }
             Self::Counter { dof } => write!(
                 f,
-                "{dof:?} grows by exactly 1 a sample in every demonstration: a counter of samples? Leave the column out"
+                "{dof:?} increases by exactly 1 per sample in every demonstration: a sample counter? Leave the column out"
             ),
             Self::Clock { dof } => write!(
                 f,
-                "{dof:?} is the time of the samples in every demonstration: leave the column out, and pass it as time="
+                "{dof:?} equals the time stamps in every demonstration: leave the column out, and pass it as time="
             ),
             Self::Wrap { demo, dof, place, jump, turn } => write!(
                 f,
-                "demo {demo}: {dof:?} jumps by {jump:.4} at {place}, about a full turn of {turn:.4}: an angle that was \
-                 wrapped? Unwrap it with pdmp.preprocessing.unwrap"
+                "demo {demo}: {dof:?} jumps by {jump:.4} at {place}, about a full turn of {turn:.4}: a wrapped angle? Unwrap \
+                 it with pdmp.preprocessing.unwrap"
             ),
             Self::TurnsApart { demo, dof, turns, turn, mended } => {
                 write!(
@@ -200,31 +200,31 @@ impl fmt::Display for Finding {
                     "demo {demo}: {dof:?} lies {turns} full turns of {turn:.4} from that of most demonstrations: "
                 )?;
                 f.write_str(if *mended {
-                    "they were taken off; bring the recordings together to avoid this"
+                    "the turns were subtracted; use one range of angles in all recordings to avoid this"
                 } else {
-                    "an angle? Give its unit, \"rad\" or \"deg\", to take them off"
+                    "an angle? Give its unit, \"rad\" or \"deg\", to subtract the turns"
                 })
             }
             Self::Stiff { alpha_z, dof, demo, reproduced, shown, n_samples } => write!(
                 f,
-                "alpha_z = {}: the reproduction of demo {demo} accelerates up to {} in {dof:?}, where {} was recorded; \
-                 {n_samples} samples do not resolve transients that fast: lower alpha_z, or raise n_samples",
+                "alpha_z = {}: the reproduction of demo {demo} accelerates up to {} in {dof:?}, the demonstration up to {}; \
+                 {n_samples} samples do not resolve such fast transients: lower alpha_z, or raise n_samples",
                 short(*alpha_z),
                 short(*reproduced),
                 short(*shown)
             ),
             Self::Noisy { dof, level, share, cut_off } => write!(
                 f,
-                "{dof:?} has measurement noise of standard deviation {}, {} % of its range; it is smoothed at {} Hz: check \
-                 the recordings, or choose the cut-off by smoothing",
+                "{dof:?} has measurement noise of standard deviation {}, {} % of its range, and is smoothed at {} Hz: check \
+                 the recordings, or set the cut-off by smoothing",
                 short(*level),
                 short(100.0 * share),
                 short(*cut_off)
             ),
             Self::LeftOut { dof, range, largest, share, n_styles } => write!(
                 f,
-                "{n_styles} styles leave out {} % of {dof:?}, whose range of {} is small beside {}: if its unit is another \
-                 one, give units or dof_scale = \"range\"; otherwise raise n_styles",
+                "{n_styles} styles leave out {} % of {dof:?}, whose range of {} is small relative to {}: if its unit differs, \
+                 give units or dof_scale = \"range\"; otherwise raise n_styles",
                 short((100.0 * share).round()),
                 short(*range),
                 short(*largest)
@@ -233,22 +233,22 @@ impl fmt::Display for Finding {
     }
 }
 
-/// A number with at most four significant digits.
+/// Formats a number with at most four significant digits.
 fn short(value: f64) -> String {
     let text = format!("{value:.3e}").parse::<f64>().unwrap_or(value);
     format!("{text}")
 }
 
-/// Names as a list in one line, some of them where there are many.
+/// Display of names as a list in one line, abbreviated beyond a few.
 struct Names<'a>(&'a [String]);
 
 impl fmt::Display for Names<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        const MOST: usize = 4;
-        for (k, name) in self.0.iter().take(MOST).enumerate() {
+        const MAX_NAMES: usize = 4;
+        for (k, name) in self.0.iter().take(MAX_NAMES).enumerate() {
             write!(f, "{}{name:?}", if k == 0 { "" } else { ", " })?;
         }
-        let more = self.0.len().saturating_sub(MOST);
-        if more > 0 { write!(f, " and {more} more") } else { Ok(()) }
+        let n_omitted = self.0.len().saturating_sub(MAX_NAMES);
+        if n_omitted > 0 { write!(f, " and {n_omitted} more") } else { Ok(()) }
     }
 }

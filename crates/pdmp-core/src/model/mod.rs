@@ -1,4 +1,4 @@
-//! A learnt primitive with what is known of its demonstrations.
+//! Models: a learnt primitive with the parameters of its demonstrations, the summary of the fit and the context map.
 
 pub(crate) mod conditions;
 pub(crate) mod file;
@@ -27,7 +27,7 @@ pub use primitive::Primitive;
 pub use responses::Derivative;
 pub use template::{TimeWarp, WarpTemplate};
 
-/// What was learnt from each demonstration, in absolute coordinates.
+/// Parameters of each demonstration, in absolute coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DemonstrationParameters {
     /// Styles S (M, J).
@@ -36,49 +36,68 @@ pub struct DemonstrationParameters {
     pub goals: Array2<f64>,
     /// Starts (M, D).
     pub starts: Array2<f64>,
-    /// Means (M, D), about which a cycle oscillates.
+    /// Means of the positions (M, D), the anchors of rhythmic movements.
     pub anchors: Array2<f64>,
-    /// Timings (M, K): the time spent in each segment, in seconds.
+    /// Durations of the K segments between breaks (M, K), in seconds.
     pub segment_durations: Array2<f64>,
-    /// Durations or periods (M,), in seconds: the sums of the segment_durations.
+    /// Durations or periods (M,), in seconds: the sums of the segment durations.
     pub durations: Vec<f64>,
-    /// Contexts (M, Q), labels as their index among [`ContextMap::columns`].
+    /// Contexts (M, Q); a label is its index in [`ContextMap::columns`].
     pub contexts: Option<Array2<f64>>,
     /// Index of the nominal demonstration.
     pub nominal: usize,
 }
 
-/// How the model was learnt, as far as a new demonstration must be treated alike.
+/// Summary of a fit, with the settings that apply to new demonstrations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitSummary {
     /// Samples C of the aligned demonstrations.
     pub n_samples: usize,
-    /// Measurement noise of the demonstrations, and the cut-offs that take it off.
+    /// Measurement noise of the demonstrations, and the cut-off frequencies of their smoothing.
     pub noise: Noise,
-    /// What time was warped to, if it was.
+    /// Template of the time warp; `None` without one.
     pub template: Option<WarpTemplate>,
     /// Unit of each DoF in the factorisation (D,).
     pub dof_scale: Vec<f64>,
-    /// Singular values of the targets, in decreasing order: all, or the first J alone, where the factorization did not
-    /// compute the others.
+    /// Singular values of the targets in decreasing order: all of them, or the first J if the factorisation computed no
+    /// others.
     pub singular_values: Vec<f64>,
-    /// Share of the targets, by root mean square, that J styles leave out.
+    /// Truncation error of J styles relative to the targets, by root mean square.
     pub truncation_error: f64,
-    /// Variance over the phase (S, D) of what J styles leave out of the demonstrations, where contexts are known.
+    /// Residual variance of the demonstrations over the phase (S, D), in the squared unit of each DoF; `None` without
+    /// contexts.
     pub residual_variance: Option<Array2<f64>>,
-    /// The basis functions, in one line.
+    /// Description of the regression in one line.
     pub regression: String,
-    /// What was implausible about the demonstrations or the fit; empty in a model that was read from a file.
+    /// Implausible properties of the demonstrations or the fit; empty in a model read from a file.
     pub findings: Vec<Finding>,
 }
 
-/// Most by which a predicted duration may leave the range of the demonstrations': far outside of their contexts its
-/// logarithm may be anything.
+/// Maximum factor by which a predicted duration exceeds the range of the demonstrations. The map predicts its logarithm,
+/// whose extrapolation is unbounded.
 const MAX_DURATION_RATIO: f64 = 3.0;
 
-/// A parametric dynamic movement primitive with its demonstrations' conditions and the map from contexts to conditions.
+/// Parametric dynamic movement primitive with the parameters of its demonstrations and the map from contexts to conditions.
 ///
-/// It dereferences to its [`Primitive`], which carries the constants of the movement.
+/// A model dereferences to its [`Primitive`], which has the constants of the movement.
+///
+/// ```
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, Model, fit, rollout};
+/// # use pdmp_core::motion::TimeGrid;
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// // Reaches over obstacles of height 0.1, 0.2 and 0.3 m, which are their contexts.
+/// let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let prediction = model.predict(&[0.25])?;
+/// let grid = TimeGrid { dt: 0.01, duration: None };
+/// let trajectory = rollout(model.primitive(), &prediction.conditions, grid)?;
+/// assert_eq!(trajectory.position.ncols(), model.n_dofs());
+///
+/// let same = Model::from_bytes(&model.to_bytes()?)?;
+/// assert_eq!(same.predict(&[0.25])?, prediction);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Model {
     pub(crate) primitive: Arc<Primitive>,
@@ -96,22 +115,22 @@ impl Deref for Model {
 }
 
 impl Model {
-    /// The primitive, which rollouts and controllers share.
+    /// Returns the primitive, which rollouts and controllers share.
     pub fn primitive(&self) -> &Arc<Primitive> {
         &self.primitive
     }
 
-    /// Number of demonstrations M.
+    /// Returns the number of demonstrations M.
     pub fn n_demos(&self) -> usize {
         self.demonstrated.durations.len()
     }
 
-    /// What was learnt from each demonstration.
+    /// Returns the parameters of the demonstrations.
     pub fn demonstrated(&self) -> &DemonstrationParameters {
         &self.demonstrated
     }
 
-    /// How the model was learnt.
+    /// Returns the summary of the fit.
     pub fn learnt(&self) -> &FitSummary {
         &self.learnt
     }
@@ -142,24 +161,24 @@ impl Model {
         Ok(Conditions { style, goal, start, anchor, segment_durations, ..Conditions::default() })
     }
 
-    /// The map from contexts to style, goal and start or anchor, and logarithm of the duration, where contexts are
-    /// known.
+    /// Returns the map from contexts to style, goal and start or anchor, and logarithm of the duration; `None` if the
+    /// demonstrations have no contexts.
     pub fn map(&self) -> Option<&ContextMap> {
         self.map.as_ref()
     }
 
-    /// The movement for a context (Q,), as in Section 4.1.2. Its duration is at least a third of the shortest
-    /// demonstration's and at most three times the longest one's.
+    /// Predicts the movement for a context (Q,), as in Section 4.1.2. Its duration lies between a third of the shortest and
+    /// three times the longest demonstrated duration.
     ///
     /// # Errors
-    /// A model without contexts, a context of another length, a label never shown, or a number that is not finite.
+    /// A model without a context map, a context of another length, an unknown label, or a number that is not finite.
     pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<Prediction> {
         let map = self.map.as_ref().ok_or(Error::Arguments(
-            "the model knows no contexts: fit it with contexts=, or with demonstrations that carry one",
+            "the model has no context map: fit it with contexts=, or with demonstrations that have a context",
         ))?;
         let demonstrated = self.demonstrated.durations.iter();
         let [shortest, longest] =
-            [f64::min, f64::max].map(|of| demonstrated.clone().copied().reduce(of).unwrap_or(1.0));
+            [f64::min, f64::max].map(|extreme| demonstrated.clone().copied().reduce(extreme).unwrap_or(1.0));
         let durations = shortest / MAX_DURATION_RATIO..=longest * MAX_DURATION_RATIO;
         Prediction::of(
             map.predict(context)?,
@@ -173,24 +192,25 @@ impl Model {
 }
 
 impl DemonstrationParameters {
-    /// Outputs of the context map (M, P): style, goal and start or anchor, and timing.
+    /// Returns the training outputs of the context map (M, P): style, goal and start or anchor, and duration and its
+    /// division into segments.
     pub(crate) fn outputs(&self, kind: Kind) -> Array2<f64> {
-        let places = [self.goals.view(), self.starts.view(), self.anchors.view()];
-        outputs(kind, self.styles.view(), places, self.segment_durations.view())
+        let positions = [self.goals.view(), self.starts.view(), self.anchors.view()];
+        outputs(kind, self.styles.view(), positions, self.segment_durations.view())
     }
 
-    /// Conditions of the nominal demonstration.
+    /// Returns the conditions of the nominal demonstration.
     pub(crate) fn nominal(&self, kind: Kind) -> Nominal {
-        let of = |matrix: &Array2<f64>| matrix.row(self.nominal).to_vec();
+        let row = |matrix: &Array2<f64>| matrix.row(self.nominal).to_vec();
         let centre = match kind {
             Kind::Discrete => &self.goals,
             Kind::Rhythmic => &self.anchors,
         };
         Nominal {
-            style: of(&self.styles),
-            centre: of(centre),
-            start: of(&self.starts),
-            segment_durations: of(&self.segment_durations),
+            style: row(&self.styles),
+            centre: row(centre),
+            start: row(&self.starts),
+            segment_durations: row(&self.segment_durations),
         }
     }
 }

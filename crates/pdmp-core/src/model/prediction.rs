@@ -1,61 +1,67 @@
-//! The movement that a map predicts.
+//! Movements predicted by a context map.
 
 use std::ops::RangeInclusive;
 
 use ndarray::Array2;
 
 use super::conditions::Conditions;
-use crate::context::{ContextPrediction, relative_changes};
+use crate::context::{ContextPrediction, log_duration_jacobian};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 
-/// The movement predicted for a condition.
+/// Movement predicted for a context.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
-    /// Style, goal and start or anchor, and timing.
+    /// Style, goal and start or anchor, and segment durations.
     pub conditions: Conditions,
-    /// Duration or period, in seconds: the sum of the timing.
+    /// Duration or period, in seconds: the sum of the segment durations.
     pub duration: f64,
-    /// Covariance (P, P) of a new movement's style, goal and start or anchor, and timing, in this order; `None` where the
-    /// demonstrations leave no degree of freedom to estimate it.
+    /// Covariance (P, P) of style, goal and start or anchor, and segment durations of a new movement, in this order; `None`
+    /// if the demonstrations leave no degrees of freedom for its estimate.
     pub covariance: Option<Array2<f64>>,
-    /// Degrees of freedom from which the covariance is known.
+    /// Degrees of freedom of the estimate of the covariance.
     pub degrees_of_freedom: usize,
-    /// How far each value of the context lies outside of those demonstrated, in their range (Q,): 0 inside, infinite
-    /// where a value that was never varied differs.
+    /// Extrapolation (Q,): distance of each value of the context from the demonstrated range, relative to that range; 0
+    /// inside the range, infinite for a value other than the only demonstrated one.
     pub extrapolation: Vec<f64>,
 }
 
 impl Prediction {
-    /// The movement whose outputs are expected, its duration within a range.
+    /// Returns the movement for the outputs predicted by the map; its duration is clamped to a range in seconds.
     ///
     /// # Errors
-    /// Times that overflow.
+    /// Durations or covariances that overflow.
     pub(crate) fn of(
-        expected: ContextPrediction,
+        outputs: ContextPrediction,
         degrees_of_freedom: usize,
         kind: Kind,
         n_styles: usize,
         n_dofs: usize,
         durations: RangeInclusive<f64>,
     ) -> Result<Self> {
-        let ContextPrediction { mean, mut covariance, extrapolation } = expected;
-        let first = n_styles + n_dofs * if kind == Kind::Discrete { 2 } else { 1 };
-        let duration = mean[first].exp().clamp(*durations.start(), *durations.end());
-        let weights: Vec<f64> = mean[first + 1..].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
-        let whole: f64 = weights.iter().sum();
-        let segment_durations: Vec<f64> = weights.iter().map(|weight| duration * weight / whole).collect();
+        let ContextPrediction { mean, mut covariance, extrapolation } = outputs;
+        let first_duration = n_styles + n_dofs * if kind == Kind::Discrete { 2 } else { 1 };
+        let duration = mean[first_duration].exp().clamp(*durations.start(), *durations.end());
+        let weights: Vec<f64> =
+            mean[first_duration + 1..].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        let segment_durations: Vec<f64> = weights.iter().map(|weight| duration * weight / sum).collect();
         if let Some(covariance) = &mut covariance {
-            let changes = relative_changes(&segment_durations);
-            let mut seconds = Array2::eye(mean.len());
+            let changes = log_duration_jacobian(&segment_durations);
+            // Jacobian of the segment durations in seconds with respect to the outputs.
+            let mut jacobian = Array2::eye(mean.len());
             for ((k, i), change) in changes.indexed_iter() {
-                seconds[[first + k, first + i]] = segment_durations[k] * change;
+                jacobian[[first_duration + k, first_duration + i]] = segment_durations[k] * change;
             }
-            *covariance = seconds.dot(covariance).dot(&seconds.t());
+            *covariance = jacobian.dot(covariance).dot(&jacobian.t());
         }
         let finite = covariance.iter().flatten().all(|x| x.is_finite());
         if !(finite && duration.is_finite() && segment_durations.iter().all(|&time| time > 0.0)) {
-            return Err(Error::Arguments("context is so far from the demonstrations that the prediction overflows"));
+            return Err(Error::Range {
+                name: "distance of context from the demonstrations, in their range",
+                value: extrapolation.iter().copied().fold(0.0, f64::max),
+                allowed: "the prediction overflows; pass a context closer to the demonstrations",
+            });
         }
         let part = |k: usize| Some(mean[n_styles + k * n_dofs..n_styles + (k + 1) * n_dofs].to_vec());
         let (goal, start, anchor) = match kind {

@@ -1,4 +1,4 @@
-//! The primitive: all that a rollout or a control loop needs.
+//! Primitives: the constants of a movement that rollouts and control loops need.
 
 use std::f64::consts::TAU;
 
@@ -13,26 +13,39 @@ use crate::model::responses::Cache;
 use crate::numerics::simd::{F64x4, groups};
 use crate::validate::check_vector;
 
-/// Largest rate α_z, β_z, α_x or μ, and the inverse of the smallest: products of several stay finite.
+/// Maximum of the rates α_z, β_z, α_x and μ, and inverse of their minimum: products of several stay finite.
 pub(crate) const MAX_RATE: f64 = 1e6;
-/// Largest time constant, in seconds, and the inverse of the smallest: rates and their squares stay finite.
+/// Maximum time constant in seconds, and inverse of the minimum: rates and their squares stay finite.
 pub(crate) const MAX_TAU: f64 = 1e12;
 
-/// Conditions of the nominal demonstration, from which a movement starts unless others are given.
+/// Conditions of the nominal demonstration, the defaults of a movement.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Nominal {
     /// Style s (J,).
     pub(crate) style: Vec<f64>,
-    /// Goal g where discrete, anchor y_a where rhythmic (D,).
+    /// Goal g of a discrete movement, anchor y_a of a rhythmic one (D,).
     pub(crate) centre: Vec<f64>,
-    /// Start y₀ (D,), discrete.
+    /// Start y₀ of a discrete movement (D,).
     pub(crate) start: Vec<f64>,
-    /// Time in each segment between two breaks (K,), in seconds.
+    /// Durations of the segments between breaks (K,), in seconds.
     pub(crate) segment_durations: Vec<f64>,
 }
 
-/// A parametric dynamic movement primitive: immutable, but for a cache of responses behind a lock, which the control
-/// loop never touches.
+/// Parametric dynamic movement primitive.
+///
+/// It is immutable except for a cache of unit responses behind a lock, which the control loop does not use.
+///
+/// ```
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let primitive = model.primitive();
+/// assert_eq!((primitive.kind(), primitive.n_dofs()), (Kind::Discrete, 2));
+/// assert!(primitive.transport(primitive.canonical().extent())? == 1.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Primitive {
     pub(crate) attractor: Attractor,
@@ -45,19 +58,19 @@ pub struct Primitive {
     pub(crate) ranges: Vec<f64>,
     pub(crate) breaks: Vec<f64>,
     pub(crate) nominal: Nominal,
-    /// Periodic steady state at φ = 0 per unit of style and amplitude, by groups of DoFs and styles; zero where discrete,
-    /// which starts at rest in z.
+    /// State of the limit cycle at φ = 0 per unit of style and amplitude, by groups of DoFs and styles; zero for a discrete
+    /// movement, which starts with z = 0.
     pub(crate) cycle: Vec<State<F64x4>>,
     pub(crate) responses: Cache,
 }
 
-/// The parts of a primitive, from which [`Primitive::new`] computes the rest.
+/// Independent parts of a primitive, from which [`Primitive::new`] computes the others.
 pub(crate) struct Parts {
     pub(crate) attractor: Attractor,
-    /// The forcing term without its braking past the end.
+    /// Forcing term without the braking past the end.
     pub(crate) forcing_table: ForcingTable,
     pub(crate) transport: Transport,
-    /// κ, per unit of the clock, at which a movement brakes past its end; none where transport is immediate, and rhythmic.
+    /// Braking rate κ past the end, per unit of the clock; `None` for immediate transport and rhythmic movements.
     pub(crate) braking: Option<f64>,
     /// Time constant τ of the nominal demonstration, in seconds.
     pub(crate) tau: f64,
@@ -65,13 +78,14 @@ pub(crate) struct Parts {
     pub(crate) units: Vec<String>,
     /// Largest range of each DoF within one demonstration (D,).
     pub(crate) ranges: Vec<f64>,
-    /// Phases (K+1,) from 0 to 1 that divide the movement into segments; K = 1 where time is scaled linearly.
+    /// Breaks between segments (K+1,), phases from 0 to 1; K = 1 for linear time.
     pub(crate) breaks: Vec<f64>,
     pub(crate) nominal: Nominal,
 }
 
 impl Primitive {
-    /// Returns the primitive of these parts, with its braking past the end or its limit cycle.
+    /// Builds a primitive from its parts: adds the braking past the end of a discrete movement and computes the limit cycle
+    /// of a rhythmic one.
     pub(crate) fn new(parts: Parts) -> Self {
         let Parts { attractor, mut forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal } =
             parts;
@@ -104,129 +118,148 @@ impl Primitive {
         }
     }
 
-    /// Discrete or rhythmic.
+    /// Returns the kind of the movement.
     pub fn kind(&self) -> Kind {
         self.canonical().kind()
     }
 
-    /// The canonical system and its constants.
+    /// Returns the canonical system.
     pub fn canonical(&self) -> Canonical {
         self.forcing_table.canonical()
     }
 
-    /// The constants of the output system.
+    /// Returns the gains of the output system.
     pub fn attractor(&self) -> Attractor {
         self.attractor
     }
 
-    /// The attractor landscape, gated, per style dimension and DoF.
+    /// Returns the table of the forcing term, the gated attractor landscape of each style dimension and DoF.
     pub fn forcing_table(&self) -> &ForcingTable {
         &self.forcing_table
     }
 
-    /// Number of degrees of freedom D.
+    /// Returns the number of degrees of freedom D.
     pub fn n_dofs(&self) -> usize {
         self.names.len()
     }
 
-    /// Dimension J of the style parameter.
+    /// Returns the dimension J of the style parameter.
     pub fn n_styles(&self) -> usize {
         self.nominal.style.len()
     }
 
-    /// Time constant τ of the nominal demonstration, in seconds.
+    /// Returns the time constant τ of the nominal demonstration, in seconds.
     pub fn tau(&self) -> f64 {
         self.tau
     }
 
-    /// Names of the DoFs (D,).
+    /// Returns the names of the DoFs (D,).
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Units of the DoFs (D,); "" where one is not known.
+    /// Returns the units of the DoFs (D,); an unknown unit is "".
     pub fn units(&self) -> &[String] {
         &self.units
     }
 
-    /// Largest range of each DoF within one demonstration (D,).
+    /// Returns the largest range of each DoF within one demonstration (D,), in its unit.
     pub fn ranges(&self) -> &[f64] {
         &self.ranges
     }
 
-    /// Duration or period of the nominal demonstration, in seconds.
+    /// Returns the duration or period of the nominal demonstration, in seconds.
     pub fn duration(&self) -> f64 {
         self.nominal.segment_durations.iter().sum()
     }
 
-    /// Phases (K+1,) from 0 to 1 that divide the movement into segments; K = 1 where time is scaled linearly.
+    /// Returns the breaks between segments (K+1,), phases that increase from 0 to 1; K = 1 for linear time.
     pub fn breaks(&self) -> &[f64] {
         &self.breaks
     }
 
-    /// The time constant τ = dt/du in seconds at a phase, x or φ, of a movement with the given timing (K,).
+    /// Returns the time constant τ = dt/du in seconds at a phase, x or φ, of a movement with the given segment durations
+    /// (K,) in seconds.
     ///
-    /// A loop that sets it at every tick follows the timing. Past its end a discrete movement goes on at the last rate.
+    /// A control loop that sets it at every tick reproduces the segment durations. Past the end of a discrete movement it is
+    /// constant.
+    ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// // One segment of twice the nominal duration.
+    /// let tau = model.tau_at(0.5, &[2.0 * model.duration()])?;
+    /// assert!((tau - 2.0 * model.tau()).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
-    /// A timing that does not fit the model, or a phase outside [0, 1] or [0, 2π).
+    /// A number of durations other than K, a duration outside of a factor of 1e6 of the nominal one, or a phase outside
+    /// [0, 1] (discrete) or [0, 2π) (rhythmic).
     pub fn tau_at(&self, phase: f64, segment_durations: &[f64]) -> Result<f64> {
         let extent = self.canonical().extent();
         let clock = self.canonical().clock_at(phase);
-        // Long after the end x is zero, and the clock infinite.
-        let beyond = self.kind() == Kind::Rhythmic && phase >= TAU;
-        if !(phase.is_finite() && clock >= 0.0) || beyond {
-            let allowed = "must lie in [0, 1] where discrete, in [0, 2π) where rhythmic";
+        // Long after the end x underflows to zero, and the clock is infinite.
+        let past_cycle = self.kind() == Kind::Rhythmic && phase >= TAU;
+        if !(phase.is_finite() && clock >= 0.0) || past_cycle {
+            let allowed = "must lie in [0, 1] for a discrete and in [0, 2π) for a rhythmic primitive";
             return Err(Error::Range { name: "phase", value: phase, allowed });
         }
         Ok(self.warping_function(segment_durations)?.slope(clock / extent) / extent)
     }
 
-    /// Time over phase for a timing (K,).
+    /// Returns the warping function for segment durations (K,) in seconds.
     ///
     /// # Errors
-    /// Another number of times than the movement has segments, or one that is not within a millionfold of the nominal
-    /// demonstration's.
+    /// As for [`Self::check_segment_durations`].
     pub(crate) fn warping_function(&self, segment_durations: &[f64]) -> Result<WarpingFunction> {
         self.check_segment_durations(segment_durations)?;
         Ok(WarpingFunction::new(self.kind(), &self.breaks, segment_durations))
     }
 
+    /// Checks segment durations (K,) in seconds.
+    ///
+    /// # Errors
+    /// A number of durations other than K, or one outside of a factor of 1e6 of the nominal demonstration's.
     pub(crate) fn check_segment_durations(&self, segment_durations: &[f64]) -> Result<()> {
         let nominal = &self.nominal.segment_durations;
         check_vector("segment_durations", segment_durations, nominal.len(), "segment between breaks")?;
-        match segment_durations.iter().zip(nominal).find(|(time, own)| !(1e-6..=1e6).contains(&(*time / *own))) {
+        let invalid = |(duration, nominal): &(&f64, &f64)| !(1e-6..=1e6).contains(&(*duration / *nominal));
+        match segment_durations.iter().zip(nominal).find(invalid) {
             Some((&value, _)) => {
-                let allowed = "seconds must be positive, within a millionfold of the nominal demonstration's";
+                let allowed = "seconds must be positive, within a factor of 1e6 of the nominal demonstration's";
                 Err(Error::Range { name: "segment_durations", value, allowed })
             }
             None => Ok(()),
         }
     }
 
-    /// Share m(u) of the way from start to goal that a discrete movement has covered at clock `u`: 1 throughout where
-    /// transport is immediate.
+    /// Returns the transport profile m(u) of a discrete movement at clock `u`, the position of its frame as a fraction of the
+    /// displacement from start to goal. Immediate transport is m ≡ 1.
     ///
     /// # Errors
     /// A rhythmic primitive, or a clock that is negative or not finite.
     pub fn transport(&self, u: f64) -> Result<f64> {
         if self.kind() == Kind::Rhythmic {
-            let instead = ": it moves about an anchor, which no profile leads to";
+            let instead = ": it moves about an anchor and has no transport profile";
             return Err(Error::Kind { name: "transport", kind: self.kind(), instead });
         }
         if !(u.is_finite() && u >= 0.0) {
-            return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative" });
+            return Err(Error::Range { name: "u", value: u, allowed: "must be finite and not negative" });
         }
         Ok(1.0 + self.transport.lag(u).value)
     }
 
-    /// Rate κ, per unit of the clock, at which a discrete movement brakes past its end; none where its forcing fades with
-    /// the phase, as it does where transport is immediate.
+    /// Returns the braking rate κ of a discrete movement past its end, per unit of the clock; `None` for immediate transport,
+    /// where the forcing decays with the phase, and for rhythmic movements.
     pub fn braking(&self) -> Option<f64> {
         self.braking
     }
 
-    /// Basis functions b (J, D) by rows at clock `u`: the landscape without its gate.
+    /// Returns the attractor landscape b (J, D) by rows at clock `u`, without its gate.
     ///
     /// # Errors
     /// A clock that is not finite, or negative for a discrete movement.
@@ -235,7 +268,7 @@ impl Primitive {
         if !u.is_finite() || (discrete && u < 0.0) {
             return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative if discrete" });
         }
-        // Past the end gate and forcing fade together: b stays what it was.
+        // Past the end gate and forcing decay together, so that b is constant.
         let u = if discrete { u.min(self.canonical().extent()) } else { u };
         let (mut value, mut slope) =
             (vec![0.0; self.forcing_table.n_outputs()], vec![0.0; self.forcing_table.n_outputs()]);
@@ -248,7 +281,8 @@ impl Primitive {
     }
 }
 
-/// The states to which the demonstrated stretch leads from rest, of unit styles, by groups of DoFs and styles.
+/// Returns the states at the end of the demonstrated clock interval for unit styles, starting from zero, by groups of DoFs
+/// and styles.
 fn from_rest(
     attractor: Attractor,
     forcing_table: &ForcingTable,
@@ -259,19 +293,20 @@ fn from_rest(
     let mut states = Vec::with_capacity(groups(n_dofs) * n_styles);
     for group in 0..groups(n_dofs) {
         states.extend((0..n_styles).map(|j| {
-            let jet = |k: usize| forcing_table.knot(k, group, j);
-            (0..cells).fold(State::default(), |state, k| cell.advance(state, [jet(k), jet(k + 1)]))
+            let knot = |k: usize| forcing_table.knot(k, group, j);
+            (0..cells).fold(State::default(), |state, k| cell.advance(state, [knot(k), knot(k + 1)]))
         }));
     }
     states
 }
 
-/// The states from which one turn leads back to itself, (I − exp(2πA))⁻¹ times the response of a turn from rest.
+/// Returns the states of the limit cycle at φ = 0 for unit styles: (I − exp(2πA))⁻¹ times the response of one cycle from
+/// zero.
 fn steady_cycle(attractor: Attractor, forcing_table: &ForcingTable, shape: (usize, usize)) -> Vec<State<F64x4>> {
-    let [[a, b], [c, d]] = attractor.propagator(TAU).transition();
-    // A stable system never returns to where it was unforced: the determinant is positive.
+    let [[a, b], [c, d]] = attractor.propagator(TAU).transition;
+    // All eigenvalues of exp(2πA) lie inside the unit circle, so that the determinant is positive.
     let scale = 1.0 / ((1.0 - a) * (1.0 - d) - b * c);
-    let closed =
+    let solve =
         |State { e, z }: State<F64x4>| State { e: (e * (1.0 - d) + z * b) * scale, z: (e * c + z * (1.0 - a)) * scale };
-    from_rest(attractor, forcing_table, shape).into_iter().map(closed).collect()
+    from_rest(attractor, forcing_table, shape).into_iter().map(solve).collect()
 }

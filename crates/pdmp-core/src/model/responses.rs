@@ -1,4 +1,4 @@
-//! Responses of a movement to a unit of each condition, and a cache of them.
+//! Unit responses of a movement, and their cache.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -8,11 +8,20 @@ use ndarray::Array2;
 
 use crate::error::{Error, Result};
 
-/// Most responses that a model keeps, and the most memory that they take, in bytes.
+/// Maximum number of responses in the cache of a primitive.
 const MAX_ENTRIES: usize = 8;
+/// Maximum memory of the responses in the cache, in bytes.
 const MAX_BYTES: usize = 64 << 20;
 
-/// How often a movement is differentiated with respect to time.
+/// Order of the derivative of a movement with respect to time.
+///
+/// ```
+/// use pdmp_core::model::Derivative;
+///
+/// assert_eq!(Derivative::of_order("derivative", 1)?, Derivative::Velocity);
+/// assert!(Derivative::of_order("derivative", 3).is_err());
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Derivative {
     /// Positions, in the unit of each DoF.
@@ -24,10 +33,10 @@ pub enum Derivative {
 }
 
 impl Derivative {
-    /// All, in order.
+    /// Position, velocity and acceleration.
     pub const ALL: [Self; 3] = [Self::Position, Self::Velocity, Self::Acceleration];
 
-    /// The derivative of order `n`, where `name` is the argument that says so.
+    /// Returns the derivative of order `n`; `name` is the argument that an error names.
     ///
     /// # Errors
     /// An order above 2.
@@ -37,21 +46,23 @@ impl Derivative {
     }
 }
 
-/// Responses over time (T, D), of one derivative.
+/// Unit responses (T, D) of one derivative over time; see `motion/unit_responses.rs`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Curves {
-    /// Rⱼ.
+    /// Responses Rⱼ to the styles.
     pub(crate) styles: Vec<Array2<f64>>,
-    /// E, the same for every DoF, as is V.
+    /// Response E to the start position, equal for all DoFs.
     pub(crate) start: Array2<f64>,
+    /// Response V to the start velocity, equal for all DoFs.
     pub(crate) velocity: Array2<f64>,
 }
 
-/// Curves of positions, velocities and accelerations.
+/// Unit responses of positions, velocities and accelerations.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Responses(pub(crate) [Curves; 3]);
 
 impl Responses {
+    /// Returns the responses of one derivative.
     pub(crate) fn of(&self, derivative: Derivative) -> &Curves {
         &self.0[derivative as usize]
     }
@@ -61,7 +72,7 @@ impl Responses {
     }
 }
 
-/// What responses depend on, apart from the model.
+/// Key of the cache: all quantities on which the responses of a primitive depend.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Key {
     pub(crate) dt: f64,
@@ -69,35 +80,38 @@ pub(crate) struct Key {
     pub(crate) steps: usize,
 }
 
-/// The responses used last. A copied model starts without any.
+/// Least-recently-used cache of responses. The cache of a cloned primitive is empty.
 #[derive(Default)]
 pub(crate) struct Cache(Mutex<VecDeque<(Key, Arc<Responses>)>>);
 
 impl Cache {
-    /// Does `work` on what is kept, the latest last. Whatever panicked meanwhile left it whole.
-    fn with<T>(&self, work: impl FnOnce(&mut VecDeque<(Key, Arc<Responses>)>) -> T) -> T {
-        work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    /// Calls `f` with the entries, the most recently used one last. Poison is ignored: each change leaves the entries
+    /// consistent.
+    fn with<T>(&self, f: impl FnOnce(&mut VecDeque<(Key, Arc<Responses>)>) -> T) -> T {
+        f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
+    /// Returns the responses of a key and marks them as the most recently used ones.
     pub(crate) fn find(&self, key: Key) -> Option<Arc<Responses>> {
-        self.with(|kept| {
-            let entry = kept.iter().position(|(k, _)| *k == key).and_then(|index| kept.remove(index))?;
-            let found = Arc::clone(&entry.1);
-            kept.push_back(entry);
-            Some(found)
+        self.with(|entries| {
+            let entry = entries.iter().position(|(k, _)| *k == key).and_then(|index| entries.remove(index))?;
+            let responses = Arc::clone(&entry.1);
+            entries.push_back(entry);
+            Some(responses)
         })
     }
 
-    /// Keeps responses as long as no later ones need their place; those that are too large not at all.
-    pub(crate) fn keep(&self, key: Key, responses: &Arc<Responses>) {
+    /// Inserts responses and evicts the least recently used ones beyond the limits. Responses larger than [`MAX_BYTES`]
+    /// are not inserted.
+    pub(crate) fn insert(&self, key: Key, responses: &Arc<Responses>) {
         if responses.bytes() > MAX_BYTES {
             return;
         }
-        self.with(|kept| {
-            kept.retain(|(k, _)| *k != key);
-            kept.push_back((key, Arc::clone(responses)));
-            while kept.len() > MAX_ENTRIES || kept.iter().map(|(_, kept)| kept.bytes()).sum::<usize>() > MAX_BYTES {
-                kept.pop_front();
+        self.with(|entries| {
+            entries.retain(|(k, _)| *k != key);
+            entries.push_back((key, Arc::clone(responses)));
+            while entries.len() > MAX_ENTRIES || entries.iter().map(|(_, r)| r.bytes()).sum::<usize>() > MAX_BYTES {
+                entries.pop_front();
             }
         });
     }
@@ -128,48 +142,48 @@ mod tests {
         Key { dt: 0.01, tau: 1.0, steps }
     }
 
-    /// Those asked for last are kept, up to a number of entries and of bytes.
+    /// The most recently used entries are kept, up to the limits of number and memory.
     #[test]
     fn memory_of_the_cache_is_bounded() {
         let cache = Cache::default();
         for n in 0..100 {
-            cache.keep(key(n), &responses(3));
-            assert!(cache.find(key(0)).is_some(), "what is asked for again and again stays");
+            cache.insert(key(n), &responses(3));
+            assert!(cache.find(key(0)).is_some(), "an entry in constant use is evicted");
         }
         let kept = (0..100).filter(|&n| cache.find(key(n)).is_some()).collect::<Vec<_>>();
         assert_eq!(kept, [0, 93, 94, 95, 96, 97, 98, 99]);
-        // Three eighths of the bytes each.
+        // Each takes three eighths of the memory.
         let large = responses(MAX_BYTES / (9 * 8) * 3 / 8);
         for n in 0..20 {
-            cache.keep(key(n), &large);
-            assert!(cache.with(|kept| kept.iter().map(|(_, kept)| kept.bytes()).sum::<usize>()) <= MAX_BYTES);
+            cache.insert(key(n), &large);
+            assert!(cache.with(|entries| entries.iter().map(|(_, r)| r.bytes()).sum::<usize>()) <= MAX_BYTES);
         }
         assert_eq!((0..20).filter(|&n| cache.find(key(n)).is_some()).collect::<Vec<_>>(), [18, 19]);
-        cache.keep(key(50), &responses(MAX_BYTES));
-        assert!(cache.find(key(50)).is_none(), "too large to be kept");
-        assert!(cache.find(key(18)).is_some() && cache.find(key(19)).is_some(), "others stay");
+        cache.insert(key(50), &responses(MAX_BYTES));
+        assert!(cache.find(key(50)).is_none(), "an entry above the limit is inserted");
+        assert!(cache.find(key(18)).is_some() && cache.find(key(19)).is_some(), "it evicts others");
     }
 
-    /// A key is the whole of what responses depend on; a copy of a cache is empty.
+    /// An entry is found by its whole key only; the clone of a cache is empty.
     #[test]
-    fn other_times_are_not_found() {
+    fn other_keys_are_not_found() {
         let cache = Cache::default();
-        cache.keep(key(5), &responses(6));
-        cache.keep(key(5), &responses(6));
-        assert_eq!(cache.with(|kept| kept.len()), 1);
+        cache.insert(key(5), &responses(6));
+        cache.insert(key(5), &responses(6));
+        assert_eq!(cache.with(|entries| entries.len()), 1);
         for other in [Key { dt: 0.02, ..key(5) }, Key { tau: 1.1, ..key(5) }, key(6)] {
             assert!(cache.find(other).is_none());
         }
         assert!(cache.clone().find(key(5)).is_none());
     }
 
-    /// A panic elsewhere while the cache was held does not close it.
+    /// A panic while the cache was locked does not disable it.
     #[test]
-    fn poisoned_cache_works_on() {
+    fn poisoned_cache_stays_usable() {
         let cache = Cache::default();
         let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| cache.with(|_| panic!("on purpose"))));
         assert!(panic.is_err());
-        cache.keep(key(5), &responses(6));
+        cache.insert(key(5), &responses(6));
         assert!(cache.find(key(5)).is_some());
     }
 }

@@ -1,20 +1,28 @@
-//! The template to which time was warped, and the settings of the warp.
+//! Template and settings of the elastic time warp.
 
 use ndarray::Array2;
 
 use crate::error::{Error, Result};
 
-/// Steps of the grid of time in a segment of linear time, and as many places at which a segment is compared.
+/// Number of time steps of the search grid per segment of linear time, and of comparison points per segment.
 pub(crate) const STEPS: usize = 10;
-/// Steepest slope that can be asked for: the grid knows no flatter one than its inverse.
-const STEEPEST: f64 = STEPS as f64;
+/// Maximum of `max_slope`: the smallest slope that the grid resolves is its inverse.
+const MAX_SLOPE: f64 = STEPS as f64;
 
 /// Settings of a time warp.
+///
+/// ```
+/// use pdmp_core::model::TimeWarp;
+///
+/// assert_eq!(TimeWarp::new(8, 2.5)?, TimeWarp::default());
+/// assert!(TimeWarp::new(0, 2.5).is_err());
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeWarp {
-    /// Number K of segments of equal phase: how many times describe the timing of a movement.
+    /// Number K of segments of equal phase, whose durations are individual to each demonstration.
     pub n_segments: usize,
-    /// Bound of a segment's time: at most `max_slope` times that of linear scaling, at least as many times less.
+    /// Bound of the duration of a segment, relative to linear scaling: between 1/`max_slope` and `max_slope`.
     pub max_slope: f64,
 }
 
@@ -24,43 +32,45 @@ impl Default for TimeWarp {
     }
 }
 
-/// What demonstrations were warped to, so that new ones can be.
+/// Mean movement to which demonstrations were warped; new demonstrations are warped to it too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WarpTemplate {
-    /// Bound of the slopes.
+    /// Bound of the slopes, [`TimeWarp::max_slope`].
     pub(crate) slope: f64,
-    /// What each DoF is counted in (D,).
+    /// Scale of each DoF in the comparison (D,).
     pub(crate) unit: Vec<f64>,
     /// Square-root velocities q₀ on the grid (10·K, D).
     pub(crate) shape: Array2<f64>,
 }
 
 impl WarpTemplate {
-    /// Number of cells of a template of so many segments.
+    /// Returns the number of grid cells of a template with K segments.
     pub(crate) fn cells(segments: usize) -> usize {
         segments * STEPS
     }
 }
 
 impl TimeWarp {
-    /// A warp of so many segments, whose slopes lie between 1/`max_slope` and `max_slope`.
+    /// Returns the settings for K segments whose slopes lie between 1/`max_slope` and `max_slope`.
     ///
     /// # Errors
-    /// No segment, or a slope outside 1 to 10.
+    /// `n_segments` of 0, or `max_slope` outside 1 to 10.
     pub fn new(n_segments: usize, max_slope: f64) -> Result<Self> {
         let warp = Self { n_segments, max_slope };
         warp.check(usize::MAX)?;
         Ok(warp)
     }
 
-    /// Checks the settings, given the most segments that the samples carry.
-    pub(crate) fn check(&self, most: usize) -> Result<()> {
+    /// Checks the settings, given the maximum number of segments that the samples resolve.
+    pub(crate) fn check(&self, max_segments: usize) -> Result<()> {
         match *self {
             Self { n_segments: 0, .. } => {
                 Err(Error::Range { name: "n_segments", value: 0.0, allowed: "must be at least 1, which is linear" })
             }
-            Self { n_segments, .. } if n_segments > most => Err(Error::Segments { n_segments, most }),
-            Self { max_slope, .. } if !(1.0..=STEEPEST).contains(&max_slope) => Err(Error::Range {
+            Self { n_segments, .. } if n_segments > max_segments => {
+                Err(Error::Segments { n_segments, most: max_segments })
+            }
+            Self { max_slope, .. } if !(1.0..=MAX_SLOPE).contains(&max_slope) => Err(Error::Range {
                 name: "max_slope",
                 value: max_slope,
                 allowed: "must lie between 1, which is linear, and 10",

@@ -1,4 +1,4 @@
-//! Many movements at once: sums of the same responses, each with its own coefficients.
+//! Batches of rollouts: linear combinations of shared unit responses.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -11,66 +11,86 @@ use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE};
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::rollout::TimeGrid;
-use crate::motion::superposition::Combination;
+use crate::motion::superposition::{self, Combination};
 use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
-use crate::validate::check_vector;
-use crate::validate::{check_matrix, zeros};
+use crate::validate::{check_matrix, check_vector, zeros};
 
-/// Numbers that one thread writes into each output before it takes new work, and fewest movements among them: the
-/// responses are read from cache memory for all of these.
+/// Number of elements of each output that one thread writes per block.
 const BLOCK: usize = 1 << 17;
+/// Minimum number of movements per block, so that a tile of the responses is read from cache several times.
 const MIN_MOVEMENTS_PER_BLOCK: usize = 8;
-/// Blocks for each thread between two questions whether to go on.
-const PORTION: usize = 16;
+/// Number of blocks per thread between two calls of `progress`.
+const PROGRESS_INTERVAL: usize = 16;
 
-/// A vector (D,) for all movements of a batch, or one for each.
+/// One vector (D,) for all movements of a batch, or one for each.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PerMovement {
-    /// The same for all, (D,).
+    /// One vector (D,) for all movements.
     All(Vec<f64>),
-    /// One for each, (B, D).
+    /// One vector for each of B movements (B, D).
     Each(Array2<f64>),
 }
 
-/// What the movements of a batch start with; what is `None` is that of the nominal demonstration.
+/// Conditions of the movements of a batch. The default of an optional field is the value of the nominal demonstration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BatchConditions {
     /// Styles s (B, J).
     pub styles: Array2<f64>,
-    /// Goals g, discrete.
+    /// Goals g of discrete movements.
     pub goals: Option<PerMovement>,
-    /// Anchors y_a, rhythmic.
+    /// Anchors y_a of rhythmic movements.
     pub anchors: Option<PerMovement>,
-    /// Start positions; rhythmic movements otherwise start on their cycles.
+    /// Start positions. The default of rhythmic movements is their limit cycle at φ = 0.
     pub starts: Option<PerMovement>,
-    /// Start velocities, per second; otherwise those of the demonstrations.
+    /// Start velocities, per second. The default is the velocity of the demonstrated movement.
     pub velocities: Option<PerMovement>,
-    /// Amplitude r₀ of all, rhythmic; otherwise 1.
+    /// Common amplitude r₀ of rhythmic movements. The default is 1.
     pub amplitude: Option<f64>,
-    /// Time constant τ of all, in seconds.
+    /// Common time constant τ, in seconds.
     pub tau: Option<f64>,
 }
 
-/// Movements that are ready to be written, all or some at a time, with the same bits whichever way.
+/// Checked movements of a batch, ready to be computed as a whole or in parts, with bitwise equal results.
+///
+/// ```
+/// # use ndarray::Array2;
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+/// # use pdmp_core::model::Derivative;
+/// # use pdmp_core::motion::{BatchConditions, TimeGrid, batch};
+/// # use pdmp_core::numerics::Threads;
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let styles = Array2::from_shape_fn((1000, model.n_styles()), |(b, _)| b as f64 / 1000.0);
+/// let conditions = BatchConditions { styles, ..BatchConditions::default() };
+/// let batch = batch(model.primitive(), conditions, TimeGrid { dt: 0.01, duration: None }, &mut |_| Ok(()))?;
+/// for movements in batch.chunks(300)? {
+///     let n = movements.len();
+///     let outputs = batch.rollouts(movements, Derivative::Velocity, Threads::ONE, &mut |_| Ok(()))?;
+///     assert_eq!(outputs[1].dim(), (n, 101, 2));
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Batch {
     responses: Arc<Responses>,
     styles: Array2<f64>,
-    /// Goals or anchors.
+    /// Goals of discrete, anchors of rhythmic movements.
     centres: PerMovement,
     starts: Option<PerMovement>,
     velocities: Option<PerMovement>,
     amplitude: f64,
 }
 
-/// Movements of many styles, checked and ready to be written.
+/// Checks the conditions of a batch and computes the unit responses, unless the primitive has them in its cache.
 ///
-/// `progress` is told now and then the share that is done of responses which the model does not remember.
+/// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
 ///
 /// # Errors
-/// Conditions or times that do not fit the model, another number of rows than there are styles, or whatever
-/// `progress` returns.
+/// Conditions or times that do not fit the primitive, a number of rows other than that of the styles, or the error of
+/// `progress`.
 pub fn batch(
     primitive: &Arc<Primitive>,
     conditions: BatchConditions,
@@ -104,10 +124,32 @@ pub fn batch(
     })
 }
 
-/// Movements of many styles: positions and their derivatives up to `highest`, each (B, T, D).
+/// Computes the movements of a batch: positions and their derivatives up to `highest`, each (B, T, D).
+///
+/// `progress` is called as by [`batch()`] and [`Batch::write`].
+///
+/// ```
+/// # use ndarray::array;
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+/// # use pdmp_core::model::Derivative;
+/// # use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, rollouts};
+/// # use pdmp_core::numerics::Threads;
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let goals = PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1], [0.8, 0.3]]);
+/// let styles = model.demonstrated().styles.clone();
+/// let conditions = BatchConditions { styles, goals: Some(goals), ..BatchConditions::default() };
+/// let grid = TimeGrid { dt: 0.01, duration: None };
+/// let threads = Threads::available();
+/// let outputs = rollouts(model.primitive(), conditions, grid, Derivative::Position, threads, &mut |_| Ok(()))?;
+/// assert_eq!(outputs[0].dim(), (3, 101, 2));
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// As for [`batch`], or movements that memory does not hold.
+/// As for [`batch()`], or outputs that do not fit into memory.
 pub fn rollouts(
     primitive: &Arc<Primitive>,
     conditions: BatchConditions,
@@ -121,28 +163,28 @@ pub fn rollouts(
 }
 
 impl Batch {
-    /// Numbers of movements B, samples T and degrees of freedom D.
+    /// Returns the numbers of movements B, samples T and degrees of freedom D.
     pub fn shape(&self) -> (usize, usize, usize) {
         let (n_samples, n_dofs) = self.responses.of(Derivative::Position).start.dim();
         (self.styles.nrows(), n_samples, n_dofs)
     }
 
-    /// The whole batch in pieces of `size` movements, the last perhaps shorter, for [`Batch::rollouts`] or
-    /// [`Batch::write`]: so many are in memory at a time.
+    /// Returns consecutive ranges of `size` movements, the last one possibly shorter, to compute the batch in parts by
+    /// [`Batch::rollouts`] or [`Batch::write`].
     ///
     /// # Errors
     /// A size of zero.
     pub fn chunks(&self, size: usize) -> Result<BatchChunks> {
         match size {
             0 => Err(Error::Range { name: "size", value: 0.0, allowed: "must be at least 1" }),
-            _ => Ok(BatchChunks { left: 0..self.styles.nrows(), size }),
+            _ => Ok(BatchChunks { remaining: 0..self.styles.nrows(), size }),
         }
     }
 
-    /// Some of the movements: positions and their derivatives up to `highest`.
+    /// Computes a range of the movements: positions and their derivatives up to `highest`, each (n, T, D).
     ///
     /// # Errors
-    /// Movements that memory does not hold, or whatever `progress` returns.
+    /// As for [`Batch::write`], or outputs that do not fit into memory.
     pub fn rollouts(
         &self,
         movements: Range<usize>,
@@ -158,11 +200,12 @@ impl Batch {
         Ok(outputs)
     }
 
-    /// Writes some of the movements where the caller wants them: positions, velocities and accelerations in this order,
-    /// as many as there are outputs. `progress` is told now and then the share that is done.
+    /// Writes a range of n movements to up to three `outputs` (n, T, D): positions, velocities and accelerations.
+    ///
+    /// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
     ///
     /// # Errors
-    /// Movements that the batch does not have, outputs of another shape, or whatever `progress` returns.
+    /// A range beyond the batch, outputs of another shape or number, or the error of `progress`.
     pub fn write(
         &self,
         movements: Range<usize>,
@@ -185,31 +228,31 @@ impl Batch {
             .step_by(in_block)
             .map(|first| (first, chunks.iter_mut().filter_map(Iterator::next).collect::<Vec<ArrayViewMut3<f64>>>()));
         loop {
-            let portion: Vec<_> = blocks.by_ref().take(PORTION * threads.get()).collect();
-            let Some((first, _)) = portion.first() else { return Ok(()) };
+            let next: Vec<_> = blocks.by_ref().take(PROGRESS_INTERVAL * threads.get()).collect();
+            let Some((first, _)) = next.first() else { return Ok(()) };
             progress((first - movements.start) as f64 / movements.len() as f64)?;
-            threads.try_for_each(portion, |(first, outputs)| {
+            threads.try_for_each(next, |(first, outputs)| {
                 self.write_block(first, outputs);
                 Ok(())
             })?;
         }
     }
 
-    /// Writes the movements from `first` on.
+    /// Writes one block, the movements from `first` on.
     fn write_block(&self, first: usize, outputs: Vec<ArrayViewMut3<f64>>) {
         let n = outputs.first().map_or(0, |output| output.len_of(Axis(0)));
         let combinations: Vec<Combination> = (first..first + n).map(|b| self.combination(b)).collect();
         for (derivative, output) in Derivative::ALL.into_iter().zip(outputs) {
-            crate::motion::superposition::write(&combinations, self.responses.of(derivative), derivative, output);
+            superposition::write(&combinations, self.responses.of(derivative), derivative, output);
         }
     }
 
-    /// How a movement is made of the responses.
+    /// Returns the coefficients of movement `b`.
     fn combination(&self, b: usize) -> Combination {
         let style: Vec<f64> = self.styles.row(b).iter().map(|s| self.amplitude * s).collect();
         let centre = self.centres.row(b).to_vec();
-        // What a given condition adds to that of the movement which starts as demonstrated.
-        let beyond = |given: &Option<PerMovement>, derivative: Derivative, centre: &[f64]| match given {
+        // Difference of a condition from its value at the start of the sum of the styles.
+        let difference = |condition: &Option<PerMovement>, derivative: Derivative, centre: &[f64]| match condition {
             Some(rows) => {
                 let curves = &self.responses.of(derivative).styles;
                 let row = rows.row(b);
@@ -221,16 +264,16 @@ impl Batch {
             }
             None => vec![0.0; centre.len()],
         };
-        let start = beyond(&self.starts, Derivative::Position, &centre);
-        let velocity = beyond(&self.velocities, Derivative::Velocity, &vec![0.0; centre.len()]);
+        let start = difference(&self.starts, Derivative::Position, &centre);
+        let velocity = difference(&self.velocities, Derivative::Velocity, &vec![0.0; centre.len()]);
         Combination::new(style, &centre, &start, &velocity)
     }
 }
 
-/// Pieces of a batch: see [`Batch::chunks`].
+/// Iterator over the ranges of movements that [`Batch::chunks`] returns.
 #[derive(Clone, Debug)]
 pub struct BatchChunks {
-    left: Range<usize>,
+    remaining: Range<usize>,
     size: usize,
 }
 
@@ -238,13 +281,14 @@ impl Iterator for BatchChunks {
     type Item = Range<usize>;
 
     fn next(&mut self) -> Option<Range<usize>> {
-        let first = self.left.start;
-        self.left.start += self.size.min(self.left.len());
-        Some(first..self.left.start).filter(|chunk| !chunk.is_empty())
+        let first = self.remaining.start;
+        self.remaining.start += self.size.min(self.remaining.len());
+        Some(first..self.remaining.start).filter(|chunk| !chunk.is_empty())
     }
 }
 
 impl PerMovement {
+    /// Returns the vector (D,) of movement `b`.
     fn row(&self, b: usize) -> ArrayView1<'_, f64> {
         match self {
             Self::All(row) => aview1(row),
@@ -252,25 +296,27 @@ impl PerMovement {
         }
     }
 
+    /// Checks the numbers of rows, if any, and of columns.
     fn check(&self, name: &'static str, n: usize, n_dofs: usize) -> Result<()> {
         match self {
             Self::All(row) => check_vector(name, row, n_dofs, "DoF"),
             Self::Each(rows) if rows.nrows() != n => Err(Error::Rows { name, expected: n, found: rows.nrows() }),
-            Self::Each(rows) => check_width(name, rows, n_dofs, "DoF"),
+            Self::Each(rows) => check_rows(name, rows, n_dofs, "DoF"),
         }
     }
 }
 
-fn check_width(name: &'static str, rows: &Array2<f64>, expected: usize, per: &'static str) -> Result<()> {
+/// Checks that rows have `expected` finite elements, one per `per`.
+fn check_rows(name: &'static str, rows: &Array2<f64>, expected: usize, per: &'static str) -> Result<()> {
     if rows.ncols() != expected {
         return Err(Error::Length { name, expected, found: rows.ncols(), per });
     }
     check_matrix(name, rows.view())
 }
 
-/// Checks styles (B, J) as [`crate::model::conditions::check_style`] does one.
+/// Checks styles (B, J); the row-wise counterpart of [`crate::model::conditions::check_style`].
 fn check_styles(styles: &Array2<f64>, n_styles: usize) -> Result<()> {
-    check_width("styles", styles, n_styles, "style dimension")?;
+    check_rows("styles", styles, n_styles, "style dimension")?;
     match styles.indexed_iter().find(|(_, s)| s.abs() > MAX_STYLE_MAGNITUDE) {
         Some(((row, column), &value)) => {
             Err(Error::Magnitude { name: "styles", row, column, value, limit: MAX_STYLE_MAGNITUDE })

@@ -1,4 +1,4 @@
-//! What the caller owns of a tick: what is commanded, and where the motion is written.
+//! Input and output of a control tick, in memory of the caller.
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -6,33 +6,41 @@ use crate::model::conditions::{check_amplitude, check_style, check_tau, reject_f
 use crate::model::primitive::Primitive;
 use crate::validate::check_vector;
 
-/// All that one tick is told; what is `None` stays as it was.
+/// Command of one tick. A field that is `None` leaves its quantity unchanged.
 ///
-/// Style, goal, anchor, τ and amplitude stay in force until they are commanded again, so that the same command can be
-/// given at every tick; `measured` until the next one or [`crate::Controller::release`]; `dt` and `coupling` hold for this
-/// tick alone.
+/// Style, goal, anchor, τ and amplitude remain in force until the next command, and a repeated command has no further
+/// effect. `measured` remains in force until the next measurement or [`crate::Controller::release`]. `dt` and `coupling`
+/// apply to this tick only.
+///
+/// ```
+/// use pdmp_core::Command;
+///
+/// let goal = [0.4, 0.1];
+/// let command = Command { goal: Some(&goal), tau: Some(0.8), ..Command::default() };
+/// assert!(command.style.is_none());
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Command<'a> {
-    /// Length of this tick, in seconds, if it differs from the controller's. In a tick of length zero commands take effect
-    /// as between ticks, and nothing moves.
+    /// Length of this tick, in seconds; the default is that of the controller. A tick of length zero applies the command
+    /// without moving.
     pub dt: Option<f64>,
-    /// Style s (J,) to go to.
+    /// New style s (J,).
     pub style: Option<&'a [f64]>,
-    /// Goal g (D,) to go to, discrete.
+    /// New goal g (D,) of a discrete movement, in the unit of each DoF.
     pub goal: Option<&'a [f64]>,
-    /// Anchor y_a (D,) to go to, rhythmic.
+    /// New anchor y_a (D,) of a rhythmic movement, in the unit of each DoF.
     pub anchor: Option<&'a [f64]>,
-    /// Time constant τ to go to, in seconds.
+    /// New time constant τ, in seconds.
     pub tau: Option<f64>,
-    /// Amplitude r₀ to go to, rhythmic.
+    /// New amplitude r₀ of a rhythmic movement.
     pub amplitude: Option<f64>,
-    /// Position ỹ (D,) at which the robot is now, in the unit of each DoF; `None` if it was not measured anew.
+    /// Measured position ỹ (D,) of the robot, in the unit of each DoF; `None` without a new measurement.
     pub measured: Option<&'a [f64]>,
-    /// The user's own terms.
+    /// Coupling terms.
     pub coupling: Option<Coupling<'a>>,
 }
 
-/// Terms of the user's own, constant over the tick. The velocity jumps where c_v does.
+/// Coupling terms of the user, constant over the tick. A jump of c_v makes the velocity jump.
 #[derive(Clone, Copy, Debug)]
 pub struct Coupling<'a> {
     /// c_v (D,), added to the velocity, per second.
@@ -41,7 +49,21 @@ pub struct Coupling<'a> {
     pub acceleration: &'a [f64],
 }
 
-/// Where a tick writes its motion: three vectors of the caller's, (D,) each.
+/// Output of a tick: three vectors (D,) that the caller owns.
+///
+/// ```
+/// # use pdmp_core::{Command, Conditions, Controller, Demonstration, FitOptions, Kind, Motion, fit};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+/// let (mut y, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+/// let mut motion = Motion { position: &mut y, velocity: &mut v, acceleration: &mut a };
+/// controller.update(&Command::default(), &mut motion)?;
+/// assert_eq!(y, controller.position());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Motion<'a> {
     /// Position y, in the unit of each DoF.
@@ -53,7 +75,10 @@ pub struct Motion<'a> {
 }
 
 impl Command<'_> {
-    /// Checks every number against the model.
+    /// Checks shapes, ranges and kind against the primitive.
+    ///
+    /// # Errors
+    /// A vector of another length, a number out of range, or an argument of the other kind of primitive.
     pub(crate) fn check(&self, model: &Primitive) -> Result<()> {
         let (kind, n_dofs) = (model.kind(), model.n_dofs());
         let vector = |name, vector: Option<&[f64]>| match vector {
@@ -87,7 +112,7 @@ impl Command<'_> {
 }
 
 impl Motion<'_> {
-    /// Checks that each vector has one place per DoF.
+    /// Checks that each vector has one element per DoF.
     pub(crate) fn check(&self, n_dofs: usize) -> Result<()> {
         let lengths = [
             ("position", self.position.len()),

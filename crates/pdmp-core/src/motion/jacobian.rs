@@ -1,4 +1,4 @@
-//! Derivatives of whole movements with respect to their conditions: the responses, put together.
+//! Jacobians of movements with respect to their conditions, from unit responses.
 
 use std::sync::Arc;
 
@@ -13,21 +13,22 @@ use crate::motion::rollout::TimeGrid;
 use crate::motion::unit_responses::responses;
 use crate::validate::zeros;
 
-/// The condition with respect to which a movement is differentiated.
+/// Condition with respect to which a movement is differentiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WithRespectTo {
     /// Style s (J,).
     Style,
-    /// Goal g (D,), discrete.
+    /// Goal g (D,) of a discrete movement.
     Goal,
-    /// Anchor y_a (D,), rhythmic.
+    /// Anchor y_a (D,) of a rhythmic movement.
     Anchor,
-    /// Start position y(0) (D,), where one is given.
+    /// Start position y(0) (D,).
     Start,
 }
 
-/// Jacobian of a rollout, (T, D, J) with respect to the style and (T, D, D) otherwise; exact, and the same wherever
-/// it is taken, since a movement is linear in all of these:
+/// Computes the Jacobian of a rollout: (T, D, J) with respect to the style, (T, D, D) otherwise.
+///
+/// A movement is linear in these conditions, so that the Jacobian is exact and independent of their values:
 ///
 /// ```text
 /// ∂y/∂sⱼ = r₀(Rⱼ − Rⱼ(0)·E − Ṙⱼ(0)·V)
@@ -36,13 +37,28 @@ pub enum WithRespectTo {
 /// ∂y/∂y(0) = E
 /// ```
 ///
-/// with the curves R of the unit styles, E of a unit start, and V of a unit start velocity, where the terms with E and
-/// V belong to a given start and a given start velocity. Which of the two are given matters, their values do not.
-/// `derivative` asks for the same of ẏ or ÿ. `progress` is told now and then the share that is done.
+/// with the responses R to the unit styles, E to a unit start and V to a unit start velocity. The terms with E and V apply
+/// only if a start or a start velocity is given. `derivative` selects y, ẏ or ÿ. `progress` is called periodically with the
+/// completed fraction; an error it returns cancels the call.
+///
+/// ```
+/// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+/// # use pdmp_core::model::Derivative;
+/// # use pdmp_core::motion::{TimeGrid, WithRespectTo, jacobian};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let grid = TimeGrid { dt: 0.01, duration: None };
+/// let (variable, derivative) = (WithRespectTo::Style, Derivative::Position);
+/// let by_style = jacobian(model.primitive(), variable, derivative, &Conditions::default(), grid, &mut |_| Ok(()))?;
+/// assert_eq!(by_style.dim(), (101, 2, model.n_styles()));
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// A variable of the other kind of primitive, a timing of several segments, conditions or times that do not fit the
-/// model, or whatever `progress` returns.
+/// A variable of the other kind of primitive, durations of several segments, conditions or times that do not fit the
+/// primitive, or the error of `progress`.
 pub fn jacobian(
     primitive: &Arc<Primitive>,
     variable: WithRespectTo,
@@ -51,51 +67,50 @@ pub fn jacobian(
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Array3<f64>> {
-    reject_for_kind(primitive.kind(), "goal", variable == WithRespectTo::Goal && primitive.kind() == Kind::Rhythmic)?;
-    reject_for_kind(
-        primitive.kind(),
-        "anchor",
-        variable == WithRespectTo::Anchor && primitive.kind() == Kind::Discrete,
-    )?;
+    let kind = primitive.kind();
+    reject_for_kind(kind, "goal", variable == WithRespectTo::Goal && kind == Kind::Rhythmic)?;
+    reject_for_kind(kind, "anchor", variable == WithRespectTo::Anchor && kind == Kind::Discrete)?;
     if conditions.segment_durations.as_ref().is_some_and(|segment_durations| segment_durations.len() > 1) {
         return Err(Error::Arguments(
-            "a Jacobian is that of a movement in linear time: pass tau in place of segment_durations",
+            "Jacobians are available in linear time only: pass tau instead of segment_durations",
         ));
     }
     let conditions = conditions.complete(primitive)?;
     let responses = responses(primitive, conditions.tau, grid, progress)?;
-    let still = if derivative == Derivative::Position { 1.0 } else { 0.0 };
+    // Derivative of the centre with respect to itself, and its derivatives with respect to time.
+    let one = if derivative == Derivative::Position { 1.0 } else { 0.0 };
     match variable {
         WithRespectTo::Style => by_style(&responses, derivative, &conditions),
         WithRespectTo::Goal | WithRespectTo::Anchor if conditions.start.is_some() => {
-            by_dof(&responses, derivative, |response| still - response)
+            by_dof(&responses, derivative, |response| one - response)
         }
-        WithRespectTo::Goal | WithRespectTo::Anchor => by_dof(&responses, derivative, |_| still),
+        WithRespectTo::Goal | WithRespectTo::Anchor => by_dof(&responses, derivative, |_| one),
         WithRespectTo::Start => by_dof(&responses, derivative, |response| response),
     }
 }
 
+/// Returns the Jacobian (T, D, J) with respect to the style.
 fn by_style(responses: &Responses, derivative: Derivative, conditions: &ResolvedConditions) -> Result<Array3<f64>> {
     let curves = responses.of(derivative);
     let (n_samples, n_dofs) = curves.start.dim();
     let mut jacobian = zeros("jacobian", (n_samples, n_dofs, curves.styles.len()))?;
     for (j, mut jacobian) in jacobian.axis_iter_mut(Axis(2)).enumerate() {
         jacobian.scaled_add(conditions.amplitude, &curves.styles[j]);
-        let mut take_away = |at: Derivative, curve| {
-            let at_start = &responses.of(at).styles[j].row(0) * conditions.amplitude;
-            jacobian -= &(&at_start * curve);
+        let mut subtract = |derivative: Derivative, response| {
+            let at_start = &responses.of(derivative).styles[j].row(0) * conditions.amplitude;
+            jacobian -= &(&at_start * response);
         };
         if conditions.start.is_some() {
-            take_away(Derivative::Position, &curves.start);
+            subtract(Derivative::Position, &curves.start);
         }
         if conditions.velocity.is_some() {
-            take_away(Derivative::Velocity, &curves.velocity);
+            subtract(Derivative::Velocity, &curves.velocity);
         }
     }
     Ok(jacobian)
 }
 
-/// A Jacobian of DoFs that do not know of each other, from the response of each to a unit start.
+/// Returns a Jacobian (T, D, D), diagonal in the DoFs, with entries as a function of the response to a unit start.
 fn by_dof(responses: &Responses, derivative: Derivative, entry: impl Fn(f64) -> f64) -> Result<Array3<f64>> {
     let curve = &responses.of(derivative).start;
     let (n_samples, n_dofs) = curve.dim();

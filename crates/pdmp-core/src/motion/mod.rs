@@ -1,4 +1,4 @@
-//! Motion of a primitive: the control loop, whole trajectories and many at once.
+//! Motion generation: the control loop, rollouts, batches of rollouts and their derivatives.
 
 pub(crate) mod batch;
 pub(crate) mod command;

@@ -1,4 +1,4 @@
-//! What happens to a movement on its way: the robot's measured position ỹ, and terms c_v and c_a of the user's own.
+//! Perturbation of a movement by the measured position ỹ of the robot and by coupling terms c_v and c_a of the user.
 //!
 //! ```text
 //! τẏ = z + w(u) + k_t d + τc_v                      Eq. (2)
@@ -7,18 +7,21 @@
 //! τȯ = λκ(e − o)                                    expected error
 //! ```
 //!
-//! so that ẏ gains c_v and ÿ gains c_a. Of the tracking error e = ỹ − y only what lies beyond the expected error o counts:
-//! per DoF, d = e − min(max(o, min(e, 0)), max(e, 0)), never larger than e nor of another sign. A constant error (sag,
-//! friction) so passes from d into o, and neither moves the goal nor stops the phase for ever; o follows on the clock of
-//! the phase, so that a robot held fast, which stops that clock, stays unexpected. Between two measurements the robot is
-//! taken to keep its distance: e is that of the last one, and the pull is spread over the ticks so that all of them
-//! together pull no further than ỹ. The error of an angle is taken the short way round. A robot that is held fast holds the position with it and all but stops the
-//! phase; let go, the movement goes on from there. Phase stopping and the term in the row of Eq. (2) are those of
-//! Ijspeert, Nakanishi and Schaal, ICRA 2002, [doi:10.1109/ROBOT.2002.1014739], and of Schaal, Mohajerian and Ijspeert,
-//! Progress in Brain Research 165, 2007, [doi:10.1016/S0079-6123(06)65027-9]; terms in the row of Eq. (1) those of
-//! Pastor, Hoffmann, Asfour and Schaal, ICRA 2009, [doi:10.1109/ROBOT.2009.5152385].
+//! The coupling terms add c_v to ẏ and c_a to ÿ. Of the tracking error e = ỹ − y only the excess over the expected error o
+//! counts: per DoF, d = e − min(max(o, min(e, 0)), max(e, 0)), which has the sign of e and is not larger. A constant error
+//! (sag, friction) thus passes from d into o, and neither shifts the goal nor stops the phase permanently. The expected
+//! error adapts on the clock of the phase: a blocked robot stops this clock, so that its error remains unexpected. Between
+//! two measurements the robot is assumed to keep its distance: e is that of the last measurement, and the pull is
+//! distributed over the ticks such that their sum does not overshoot ỹ. The error of an angle is wrapped to half a turn. A
+//! blocked robot holds the movement at its position and almost stops the phase; after its release the movement continues
+//! from there.
 //!
-//! All three are evaluated at the start of a tick and held over it, so that its propagation stays exact.
+//! Phase stopping and the tracking term in Eq. (2) are those of Ijspeert, Nakanishi and Schaal, ICRA 2002,
+//! [doi:10.1109/ROBOT.2002.1014739], and of Schaal, Mohajerian and Ijspeert, Progress in Brain Research 165, 2007,
+//! [doi:10.1016/S0079-6123(06)65027-9]; terms in Eq. (1) those of Pastor, Hoffmann, Asfour and Schaal, ICRA 2009,
+//! [doi:10.1109/ROBOT.2009.5152385].
+//!
+//! All terms are evaluated at the start of a tick and constant over it, so that its propagation stays exact.
 //!
 //! [doi:10.1109/ROBOT.2002.1014739]: https://doi.org/10.1109/ROBOT.2002.1014739
 //! [doi:10.1016/S0079-6123(06)65027-9]: https://doi.org/10.1016/S0079-6123(06)65027-9
@@ -29,171 +32,179 @@ use crate::motion::command::{Command, Coupling};
 use crate::numerics::simd::{F64x4, groups, pack, repack};
 
 /// Default k_s: an error of a tenth of the range slows the phase elevenfold.
-const STOPPING: f64 = 1000.0;
-/// Default k_t, over the demonstrated stretch of the clock: held for long, a stronger pull would let the phase creep on
-/// and the movement leap once let go, a weaker one would leave the robot farther behind.
-const TRACKING: f64 = 10.0;
-/// λ, over the demonstrated stretch of the clock. A larger one lets a robot that is held fast pass for one that sags, a
-/// smaller one takes longer over an error that is there from the start.
-const EXPECTING: f64 = 5.0;
-/// Largest gain; it only keeps products finite.
+const STOPPING_GAIN: f64 = 1000.0;
+/// Default k_t times the demonstrated clock interval. While a robot is blocked for long, a larger gain lets the phase creep
+/// and the movement leap after the release; a smaller one leaves the robot farther behind.
+const TRACKING_GAIN: f64 = 10.0;
+/// λ times the demonstrated clock interval. A larger rate takes a blocked robot for one that sags; a smaller one adapts
+/// later to an error that is present from the start.
+const ADAPTATION_RATE: f64 = 5.0;
+/// Maximum gain. It keeps products finite.
 const MAX_GAIN: f64 = 1e100;
-/// A DoF whose range is no more than this share of the widest stands still.
+/// Range, relative to the largest one, up to which a DoF is stationary.
 pub(crate) const MIN_RANGE_RATIO: f64 = 1e-6;
+/// Range up to which a DoF is stationary, since the square of its inverse may overflow.
+const MIN_RANGE: f64 = 1e-140;
 
-/// A range below which its inverse would leave what can be squared.
-const LEAST: f64 = 1e-140;
-
-/// What is added over a tick, by groups of DoFs.
+/// Velocity and acceleration that are added over a tick, by groups of DoFs.
 #[derive(Clone, Debug)]
 pub(crate) struct PerturbationTerms {
     pub(crate) velocity: Vec<F64x4>,
     pub(crate) acceleration: Vec<F64x4>,
 }
 
-/// The perturbation of the tick at work, and how much the movement gives way to it.
+/// Perturbation of the current tick, and the gains of the movement's response.
 #[derive(Clone, Debug)]
 pub(crate) struct Perturbation {
-    push: PerturbationTerms,
-    pushed: bool,
-    pace: f64,
+    terms: PerturbationTerms,
+    /// True if the terms apply to the tick.
+    active: bool,
+    /// κ.
+    phase_rate: f64,
     /// k_s and k_t.
     compliance: (f64, f64),
-    /// Whether a measurement is in force.
-    followed: bool,
-    /// e of the last measurement, by groups of DoFs.
+    /// True while a measurement is in force.
+    measured: bool,
+    /// Tracking error e of the last measurement, by groups of DoFs.
     error: Vec<F64x4>,
-    /// o by groups of DoFs.
-    expected: Vec<F64x4>,
+    /// Expected error o, by groups of DoFs.
+    expected_error: Vec<F64x4>,
     /// λ, per unit of the clock.
-    expecting: f64,
-    /// Share of the way to ỹ that the ticks since the last measurement have not pulled yet.
-    left: f64,
-    /// A full turn of a DoF that is an angle and its inverse; zero of any other.
+    adaptation_rate: f64,
+    /// Share of the last measured error that the ticks since then have not yet corrected.
+    remaining_pull: f64,
+    /// Full turn of an angular DoF in its unit; zero for other DoFs.
     turn: Vec<F64x4>,
-    per_turn: Vec<F64x4>,
-    /// 1/range by groups of DoFs; zero where a DoF stands still, so that an error there does not stop the phase.
-    per_range: Vec<F64x4>,
+    /// Inverse of the full turn; zero for other DoFs.
+    inverse_turn: Vec<F64x4>,
+    /// Inverse of the range; zero for a stationary DoF, whose error does not stop the phase.
+    inverse_range: Vec<F64x4>,
 }
 
-/// The widest of the DoFs' ranges.
-pub(crate) fn widest(ranges: &[f64]) -> f64 {
-    ranges.iter().fold(0.0, |widest, range| widest.max(*range))
+/// Returns the largest range of a DoF.
+pub(crate) fn largest_range(ranges: &[f64]) -> f64 {
+    ranges.iter().fold(0.0, |largest, range| largest.max(*range))
 }
 
 impl Perturbation {
-    /// No perturbation, for DoFs of these ranges and units and a movement of this extent on the clock.
+    /// Returns no perturbation, with default gains for the ranges and units of the DoFs and the extent of the clock.
     pub(crate) fn new(ranges: &[f64], units: &[String], extent: f64) -> Self {
-        let widest = widest(ranges);
-        let inverse = |&range: &f64| if range > (MIN_RANGE_RATIO * widest).max(LEAST) { 1.0 / range } else { 0.0 };
+        let min_range = (MIN_RANGE_RATIO * largest_range(ranges)).max(MIN_RANGE);
+        let inverse = |&range: &f64| if range > min_range { 1.0 / range } else { 0.0 };
         let zeros = vec![F64x4::ZERO; groups(ranges.len())];
-        let per_range: Vec<f64> = ranges.iter().map(inverse).collect();
+        let inverse_range: Vec<f64> = ranges.iter().map(inverse).collect();
         let turn: Vec<f64> = (0..ranges.len()).map(|d| units.get(d).map_or(0.0, |unit| full_turn(unit))).collect();
-        let per_turn: Vec<f64> = turn.iter().map(|&turn| if turn > 0.0 { 1.0 / turn } else { 0.0 }).collect();
+        let inverse_turn: Vec<f64> = turn.iter().map(|&turn| if turn > 0.0 { 1.0 / turn } else { 0.0 }).collect();
         Self {
-            push: PerturbationTerms { velocity: zeros.clone(), acceleration: zeros.clone() },
-            pushed: false,
-            pace: 1.0,
-            compliance: (STOPPING, TRACKING / extent),
-            followed: false,
+            terms: PerturbationTerms { velocity: zeros.clone(), acceleration: zeros.clone() },
+            active: false,
+            phase_rate: 1.0,
+            compliance: (STOPPING_GAIN, TRACKING_GAIN / extent),
+            measured: false,
             error: zeros.clone(),
-            expected: zeros,
-            expecting: EXPECTING / extent,
-            left: 1.0,
+            expected_error: zeros,
+            adaptation_rate: ADAPTATION_RATE / extent,
+            remaining_pull: 1.0,
             turn: pack(&turn),
-            per_turn: pack(&per_turn),
-            per_range: pack(&per_range),
+            inverse_turn: pack(&inverse_turn),
+            inverse_range: pack(&inverse_range),
         }
     }
 
-    /// Adds nothing over the tick to come.
-    pub(crate) fn rest(&mut self) {
-        (self.pushed, self.pace) = (false, 1.0);
+    /// Removes the terms of the tick; a measurement remains in force.
+    pub(crate) fn clear_terms(&mut self) {
+        (self.active, self.phase_rate) = (false, 1.0);
     }
 
-    /// Forgets the robot.
-    pub(crate) fn release(&mut self) {
-        self.rest();
-        self.followed = false;
-        self.expected.fill(F64x4::ZERO);
+    /// Discards terms, measurement and expected error.
+    pub(crate) fn clear(&mut self) {
+        self.clear_terms();
+        self.measured = false;
+        self.expected_error.fill(F64x4::ZERO);
     }
 
-    /// Whether a measurement is in force.
-    pub(crate) fn followed(&self) -> bool {
-        self.followed
+    /// Returns whether a measurement is in force.
+    pub(crate) fn has_measurement(&self) -> bool {
+        self.measured
     }
 
-    /// Takes the perturbation of a tick of `dt` seconds, `h` on the clock, that starts at `position`; its vectors have
-    /// been checked.
-    pub(crate) fn take(&mut self, command: &Command, position: &[F64x4], dt: f64, h: f64) {
-        self.rest();
+    /// Sets the perturbation of a tick of `dt` seconds and `h` on the clock that starts at `position`. The command is valid.
+    pub(crate) fn set(&mut self, command: &Command, position: &[F64x4], dt: f64, h: f64) {
+        self.clear_terms();
         if let Some(measured) = command.measured {
-            (self.followed, self.left) = (true, 1.0);
+            (self.measured, self.remaining_pull) = (true, 1.0);
             repack(&mut self.error, measured);
             for (group, error) in self.error.iter_mut().enumerate() {
-                let straight = *error - position[group];
-                *error = straight - (straight * self.per_turn[group]).round() * self.turn[group];
+                let difference = *error - position[group];
+                *error = difference - (difference * self.inverse_turn[group]).round() * self.turn[group];
             }
         }
-        self.pushed = self.followed || command.coupling.is_some();
-        if !self.pushed {
+        self.active = self.measured || command.coupling.is_some();
+        if !self.active {
             return;
         }
         if let Some(Coupling { velocity, acceleration }) = command.coupling {
-            repack(&mut self.push.velocity, velocity);
-            repack(&mut self.push.acceleration, acceleration);
+            repack(&mut self.terms.velocity, velocity);
+            repack(&mut self.terms.acceleration, acceleration);
         } else {
-            self.push.velocity.fill(F64x4::ZERO);
-            self.push.acceleration.fill(F64x4::ZERO);
+            self.terms.velocity.fill(F64x4::ZERO);
+            self.terms.acceleration.fill(F64x4::ZERO);
         }
-        if self.followed {
-            self.follow(dt, h);
+        if self.measured {
+            self.add_tracking(dt, h);
         }
     }
 
-    /// Pulls towards the robot, and slows the phase.
-    fn follow(&mut self, dt: f64, h: f64) {
+    /// Adds the tracking term, computes the phase rate and adapts the expected error.
+    fn add_tracking(&mut self, dt: f64, h: f64) {
         let (stopping, tracking) = self.compliance;
-        // What k_t alone would take off the error over the tick, so that it pulls no further than ỹ: stable for every
-        // tick and gain up to β_z = 4α_z at least, far from the critical damping of α_z/4.
+        // The share of the error that k_t alone would correct over the tick, so that the pull does not overshoot ỹ. It is
+        // stable for every tick and gain up to β_z = 4α_z at least, far above the critical damping of α_z/4.
         let share = -(-tracking * h).exp_m1();
-        let pull = self.left * share / dt;
-        self.left *= 1.0 - share;
-        let mut strain = F64x4::ZERO;
-        for (group, velocity) in self.push.velocity.iter_mut().enumerate() {
+        let pull = self.remaining_pull * share / dt;
+        self.remaining_pull *= 1.0 - share;
+        let mut squares = F64x4::ZERO;
+        for (group, velocity) in self.terms.velocity.iter_mut().enumerate() {
             let error = self.error[group];
-            let unexpected = error - self.expected[group].max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
+            let unexpected = error - self.expected_error[group].max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
             *velocity += unexpected * pull;
-            let share = unexpected * self.per_range[group] * stopping.sqrt();
-            strain += share * share;
+            let scaled = unexpected * self.inverse_range[group] * stopping.sqrt();
+            squares += scaled * scaled;
         }
-        self.pace = 1.0 / (1.0 + strain.to_array().iter().sum::<f64>());
-        let learnt = -(-self.expecting * self.pace * h).exp_m1();
-        for (expected, &error) in self.expected.iter_mut().zip(&self.error) {
-            *expected += (error - *expected) * learnt;
+        self.phase_rate = 1.0 / (1.0 + squares.to_array().iter().sum::<f64>());
+        let adapted = -(-self.adaptation_rate * self.phase_rate * h).exp_m1();
+        for (expected_error, &error) in self.expected_error.iter_mut().zip(&self.error) {
+            *expected_error += (error - *expected_error) * adapted;
         }
     }
 
-    /// What is added, if anything.
-    pub(crate) fn push(&self) -> Option<&PerturbationTerms> {
-        self.pushed.then_some(&self.push)
+    /// Returns the terms of the tick, `None` without a perturbation.
+    pub(crate) fn terms(&self) -> Option<&PerturbationTerms> {
+        self.active.then_some(&self.terms)
     }
 
-    /// κ: how fast the phase goes, per unit of the output system's clock.
-    pub(crate) fn pace(&self) -> f64 {
-        self.pace
+    /// Returns κ, the rate of the phase's clock relative to that of the output system.
+    pub(crate) fn phase_rate(&self) -> f64 {
+        self.phase_rate
     }
 
-    /// k_s and k_t.
+    /// Returns k_s and k_t.
     pub(crate) fn compliance(&self) -> (f64, f64) {
         self.compliance
     }
 
     /// Sets k_s and k_t.
+    ///
+    /// # Errors
+    /// A gain outside [0, 1e100]. Both then remain unchanged.
     pub(crate) fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
         for (name, value) in [("stopping", stopping), ("tracking", tracking)] {
             if !(0.0..=MAX_GAIN).contains(&value) {
-                return Err(Error::Range { name, value, allowed: "must lie between 0, which is without, and 1e100" });
+                return Err(Error::Range {
+                    name,
+                    value,
+                    allowed: "must lie between 0, which disables the term, and 1e100",
+                });
             }
         }
         self.compliance = (stopping, tracking);
@@ -201,7 +212,7 @@ impl Perturbation {
     }
 }
 
-/// A full turn in a unit of angle, zero in any other.
+/// Returns a full turn in a unit of angle, and zero for any other unit.
 fn full_turn(unit: &str) -> f64 {
     match unit.trim() {
         "rad" | "radian" | "radians" => std::f64::consts::TAU,

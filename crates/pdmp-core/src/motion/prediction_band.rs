@@ -1,8 +1,8 @@
-//! How a predicted movement may turn out: the covariance of its conditions, seen through the responses to each, and what
-//! its styles leave out.
+//! Prediction bands: the covariance of predicted conditions, propagated to positions, and the residual variance of the
+//! styles.
 //!
-//! A movement is compared with another at an equal share of its duration: where time is scaled linearly that is equal
-//! phase, and else the timing moves the phase.
+//! Movements are compared at equal fractions of their duration. With linear time scaling this is equal phase; a time warp
+//! adds the sensitivity of the phase to the segment durations.
 
 use std::sync::Arc;
 
@@ -20,9 +20,13 @@ use crate::model::sensitivity::{STEPS, Sensitivity};
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::motion::unit_responses::phases;
 
-/// Positions (S, D) of a predicted movement per second of the time in each of its segments, at an equal share of its
-/// duration: y′ ∂p/∂T_k, with ∂p/∂T_k = −(∂s/∂T_k)/(∂s/∂p) of that share s(p). None where time is linear.
-fn paces(primitive: &Arc<Primitive>, conditions: &Conditions, segment_durations: &[f64]) -> Result<Vec<Array2<f64>>> {
+/// Computes the sensitivities ∂y/∂T_k (S, D) of the positions to each segment duration, in DoF units per second, at equal
+/// fractions s of the duration: y′ ∂p/∂T_k with the phase p and ∂p/∂T_k = −(∂s/∂T_k)/(∂s/∂p). Empty for linear time.
+fn duration_sensitivities(
+    primitive: &Arc<Primitive>,
+    conditions: &Conditions,
+    segment_durations: &[f64],
+) -> Result<Vec<Array2<f64>>> {
     if segment_durations.len() == 1 {
         return Ok(Vec::new());
     }
@@ -30,78 +34,96 @@ fn paces(primitive: &Arc<Primitive>, conditions: &Conditions, segment_durations:
     let nominal = Conditions { segment_durations: None, ..conditions.clone() };
     let velocity = rollout(primitive, &nominal, TimeGrid { dt: duration / STEPS as f64, duration: None })?.velocity;
     let time = primitive.warping_function(segment_durations)?;
-    let pace = |segment: usize| {
+    let sensitivity = |segment: usize| {
         let step = 1e-4 * segment_durations[segment];
-        let [less, more] = [-step, step].map(|by| {
+        let [below, above] = [-step, step].map(|change| {
             let mut segment_durations = segment_durations.to_vec();
-            segment_durations[segment] += by;
+            segment_durations[segment] += change;
             primitive.warping_function(&segment_durations)
         });
-        let (less, more) = (less?, more?);
+        let (below, above) = (below?, above?);
         Ok(Array2::from_shape_fn(velocity.dim(), |(k, d)| {
             let phase = k as f64 / STEPS as f64;
-            let share = (more.share(phase) - less.share(phase)) / (2.0 * step);
-            -velocity[[k, d]] * duration * share * time.duration() / time.slope(phase)
+            let slope = (above.share(phase) - below.share(phase)) / (2.0 * step);
+            -velocity[[k, d]] * duration * slope * time.duration() / time.slope(phase)
         }))
     };
-    (0..segment_durations.len()).map(pace).collect()
+    (0..segment_durations.len()).map(sensitivity).collect()
 }
 
-/// Bounds (T, D) within which a new movement of the predicted condition lies at each share of its duration, with the
-/// probability `level` for each number by itself: the samples of [`rollout`] with the prediction's conditions,
+/// Computes the pointwise prediction band of a new movement under predicted conditions: lower and upper bound (T, D), in the
+/// unit of each DoF, at the samples of [`rollout`],
 ///
 /// ```text
 /// y ± t·√(aᵀΣa + v),
 /// ```
 ///
-/// with the covariance Σ of the prediction, a = ∂y/∂(style, goal, start, grid), the variance v that the styles leave
-/// out of the demonstrations, and Student's quantile t for the prediction's degrees of freedom.
+/// with the covariance Σ of the prediction, a = ∂y/∂(style, goal, start, segment durations), the residual variance v of the
+/// demonstrations about their styles, and the quantile t of Student's distribution with the degrees of freedom of the
+/// prediction. Each bound pair contains the position with probability `level`.
+///
+/// ```
+/// # use pdmp_core::motion::{TimeGrid, prediction_band};
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let prediction = model.predict(&[0.25])?;
+/// let [lower, upper] = prediction_band(&model, &prediction, 0.95, TimeGrid { dt: 0.01, duration: None })?;
+/// assert!(lower.iter().zip(&upper).all(|(lower, upper)| lower <= upper));
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// A prediction without covariance, or a level that is no probability; else as for a rollout.
+/// A prediction without covariance, a `level` outside (0, 1), a band that overflows, or an error of the rollout.
 pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid: TimeGrid) -> Result<[Array2<f64>; 2]> {
     if !(level > 0.0 && level < 1.0) {
         return Err(Error::Range { name: "level", value: level, allowed: "must lie between 0 and 1" });
     }
     let covariance = prediction.covariance.as_ref().ok_or(Error::Arguments(
-        "the demonstrations leave nothing from which a band could be told: show more, or more contexts",
+        "the prediction has no covariance: a band needs more demonstrations, or more different contexts",
     ))?;
-    let residual_variance =
-        model.learnt.residual_variance.as_ref().ok_or(Error::Arguments("the model knows no contexts"))?;
+    let residual_variance = model
+        .learnt
+        .residual_variance
+        .as_ref()
+        .ok_or(Error::Arguments("the model has no context map: fit demonstrations with contexts"))?;
     let primitive = model.primitive();
     let conditions = &prediction.conditions;
     let segment_durations = conditions.segment_durations.as_deref().unwrap_or(&primitive.nominal.segment_durations);
     let centre = rollout(primitive, conditions, grid)?.position;
     let responses = phases(primitive)?;
     let (curves, kind) = (responses.of(Derivative::Position), model.kind());
-    let sensitivity = Sensitivity::new(kind, curves, paces(primitive, conditions, segment_durations)?);
-    // Of a cycle, the last of the responses is the first of the next one.
+    let sensitivity = Sensitivity::new(kind, curves, duration_sensitivities(primitive, conditions, segment_durations)?);
+    // The last response of a cycle is the first of the next one.
     let variances =
         &sensitivity.variances(covariance).slice(ndarray::s![..residual_variance.nrows(), ..]) + residual_variance;
     let time = model.warping_function(segment_durations)?;
-    let mut width = Array2::zeros(centre.dim());
-    for (k, mut width) in width.rows_mut().into_iter().enumerate() {
+    let mut variance = Array2::zeros(centre.dim());
+    for (k, mut variance) in variance.rows_mut().into_iter().enumerate() {
         let [phase, ..] = time.phase(k as f64 * grid.dt);
-        width.assign(&at(&variances, phase * STEPS as f64, model.kind()));
+        variance.assign(&interpolate(&variances, phase * STEPS as f64, kind));
     }
     let student = StudentsT::new(0.0, 1.0, prediction.degrees_of_freedom.max(1) as f64)
-        .map_err(|_| Error::Arguments("no degree of freedom is left"))?;
+        .map_err(|_| Error::Arguments("a band needs at least one degree of freedom"))?;
     let quantile = student.inverse_cdf(0.5 * (1.0 + level));
-    let width = width.mapv(|variance| quantile * variance.sqrt());
+    let width = variance.mapv(|variance| quantile * variance.sqrt());
     let bounds = [&centre - &width, &centre + &width];
     if bounds.iter().flatten().any(|bound| !bound.is_finite()) {
-        return Err(Error::Arguments("the prediction varies so much that its band overflows"));
+        return Err(Error::Arguments("the prediction band overflows: pass a context closer to the demonstrations"));
     }
     Ok(bounds)
 }
 
-/// Curves (S, D) at a place between two samples: the last one past the end, or around.
-fn at(curves: &Array2<f64>, place: f64, kind: Kind) -> Array1<f64> {
+/// Interpolates curves (S, D) linearly at a fractional sample: constant past the end of a discrete movement, periodic for a
+/// rhythmic one.
+fn interpolate(curves: &Array2<f64>, sample: f64, kind: Kind) -> Array1<f64> {
     let n = curves.nrows();
-    let (low, share) = (place.floor(), place.fract());
+    let (low, fraction) = (sample.floor(), sample.fract());
     let row = |k: f64| match kind {
         Kind::Discrete => curves.row((k as usize).min(n - 1)),
         Kind::Rhythmic => curves.row(k as usize % n),
     };
-    &row(low) * (1.0 - share) + &row(low + 1.0) * share
+    &row(low) * (1.0 - fraction) + &row(low + 1.0) * fraction
 }

@@ -1,8 +1,8 @@
-//! One whole trajectory: the control loop run at once, in linear time or in that of a timing.
+//! Rollouts: trajectories under constant conditions, by the control loop, in linear or warped time.
 
 use std::sync::Arc;
 
-use ndarray::Array2;
+use ndarray::Ix2;
 
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
@@ -11,27 +11,28 @@ use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::controller::Controller;
 use crate::motion::trajectory::Trajectory;
-use crate::validate::check_positive;
-use crate::validate::zeros;
+use crate::validate::{check_positive, row_major_mut, zeros};
 
-/// Samples between two questions whether to go on.
-const PORTION: usize = 4096;
-/// Ticks that pass, one right after the other, while memory answers.
-const LEAD: f64 = 16.0;
-/// Most samples of a rollout.
+/// Number of samples between two calls of `progress`.
+const PROGRESS_INTERVAL: usize = 4096;
+/// Number of ticks by which the forcing table is prefetched: about the latency of main memory.
+const PREFETCH_TICKS: f64 = 16.0;
+/// Maximum number of steps of a rollout.
 const MAX_STEPS: f64 = 1e7;
 
-/// Times of a rollout, in seconds.
+/// Sampling times 0, dt, 2dt, … of a rollout.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeGrid {
-    /// Interval between samples.
+    /// Sampling interval, in seconds.
     pub dt: f64,
-    /// Length of the rollout; otherwise the demonstrated duration scaled by τ, the sum of the timing, or one period.
+    /// Duration of the rollout, in seconds. The default is the nominal duration or period scaled by τ, which is the sum of
+    /// the segment durations if these are given.
     pub duration: Option<f64>,
 }
 
 impl TimeGrid {
-    /// Number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋: a whole multiple of dt keeps its last sample.
+    /// Returns the number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋; the margins keep the last sample of a duration that
+    /// is a multiple of dt up to rounding.
     pub(crate) fn steps(&self, primitive: &Primitive, tau: f64) -> Result<usize> {
         check_positive("dt", self.dt)?;
         check_tau(tau, primitive.tau)?;
@@ -54,18 +55,47 @@ impl TimeGrid {
     }
 }
 
-/// The movement under constant conditions: n + 1 samples at t = 0, dt, …, start included.
+/// Computes the movement under constant conditions: n + 1 samples at t = 0, dt, …, n·dt.
+///
+/// ```
+/// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit, rollout};
+/// # use pdmp_core::motion::TimeGrid;
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let conditions = Conditions { goal: Some(vec![1.2, 0.1]), ..Conditions::default() };
+/// let trajectory = rollout(model.primitive(), &conditions, TimeGrid { dt: 0.01, duration: Some(2.0) })?;
+/// assert_eq!(trajectory.position.dim(), (201, 2));
+/// assert!((trajectory.position[[200, 0]] - 1.2).abs() < 1e-3);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// Conditions or times that do not fit the primitive.
+/// Conditions or times that do not fit the primitive, or a trajectory that does not fit into memory.
 pub fn rollout(primitive: &Arc<Primitive>, conditions: &Conditions, grid: TimeGrid) -> Result<Trajectory> {
     rollout_with(primitive, conditions, grid, &mut |_| Ok(()))
 }
 
-/// [`rollout`] that can be stopped: `progress` is told the share that is done.
+/// Computes a [`rollout`] and reports progress: `progress` is called periodically with the completed fraction; an error it
+/// returns cancels the call.
+///
+/// ```
+/// # use pdmp_core::{Conditions, Demonstration, Error, FitOptions, Kind, fit};
+/// # use pdmp_core::motion::{TimeGrid, rollout_with};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let grid = TimeGrid { dt: 1e-4, duration: Some(1.0) };
+/// let mut cancel = |completed: f64| if completed < 0.5 { Ok(()) } else { Err(Error::Interrupted) };
+/// let result = rollout_with(model.primitive(), &Conditions::default(), grid, &mut cancel);
+/// assert!(matches!(result, Err(Error::Interrupted)));
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// Conditions or times that do not fit the model, or whatever `progress` returns.
+/// As for [`rollout`], or the error of `progress`.
 pub fn rollout_with(
     primitive: &Arc<Primitive>,
     conditions: &Conditions,
@@ -76,11 +106,11 @@ pub fn rollout_with(
     let mut clock = Clock::of(primitive, conditions)?;
     if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
         return Err(Error::Arguments(
-            "pass phase or a segment_durations of several segments, not both: a segment_durations starts at phase 0",
+            "pass phase or segment_durations of several segments, not both: warped time starts at phase 0",
         ));
     }
     let conditions = clock.conditions(conditions);
-    let mut controller = Controller::new(primitive, grid.dt, &conditions, Some(0.0))?.looking_ahead(LEAD);
+    let mut controller = Controller::new(primitive, grid.dt, &conditions, Some(0.0))?.looking_ahead(PREFETCH_TICKS);
     let shape = (steps + 1, primitive.n_dofs());
     let mut trajectory = Trajectory {
         time: (0..=steps).map(|k| k as f64 * grid.dt).collect(),
@@ -89,10 +119,10 @@ pub fn rollout_with(
         acceleration: zeros("rollout", shape)?,
     };
     let Trajectory { time, position, velocity, acceleration } = &mut trajectory;
-    let rows = |array| Array2::as_slice_mut(array).unwrap_or_default().chunks_exact_mut(primitive.n_dofs());
+    let rows = |array| row_major_mut::<_, Ix2>(array).chunks_exact_mut(primitive.n_dofs());
     let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
     for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
-        if k % PORTION == 0 {
+        if k % PROGRESS_INTERVAL == 0 {
             progress(k as f64 / (steps + 1) as f64)?;
         }
         if k > 0 {
@@ -100,19 +130,21 @@ pub fn rollout_with(
         }
         let mut motion = Motion { position, velocity, acceleration };
         controller.read(&mut motion);
-        clock.pace(&mut motion);
+        clock.rescale(&mut motion);
     }
     Ok(trajectory)
 }
 
-/// What drives a rollout: time itself, or time warped to the nominal demonstration's by a timing.
+/// Clock of a rollout.
 ///
-/// With u(t) in place of t/τ the movement is the same function of u, ẏ = y′u̇ and ÿ = y″u̇² + y′ü.
+/// In warped time u(t) replaces t/τ: the movement is the same function of u, with ẏ = y′u̇ and ÿ = y″u̇² + y′ü.
 enum Clock {
+    /// Time of the controller.
     Linear,
+    /// Time warped by segment durations.
     Warped {
         warp: WarpingFunction,
-        /// Seconds of the nominal time per unit of phase.
+        /// Nominal time per unit of phase, in seconds.
         extent: f64,
         /// Phase p, ṗ and p̈.
         phase: [f64; 3],
@@ -131,22 +163,17 @@ impl Clock {
         Ok(Self::Warped { warp, extent: primitive.tau * primitive.canonical().extent(), phase })
     }
 
-    /// The conditions in the time of the controller.
-    fn conditions(&self, given: &Conditions) -> Conditions {
-        match self {
-            Self::Linear => given.clone(),
-            Self::Warped { extent, phase: [_, rate, _], .. } => Conditions {
-                segment_durations: None,
-                velocity: given
-                    .velocity
-                    .as_ref()
-                    .map(|velocity| velocity.iter().map(|v| v / (extent * rate)).collect()),
-                ..given.clone()
-            },
+    /// Converts conditions to the time of the controller.
+    fn conditions(&self, conditions: &Conditions) -> Conditions {
+        let mut conditions = conditions.clone();
+        if let Self::Warped { extent, phase: [_, rate, _], .. } = self {
+            conditions.segment_durations = None;
+            conditions.velocity.iter_mut().flatten().for_each(|v| *v /= extent * rate);
         }
+        conditions
     }
 
-    /// Takes the controller to a time, in seconds.
+    /// Advances the controller to a time in seconds.
     fn step(&mut self, controller: &mut Controller, time: f64) -> Result<()> {
         match self {
             Self::Linear => controller.step(),
@@ -160,13 +187,13 @@ impl Clock {
         .map(drop)
     }
 
-    /// Makes the motion of the controller that of the movement.
-    fn pace(&self, motion: &mut Motion) {
-        if let Self::Warped { extent, phase: [_, rate, bend], .. } = self {
-            let (pace, change) = (extent * rate, extent * bend);
+    /// Converts velocity and acceleration from the time of the controller to warped time.
+    fn rescale(&self, motion: &mut Motion) {
+        if let Self::Warped { extent, phase: [_, rate, rate_change], .. } = self {
+            let (speed, change) = (extent * rate, extent * rate_change);
             for (velocity, acceleration) in motion.velocity.iter_mut().zip(motion.acceleration.iter_mut()) {
-                *acceleration = *acceleration * pace * pace + *velocity * change;
-                *velocity *= pace;
+                *acceleration = *acceleration * speed * speed + *velocity * change;
+                *velocity *= speed;
             }
         }
     }

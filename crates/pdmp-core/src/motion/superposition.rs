@@ -1,36 +1,38 @@
-//! Sums of response curves: the inner loop of a batch.
+//! Superposition of unit responses: the inner loop of a batch.
 //!
-//! Samples of all DoFs lie side by side, so that every loop runs over one stretch of memory. Each number is summed in the
-//! same order wherever it stands: results do not depend on how a batch is divided.
+//! The loops run over contiguous memory, across samples and DoFs. Each element is summed in the same order regardless of
+//! its position, so that results do not depend on the division of a batch.
 
 use std::ops::Range;
 
 use ndarray::{ArrayViewMut3, Axis};
 
 use crate::model::responses::{Curves, Derivative};
+use crate::validate::row_major;
 
-/// Fewest numbers of a pattern that repeats what each DoF has, and of a tile, after which the next movement is written.
-const PATTERN: usize = 64;
+/// Minimum length to which the coefficients of the DoFs are repeated, for loops that fill vector registers.
+const MIN_PATTERN: usize = 64;
+/// Number of elements of a tile: its responses are read from cache for all movements of a block.
 const TILE: usize = 1024;
 
 /// Coefficients of a movement y = g + s·R + Δy(0)·E + Δẏ(0)·V.
 pub(crate) struct Combination {
     style: Vec<f64>,
-    /// What each DoF has, over and over.
+    /// Coefficients g of the DoFs, repeated to at least [`MIN_PATTERN`] elements, as are the following.
     centre: Vec<f64>,
     start: Vec<f64>,
     velocity: Vec<f64>,
 }
 
 impl Combination {
-    /// Coefficients (J,) of the unit styles, and (D,) of the rest.
+    /// Returns the combination of the styles (J,) with centre, start and velocity coefficients (D,).
     pub(crate) fn new(style: Vec<f64>, centre: &[f64], start: &[f64], velocity: &[f64]) -> Self {
-        let pattern = |values: &[f64]| values.repeat(PATTERN.div_ceil(values.len()));
+        let pattern = |values: &[f64]| values.repeat(MIN_PATTERN.div_ceil(values.len()));
         Self { style, centre: pattern(centre), start: pattern(start), velocity: pattern(velocity) }
     }
 }
 
-/// Writes movements (B, T, D) of the given derivative.
+/// Writes one derivative of movements (B, T, D).
 pub(crate) fn write(
     combinations: &[Combination],
     curves: &Curves,
@@ -38,39 +40,39 @@ pub(crate) fn write(
     mut output: ArrayViewMut3<f64>,
 ) {
     let Some(period) = combinations.first().map(|first| first.centre.len()) else { return };
-    // Derivatives do not know where the centre is.
-    let nowhere = vec![0.0; period];
+    // The centre is constant: its derivatives are zero.
+    let zeros = vec![0.0; period];
     let (n_dofs, length) = (output.len_of(Axis(2)), curves.start.len());
     let tile = period * (TILE / period).max(1);
-    let mut spare = vec![0.0; tile];
+    let mut buffer = vec![0.0; tile];
     for from in (0..length).step_by(tile) {
         let at = from..(from + tile).min(length);
-        let part = Part::new(curves, at.clone());
+        let part = Tile::new(curves, at.clone());
         for (combination, mut movement) in combinations.iter().zip(output.outer_iter_mut()) {
-            let centre = if derivative == Derivative::Position { &combination.centre } else { &nowhere };
+            let centre = if derivative == Derivative::Position { &combination.centre } else { &zeros };
             match movement.as_slice_mut() {
                 Some(movement) => part.sum(combination, centre, &mut movement[at.clone()]),
                 None => {
-                    let spare = &mut spare[..at.len()];
-                    part.sum(combination, centre, spare);
+                    let buffer = &mut buffer[..at.len()];
+                    part.sum(combination, centre, buffer);
                     let mut samples = movement.slice_mut(ndarray::s![at.start / n_dofs..at.end / n_dofs, ..]);
-                    samples.iter_mut().zip(spare).for_each(|(to, from)| *to = *from);
+                    samples.iter_mut().zip(buffer).for_each(|(to, from)| *to = *from);
                 }
             }
         }
     }
 }
 
-/// The curves over some samples.
-struct Part<'a> {
+/// Unit responses over a range of elements.
+struct Tile<'a> {
     styles: Vec<&'a [f64]>,
     start: &'a [f64],
     velocity: &'a [f64],
 }
 
-impl<'a> Part<'a> {
+impl<'a> Tile<'a> {
     fn new(curves: &'a Curves, at: Range<usize>) -> Self {
-        let part = |curve: &'a ndarray::Array2<f64>| &curve.as_slice().expect("in the order it was made")[at.clone()];
+        let part = |curve: &'a ndarray::Array2<f64>| &row_major(curve)[at.clone()];
         Self {
             styles: curves.styles.iter().map(part).collect(),
             start: part(&curves.start),
@@ -78,17 +80,19 @@ impl<'a> Part<'a> {
         }
     }
 
-    fn sum(&self, by: &Combination, centre: &[f64], out: &mut [f64]) {
+    /// Writes the tile of one movement, with the repeated coefficients `centre` of g.
+    fn sum(&self, combination: &Combination, centre: &[f64], out: &mut [f64]) {
+        let Combination { style, start, velocity, .. } = combination;
         let period = centre.len();
-        let rest = self.start.chunks(period).zip(self.velocity.chunks(period));
-        for (out, (start, velocity)) in out.chunks_mut(period).zip(rest) {
-            let coefficients = centre.iter().zip(&by.start).zip(&by.velocity);
-            for (((out, ((g, s), v)), e), w) in out.iter_mut().zip(coefficients).zip(start).zip(velocity) {
-                *out = g + s * e + v * w;
+        let responses = self.start.chunks(period).zip(self.velocity.chunks(period));
+        for (out, (e, v)) in out.chunks_mut(period).zip(responses) {
+            let coefficients = centre.iter().zip(start).zip(velocity);
+            for (((out, ((g, start), velocity)), e), v) in out.iter_mut().zip(coefficients).zip(e).zip(v) {
+                *out = g + start * e + velocity * v;
             }
         }
-        let (styles, fours) = (by.style.chunks(4), self.styles.chunks(4));
-        for (s, curves) in styles.zip(fours) {
+        // Four styles per pass over the output reduce its loads and stores.
+        for (s, curves) in style.chunks(4).zip(self.styles.chunks(4)) {
             match (s, curves) {
                 (&[a, b, c, d], [r, s, t, u]) => add([a, b, c, d], [r, s, t, u], out),
                 (&[a, b, c], [r, s, t]) => add([a, b, c], [r, s, t], out),
@@ -99,7 +103,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Adds curves times their coefficients.
+/// Adds curves, multiplied by their coefficients, to `out`.
 #[inline(always)]
 fn add<const N: usize>(coefficients: [f64; N], curves: [&[f64]; N], out: &mut [f64]) {
     let curves = curves.map(|curve| &curve[..out.len()]);

@@ -1,8 +1,8 @@
-//! A generated movement.
+//! Trajectories: sampled movements.
 
 use ndarray::Array2;
 
-/// A generated movement: row k of each array is the state at `time[k]`.
+/// Generated movement, sampled at T times: row k of each array is the state at `time[k]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
     /// Times (T,), in seconds from the start.

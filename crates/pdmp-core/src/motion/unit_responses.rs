@@ -1,4 +1,4 @@
-//! What whole movements are made of: responses to a unit of each condition.
+//! Unit responses: movements for a unit of one condition and zero for the others.
 //!
 //! For constant style, goal and τ a movement is linear in its conditions,
 //!
@@ -6,10 +6,11 @@
 //! y(t) = y⁰(t) + (y(0) − y⁰(0))·E(t) + (ẏ(0) − ẏ⁰(0))·V(t),   y⁰(t) = g + r₀ Σⱼ sⱼRⱼ(t),
 //! ```
 //!
-//! where Rⱼ is the movement of the j-th unit style about zero, from zero (discrete) or on its cycle (rhythmic), E the way
-//! from a start of one to a goal of zero, 1 − m(u) where a transport was learnt, and V what a start velocity of one adds. Where no start velocity is given the last term
-//! is missing, and the one before it where a rhythmic movement is given no start. Velocities and accelerations are
-//! made of the curves' derivatives in the same way. All curves are rollouts, so that they repeat the control loop.
+//! where Rⱼ is the movement of the j-th unit style about zero, from zero (discrete) or on its limit cycle (rhythmic), E the
+//! movement from a start of one to a goal of zero, which is 1 − m(u) for learnt transport, and V the response to a start
+//! velocity of one. Without a given start velocity the last term is zero, and for a rhythmic movement without a given start
+//! the one before it, too. Velocities and accelerations are sums of the derivatives of the responses. All responses are
+//! rollouts, so that they agree with the control loop.
 
 use std::sync::Arc;
 
@@ -22,7 +23,10 @@ use crate::model::sensitivity::STEPS;
 use crate::motion::rollout::{TimeGrid, rollout_with};
 use crate::motion::trajectory::Trajectory;
 
-/// The responses at these times, from the cache where they are found.
+/// Returns the responses at the times of a grid, from the cache of the primitive if present.
+///
+/// # Errors
+/// Times that do not fit the primitive, responses that do not fit into memory, or the error of `progress`.
 pub(crate) fn responses(
     primitive: &Arc<Primitive>,
     tau: f64,
@@ -30,23 +34,19 @@ pub(crate) fn responses(
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Arc<Responses>> {
     let key = Key { dt: grid.dt, tau, steps: grid.steps(primitive, tau)? };
-    if let Some(found) = primitive.responses.find(key) {
-        return Ok(found);
+    if let Some(responses) = primitive.responses.find(key) {
+        return Ok(responses);
     }
-    // The cache is free meanwhile: whoever computes the same finds the same.
+    // The cache is not locked during the computation; concurrent calls compute equal responses.
     let responses = Arc::new(compute_responses(primitive, tau, grid, progress)?);
-    primitive.responses.keep(key, &responses);
+    primitive.responses.insert(key, &responses);
     Ok(responses)
 }
 
-/// Responses over the demonstrated duration, in as many steps as errors are averaged over.
+/// Returns the responses over the demonstrated duration in [`STEPS`] steps, over which errors are averaged.
 pub(crate) fn phases(primitive: &Arc<Primitive>) -> Result<Arc<Responses>> {
-    responses(
-        primitive,
-        primitive.tau,
-        TimeGrid { dt: primitive.duration() / STEPS as f64, duration: None },
-        &mut |_| Ok(()),
-    )
+    let grid = TimeGrid { dt: primitive.duration() / STEPS as f64, duration: None };
+    responses(primitive, primitive.tau, grid, &mut |_| Ok(()))
 }
 
 fn compute_responses(
@@ -57,23 +57,23 @@ fn compute_responses(
 ) -> Result<Responses> {
     let (n_dofs, n_styles) = (primitive.n_dofs(), primitive.n_styles());
     let n_runs = (n_styles + 2) as f64;
-    let mut run = |done: usize, conditions: Conditions| {
+    let mut run = |n_completed: usize, conditions: Conditions| {
+        let mut progress = |share| progress((n_completed as f64 + share) / n_runs);
         let Trajectory { position, velocity, acceleration, .. } =
-            rollout_with(primitive, &conditions, grid, &mut |share| progress((done as f64 + share) / n_runs))?;
+            rollout_with(primitive, &conditions, grid, &mut progress)?;
         Ok([position, velocity, acceleration])
     };
-    let zeros = || Some(vec![0.0; n_dofs]);
-    let ones = || Some(vec![1.0; n_dofs]);
-    let still =
-        Conditions { style: Some(vec![0.0; n_styles]), start: zeros(), tau: Some(tau), ..about_zero(primitive) };
-    let start = run(0, Conditions { start: ones(), ..still.clone() })?;
-    let velocity = run(1, Conditions { velocity: ones(), ..still.clone() })?;
+    let vector = |value: f64| Some(vec![value; n_dofs]);
+    let style = Some(vec![0.0; n_styles]);
+    let zero = Conditions { style, start: vector(0.0), tau: Some(tau), ..about_zero(primitive) };
+    let start = run(0, Conditions { start: vector(1.0), ..zero.clone() })?;
+    let velocity = run(1, Conditions { velocity: vector(1.0), ..zero })?;
     let mut curves = std::iter::zip(start, velocity).map(|(start, velocity)| Curves {
         styles: Vec::with_capacity(n_styles),
         start,
         velocity,
     });
-    let mut responses = Responses(std::array::from_fn(|_| curves.next().expect("three of each")));
+    let mut responses = Responses(std::array::from_fn(|_| curves.next().expect("three derivatives of each")));
     for j in 0..n_styles {
         let style = (0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect();
         let unit = Conditions { style: Some(style), tau: Some(tau), ..about_zero(primitive) };
@@ -84,7 +84,7 @@ fn compute_responses(
     Ok(responses)
 }
 
-/// A goal and start, or an anchor, of zero.
+/// Returns conditions with goal and start, or anchor, of zero.
 fn about_zero(primitive: &Primitive) -> Conditions {
     let zeros = Some(vec![0.0; primitive.n_dofs()]);
     match primitive.kind() {

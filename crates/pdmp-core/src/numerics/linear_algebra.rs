@@ -1,7 +1,7 @@
 //! Dense decompositions of the context map.
 //!
-//! faer computes them in a build that learns. A build without learning has nalgebra alone, which agrees to rounding and
-//! takes several times as long for as many contexts as a map can hold.
+//! faer computes them in a build with learning. A build without learning has only nalgebra, whose results agree up to
+//! rounding and which takes several times as long for the largest context maps.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -12,27 +12,27 @@ use faer_backend as backend;
 #[cfg(not(feature = "learning"))]
 use nalgebra_backend as backend;
 
-/// Returns the eigenvalues (n,), increasing, and by columns the eigenvectors (n, n) of a symmetric matrix.
+/// Returns the eigenvalues (n,) of a symmetric matrix in increasing order, and its eigenvectors (n, n) as columns.
 ///
 /// # Errors
-/// Eigenvalues that do not converge; the text names the matrix.
+/// Eigenvalues that do not converge; `name` describes the matrix in the text.
 pub(crate) fn symmetric_eigen(matrix: ArrayView2<f64>, name: &str) -> Result<(Vec<f64>, Array2<f64>)> {
     let n = matrix.nrows();
     backend::symmetric_eigen(matrix)
         .ok_or_else(|| Error::Fit(format!("the eigenvalues of the {name}, {n} by {n}, did not converge")))
 }
 
-/// Returns U (n, k), σ (k,), decreasing, and V (m, k) of a matrix (n, m) = U·diag(σ)·Vᵀ, with k = min(n, m).
+/// Returns U (n, k), σ (k,) in decreasing order and V (m, k) of a matrix (n, m) = U·diag(σ)·Vᵀ, with k = min(n, m).
 ///
 /// # Errors
-/// Singular values that do not converge; the text names the matrix.
+/// Singular values that do not converge; `name` describes the matrix in the text.
 pub(crate) fn thin_svd(matrix: ArrayView2<f64>, name: &str) -> Result<(Array2<f64>, Vec<f64>, Array2<f64>)> {
     let (n, m) = matrix.dim();
     backend::thin_svd(matrix)
         .ok_or_else(|| Error::Fit(format!("the singular values of the {name}, {n} by {m}, did not converge")))
 }
 
-/// Returns the inverse (n, n) of a matrix, with numbers that are not finite where it is singular.
+/// Returns the inverse (n, n) of a matrix; that of a singular one contains numbers that are not finite.
 pub(crate) fn inverse(matrix: ArrayView2<f64>) -> Array2<f64> {
     backend::inverse(matrix)
 }
@@ -71,7 +71,7 @@ mod nalgebra_backend {
     use nalgebra::{DMatrix, SVD, SymmetricEigen};
     use ndarray::{Array2, ArrayView2};
 
-    /// Sweeps within which every decomposition converges; without a bound one of a matrix with NaN would not end.
+    /// Iteration limit, far above what a finite matrix needs: the decomposition of a matrix with NaN would not end.
     const MAX_SWEEPS: usize = 10_000;
 
     fn mat(matrix: ArrayView2<f64>) -> DMatrix<f64> {
@@ -113,10 +113,10 @@ mod tests {
     }
 
     fn distance(a: &Array2<f64>, b: &ArrayView2<f64>) -> f64 {
-        (a - b).iter().fold(0.0, |most, x| most.max(x.abs()))
+        (a - b).iter().fold(0.0, |max, x| max.max(x.abs()))
     }
 
-    /// Either backend gives factors whose product is the matrix.
+    /// The product of the factors is the matrix, for both backends.
     #[test]
     fn both_backends_reproduce_the_matrix() {
         let general = matrix(7, 4);
@@ -141,9 +141,9 @@ mod tests {
         }
     }
 
-    /// A singular matrix has no finite inverse, and one with NaN no factors.
+    /// A singular matrix has no finite inverse, and a matrix with NaN no finite eigenvalues.
     #[test]
-    fn neither_backend_decomposes_what_has_no_decomposition() {
+    fn singular_matrices_and_nan_give_no_finite_result() {
         let singular = Array2::ones((3, 3));
         assert!(nalgebra_backend::inverse(singular.view()).iter().any(|x| !x.is_finite()));
         assert!(faer_backend::inverse(singular.view()).iter().any(|x| !x.is_finite()));

@@ -1,4 +1,4 @@
-//! Numerical methods that know no movement.
+//! Numerical methods that are independent of movements.
 
 pub(crate) mod linear_algebra;
 pub(crate) mod simd;

@@ -1,18 +1,18 @@
-//! Four degrees of freedom side by side, as the processor takes them.
+//! SIMD over degrees of freedom, four to a register.
 //!
-//! The control loop keeps its vectors in groups of four, padded with zeros, so that every formula of it is written once
-//! and runs in full registers whatever D is. An operation rounds each lane as it would round a number alone: results do
-//! not depend on the machine's width.
+//! The control loop keeps its vectors in groups of four DoFs, padded with zeros: each formula is written once and runs in
+//! full registers for every D. An operation rounds each lane as it rounds a scalar, so that results do not depend on the
+//! register width of the machine.
 
 use std::ops::{Add, Mul, Range, Sub};
 
-/// Four DoFs, as they lie in memory, and as every processor can take them.
+/// Group of four DoFs in memory, and the portable register type.
 pub(crate) type F64x4 = wide::f64x4;
 
 /// Number of DoFs in a group.
 pub(crate) const WIDTH: usize = 4;
 
-/// What a formula is evaluated on: a number, or several side by side.
+/// Operand of a formula: a scalar, or a register of several.
 pub(crate) trait Real:
     Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
 {
@@ -21,13 +21,14 @@ pub(crate) trait Real:
 impl Real for f64 {}
 impl Real for F64x4 {}
 
-/// Four DoFs in a register.
+/// Register of four DoFs.
 pub(crate) trait Register: Real {
-    /// Takes them from memory.
+    /// Loads a group from memory.
     fn load(lanes: &F64x4) -> Self;
-    /// Gives them back.
+    /// Returns the lanes as a group.
     fn store(self) -> F64x4;
 
+    /// Returns a register with the same value in all lanes.
     #[inline(always)]
     fn splat(value: f64) -> Self {
         Self::load(&F64x4::splat(value))
@@ -46,31 +47,35 @@ impl Register for F64x4 {
     }
 }
 
-/// Flushes what has all but come to rest to zero: adding `rest` and taking it away leaves what lies 16 digits above it
-/// as it was, and nothing of what lies below, whose products would leave the range of fast numbers.
+/// Flushes values far below `rest` to zero.
+///
+/// Adding and subtracting `rest` leaves larger values unchanged to 16 digits and rounds values below 1e-16·`rest` to zero.
+/// Products of such values would become subnormal numbers, which are slow.
 #[inline(always)]
 pub(crate) fn flush<T: Register>(value: T, rest: T) -> T {
     (value + rest) - rest
 }
 
-/// Groups that hold `n` DoFs.
+/// Returns the number of groups for `n` DoFs.
 pub(crate) fn groups(n: usize) -> usize {
     n.div_ceil(WIDTH)
 }
 
-/// A vector (D,) in groups.
+/// Returns a vector (D,) in groups.
 pub(crate) fn pack(values: &[f64]) -> Vec<F64x4> {
     let mut lanes = vec![F64x4::ZERO; groups(values.len())];
     repack(&mut lanes, values);
     lanes
 }
 
-/// Writes a vector over another of its length.
+/// Overwrites the first elements of groups with a vector (D,).
 pub(crate) fn repack(lanes: &mut [F64x4], values: &[f64]) {
     bytemuck::cast_slice_mut(lanes)[..values.len()].copy_from_slice(values);
 }
 
-/// Up to four numbers, padded with zeros. A call to copy so few would cost more than most of what is done with them.
+/// Returns up to four numbers, padded with zeros.
+///
+/// The match compiles to moves; a call of `memcpy` would cost more than most formulas on the result.
 #[inline(always)]
 pub(crate) fn padded(numbers: &[f64]) -> F64x4 {
     F64x4::new(match *numbers {
@@ -82,7 +87,7 @@ pub(crate) fn padded(numbers: &[f64]) -> F64x4 {
     })
 }
 
-/// Writes the first numbers of four, as many as there is room for.
+/// Writes the lanes of a group to a slice of up to four numbers.
 #[inline(always)]
 pub(crate) fn unpad(lanes: F64x4, numbers: &mut [f64]) {
     match (numbers, lanes.to_array()) {
@@ -94,30 +99,30 @@ pub(crate) fn unpad(lanes: F64x4, numbers: &mut [f64]) {
     }
 }
 
-/// Writes the numbers of groups, as many as there is room for.
+/// Writes the elements of groups to a slice (D,).
 #[inline(always)]
 pub(crate) fn copy(lanes: &[F64x4], numbers: &mut [f64]) {
     numbers.chunks_mut(WIDTH).zip(lanes).for_each(|(numbers, lanes)| unpad(*lanes, numbers));
 }
 
-/// Takes the DoFs of one group out of rows (k, `n`): what is a loop over samples for one DoF is one for four.
+/// Copies the DoFs of one group from rows (k, `n`) to a column of k groups.
 pub(crate) fn gather(rows: &[f64], n: usize, group: usize, column: &mut [F64x4]) {
-    let dofs = dofs(n, group);
+    let dofs = dof_range(n, group);
     column.iter_mut().zip(rows.chunks_exact(n)).for_each(|(lanes, row)| *lanes = padded(&row[dofs.clone()]));
 }
 
-/// Puts the DoFs of one group back into rows (k, `n`).
+/// Copies a column of k groups to the DoFs of one group in rows (k, `n`).
 pub(crate) fn scatter(column: &[F64x4], n: usize, group: usize, rows: &mut [f64]) {
-    let dofs = dofs(n, group);
+    let dofs = dof_range(n, group);
     column.iter().zip(rows.chunks_exact_mut(n)).for_each(|(lanes, row)| unpad(*lanes, &mut row[dofs.clone()]));
 }
 
-/// The DoFs, of `n`, that one group holds.
-fn dofs(n: usize, group: usize) -> Range<usize> {
+/// Returns the indices of the DoFs in one group, of `n` DoFs in all.
+fn dof_range(n: usize, group: usize) -> Range<usize> {
     group * WIDTH..n.min((group + 1) * WIDTH)
 }
 
-/// The first `n` numbers of groups.
+/// Returns the first `n` elements of groups.
 pub(crate) fn unpack(lanes: &[F64x4], n: usize) -> &[f64] {
     &bytemuck::cast_slice(lanes)[..n]
 }

@@ -1,4 +1,4 @@
-//! Interpolating cubic splines through the samples of a recording, by their values and slopes at the knots.
+//! Interpolating cubic splines through the samples of a recording, in terms of values and slopes at the knots.
 //!
 //! On the interval from knot k to its neighbour o, with H = t_o − t_k, r = (t − t_k)/H and the chord δ = (y_o − y_k)/H,
 //!
@@ -6,108 +6,109 @@
 //! y(t) = y_k + (t − t_k)[ṡ_k + r(3δ − 2ṡ_k − ṡ_o) + r²(ṡ_k + ṡ_o − 2δ)]
 //! ```
 //!
-//! and the slopes ṡ follow from the continuity of the second derivative: one tridiagonal system for all splines over the
-//! same knots, solved in O(n), for one DoF or for four side by side. Every coefficient is a ratio of intervals, and no
-//! value is squared: neither the unit of time nor that of the values matters.
+//! The slopes ṡ follow from the continuity of the second derivative: one tridiagonal system for all splines over the same
+//! knots, solved in O(n), for one DoF or for four in a register. Every coefficient is a ratio of intervals and no value is
+//! squared, so that the accuracy depends neither on the unit of time nor on that of the values.
 //!
 //! C. de Boor, A Practical Guide to Splines, Springer 1978, chapter IV.
 
 use ndarray::Array2;
 
 use crate::numerics::simd::{F64x4, Real, gather, groups, scatter};
+use crate::validate::row_major_mut;
 
-/// Knots of cubic splines, with the system that the slopes solve, factorised.
+/// Knots of cubic splines with the factorised system of their slopes.
 #[derive(Clone, Debug)]
 pub(crate) struct Knots {
-    /// Times of the n knots; those of periodic splines repeat the first a period later.
+    /// Times of the n knots; a periodic spline repeats the first knot one period later.
     time: Vec<f64>,
-    /// An equation for the slope at each knot.
-    equations: Vec<Equation>,
-    /// What joins the ends of periodic splines.
-    seam: Option<Seam>,
+    /// Factorised rows (n,) of the system.
+    rows: Vec<FactorisedRow>,
+    /// Low-rank correction of the cyclic system of periodic splines.
+    cyclic: Option<CyclicCorrection>,
 }
 
-/// A row of the tridiagonal system before it is factorised: what the slopes before, at and after the knot weigh, and the
-/// rises over two neighbouring intervals.
-struct Condition {
+/// Row of the tridiagonal system: coefficients of the slopes before, at and after the knot on the left-hand side, and of
+/// the rises over two neighbouring intervals on the right-hand side.
+struct Row {
     slopes: [f64; 3],
     rises: [f64; 2],
 }
 
-/// A row of the factorised system, divided by its pivot: either substitution is a multiplication and a subtraction a row,
-/// for which the next row waits.
+/// Row of the factorised system, divided by its pivot, which leaves one multiplication and one subtraction per row in the
+/// dependent part of either substitution.
 #[derive(Clone, Copy, Debug)]
-struct Equation {
+struct FactorisedRow {
     /// Weights of the rises over two neighbouring intervals.
     rises: [f64; 2],
-    /// How much of the slope before is taken off in the forward substitution.
+    /// Factor of the previous slope in the forward substitution.
     lower: f64,
-    /// How much of the slope after is taken off in the backward substitution.
+    /// Factor of the next slope in the backward substitution.
     upper: f64,
     /// Inverse of the pivot.
-    scale: f64,
+    inverse_pivot: f64,
 }
 
-/// Sherman–Morrison: the cyclic matrix is a tridiagonal one plus u·vᵀ, u = (−2, 0, …, bottom), v = (1, 0, …, last).
+/// Sherman–Morrison correction: the cyclic matrix is a tridiagonal one plus u·vᵀ, u = (−2, 0, …, bottom), v = (1, 0, …, last).
 #[derive(Clone, Debug)]
-struct Seam {
+struct CyclicCorrection {
     last: f64,
-    /// The tridiagonal system's solution x for u, as x/(1 + vᵀx).
-    correction: Vec<f64>,
+    /// x/(1 + vᵀx) with the solution x of the tridiagonal system for u.
+    solution: Vec<f64>,
 }
 
 impl Knots {
-    /// Knots of splines whose third derivative is continuous at the second knot and the last but one. They reproduce
-    /// cubics.
+    /// Returns the knots of not-a-knot splines, whose third derivative is continuous at the second and the last but one
+    /// knot. They reproduce cubics.
     ///
-    /// The caller has checked that n is at least 4 and that the times increase.
+    /// The caller ensures that n is at least 4 and that the times increase.
     pub(crate) fn not_a_knot(time: Vec<f64>) -> Self {
         let (n, h) = (time.len(), intervals(&time));
-        let mut conditions = Vec::with_capacity(n);
+        let mut rows = Vec::with_capacity(n);
         let ([end, next], rises) = end_condition(h[0], h[1]);
-        conditions.push(Condition { slopes: [0.0, end, next], rises });
-        conditions.extend(h.windows(2).map(|h| inner_condition(h[0], h[1])));
+        rows.push(Row { slopes: [0.0, end, next], rises });
+        rows.extend(h.windows(2).map(|h| inner_condition(h[0], h[1])));
         let ([end, next], [outer, inner]) = end_condition(h[n - 2], h[n - 3]);
-        conditions.push(Condition { slopes: [next, end, 0.0], rises: [inner, outer] });
-        Self { time, equations: factorise(&conditions), seam: None }
+        rows.push(Row { slopes: [next, end, 0.0], rises: [inner, outer] });
+        Self { time, rows: factorise(&rows), cyclic: None }
     }
 
-    /// Knots of splines of the given period, t_0 < … < t_{n−1} < t_0 + period.
+    /// Returns the knots of periodic splines, t_0 < … < t_{n−1} < t_0 + period.
     ///
-    /// The caller has checked that n is at least 3 and that the times increase.
+    /// The caller ensures that n is at least 3 and that the times increase.
     pub(crate) fn periodic(mut time: Vec<f64>, period: f64) -> Self {
         let n = time.len();
         time.push(time[0] + period);
         let h = intervals(&time);
-        let mut conditions: Vec<_> = (0..n).map(|i| inner_condition(h[(i + n - 1) % n], h[i])).collect();
-        let (top, bottom) = (conditions[0].slopes[0], conditions[n - 1].slopes[2]);
-        conditions[0].slopes[1] += 2.0;
-        conditions[n - 1].slopes[1] += top * bottom / 2.0;
-        let equations = factorise(&conditions);
+        let mut rows: Vec<_> = (0..n).map(|i| inner_condition(h[(i + n - 1) % n], h[i])).collect();
+        let (top, bottom) = (rows[0].slopes[0], rows[n - 1].slopes[2]);
+        rows[0].slopes[1] += 2.0;
+        rows[n - 1].slopes[1] += top * bottom / 2.0;
+        let rows = factorise(&rows);
 
         let last = -top / 2.0;
-        let mut correction = vec![0.0; n];
-        (correction[0], correction[n - 1]) = (-2.0 * equations[0].scale, bottom * equations[n - 1].scale);
+        let mut solution = vec![0.0; n];
+        (solution[0], solution[n - 1]) = (-2.0 * rows[0].inverse_pivot, bottom * rows[n - 1].inverse_pivot);
         for i in 1..n {
-            correction[i] -= equations[i].lower * correction[i - 1];
+            solution[i] -= rows[i].lower * solution[i - 1];
         }
-        substitute_back(&equations, &mut correction);
-        let size = 1.0 + correction[0] + last * correction[n - 1];
-        correction.iter_mut().for_each(|x| *x /= size);
-        Self { time, equations, seam: Some(Seam { last, correction }) }
+        substitute_back(&rows, &mut solution);
+        let denominator = 1.0 + solution[0] + last * solution[n - 1];
+        solution.iter_mut().for_each(|x| *x /= denominator);
+        Self { time, rows, cyclic: Some(CyclicCorrection { last, solution }) }
     }
 
-    /// Number of knots n.
+    /// Returns the number of knots n.
     fn len(&self) -> usize {
-        self.equations.len()
+        self.rows.len()
     }
 
     /// Writes the `slopes` (n,) at the knots of the spline through `values` (n,).
     pub(crate) fn slopes<T: Real>(&self, values: &[T], slopes: &mut [T]) {
         let n = self.len();
         let mut before = T::default();
-        for (i, Equation { rises: [left, right], lower, .. }) in self.equations.iter().enumerate() {
-            let [from, at, to] = match self.seam {
+        for (i, FactorisedRow { rises: [left, right], lower, .. }) in self.rows.iter().enumerate() {
+            let [from, at, to] = match self.cyclic {
                 None if i == 0 => [0, 1, 2],
                 None if i == n - 1 => [n - 3, n - 2, n - 1],
                 Some(_) if i == 0 => [n - 1, 0, 1],
@@ -118,15 +119,16 @@ impl Knots {
             before = (at - from) * *left + (to - at) * *right - before * *lower;
             slopes[i] = before;
         }
-        substitute_back(&self.equations, slopes);
-        if let Some(Seam { last, correction }) = &self.seam {
-            let along = slopes[0] + slopes[n - 1] * *last;
-            slopes.iter_mut().zip(correction).for_each(|(slope, x)| *slope = *slope - along * *x);
+        substitute_back(&self.rows, slopes);
+        if let Some(CyclicCorrection { last, solution }) = &self.cyclic {
+            let projection = slopes[0] + slopes[n - 1] * *last;
+            slopes.iter_mut().zip(solution).for_each(|(slope, x)| *slope = *slope - projection * *x);
         }
     }
 
-    /// Writes to `out` (k,) what the spline of such `values` and `slopes` (n,) is worth at `times` (k,), which do not
-    /// decrease. At the knots the values come out bit for bit, and beyond them the end cubics continue.
+    /// Evaluates the spline with `values` and `slopes` (n,) at non-decreasing `times` (k,), into `out` (k,).
+    ///
+    /// The values at the knots are reproduced bit for bit. Outside of the knots the end cubics continue.
     pub(crate) fn sample<T: Real>(
         &self,
         values: &[T],
@@ -150,51 +152,51 @@ impl Knots {
         }
     }
 
-    /// The knot `right` and the one before it, the nearer to `t` first: expanded about it, the cubic has its very values
-    /// at the knots.
+    /// Returns the knot `right` and the one before it, the nearer to `t` first. Expanded about the nearer knot, the cubic
+    /// reproduces the values at both without rounding error.
     fn by_distance(&self, t: f64, right: usize) -> [usize; 2] {
         let left = right - 1;
         if t - self.time[left] < self.time[right] - t { [left, right] } else { [right, left] }
     }
 }
 
-/// Splines of all DoFs of a movement, over the same knots.
+/// Splines of all DoFs of a movement over common knots.
 #[derive(Clone, Debug)]
 pub(crate) struct Splines {
     knots: Knots,
     n_dofs: usize,
-    /// Values and slopes (n,) at the knots, for each group of DoFs.
+    /// Values and slopes (n,) at the knots of each group of DoFs.
     groups: Vec<[Vec<F64x4>; 2]>,
 }
 
 impl Splines {
-    /// Through values (n·D) at the knots, by rows: those of all D DoFs at the first knot, then at the next.
+    /// Returns the splines through values (n, D) at the knots, given by rows.
     pub(crate) fn through(knots: Knots, rows: &[f64], n_dofs: usize) -> Self {
-        let of = |group| {
+        let interpolate = |group| {
             let [mut values, mut slopes] = [(); 2].map(|()| vec![F64x4::ZERO; knots.len()]);
             gather(rows, n_dofs, group, &mut values);
             knots.slopes(&values, &mut slopes);
             [values, slopes]
         };
-        let groups = (0..groups(n_dofs)).map(of).collect();
+        let groups = (0..groups(n_dofs)).map(interpolate).collect();
         Self { knots, n_dofs, groups }
     }
 
-    /// Number of DoFs D.
+    /// Returns the number of DoFs D.
     pub(crate) fn n_dofs(&self) -> usize {
         self.n_dofs
     }
 
-    /// Slopes (n, D) at the knots.
+    /// Returns the slopes (n, D) at the knots.
     pub(crate) fn slopes(&self) -> Array2<f64> {
         let mut rows = Array2::zeros((self.knots.len(), self.n_dofs));
         for (group, [_, slopes]) in self.groups.iter().enumerate() {
-            scatter(slopes, self.n_dofs, group, rows.as_slice_mut().unwrap_or_default());
+            scatter(slopes, self.n_dofs, group, row_major_mut(&mut rows));
         }
         rows
     }
 
-    /// Writes to `rows` (k·D) what the splines are worth at `times` (k), as [`Knots::sample`] does for one DoF.
+    /// Evaluates the splines at non-decreasing `times` (k,), into `rows` (k, D), as [`Knots::sample`] does for one DoF.
     pub(crate) fn sample(&self, times: impl Iterator<Item = f64> + Clone, rows: &mut [f64]) {
         let mut sampled = vec![F64x4::ZERO; rows.len() / self.n_dofs];
         for (group, [values, slopes]) in self.groups.iter().enumerate() {
@@ -208,36 +210,37 @@ fn intervals(time: &[f64]) -> Vec<f64> {
     time.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// Continuity of the second derivative between two intervals.
-fn inner_condition(left: f64, right: f64) -> Condition {
+/// Returns the row for continuity of the second derivative between two intervals.
+fn inner_condition(left: f64, right: f64) -> Row {
     let (a, b) = (right / (left + right), left / (left + right));
-    Condition { slopes: [a, 2.0, b], rises: [3.0 * a / left, 3.0 * b / right] }
+    Row { slopes: [a, 2.0, b], rises: [3.0 * a / left, 3.0 * b / right] }
 }
 
-/// Continuity of the third derivative between the two intervals at an end, less the condition on the second:
-/// weights of the end slope and the next, and of the outer rise and the inner.
+/// Returns the condition for continuity of the third derivative between the two intervals at an end, with the condition
+/// on the second derivative subtracted: coefficients of the end slope and its neighbour, and of the outer and inner rise.
 fn end_condition(outer: f64, inner: f64) -> ([f64; 2], [f64; 2]) {
     let (a, b) = (inner / (outer + inner), outer / (outer + inner));
     ([a, 1.0], [a * (2.0 + b) / outer, b * b / inner])
 }
 
-/// Gauss without exchanging pivots: all of these systems are diagonally dominant, those of the end conditions once the
-/// end slope is eliminated.
-fn factorise(conditions: &[Condition]) -> Vec<Equation> {
-    let mut equations: Vec<Equation> = Vec::with_capacity(conditions.len());
-    for &Condition { slopes: [below, diagonal, above], rises } in conditions {
-        let eliminated = equations.last().map_or(0.0, |before| below * before.upper);
-        let scale = 1.0 / (diagonal - eliminated);
-        equations.push(Equation { rises: rises.map(|w| w * scale), lower: below * scale, upper: above * scale, scale });
+/// Factorises the system by Gaussian elimination. No pivoting is needed: the systems are diagonally dominant, those with
+/// end conditions after elimination of the end slope.
+fn factorise(rows: &[Row]) -> Vec<FactorisedRow> {
+    let mut factorised: Vec<FactorisedRow> = Vec::with_capacity(rows.len());
+    for &Row { slopes: [below, diagonal, above], rises } in rows {
+        let eliminated = factorised.last().map_or(0.0, |before| below * before.upper);
+        let inverse_pivot = 1.0 / (diagonal - eliminated);
+        let [lower, upper] = [below, above].map(|x| x * inverse_pivot);
+        factorised.push(FactorisedRow { rises: rises.map(|w| w * inverse_pivot), lower, upper, inverse_pivot });
     }
-    equations
+    factorised
 }
 
-/// Solves the upper half of the system, in place.
-fn substitute_back<T: Real>(equations: &[Equation], slopes: &mut [T]) {
+/// Performs the backward substitution in place.
+fn substitute_back<T: Real>(rows: &[FactorisedRow], slopes: &mut [T]) {
     let mut after = T::default();
-    for (slope, equation) in slopes.iter_mut().zip(equations).rev() {
-        after = *slope - after * equation.upper;
+    for (slope, row) in slopes.iter_mut().zip(rows).rev() {
+        after = *slope - after * row.upper;
         *slope = after;
     }
 }
@@ -250,7 +253,7 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::TAU;
 
-    /// Splines with all that they follow from.
+    /// Splines with their period and the values and slopes at the knots.
     struct Spline {
         splines: Splines,
         period: Option<f64>,
@@ -275,14 +278,14 @@ mod tests {
 
         fn sample(&self, times: &[f64]) -> Array2<f64> {
             let mut out = Array2::zeros((times.len(), self.values.ncols()));
-            self.splines.sample(times.iter().map(|&t| self.turned(t)), out.as_slice_mut().unwrap());
+            self.splines.sample(times.iter().map(|&t| self.wrapped(t)), out.as_slice_mut().unwrap());
             out
         }
 
-        /// The derivative of what is sampled, by the formula that heads this file.
+        /// Derivative at `times`, by differentiation of the equation at the head of this file.
         fn sample_slopes(&self, times: &[f64]) -> Array2<f64> {
             Array2::from_shape_fn((times.len(), self.values.ncols()), |(i, d)| {
-                let (t, time) = (self.turned(times[i]), &self.splines.knots.time);
+                let (t, time) = (self.wrapped(times[i]), &self.splines.knots.time);
                 let right = time.partition_point(|&knot| knot <= t).clamp(1, time.len() - 1);
                 let [near, far] = self.splines.knots.by_distance(t, right);
                 let width = time[far] - time[near];
@@ -294,7 +297,7 @@ mod tests {
             })
         }
 
-        fn turned(&self, t: f64) -> f64 {
+        fn wrapped(&self, t: f64) -> f64 {
             let first = self.splines.knots.time[0];
             match self.period {
                 Some(period) if !(first..first + period).contains(&t) => first + (t - first).rem_euclid(period),
@@ -310,7 +313,7 @@ mod tests {
         })
     }
 
-    /// One column of samples of `f`.
+    /// Samples of `f` as a column (n, 1).
     fn column(time: &[f64], f: impl Fn(f64) -> f64) -> Array2<f64> {
         Array2::from_shape_fn((time.len(), 1), |(i, _)| f(time[i]))
     }
@@ -327,8 +330,8 @@ mod tests {
         spline.sample_slopes(&[t])[[0, 0]]
     }
 
-    /// Second derivative at `t` from one side; exact on a cubic piece that holds `t` and `t` + 2`h`.
-    fn bend_at(spline: &Spline, t: f64, h: f64) -> f64 {
+    /// One-sided second derivative at `t`; exact on a cubic piece that contains `t` and `t` + 2`h`.
+    fn second_derivative_at(spline: &Spline, t: f64, h: f64) -> f64 {
         let [s0, s1, s2] = [0.0, 1.0, 2.0].map(|k| slope_at(spline, t + k * h));
         (4.0 * s1 - 3.0 * s0 - s2) / (2.0 * h)
     }
@@ -359,14 +362,14 @@ mod tests {
             }
             for spline in &splines {
                 for &t in if spline.period.is_some() { &time[..] } else { &time[1..n - 1] } {
-                    let (before, after) = (bend_at(spline, t, -0.04), bend_at(spline, t, 0.04));
+                    let (before, after) = (second_derivative_at(spline, t, -0.04), second_derivative_at(spline, t, 0.04));
                     assert_abs_diff_eq!(before, after, epsilon = 1e-7 * (1.0 + before.abs()));
                 }
             }
         }
 
         #[test]
-        fn knots_come_out_bit_for_bit(time in knots(4..12), y in prop::collection::vec(-1.0..1.0, 12)) {
+        fn values_at_the_knots_are_reproduced_bit_for_bit(time in knots(4..12), y in prop::collection::vec(-1.0..1.0, 12)) {
             let values = Array2::from_shape_fn((time.len(), 1), |(i, _)| y[i]);
             let period = 12.0 + time[0].abs();
             for spline in [
@@ -380,7 +383,7 @@ mod tests {
     }
 
     proptest! {
-        /// However many DoFs share the knots, in groups that are full or not: to the last bit.
+        /// Splines of several DoFs are bitwise those of each DoF alone, in full and in partial groups.
         #[test]
         fn splines_of_many_dofs_are_those_of_each_alone(
             time in knots(4..12), n_dofs in 1..=9usize, y in prop::collection::vec(-1.0..1.0, 9 * 12), gap in 0.1..1.0,
@@ -405,7 +408,8 @@ mod tests {
     fn the_third_derivative_is_continuous_next_to_the_ends() {
         let time = [0.0, 0.3, 1.0, 1.2, 2.0, 2.7];
         let spline = Spline::not_a_knot(&time, column(&time, |t| (3.0 * t).sin()).view());
-        let third = |t: f64| (bend_at(&spline, t + 0.02, 0.02) - bend_at(&spline, t, 0.02)) / 0.02;
+        let third =
+            |t: f64| (second_derivative_at(&spline, t + 0.02, 0.02) - second_derivative_at(&spline, t, 0.02)) / 0.02;
         assert_relative_eq!(third(0.1), third(0.5), max_relative = 1e-8);
         assert_relative_eq!(third(1.5), third(2.3), max_relative = 1e-8);
         assert!((third(0.5) - third(1.05)).abs() > 1e-2);

@@ -1,7 +1,7 @@
-//! Independent work on several threads.
+//! Parallel execution of independent tasks.
 //!
-//! Threads live for one call. A pool that outlives the call would be dead in a forked process, as Python's
-//! multiprocessing makes them, and whoever waits for it there would wait forever.
+//! Threads live for one call. The threads of a global pool do not survive a fork, as by Python's multiprocessing: a call in
+//! the child process would wait for them forever.
 
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -10,10 +10,18 @@ use std::thread;
 
 use crate::error::{Error, Result};
 
-/// Most threads that can be asked for.
-const MOST: usize = 1024;
+/// Maximum number of threads: more than the cores of one machine, and few enough to catch a mistaken argument.
+const MAX_THREADS: usize = 1024;
 
-/// How many threads may work at once. The result never depends on it, to the last bit.
+/// Number of threads of a call. Results do not depend on it, to the last bit.
+///
+/// ```
+/// use pdmp_core::numerics::Threads;
+///
+/// assert_eq!(Threads::new(4)?.get(), 4);
+/// assert!(Threads::new(0).is_err());
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Threads(NonZeroUsize);
 
@@ -21,42 +29,46 @@ impl Threads {
     /// The calling thread alone.
     pub const ONE: Self = Self(NonZeroUsize::MIN);
 
-    /// So many threads, the calling one among them.
+    /// Returns a number of threads, which includes the calling thread.
     ///
     /// # Errors
-    /// None, or more than 1024.
+    /// A number outside 1 to 1024.
     pub fn new(n: usize) -> Result<Self> {
-        NonZeroUsize::new(n).filter(|n| n.get() <= MOST).map(Self).ok_or(Error::Range {
+        NonZeroUsize::new(n).filter(|n| n.get() <= MAX_THREADS).map(Self).ok_or(Error::Range {
             name: "threads",
             value: n as f64,
             allowed: "must lie between 1 and 1024",
         })
     }
 
-    /// As many as the system lets this process run at once.
+    /// Returns the number of threads that the system runs in parallel for this process.
     pub fn available() -> Self {
-        thread::available_parallelism().map_or(Self::ONE, |n| Self(n.min(NonZeroUsize::new(MOST).unwrap_or(n))))
+        thread::available_parallelism().map_or(Self::ONE, |n| Self(n.min(NonZeroUsize::new(MAX_THREADS).unwrap_or(n))))
     }
 
-    /// How many.
+    /// Returns the number.
     pub fn get(self) -> usize {
         self.0.get()
     }
 
-    /// Does `work` on every item; whoever is free takes the next one.
+    /// Calls `work` with every item; an idle thread takes the next item from a queue.
     ///
     /// # Errors
-    /// That of the first item that has one; what comes after it may be left undone.
+    /// The error of the first item that has one, by position; later items may remain unprocessed.
     pub(crate) fn try_for_each<T: Send>(self, items: Vec<T>, work: impl Fn(T) -> Result<()> + Sync) -> Result<()> {
         self.try_for_each_told(items, || (), |(), item| work(item), &mut |_| Ok(()))
     }
 
-    /// [`Self::try_for_each`] that asks `progress` whether to go on, with the share of the items that have been taken.
-    /// The calling thread asks, which alone may: at first, and before each item of its own. It also makes the `scratch`
-    /// of each thread beforehand: the system takes back the memory of threads that end, and is slow to give it again.
+    /// Calls `work` with every item and the `scratch` memory of the thread, as [`Self::try_for_each`] does, and reports
+    /// progress.
+    ///
+    /// `progress` is called with the fraction of the items that have been taken; an error it returns cancels the call. Only
+    /// the calling thread calls it, once at the start and before each item that this thread takes. The calling thread also
+    /// allocates all scratch memory: the allocator returns the memory of a finished thread to the system, and allocating
+    /// it again is slow.
     ///
     /// # Errors
-    /// Whatever `progress` returns; otherwise that of the first item that has one.
+    /// The error of `progress`; otherwise the error of the first item that has one, by position.
     pub(crate) fn try_for_each_told<T: Send, S: Send>(
         self,
         items: Vec<T>,
@@ -64,59 +76,59 @@ impl Threads {
         work: impl Fn(&mut S, T) -> Result<()> + Sync,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<()> {
-        // Asked once at least, also where others are quick to take all that there is.
+        // At least one call, even if other threads take all items before this one does.
         progress(0.0)?;
         let n_items = items.len();
-        let others = self.get().min(n_items).saturating_sub(1);
+        let n_spawned = self.get().min(n_items).saturating_sub(1);
         let queue = Mutex::new(items.into_iter().enumerate());
-        let failed: Mutex<Option<(usize, Error)>> = Mutex::new(None);
+        let first_failure: Mutex<Option<(usize, Error)>> = Mutex::new(None);
         let stopped = AtomicBool::new(false);
-        // Works on the next item, if there is one and the work goes on.
-        let labour = |scratch: &mut S| {
+        // Processes the next item; false if there is none or the call is stopped.
+        let process_next = |scratch: &mut S| {
             if stopped.load(Relaxed) {
                 return false;
             }
-            // In a statement of its own: the queue is free again while the work is done.
-            let next = held(&queue).next();
+            // The guard must be dropped before the work, or other threads would wait for it.
+            let next = lock(&queue).next();
             let Some((index, item)) = next else { return false };
             if let Err(error) = work(scratch, item) {
                 stopped.store(true, Relaxed);
-                let mut failed = held(&failed);
-                if failed.as_ref().is_none_or(|(first, _)| index < *first) {
-                    *failed = Some((index, error));
+                let mut first_failure = lock(&first_failure);
+                if first_failure.as_ref().is_none_or(|(first, _)| index < *first) {
+                    *first_failure = Some((index, error));
                 }
             }
             true
         };
-        let told = thread::scope(|scope| {
-            let labour = &labour;
-            for _ in 0..others {
+        let reported = thread::scope(|scope| {
+            let process_next = &process_next;
+            for _ in 0..n_spawned {
                 let mut scratch = scratch();
-                // A system without threads to spare leaves the work to those that run.
-                let _ = thread::Builder::new().spawn_scoped(scope, move || while labour(&mut scratch) {});
+                // If the system cannot spawn a thread, the running ones process its share.
+                let _ = thread::Builder::new().spawn_scoped(scope, move || while process_next(&mut scratch) {});
             }
             let mut scratch = scratch();
             loop {
-                let left = held(&queue).len();
-                if left == 0 {
+                let n_remaining = lock(&queue).len();
+                if n_remaining == 0 {
                     return Ok(());
                 }
-                let told = progress((n_items - left) as f64 / n_items as f64);
-                stopped.fetch_or(told.is_err(), Relaxed);
-                if told.is_err() || !labour(&mut scratch) {
-                    return told;
+                let reported = progress((n_items - n_remaining) as f64 / n_items as f64);
+                stopped.fetch_or(reported.is_err(), Relaxed);
+                if reported.is_err() || !process_next(&mut scratch) {
+                    return reported;
                 }
             }
         });
-        match (told, failed.into_inner().unwrap_or_else(PoisonError::into_inner)) {
+        match (reported, first_failure.into_inner().unwrap_or_else(PoisonError::into_inner)) {
             (Ok(()), Some((_, error))) => Err(error),
-            (told, _) => told,
+            (reported, _) => reported,
         }
     }
 }
 
-/// A panic elsewhere is on its way to the caller already.
-fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+/// Locks a mutex. Poison is ignored: [`thread::scope`] passes the panic of a thread on to the caller.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -124,9 +136,9 @@ fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 mod tests {
     use super::*;
 
-    /// Every item is worked on once, whatever the number of threads.
+    /// Every item is processed once, for any number of threads.
     #[test]
-    fn all_items_are_done() {
+    fn every_item_is_processed_once() {
         for n in [1, 2, 3, 7, 40] {
             for n_items in [0, 1, 2, 6, 7, 8, 30] {
                 let mut done = vec![0; n_items];
@@ -141,9 +153,9 @@ mod tests {
         }
     }
 
-    /// Of several errors the first item's is told, as a single thread would.
+    /// Of several errors that of the first item is returned, as by a single thread.
     #[test]
-    fn the_first_error_is_told() {
+    fn the_error_of_the_first_item_is_returned() {
         for n in [1, 2, 5] {
             let work = |i: usize| if i % 7 == 6 { Err(Error::Interrupted.in_demo(i)) } else { Ok(()) };
             let error = Threads::new(n).unwrap().try_for_each((0..30).collect(), work).unwrap_err();
@@ -152,13 +164,13 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_threads_out_of_range_are_refused() {
+    fn numbers_of_threads_out_of_range_are_rejected() {
         for n in [0, 1025, usize::MAX] {
             assert!(matches!(Threads::new(n), Err(Error::Range { name: "threads", .. })));
         }
     }
 
-    /// All that the system lets this process run at once, so that these too can be asked for.
+    /// The number of available threads is that of the system, up to the maximum, and can be requested.
     #[test]
     fn available_threads_are_those_of_the_system() {
         let n = Threads::available().get();

@@ -1,16 +1,16 @@
-//! A recording between its samples.
+//! Continuous recordings.
 //!
-//! It is the cubic spline through the samples as generalised cross-validation smooths them, and beside it the noise r
-//! that smoothing takes off, which is carried by the nearest sample:
+//! A recording as a function of time is the cubic spline f through its samples, smoothed by generalised cross-validation,
+//! plus the residual r of the smoothing at the nearest sample:
 //!
 //! ```text
 //! y(t) = f(t) + r(nearest sample)
 //! ```
 //!
-//! Clean samples are met by f alone. A spline through noisy ones would be smooth noise, which no later smoothing can
-//! separate from movement; carried by the samples it stays as white as it was recorded, as long as no more samples are
-//! drawn than there are. Of several within a new interval it is the mean: then its power density stays, too. At the times
-//! of the recording, y is what was recorded.
+//! f interpolates clean samples. A spline through noisy samples would turn the noise into smooth curves, which no later
+//! smoothing can separate from movement. The residual of the nearest sample is as white as the recorded noise, as long as
+//! the new samples are no denser than the recorded ones. If a new interval has several recorded samples, their mean
+//! preserves the power density of the noise. At the times of the recording y is the recorded value.
 
 use std::ops::Range;
 
@@ -21,18 +21,23 @@ use crate::demonstration::Demonstration;
 use crate::error::Result;
 use crate::numerics::smoothing_spline::{Smoothing, smooth};
 use crate::numerics::spline::{Knots, Splines};
-use crate::validate::zeros;
+use crate::validate::{row_major_mut, zeros};
 
-/// A recording between its samples.
+/// Recording as a function of time.
 pub(super) struct Curve {
+    /// Sampling times (T,), in seconds.
     pub(super) time: Vec<f64>,
-    /// Through the smoothed samples.
+    /// Splines through the smoothed samples.
     pub(super) splines: Splines,
-    /// What smoothing takes off the samples (T, D).
+    /// Residual of the smoothing (T, D), in the unit of each DoF.
     pub(super) noise: Array2<f64>,
 }
 
 impl Curve {
+    /// Smooths a recording.
+    ///
+    /// # Errors
+    /// A recording without times.
     pub(super) fn of(demo: &Demonstration) -> Result<Self> {
         let time = clock(demo)?;
         let smoothed = smooth(Smoothing::Auto, &time, None, demo.position())?;
@@ -41,61 +46,64 @@ impl Curve {
         Ok(Self { time, splines, noise: &demo.position() - &smoothed })
     }
 
+    /// Returns the time of the first sample, in seconds.
     pub(super) fn first(&self) -> f64 {
         self.time[0]
     }
 
+    /// Returns the time of the last sample, in seconds.
     pub(super) fn last(&self) -> f64 {
         self.time[self.time.len() - 1]
     }
 
-    /// Mean sampling interval, in seconds.
+    /// Returns the mean sampling interval, in seconds.
     pub(super) fn interval(&self) -> f64 {
         (self.last() - self.first()) / (self.time.len() - 1) as f64
     }
 
-    /// Positions (n, D) at n even times from `from` to `to`, both included, without noise.
+    /// Returns positions (n, D) without noise at n equidistant times from `from` to `to`, both included.
     pub(super) fn smooth(&self, from: f64, to: f64, n: usize) -> Result<Array2<f64>> {
         let mut position = zeros("position", (n, self.splines.n_dofs()))?;
-        self.splines.sample(even(from, to, n), position.as_slice_mut().unwrap_or_default());
+        self.splines.sample(equidistant(from, to, n), row_major_mut(&mut position));
         Ok(position)
     }
 
-    /// Positions (n, D) at n even times from `from` to `to`, both included, of the spline through all samples.
+    /// Returns positions (n, D) of the spline through all samples at n equidistant times from `from` to `to`, both included.
     pub(super) fn interpolate(&self, from: f64, to: f64, n: usize) -> Result<Array2<f64>> {
         let values: Vec<f64> = self.noise.iter().copied().collect();
         let noise = Splines::through(Knots::not_a_knot(self.time.clone()), &values, self.splines.n_dofs());
         let mut position = zeros("position", (n, self.splines.n_dofs()))?;
-        noise.sample(even(from, to, n), position.as_slice_mut().unwrap_or_default());
+        noise.sample(equidistant(from, to, n), row_major_mut(&mut position));
         Ok(position + self.smooth(from, to, n)?)
     }
 
-    /// Positions (n, D) at n even times from `from` to `to`, both included, with the noise of the nearest samples.
+    /// Returns positions (n, D) with the noise of the nearest samples at n equidistant times from `from` to `to`, both
+    /// included.
     pub(super) fn sample(&self, from: f64, to: f64, n: usize) -> Result<Array2<f64>> {
         let mut position = self.smooth(from, to, n)?;
-        let half = 0.5 * (to - from) / (n - 1) as f64;
-        for (mut row, t) in position.rows_mut().into_iter().zip(even(from, to, n)) {
-            let near = self.near(t, half);
-            let share = 1.0 / near.len() as f64;
-            near.for_each(|c| row.scaled_add(share, &self.noise.row(c)));
+        let half_interval = 0.5 * (to - from) / (n - 1) as f64;
+        for (mut row, t) in position.rows_mut().into_iter().zip(equidistant(from, to, n)) {
+            let nearest = self.nearest(t, half_interval);
+            let weight = 1.0 / nearest.len() as f64;
+            nearest.for_each(|c| row.scaled_add(weight, &self.noise.row(c)));
         }
         Ok(position)
     }
 
-    /// The samples less than `half` an interval from a time, or the nearest one.
-    fn near(&self, t: f64, half: f64) -> Range<usize> {
-        let before = |limit: f64| self.time.partition_point(|&time| time < limit);
-        let within = before(t - half)..before(t + half);
+    /// Returns the samples within `half_interval` of time `t`, or the nearest one.
+    fn nearest(&self, t: f64, half_interval: f64) -> Range<usize> {
+        let n_before = |limit: f64| self.time.partition_point(|&time| time < limit);
+        let within = n_before(t - half_interval)..n_before(t + half_interval);
         if !within.is_empty() {
             return within;
         }
-        let after = before(t).clamp(1, self.time.len() - 1);
+        let after = n_before(t).clamp(1, self.time.len() - 1);
         let nearest = if t - self.time[after - 1] <= self.time[after] - t { after - 1 } else { after };
         nearest..nearest + 1
     }
 }
 
-/// The n even times from `from` to `to`, both included.
-fn even(from: f64, to: f64, n: usize) -> impl Iterator<Item = f64> + Clone {
+/// Returns n equidistant times from `from` to `to`, both included.
+fn equidistant(from: f64, to: f64, n: usize) -> impl Iterator<Item = f64> + Clone {
     (0..n).map(move |c| from + (to - from) * (c as f64 / (n - 1) as f64))
 }

@@ -1,9 +1,10 @@
-//! When each cycle of a recording begins.
+//! Onsets of the cycles of a recording, by template matching.
 //!
-//! A cycle is looked for about a period after the one before, where a template of one cycle, repeated without end,
+//! The onset of a cycle is searched about one period after the previous onset, where a periodic template of one cycle
 //! agrees best with the recording: by the mean over all traits of Pearson's correlation within half a period on either
-//! side, weighted by nearness. The first template is the first cycle; the second, by which the bounds are found for good,
-//! is the mean of all, turned to the phase of the nominal recording by circular cross-correlation with its mean cycle.
+//! side, weighted by a Hann window. The first template is the first cycle. The second template, which gives the final
+//! onsets, is the mean cycle, shifted to the phase of the nominal recording by circular cross-correlation with its mean
+//! cycle.
 
 use std::f64::consts::TAU;
 
@@ -11,74 +12,74 @@ use ndarray::{Array2, ArrayView1, ArrayView2, Axis, s};
 
 use super::periodicity::vertex;
 
-/// How far from where it is expected a cycle is looked for, in periods.
-const REACH: f64 = 0.25;
+/// Search range about the expected onset, in periods.
+const SEARCH_RANGE: f64 = 0.25;
 
-/// How far outside the recording a bound is one at its very end, in samples.
-const SLACK: f64 = 1.0;
+/// Distance outside of the recording within which an onset counts as one at its end, in samples.
+const END_TOLERANCE: f64 = 1.0;
 
-/// A cyclic recording: traits (n, F) and its period in samples.
-pub(super) struct Track<'a> {
+/// Search for the cycles of a recording with traits (n, F) and a period in samples.
+pub(super) struct CycleSearch<'a> {
     pub(super) traits: ArrayView2<'a, f64>,
     pub(super) period: f64,
 }
 
-impl Track<'_> {
-    /// Bounds of successive cycles, in samples, and their mean (W, F): in phase with `nominal` (W₀, F), or from the first
-    /// sample on.
+impl CycleSearch<'_> {
+    /// Returns the bounds of successive cycles in samples, and their mean cycle (W, F). The cycles are in phase with
+    /// `nominal` (W₀, F), or begin at the first sample.
     pub(super) fn bounds(&self, nominal: Option<&Array2<f64>>) -> (Vec<f64>, Array2<f64>) {
         let width = self.period.round() as usize;
         let first = self.search(self.traits.slice(s![..width, ..]), 0.0);
         let mean = self.mean(&first, width);
-        let shift = nominal.map_or(0.0, |nominal| shift(nominal.view(), mean.view()));
-        let turned = turned(mean.view(), shift, width);
-        let bounds = self.search(turned.view(), shift * self.period / width as f64);
+        let shift = nominal.map_or(0.0, |nominal| phase_shift(nominal.view(), mean.view()));
+        let template = shifted(mean.view(), shift, width);
+        let bounds = self.search(template.view(), shift * self.period / width as f64);
         let mean = self.mean(&bounds, width);
         (bounds, mean)
     }
 
-    /// Where cycles such as the template (W, F) begin, about each period after `from`.
+    /// Returns the onsets of cycles that match the template (W, F), searched about `from` and each period after an onset.
     fn search(&self, template: ArrayView2<f64>, from: f64) -> Vec<f64> {
         let end = (self.traits.nrows() - 1) as f64;
-        let (mut bounds, mut expected) = (Vec::new(), from);
+        let (mut onsets, mut expected) = (Vec::new(), from);
         loop {
-            let found = self.locate(template, expected);
-            if found > end + SLACK {
-                return bounds;
+            let onset = self.locate(template, expected);
+            if onset > end + END_TOLERANCE {
+                return onsets;
             }
-            if found >= -SLACK {
-                bounds.push(found.clamp(0.0, end));
+            if onset >= -END_TOLERANCE {
+                onsets.push(onset.clamp(0.0, end));
             }
-            expected = found + self.period;
+            expected = onset + self.period;
         }
     }
 
-    /// Where near `expected` the template agrees best, to a part of a sample.
+    /// Returns the onset near `expected` at which the template agrees best, to a fraction of a sample.
     fn locate(&self, template: ArrayView2<f64>, expected: f64) -> f64 {
-        let reach = (REACH * self.period).max(1.0);
-        let from = (expected - reach).ceil() as isize;
-        let scores: Vec<f64> = (from..=(expected + reach) as isize).map(|at| self.score(template, at)).collect();
+        let range = (SEARCH_RANGE * self.period).max(1.0);
+        let from = (expected - range).ceil() as isize;
+        let scores: Vec<f64> = (from..=(expected + range) as isize).map(|onset| self.score(template, onset)).collect();
         let best = (0..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])).unwrap_or(0);
         if best == 0 || best + 1 == scores.len() {
-            // Nothing agrees best within reach: time goes on as it did.
+            // Without a maximum inside the range the period continues unchanged.
             return expected;
         }
         from as f64 + vertex(best, [scores[best - 1], scores[best], scores[best + 1]]).0
     }
 
-    /// How well the template agrees with the recording if it begins at sample `at`.
-    fn score(&self, template: ArrayView2<f64>, at: isize) -> f64 {
+    /// Returns the sum over traits of the weighted correlation between the template and the recording for an onset.
+    fn score(&self, template: ArrayView2<f64>, onset: isize) -> f64 {
         let (width, n_traits) = template.dim();
         let half = (width / 2) as isize;
-        // Of each trait: both sums, both sums of squares, and the sum of products.
+        // For each trait the weighted Σa, Σb, Σa², Σb² and Σab.
         let (mut n, mut sums) = (0.0, vec![[0.0; 5]; n_traits]);
         for j in -half..width as isize - half {
-            let Some(row) = usize::try_from(at + j).ok().filter(|&row| row < self.traits.nrows()) else { continue };
-            // Hann's window: what is near the bound tells most about it.
+            let Some(row) = usize::try_from(onset + j).ok().filter(|&row| row < self.traits.nrows()) else { continue };
+            // Hann window about the onset.
             let weight = 0.5 + 0.5 * (TAU * j as f64 / width as f64).cos();
             n += weight;
-            let pair = template.row(j.rem_euclid(width as isize) as usize);
-            for (sums, (a, b)) in sums.iter_mut().zip(pair.iter().zip(self.traits.row(row))) {
+            let pattern = template.row(j.rem_euclid(width as isize) as usize);
+            for (sums, (a, b)) in sums.iter_mut().zip(pattern.iter().zip(self.traits.row(row))) {
                 for (sum, x) in sums.iter_mut().zip([*a, *b, a * a, b * b, a * b]) {
                     *sum += weight * x;
                 }
@@ -91,7 +92,7 @@ impl Track<'_> {
         if n > 0.0 { sums.into_iter().map(correlation).sum() } else { 0.0 }
     }
 
-    /// The mean (W, F) of the cycles between successive bounds, at `width` phases.
+    /// Returns the mean (W, F) of the cycles between successive bounds at `width` phases, by linear interpolation.
     fn mean(&self, bounds: &[f64], width: usize) -> Array2<f64> {
         let mut mean = Array2::zeros((width, self.traits.ncols()));
         for pair in bounds.windows(2) {
@@ -107,8 +108,8 @@ impl Track<'_> {
     }
 }
 
-/// The cycle (W, F) from sample `shift` on, at `width` phases.
-fn turned(cycle: ArrayView2<f64>, shift: f64, width: usize) -> Array2<f64> {
+/// Returns the cycle (W, F), circularly shifted to begin at sample `shift`, at `width` phases.
+fn shifted(cycle: ArrayView2<f64>, shift: f64, width: usize) -> Array2<f64> {
     let n = cycle.nrows();
     Array2::from_shape_fn((width, cycle.ncols()), |(c, f)| {
         let at = (shift + c as f64 * n as f64 / width as f64).rem_euclid(n as f64);
@@ -117,10 +118,11 @@ fn turned(cycle: ArrayView2<f64>, shift: f64, width: usize) -> Array2<f64> {
     })
 }
 
-/// The sample of `cycle` (W, F) at which it is in the phase in which `nominal` (W₀, F) begins.
-fn shift(nominal: ArrayView2<f64>, cycle: ArrayView2<f64>) -> f64 {
+/// Returns the sample at which `cycle` (W, F) is in the phase in which `nominal` (W₀, F) begins, by circular
+/// cross-correlation.
+fn phase_shift(nominal: ArrayView2<f64>, cycle: ArrayView2<f64>) -> f64 {
     let n = cycle.nrows();
-    let nominal = turned(nominal, 0.0, n);
+    let nominal = shifted(nominal, 0.0, n);
     let centred = |column: ArrayView1<f64>| -> Vec<f64> {
         let mean = column.sum() / n as f64;
         column.iter().map(|y| y - mean).collect()

@@ -1,143 +1,161 @@
-//! From cyclic recordings to closed cycles in one phase.
+//! Segmentation of cyclic recordings into closed cycles of common phase.
 
 use ndarray::{Array1, Array2, Axis, s};
 
-use super::cycle_growth::{Growth, surpasses, turns, typical};
-use super::cycle_onsets::Track;
-use super::outliers::{RejectionReason, median, odd};
+use super::cycle_growth::{Growth, exceeds_movement, median_gain, turns};
+use super::cycle_onsets::CycleSearch;
+use super::outliers::{RejectionReason, median, rejections};
 use super::periodicity::{period_of, traits};
 use super::resampling::check_times;
 use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
 use crate::preprocessing::Curve;
 
-/// What becomes of the cycles of a recording.
+/// Demonstrations that are made from the cycles of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CycleOutput {
-    /// Each is a demonstration.
+    /// One for each cycle.
     Each,
-    /// Their mean is one.
+    /// One for each recording, the mean of its cycles.
     Mean,
 }
 
-/// The cycles of one or several recordings.
+/// Cycles of one or several recordings.
 #[derive(Clone, Debug)]
 pub struct Cycles {
-    /// Those that are kept, in the order of the recordings.
+    /// Accepted cycles, in the order of the recordings.
     pub kept: Vec<Cycle>,
-    /// Those that are unlike the others of their recording, and whole recordings that do not repeat themselves.
+    /// Cycles that differ from the others of their recording, and whole recordings without a period.
     pub rejected: Vec<Rejected>,
-    /// What gains more in each cycle than it moves within, or turns: closed cycles lack it.
+    /// Degrees of freedom whose gain per cycle exceeds their movement, or that turn; closed cycles lack the gain.
     pub growths: Vec<Growth>,
 }
 
-/// One cycle, or the mean of those of a recording.
+/// One cycle, or the mean cycle of a recording.
 #[derive(Clone, Debug)]
 pub struct Cycle {
     /// Index of the recording.
     pub recording: usize,
-    /// Its period, in seconds.
+    /// Period, in seconds.
     pub period: f64,
-    /// What each DoF (D,) gained from its beginning to its end before it was closed, in the unit of the DoF.
+    /// Gain of each DoF (D,) per cycle before it was closed, in the unit of the DoF.
     pub gain: Vec<f64>,
-    /// C samples `period`/C apart, closed: the next would be the first again.
+    /// C samples at intervals of `period`/C; the next sample would be the first one again.
     pub demo: Demonstration,
 }
 
-/// A cycle that is left out, or a whole recording.
+/// Rejected cycle, or rejected recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rejected {
     /// Index of the recording.
     pub recording: usize,
-    /// When it begins, in seconds on the recording's clock.
+    /// Start of the cycle, in seconds on the clock of the recording.
     pub start: f64,
-    /// Its period, or the duration of the recording, in seconds.
+    /// Period of the cycle, or duration of the recording, in seconds.
     pub period: f64,
-    /// What is odd about it.
+    /// Reason of the rejection.
     pub reason: RejectionReason,
 }
 
-/// Cuts cyclic recordings into cycles.
+/// Segments cyclic recordings into cycles.
 ///
-/// Without `onsets`, the period of each recording is found by [`super::period`], and its cycles by a template. They
-/// begin in the phase of the first recording's first sample. With `onsets`, one list for each recording, they begin at
-/// the times [s] that are given, and end where the next begins.
+/// Without `onsets`, [`super::period`] estimates the period of each recording, and template matching the onsets of its
+/// cycles, which begin in the phase of the first sample of the first recording. With `onsets`, one list of times in seconds
+/// per recording, cycles extend from each onset to the next.
 ///
-/// A cycle is C samples of the recording, as many as that has in a period, with the noise of the nearest recorded
-/// samples, which stays white. Where its smoothed course ends elsewhere than it began, at f(T) rather than f(0), the gain
-/// is distributed over it, and its mean stays:
+/// A cycle has C samples at the sampling rate of the recording, with the noise of the nearest recorded samples, which stays
+/// white. The gain of the smoothed recording over the cycle, from f(0) to f(T), is removed linearly, which preserves the
+/// mean:
 ///
 /// ```text
 /// y_c = y(cT/C) − (c/C − 1/2)(f(T) − f(0))
 /// ```
 ///
-/// An angle that gains whole turns per cycle, such as that of a wheel, loses them from each cycle to the next too, so that
-/// all cycles are about one mean. Units tell what is an angle; without units, a gain of one turn in radians or degrees to
-/// a hundredth does.
+/// For an angle that gains whole turns per cycle, such as that of a wheel, the turns of all previous cycles are subtracted
+/// too, so that all cycles have a common mean. Angles are recognised by their unit; without a unit, by a gain of one turn in
+/// radians or degrees to within a hundredth.
 ///
-/// Cycles unlike the others of their recording, in period or shape, are rejected, and so are recordings that do not
-/// repeat themselves, unless none does. Names, units and context go along.
+/// Cycles that differ from the others of their recording, in period or shape, are rejected, and so are recordings without a
+/// period, unless all are. Names, units and context are kept.
+///
+/// ```
+/// # use ndarray::Array2;
+/// # use pdmp_core::{Demonstration, Sampling};
+/// # use pdmp_core::preprocessing::{CycleOutput, cycles};
+/// # fn main() -> pdmp_core::Result<()> {
+/// // Five and a half periods of 0.8 s.
+/// let position = Array2::from_shape_fn((440, 1), |(c, _)| (std::f64::consts::TAU * c as f64 / 80.0).sin());
+/// let recording = Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?;
+/// let cycles = cycles(&[recording], None, CycleOutput::Each)?;
+/// assert_eq!(cycles.kept.len(), 5);
+/// assert!((cycles.kept[2].period - 0.8).abs() < 1e-3);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// No recording, none that repeats itself, one without times, onsets that do not increase or lie outside.
+/// No recording, no recording with a period, a recording without times, onsets that do not increase or lie outside their
+/// recording.
 pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: CycleOutput) -> Result<Cycles> {
     let n_dofs = recordings.first().ok_or(Error::NoDemonstrations)?.n_dofs();
     if let Some(found) = onsets.map(<[_]>::len).filter(|&found| found != recordings.len()) {
         return Err(Error::Length { name: "onsets", expected: recordings.len(), found, per: "recording" });
     }
     let mut cycles = Cycles { kept: Vec::new(), rejected: Vec::new(), growths: Vec::new() };
-    let (mut nominal, mut refusals) = (None, Vec::new());
+    let (mut nominal, mut errors) = (None, Vec::new());
     for (recording, demo) in recordings.iter().enumerate() {
-        let mut cut = || {
+        let mut segment = || {
             if demo.n_dofs() != n_dofs {
                 return Err(Error::Dofs { expected: n_dofs, found: demo.n_dofs() });
             }
             let curve = Curve::of(demo)?;
-            let found = match onsets {
-                Some(onsets) => given(&curve, &onsets[recording]),
-                None => found(&curve, &mut nominal),
+            let bounds = match onsets {
+                Some(onsets) => bounds_at_onsets(&curve, &onsets[recording]),
+                None => find_bounds(&curve, &mut nominal),
             };
-            match found {
+            match bounds {
                 Ok((period, bounds)) => cycles.add(recording, demo, &curve, period, &bounds, keep),
                 Err(error) => {
                     let Some(reason) = RejectionReason::of(&error) else { return Err(error) };
                     let (start, period) = (curve.first(), curve.last() - curve.first());
                     cycles.rejected.push(Rejected { recording, start, period, reason });
-                    refusals.push(error.in_demo(recording));
+                    errors.push(error.in_demo(recording));
                     Ok(())
                 }
             }
         };
-        cut().map_err(|error| error.in_demo(recording))?;
+        segment().map_err(|error| error.in_demo(recording))?;
     }
-    if refusals.len() == recordings.len() { Err(refusals.swap_remove(0)) } else { Ok(cycles) }
+    if errors.len() == recordings.len() { Err(errors.swap_remove(0)) } else { Ok(cycles) }
 }
 
-/// Median period and bounds of the cycles between given onsets, in seconds.
-fn given(curve: &Curve, onsets: &[f64]) -> Result<(f64, Vec<f64>)> {
+/// Returns the median period and the bounds of the cycles between onsets, in seconds.
+fn bounds_at_onsets(curve: &Curve, onsets: &[f64]) -> Result<(f64, Vec<f64>)> {
     check_times("onsets", onsets, curve)?;
     Ok((median(&intervals(onsets)), onsets.to_vec()))
 }
 
-/// Period and bounds of the cycles that are found in the phase of the `nominal` mean cycle, in seconds.
-fn found(curve: &Curve, nominal: &mut Option<Array2<f64>>) -> Result<(f64, Vec<f64>)> {
+/// Returns the period and the bounds of the cycles, in seconds, in phase with the `nominal` mean cycle, which the first
+/// recording defines.
+fn find_bounds(curve: &Curve, nominal: &mut Option<Array2<f64>>) -> Result<(f64, Vec<f64>)> {
     let traits = traits(curve)?;
     let period = period_of(traits.view(), curve.interval())?;
-    let (bounds, mean) = Track { traits: traits.view(), period }.bounds(nominal.as_ref());
+    let (bounds, mean) = CycleSearch { traits: traits.view(), period }.bounds(nominal.as_ref());
     nominal.get_or_insert(mean);
     let seconds = bounds.iter().map(|bound| curve.first() + bound * curve.interval()).collect();
     Ok((period * curve.interval(), seconds))
 }
 
-/// The cycles between successive bounds, closed.
-struct Closed {
-    /// Positions (C, D) of each.
+/// Closed cycles of one recording.
+struct ClosedCycles {
+    /// Positions (C, D) of each cycle.
     cycles: Vec<Array2<f64>>,
-    /// What each DoF (D,) gains in each.
+    /// Gain of each DoF (D,) in each cycle.
     gains: Vec<Array1<f64>>,
 }
 
-impl Closed {
+impl ClosedCycles {
+    /// Samples and closes the cycles between successive bounds in seconds.
     fn between(curve: &Curve, bounds: &[f64], n_samples: usize) -> Result<Self> {
         let (mut cycles, mut gains) = (Vec::new(), Vec::new());
         for pair in bounds.windows(2) {
@@ -151,8 +169,8 @@ impl Closed {
         Ok(Self { cycles, gains })
     }
 
-    /// Takes whole turns off each cycle and all that follow; returns the growth of DoFs that turn or gain much.
-    fn turn_back(&mut self, recording: usize, units: Option<&[String]>) -> Vec<Growth> {
+    /// Subtracts whole turns per cycle from all later cycles; returns the DoFs that turn or whose gain exceeds their movement.
+    fn remove_turns(&mut self, recording: usize, units: Option<&[String]>) -> Vec<Growth> {
         let mut growths = Vec::new();
         for dof in 0..self.gains.first().map_or(0, Array1::len) {
             let mean = self.gains.iter().map(|gain| gain[dof]).sum::<f64>() / self.gains.len() as f64;
@@ -160,8 +178,8 @@ impl Closed {
             for (k, cycle) in self.cycles.iter_mut().enumerate().filter(|_| turns != 0) {
                 cycle.column_mut(dof).mapv_inplace(|y| y - (k as f64 * f64::from(turns)) * turn);
             }
-            let gain = typical(&self.gains, dof);
-            if turns != 0 || surpasses(gain, &self.cycles, dof) {
+            let gain = median_gain(&self.gains, dof);
+            if turns != 0 || exceeds_movement(gain, &self.cycles, dof) {
                 growths.push(Growth { recording, dof, gain, turns });
             }
         }
@@ -169,12 +187,13 @@ impl Closed {
     }
 }
 
+/// Returns the differences of successive bounds.
 fn intervals(bounds: &[f64]) -> Vec<f64> {
     bounds.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
 impl Cycles {
-    /// Adds the cycles of a recording between `bounds` [s], those that are odd to the rejected.
+    /// Adds the cycles of a recording between `bounds` in seconds to the accepted or the rejected ones.
     fn add(
         &mut self,
         recording: usize,
@@ -190,11 +209,11 @@ impl Cycles {
             return Ok(());
         }
         let n_samples = (period / curve.interval()).round().max(MIN_SAMPLES_PER_DEMONSTRATION as f64);
-        let mut closed = Closed::between(curve, bounds, n_samples as usize)?;
-        self.growths.extend(closed.turn_back(recording, demo.units()));
+        let mut closed = ClosedCycles::between(curve, bounds, n_samples as usize)?;
+        self.growths.extend(closed.remove_turns(recording, demo.units()));
         let periods = intervals(bounds);
         let mut kept = Vec::new();
-        for (k, reason) in odd(&periods, &closed.cycles).into_iter().enumerate() {
+        for (k, reason) in rejections(&periods, &closed.cycles).into_iter().enumerate() {
             match reason {
                 Some(reason) => {
                     let (start, period) = (bounds[k], periods[k]);

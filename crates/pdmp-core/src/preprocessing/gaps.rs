@@ -1,4 +1,4 @@
-//! Samples that are missing.
+//! Interpolation of missing samples.
 
 use std::f64::consts::TAU;
 
@@ -9,17 +9,28 @@ use crate::error::{Error, Result};
 use crate::numerics::spline::Knots;
 use crate::validate::check_time;
 
-/// The `position` (T, D) with its gaps, samples that are NaN, interpolated by the cubic spline through the others of the
-/// same column.
+/// Fills the gaps of `position` (T, D), samples that are NaN, by the cubic spline through the other samples of the column.
 ///
-/// A gap lasts from the sample before it to the one after it. `time` (T,) is in seconds, and `turns` (D,) tells what a
-/// full turn is where a column is an angle, 0 where it is none and NaN where that is not known: an angle goes the shorter
-/// way round through a gap. `names` (D,) are those that errors tell.
+/// A gap extends from the sample before it to the sample after it. `time` (T,) is in seconds. `turns` (D,) is the full turn
+/// in the unit of each column that is an angle, 0 for other columns and NaN for unknown units: an angle is interpolated
+/// the shorter way round. `names` (D,) appear in errors.
+///
+/// ```
+/// # use ndarray::array;
+/// # use pdmp_core::preprocessing::fill_gaps;
+/// # fn main() -> pdmp_core::Result<()> {
+/// let time = [0.0, 0.1, 0.2, 0.3, 0.4];
+/// let position = array![[0.0], [1.0], [f64::NAN], [3.0], [4.0]];
+/// let filled = fill_gaps(position, &time, &["x".to_string()], &[0.0], 0.2)?;
+/// assert!((filled[[2, 0]] - 2.0).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// A change by about a full turn through a gap of a column that may be an angle. A gap longer than `max_gap` seconds, or at either end; a column with fewer than four samples; times that do not
-/// increase.
-pub fn fill(
+/// A gap longer than `max_gap` seconds, or at either end; a change by about a full turn through a gap of a column of
+/// unknown unit; a column with fewer than four samples; times that do not increase.
+pub fn fill_gaps(
     mut position: Array2<f64>,
     time: &[f64],
     names: &[String],
@@ -44,12 +55,12 @@ pub fn fill(
         if present.len() == n_samples {
             continue;
         }
-        check(&present, time, name, max_gap)?;
+        check_gaps(&present, time, name, max_gap)?;
         let mut values: Vec<f64> = present.iter().map(|&c| column[c]).collect();
         if turn > 0.0 {
             unwrap(&mut values, turn);
         } else if turn.is_nan()
-            && let Some(k) = wrap(&values, &present)
+            && let Some(k) = find_wrap(&values, &present)
         {
             let (column, [from, to]) = (name.clone(), [k, k + 1].map(|k| time[present[k]]));
             return Err(Error::WrapInGap { column, from, to, change: values[k + 1] - values[k] });
@@ -65,8 +76,8 @@ pub fn fill(
     Ok(position)
 }
 
-/// Checks the gaps between the samples that are present, and at both ends.
-fn check(present: &[usize], time: &[f64], name: &str, max_gap: f64) -> Result<()> {
+/// Checks the gaps between the present samples and at both ends.
+fn check_gaps(present: &[usize], time: &[f64], name: &str, max_gap: f64) -> Result<()> {
     let gap = |from, to| Error::Gap { column: name.to_string(), from, to, max_gap };
     let [Some(&first), Some(&last)] = [present.first(), present.last()] else {
         return Err(gap(f64::NEG_INFINITY, f64::INFINITY));
@@ -77,9 +88,9 @@ fn check(present: &[usize], time: &[f64], name: &str, max_gap: f64) -> Result<()
     if last + 1 < time.len() {
         return Err(gap(time[last], f64::INFINITY));
     }
-    // Rounding of the stamps must not decide.
-    let longest = max_gap * (1.0 + 1e-9);
-    match present.windows(2).find(|pair| pair[1] > pair[0] + 1 && time[pair[1]] - time[pair[0]] > longest) {
+    // The margin admits a gap of exactly `max_gap` between rounded time stamps.
+    let limit = max_gap * (1.0 + 1e-9);
+    match present.windows(2).find(|pair| pair[1] > pair[0] + 1 && time[pair[1]] - time[pair[0]] > limit) {
         Some(pair) => Err(gap(time[pair[0]], time[pair[1]])),
         None if present.len() < MIN_SAMPLES_PER_DEMONSTRATION => {
             Err(Error::Samples { found: present.len(), least: MIN_SAMPLES_PER_DEMONSTRATION })
@@ -88,28 +99,28 @@ fn check(present: &[usize], time: &[f64], name: &str, max_gap: f64) -> Result<()
     }
 }
 
-/// Ranges that look like those of a wrapped angle, in turns.
-const WRAPPED: [f64; 2] = [0.9, 1.02];
-/// Least change through a gap that looks like a wrap, in turns, and over what the fastest change between neighbours makes of
-/// the length of the gap.
+/// Range of the values of a column that may be a wrapped angle, in turns.
+const WRAPPED_RANGE: [f64; 2] = [0.9, 1.02];
+/// Minimum change through a gap that may be a wrap, in turns.
 const MIN_WRAP: f64 = 0.5;
+/// Minimum ratio of that change to the largest change between neighbouring samples times the length of the gap.
 const MIN_RATIO: f64 = 3.0;
 
-/// The present sample before the first gap through which the values change as a wrapped angle does.
-fn wrap(values: &[f64], present: &[usize]) -> Option<usize> {
+/// Returns the present sample before the first gap through which the values change like those of a wrapped angle.
+fn find_wrap(values: &[f64], present: &[usize]) -> Option<usize> {
     let [low, high] = values.iter().fold([f64::MAX, f64::MIN], |[low, high], &y| [low.min(y), high.max(y)]);
-    let range = |turn: f64| (WRAPPED[0] * turn..=WRAPPED[1] * turn).contains(&(high - low));
-    let turn = [TAU, 360.0].into_iter().find(|turn| range(*turn))?;
+    let may_wrap = |turn: f64| (WRAPPED_RANGE[0] * turn..=WRAPPED_RANGE[1] * turn).contains(&(high - low));
+    let turn = [TAU, 360.0].into_iter().find(|turn| may_wrap(*turn))?;
     let change = |k: usize| (values[k + 1] - values[k]).abs();
-    let samples = |k: usize| present[k + 1] - present[k];
-    // Wraps between neighbours are none of the changes to compare with.
-    let usual = (0..values.len() - 1).filter(|&k| samples(k) == 1 && change(k) < MIN_WRAP * turn);
-    let fastest = usual.map(change).fold(0.0, f64::max);
+    let steps = |k: usize| present[k + 1] - present[k];
+    // Wraps between neighbouring samples are excluded from the comparison.
+    let neighbours = (0..values.len() - 1).filter(|&k| steps(k) == 1 && change(k) < MIN_WRAP * turn);
+    let fastest = neighbours.map(change).fold(0.0, f64::max);
     (0..values.len() - 1)
-        .find(|&k| samples(k) > 1 && change(k) > MIN_WRAP * turn && change(k) > MIN_RATIO * fastest * samples(k) as f64)
+        .find(|&k| steps(k) > 1 && change(k) > MIN_WRAP * turn && change(k) > MIN_RATIO * fastest * steps(k) as f64)
 }
 
-/// Takes off the full turns between one angle and the next.
+/// Subtracts the full turns between each angle and the one before it.
 fn unwrap(angles: &mut [f64], turn: f64) {
     for c in 1..angles.len() {
         angles[c] -= turn * ((angles[c] - angles[c - 1]) / turn).round();

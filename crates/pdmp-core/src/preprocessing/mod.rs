@@ -1,21 +1,21 @@
-//! From recordings to demonstrations: what is done to a raw recording before a primitive is learnt from it.
+//! Preprocessing: from raw recordings to demonstrations.
 //!
-//! | room | what it does |
+//! | module | content |
 //! |---|---|
-//! | `gaps` | interpolates samples that are missing |
-//! | `lowpass` | the low-pass filter, and what it takes off at each cut-off |
-//! | `curve` | a recording between its samples: its smoothing spline, and the noise beside it |
-//! | `cut` | even sampling, parts between given times |
-//! | `trim` | the part in which there is movement |
-//! | `repetition` | how well a recording repeats itself after each lag, and its period |
-//! | `track` | when each cycle begins |
-//! | `odd` | which cycles are unlike the others |
-//! | `significance` | the least correlation that chance does not explain |
-//! | `growth` | what grows from cycle to cycle, such as the angle of a wheel |
+//! | `gaps` | interpolation of missing samples |
+//! | `lowpass` | low-pass filter, and its residual at each cut-off frequency |
+//! | `curve` | continuous recording: a smoothing spline, and the noise of the samples |
+//! | `resampling` | uniform sampling, and splitting at given times |
+//! | `trim` | removal of rest before and after the movement |
+//! | `periodicity` | autocorrelation of a recording, and its period |
+//! | `significance` | correlations that chance explains |
+//! | `cycle_onsets` | onset of each cycle |
+//! | `outliers` | cycles that differ from the others |
+//! | `cycle_growth` | gain per cycle, such as that of the angle of a wheel |
 //! | `cycles` | one closed demonstration per cycle, in phase across recordings |
+//! | `inspection` | detection of implausible samples |
 //!
-//! What is made of a recording keeps the names, units and context, and the goal where the end of the movement is the
-//! same.
+//! Results keep the names, units and context of a recording, and its goal if the movement ends where the recording does.
 
 mod curve;
 mod cycle_growth;
@@ -38,19 +38,19 @@ use curve::Curve;
 
 pub use cycle_growth::Growth;
 pub use cycles::{Cycle, CycleOutput, Cycles, Rejected, cycles};
-pub use gaps::fill;
+pub use gaps::fill_gaps;
 pub use lowpass::{lowpass, residuals};
 pub use outliers::RejectionReason;
 pub use periodicity::period;
-pub use resampling::{cut, resample};
+pub use resampling::{resample, split_at};
 pub use trim::trim;
 
-/// When the samples were taken (T,), in seconds.
+/// Returns the sampling times (T,), in seconds.
 fn clock(demo: &Demonstration) -> Result<Vec<f64>> {
     let time: Vec<f64> = match demo.sampling() {
         Sampling::Unknown => {
             return Err(Error::Arguments(
-                "the recording does not tell when its samples were taken: make the demonstration with dt= or time=",
+                "the recording has no sampling times: create the demonstration with dt= or time=",
             ));
         }
         Sampling::Uniform { dt } => (0..demo.n_samples()).map(|c| c as f64 * dt).collect(),

@@ -1,10 +1,10 @@
-//! Which cycles of a recording are unlike the others.
+//! Outliers among the cycles of a recording.
 //!
-//! A number is odd where it lies further from the median than so many times the median absolute deviation, scaled to a
-//! normal standard deviation, and further than what never matters.
+//! A period or a shape is an outlier if its modified z-score, the distance from the median over the median absolute
+//! deviation scaled to a normal standard deviation, exceeds a limit, and the distance itself another one.
 //!
-//! B. Iglewicz, D. C. Hoaglin, How to detect and handle outliers, ASQC Quality Press 1993 (the modified z-score, and the
-//! limit of 3.5).
+//! B. Iglewicz, D. C. Hoaglin, How to detect and handle outliers, ASQC Quality Press 1993 (modified z-score and its limit
+//! of 3.5).
 
 use std::fmt;
 
@@ -13,49 +13,50 @@ use ndarray::{Array2, Axis};
 use super::periodicity::STANDS_STILL;
 use crate::error::Error;
 
-/// Largest modified z-score.
+/// Maximum modified z-score.
 const MAX_SCORE: f64 = 3.5;
-/// The median absolute deviation of a normal distribution, over its standard deviation.
-const NORMAL: f64 = 0.6745;
-/// Periods may always differ from their median by this share,
-const PERIODS: f64 = 0.1;
-/// and shapes from the median cycle by this many standard deviations of the movement,
-const SHAPES: f64 = 0.25;
-/// and by this many times what is usual: of few cycles, the scatter is known badly.
-const USUAL: f64 = 2.0;
+/// Median absolute deviation of a normal distribution, relative to its standard deviation.
+const NORMAL_DEVIATION: f64 = 0.6745;
+/// Relative deviation from the median period that is always accepted.
+const PERIOD_TOLERANCE: f64 = 0.1;
+/// Distance from the median cycle that is always accepted, in standard deviations of the movement.
+const SHAPE_TOLERANCE: f64 = 0.25;
+/// Multiple of the median distance that is always accepted: the scatter is uncertain for few cycles.
+const DISTANCE_TOLERANCE: f64 = 2.0;
 
-/// Why a cycle was left out.
+/// Reason for which a cycle or a recording was rejected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RejectionReason {
-    /// It lasts longer or shorter than the others.
+    /// Period that differs from the others.
     Period {
-        /// Median of the recording's cycles, in seconds.
+        /// Median period of the recording, in seconds.
         median: f64,
     },
-    /// It takes another path.
+    /// Path that differs from the others.
     Shape {
-        /// Its distance from the median cycle, over the standard deviation of the movement.
+        /// Distance from the median cycle, in standard deviations of the movement.
         distance: f64,
-        /// The median of that distance over the recording's cycles.
+        /// Median of that distance over the cycles of the recording.
         median: f64,
     },
-    /// The recording ends before a whole cycle that begins in the phase of the first recording's.
+    /// No complete cycle that begins in the phase of the first recording.
     Phase,
-    /// The recording does not repeat itself.
+    /// No period.
     Aperiodic {
-        /// Where it resembles itself most, in seconds.
+        /// Lag of the largest autocorrelation, in seconds.
         lag: f64,
-        /// The mean correlation of all DoFs there.
+        /// Mean autocorrelation of all DoFs at that lag.
         share: f64,
-        /// The least correlation that chance does not explain.
+        /// Minimum autocorrelation of a periodic recording.
         least: f64,
     },
-    /// The recording stands still.
+    /// No movement.
     Still,
 }
 
 impl RejectionReason {
-    /// The reason for which a whole recording is left out, from what the search for its period says.
+    /// Returns the reason for which a whole recording is rejected, from the error of the search for its period; `None` for
+    /// an error of another kind.
     pub(super) fn of(error: &Error) -> Option<Self> {
         match *error {
             Error::Aperiodic { lag, share, least } => Some(Self::Aperiodic { lag, share, least }),
@@ -73,7 +74,7 @@ impl fmt::Display for RejectionReason {
                 write!(f, "{distance:.2} standard deviations from the median cycle, the others {median:.2}")
             }
             RejectionReason::Phase => {
-                write!(f, "the recording holds no whole cycle from the phase in which the first begins")
+                write!(f, "the recording has no complete cycle that begins in the phase of the first recording")
             }
             RejectionReason::Aperiodic { lag, share, least } => Error::Aperiodic { lag, share, least }.fmt(f),
             RejectionReason::Still => write!(f, "{STANDS_STILL}"),
@@ -81,46 +82,49 @@ impl fmt::Display for RejectionReason {
     }
 }
 
-/// What is odd about each cycle of one recording, of such periods [s] and closed positions (C, D).
-pub(super) fn odd(periods: &[f64], cycles: &[Array2<f64>]) -> Vec<Option<RejectionReason>> {
-    let middle = median(periods);
-    let deviation = spread(periods, middle);
+/// Returns for each cycle of a recording the reason of its rejection, if any, from the periods in seconds and the closed
+/// positions (C, D).
+pub(super) fn rejections(periods: &[f64], cycles: &[Array2<f64>]) -> Vec<Option<RejectionReason>> {
+    let median_period = median(periods);
+    let period_limit = f64::max(MAX_SCORE * deviation(periods, median_period), PERIOD_TOLERANCE * median_period);
     let distances = distances(cycles);
-    let usual = median(&distances);
-    let scatter = spread(&distances, usual);
-    let judge = |(&period, &distance): (&f64, &f64)| {
-        if (period - middle).abs() > f64::max(MAX_SCORE * deviation, PERIODS * middle) {
-            return Some(RejectionReason::Period { median: middle });
+    let median_distance = median(&distances);
+    let distance_limit = (median_distance + MAX_SCORE * deviation(&distances, median_distance))
+        .max(DISTANCE_TOLERANCE * median_distance)
+        .max(SHAPE_TOLERANCE);
+    let rejection = |(&period, &distance): (&f64, &f64)| {
+        if (period - median_period).abs() > period_limit {
+            return Some(RejectionReason::Period { median: median_period });
         }
-        let limit = (usual + MAX_SCORE * scatter).max(USUAL * usual).max(SHAPES);
-        (distance > limit).then_some(RejectionReason::Shape { distance, median: usual })
+        (distance > distance_limit).then_some(RejectionReason::Shape { distance, median: median_distance })
     };
-    periods.iter().zip(&distances).map(judge).collect()
+    periods.iter().zip(&distances).map(rejection).collect()
 }
 
-/// Root mean square distance of each cycle from the median one, each DoF over its standard deviation.
+/// Returns the root mean square distance of each cycle from the median cycle, each DoF relative to its standard deviation.
 fn distances(cycles: &[Array2<f64>]) -> Vec<f64> {
     let Some(first) = cycles.first() else { return Vec::new() };
     let centred = |cycle: &Array2<f64>| cycle - &cycle.mean_axis(Axis(0)).unwrap_or_default();
     let cycles: Vec<Array2<f64>> = cycles.iter().map(centred).collect();
-    let usual = Array2::from_shape_fn(first.dim(), |place| {
-        median(&cycles.iter().map(|cycle| cycle[place]).collect::<Vec<_>>())
+    let median_cycle = Array2::from_shape_fn(first.dim(), |index| {
+        median(&cycles.iter().map(|cycle| cycle[index]).collect::<Vec<_>>())
     });
-    let deviations = usual.std_axis(Axis(0), 0.0);
-    let off = |cycle: &Array2<f64>| {
-        let off = (cycle - &usual) / &deviations;
-        // A DoF at rest tells nothing.
-        let moving: Vec<f64> = off.iter().copied().filter(|x| x.is_finite()).collect();
+    let deviations = median_cycle.std_axis(Axis(0), 0.0);
+    let distance = |cycle: &Array2<f64>| {
+        let differences = (cycle - &median_cycle) / &deviations;
+        // The quotient is not finite for a DoF at rest, which is left out.
+        let moving: Vec<f64> = differences.iter().copied().filter(|x| x.is_finite()).collect();
         (moving.iter().map(|x| x * x).sum::<f64>() / moving.len().max(1) as f64).sqrt()
     };
-    cycles.iter().map(off).collect()
+    cycles.iter().map(distance).collect()
 }
 
-/// The standard deviation of a normal distribution of the same median absolute deviation.
-fn spread(numbers: &[f64], middle: f64) -> f64 {
-    median(&numbers.iter().map(|x| (x - middle).abs()).collect::<Vec<_>>()) / NORMAL
+/// Returns the standard deviation of a normal distribution with the median absolute deviation of the numbers.
+fn deviation(numbers: &[f64], middle: f64) -> f64 {
+    median(&numbers.iter().map(|x| (x - middle).abs()).collect::<Vec<_>>()) / NORMAL_DEVIATION
 }
 
+/// Returns the median, or 0 without numbers.
 pub(super) fn median(numbers: &[f64]) -> f64 {
     let mut sorted = numbers.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -1,24 +1,28 @@
-//! What a test of the control loop needs: an allocator that counts, and random numbers that allocate nothing.
+//! Allocation counter and allocation-free random numbers for tests of the control loop.
 #![allow(dead_code, missing_docs, unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+/// Allocator of the system that counts the allocations of each thread.
 struct Counting;
 
 thread_local! {
-    /// Of this thread, for tests run side by side.
+    /// Count per thread, because tests run in parallel.
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
 }
 
-// SAFETY: every call is handed to the system's allocator unchanged.
+// SAFETY: every call is forwarded unchanged to `System`, whose contract is that of `GlobalAlloc`. The counter is a constant
+// initialised thread-local without a destructor, so that counting neither allocates nor unwinds.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: the caller guarantees a layout of non-zero size.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller guarantees that `alloc`, hence `System`, returned the pointer for this layout.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -26,12 +30,12 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Allocations of this thread so far.
+/// Returns the number of allocations of this thread.
 pub(crate) fn allocations() -> usize {
     ALLOCATIONS.get()
 }
 
-/// A small generator of numbers in [0, 1).
+/// Linear congruential generator of numbers in [0, 1).
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {

@@ -1,4 +1,4 @@
-//! Movements to learn from, made by formulas that the library does not contain.
+//! Synthetic demonstrations by formulas that the library does not contain, and helpers of the tests.
 #![allow(dead_code, missing_docs)]
 
 use std::f64::consts::TAU;
@@ -7,6 +7,7 @@ use std::sync::{Arc, LazyLock};
 use ndarray::{Array1, Array2};
 use pdmp_core::learning::Truncation;
 use pdmp_core::learning::regression::{Basis, Gp, NGnet};
+use pdmp_core::learning::{CanonicalOptions, TransportSelection};
 use pdmp_core::motion::TimeGrid;
 use pdmp_core::rollout;
 use pdmp_core::{Command, Controller, Demonstration, FitOptions, Kind, Model, Motion, Result, Sampling, Status, fit};
@@ -16,7 +17,7 @@ pub(crate) fn minimum_jerk(s: f64) -> f64 {
     s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
 }
 
-/// A reach with D = 3: straight, over an obstacle of height `h`, and a DoF that ends where it starts.
+/// Reach with D = 3: a straight DoF, one over an obstacle of height `h`, and one that ends where it starts.
 pub(crate) fn reach(h: f64, duration: f64, dt: f64) -> Demonstration {
     let n = (duration / dt).round() as usize + 1;
     let position = Array2::from_shape_fn((n, 3), |(c, d)| {
@@ -36,7 +37,7 @@ pub(crate) fn reaches() -> Vec<Demonstration> {
     [0.0, 0.15, 0.3, 0.45, 0.6].iter().map(|&h| reach(h, 0.9 + 0.3 * h, 0.01)).collect()
 }
 
-/// One cycle with D = 2 about (1, −2): a style-dependent second harmonic.
+/// One cycle with D = 2 about (1, −2), with a style-dependent second harmonic.
 pub(crate) fn cycle(style: f64, period: f64, n: usize) -> Demonstration {
     let position = Array2::from_shape_fn((n, 2), |(c, d)| {
         let phi = TAU * c as f64 / n as f64;
@@ -52,13 +53,14 @@ pub(crate) fn cycles() -> Vec<Demonstration> {
     [0.0, 0.1, 0.25, 0.4].iter().map(|&s| cycle(s, 1.0 + 0.2 * s, 120)).collect()
 }
 
-/// A network, which fits in a moment, and nearly all of the spectrum.
+/// Discrete movements with the paper's immediate transport.
+pub(crate) fn immediate() -> CanonicalOptions {
+    CanonicalOptions::Discrete { tau: None, alpha_x: None, transport: TransportSelection::Immediate }
+}
+
+/// Options with a normalised Gaussian network, which is fast to fit, and nearly all of the spectrum.
 pub(crate) fn options(kind: Kind) -> FitOptions {
-    FitOptions {
-        n_styles: Truncation::Share(0.9999).into(),
-        basis: Basis::NGnet(NGnet::default()),
-        ..FitOptions::new(kind)
-    }
+    FitOptions::new(kind).n_styles(Truncation::Share(0.9999)).basis(Basis::NGnet(NGnet::default()))
 }
 
 pub(crate) fn gp() -> Basis {
@@ -69,18 +71,18 @@ pub(crate) fn learn(demos: &[Demonstration], options: &FitOptions) -> Arc<Model>
     Arc::new(fit(demos, options).unwrap())
 }
 
-/// Reaches and cycles learnt with two styles.
-pub(crate) static REACH: LazyLock<Arc<Model>> = LazyLock::new(|| {
-    learn(&reaches(), &FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Discrete) })
-});
+/// Model of the reaches with two styles.
+pub(crate) static REACH: LazyLock<Arc<Model>> =
+    LazyLock::new(|| learn(&reaches(), &options(Kind::Discrete).n_styles(Truncation::Rank(2))));
+/// Model of the cycles with two styles.
 pub(crate) static CYCLE: LazyLock<Arc<Model>> =
-    LazyLock::new(|| learn(&cycles(), &FitOptions { n_styles: Truncation::Rank(2).into(), ..options(Kind::Rhythmic) }));
+    LazyLock::new(|| learn(&cycles(), &options(Kind::Rhythmic).n_styles(Truncation::Rank(2))));
 
 pub(crate) fn grid(dt: f64, duration: f64) -> TimeGrid {
     TimeGrid { dt, duration: Some(duration) }
 }
 
-/// One tick under a command; the motion is then read from the controller.
+/// Performs one tick under a command and checks that the motion written is that of the controller.
 pub(crate) fn tick(controller: &mut Controller, command: &Command) -> Result<Status> {
     let n = controller.primitive().n_dofs();
     let (mut position, mut velocity, mut acceleration) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -92,7 +94,7 @@ pub(crate) fn tick(controller: &mut Controller, command: &Command) -> Result<Sta
     Ok(status)
 }
 
-/// All that a demonstration was learnt with: its style, goal or anchor, start and timing.
+/// Conditions of demonstration `m`: style, goal or anchor, start and segment durations.
 pub(crate) fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
     let demonstrated = model.demonstrated();
     let row = |matrix: &Array2<f64>| Some(matrix.row(m).to_vec());
@@ -107,16 +109,16 @@ pub(crate) fn conditions_of(model: &Model, m: usize) -> pdmp_core::Conditions {
     }
 }
 
-/// Root mean square of the reproduction's error at the demonstration's own samples, over its largest range.
+/// Root mean square error of the reproduction at the samples of demonstration `m`, relative to its largest range.
 pub(crate) fn reproduction_error(model: &Arc<Model>, demos: &[Demonstration], m: usize) -> f64 {
     let n = demos[m].n_samples();
     let steps = if model.kind() == Kind::Discrete { n - 1 } else { n };
     let duration = model.demonstrated().durations[m];
     let grid = TimeGrid { dt: duration / steps as f64, duration: Some(duration) };
     let found = rollout(model.primitive(), &conditions_of(model, m), grid).unwrap().position;
-    let shown = demos[m].position();
-    let error = (&found.slice(ndarray::s![..n, ..]) - &shown).mapv(|e| e * e).mean().unwrap().sqrt();
-    let range = shown.columns().into_iter().map(|y| max(&y.to_owned()) + max(&-y.to_owned())).fold(0.0, f64::max);
+    let recorded = demos[m].position();
+    let error = (&found.slice(ndarray::s![..n, ..]) - &recorded).mapv(|e| e * e).mean().unwrap().sqrt();
+    let range = recorded.columns().into_iter().map(|y| max(&y.to_owned()) + max(&-y.to_owned())).fold(0.0, f64::max);
     error / range
 }
 

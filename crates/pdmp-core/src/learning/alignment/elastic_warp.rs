@@ -1,18 +1,18 @@
-//! The time warp that brings a demonstration closest to a template, by dynamic programming.
+//! Elastic time warp of a demonstration to a template, by dynamic programming.
 //!
-//! Movements are compared by q = ẏ/√|ẏ|, their square-root velocity functions, of unit size. A warp γ of time takes q to
-//! (q∘γ)√γ̇, which is of unit size again, so that no stretch of a movement is shrunk to hide that it differs:
+//! Movements are compared by their square-root velocity functions q = ẏ/√|ẏ|, scaled to unit norm. A warp γ of time maps
+//! q to (q∘γ)√γ̇, which preserves the norm, so that differences cannot be hidden by compressing a part of a movement:
 //!
 //! ```text
 //! E(γ) = ∫ |q₀ − (q∘γ)√γ̇|² + λ ln²γ̇ dp = 2 − 2∫ q₀·(q∘γ)√γ̇ dp + λ∫ ln²γ̇ dp
 //! ```
 //!
-//! γ is linear in each segment of the phase, its ends on a grid of the demonstration's time. Of all such warps whose
-//! slopes stay within bounds the best one is found: the cost of a segment depends on nothing but where it starts and
-//! how steep it is. The second term keeps noise from warping time; a demonstration like the template is not warped.
+//! γ is linear in each segment of the phase, with segment ends on a grid of the demonstration's time. The search returns
+//! the global optimum among all such warps with bounded slopes, because the cost of a segment depends only on its start
+//! and slope. The penalty keeps noise from warping time; a demonstration equal to the template is not warped.
 //!
 //! - A. Srivastava, E. Klassen, S. H. Joshi, I. H. Jermyn, Shape analysis of elastic curves in Euclidean spaces, IEEE
-//!   TPAMI 33, 2011, doi:10.1109/TPAMI.2010.184 (the cost, and the mean of what is aligned as the template);
+//!   TPAMI 33, 2011, doi:10.1109/TPAMI.2010.184 (the cost, and the mean of aligned functions as the template);
 //! - N.-P. V. Nielsen, J. M. Carstensen, J. Smedsgaard, Aligning of single and multiple wavelength chromatographic
 //!   profiles for chemometric data analysis using correlation optimised warping, Journal of Chromatography A 805, 1998,
 //!   doi:10.1016/S0021-9673(98)00021-1 (the search).
@@ -25,17 +25,18 @@ use crate::model::template::{STEPS, TimeWarp, WarpTemplate};
 use crate::numerics::threads::Threads;
 use crate::validate::zeros;
 
-/// Segments whose search takes some 160 MB a thread: its memory grows with their square.
+/// Largest number of segments; the search then takes some 160 MB per thread, and grows with the square of the number.
 const MAX_SEGMENTS: usize = 1000;
-/// λ, what a warp costs.
-const STIFFNESS: f64 = 0.05;
+/// Weight λ of the warp penalty.
+const PENALTY: f64 = 0.05;
 
 impl Aligned<'_> {
-    /// Warps the time of all demonstrations to that of the nominal one: to its own shape first, then to the mean shape of
-    /// what is aligned, in the nominal time still.
+    /// Warps the time of all demonstrations to that of the nominal one, and returns the template.
+    ///
+    /// The first pass aligns to the shape of the nominal demonstration, the second to the mean of the aligned shapes.
     ///
     /// # Errors
-    /// Settings out of range, no memory, or whatever `progress` returns.
+    /// Settings out of range, too little memory, or the error that `progress` returned.
     pub(super) fn warp(
         &mut self,
         warp: &TimeWarp,
@@ -43,7 +44,7 @@ impl Aligned<'_> {
         threads: Threads,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<WarpTemplate> {
-        warp.check(self.most_segments())?;
+        warp.check(self.max_segments())?;
         let (n_demos, n_dofs) = (self.n_demos(), self.demo(0).n_dofs());
         let unit = unit.map_or_else(|| ranges(self), <[f64]>::to_vec);
         let search = Search::new(warp.n_segments, warp.max_slope, n_dofs);
@@ -54,7 +55,10 @@ impl Aligned<'_> {
         threads.try_for_each_told(
             shapes.axis_iter_mut(Axis(0)).enumerate().collect(),
             || (),
-            |(), (m, mut shape)| aligned.shape(m, &unit, shape.as_slice_mut().unwrap_or_default()),
+            |(), (m, mut shape)| {
+                aligned.shape(m, &unit, crate::validate::row_major_mut(&mut shape));
+                Ok(())
+            },
             &mut |share| progress(share / 3.0),
         )?;
         let nominal = self.nominal;
@@ -87,55 +91,50 @@ impl Aligned<'_> {
         Ok(WarpTemplate { slope: warp.max_slope, unit, shape })
     }
 
-    /// The most segments that the samples carry: half of them.
-    pub(super) fn most_segments(&self) -> usize {
+    /// Returns the largest number of segments, half the smallest number of samples.
+    pub(super) fn max_segments(&self) -> usize {
         let fewest = self.demos.iter().map(|demo| demo.n_samples()).min().unwrap_or(0).min(self.n_samples);
         (fewest / 2).min(MAX_SEGMENTS)
     }
 
-    /// Warps the one demonstration to a template.
-    ///
-    /// # Errors
-    /// A bad smoothing.
-    pub(crate) fn warp_to(&mut self, template: &WarpTemplate) -> Result<()> {
+    /// Warps the only demonstration to a template.
+    pub(crate) fn warp_to(&mut self, template: &WarpTemplate) {
         let (cells, n_dofs) = template.shape.dim();
         let search = Search::new(cells / STEPS, template.slope, n_dofs);
         let (mut shape, mut path) = (vec![0.0; cells * n_dofs], vec![STEPS; search.segments]);
-        self.shape(0, &template.unit, &mut shape)?;
-        let onto = template.shape.as_slice().unwrap_or_default();
+        self.shape(0, &template.unit, &mut shape);
+        let onto = crate::validate::row_major(&template.shape);
         search.run(onto, &shape, &mut path, &mut Scratch::new(&search));
         let segment_durations: Vec<f64> =
             path.iter().map(|&steps| search.seconds(steps, self.clocks[0].duration)).collect();
         self.warps[0] = Some(WarpingFunction::new(self.kind, &search.breaks(), &segment_durations));
-        Ok(())
     }
 
-    /// Writes the square-root velocities (N·D) of demonstration `m` in N cells of its time, of unit size.
-    fn shape(&self, m: usize, unit: &[f64], shape: &mut [f64]) -> Result<()> {
+    /// Writes the square-root velocities (N·D) of demonstration `m` in N equal cells of its time, with unit norm.
+    fn shape(&self, m: usize, unit: &[f64], shape: &mut [f64]) {
         let n_dofs = unit.len();
         let cells = shape.len() / n_dofs;
         let mut edges = vec![0.0; shape.len() + n_dofs];
         let extent = self.clocks[m].extent;
         self.read(m, (0..=cells).map(|j| extent * (j as f64 / cells as f64)), &mut edges);
-        for (i, rise) in shape.iter_mut().enumerate() {
-            *rise = (edges[i + n_dofs] - edges[i]) / unit[i % n_dofs];
+        for (i, difference) in shape.iter_mut().enumerate() {
+            *difference = (edges[i + n_dofs] - edges[i]) / unit[i % n_dofs];
         }
-        // As shares of the largest no number can be too large or too small to be squared.
-        let largest = shape.iter().fold(0.0f64, |most, rise| most.max(rise.abs()));
+        // Division by the largest magnitude prevents overflow and underflow of the squares.
+        let largest = shape.iter().fold(0.0f64, |most, difference| most.max(difference.abs()));
         if largest > 0.0 {
-            shape.iter_mut().for_each(|rise| *rise /= largest);
-            for rise in shape.chunks_exact_mut(n_dofs) {
-                let speed = norm(rise);
+            shape.iter_mut().for_each(|difference| *difference /= largest);
+            for velocity in shape.chunks_exact_mut(n_dofs) {
+                let speed = norm(velocity);
                 let root = if speed > 0.0 { speed.sqrt() } else { 1.0 };
-                rise.iter_mut().for_each(|rise| *rise /= root);
+                velocity.iter_mut().for_each(|component| *component /= root);
             }
-            to_unit_size(shape, cells);
+            normalise(shape, cells);
         }
-        Ok(())
     }
 }
 
-/// Largest peak-to-peak range of each DoF within one demonstration (D,); 1 where nothing moves.
+/// Returns the largest peak-to-peak range of each DoF within one demonstration (D,); 1 for a DoF at rest.
 fn ranges(aligned: &Aligned) -> Vec<f64> {
     let range = |d: usize| {
         let widths = aligned.demos.iter().map(|demo| {
@@ -150,47 +149,48 @@ fn ranges(aligned: &Aligned) -> Vec<f64> {
     (0..aligned.demo(0).n_dofs()).map(range).collect()
 }
 
+/// Returns the Euclidean norm.
 fn norm(vector: &[f64]) -> f64 {
     vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Scales square-root velocities to a mean square of 1, if they are not zero throughout.
-fn to_unit_size(shape: &mut [f64], cells: usize) {
+/// Scales square-root velocities to a mean square of 1, unless all are zero.
+fn normalise(shape: &mut [f64], cells: usize) {
     let size = norm(shape) / (cells as f64).sqrt();
     if size > 0.0 {
         shape.iter_mut().for_each(|q| *q /= size);
     }
 }
 
-/// All warps of K segments whose ends lie on a grid of N = 10·K steps of time.
+/// Search space of warps with K segments whose ends lie on a grid of N = 10·K steps of time.
 struct Search {
     segments: usize,
     n_dofs: usize,
     slopes: Vec<Slope>,
 }
 
-/// A slope of the warp.
+/// Admissible slope of a segment.
 struct Slope {
-    /// Steps of time that a segment takes.
+    /// Steps of time that the segment covers.
     steps: usize,
-    /// √γ̇/N, times which the products of shapes in a segment count.
+    /// √γ̇/N, weight of the products of shapes.
     weight: f64,
     /// λ ln²γ̇/K.
     penalty: f64,
-    /// For each place of a segment the cell of time beside it, one more than from the segment's start, and how far the
-    /// place lies on the way to the next.
-    places: [(usize, f64); STEPS],
+    /// For each phase cell of the segment, the time cell to interpolate from, counted from the segment's start plus one,
+    /// and the fraction towards the next time cell.
+    cells: [(usize, f64); STEPS],
 }
 
-/// What a search works in, for one demonstration after the other.
+/// Work space of a search, reused between demonstrations.
 struct Scratch {
-    /// Products q₀·q of the places of a segment with all cells of time, those at the ends twice.
+    /// Products q₀·q of the phase cells of a segment with all time cells, of which the first and last are repeated.
     products: Vec<f64>,
-    /// Least cost at which a segment can start at each step of time, (K+1)·(N+1).
-    least: Vec<f64>,
-    /// The slope before it, by its place among all.
-    before: Vec<usize>,
-    /// Sums of products along a slope, for every start.
+    /// Lowest cost of a path to each segment start and time step, (K+1)·(N+1).
+    costs: Vec<f64>,
+    /// Index of the slope that leads to it.
+    predecessors: Vec<usize>,
+    /// Sums of products along a slope for every start.
     sums: Vec<f64>,
 }
 
@@ -199,8 +199,8 @@ impl Scratch {
         let (cells, nodes) = (search.cells(), (search.segments + 1) * (search.cells() + 1));
         Self {
             products: vec![0.0; STEPS * (cells + 2)],
-            least: vec![0.0; nodes],
-            before: vec![0; nodes],
+            costs: vec![0.0; nodes],
+            predecessors: vec![0; nodes],
             sums: vec![0.0; cells + 1],
         }
     }
@@ -208,53 +208,58 @@ impl Scratch {
 
 impl Search {
     fn new(segments: usize, slope: f64, n_dofs: usize) -> Self {
-        // A bound that is a multiple of the grid is not missed for a rounding error.
-        let flattest = (STEPS as f64 / slope - 1e-9).ceil() as usize;
-        let steepest = (STEPS as f64 * slope + 1e-9).floor() as usize;
-        let slopes = (flattest..=steepest)
+        // The tolerance includes a bound on the grid despite rounding.
+        let fewest_steps = (STEPS as f64 / slope - 1e-9).ceil() as usize;
+        let most_steps = (STEPS as f64 * slope + 1e-9).floor() as usize;
+        let slopes = (fewest_steps..=most_steps)
             .map(|steps| {
                 let slope = steps as f64 / STEPS as f64;
-                let places = std::array::from_fn(|i| {
+                let cells = std::array::from_fn(|i| {
                     let cell = slope * (i as f64 + 0.5) + 0.5;
                     (cell as usize, cell.fract())
                 });
                 let (weight, penalty) = (slope.sqrt() / (segments * STEPS) as f64, slope.ln().powi(2));
-                Slope { steps, weight, penalty: STIFFNESS * penalty / segments as f64, places }
+                Slope { steps, weight, penalty: PENALTY * penalty / segments as f64, cells }
             })
             .collect();
         Self { segments, n_dofs, slopes }
     }
 
-    /// Cells N of the grid of time.
+    /// Returns the number of cells N of the time grid.
     fn cells(&self) -> usize {
         self.segments * STEPS
     }
 
+    /// Returns the phases (K+1,) of the segment ends.
     fn breaks(&self) -> Vec<f64> {
         (0..=self.segments).map(|k| k as f64 / self.segments as f64).collect()
     }
 
+    /// Converts steps of the time grid to seconds.
     fn seconds(&self, steps: usize, duration: f64) -> f64 {
         duration * (steps as f64 / self.cells() as f64)
     }
 
-    /// The steps of time at which segment `k` can start, given that all of time must be spent in the end.
+    /// Returns the first and last time step at which segment `k` can start so that the warp ends with the demonstration.
     fn starts(&self, k: usize) -> [usize; 2] {
-        let [flattest, steepest] = [0, self.slopes.len() - 1].map(|i| self.slopes[i].steps);
-        let (n, left) = (self.cells(), self.segments - k);
-        [(k * flattest).max(n.saturating_sub(left * steepest)), (k * steepest).min(n - left * flattest)]
+        let [fewest_steps, most_steps] = [0, self.slopes.len() - 1].map(|i| self.slopes[i].steps);
+        let (n, remaining) = (self.cells(), self.segments - k);
+        [
+            (k * fewest_steps).max(n.saturating_sub(remaining * most_steps)),
+            (k * most_steps).min(n - remaining * fewest_steps),
+        ]
     }
 
-    /// Writes the steps of time (K,) in each segment of the warp that brings `shape` closest to the `template`.
+    /// Writes the steps of time (K,) of each segment of the warp of `shape` with the lowest cost to the `template`.
     fn run(&self, template: &[f64], shape: &[f64], path: &mut [usize], scratch: &mut Scratch) {
         let width = self.cells() + 1;
-        scratch.least.fill(f64::INFINITY);
-        scratch.least[0] = 0.0;
+        scratch.costs.fill(f64::INFINITY);
+        scratch.costs[0] = 0.0;
         for (k, template) in template.chunks_exact(STEPS * self.n_dofs).enumerate() {
             self.multiply(template, shape, &mut scratch.products);
             let ([first, last], [first_end, last_end]) = (self.starts(k), self.starts(k + 1));
-            let (least, next) = scratch.least[k * width..].split_at_mut(width);
-            let before = &mut scratch.before[(k + 1) * width..];
+            let (costs, next) = scratch.costs[k * width..].split_at_mut(width);
+            let predecessors = &mut scratch.predecessors[(k + 1) * width..];
             for (index, slope) in self.slopes.iter().enumerate() {
                 let start = first.max(first_end.saturating_sub(slope.steps));
                 let end = (last + 1).min((last_end + 1).saturating_sub(slope.steps));
@@ -263,41 +268,41 @@ impl Search {
                 }
                 let sums = &mut scratch.sums[..end - start];
                 sums.fill(0.0);
-                for (products, &(cell, share)) in scratch.products.chunks_exact(width + 1).zip(&slope.places) {
+                for (products, &(cell, share)) in scratch.products.chunks_exact(width + 1).zip(&slope.cells) {
                     let products = &products[start + cell..][..sums.len() + 1];
                     for (sum, pair) in sums.iter_mut().zip(products.windows(2)) {
                         *sum += (1.0 - share) * pair[0] + share * pair[1];
                     }
                 }
                 let ends = start + slope.steps;
-                let nodes = next[ends..].iter_mut().zip(&mut before[ends..]);
-                for ((sum, so_far), (least, before)) in sums.iter().zip(&least[start..]).zip(nodes) {
-                    let cost = so_far + slope.penalty - 2.0 * slope.weight * sum;
-                    if cost < *least {
-                        (*least, *before) = (cost, index);
+                let nodes = next[ends..].iter_mut().zip(&mut predecessors[ends..]);
+                for ((sum, cost_so_far), (lowest, predecessor)) in sums.iter().zip(&costs[start..]).zip(nodes) {
+                    let cost = cost_so_far + slope.penalty - 2.0 * slope.weight * sum;
+                    if cost < *lowest {
+                        (*lowest, *predecessor) = (cost, index);
                     }
                 }
             }
         }
         let mut end = self.cells();
         for (k, steps) in path.iter_mut().enumerate().rev() {
-            *steps = self.slopes[scratch.before[(k + 1) * width + end]].steps;
+            *steps = self.slopes[scratch.predecessors[(k + 1) * width + end]].steps;
             end -= *steps;
         }
     }
 
-    /// Writes the products of the places of a segment of the template (10·D) with all cells of a shape (N·D).
+    /// Writes the products of the phase cells of a template segment (10·D) with all time cells of a shape (N·D).
     fn multiply(&self, template: &[f64], shape: &[f64], products: &mut [f64]) {
         let cells = self.cells();
-        for (place, products) in template.chunks_exact(self.n_dofs).zip(products.chunks_exact_mut(cells + 2)) {
+        for (phase_cell, products) in template.chunks_exact(self.n_dofs).zip(products.chunks_exact_mut(cells + 2)) {
             for (product, cell) in products[1..].iter_mut().zip(shape.chunks_exact(self.n_dofs)) {
-                *product = place.iter().zip(cell).map(|(a, b)| a * b).sum();
+                *product = phase_cell.iter().zip(cell).map(|(a, b)| a * b).sum();
             }
             (products[0], products[cells + 1]) = (products[1], products[cells]);
         }
     }
 
-    /// The mean of warped shapes, (q∘γ)√γ̇, of unit size.
+    /// Returns the mean of the warped shapes (q∘γ)√γ̇, scaled to unit norm.
     fn mean(&self, shapes: &Array2<f64>, paths: &Array2<usize>) -> Vec<f64> {
         let (cells, n_dofs) = (self.cells(), self.n_dofs);
         let mut mean = vec![0.0; cells * n_dofs];
@@ -306,7 +311,7 @@ impl Search {
             for (&steps, mean) in path.iter().zip(mean.chunks_exact_mut(STEPS * n_dofs)) {
                 let slope = &self.slopes[steps - self.slopes[0].steps];
                 let root = (steps as f64 / STEPS as f64).sqrt();
-                for (mean, &(cell, share)) in mean.chunks_exact_mut(n_dofs).zip(&slope.places) {
+                for (mean, &(cell, share)) in mean.chunks_exact_mut(n_dofs).zip(&slope.cells) {
                     let [near, far] = [0, 1].map(|next| (start + cell + next).clamp(1, cells) - 1);
                     for (d, mean) in mean.iter_mut().enumerate() {
                         let (near, far) = (shape[near * n_dofs + d], shape[far * n_dofs + d]);
@@ -316,7 +321,7 @@ impl Search {
                 start += steps;
             }
         }
-        to_unit_size(&mut mean, cells);
+        normalise(&mut mean, cells);
         mean
     }
 }

@@ -1,4 +1,4 @@
-//! Landmark registration: time between events that the user has marked is scaled to that of the nominal demonstration.
+//! Landmark registration: the time between given landmarks is scaled to that of the nominal demonstration.
 //!
 //! J. O. Ramsay, B. W. Silverman, Functional Data Analysis, Springer 2005, section 7.3.
 
@@ -9,26 +9,29 @@ use super::{Aligned, WarpingFunction};
 use crate::error::{Error, Result};
 use crate::validate::check_vector;
 
-/// Shortest segment, as a share of the duration.
-const SHORTEST: f64 = 1e-6;
+/// Shortest segment as a share of the duration.
+const MIN_SEGMENT: f64 = 1e-6;
 
 impl Aligned<'_> {
-    /// Divides the phase axis where the nominal demonstration has its events (M, E), and times all by theirs.
+    /// Divides the phase axis at the landmarks of the nominal demonstration, and registers all demonstrations to it.
+    ///
+    /// `landmarks` (M, E) are the times of the landmarks in seconds.
     ///
     /// # Errors
-    /// Another number of rows than there are demonstrations, no column, events out of order or outside a demonstration.
-    pub(super) fn register(&mut self, events: ArrayView2<f64>) -> Result<()> {
-        let (found, expected) = (events.nrows(), self.n_demos());
+    /// Another number of rows than demonstrations, no column, landmarks out of order or outside a demonstration.
+    pub(super) fn register(&mut self, landmarks: ArrayView2<f64>) -> Result<()> {
+        let (found, expected) = (landmarks.nrows(), self.n_demos());
         if found != expected {
             return Err(Error::Length { name: "landmarks", expected, found, per: "demonstration" });
         }
-        if events.ncols() == 0 {
+        if landmarks.ncols() == 0 {
             return Err(Error::Arguments(
                 "landmarks has no columns: pass their times (M, E) in seconds, with E of at least 1",
             ));
         }
-        let mut segment_durations = Array2::zeros((expected, events.ncols() + 1));
-        for (m, (row, mut segment_durations)) in events.rows().into_iter().zip(segment_durations.rows_mut()).enumerate()
+        let mut segment_durations = Array2::zeros((expected, landmarks.ncols() + 1));
+        for (m, (row, mut segment_durations)) in
+            landmarks.rows().into_iter().zip(segment_durations.rows_mut()).enumerate()
         {
             segment_durations.assign(&ArrayView1::from(
                 &self.segment_durations(m, &row.to_vec()).map_err(|error| error.in_demo(m))?,
@@ -46,37 +49,37 @@ impl Aligned<'_> {
         Ok(())
     }
 
-    /// Times the one demonstration by its events (E,) between the given breaks (E+2,).
+    /// Registers the only demonstration by its landmarks (E,) to the given breaks (E+2,).
     ///
     /// # Errors
-    /// Another number of events than there are breaks between segments, or as for a fit.
-    pub(crate) fn register_to(&mut self, breaks: &[f64], events: &[f64]) -> Result<()> {
-        check_vector("landmarks", events, breaks.len() - 2, "break between segments")?;
-        let segment_durations = self.segment_durations(0, events)?;
+    /// Another number of landmarks than breaks between segments, landmarks out of order or outside the demonstration.
+    pub(crate) fn register_to(&mut self, breaks: &[f64], landmarks: &[f64]) -> Result<()> {
+        check_vector("landmarks", landmarks, breaks.len() - 2, "break between segments")?;
+        let segment_durations = self.segment_durations(0, landmarks)?;
         self.warps[0] = Some(WarpingFunction::new(self.kind, breaks, &segment_durations));
         Ok(())
     }
 
-    /// The seconds (E+1,) before, between and after the events of demonstration `m`.
-    fn segment_durations(&self, m: usize, events: &[f64]) -> Result<Vec<f64>> {
+    /// Returns the segment durations (E+1,) of demonstration `m` in seconds.
+    fn segment_durations(&self, m: usize, landmarks: &[f64]) -> Result<Vec<f64>> {
         let clock = self.clocks[m];
         let start = match clock.ticks {
             Ticks::Even { .. } => 0.0,
             Ticks::Stamps(time) => time[0],
         };
         let end = start + clock.duration;
-        let mut before = start;
-        let mut segment_durations = Vec::with_capacity(events.len() + 1);
-        for (index, &time) in events.iter().enumerate() {
-            // Not a number is out of order too.
-            let in_order = time - before > SHORTEST * clock.duration && end - time > SHORTEST * clock.duration;
+        let mut previous = start;
+        let mut segment_durations = Vec::with_capacity(landmarks.len() + 1);
+        for (index, &time) in landmarks.iter().enumerate() {
+            // NaN compares as out of order.
+            let in_order = time - previous > MIN_SEGMENT * clock.duration && end - time > MIN_SEGMENT * clock.duration;
             if !in_order {
-                return Err(Error::Landmark { index, time, before, end });
+                return Err(Error::Landmark { index, time, before: previous, end });
             }
-            segment_durations.push(time - before);
-            before = time;
+            segment_durations.push(time - previous);
+            previous = time;
         }
-        segment_durations.push(end - before);
+        segment_durations.push(end - previous);
         Ok(segment_durations)
     }
 }

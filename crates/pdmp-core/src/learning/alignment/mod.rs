@@ -1,7 +1,7 @@
-//! Alignment of demonstrations (step 1 of Section 3.2): time scaling to a nominal one, resampled to C samples.
+//! Alignment of demonstrations (step 1 of Section 3.2): time scaling to a nominal one, and resampling to C samples.
 //!
-//! The paper scales time linearly. Repetitions with pauses need more: the phase axis is divided into segments, and each
-//! demonstration has its own time for each, its *timing*, found by a warp or given by landmarks.
+//! The paper scales time linearly. For repetitions that pause at different phases, the phase axis is divided into
+//! segments, and each demonstration has its own duration of each, estimated by a time warp or given by landmarks.
 
 mod elastic_warp;
 mod landmarks;
@@ -16,80 +16,78 @@ use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::template::{TimeWarp, WarpTemplate};
-use crate::numerics::smoothing_spline::{MIN_THINNED, Noise, Samples, Smoothing, pool};
+use crate::numerics::smoothing_spline::{MIN_DECIMATED, Noise, Samples, Smoothing, pooled};
 use crate::numerics::spline::{Knots, Splines};
 use crate::numerics::threads::Threads;
 use sample_times::{Clock, Ticks};
 
-/// Fewest steps of the aligned demonstrations, unless their number is given: each step of the nominal one is divided into
-/// as many as it takes. The target between a few samples, where a movement turns sharply, is more than they show.
-const FINE: usize = 150;
-/// Most samples after alignment.
+/// Smallest number of steps of the aligned demonstrations, unless their number of samples is given: the steps of the
+/// nominal demonstration are subdivided. A few samples do not resolve the target where a movement turns sharply.
+const MIN_STEPS: usize = 150;
+/// Largest number of samples after alignment.
 const MAX_SAMPLES: usize = 1_000_000;
 
-/// How demonstrations are read as samples of one movement.
+/// Settings of sampling, smoothing and alignment of demonstrations.
 #[derive(Clone, Debug)]
-pub struct Alignment {
-    /// From start to goal, or one cycle.
-    pub kind: Kind,
-    /// Sampling interval in seconds of demonstrations that carry none.
-    pub dt: Option<f64>,
-    /// Periods in seconds of time-stamped cycles: one for all, or one each; empty where the intervals give them.
-    pub period: Vec<f64>,
-    /// What is done about measurement noise.
-    pub smoothing: Smoothing,
-    /// Index of the nominal demonstration; otherwise the one of median duration.
-    pub nominal: Option<usize>,
-    /// Samples C; otherwise as many as the nominal demonstration has, and the same with equal parts of its steps where
-    /// these are fewer than 150.
-    pub n_samples: Option<usize>,
-    /// How time is scaled to that of the nominal demonstration.
-    pub time_scaling: TimeScaling,
+pub(crate) struct Alignment {
+    /// Discrete movements from start to goal, or cycles.
+    pub(crate) kind: Kind,
+    /// Sampling interval in seconds, for demonstrations that carry none.
+    pub(crate) dt: Option<f64>,
+    /// Periods in seconds of time-stamped cycles, one for all or one for each; empty where the sampling interval gives them.
+    pub(crate) period: Vec<f64>,
+    /// Smoothing of measurement noise.
+    pub(crate) smoothing: Smoothing,
+    /// Index of the nominal demonstration; otherwise that of median duration.
+    pub(crate) nominal: Option<usize>,
+    /// Number of samples C, from 4 to 1e6; otherwise that of the nominal demonstration, whose steps are subdivided equally
+    /// if there are fewer than 150.
+    pub(crate) n_samples: Option<usize>,
 }
 
-/// How the time of a demonstration is scaled to that of the nominal one.
+/// Scaling of the time of each demonstration to that of the nominal one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum TimeScaling {
-    /// By Tⁿ/Tᵐ throughout, as the paper does.
+    /// Linear scaling by Tⁿ/Tᵐ, as in the paper.
     #[default]
     Linear,
-    /// By the monotone warp that brings the demonstrations closest to each other.
+    /// Monotone time warp that aligns the shapes of the demonstrations.
     Warp(TimeWarp),
-    /// By the default warp, in fewer segments where a demonstration has fewer than 16 samples; in a fit with at least three
-    /// different contexts only if movements at contexts held out are foreseen better so, by more than the standard error,
-    /// and linearly otherwise.
+    /// Default warp, with fewer segments where a demonstration has fewer than 16 samples. In a fit with at least three
+    /// different contexts it is kept only if it lowers the cross-validation error over the contexts by more than the
+    /// standard error; otherwise scaling is linear.
     WarpIfBetter,
-    /// So that landmarks fall on those of the nominal demonstration: their times (M, E) in seconds, from the first sample
-    /// or of the time stamps.
+    /// Landmark registration: piecewise linear scaling between landmarks. Their times (M, E) are in seconds, from the
+    /// first sample or on the clock of the time stamps.
     Landmarks(Array2<f64>),
 }
 
-/// Demonstrations that can be read as samples of one phase, each when it is asked for.
+/// Demonstrations on a common phase axis, each of which is resampled on demand.
 #[derive(Clone, Debug)]
 pub(crate) struct Aligned<'a> {
     demos: &'a [Demonstration],
     clocks: Vec<Clock<'a>>,
     kind: Kind,
-    /// Measurement noise, which is smoothed away.
+    /// Measurement noise, which smoothing removes.
     pub(crate) noise: Noise,
-    /// Where time is not linear.
+    /// Warping functions (M,); `None` for linear time.
     warps: Vec<Option<WarpingFunction>>,
     /// Phases (K+1,) that divide the movement into segments.
     pub(crate) breaks: Vec<f64>,
-    /// Times (M, K) that the demonstrations spend in each segment, in seconds.
+    /// Durations (M, K) of the segments, in seconds.
     pub(crate) segment_durations: Array2<f64>,
     /// Index of the nominal demonstration.
     pub(crate) nominal: usize,
-    /// Samples C of each after alignment.
+    /// Number of samples C of each demonstration after alignment.
     pub(crate) n_samples: usize,
 }
 
 impl Alignment {
-    /// Reads the clocks of all demonstrations, whose time is linear until it is warped, and estimates their noise.
+    /// Returns the demonstrations with linear time scaling, and estimates their noise.
     ///
     /// # Errors
-    /// No demonstration, different DoFs, a missing rate or period, a bad nominal index or number of samples, a bad
-    /// cut-off.
+    /// No demonstration, different numbers of DoFs, a missing sampling interval or period, or a nominal index, number of
+    /// samples or cut-off out of range.
     pub(crate) fn align<'a>(&self, demos: &'a [Demonstration], threads: Threads) -> Result<Aligned<'a>> {
         let n_dofs = demos.first().ok_or(Error::NoDemonstrations)?.n_dofs();
         if !(self.period.len() <= 1 || self.period.len() == demos.len()) {
@@ -111,7 +109,7 @@ impl Alignment {
         let durations: Vec<f64> = clocks.iter().map(|clock| clock.duration).collect();
         let nominal = self.nominal_of(&durations)?;
         let steps = self.kind.steps(demos[nominal].n_samples());
-        let n_samples = self.n_samples.unwrap_or(self.kind.samples(steps * FINE.div_ceil(steps)));
+        let n_samples = self.n_samples.unwrap_or(self.kind.samples(steps * MIN_STEPS.div_ceil(steps)));
         if !(MIN_SAMPLES_PER_DEMONSTRATION..=MAX_SAMPLES).contains(&n_samples) {
             let value = n_samples as f64;
             return Err(Error::Range { name: "n_samples", value, allowed: "must lie between 4 and 1e6" });
@@ -124,19 +122,19 @@ impl Alignment {
         Ok(aligned)
     }
 
-    /// Estimates the measurement noise of demonstrations, in a pool of them.
+    /// Estimates the measurement noise from a pool of demonstrations.
     fn noise(&self, aligned: &Aligned, threads: Threads) -> Result<Noise> {
         if let Smoothing::CutOff { .. } = self.smoothing {
             for m in 0..aligned.n_demos() {
                 self.smoothing.check(&aligned.samples(m, &aligned.seconds(m))).map_err(|error| error.in_demo(m))?;
             }
         }
-        let pool: Vec<(usize, Vec<f64>)> = pool(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
+        let pool: Vec<(usize, Vec<f64>)> = pooled(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
         let samples: Vec<Samples> = pool.iter().map(|(m, time)| aligned.samples(*m, time)).collect();
-        Noise::of(self.smoothing, &samples, MIN_THINNED, threads)
+        Noise::estimate(self.smoothing, &samples, MIN_DECIMATED, threads)
     }
 
-    /// The demonstration of median duration: the lower one of two, the earlier one of equals.
+    /// Returns the given nominal index, or that of the lower median of the durations, the first of equals.
     fn nominal_of(&self, durations: &[f64]) -> Result<usize> {
         match self.nominal {
             Some(nominal) if nominal < durations.len() => Ok(nominal),
@@ -154,12 +152,12 @@ impl Alignment {
 }
 
 impl TimeScaling {
-    /// Scales time as it says; `unit` (D,) is what each DoF weighs, otherwise its range.
+    /// Scales the time of the demonstrations, and returns the template of a warp.
     ///
-    /// What the demonstrations were warped to is returned, so that others can be.
+    /// `unit` (D,) are the scales of the DoFs in the comparison; otherwise their ranges.
     ///
     /// # Errors
-    /// Settings out of range, landmarks out of order, no memory, or whatever `progress` returns.
+    /// Settings out of range, landmarks out of order, too little memory, or the error that `progress` returned.
     pub(crate) fn apply(
         &self,
         aligned: &mut Aligned,
@@ -172,39 +170,39 @@ impl TimeScaling {
             Self::Warp(warp) => aligned.warp(warp, unit, threads, progress).map(Some),
             Self::WarpIfBetter => {
                 let warp = TimeWarp::default();
-                let segments = warp.n_segments.min(aligned.most_segments());
+                let segments = warp.n_segments.min(aligned.max_segments());
                 aligned.warp(&TimeWarp { n_segments: segments, ..warp }, unit, threads, progress).map(Some)
             }
-            Self::Landmarks(times) => aligned.register(times.view()).map(|()| None),
+            Self::Landmarks(landmarks) => aligned.register(landmarks.view()).map(|()| None),
         }
     }
 }
 
 impl Aligned<'_> {
-    /// The same, read at another number of samples.
+    /// Changes the number of samples.
     pub(crate) fn resampled(self, n_samples: usize) -> Self {
         Self { n_samples, ..self }
     }
 
-    /// Demonstration `m` as it was given.
+    /// Returns demonstration `m` as recorded.
     pub(crate) fn demo(&self, m: usize) -> &Demonstration {
         &self.demos[m]
     }
 
-    /// Number of demonstrations M.
+    /// Returns the number of demonstrations M.
     pub(crate) fn n_demos(&self) -> usize {
         self.demos.len()
     }
 
-    /// Durations or periods (M,), in seconds.
+    /// Returns the durations or periods (M,) in seconds.
     pub(crate) fn durations(&self) -> Vec<f64> {
         self.segment_durations.sum_axis(Axis(1)).to_vec()
     }
 
-    /// Writes the positions of demonstration `m` (C·D, by rows), absolute.
+    /// Writes the resampled positions of demonstration `m` (C·D), in row-major order.
     ///
-    /// Time scaling by Tⁿ/Tᵐ puts sample c at the share c/(C−1) of the duration, or c/C of the period; what is warped is
-    /// read where its warping function is at that phase.
+    /// Linear scaling places sample c at the share c/(C−1) of the duration, or c/C of the period. A warped demonstration
+    /// is read at the time where its warping function has that phase.
     pub(crate) fn sample(&self, m: usize, position: &mut [f64]) {
         let Clock { ticks, extent, .. } = self.clocks[m];
         let steps = self.kind.steps(self.n_samples) as f64;
@@ -221,7 +219,7 @@ impl Aligned<'_> {
         }
     }
 
-    /// Writes the positions of demonstration `m` at times in its ticks, which do not decrease.
+    /// Writes the positions of demonstration `m` at non-decreasing times in units of its ticks.
     fn read(&self, m: usize, times: impl Iterator<Item = f64> + Clone, position: &mut [f64]) {
         let Clock { ticks, extent, .. } = self.clocks[m];
         let values = self.smoothed(m);
@@ -233,19 +231,19 @@ impl Aligned<'_> {
         Splines::through(knots, &values, self.demos[m].n_dofs()).sample(times, position);
     }
 
-    /// Samples of demonstration `m`, at the times of [`Aligned::seconds`].
+    /// Returns the samples of demonstration `m` at the times of [`Aligned::seconds`].
     fn samples<'a>(&'a self, m: usize, time: &'a [f64]) -> Samples<'a> {
         let period = (self.kind == Kind::Rhythmic).then_some(self.clocks[m].duration);
         Samples { time, period, values: self.demos[m].position() }
     }
 
-    /// Times of the samples of demonstration `m` (n,), in seconds from the first.
+    /// Returns the times of the samples of demonstration `m` (n,) in seconds from the first.
     fn seconds(&self, m: usize) -> Vec<f64> {
         let ticks = self.clocks[m].ticks;
         (0..self.demos[m].n_samples()).map(|c| ticks.at(c) * ticks.unit()).collect()
     }
 
-    /// The samples of demonstration `m` (n·D), smoothed where they are noisy.
+    /// Returns the samples of demonstration `m` (n·D), smoothed where they are noisy.
     fn smoothed(&self, m: usize) -> Cow<'_, [f64]> {
         let own = self.demos[m].position();
         if self.noise.cut_offs().iter().all(Option::is_none) {

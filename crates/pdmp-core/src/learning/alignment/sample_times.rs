@@ -1,4 +1,4 @@
-//! When the samples of a demonstration were taken.
+//! Sample times of a demonstration.
 
 use super::Alignment;
 use crate::demonstration::{Demonstration, Sampling};
@@ -6,26 +6,30 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::validate::{check_duration, check_positive};
 
-/// When the samples of a demonstration were taken, and how long it lasts.
+/// Sample times and duration of a demonstration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock<'a> {
     pub(super) ticks: Ticks<'a>,
-    /// Seconds from start to end, or to the next cycle.
+    /// Duration or period, in seconds.
     pub(super) duration: f64,
-    /// The same in the unit of the ticks.
+    /// Duration or period, in ticks.
     pub(super) extent: f64,
 }
 
+/// Unit in which sample times are counted.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Ticks<'a> {
-    /// Intervals of `dt` seconds, which are counted: what falls on a sample does so to the last bit.
+    /// Intervals of `dt` seconds. Samples have integer ticks, so that their times are exact.
     Even { dt: f64 },
-    /// Stamps in seconds, counted from the first.
+    /// Time stamps in seconds; ticks are seconds from the first.
     Stamps(&'a [f64]),
 }
 
 impl<'a> Clock<'a> {
-    /// The clock of a demonstration, whose rate and period are told where it does not know them.
+    /// Returns the clock of a demonstration; the alignment supplies a missing sampling interval, `period` the period.
+    ///
+    /// # Errors
+    /// A missing or invalid sampling interval or period, or a period of a discrete movement.
     pub(super) fn of(demo: &'a Demonstration, alignment: &Alignment, period: Option<f64>) -> Result<Self> {
         let n = demo.n_samples();
         let even = |dt: f64| {
@@ -40,13 +44,11 @@ impl<'a> Clock<'a> {
             }
             (Sampling::Unknown, None) => {
                 return Err(Error::Arguments(
-                    "no sampling interval: pass dt= in seconds, or demonstrations with time=",
+                    "no sampling interval: pass dt in seconds, or demonstrations with time stamps",
                 ));
             }
             (Sampling::Stamped { .. }, _) if alignment.kind == Kind::Rhythmic && period.is_none() => {
-                return Err(Error::Arguments(
-                    "a time-stamped cycle does not tell when the next one begins: pass period= in seconds",
-                ));
+                return Err(Error::Arguments("a time-stamped cycle has no known period: pass period in seconds"));
             }
             (Sampling::Stamped { time }, _) => {
                 let duration = time[n - 1] - time[0];
@@ -70,7 +72,7 @@ impl<'a> Clock<'a> {
 }
 
 impl Ticks<'_> {
-    /// Seconds that make one tick.
+    /// Returns the seconds per tick.
     pub(super) fn unit(&self) -> f64 {
         match *self {
             Ticks::Even { dt } => dt,
@@ -78,7 +80,7 @@ impl Ticks<'_> {
         }
     }
 
-    /// The tick of sample `c`.
+    /// Returns the tick of sample `c`.
     pub(super) fn at(&self, c: usize) -> f64 {
         match self {
             Ticks::Even { .. } => c as f64,

@@ -1,4 +1,4 @@
-//! All singular values, and the leading singular vectors, from the Gram matrix.
+//! Singular values and leading singular vectors from the eigendecomposition of the Gram matrix.
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -7,22 +7,28 @@ use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use super::{ACCURACY, PANEL, product, turned};
+use super::{ACCURACY, PANEL, product, projected};
 use crate::error::Result;
 
-/// Singular values below this share of σ₁ are not taken from the Gram matrix: an eigenvector is off by ε·(σ₁/σ)².
+/// Smallest ratio σ/σ₁ for which the Gram matrix is accurate enough: the error of an eigenvector is ε·(σ₁/σ)².
 pub(super) const SMALL: f64 = 1e-4;
 
-/// Eigenvectors (K, K) of A·Aᵀ for A (K, L), and the roots of its eigenvalues, in decreasing order; off by √(K·ε)·σ₁
-/// where they vanish. Nothing where the iteration does not converge.
+/// Largest sum of squared cosines between the rows of VᵀA: the scaled product then has eigenvalues above one half.
+const MAX_OFF_DIAGONAL: f64 = 0.1;
+
+/// Eigendecomposition of the Gram matrix A·Aᵀ for A (K, L).
 pub(super) struct Gram {
     matrix: Mat<f64>,
+    /// Eigenvectors (K, K) by ascending eigenvalues.
     pub(super) vectors: Mat<f64>,
+    /// Square roots of the eigenvalues in decreasing order, with an error of √(K·ε)·σ₁ where they vanish.
     pub(super) values: Vec<f64>,
 }
 
 impl Gram {
-    /// Half the work of a triangularisation, and all of it products. `progress` is asked every so often.
+    /// Decomposes A·Aᵀ; returns `None` if the iteration does not converge.
+    ///
+    /// `progress` is called at least once every 10⁹ multiplications.
     pub(super) fn of(wide: MatRef<f64>, progress: &mut dyn FnMut(f64) -> Result<()>) -> Result<Option<Self>> {
         let (k, length) = wide.shape();
         let most = (1_000_000_000 / (k * k)).max(1024);
@@ -48,12 +54,12 @@ impl Gram {
         Ok(Some(Self { matrix, vectors, values }))
     }
 
-    /// The triangle R with V·Rᵀ·R·Vᵀ = A·Aᵀ for the eigenvectors V, as exact as by reflections; nothing where they are
-    /// too far from singular vectors for that.
+    /// Returns the triangle R with V·Rᵀ·R·Vᵀ = A·Aᵀ for the eigenvectors V, as accurate as by reflections, or `None` if V
+    /// is too far from the singular vectors.
     ///
-    /// VᵀA has all but orthogonal rows b: of P = VᵀA·AᵀV, scaled by their lengths to a diagonal of ones, no eigenvalue
-    /// is far from one, so that it has a Cholesky factor to the last digits however much the lengths differ
-    /// (CholeskyQR2: Yamamoto, Nakatsukasa, Yanagisawa, Fukaya, ETNA 44 (2015) 306–326).
+    /// The rows b of VᵀA are nearly orthogonal. P = VᵀA·AᵀV, scaled by their lengths to a unit diagonal, has eigenvalues
+    /// close to one, and so a Cholesky factor to full accuracy, however much the lengths differ (CholeskyQR2: Yamamoto,
+    /// Nakatsukasa, Yanagisawa, Fukaya, ETNA 44 (2015) 306–326).
     pub(super) fn triangle(
         &self,
         wide: MatRef<f64>,
@@ -63,14 +69,14 @@ impl Gram {
         let (mut products, mut part) = (Mat::zeros(k, k), vec![0.0; k * PANEL.min(length)]);
         for start in (0..length).step_by(PANEL) {
             progress(start as f64 / length as f64)?;
-            let rows = turned(&mut part, self.vectors.as_ref(), wide.subcols(start, PANEL.min(length - start)));
+            let rows = projected(&mut part, self.vectors.as_ref(), wide.subcols(start, PANEL.min(length - start)));
             add_square(products.as_mut(), rows);
         }
         let lengths: Vec<f64> = (0..k).map(|j| products[(j, j)].sqrt()).collect();
         let mut scaled = Mat::from_fn(k, k, |i, j| products[(i.max(j), i.min(j))] / (lengths[i] * lengths[j]));
         let off: f64 = (0..k).flat_map(|j| (0..j).map(move |i| (i, j))).map(|at| scaled[at].powi(2)).sum();
-        // Where a row vanishes, this is no number.
-        if off.is_nan() || off > 0.1 {
+        // NaN where a row vanishes.
+        if off.is_nan() || off > MAX_OFF_DIAGONAL {
             return Ok(None);
         }
         let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(k, Par::Seq, Default::default()));
@@ -80,8 +86,8 @@ impl Gram {
         Ok(factor.is_ok().then(|| Mat::from_fn(k, k, upper)))
     }
 
-    /// The first `kept` vectors, if the leading J among them are singular vectors: not below [`SMALL`]·σ₁, and with
-    /// measured residuals of at most [`ACCURACY`]·σ₁.
+    /// Returns the first `kept` vectors, or `None` if one of the leading J is inaccurate: its singular value is below
+    /// [`SMALL`]·σ₁, or its measured residual above [`ACCURACY`]·σ₁.
     pub(super) fn leading(&self, n_styles: usize, kept: usize) -> Option<Mat<f64>> {
         let (first, values) = (self.values[0], &self.values[..n_styles]);
         let vectors = self.vectors.as_ref().reverse_cols().subcols(0, kept).to_owned();
@@ -95,7 +101,7 @@ impl Gram {
     }
 }
 
-/// Adds A·Aᵀ to the lower half of a square.
+/// Adds A·Aᵀ to the lower triangle of a square matrix.
 pub(super) fn add_square(square: MatMut<f64>, a: MatRef<f64>) {
     let (lower, dense) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
     matmul(square, lower, Accum::Add, a, dense, a.transpose(), dense, 1.0, Par::Seq);

@@ -1,7 +1,7 @@
-//! Orthogonalisation by Householder reflections, which no loss of rank disturbs.
+//! QR decomposition by Householder reflections, for matrices of any rank.
 //!
-//! faer's own QR takes a column for dependent, and drops what is left of it, below 16·n·ε of its length: for targets
-//! of 28 000 values that is 1e-10. Here nothing is dropped.
+//! faer's own QR treats a column as dependent, and drops its remainder, below 16·n·ε of its norm: 1e-10 for targets of
+//! 28 000 values. Here no remainder is dropped.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::householder::{
@@ -12,7 +12,7 @@ use faer::linalg::matmul::{matmul, triangular};
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, Conj, Mat, MatMut, MatRef, Par};
 
-/// Orthonormal columns Q and the triangle R with Q·R = A, for A with no fewer rows than columns.
+/// Returns orthonormal columns Q and the triangle R with Q·R = A, for A with no fewer rows than columns.
 pub(super) fn orthonormal(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
     let (rows, columns) = a.shape();
     let mut factor = Mat::zeros(columns, columns);
@@ -31,8 +31,9 @@ pub(super) fn orthonormal(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
     (q, r)
 }
 
-/// The triangle R (K, K) with RᵀR = A·Aᵀ for A (K, L), block of columns by block of columns, so that no copy of A is
-/// made. `progress` is asked before each block.
+/// Returns the triangle R (K, K) with RᵀR = A·Aᵀ for A (K, L), by blocks of columns, so that A is not copied.
+///
+/// `progress` is called before each block.
 pub(super) fn triangle<E>(wide: MatRef<f64>, progress: &mut dyn FnMut(f64) -> Result<(), E>) -> Result<Mat<f64>, E> {
     let (k, length) = wide.shape();
     let most = (4 * k).max(2048).min(length);
@@ -60,8 +61,9 @@ fn upper(a: MatRef<f64>) -> Mat<f64> {
     Mat::from_fn(a.ncols(), a.ncols(), |i, j| if i <= j { a[(i, j)] } else { 0.0 })
 }
 
-/// A becomes R above the diagonal and the reflections below; half of the columns at a time, so that nearly all work is
-/// products of matrices (Elmroth and Gustavson 2000).
+/// Overwrites A with R above the diagonal and the reflections below.
+///
+/// Recursion on halves of the columns, so that nearly all work is matrix products (Elmroth and Gustavson 2000).
 fn reflect(mut a: MatMut<f64>, mut factor: MatMut<f64>, stack: &mut MemStack) {
     let columns = a.ncols();
     if columns == 1 {
@@ -84,7 +86,7 @@ fn reflect(mut a: MatMut<f64>, mut factor: MatMut<f64>, stack: &mut MemStack) {
     );
     let mut below = right.subrows_mut(half, left.nrows() - half);
     reflect(below.rb_mut(), second, stack);
-    // The reflections of both halves as one: the products of their vectors.
+    // Products of the reflection vectors couple both halves into one block reflection.
     let (left_top, left_rest) = left.rb().subrows(half, left.nrows() - half).split_at_row(columns - half);
     let (top, rest) = below.rb().split_at_row(columns - half);
     let (dense, unit) = (triangular::BlockStructure::Rectangular, triangular::BlockStructure::UnitTriangularLower);

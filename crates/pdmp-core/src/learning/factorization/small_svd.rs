@@ -1,4 +1,4 @@
-//! The singular value decomposition of a small square matrix, which always succeeds.
+//! Singular value decomposition of a small square matrix, with a fallback that always converges.
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -7,7 +7,7 @@ use faer::{ColRef, Mat, MatRef, Par};
 
 use super::householder::orthonormal;
 
-/// A = U·diag(σ)·Vᵀ, σ decreasing.
+/// Decomposition A = U·diag(σ)·Vᵀ with decreasing σ.
 pub(super) struct Svd {
     pub(super) u: Mat<f64>,
     pub(super) sigma: Vec<f64>,
@@ -15,27 +15,26 @@ pub(super) struct Svd {
 }
 
 impl Svd {
-    /// By bidiagonalisation; where its iteration does not converge, of the transpose; and else by rotations.
+    /// Decomposes a matrix by bidiagonalisation, or by Jacobi rotations if that iteration does not converge.
     pub(super) fn of(a: MatRef<f64>) -> Self {
         let largest = largest(a);
         if largest == 0.0 {
             let (u, v) = (Mat::identity(a.nrows(), a.ncols()), Mat::identity(a.ncols(), a.ncols()));
             return Self { u, sigma: vec![0.0; a.ncols()], v };
         }
-        // None of them scales its input; a power of two changes no digit.
+        // Neither method scales its input; division by a power of two is exact.
         let scale = largest.log2().floor().exp2();
         let scaled = Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] / scale);
-        let found = Self::bidiagonal(scaled.as_ref())
-            .or_else(|| Self::bidiagonal(scaled.transpose()).map(|Self { u, sigma, v }| Self { u: v, sigma, v: u }));
-        let Self { u, sigma, v } = found.unwrap_or_else(|| Self::rotated(scaled));
+        let Self { u, sigma, v } = Self::bidiagonal(scaled.as_ref()).unwrap_or_else(|| Self::rotated(scaled));
         Self { u, sigma: sigma.into_iter().map(|s| s * scale).collect(), v }
     }
 
+    /// Decomposes a matrix by bidiagonalisation; `None` if the result is not sound.
     pub(super) fn bidiagonal(a: MatRef<f64>) -> Option<Self> {
         let k = a.nrows();
         let (mut u, mut sigma, mut v) = (Mat::zeros(k, k), Diag::zeros(k), Mat::zeros(k, k));
         let thin = ComputeSvdVectors::Thin;
-        // One thread, named here: faer's own default belongs to the whole process.
+        // One thread, explicitly: faer's default is a setting of the whole process.
         let par = Par::Seq;
         let mut memory = MemBuffer::new(svd_scratch::<f64>(k, k, thin, thin, par, Default::default()));
         let stack = MemStack::new(&mut memory);
@@ -45,13 +44,14 @@ impl Svd {
         sound.then_some(Self { u, sigma, v })
     }
 
-    /// Jacobi's rotations of pairs of columns until all are orthogonal (Hestenes 1958): slow, and without a way to
-    /// fail, as every rotation brings the columns closer to it, and the number of sweeps is bounded.
+    /// Decomposes a matrix by one-sided Jacobi rotations of pairs of columns until all are orthogonal (Hestenes 1958).
+    ///
+    /// Slow, but every rotation reduces the inner products, and the number of sweeps is bounded.
     pub(super) fn rotated(mut a: Mat<f64>) -> Self {
         let k = a.ncols();
         let mut v = Mat::identity(k, k);
         for _ in 0..60 {
-            let mut still = true;
+            let mut converged = true;
             for q in 1..k {
                 for p in 0..q {
                     let (x, y) = (a.col(p), a.col(q));
@@ -59,7 +59,7 @@ impl Svd {
                     if xy.abs() <= 1e-15 * (xx * yy).sqrt() || xy.abs() < f64::MIN_POSITIVE {
                         continue;
                     }
-                    still = false;
+                    converged = false;
                     let zeta = (yy - xx) / (2.0 * xy);
                     let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
                     let cosine = 1.0 / tangent.hypot(1.0);
@@ -67,7 +67,7 @@ impl Svd {
                     rotate(&mut v, p, q, cosine, cosine * tangent);
                 }
             }
-            if still {
+            if converged {
                 break;
             }
         }
@@ -75,7 +75,7 @@ impl Svd {
         let mut order: Vec<usize> = (0..k).collect();
         order.sort_by(|&i, &j| norms[j].total_cmp(&norms[i]));
         let sorted = |matrix: &Mat<f64>| Mat::from_fn(k, k, |i, j| matrix[(i, order[j])]);
-        // Columns that vanish have no direction of their own; in decreasing order the others keep theirs.
+        // Orthonormalisation in decreasing order gives zero columns a direction, and keeps that of the others.
         let (mut u, r) = orthonormal(sorted(&a));
         for j in (0..k).filter(|&j| r[(j, j)] < 0.0) {
             u.col_mut(j).iter_mut().for_each(|x| *x = -*x);
@@ -96,7 +96,7 @@ fn rotate(matrix: &mut Mat<f64>, p: usize, q: usize, cosine: f64, sine: f64) {
     }
 }
 
-/// Largest magnitude, infinite where an element is not a number.
+/// Returns the largest magnitude; infinity if an element is NaN.
 fn largest(a: MatRef<f64>) -> f64 {
     let magnitudes = a.col_iter().flat_map(|column| column.iter().map(|x| x.abs()));
     magnitudes.fold(0.0, |most, x| if x.is_nan() { f64::INFINITY } else { most.max(x) })

@@ -13,10 +13,10 @@ fn of(targets: &Array2<f64>, styles: Truncation) -> Factors {
     Factors::of(targets.view(), styles, &mut go).unwrap()
 }
 
-/// Every factor, by the way that cannot fail.
+/// Computes every factor to full accuracy.
 fn exact(targets: &Array2<f64>) -> Factors {
-    let library = Library::of(targets.view()).unwrap().unwrap();
-    library.exact(Truncation::Rank(targets.nrows().min(targets.ncols())), &mut go).unwrap()
+    let scaled = ScaledTargets::of(targets.view()).unwrap().unwrap();
+    scaled.exact(Truncation::Rank(targets.nrows().min(targets.ncols())), &mut go).unwrap()
 }
 
 fn norm(a: &Array2<f64>) -> f64 {
@@ -24,7 +24,7 @@ fn norm(a: &Array2<f64>) -> f64 {
     if largest == 0.0 { 0.0 } else { largest * a.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt() }
 }
 
-/// Columns as orthonormal as rounding allows, by modified Gram-Schmidt, twice.
+/// Returns columns that are orthonormal to rounding, by modified Gram-Schmidt, twice.
 fn orthonormal(rows: usize, columns: usize, seed: f64) -> Array2<f64> {
     let mut q = Array2::from_shape_fn((rows, columns), |(i, j)| {
         ((i as f64 + seed) * 12.9898 + (j as f64 + 1.0) * 78.233).sin() * 43758.5453 % 1.0
@@ -43,7 +43,7 @@ fn orthonormal(rows: usize, columns: usize, seed: f64) -> Array2<f64> {
     q
 }
 
-/// Q₁·diag(σ)·Q₂ᵀ.
+/// Returns Q₁·diag(σ)·Q₂ᵀ.
 fn matrix(rows: usize, columns: usize, sigma: &[f64]) -> Array2<f64> {
     let right = orthonormal(columns, sigma.len(), 0.7);
     (orthonormal(rows, sigma.len(), 0.3) * Array1::from_vec(sigma.to_vec())).dot(&right.t())
@@ -53,8 +53,8 @@ fn decaying(n: usize, ratio: f64) -> Vec<f64> {
     (0..n).map(|k| ratio.powi(k as i32)).collect()
 }
 
-/// What is claimed of all factors: S orthonormal, signs fixed, F_basis = SᵀF with orthogonal rows as long as the
-/// singular values, and the error no smaller than it is, nor much larger.
+/// Asserts the claims about all factors: S is orthonormal with fixed signs, the rows of F_basis = SᵀF are orthogonal and
+/// as long as the singular values, and the stated error bounds the truncation error closely.
 fn check(targets: &Array2<f64>, factors: &Factors) {
     let Factors { styles, basis, singular_values, error } = factors;
     let n_styles = styles.ncols();
@@ -81,8 +81,8 @@ fn check(targets: &Array2<f64>, factors: &Factors) {
     assert!(left <= error + 1e-13 * size && *error <= left + 1e-6 * size, "{left:e} {error:e}");
 }
 
-/// The singular values are those that the matrix was made of, by each way, whatever its shape and scale, also where
-/// they fall over sixteen decades, vanish or coincide.
+/// The singular values are those of the construction for any shape and scale, also where they span sixteen decades,
+/// vanish or coincide.
 #[test]
 fn singular_values_are_those_of_the_construction() {
     let cases =
@@ -96,7 +96,7 @@ fn singular_values_are_those_of_the_construction() {
                     check(&targets, &factors);
                     for (k, found) in factors.singular_values.iter().enumerate() {
                         let expected = sigma.get(k).copied().unwrap_or(0.0);
-                        // Beyond J the Gram matrix knows half the digits.
+                        // Beyond J the Gram matrix gives half the digits.
                         let digits = if k < sigma.len() { digits } else { digits.max(1e-8) };
                         assert!(
                             (found / scale - expected).abs() < digits * sigma[0] * 4.0,
@@ -109,7 +109,7 @@ fn singular_values_are_those_of_the_construction() {
     }
 }
 
-/// Every size of work meets the same claims: few long rows, many short ones, one row, one column.
+/// Few long rows, many short ones, one row and one column are factorised.
 #[test]
 fn all_shapes_are_factorised() {
     for (rows, columns) in [(1, 1), (1, 9), (9, 1), (2, 1), (5, 4000), (4000, 5), (70, 80), (80, 70), (130, 900)] {
@@ -122,9 +122,9 @@ fn all_shapes_are_factorised() {
     }
 }
 
-/// Repeated demonstrations have one style; DoFs at rest keep targets of exactly zero; all at rest, all is zero.
+/// Repeated demonstrations have one style, and DoFs at rest keep targets of exactly zero.
 #[test]
-fn degenerate_libraries_are_factorised() {
+fn degenerate_targets_are_factorised() {
     let row = Array1::from_shape_fn(500, |j| if j % 7 == 3 { 0.0 } else { (j as f64).sin() });
     for rows in [1, 2, 30, 600] {
         let targets = row.broadcast((rows, 500)).unwrap().to_owned();
@@ -143,14 +143,14 @@ fn degenerate_libraries_are_factorised() {
     }
 }
 
-/// The few styles of a large library, from products with it alone, are those of the full decomposition.
+/// The leading factors of many demonstrations by Krylov subspaces are those of the full decomposition.
 #[test]
 fn few_leading_factors_are_those_of_all() {
     for (rows, columns) in [(300, 500), (500, 300), (260, 2000)] {
         for sigma in [decaying(260, 0.8), decaying(260, 0.2), vec![3.0, 2.0, 1.0, 0.5, 0.2], decaying(12, 1e-3)] {
             let targets = matrix(rows, columns, &sigma);
             let (few, all) = (of(&targets, Truncation::Rank(5)), exact(&targets));
-            assert_eq!(few.singular_values.len(), 5, "not by the leading way");
+            assert_eq!(few.singular_values.len(), 5, "not by Krylov subspaces");
             check(&targets, &few);
             for j in 0..5 {
                 assert!((few.singular_values[j] - all.singular_values[j]).abs() < 1e-10 * sigma[0]);
@@ -170,9 +170,9 @@ fn few_leading_factors_are_those_of_all() {
     }
 }
 
-/// Where the spectrum hardly falls or has no gap after J, the work goes to a slower way and the error is still right.
+/// For spectra that decay slowly or have no gap after J, a slower method is used and the error stays correct.
 #[test]
-fn slow_and_clustered_spectra_end_well() {
+fn slow_and_clustered_spectra_are_factorised() {
     let (rows, columns) = (300, 400);
     let slow: Vec<f64> = (0..300).map(|k| 1.0 - k as f64 * 1e-3).collect();
     let flat = vec![1.0; 300];
@@ -214,9 +214,9 @@ fn slow_and_clustered_spectra_end_well() {
     }
 }
 
-/// By the share of the spectrum as many are kept as the exact singular values ask for, and they are accurate.
+/// The share rule keeps as many styles as the exact singular values require, and they are accurate.
 #[test]
-fn the_share_of_the_spectrum_decides() {
+fn the_share_rule_follows_the_exact_singular_values() {
     for (rows, columns) in [(100, 700), (400, 90)] {
         for ratio in [0.1, 0.5, 0.9, 0.99] {
             let sigma = decaying(90, ratio);
@@ -224,7 +224,7 @@ fn the_share_of_the_spectrum_decides() {
             for share in [0.5, 0.9, 0.999] {
                 let factors = of(&targets, Truncation::Share(share));
                 check(&targets, &factors);
-                assert_eq!(factors.styles.ncols(), leading(&sigma, share));
+                assert_eq!(factors.styles.ncols(), Truncation::Share(share).among(&sigma, rows));
                 assert_eq!(factors.singular_values.len(), rows.min(columns));
                 for (found, expected) in factors.singular_values.iter().zip(&sigma) {
                     assert!((found - expected).abs() < 2e-8);
@@ -234,19 +234,14 @@ fn the_share_of_the_spectrum_decides() {
     }
 }
 
-/// Each way to the decomposition of a small matrix holds by itself.
+/// Both methods for small matrices return sound decompositions.
 #[test]
-fn every_fallback_decomposes() {
+fn both_methods_decompose_small_matrices() {
     for k in [1, 2, 3, 17, 60] {
         for sigma in [vec![1.0; k], decaying(k, 0.3), decaying(k.div_ceil(2), 1e-2), vec![0.0; k]] {
             let square = matrix(k, k, &sigma);
             let a = Mat::from_fn(k, k, |i, j| square[[i, j]]);
-            for found in [
-                Some(Svd::of(a.as_ref())),
-                Some(Svd::rotated(a.clone())),
-                Svd::bidiagonal(a.transpose()).map(|Svd { u, sigma, v }| Svd { u: v, sigma, v: u }),
-            ] {
-                let Svd { u, sigma: values, v } = found.unwrap();
+            for Svd { u, sigma: values, v } in [Svd::of(a.as_ref()), Svd::rotated(a.clone())] {
                 let close = |a: &Mat<f64>, b: &Mat<f64>| (a - b).norm_l2() < 1e-13 * k as f64;
                 let eye = Mat::<f64>::identity(k, k);
                 assert!(close(&(u.transpose() * &u), &eye) && close(&(v.transpose() * &v), &eye));
@@ -258,7 +253,7 @@ fn every_fallback_decomposes() {
     }
 }
 
-/// A triangle R of many columns' blocks has RᵀR = A·Aᵀ, and Q·R is the matrix.
+/// The triangle R by blocks of columns has RᵀR = A·Aᵀ, and Q·R is the matrix.
 #[test]
 fn reflections_keep_the_products() {
     for (k, length) in [(1, 1), (1, 5000), (3, 3), (20, 7000), (33, 2049), (64, 64)] {
@@ -271,7 +266,7 @@ fn reflections_keep_the_products() {
     }
 }
 
-/// The Gram matrix is not trusted with what it cannot resolve.
+/// The Gram matrix is not used for singular values that it cannot resolve.
 #[test]
 fn small_singular_values_are_not_taken_from_the_gram_matrix() {
     let a = matrix(10, 200, &decaying(10, 0.1));
@@ -280,20 +275,20 @@ fn small_singular_values_are_not_taken_from_the_gram_matrix() {
     assert!(gram.leading(3, 10).is_some() && gram.leading(5, 10).is_none());
 }
 
-/// Whoever is asked may end every way, between any two passes.
+/// Every method can be cancelled between any two passes.
 #[test]
-fn factorising_can_be_interrupted() {
+fn a_factorisation_can_be_cancelled() {
     let targets = matrix(300, 400, &decaying(300, 0.99));
     for styles in [Truncation::Rank(5), Truncation::Rank(300), Truncation::Share(0.9)] {
-        let mut asked = 0;
+        let mut reports = 0;
         Factors::of(targets.view(), styles, &mut |share| {
             assert!((0.0..=1.0).contains(&share));
-            asked += 1;
+            reports += 1;
             Ok(())
         })
         .unwrap();
-        assert!(asked > 0);
-        for last in 0..asked {
+        assert!(reports > 0);
+        for last in 0..reports {
             let mut count = 0;
             let mut stop = |_| {
                 count += 1;
@@ -304,15 +299,15 @@ fn factorising_can_be_interrupted() {
     }
 }
 
-/// The same bits every time, and for a matrix whatever the order of its elements in memory.
+/// Results are equal bit for bit in every run and for every memory order of the targets.
 #[test]
-fn the_answer_is_always_the_same() {
+fn results_are_reproducible() {
     for sigma in [decaying(300, 0.7), decaying(300, 0.99)] {
         let targets = matrix(300, 400, &sigma);
-        let turned = targets.t().as_standard_layout().into_owned();
+        let transposed = targets.t().as_standard_layout().into_owned();
         for styles in [Truncation::Rank(5), Truncation::Share(0.9)] {
             let first = of(&targets, styles);
-            for again in [of(&targets, styles), Factors::of(turned.t(), styles, &mut go).unwrap()] {
+            for again in [of(&targets, styles), Factors::of(transposed.t(), styles, &mut go).unwrap()] {
                 assert_eq!(
                     (&first.styles, &first.basis, &first.singular_values),
                     (&again.styles, &again.basis, &again.singular_values)
@@ -322,18 +317,8 @@ fn the_answer_is_always_the_same() {
     }
 }
 
-/// J is the smallest number of singular values above the share, and 1 where all targets vanish.
 #[test]
-fn spectrum_rule_is_the_papers() {
-    assert_eq!(leading(&[8.0, 1.5, 0.5], 0.9), 2);
-    assert_eq!(leading(&[9.0, 1.0], 0.9), 2);
-    assert_eq!(leading(&[9.1, 0.9], 0.9), 1);
-    assert_eq!(leading(&[3.0, 2.0, 0.0], 1.0), 2);
-    assert_eq!(leading(&[0.0, 0.0], 0.9), 1);
-}
-
-#[test]
-fn style_counts_outside_the_data_are_refused() {
+fn numbers_of_styles_out_of_range_are_rejected() {
     let targets = matrix(5, 40, &decaying(5, 0.5));
     for count in [Truncation::Rank(0), Truncation::Rank(6), Truncation::Share(0.0), Truncation::Share(f64::NAN)] {
         assert!(Factors::of(targets.view(), count, &mut go).is_err());
@@ -341,7 +326,7 @@ fn style_counts_outside_the_data_are_refused() {
 }
 
 #[test]
-fn targets_that_are_not_numbers_are_refused() {
+fn targets_that_are_not_finite_are_rejected() {
     for value in [f64::NAN, f64::INFINITY, -1e151] {
         let mut targets = Array2::ones((5, 40));
         targets[[3, 7]] = value;
@@ -372,10 +357,10 @@ proptest! {
     }
 }
 
-/// The triangle from the Gram matrix has the singular values of the construction as reflections do, and the factors are
-/// as exact; where they fall too far there may be none.
+/// The triangle of the second Gram pass has the singular values of the construction, and its factors are as accurate as
+/// those of reflections; singular values that fall too far may have none.
 #[test]
-fn graded_libraries_have_a_triangle_of_products() {
+fn second_gram_pass_is_as_accurate_as_reflections() {
     let cases = [
         vec![1.0; 6],
         decaying(6, 0.1),
@@ -386,14 +371,14 @@ fn graded_libraries_have_a_triangle_of_products() {
     ];
     for sigma in cases {
         let targets = matrix(sigma.len(), 3000, &sigma);
-        let library = Library::of(targets.view()).unwrap().unwrap();
-        let gram = Gram::of(library.wide(), &mut go).unwrap().unwrap();
-        let Some(triangle) = gram.triangle(library.wide(), &mut go).unwrap() else {
+        let scaled = ScaledTargets::of(targets.view()).unwrap().unwrap();
+        let gram = Gram::of(scaled.wide(), &mut go).unwrap().unwrap();
+        let Some(triangle) = gram.triangle(scaled.wide(), &mut go).unwrap() else {
             assert!(sigma[sigma.len() - 1] < 1e-8, "{sigma:?}");
             continue;
         };
         let n_styles = Truncation::Rank(sigma.len());
-        let factors = library.of_triangle(n_styles, triangle.as_ref(), Some(gram.vectors.as_ref())).unwrap();
+        let factors = scaled.of_triangle(n_styles, triangle.as_ref(), Some(gram.vectors.as_ref())).unwrap();
         check(&targets, &factors);
         for (j, sigma) in sigma.iter().enumerate() {
             assert!((factors.singular_values[j] - sigma).abs() < 1e-14);
@@ -403,13 +388,13 @@ fn graded_libraries_have_a_triangle_of_products() {
     }
 }
 
-/// Where a demonstration stands still, its direction has no image whose length could be divided by.
+/// A row of zeros has no direction, and so no triangle by the second Gram pass.
 #[test]
 fn vanishing_rows_have_no_triangle_of_products() {
     let mut targets = matrix(6, 3000, &[1.0; 6]);
     targets.row_mut(2).fill(0.0);
-    let library = Library::of(targets.view()).unwrap().unwrap();
-    let gram = Gram::of(library.wide(), &mut go).unwrap().unwrap();
-    assert!(gram.triangle(library.wide(), &mut go).unwrap().is_none());
+    let scaled = ScaledTargets::of(targets.view()).unwrap().unwrap();
+    let gram = Gram::of(scaled.wide(), &mut go).unwrap().unwrap();
+    assert!(gram.triangle(scaled.wide(), &mut go).unwrap().is_none());
     check(&targets, &of(&targets, Truncation::Rank(6)));
 }

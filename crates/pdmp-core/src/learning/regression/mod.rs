@@ -1,4 +1,4 @@
-//! Regression of the basis targets over the clock (step 4 of Section 3.2): one regressor a file.
+//! Regression of the basis targets over the clock (step 4 of Section 3.2).
 
 mod gp;
 mod hyperparameter_search;
@@ -14,20 +14,27 @@ pub use self::ngnet::{NGnet, NGnetRegression};
 use crate::error::{Error, Result};
 use crate::validate::check_positive;
 
-/// The stretch of the clock over which the landscape is learnt.
+/// Domain of the clock on which the landscape is learnt.
+///
+/// ```
+/// use pdmp_core::learning::regression::Domain;
+///
+/// assert_eq!(Domain::Interval { end: 2.0 }.extent(), 2.0);
+/// assert_eq!(Domain::Circle.extent(), std::f64::consts::TAU);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Domain {
-    /// [0, end], discrete movements.
+    /// Interval [0, end] of discrete movements.
     Interval {
         /// Clock at the end of the demonstrated movement.
         end: f64,
     },
-    /// [0, 2π) with its ends joined, rhythmic movements.
+    /// Circle [0, 2π) of rhythmic movements.
     Circle,
 }
 
 impl Domain {
-    /// Its length: `end`, or one turn.
+    /// Returns the length of the domain: `end`, or 2π.
     pub fn extent(self) -> f64 {
         match self {
             Domain::Interval { end } => end,
@@ -36,12 +43,12 @@ impl Domain {
     }
 }
 
-/// A fitted function of the clock with several outputs, which several threads may read.
+/// Fitted function of the clock with several outputs, which can be evaluated from several threads.
 pub trait Regression: fmt::Debug + Sync {
     /// Writes the outputs and their derivatives with respect to `u`, each (outputs,).
     fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]);
 
-    /// The same at every one of `u` (n,), each (n, outputs) by rows.
+    /// Writes the outputs and their derivatives at each of `u` (n,), each (n, outputs) in row-major order.
     fn evaluate_all(&self, u: &[f64], values: &mut [f64], slopes: &mut [f64]) {
         let n_outputs = values.len() / u.len().max(1);
         let rows = values.chunks_exact_mut(n_outputs.max(1)).zip(slopes.chunks_exact_mut(n_outputs.max(1)));
@@ -50,11 +57,25 @@ pub trait Regression: fmt::Debug + Sync {
         }
     }
 
-    /// What was chosen, in one line.
+    /// Returns a one-line description of the regressor and its hyperparameters.
     fn describe(&self) -> String;
 }
 
-/// Which function approximator learns the landscape.
+/// Function approximator of the landscape.
+///
+/// ```
+/// # use ndarray::Array2;
+/// use pdmp_core::learning::regression::{Basis, Domain, NGnet};
+///
+/// let u: Vec<f64> = (0..50).map(|i| f64::from(i) / 49.0).collect();
+/// let targets = Array2::from_shape_fn((50, 1), |(i, _)| (3.0 * u[i]).sin());
+/// let basis = Basis::NGnet(NGnet::default());
+/// let regression = basis.regress(Domain::Interval { end: 1.0 }, &u, targets.view(), &mut |_| Ok(()))?;
+/// let (mut value, mut slope) = ([0.0], [0.0]);
+/// regression.evaluate(0.5, &mut value, &mut slope);
+/// assert!((value[0] - 1.5f64.sin()).abs() < 1e-3);
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Basis {
     /// Gaussian process regression, the paper's choice.
@@ -64,13 +85,14 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// Regresses the landscape's `targets` (C, outputs) on the clock `u` (C,): a Gaussian process within
-    /// [`NoiseBound::LANDSCAPE`].
+    /// Regresses the landscape's `targets` (C, outputs) on the clock `u` (C,), which must not decrease.
     ///
-    /// `progress` is asked now and then whether to go on, with the share done in [0, 1].
+    /// The noise of a Gaussian process is bounded by [`NoiseBound::LANDSCAPE`]. `progress` is called periodically with
+    /// the completed fraction; an error it returns cancels the regression.
     ///
     /// # Errors
-    /// An ill-posed problem, or an interruption through `progress`.
+    /// Settings out of range, arrays that do not match, values that are not finite, an ill-posed problem, or the error
+    /// that `progress` returned.
     pub fn regress(
         &self,
         domain: Domain,
@@ -85,7 +107,7 @@ impl Basis {
     }
 }
 
-/// Checks what every regressor is given.
+/// Checks the arguments that all regressors share.
 fn check(domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<()> {
     if u.is_empty() {
         return Err(Error::Arguments("u is empty: at least one sample is needed"));
@@ -107,7 +129,7 @@ fn check(domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<()> {
     }
 }
 
-/// Largest magnitude of the values, or 1 where all are zero.
+/// Returns the largest magnitude of the values, or 1 where all are zero.
 ///
 /// Divided by it, values of any magnitude can be squared and summed.
 fn magnitude<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
@@ -121,7 +143,7 @@ mod tests {
     use ndarray::{Array2, array};
 
     #[test]
-    fn malformed_input_is_refused_by_every_regressor() {
+    fn every_regressor_rejects_malformed_input() {
         let (interval, two) = (Domain::Interval { end: 1.0 }, Array2::ones((2, 1)));
         let nan = f64::NAN;
         for basis in [Basis::Gp(Gp::default()), Basis::NGnet(NGnet::default())] {

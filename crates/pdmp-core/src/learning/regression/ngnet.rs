@@ -1,4 +1,4 @@
-//! Normalised Gaussian network: regression by bell functions that sum to one.
+//! Normalised Gaussian network: regression by Gaussian basis functions that sum to one.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -10,57 +10,70 @@ use super::{Domain, Regression, magnitude};
 use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
 
-/// How far the centres reach beyond either end of an interval, in centre spacings.
+/// Margin of the centres beyond either end of an interval, in centre spacings.
 ///
-/// Centres that stop at the ends lose the slope there: 50 functions reproduce a minimum-jerk movement to 4e-5 of its
-/// range without a margin, 6e-6 with one spacing, 5e-7 with two, and handwriting at worst to 1.7e-3, 9e-4, 6e-4.
+/// Without a margin the slope at the ends is inaccurate: 50 functions reproduce a minimum-jerk movement to 4e-5 of its
+/// range without one, 6e-6 with one spacing and 5e-7 with two, and handwriting at worst to 1.7e-3, 9e-4 and 6e-4.
 const MARGIN: f64 = 2.0;
 
-/// Penalty on the weights, relative to the design's scale.
+/// Ridge penalty on the weights, relative to the scale of the design matrix.
 ///
-/// Weights that swing from one function to the next hardly show at the samples where there are about as many samples as
-/// functions: with 1e-3 of noise on 50 samples, 50 functions missed by 0.35 of the range at 1e-8, by 5e-4 at 1e-5 and at
-/// 1e-4. Up to 1e-4 a well-posed fit does not see it: handwriting 4e-4, minimum jerk 1e-6.
+/// With about as many samples as functions, weights that alternate in sign hardly change the values at the samples: with
+/// noise of 1e-3 on 50 samples, the error of 50 functions was 0.35 of the range at a penalty of 1e-8, and 5e-4 at 1e-5
+/// and at 1e-4. A penalty of up to 1e-4 does not affect a well-posed fit: handwriting 4e-4, minimum jerk 1e-6.
 ///
-/// It also bounds the condition of the normal equations by 1e8: what their rounding does to the outputs is a hundredth of
-/// a millionth of 1e-4, where QR of the design would cost five times as much.
+/// The penalty also bounds the condition number of the normal equations by 1e8. Their rounding then changes the outputs
+/// by about 1e-12; a QR decomposition of the design matrix would take five times as long.
 const RIDGE: f64 = 1e-4;
 
-/// Widths from a centre at which a bell function has fallen to the last digit, exp(−8.5²/2) = 2e-16.
+/// Distance from a centre, in widths, beyond which a basis function is negligible: exp(−8.5²/2) = 2e-16.
 const REACH: f64 = 8.5;
 
-/// Places at which the functions are had at once.
+/// Points at which the basis functions are evaluated together.
 const PORTION: usize = 64;
 
 /// Normalised Gaussian network.
 ///
-/// b(u) = Σₖ wₖψₖ(u) / Σᵢψᵢ(u), with N bell functions at equal distances h on the clock u:
-/// ψₖ = exp(−(u − cₖ)²/2s²) on an interval, where the outermost centres lie two h beyond the ends, and the von Mises
-/// function ψₖ = exp((cos(u − cₖ) − 1)/s²) on the circle; s = `overlap`·h. Only the functions near u
-/// count. The weights are found in O(C·N² + N³).
+/// b(u) = Σₖ wₖψₖ(u) / Σᵢψᵢ(u), with N basis functions at equal spacings h on the clock u. On an interval
+/// ψₖ = exp(−(u − cₖ)²/2s²), and the outermost centres lie 2h beyond the ends; on the circle ψₖ is the von Mises
+/// function exp((cos(u − cₖ) − 1)/s²). Their width is s = `overlap`·h. Functions far from u are skipped. The weights
+/// are fitted in O(C·N² + N³).
 ///
 /// Moody and Darken, Neural Computation 1 (1989) 281–294; as the basis of movement primitives: Ijspeert, Nakanishi,
 /// Hoffmann, Pastor and Schaal, Neural Computation 25 (2013) 328–373, <https://doi.org/10.1162/NECO_a_00393>.
+///
+/// ```
+/// # use ndarray::Array2;
+/// use pdmp_core::learning::regression::{Domain, NGnet, Regression};
+///
+/// let u: Vec<f64> = (0..50).map(|i| f64::from(i) / 49.0).collect();
+/// let targets = Array2::from_shape_fn((50, 1), |(i, _)| (3.0 * u[i]).sin());
+/// let network = NGnet::new(30, 1.2)?.regress(Domain::Interval { end: 1.0 }, &u, targets.view())?;
+/// let (mut value, mut slope) = ([0.0], [0.0]);
+/// network.evaluate(0.5, &mut value, &mut slope);
+/// assert!((value[0] - 1.5f64.sin()).abs() < 1e-3);
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct NGnet {
-    /// Number of functions N, from 2 to 1000.
+    /// Number of basis functions N, from 2 to 1000.
     pub n_basis: usize,
-    /// Width s of a function in centre spacings, from 0.3 to 3.
+    /// Width s of a basis function in centre spacings, from 0.3 to 3.
     ///
-    /// Narrow functions ripple between their centres, wide ones are nearly dependent. From 1 to 1.5 the fit hardly
-    /// changes.
+    /// Narrow functions ripple between their centres; wide ones are nearly linearly dependent. Between 1 and 1.5 the fit
+    /// hardly changes.
     pub overlap: f64,
 }
 
 impl Default for NGnet {
-    /// 50 functions, 1.2 spacings wide.
+    /// Returns a network of 50 functions, 1.2 spacings wide.
     fn default() -> Self {
         Self { n_basis: 50, overlap: 1.2 }
     }
 }
 
 impl NGnet {
-    /// A network of `n_basis` functions, `overlap` centre spacings wide.
+    /// Returns a network of `n_basis` functions, `overlap` centre spacings wide.
     ///
     /// # Errors
     /// A number outside 2 to 1000, or a width outside 0.3 to 3.
@@ -73,7 +86,7 @@ impl NGnet {
     /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease.
     ///
     /// # Errors
-    /// Settings out of range, arrays that do not match, numbers that are not finite.
+    /// Settings out of range, arrays that do not match, or values that are not finite.
     pub fn regress(&self, domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<NGnetRegression> {
         self.check()?;
         super::check(domain, u, targets)?;
@@ -84,7 +97,7 @@ impl NGnet {
         // The normal equations ΦᵀΦ and Φᵀy.
         let n_basis = self.n_basis;
         let (mut system, mut right) = (Mat::<f64>::zeros(n_basis, n_basis), Mat::<f64>::zeros(n_basis, n_outputs));
-        let mut rows = Rows::new(n_basis);
+        let mut rows = Design::new(n_basis);
         for (u, targets) in u.chunks(PORTION).zip(targets.axis_chunks_iter(Axis(0), PORTION)) {
             functions.fill(&mut rows, u);
             let (phi, _) = rows.matrices(n_basis);
@@ -96,7 +109,9 @@ impl NGnet {
         for k in 0..n_basis {
             system[(k, k)] += RIDGE * RIDGE * n_samples as f64 / n_basis as f64;
         }
-        let factor = system.llt(Side::Lower).map_err(|_| Error::Fit("the network's functions are dependent".into()))?;
+        let factor = system
+            .llt(Side::Lower)
+            .map_err(|_| Error::Fit("the basis functions of the network are linearly dependent".into()))?;
         let solution = factor.solve(right);
         let weights = (0..n_basis * n_outputs).map(|at| (at / n_outputs, at % n_outputs));
         let weights = weights.map(|(k, o)| solution[(k, o)] * scale[o]).collect();
@@ -115,19 +130,19 @@ impl NGnet {
     }
 }
 
-/// The bell functions ψₖ.
+/// Basis functions ψₖ.
 #[derive(Clone, Debug)]
 struct Functions {
     settings: NGnet,
     domain: Domain,
-    /// The first centre.
+    /// First centre.
     first: f64,
-    /// Distance h from one centre to the next.
+    /// Centre spacing h.
     spacing: f64,
-    /// Functions on either side of the nearest one that are not negligible.
+    /// Number of functions on either side of the nearest one that are not negligible.
     reach: usize,
-    /// exp(−(2i + 1)h²/2s²): on an interval the quotient of neighbours, i and i + 1 from the nearest one, at its centre.
-    quotients: Vec<f64>,
+    /// Ratios exp(−(2i + 1)h²/2s²) of the functions i + 1 and i from the nearest one, at its centre; on an interval.
+    ratios: Vec<f64>,
 }
 
 impl Functions {
@@ -135,59 +150,58 @@ impl Functions {
         let gaps = (ngnet.n_basis - 1) as f64;
         let (first, spacing, reach) = match domain {
             Domain::Interval { end } => {
-                // A small network keeps at least half of its gaps inside.
+                // At least half of the spacings of a small network lie inside.
                 let margin = MARGIN.min(gaps / 4.0);
                 let spacing = end / (gaps - 2.0 * margin);
                 (-margin * spacing, spacing, REACH * ngnet.overlap)
             }
             Domain::Circle => {
                 let spacing = domain.extent() / ngnet.n_basis as f64;
-                // Where 1 − cos r = (REACH·s)²/2; wide functions go all the way round.
+                // 1 − cos r = (REACH·s)²/2; wide functions reach around the whole circle.
                 let angle = 2.0 * (REACH * ngnet.overlap * spacing / 2.0).min(1.0).asin();
                 (0.0, spacing, angle / spacing)
             }
         };
         // The nearest centre lies up to half a spacing away.
         let reach = (reach + 0.5).ceil() as usize;
-        let quotient = |i: usize| (-0.5 * (2 * i + 1) as f64 / ngnet.overlap.powi(2)).exp();
-        let quotients = (0..reach).map(quotient).collect();
-        Self { settings: ngnet.clone(), domain, first, spacing, reach, quotients }
+        let ratio = |i: usize| (-0.5 * (2 * i + 1) as f64 / ngnet.overlap.powi(2)).exp();
+        let ratios = (0..reach).map(ratio).collect();
+        Self { settings: ngnet.clone(), domain, first, spacing, reach, ratios }
     }
 
-    /// Most functions that are not negligible anywhere.
+    /// Returns the largest number of functions that are not negligible at one point.
     fn window(&self) -> usize {
         self.settings.n_basis.min(2 * self.reach + 1)
     }
 
-    /// Fills the rows φₖ = ψₖ/Σᵢψᵢ and their derivatives for each `u`.
-    fn fill(&self, rows: &mut Rows, u: &[f64]) {
+    /// Computes φₖ = ψₖ/Σᵢψᵢ and their derivatives at each `u`.
+    fn fill(&self, rows: &mut Design, u: &[f64]) {
         let n_basis = self.settings.n_basis;
-        for numbers in [&mut rows.shares, &mut rows.rises] {
+        for numbers in [&mut rows.values, &mut rows.slopes] {
             numbers.clear();
             numbers.resize(u.len() * n_basis, 0.0);
         }
-        let both = rows.shares.chunks_exact_mut(n_basis).zip(rows.rises.chunks_exact_mut(n_basis));
-        for (&u, (phi, rise)) in u.iter().zip(both) {
+        let both = rows.values.chunks_exact_mut(n_basis).zip(rows.slopes.chunks_exact_mut(n_basis));
+        for (&u, (phi, slope)) in u.iter().zip(both) {
             // With q = Σψ: φ = ψ/q and φ′ = φ(ln ψ − ln q)′.
             let (mut q, mut dq) = (0.0, 0.0);
             self.for_each(u, |k, psi, rate| {
-                (phi[k], rise[k]) = (psi, rate);
+                (phi[k], slope[k]) = (psi, rate);
                 q += psi;
                 dq += psi * rate;
             });
-            let (share, rate) = (1.0 / q, dq / q);
-            for (phi, rise) in phi.iter_mut().zip(rise) {
-                *phi *= share;
-                *rise = *phi * (*rise - rate);
+            let (inverse, rate) = (1.0 / q, dq / q);
+            for (phi, slope) in phi.iter_mut().zip(slope) {
+                *phi *= inverse;
+                *slope = *phi * (*slope - rate);
             }
         }
     }
 
-    /// Calls `visit(k, ψₖ, d ln ψₖ/du)` for the functions near `u`, where all ψ share a factor that makes the largest
-    /// one 1.
+    /// Calls `visit(k, ψₖ, d ln ψₖ/du)` for the functions near `u`, scaled so that the largest one is 1.
     ///
-    /// The factor cancels in the network. Without it every ψ would underflow far from the centres. On an interval one
-    /// exponential tells the quotients of all neighbours.
+    /// The scale cancels in the network. Without it every ψ would underflow far from the centres. On an interval a
+    /// single exponential yields the ratios of all neighbours.
     fn for_each(&self, u: f64, mut visit: impl FnMut(usize, f64, f64)) {
         let NGnet { n_basis, overlap } = self.settings;
         let precision = 1.0 / (overlap * self.spacing).powi(2);
@@ -197,15 +211,15 @@ impl Functions {
                 let nearest = (((u - self.first) / self.spacing).round() as usize).min(n_basis - 1);
                 let rate = |k: usize| (centre(k) - u) * precision;
                 let growth = ((u - centre(nearest)) * self.spacing * precision).exp();
-                let decline = 1.0 / growth;
+                let decay = 1.0 / growth;
                 let (mut above, mut below) = (1.0, 1.0);
                 visit(nearest, 1.0, rate(nearest));
-                for (k, quotient) in (nearest + 1..n_basis).zip(&self.quotients) {
-                    above *= growth * quotient;
+                for (k, ratio) in (nearest + 1..n_basis).zip(&self.ratios) {
+                    above *= growth * ratio;
                     visit(k, above, rate(k));
                 }
-                for (k, quotient) in (0..nearest).rev().zip(&self.quotients) {
-                    below *= decline * quotient;
+                for (k, ratio) in (0..nearest).rev().zip(&self.ratios) {
+                    below *= decay * ratio;
                     visit(k, below, rate(k));
                 }
             }
@@ -214,7 +228,7 @@ impl Functions {
                 let nearest = (u / self.spacing).round() as usize;
                 let largest = (u - centre(nearest)).cos();
                 let window = self.window();
-                // Whatever is left out lies opposite.
+                // The functions outside the window lie on the opposite side.
                 let first = nearest + n_basis - window / 2;
                 for k in (first..first + window).map(|k| k % n_basis) {
                     let (sin, cos) = (u - centre(k)).sin_cos();
@@ -225,29 +239,29 @@ impl Functions {
     }
 }
 
-/// φ and φ′ at some places, (n·N, by rows).
-struct Rows {
-    shares: Vec<f64>,
-    rises: Vec<f64>,
+/// φ and φ′ at n points, (n·N) in row-major order.
+struct Design {
+    values: Vec<f64>,
+    slopes: Vec<f64>,
 }
 
-impl Rows {
+impl Design {
     fn new(n_basis: usize) -> Self {
-        let [shares, rises] = [0, 1].map(|_| Vec::with_capacity(PORTION * n_basis));
-        Self { shares, rises }
+        let [values, slopes] = [0, 1].map(|_| Vec::with_capacity(PORTION * n_basis));
+        Self { values, slopes }
     }
 
     fn matrices(&self, n_basis: usize) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
-        let matrix = |numbers| MatRef::from_row_major_slice(numbers, self.shares.len() / n_basis, n_basis);
-        (matrix(&self.shares), matrix(&self.rises))
+        let matrix = |numbers| MatRef::from_row_major_slice(numbers, self.values.len() / n_basis, n_basis);
+        (matrix(&self.values), matrix(&self.slopes))
     }
 }
 
-/// A fitted network.
+/// Fitted network.
 #[derive(Clone, Debug)]
 pub struct NGnetRegression {
     functions: Functions,
-    /// wₖ (N·outputs, by rows).
+    /// Weights wₖ (N·outputs), in row-major order.
     weights: Vec<f64>,
 }
 
@@ -260,12 +274,12 @@ impl Regression for NGnetRegression {
         let n_basis = self.functions.settings.n_basis;
         let n_outputs = self.weights.len() / n_basis;
         let weights = MatRef::from_row_major_slice(&self.weights, n_basis, n_outputs);
-        let mut rows = Rows::new(n_basis);
+        let mut rows = Design::new(n_basis);
         let size = PORTION * n_outputs.max(1);
         for (u, (values, slopes)) in u.chunks(PORTION).zip(values.chunks_mut(size).zip(slopes.chunks_mut(size))) {
             self.functions.fill(&mut rows, u);
-            let (phi, rise) = rows.matrices(n_basis);
-            for (numbers, functions) in [(values, phi), (slopes, rise)] {
+            let (phi, slope) = rows.matrices(n_basis);
+            for (numbers, functions) in [(values, phi), (slopes, slope)] {
                 let into = MatMut::from_row_major_slice_mut(numbers, u.len(), n_outputs);
                 matmul(into, Accum::Replace, functions, weights, 1.0, Par::Seq);
             }
@@ -307,7 +321,7 @@ mod tests {
         move |u: f64| (TAU * u / domain.extent() + 0.4).sin().exp()
     }
 
-    /// Integrates z′ = −25z + 25·6.25·(1 − y), and y′ = z + w if `w` is given, over [0, 1] by RK4: rows (y, z).
+    /// Integrates z′ = −25z + 25·6.25·(1 − y), and y′ = z + w if `w` is given, over [0, 1] by RK4. Returns rows (y, z).
     fn output_system(position: impl Fn(f64) -> f64, w: Option<&dyn Fn(f64) -> f64>, n_steps: usize) -> Vec<(f64, f64)> {
         let rate = |u: f64, (y, z): (f64, f64)| {
             let y_driving = if w.is_some() { y } else { position(u) };
@@ -342,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn smooth_functions_are_met_between_the_samples_with_their_slope() {
+    fn smooth_functions_and_slopes_are_interpolated() {
         for domain in [INTERVAL, Domain::Circle] {
             let (u, f) = (grid(domain, 250), wave(domain));
             let fitted = NGnet::default().regress(domain, &u, column(&u, &f).view()).unwrap();
@@ -357,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn the_circle_closes() {
+    fn regressions_on_the_circle_are_periodic() {
         let u = grid(Domain::Circle, 100);
         let targets = column(&u, |u| (u / 2.0).sin());
         let fitted = NGnet::new(20, 1.2).unwrap().regress(Domain::Circle, &u, targets.view()).unwrap();
@@ -381,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         for n_basis in [0, 1, 1001, usize::MAX] {
             assert!(matches!(NGnet::new(n_basis, 1.2), Err(Error::Range { name: "n_basis", .. })));
         }
@@ -394,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn it_says_what_was_chosen() {
+    fn the_description_states_the_settings() {
         let fitted = NGnet::default().regress(INTERVAL, &[0.0], Array2::zeros((1, 1)).view()).unwrap();
         assert_eq!(fitted.describe(), "NGnet, 50 functions, width 1.2 spacings");
     }
@@ -415,7 +429,7 @@ mod tests {
         }
 
         #[test]
-        fn outputs_of_any_magnitude_are_fitted_as_if_alone(exponents in prop::array::uniform3(-150.0..150.0)) {
+        fn outputs_of_different_magnitudes_are_fitted_independently(exponents in prop::array::uniform3(-150.0..150.0)) {
             let (u, f) = (grid(INTERVAL, 40), wave(INTERVAL));
             let magnitudes = exponents.map(|e: f64| 10f64.powf(e));
             // Output 3 is zero.

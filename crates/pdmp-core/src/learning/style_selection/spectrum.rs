@@ -1,8 +1,8 @@
-//! The number of styles that are systematic: above the measurement noise, and enough for what contexts explain.
+//! Selection of the systematic styles: those above the measurement noise, and at least those that contexts explain.
 //!
 //! Noise adds singular values to those of the movements. Parallel analysis (Horn, Psychometrika 30, 1965,
-//! doi:10.1007/BF02289447) compares them with those of noise alone: white noise of the size that was found, on the time
-//! stamps of the demonstrations, through the same smoothing and the same targets.
+//! doi:10.1007/BF02289447) compares them with those of noise alone: white noise of the estimated level, with the
+//! durations of the demonstrations, passed through the same smoothing and converted to targets in the same way.
 
 use std::cmp::Ordering;
 
@@ -13,7 +13,7 @@ use crate::context::ContextColumn;
 use crate::demonstration::{Demonstration, Sampling};
 use crate::dynamics::transport::Transport;
 use crate::error::Result;
-use crate::learning::alignment::{Aligned, Alignment, TimeScaling};
+use crate::learning::alignment::{Aligned, Alignment};
 use crate::learning::constants::Constants;
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::targets::Targets;
@@ -24,27 +24,27 @@ use crate::numerics::threads::Threads;
 const SHARE: f64 = 0.9;
 
 /// Margin over the largest singular value of simulated noise. In simulations of 20 to 200 demonstrations with 51 to 1001
-/// samples the largest of the noise in the data was at most 1.23 times that of noise alone.
+/// samples the largest one of the noise in the data was at most 1.23 times that of noise alone.
 const MARGIN: f64 = 1.5;
 
-/// Most demonstrations of noise: the largest singular value of more follows from theirs.
+/// Largest number of simulated demonstrations; the largest singular value of more is extrapolated.
 const MAX_ROWS: usize = 64;
 
-/// Fewest samples of a demonstration of noise, unless the recording has fewer, and samples per period of the highest
-/// cut-off: smoothed noise needs no more.
+/// Smallest number of samples of a simulated demonstration, unless the recording has fewer.
 const MIN_SAMPLES: usize = 64;
+/// Samples per period of the highest cut-off, which suffice for smoothed noise.
 const SAMPLES_PER_PERIOD: f64 = 5.0;
 
-/// Chance, over all styles together, at which one that a context does not explain seems to be explained.
+/// Significance level of the F-tests of all styles together (Bonferroni).
 const SIGNIFICANCE: f64 = 0.01;
 
-/// Contexts per coefficient from which on squares of numbers are among what may explain a style.
+/// Different contexts per coefficient from which the squares of numbers are among the regressors.
 const CONTEXTS_PER_SQUARE: usize = 4;
 
-/// Returns the largest singular value that measurement noise gives the targets, with a margin; 0 without noise.
+/// Returns the largest singular value that measurement noise causes in the targets, with a margin; 0 without noise.
 ///
-/// Of P rows of noise with the largest singular value ν and the root mean square row norm t, M rows of the same
-/// distribution have t + (ν − t)√(M/P) at most, on average (Gordon's inequality, as an equation).
+/// If P rows of noise have the largest singular value ν and the root mean square row norm t, then M rows of the same
+/// distribution have t + (ν − t)√(M/P) on average (Gordon's inequality, used as an equation).
 pub(crate) fn noise_limit(
     aligned: &Aligned,
     constants: &Constants,
@@ -60,25 +60,18 @@ pub(crate) fn noise_limit(
     let noise = |row: usize| {
         let m = row * n_demos / n_rows;
         let recorded = aligned.demo(m).n_samples();
-        let enough = (SAMPLES_PER_PERIOD * highest * durations[m]).ceil() as usize;
-        let n = enough.max(MIN_SAMPLES).min(recorded);
-        // Fewer samples of the same noise per second.
-        let share = (n as f64 / recorded as f64).sqrt();
-        let size: Vec<f64> = aligned.noise.levels().iter().map(|level| level * share).collect();
+        let sufficient = (SAMPLES_PER_PERIOD * highest * durations[m]).ceil() as usize;
+        let n = sufficient.max(MIN_SAMPLES).min(recorded);
+        // White noise of the same power density at a lower sampling rate.
+        let ratio = (n as f64 / recorded as f64).sqrt();
+        let size: Vec<f64> = aligned.noise.levels().iter().map(|level| level * ratio).collect();
         let position = Array2::from_shape_fn((n, size.len()), |(_, d)| signs.next() * size[d]);
         Demonstration::new(position, Sampling::Uniform { dt: durations[m] / kind.steps(n) as f64 })
     };
     let noise = (0..n_rows).map(noise).collect::<Result<Vec<_>>>()?;
     let n_samples = noise.iter().map(Demonstration::n_samples).max();
-    let alignment = Alignment {
-        kind,
-        dt: None,
-        period: Vec::new(),
-        smoothing: Smoothing::Interpolate,
-        nominal: None,
-        n_samples,
-        time_scaling: TimeScaling::Linear,
-    };
+    let alignment =
+        Alignment { kind, dt: None, period: Vec::new(), smoothing: Smoothing::Interpolate, nominal: None, n_samples };
     let mut rows = alignment.align(&noise, threads)?;
     rows.noise = aligned.noise.clone();
     let mut targets = Targets::of(&rows, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
@@ -93,7 +86,7 @@ pub(crate) fn noise_limit(
     Ok(MARGIN * largest * density.sqrt())
 }
 
-/// Returns the systematic factors of targets, of which `contexts` may explain more than the first.
+/// Returns the systematic factors of the targets, including those that `contexts` explain.
 pub(crate) fn systematic(
     targets: ArrayView2<f64>,
     noise: f64,
@@ -108,8 +101,10 @@ pub(crate) fn systematic(
     Ok(all.leading(n_styles))
 }
 
-/// Returns the number of leading styles (M, J) up to the last that contexts explain: by an F-test of a regression on
-/// their numbers, the squares of these where there are enough contexts, and their labels.
+/// Returns the number of leading styles (M, J) up to the last one that contexts explain significantly.
+///
+/// Each style is regressed on the numbers of the contexts, their squares where there are enough contexts, and indicators
+/// of their labels, and tested by an F-test.
 fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<f64>) -> usize {
     let (n_demos, n_styles) = styles.dim();
     let numbers = || columns.iter().zip(contexts.columns()).filter(|(column, _)| **column == ContextColumn::Number);
@@ -129,26 +124,26 @@ fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<
             span.add(values.map(|value| (value - centre).powi(2)).view());
         }
     }
-    let explaining = span.0.len() - 1;
-    let free = n_demos.saturating_sub(explaining + 1);
-    let Ok(distribution) = FisherSnedecor::new(explaining as f64, free as f64) else { return 1 };
+    let n_regressors = span.0.len() - 1;
+    let degrees_of_freedom = n_demos.saturating_sub(n_regressors + 1);
+    let Ok(distribution) = FisherSnedecor::new(n_regressors as f64, degrees_of_freedom as f64) else { return 1 };
     let is_explained = |j: &usize| {
-        let [whole, rest] = span.squares(styles.column(*j));
-        let ratio = (whole - rest).max(0.0) / explaining as f64 / (rest / free as f64);
-        match rest.partial_cmp(&(1e-12 * whole)) {
-            Some(Ordering::Less | Ordering::Equal) => whole > 0.0,
+        let [total, residual] = span.squares(styles.column(*j));
+        let ratio = (total - residual).max(0.0) / n_regressors as f64 / (residual / degrees_of_freedom as f64);
+        match residual.partial_cmp(&(1e-12 * total)) {
+            Some(Ordering::Less | Ordering::Equal) => total > 0.0,
             _ => distribution.sf(ratio) * (n_styles as f64) < SIGNIFICANCE,
         }
     };
     (0..n_styles).rev().find(is_explained).map_or(1, |j| j + 1)
 }
 
-/// An orthonormal basis of some columns, the first of which is constant.
+/// Orthonormal basis of regressors, the first of which is constant.
 #[derive(Default)]
 struct Span(Vec<ndarray::Array1<f64>>);
 
 impl Span {
-    /// Adds a column, unless it depends on those before.
+    /// Adds a regressor, unless it depends linearly on those before.
     fn add(&mut self, column: ArrayView1<f64>) {
         let scale = column.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         if scale == 0.0 {
@@ -161,7 +156,7 @@ impl Span {
         }
     }
 
-    /// The part of a column that is orthogonal to the basis; twice, which takes rounding errors off.
+    /// Returns the part of a column that is orthogonal to the basis; projected twice, to full accuracy.
     fn rest(&self, column: ArrayView1<f64>) -> ndarray::Array1<f64> {
         let mut rest = column.to_owned();
         for unit in self.0.iter().chain(&self.0) {
@@ -171,7 +166,7 @@ impl Span {
         rest
     }
 
-    /// Squared size of a column less its mean, and of what the whole basis leaves of it.
+    /// Returns the total sum of squares of a column about its mean, and the residual sum of squares.
     fn squares(&self, column: ArrayView1<f64>) -> [f64; 2] {
         let mean = Span(self.0[..1].to_vec()).rest(column);
         let rest = self.rest(column);
@@ -179,8 +174,8 @@ impl Span {
     }
 }
 
-/// Random signs, the same in every run (SplitMix64; Steele, Lea, Flood, OOPSLA 2014, doi:10.1145/2660193.2660195): sums
-/// of many are normal.
+/// Reproducible random signs, sums of many of which are normally distributed (SplitMix64; Steele, Lea, Flood, OOPSLA
+/// 2014, doi:10.1145/2660193.2660195).
 struct Signs(u64);
 
 impl Signs {

@@ -1,4 +1,4 @@
-//! The header of a file, checked in one pass before anything is built from it.
+//! Header of a model file, checked in one pass before anything is allocated from it.
 
 use std::fmt;
 
@@ -8,19 +8,19 @@ use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, Visitor};
 use super::check_size;
 use crate::error::{Error, Result};
 
-/// Most entries of a header: the metadata and the arrays, of which a model has fewer.
+/// Maximum number of entries of a header: the metadata and the arrays, of which a model has fewer.
 const MAX_ENTRIES: usize = 64;
-/// Most bytes of a header besides the letters of labels, names and units: those of a model with 200,000 labels.
+/// Maximum size of a header outside of JSON strings, in bytes: that of a model with 200,000 labels.
 const MAX_STRUCTURE: usize = 1 << 20;
 
-/// The metadata, of one key alone.
+/// Metadata with its only key.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Metadata {
     pdmp: String,
 }
 
-/// The constants of a header, as text.
+/// Constants in a header, as JSON text.
 struct Header(Option<String>);
 
 impl<'de> Deserialize<'de> for Header {
@@ -53,13 +53,13 @@ impl<'de> Deserialize<'de> for Header {
     }
 }
 
-/// The constants as JSON, after the size of the header was checked: its labels apart, it takes little.
+/// Returns the constants as JSON, after a check of the size of the header with and without its strings.
 pub(super) fn constants(bytes: &[u8]) -> Result<String> {
     check_size(bytes)?;
     let bad = |reason: &str| Error::File(reason.to_string());
     let (head, rest) = bytes.split_first_chunk().ok_or(bad("shorter than a header"))?;
     let length = usize::try_from(u64::from_le_bytes(*head)).map_err(|_| bad("not a safetensors file"))?;
-    let header = rest.get(..length).ok_or(bad("not whole: it ends within its header"))?;
+    let header = rest.get(..length).ok_or(bad("truncated: it ends within its header"))?;
     let Header(json) = serde_json::from_slice(header).map_err(|error| Error::File(format!("header: {error}")))?;
     let json = json.ok_or(bad("no pdmp metadata"))?;
     if header.len() - json.len().min(header.len()) + structure(&json) > MAX_STRUCTURE {
@@ -68,15 +68,15 @@ pub(super) fn constants(bytes: &[u8]) -> Result<String> {
     Ok(json)
 }
 
-/// Bytes of a JSON text that are not within strings.
+/// Returns the number of bytes of a JSON text outside of strings.
 fn structure(json: &str) -> usize {
-    let (mut count, mut within, mut escaped) = (0, false, false);
+    let (mut count, mut in_string, mut escaped) = (0, false, false);
     for byte in json.bytes() {
         match byte {
             _ if escaped => escaped = false,
-            b'\\' if within => escaped = true,
-            b'"' => (within, count) = (!within, count + 1),
-            _ if !within => count += 1,
+            b'\\' if in_string => escaped = true,
+            b'"' => (in_string, count) = (!in_string, count + 1),
+            _ if !in_string => count += 1,
             _ => {}
         }
     }
@@ -88,7 +88,7 @@ mod tests {
     use super::structure;
 
     #[test]
-    fn letters_within_strings_are_no_structure() {
+    fn contents_of_strings_are_not_counted() {
         for (json, expected) in [("[1,2]", 5), (r#"["abc"]"#, 4), (r#"["a\"],","b"]"#, 7), (r#"["\\"]"#, 4)] {
             assert_eq!(structure(json), expected, "{json}");
         }

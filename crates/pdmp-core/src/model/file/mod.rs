@@ -1,12 +1,13 @@
-//! The model file: safetensors, with the constants as JSON beside the arrays.
+//! Model files: safetensors, with the constants as JSON in the metadata.
 //!
-//! One metadata key holds the JSON, as several would be written in random order. A checksum over the constants and
-//! all arrays finds damage that leaves every shape intact. It is no signature: anyone can write a file that passes.
+//! The JSON has a single metadata key, because the order of several would be random. A checksum over the constants and
+//! all arrays detects damage that leaves every shape intact. It is not a signature: anyone can write a valid file.
 //!
-//! A file from elsewhere is data. It holds no code and names no other file, and a loaded model moves in finite numbers
-//! or refuses to. Reading takes memory and time in proportion to the file: header, number of arrays, contexts of a map
-//! and size of every number have the bounds of the interface and of [`crate::learning`]. What a file can do is
-//! describe a harmful movement, under any names, labels and units: limits of the robot are to be kept by its driver.
+//! A file of unknown origin is data. It contains no code and refers to no other file. A loaded model moves in finite
+//! numbers or returns an error. Reading takes memory and time in proportion to the size of the file: header, number of
+//! arrays, contexts of a map and magnitude of every number have the bounds of the interface and of [`crate::learning`].
+//! A file can still describe a harmful movement, under any names, labels and units: the driver of the robot must enforce
+//! its limits.
 
 mod draft;
 mod header;
@@ -26,15 +27,16 @@ use crate::dynamics::canonical::Canonical;
 use crate::error::{Error, Result};
 use crate::model::Model;
 
-/// Version of the file's layout.
+/// Version of the file format.
 const SCHEMA: u32 = 6;
-/// The metadata key.
+/// Metadata key of the constants.
 const KEY: &str = "pdmp";
-/// Largest file that is read, in bytes.
+/// Maximum size of a file, in bytes.
 const MAX_FILE_SIZE: u64 = 1 << 32;
-/// Largest header that is read, in bytes: nearly all of it labels.
-const MAX_HEADER: u64 = 1 << 26;
+/// Maximum size of a header, in bytes; labels make up nearly all of a large one.
+const MAX_HEADER_SIZE: u64 = 1 << 26;
 
+/// Constants of a model with the version of the format and the checksum of the file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sealed {
@@ -43,7 +45,7 @@ struct Sealed {
     model: Constants,
 }
 
-/// All of a model that is not an array.
+/// Fields of a model that are not arrays.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Constants {
@@ -51,13 +53,13 @@ struct Constants {
     tau: f64,
     alpha_z: f64,
     beta_z: f64,
-    /// κ past the end, where transport is learnt.
+    /// Braking rate κ past the end; `None` for immediate transport.
     braking: Option<f64>,
     names: Vec<String>,
     units: Vec<String>,
     nominal: usize,
     n_samples: usize,
-    /// Bound of the slopes, where time was warped.
+    /// Bound of the slopes of the time warp; `None` without one.
     slope: Option<f64>,
     truncation_error: f64,
     regression: String,
@@ -65,7 +67,7 @@ struct Constants {
     map: Option<Map>,
 }
 
-/// How a map comes about from what was demonstrated.
+/// Constants from which the context map is restored, together with the parameters of the demonstrations.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Map {
@@ -76,67 +78,83 @@ struct Map {
 }
 
 impl Model {
-    /// Writes a model file. It appears whole or not at all, whatever interrupts the writing; what a link leads to is
-    /// replaced, not the link, and a pipe or a device is written to. It is written beside its place as `.pdmp-*.draft`
-    /// and then renamed: a process that is killed meanwhile leaves the draft, which can be deleted.
+    /// Writes a model file atomically: an interrupted call leaves an existing file unchanged.
+    ///
+    /// A symbolic link is followed; a pipe or a device is written to directly. Otherwise the bytes are written to
+    /// `.pdmp-*.draft` in the same folder, which is then renamed. A process that is killed leaves the draft, which can be
+    /// deleted.
+    ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, Model, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let folder = tempfile::tempdir().unwrap();
+    /// # let path = folder.path().join("reach.safetensors");
+    /// let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// model.save(&path)?;
+    /// let loaded = Model::load(&path)?;
+    /// assert_eq!(loaded.demonstrated(), model.demonstrated());
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A path that cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let bytes = self.to_bytes()?;
         let io = |source| Error::Io { path: path.to_path_buf(), source };
-        let place = fs::canonicalize(path)
-            // What a link leads to need not be there yet.
+        let target = fs::canonicalize(path)
+            // The target of a link need not exist.
             .or_else(|_| fs::read_link(path).map(|to| path.parent().unwrap_or(Path::new("")).join(to)))
             .unwrap_or_else(|_| path.to_path_buf());
-        if fs::metadata(&place).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-            return fs::write(&place, &bytes).map_err(io);
+        if fs::metadata(&target).is_ok_and(|existing| !existing.is_file() && !existing.is_dir()) {
+            return fs::write(&target, &bytes).map_err(io);
         }
-        let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let (draft, mut file) = Draft::create(folder).map_err(io)?;
         file.write_all(&bytes).map_err(io)?;
         file.sync_all().map_err(io)?;
-        if let Ok(older) = fs::metadata(&place) {
-            file.set_permissions(older.permissions()).map_err(io)?;
+        if let Ok(existing) = fs::metadata(&target) {
+            file.set_permissions(existing.permissions()).map_err(io)?;
         }
-        draft.persist(&place).map_err(io)
+        draft.persist(&target).map_err(io)
     }
 
     /// Reads a model file.
     ///
     /// # Errors
-    /// A path that cannot be read, or a file that is not whole, not a model, or of another version.
+    /// A path that cannot be read, or a file that is damaged, not a model, or of another version.
     pub fn load(path: &Path) -> Result<Self> {
         let io = |source| Error::Io { path: path.to_path_buf(), source };
-        let named = |error| match error {
+        let with_path = |error| match error {
             Error::File(reason) => Error::File(format!("{}: {reason}", path.display())),
             other => other,
         };
         let mut file = fs::File::open(path).map_err(io)?;
         let mut bytes = Vec::new();
-        // The header's length first: what is no model need not be read.
+        // The length of the header comes first: a large file of another format is rejected without reading it.
         Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(io)?;
-        check_size(&bytes).map_err(named)?;
+        check_size(&bytes).map_err(with_path)?;
         file.take(MAX_FILE_SIZE).read_to_end(&mut bytes).map_err(io)?;
-        Self::from_bytes(&bytes).map_err(named)
+        Self::from_bytes(&bytes).map_err(with_path)
     }
 }
 
-/// Checks the size of the file, and that of its header as the first eight bytes announce it.
+/// Checks the size of the file, and the size of its header as announced in the first eight bytes.
 fn check_size(bytes: &[u8]) -> Result<()> {
     let bad = |reason: &str| Error::File(reason.to_string());
     match bytes.first_chunk().map(|head| u64::from_le_bytes(*head)) {
         _ if bytes.len() as u64 > MAX_FILE_SIZE => Err(bad("larger than any model")),
         None => Err(bad("shorter than a header")),
         Some(0) => Err(bad("not a safetensors file")),
-        Some(length) if length > MAX_HEADER => {
+        Some(length) if length > MAX_HEADER_SIZE => {
             Err(bad("not a safetensors file, or damaged: it announces a header larger than any model has"))
         }
         Some(_) => Ok(()),
     }
 }
 
-/// CRC-32 of the constants and of all arrays, in the order in which a model lists them.
+/// Returns the CRC-32 of the constants and of the names and bytes of all arrays, in the order of `Model::arrays`.
 fn checksum<'a>(constants: &Constants, arrays: impl Iterator<Item = (&'a str, &'a [u8])>) -> Result<u32> {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&serde_json::to_vec(constants).map_err(|error| Error::File(error.to_string()))?);

@@ -1,4 +1,4 @@
-//! The bytes of a file into its model: dimensions, numbers and checksum are checked before one comes out.
+//! Deserialisation of a model from the bytes of a file, with checks of dimensions, numbers and checksum.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use safetensors::tensor::{Dtype, SafeTensors};
 use serde::Deserialize;
 
 use super::{Constants, Map, SCHEMA, Sealed, checksum, header};
-use crate::context::{ContextMap, ContextMapKind, Kernel, Recipe, Stack};
+use crate::context::{ContextMap, ContextMapKind, Kernel, MapParameters, StackingWeights};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::forcing_table::ForcingTable;
 use crate::dynamics::hermite_table::{KnotTable, MAX_CELLS};
@@ -27,11 +27,11 @@ impl Model {
     /// Reads a model from the bytes of a file.
     ///
     /// # Errors
-    /// Bytes that are not whole, not a model, or of another version.
+    /// Bytes that are damaged, not a model, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let bad = |reason: &str| Error::File(reason.to_string());
         let json = header::constants(bytes)?;
-        // The version is read alone first: another one may hold anything else.
+        // The version is parsed first: other versions may have other fields.
         let version: Version = serde_json::from_str(&json).map_err(|error| Error::File(error.to_string()))?;
         match version.schema {
             Some(found) if found == u64::from(SCHEMA) => {}
@@ -42,40 +42,39 @@ impl Model {
         }
         let tensors = SafeTensors::deserialize(bytes).map_err(|error| Error::File(error.to_string()))?;
         let sealed: Sealed = serde_json::from_str(&json).map_err(|error| Error::File(error.to_string()))?;
-        // One text alone is written for these constants: a flipped bit may leave another that means the same.
+        // The checksum covers the values of the constants. A flipped bit may give another text of the same values, such
+        // as 1.50 for 1.5, which differs from the text that `to_bytes` writes.
         if serde_json::to_string(&sealed).ok().as_deref() != Some(json.as_str()) {
-            return Err(bad("damaged: its constants are not written as they were"));
+            return Err(bad("damaged: the text of its constants is not canonical"));
         }
         Reader { tensors }.model(sealed.model, sealed.crc32)
     }
 }
 
-/// The version of a file, whatever else it holds.
+/// Version of a file; other fields are ignored.
 #[derive(Deserialize)]
 struct Version {
     schema: Option<u64>,
 }
 
-/// Takes arrays out of a file, checking dimensions and numbers.
+/// Reader of the arrays of a file, which checks dimensions and numbers.
 struct Reader<'a> {
     tensors: SafeTensors<'a>,
 }
 
 impl Reader<'_> {
+    /// Returns the elements of an array, after a check of its type, shape and magnitudes.
     fn array(&self, name: &str, shape: &[usize]) -> Result<Vec<f64>> {
         let tensor = self.tensors.tensor(name).map_err(|_| Error::File(format!("no array {name}")))?;
         if tensor.dtype() != Dtype::F64 || tensor.shape() != shape {
             let (dtype, found) = (tensor.dtype(), tensor.shape());
             return Err(Error::File(format!("{name} is {dtype:?} {found:?}, expected F64 {shape:?}")));
         }
-        let data: Vec<f64> = tensor
-            .data()
-            .chunks_exact(8)
-            .map(|chunk| f64::from_le_bytes(chunk.try_into().unwrap_or_default()))
-            .collect();
-        let limit = limit(name);
+        let (bytes, _) = tensor.data().as_chunks();
+        let data: Vec<f64> = bytes.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+        let limit = max_magnitude(name);
         match data.iter().position(|x| x.is_nan() || x.abs() > limit) {
-            Some(index) => Err(Error::File(format!("{name} holds {:e} at {index}", data[index]))),
+            Some(index) => Err(Error::File(format!("{name}[{index}] = {:e} is out of range", data[index]))),
             None => Ok(data),
         }
     }
@@ -88,7 +87,7 @@ impl Reader<'_> {
     fn positive(&self, name: &str, length: usize) -> Result<Vec<f64>> {
         let data = self.array(name, &[length])?;
         match data.iter().position(|x| *x <= 0.0) {
-            Some(index) => Err(Error::File(format!("{name} holds {} at {index}, not a positive number", data[index]))),
+            Some(index) => Err(Error::File(format!("{name}[{index}] = {} is not positive", data[index]))),
             None => Ok(data),
         }
     }
@@ -101,6 +100,7 @@ impl Reader<'_> {
         Ok(Noise { levels, cut_offs: cut_offs.into_iter().map(|hz| Some(hz).filter(|hz| *hz > 0.0)).collect() })
     }
 
+    /// Returns the shape of an array with N axes.
     fn shape<const N: usize>(&self, name: &str) -> Result<[usize; N]> {
         let tensor = self.tensors.tensor(name).map_err(|_| Error::File(format!("no array {name}")))?;
         tensor.shape().try_into().map_err(|_| Error::File(format!("{name} has {} axes", tensor.shape().len())))
@@ -139,9 +139,9 @@ impl Reader<'_> {
         let transport = Transport::from_coefficients(transport, constants.canonical)
             .map_err(|error| Error::File(error.to_string()))?;
         let braking = constants.braking;
-        // Slower than z the two parts of the forcing past the end would part without bound.
-        let sound = braking.is_none_or(|braking| (constants.alpha_z..=1e12).contains(&braking));
-        if braking.is_none() != transport.is_immediate() || !sound {
+        // The forcing past the end is exp(−α_z v)(a + b·exp(−(κ − α_z)v)): for κ < α_z the second exponential overflows.
+        let valid = braking.is_none_or(|braking| (constants.alpha_z..=1e12).contains(&braking));
+        if braking.is_none() != transport.is_immediate() || !valid {
             return Err(bad("braking does not fit the rest"));
         }
         let breaks = self.array("breaks", &[n_segments + 1])?;
@@ -150,11 +150,11 @@ impl Reader<'_> {
         }
         let segment_durations = self.matrix("segment_durations", (n_demos, n_segments))?;
         if segment_durations.iter().any(|seconds| *seconds <= 0.0) {
-            return Err(bad("a time is not positive"));
+            return Err(bad("a segment duration is not positive"));
         }
-        // What a fit makes so: movements of default length and rate then have the number of samples that dt promises.
-        let share = segment_durations.row(constants.nominal).sum() / (constants.tau * constants.canonical.extent());
-        if !((1.0 - 1e-6)..=(1.0 + 1e-6)).contains(&share) {
+        // A fit ensures this; the default duration of a rollout relies on it.
+        let ratio = segment_durations.row(constants.nominal).sum() / (constants.tau * constants.canonical.extent());
+        if !((1.0 - 1e-6)..=(1.0 + 1e-6)).contains(&ratio) {
             return Err(bad("tau does not agree with the nominal duration"));
         }
         let demonstrated = DemonstrationParameters {
@@ -177,7 +177,7 @@ impl Reader<'_> {
             Some(map) => {
                 let residual_variance = self.matrix("residual_variance", (kind.samples(STEPS), n_dofs))?;
                 if residual_variance.iter().any(|x| *x < 0.0) {
-                    return Err(bad("residual_variance holds no variances"));
+                    return Err(bad("a residual variance is negative"));
                 }
                 (Some(self.map(map, &demonstrated, kind)?), Some(residual_variance))
             }
@@ -217,12 +217,12 @@ impl Reader<'_> {
         Ok(Some(WarpTemplate { slope, unit: self.positive("template.unit", n_dofs)?, shape }))
     }
 
-    /// The map, had again from what was demonstrated.
+    /// Restores the context map from its constants and the parameters of the demonstrations.
     fn map(&self, map: &Map, demonstrated: &DemonstrationParameters, kind: Kind) -> Result<ContextMap> {
         let bad = |reason: &str| Error::File(reason.to_string());
         let outputs = demonstrated.outputs(kind);
         let ratios = self.array("map.ratios", &[outputs.ncols()])?;
-        let sound = match map.kernel {
+        let valid = match map.kernel {
             None => ratios.iter().all(|ratio| *ratio == 0.0),
             Some(Kernel::Linear) => false,
             Some(Kernel::Quadratic) => ratios.iter().all(|ratio| *ratio >= 0.0),
@@ -231,40 +231,41 @@ impl Reader<'_> {
         let contexts = demonstrated.contexts.as_ref().ok_or(bad("no contexts"))?;
         for (q, column) in map.columns.iter().enumerate() {
             if contexts.column(q).iter().any(|&number| column.value(q, number).is_err()) {
-                return Err(bad("a context is none of its labels"));
+                return Err(bad("a context has an unknown label"));
             }
         }
-        if !sound {
+        if !valid {
             return Err(bad("the map's constants are out of range"));
         }
         let errors = map.errors.iter().map(|&(kind, error)| (kind, error.unwrap_or(f64::INFINITY))).collect();
         let directions = self.matrix("map.directions", (outputs.ncols(), outputs.ncols()))?;
-        let trend = match map.kind {
-            ContextMapKind::Stacked => Some(self.trend(outputs.ncols())?),
+        let line = match map.kind {
+            ContextMapKind::Stacked => Some(self.stacked_line(outputs.ncols())?),
             _ => None,
         };
-        let recipe = Recipe { kind: map.kind, kernel: map.kernel, directions, ratios, trend, errors };
-        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), recipe)
+        let parameters = MapParameters { kind: map.kind, kernel: map.kernel, directions, ratios, line, errors };
+        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), parameters)
             .map_err(|error| Error::File(error.to_string()))
     }
 
-    /// The line of a stacked map: ratios (P,) and weights.
-    fn trend(&self, n_outputs: usize) -> Result<(Vec<f64>, Stack)> {
-        let slopes = self.array("map.slopes", &[n_outputs])?;
+    /// Returns the line of a stacked map: its signal-to-noise ratios (P,) and the stacking weights.
+    fn stacked_line(&self, n_outputs: usize) -> Result<(Vec<f64>, StackingWeights)> {
+        let ratios = self.array("map.slopes", &[n_outputs])?;
         let weights = self.array("map.weights", &[2, 2])?;
-        let stack = Stack { inside: [weights[0], weights[1]], outside: [weights[2], weights[3]] };
-        let sound = |[g, l]: [f64; 2]| g >= 0.0 && l >= 0.0 && g + l <= 1.0 + 1e-9;
-        if slopes.iter().any(|ratio| *ratio < 0.0) || !sound(stack.inside) || !sound(stack.outside) {
+        let weights =
+            StackingWeights { interpolation: [weights[0], weights[1]], extrapolation: [weights[2], weights[3]] };
+        let valid = |[g, l]: [f64; 2]| g >= 0.0 && l >= 0.0 && g + l <= 1.0 + 1e-9;
+        if ratios.iter().any(|ratio| *ratio < 0.0) || !valid(weights.interpolation) || !valid(weights.extrapolation) {
             return Err(Error::File("the map's line is out of range".to_string()));
         }
-        Ok((slopes, stack))
+        Ok((ratios, weights))
     }
 
-    /// Checks that the file holds the model's arrays and no others, unchanged.
+    /// Checks that the file contains the arrays of the model and no others, and compares the checksum.
     fn verify(&self, constants: &Constants, model: &Model, crc32: u32) -> Result<()> {
         let names: Vec<&str> = model.arrays().iter().map(|(name, ..)| *name).collect();
         if names.len() != self.tensors.len() {
-            return Err(Error::File("arrays that do not belong to a model".to_string()));
+            return Err(Error::File("it contains arrays that do not belong to a model".to_string()));
         }
         let tensors: Vec<_> = names.iter().filter_map(|name| self.tensors.tensor(name).ok()).collect();
         let found = checksum(constants, names.iter().copied().zip(tensors.iter().map(|tensor| tensor.data())))?;
@@ -272,8 +273,8 @@ impl Reader<'_> {
     }
 }
 
-/// Largest magnitude of an array's numbers: what the interface takes, or for a variance the square of it.
-fn limit(name: &str) -> f64 {
+/// Returns the maximum magnitude of the elements of an array: the limit of the interface, squared for variances.
+fn max_magnitude(name: &str) -> f64 {
     match name {
         "styles" => MAX_STYLE_MAGNITUDE,
         "residual_variance" => LARGEST * LARGEST,
@@ -282,20 +283,20 @@ fn limit(name: &str) -> f64 {
 }
 
 impl Constants {
+    /// Checks that the constants lie within the bounds that a fit imposes.
     fn check(&self) -> Result<()> {
-        let (a, b) = match self.canonical {
+        let (phase_rate, u_end) = match self.canonical {
             Canonical::Discrete { alpha_x, u_end } => (alpha_x, u_end),
             Canonical::Rhythmic { mu } => (mu, 1.0),
         };
-        let slope = self.slope.unwrap_or(1.0);
-        TimeWarp { n_segments: 1, max_slope: slope }.check(1).map_err(|error| Error::File(error.to_string()))?;
-        // The bounds within which these are learnt.
+        let max_slope = self.slope.unwrap_or(1.0);
+        TimeWarp { n_segments: 1, max_slope }.check(1).map_err(|error| Error::File(error.to_string()))?;
         for (name, value, limit) in [
             ("tau", self.tau, MAX_TAU),
             ("alpha_z", self.alpha_z, MAX_RATE),
             ("beta_z", self.beta_z, MAX_RATE),
-            ("alpha_x or mu", a, MAX_RATE),
-            ("u_end", b, 1.01e3),
+            ("alpha_x or mu", phase_rate, MAX_RATE),
+            ("u_end", u_end, 1.01e3),
         ] {
             if !(1.0 / limit..=limit).contains(&value) {
                 return Err(Error::File(format!("{name} = {value} is out of range")));

@@ -1,4 +1,4 @@
-//! A model into the bytes of its file.
+//! Serialisation of a model to the bytes of a file.
 
 use std::collections::HashMap;
 
@@ -6,12 +6,12 @@ use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
 use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header};
-use crate::context::{ContextMap, Recipe, Stack};
+use crate::context::{ContextMap, MapParameters, StackingWeights};
 use crate::dynamics::hermite_table::KnotTable;
 use crate::error::{Error, Result};
 use crate::model::Model;
 
-/// An array by name: shape and elements by rows.
+/// Array of a file: its name, shape and elements by rows.
 type Array = (&'static str, Vec<usize>, Vec<f64>);
 
 fn matrix(name: &'static str, matrix: &Array2<f64>) -> Array {
@@ -23,10 +23,10 @@ fn vector(name: &'static str, vector: &[f64]) -> Array {
 }
 
 impl Model {
-    /// The model as the bytes of a file.
+    /// Returns the model as the bytes of a file.
     ///
     /// # Errors
-    /// A model that the format cannot hold.
+    /// A model that exceeds the limits of the format.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let constants = Constants {
             canonical: self.canonical(),
@@ -63,11 +63,12 @@ impl Model {
         Ok(bytes)
     }
 
+    /// Returns the arrays of the model's file.
     pub(super) fn arrays(&self) -> Vec<Array> {
         let demonstrated = &self.demonstrated;
         let KnotTable { values, slopes, .. } = self.forcing_table.knots();
         let knots = vec![self.forcing_table.cells() + 1, self.n_styles(), self.n_dofs()];
-        // 0 where every sample is met.
+        // 0 stands for interpolation without smoothing.
         let cut_offs: Vec<f64> = self.learnt.noise.cut_offs().iter().map(|hz| hz.unwrap_or(0.0)).collect();
         let mut arrays = vec![
             matrix("styles", &demonstrated.styles),
@@ -91,12 +92,12 @@ impl Model {
         }
         if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
             arrays.push(matrix("contexts", contexts));
-            let recipe = map.recipe();
-            arrays.push(matrix("map.directions", &recipe.directions));
-            arrays.push(vector("map.ratios", &recipe.ratios));
-            if let Some((slopes, Stack { inside, outside })) = &recipe.trend {
-                arrays.push(vector("map.slopes", slopes));
-                arrays.push(("map.weights", vec![2, 2], [*inside, *outside].concat()));
+            let parameters = map.parameters();
+            arrays.push(matrix("map.directions", &parameters.directions));
+            arrays.push(vector("map.ratios", &parameters.ratios));
+            if let Some((ratios, StackingWeights { interpolation, extrapolation })) = &parameters.line {
+                arrays.push(vector("map.slopes", ratios));
+                arrays.push(("map.weights", vec![2, 2], [*interpolation, *extrapolation].concat()));
             }
             arrays.extend(
                 self.learnt
@@ -110,9 +111,10 @@ impl Model {
 }
 
 impl Map {
+    /// Returns the constants of a context map.
     fn of(map: &ContextMap) -> Self {
-        let Recipe { kind, kernel, errors, .. } = map.recipe();
-        // Infinite where the others say nothing: JSON has no such number.
+        let MapParameters { kind, kernel, errors, .. } = map.parameters();
+        // JSON has no infinity, the error of a map that no other contexts can predict.
         let errors = errors.into_iter().map(|(kind, error)| (kind, error.is_finite().then_some(error))).collect();
         Self { columns: map.columns().to_vec(), kind, kernel, errors }
     }

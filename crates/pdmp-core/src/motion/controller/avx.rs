@@ -1,6 +1,7 @@
-//! The tick with four degrees of freedom in one register of AVX2.
+//! The tick with four degrees of freedom in one AVX2 register, chosen at run time.
 //!
-//! The intrinsics must be inlined into a function that may use them, hence `inline(always)` down to the last of them.
+//! Intrinsics are inlined only into functions with their target feature, hence `inline(always)` on every operation.
+//! GAIN
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::{
@@ -12,35 +13,35 @@ use std::ops::{Add, Mul, Sub};
 use super::Controller;
 use crate::numerics::simd::{F64x4, Real, Register};
 
-/// Moves on as [`Controller::advance_in`] does, if the processor has AVX2.
+/// Advances as [`Controller::advance_with`] if the processor has AVX2. Returns whether it has.
 #[inline(always)]
 pub(super) fn advance(controller: &mut Controller, dt: f64, h: f64) -> bool {
-    let found = std::arch::is_x86_feature_detected!("avx2");
-    if found {
-        // SAFETY: it was found.
-        unsafe { advance_found(controller, dt, h) };
+    let detected = std::arch::is_x86_feature_detected!("avx2");
+    if detected {
+        // SAFETY: the processor has AVX2, the only requirement of `advance_avx2`.
+        unsafe { advance_avx2(controller, dt, h) };
     }
-    found
+    detected
 }
 
 #[target_feature(enable = "avx2")]
-fn advance_found(controller: &mut Controller, dt: f64, h: f64) {
-    controller.advance_in::<Avx>(dt, h);
+fn advance_avx2(controller: &mut Controller, dt: f64, h: f64) {
+    controller.advance_with::<Avx2>(dt, h);
 }
 
-/// Four DoFs. Only `advance_found` names this type, so that AVX2 was found wherever there is one.
+/// Register of four DoFs. Only `advance_avx2` instantiates it, which runs only on processors with AVX2.
 #[derive(Clone, Copy)]
-struct Avx(__m256d);
+struct Avx2(__m256d);
 
-impl Default for Avx {
+impl Default for Avx2 {
     #[inline(always)]
     fn default() -> Self {
-        // SAFETY: AVX2 was found, as for all that follows.
+        // SAFETY: values of this type exist only inside `advance_avx2`, so the processor has AVX2.
         Self(unsafe { _mm256_setzero_pd() })
     }
 }
 
-impl Add for Avx {
+impl Add for Avx2 {
     type Output = Self;
 
     #[inline(always)]
@@ -50,7 +51,7 @@ impl Add for Avx {
     }
 }
 
-impl Sub for Avx {
+impl Sub for Avx2 {
     type Output = Self;
 
     #[inline(always)]
@@ -60,7 +61,7 @@ impl Sub for Avx {
     }
 }
 
-impl Mul<f64> for Avx {
+impl Mul<f64> for Avx2 {
     type Output = Self;
 
     #[inline(always)]
@@ -70,19 +71,19 @@ impl Mul<f64> for Avx {
     }
 }
 
-impl Real for Avx {}
+impl Real for Avx2 {}
 
-impl Register for Avx {
+impl Register for Avx2 {
     #[inline(always)]
     fn load(lanes: &F64x4) -> Self {
-        // SAFETY: see `default`; lanes are four doubles, aligned to 32 bytes.
+        // SAFETY: see `default`. An `F64x4` is four doubles, aligned to 32 bytes, and the reference makes them readable.
         Self(unsafe { _mm256_load_pd(std::ptr::from_ref(lanes).cast()) })
     }
 
     #[inline(always)]
     fn store(self) -> F64x4 {
         let mut lanes = F64x4::default();
-        // SAFETY: see `load`.
+        // SAFETY: see `load`. The exclusive reference makes them writable.
         unsafe { _mm256_store_pd(std::ptr::from_mut(&mut lanes).cast(), self.0) };
         lanes
     }

@@ -1,95 +1,100 @@
-//! What the loop keeps of a group of DoFs, and its forcing term w from what the landscape holds.
+//! State of a group of DoFs in the control loop, and its forcing term w.
 
-use super::SETTLED;
+use super::SETTLING_RATIO;
 use crate::dynamics::forcing_table::{ForcingTable, TableIndex};
 use crate::dynamics::output_system::{Attractor, CubicSample, State};
-use crate::motion::perturbation::{MIN_RANGE_RATIO, widest};
+use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
 use crate::numerics::simd::{F64x4, Real, Register, pack};
 
-/// What the loop keeps of a group of DoFs beside its motion.
+/// State of a group of DoFs besides position, velocity and acceleration.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Group {
-    pub(super) forcing: Forcing,
-    /// The forcing term at the clock.
+    pub(super) forcing: ForcingSample,
+    /// w and w′ at the clock.
     pub(super) w: CubicSample<F64x4>,
-    /// The auxiliary state of Eq. (1).
+    /// Auxiliary state z of Eq. (1).
     pub(super) z: F64x4,
-    /// The way g − y₀ at the start, which the frame covers; zero where rhythmic.
-    pub(super) way: F64x4,
-    /// Distance from the goal at which each DoF has settled, and the least it may be.
+    /// Displacement g − y₀ of the frame from start to goal; zero for a rhythmic movement.
+    pub(super) displacement: F64x4,
+    /// Distance from the goal within which each DoF has settled.
     pub(super) tolerance: F64x4,
-    pub(super) least: F64x4,
+    /// Lower bound of the tolerance.
+    pub(super) min_tolerance: F64x4,
 }
 
 impl Group {
-    /// As many as DoFs of these ranges need.
+    /// Returns the groups of DoFs with the given ranges.
     pub(super) fn all(ranges: &[f64]) -> Vec<Self> {
-        let still = F64x4::splat(MIN_RANGE_RATIO * widest(ranges));
-        let group = |range: &F64x4| Self { least: range.max(still) * SETTLED, ..Self::default() };
+        let min_range = F64x4::splat(MIN_RANGE_RATIO * largest_range(ranges));
+        let group = |range: &F64x4| Self { min_tolerance: range.max(min_range) * SETTLING_RATIO, ..Self::default() };
         pack(ranges).iter().map(group).collect()
     }
 }
 
-/// What the landscape gives a group of DoFs at the clock.
+/// Forcing of a group of DoFs at the clock, without the factor r.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Forcing {
+pub(super) struct ForcingSample {
     /// sᵀb.
-    pub(super) shape: F64x4,
-    /// Its derivative with respect to the phase's clock.
+    pub(super) value: F64x4,
+    /// sᵀb′, with respect to the clock of the phase.
     pub(super) slope: F64x4,
     /// s′ᵀb.
-    swing: F64x4,
+    style_slope: F64x4,
 }
 
-impl Forcing {
-    /// Reads a group at a place, for a style s and, while it is on its way, s′.
+impl ForcingSample {
+    /// Evaluates the table for a style s and, while the style is in transition, its derivative s′.
     #[inline(always)]
     pub(super) fn read<T: Register>(
         forcing_table: &ForcingTable,
-        place: TableIndex,
+        index: TableIndex,
         group: usize,
-        s: &[f64],
-        rate: Option<&[f64]>,
+        style: &[f64],
+        style_rate: Option<&[f64]>,
     ) -> Self {
-        let [along, swing] = match rate {
-            Some(rate) => forcing_table.blend_both::<T>(place, group, [s, rate]),
-            None => [forcing_table.blend(place, group, s), CubicSample::default()],
+        let [forcing, change] = match style_rate {
+            Some(style_rate) => forcing_table.sample_pair::<T>(index, group, [style, style_rate]),
+            None => [forcing_table.sample(index, group, style), CubicSample::default()],
         };
-        Self { shape: along.value.store(), slope: along.slope.store(), swing: swing.value.store() }
+        Self { value: forcing.value.store(), slope: forcing.slope.store(), style_slope: change.value.store() }
     }
 }
 
-/// What turns a [`Forcing`] into w = r·sᵀb and its slope along the motion, w′ = r(κ·sᵀb′ + s′ᵀb) + r′·sᵀb. Past the end
-/// of a discrete movement r stands for the fading phase, and b for what is faded.
+/// Factors that turn a [`ForcingSample`] into w = r·sᵀb and w′ = r(κ·sᵀb′ + s′ᵀb) + r′·sᵀb, ′ being the derivative with
+/// respect to the clock of the output system. Past the end of a discrete movement r is the decaying factor of the forcing
+/// table.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gate {
     pub(super) r: f64,
-    /// κ: the landscape is read at the phase's pace; style and amplitude keep the output system's clock.
-    pub(super) pace: f64,
     /// r′.
-    pub(super) growth: f64,
+    pub(super) r_slope: f64,
+    /// κ. It scales the derivative of b alone: style and amplitude are filtered on the clock of the output system.
+    pub(super) phase_rate: f64,
     /// ρ and ρ̇.
     pub(super) rate: [f64; 2],
 }
 
 impl Gate {
-    /// w and w′.
+    /// Returns w and w′.
     #[inline(always)]
-    pub(super) fn jet<T: Register>(&self, forcing: &Forcing) -> CubicSample<T> {
-        let [shape, slope, swing] = [&forcing.shape, &forcing.slope, &forcing.swing].map(T::load);
-        CubicSample { value: shape * self.r, slope: (slope * self.pace + swing) * self.r + shape * self.growth }
+    pub(super) fn forcing<T: Register>(&self, sample: &ForcingSample) -> CubicSample<T> {
+        let [value, slope, style_slope] = [&sample.value, &sample.slope, &sample.style_slope].map(T::load);
+        CubicSample {
+            value: value * self.r,
+            slope: (slope * self.phase_rate + style_slope) * self.r + value * self.r_slope,
+        }
     }
 
-    /// ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w, where w has the motion c′ of the frame in it.
+    /// Returns ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′ with y′ = z + w, where w includes the motion c′ of the frame.
     #[inline(always)]
     pub(super) fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: CubicSample<T>) -> [T; 2] {
-        let ([rate, change], flow) = (self.rate, state.z + w.value);
-        [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * change]
+        let ([rate, rate_change], flow) = (self.rate, state.z + w.value);
+        [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * rate_change]
     }
 }
 
-/// Adds the motion of a frame that covers a `way` to the forcing, for m with respect to the output system's clock.
+/// Adds the motion c′ of a frame with the given displacement to w and w′, for m′ and m″ on the clock of the output system.
 #[inline(always)]
-pub(super) fn carried<T: Real>(w: CubicSample<T>, way: T, [slope, bend]: [f64; 2]) -> CubicSample<T> {
-    CubicSample { value: w.value + way * slope, slope: w.slope + way * bend }
+pub(super) fn add_frame_motion<T: Real>(w: CubicSample<T>, displacement: T, [slope, bend]: [f64; 2]) -> CubicSample<T> {
+    CubicSample { value: w.value + displacement * slope, slope: w.slope + displacement * bend }
 }

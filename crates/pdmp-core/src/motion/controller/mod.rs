@@ -1,19 +1,19 @@
-//! The real-time loop: one tick of the primitive per call, with every command open to change.
+//! Real-time control loop: one tick of the primitive per call, with every command adjustable between ticks.
 //!
-//! Over a tick the forcing w, the goal and the clock are known at both ends with their slopes; a cubic between them is
-//! propagated exactly ([`crate::Attractor::propagator`]). Style, goal or anchor and amplitude pass critically damped
+//! Over a tick the forcing w, the goal and the clock are given by values and slopes at both ends; the cubics between them
+//! are propagated exactly ([`crate::dynamics::Attractor`]). Style, goal or anchor, and amplitude pass critically damped
 //! filters on the clock, the rate ρ = 1/τ one in seconds, so that position and velocity stay continuous: ẏ = ρy′ and
-//! ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′. The frame c of a discrete movement is known exactly at both ends of a tick
-//! (`transport`), and outside what is propagated. A perturbation
-//! ([`Command::measured`], [`Command::coupling`]) slows the phase's clock against the output system's, and adds to ẏ and
-//! ÿ.
+//! ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′. The frame c of a discrete movement is evaluated exactly at both ends of a tick
+//! (`transport`) and is not propagated. A perturbation ([`Command::measured`], [`Command::coupling`]) slows the clock of
+//! the phase relative to that of the output system, and adds to ẏ and ÿ.
 //!
-//! Nothing in [`Controller::update`] or in a setter allocates, locks or panics. A tick takes O(J·D), whatever the model was
-//! learnt from: once if it is shorter than a 500th of the movement and than a 95th of a transition under way, and as many
-//! times as it is longer otherwise, a thousand at most.
+//! [`Controller::update`] and the setters neither allocate nor lock nor panic. A tick costs O(J·D), independent of the
+//! training data, in one step if it is shorter than 1/500 of the movement and 1/95 of each transition in progress, and in
+//! proportionally many substeps otherwise, at most 1000.
 
 #[cfg(target_arch = "x86_64")]
 mod avx;
+mod getters;
 mod group;
 mod setters;
 mod step;
@@ -24,35 +24,49 @@ use crate::dynamics::canonical::CompensatedSum;
 use crate::dynamics::command_filter::{CommandFilter, FilterGains, FilterStep};
 use crate::dynamics::output_system::{Propagator, State};
 use crate::dynamics::propagator_series::Series;
-use crate::dynamics::transport::Stretch;
+use crate::dynamics::transport::TransportSegment;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
-use crate::motion::perturbation::{Perturbation, widest};
-use crate::numerics::simd::{F64x4, WIDTH, copy, padded, repack, unpack};
+use crate::motion::perturbation::{Perturbation, largest_range};
+use crate::numerics::simd::{F64x4, WIDTH, copy, padded, repack};
 use crate::validate::check_positive;
 use group::Group;
 
-/// A tick is divided so that the clock moves by no more than this share of the movement at once.
+/// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
-/// A movement has settled within this share of its range.
-const SETTLED: f64 = 1e-3;
+/// Tolerance of a settled movement, relative to the range of each DoF.
+const SETTLING_RATIO: f64 = 1e-3;
+/// Flush level, relative to the largest range: values 1e-16 of it become zero. It lies far below the last digit of every
+/// movement, and its square is a normal number.
+const FLUSH_RATIO: f64 = 1e-150;
 
-/// A share of the range at which a movement is at rest.
-const REST: f64 = 1e-150;
-
-/// Whether a movement goes on.
+/// Status of a movement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// The movement goes on; a rhythmic one always does.
+    /// In progress. A rhythmic movement never finishes.
     Working,
-    /// The demonstrated time is over, and position and velocity have settled on the goal.
+    /// Past the demonstrated end, with position and velocity settled on the goal.
     Finished,
 }
 
-/// A running primitive: a model, its commands and its state.
+/// Running primitive: the primitive, its commands and its state.
+///
+/// ```
+/// use pdmp_core::{Conditions, Controller, Status};
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+/// controller.set_goal(&[1.2, 0.1])?;
+/// while controller.step()? == Status::Working {}
+/// assert!((controller.position()[0] - 1.2).abs() < 0.01);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Controller {
     primitive: Arc<Primitive>,
@@ -63,61 +77,62 @@ pub struct Controller {
     time: CompensatedSum,
     /// Clock u, or the polar phase φ in [0, 2π).
     clock: CompensatedSum,
-    /// Amplitude r; 1 where discrete.
+    /// Amplitude r; 1 for a discrete movement.
     r: f64,
-    /// How style and amplitude are followed, on the clock.
-    filter: FilterGains,
+    /// Filter gains of style and amplitude, on the clock.
+    command_gains: FilterGains,
     style: CommandFilter,
-    /// How ρ is followed, in seconds.
-    rate_filter: FilterGains,
+    /// Filter gains of ρ, in seconds.
+    rate_gains: FilterGains,
     /// ρ = 1/τ.
     rate: CommandFilter,
     /// Goal or anchor.
     centre: CommandFilter,
-    /// How a commanded goal is followed, on the clock: [`Controller::centre_filter`].
-    centre_filter: FilterGains,
+    /// Filter gains of goal or anchor, on the clock.
+    centre_gains: FilterGains,
     /// r₀.
     amplitude: CommandFilter,
-    /// Share of the rate 1/τ at which the path is followed.
+    /// Factor of the rate 1/τ.
     speed: f64,
     groups: Vec<Group>,
-    /// Pace of the phase for which the groups' w holds.
-    paced: f64,
-    /// The share m − 1 of the way by which the frame is off the goal at the clock.
-    lag: f64,
-    /// Where it is read.
-    stretch: Stretch,
-    /// By groups of DoFs.
+    /// Phase rate κ for which w′ of the groups was computed.
+    forcing_phase_rate: f64,
+    /// ℓ = m − 1 at the clock: the frame is at g + (g − y₀)·ℓ.
+    frame_lag: f64,
+    /// Interval of the transport profile that contains the clock.
+    transport_segment: TransportSegment,
     position: Vec<F64x4>,
     velocity: Vec<F64x4>,
     acceleration: Vec<F64x4>,
-    /// Far below the last digit of every movement.
-    rest: f64,
-    held: Perturbation,
-    /// A stretch of the clock that is not divided.
-    finest: f64,
-    /// Of the last tick, and good for the next if it is as long.
-    glide: FilterStep,
-    /// The same of the filters on the clock.
-    course: FilterStep,
-    centre_course: FilterStep,
+    /// Level relative to which tiny states are flushed to zero.
+    flush_level: f64,
+    perturbation: Perturbation,
+    /// Maximum clock step of a substep.
+    max_clock_step: f64,
+    /// Filter step of the rate over the last substep, reused for the next one of that length.
+    rate_step: FilterStep,
+    /// Filter step of style and amplitude over the last substep.
+    command_step: FilterStep,
+    /// Filter step of goal or anchor over the last substep.
+    centre_step: FilterStep,
     propagator: Propagator,
     series: Series,
-    /// Ticks from now for which the landscape is fetched.
-    lead: f64,
+    /// Number of ticks by which the forcing table is prefetched.
+    prefetch_ticks: f64,
 }
 
 impl Controller {
     /// Starts a movement.
     ///
     /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal, anchor or amplitude,
-    /// both in seconds. The rate 1/τ changes in so many seconds; the others on the clock, in so many seconds at the
-    /// model's own τ, so that the path does not depend on how fast it is followed. 0 is the paper's immediate switch, and
-    /// without it a tenth of the nominal duration (discrete) or a quarter of the nominal period (rhythmic) serves. A goal
-    /// takes what remains of the movement if that is longer, unless transport is immediate.
+    /// both in seconds. The transition of the rate 1/τ takes this time; the others take the equivalent clock interval at the
+    /// model's τ, so that the path does not depend on the rate. 0 is the paper's immediate switch. The default is a tenth of
+    /// the nominal duration of a discrete movement, a quarter of the nominal period of a rhythmic one. A new goal takes the
+    /// rest of the movement if that is longer, unless transport is immediate.
     ///
     /// # Errors
-    /// Conditions that do not fit the model, `dt` that is not positive, or a negative `transition`.
+    /// Conditions that do not fit the primitive, a `dt` that is not positive, or a `transition` that is negative or longer
+    /// than 1e6 durations.
     pub fn new(primitive: &Arc<Primitive>, dt: f64, conditions: &Conditions, transition: Option<f64>) -> Result<Self> {
         check_positive("dt", dt)?;
         let share = if primitive.kind() == Kind::Discrete { 0.1 } else { 0.25 };
@@ -127,13 +142,13 @@ impl Controller {
             return Err(Error::Range { name: "transition", value: transition, allowed });
         }
         let conditions = conditions.complete(primitive)?;
-        let rate_filter = FilterGains::new(transition);
-        let filter = rate_filter.on_clock(primitive.tau());
+        let rate_gains = FilterGains::new(transition);
+        let command_gains = rate_gains.on_clock(primitive.tau());
         let groups = Group::all(primitive.ranges());
         let zeros = vec![F64x4::ZERO; groups.len()];
-        // A tick of just this length is not divided for a rounding error.
-        let finest = MAX_CLOCK_STEP * primitive.canonical().extent() * (1.0 + 1e-9);
-        let series = Series::new(primitive.attractor(), finest);
+        // The margin keeps a tick of exactly this length in one step.
+        let max_clock_step = MAX_CLOCK_STEP * primitive.canonical().extent() * (1.0 + 1e-9);
+        let series = Series::new(primitive.attractor(), max_clock_step);
         let mut controller = Self {
             dt,
             started: false,
@@ -141,30 +156,30 @@ impl Controller {
             time: CompensatedSum::default(),
             clock: CompensatedSum::default(),
             r: 1.0,
-            filter,
+            command_gains,
             style: CommandFilter::new(&conditions.style),
-            rate_filter,
+            rate_gains,
             rate: CommandFilter::new(&[1.0 / conditions.tau]),
             centre: CommandFilter::new(&conditions.centre),
-            centre_filter: filter,
+            centre_gains: command_gains,
             amplitude: CommandFilter::new(&[conditions.amplitude]),
             speed: 1.0,
             groups,
-            paced: 1.0,
-            lag: 0.0,
-            stretch: primitive.transport.stretch(0.0),
+            forcing_phase_rate: 1.0,
+            frame_lag: 0.0,
+            transport_segment: primitive.transport.stretch(0.0),
             position: zeros.clone(),
             velocity: zeros.clone(),
             acceleration: zeros,
-            rest: REST * widest(primitive.ranges()),
-            held: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
-            finest,
-            glide: rate_filter.glide(dt),
-            course: FilterStep::START,
-            centre_course: FilterStep::START,
+            flush_level: FLUSH_RATIO * largest_range(primitive.ranges()),
+            perturbation: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
+            max_clock_step,
+            rate_step: rate_gains.step_with_integral(dt),
+            command_step: FilterStep::IDENTITY,
+            centre_step: FilterStep::IDENTITY,
             propagator: series.propagator::<F64x4>(0.0),
             series,
-            lead: 1.0,
+            prefetch_ticks: 1.0,
             conditions,
             primitive: Arc::clone(primitive),
         };
@@ -172,46 +187,60 @@ impl Controller {
         Ok(controller)
     }
 
-    /// The same with the landscape fetched so many ticks ahead, for ticks that do not wait for one another.
-    pub(crate) fn looking_ahead(self, lead: f64) -> Self {
-        Self { lead, ..self }
+    /// Returns the controller with another prefetch distance, for ticks without waiting time between them.
+    pub(crate) fn looking_ahead(self, prefetch_ticks: f64) -> Self {
+        Self { prefetch_ticks, ..self }
     }
 
-    /// Starts again under other conditions.
+    /// Restarts the movement under other conditions.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+    /// controller.step()?;
+    /// controller.reset(&Conditions { goal: Some(vec![0.8, 0.0]), ..Conditions::default() })?;
+    /// assert_eq!((controller.time(), controller.centre()), (0.0, [0.8, 0.0].as_slice()));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
-    /// As for [`Controller::new`]; the movement then goes on as it was.
+    /// As for [`Controller::new`]. The movement then remains unchanged.
     pub fn reset(&mut self, conditions: &Conditions) -> Result<()> {
         self.conditions = conditions.complete(&self.primitive)?;
         self.begin();
         Ok(())
     }
 
+    /// Sets clock, commands and state to the start of the movement.
     fn begin(&mut self) {
         self.started = false;
         self.status = Status::Working;
-        self.held.release();
+        self.perturbation.clear();
         (self.time, self.clock) = (CompensatedSum::default(), CompensatedSum::default());
         let conditions = &self.conditions;
         self.r = conditions.amplitude;
-        self.style.jump(&conditions.style);
-        self.rate.jump(&[self.speed / conditions.tau]);
-        self.amplitude.jump(&[conditions.amplitude]);
-        self.centre.jump(&conditions.centre);
+        self.style.reset(&conditions.style);
+        self.rate.reset(&[self.speed / conditions.tau]);
+        self.amplitude.reset(&[conditions.amplitude]);
+        self.centre.reset(&conditions.centre);
         if let (Kind::Discrete, Some(start)) = (self.primitive.kind(), &conditions.start) {
             for ((group, goal), start) in self.groups.iter_mut().zip(self.centre.value()).zip(start.chunks(WIDTH)) {
-                group.way = *goal - padded(start);
+                group.displacement = *goal - padded(start);
             }
         }
         self.read_frame();
         self.read_forcing();
-        self.place();
+        self.set_initial_state();
         self.set_tolerance();
         self.read_out();
     }
 
-    /// Puts position and z where the movement starts: at rest in z, or on the limit cycle of this style.
-    fn place(&mut self) {
+    /// Sets position and z at the start: z = 0 for a discrete movement, the limit cycle of the style for a rhythmic one.
+    fn set_initial_state(&mut self) {
         let Self { primitive, conditions, r, .. } = self;
         for (index, (position, group)) in self.position.iter_mut().zip(&mut self.groups).enumerate() {
             let cycle = &primitive.cycle[index * primitive.n_styles()..];
@@ -223,9 +252,9 @@ impl Controller {
         }
         let phase = conditions.phase;
         if phase > 0.0 {
-            // The limit cycle is followed to where the movement starts, no phase of it being closer to a closed form.
-            let parts = (phase / self.finest).ceil();
-            (0..parts as u32).for_each(|_| self.advance(self.dt, phase / parts));
+            // The limit cycle is known at phase 0 only, and is followed from there.
+            let substeps = (phase / self.max_clock_step).ceil();
+            (0..substeps as u32).for_each(|_| self.advance(self.dt, phase / substeps));
             self.clock = CompensatedSum::at(phase);
             self.read_forcing();
         }
@@ -235,30 +264,30 @@ impl Controller {
         }
         if let Some(velocity) = &conditions.velocity {
             for (group, velocity) in self.groups.iter_mut().zip(velocity.chunks(WIDTH)) {
-                group.z = padded(velocity) * conditions.tau - group.forcing.shape * *r;
+                group.z = padded(velocity) * conditions.tau - group.forcing.value * *r;
             }
         }
     }
 
-    /// One tick of the length given at the start, with nothing new commanded.
+    /// Performs one tick of length [`Controller::dt`] without a new command.
     ///
     /// # Errors
-    /// A tick longer than 1000 τ; the state then stays as it was.
+    /// A tick longer than 1000 τ. The state then remains unchanged.
     pub fn step(&mut self) -> Result<Status> {
-        self.check_length(self.dt, None)?;
-        let h = self.stretch(self.dt);
-        if self.held.followed() {
-            self.held.take(&Command::default(), &self.position, self.dt, h);
+        self.check_tick_length(self.dt, None)?;
+        let h = self.clock_step(self.dt);
+        if self.perturbation.has_measurement() {
+            self.perturbation.set(&Command::default(), &self.position, self.dt, h);
         } else {
-            self.held.rest();
+            self.perturbation.clear_terms();
         }
         Ok(self.tick(self.dt, h))
     }
 
-    /// One tick under a command, with the motion written where the caller wants it.
+    /// Performs one tick under a command and writes the motion to memory of the caller.
     ///
-    /// What is refused is refused as a whole: no part of the command takes effect, and no time passes. A perturbation is
-    /// held over the tick:
+    /// A rejected command is rejected as a whole: no part of it takes effect, and no time passes. A perturbation is constant
+    /// over the tick:
     ///
     /// ```text
     /// τẏ = z + w(u) + k_t d + τc_v
@@ -267,21 +296,21 @@ impl Controller {
     /// τȯ = λκ(e − o)
     /// ```
     ///
-    /// `measured` ỹ stops the phase as the robot falls behind and pulls the movement towards it, with the gains of
-    /// [`Controller::set_compliance`]. Of the error e = ỹ − y counts d, what lies beyond the error o that is expected by
-    /// now: e − o where o is of the sign of e and smaller, 0 where it is larger, e where it is of the other sign. A robot
-    /// that always lags or sags by the same so neither holds the movement up nor keeps it from its goal. The error of a
-    /// DoF whose unit is rad, deg or ° is taken the short way round. A measurement stays in force, as the distance e, until
-    /// the next one or [`Controller::release`], so that a sensor may be slower than the loop. `coupling` adds c_v to the
-    /// velocity and c_a to the acceleration. Over the tick the pull is the velocity (1 − exp(−k_t h))/dt of d at its
-    /// start, h being the tick on the clock: however long the tick, it pulls no further than ỹ.
+    /// A measured position ỹ slows the phase by its tracking error e = ỹ − y and pulls the movement towards it, with the
+    /// gains of [`Controller::set_compliance`]. Only the part d of the error in excess of the expected error o counts: e − o
+    /// if o has the sign of e and is smaller, 0 if it is larger, and e if it has the other sign. A constant lag or sag of the
+    /// robot therefore neither stops the movement nor keeps it from its goal. The error of a DoF in rad, deg or ° is wrapped
+    /// to half a turn. A measurement remains in force, as its error e, until the next one or [`Controller::release`], so
+    /// that a sensor may be slower than the loop. Coupling terms add c_v to the velocity and c_a to the acceleration. The
+    /// pull over a tick of `dt` seconds and h on the clock is the velocity d(1 − exp(−k_t h))/dt: for any length of the tick
+    /// it does not overshoot ỹ.
     ///
-    /// Phase stopping and the pull: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
+    /// Phase stopping and tracking: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
     /// Mohajerian and Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9. Terms in ż:
     /// Pastor, Hoffmann, Asfour and Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385.
     ///
     /// # Errors
-    /// A vector of a wrong length, a number that is not finite, τ, amplitude or goal that a setter refuses, or a tick
+    /// A vector of a wrong length, a number that is not finite, a τ, amplitude or goal that its setter rejects, or a tick
     /// that is negative or longer than 1000 τ.
     pub fn update(&mut self, command: &Command, motion: &mut Motion) -> Result<Status> {
         motion.check(self.primitive.n_dofs())?;
@@ -290,7 +319,7 @@ impl Controller {
         Ok(status)
     }
 
-    /// Writes the motion, whose vectors have been checked, where the caller wants it.
+    /// Writes the motion to vectors of D elements each.
     #[inline]
     pub(crate) fn read(&self, motion: &mut Motion) {
         copy(&self.position, motion.position);
@@ -298,91 +327,35 @@ impl Controller {
         copy(&self.acceleration, motion.acceleration);
     }
 
-    /// [`Controller::update`] whose motion is read from the controller afterwards.
+    /// Performs one tick as [`Controller::update`] without writing the motion, which can be read from the controller.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+    /// # use pdmp_core::Command;
+    /// let measured = [0.0, 0.01];
+    /// controller.step_with(&Command { measured: Some(&measured), ..Command::default() })?;
+    /// assert!(controller.position()[1] > 0.0);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// As for [`Controller::update`].
     pub fn step_with(&mut self, command: &Command) -> Result<Status> {
         command.check(&self.primitive)?;
         let dt = command.dt.unwrap_or(self.dt);
-        self.check_length(dt, command.tau)?;
+        self.check_tick_length(dt, command.tau)?;
         self.apply(command);
-        // Two readings of a coarse clock may be equal.
+        // Two readings of a coarse system clock may be equal.
         if dt == 0.0 {
             return Ok(self.status);
         }
-        let h = self.stretch(dt);
-        self.held.take(command, &self.position, dt, h);
+        let h = self.clock_step(dt);
+        self.perturbation.set(command, &self.position, dt, h);
         Ok(self.tick(dt, h))
-    }
-
-    /// Whether the movement goes on.
-    pub fn status(&self) -> Status {
-        self.status
-    }
-
-    /// The model that is run.
-    pub fn primitive(&self) -> &Arc<Primitive> {
-        &self.primitive
-    }
-
-    /// Length of a tick given at the start, in seconds.
-    pub fn dt(&self) -> f64 {
-        self.dt
-    }
-
-    /// Seconds since the start.
-    pub fn time(&self) -> f64 {
-        self.time.value()
-    }
-
-    /// Phase: x in (0, 1] where discrete, φ in [0, 2π) where rhythmic.
-    pub fn phase(&self) -> f64 {
-        self.primitive.canonical().phase(self.clock.value())
-    }
-
-    /// Position y (D,), in the unit of each DoF.
-    pub fn position(&self) -> &[f64] {
-        unpack(&self.position, self.primitive.n_dofs())
-    }
-
-    /// Velocity ẏ (D,), per second.
-    pub fn velocity(&self) -> &[f64] {
-        unpack(&self.velocity, self.primitive.n_dofs())
-    }
-
-    /// Acceleration ÿ (D,), per second squared.
-    pub fn acceleration(&self) -> &[f64] {
-        unpack(&self.acceleration, self.primitive.n_dofs())
-    }
-
-    /// Style commanded (J,).
-    pub fn style(&self) -> &[f64] {
-        &self.conditions.style
-    }
-
-    /// Goal or anchor commanded (D,).
-    pub fn centre(&self) -> &[f64] {
-        &self.conditions.centre
-    }
-
-    /// Time constant commanded, in seconds.
-    pub fn tau(&self) -> f64 {
-        self.conditions.tau
-    }
-
-    /// Speed commanded: share of the rate 1/τ at which the path is followed.
-    pub fn speed(&self) -> f64 {
-        self.speed
-    }
-
-    /// Gains k_s and k_t of a measured position.
-    pub fn compliance(&self) -> (f64, f64) {
-        self.held.compliance()
-    }
-
-    /// Amplitude r₀ commanded; 1 where discrete.
-    pub fn amplitude(&self) -> f64 {
-        self.conditions.amplitude
     }
 }

@@ -1,57 +1,72 @@
-//! What can be commanded between ticks. A command that is refused leaves the last good one in force.
+//! Commands between ticks. A rejected command leaves the last valid one in force.
 
-use super::{Controller, SETTLED, Status};
+use super::{Controller, SETTLING_RATIO, Status};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::command_filter::{FilterGains, FilterStep};
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
 
 impl Controller {
-    /// Sets the style s (J,) to go to.
+    /// Sets the style s (J,).
     ///
     /// # Errors
-    /// A wrong length or a number that is not finite; the style then stays as it was.
+    /// A wrong length or a number that is not finite. The style then remains unchanged.
     pub fn set_style(&mut self, style: &[f64]) -> Result<()> {
         self.set(&Command { style: Some(style), ..Command::default() })
     }
 
-    /// Sets the goal g (D,) of a discrete movement.
+    /// Sets the goal g (D,) of a discrete movement, in the unit of each DoF.
     ///
     /// # Errors
-    /// A rhythmic primitive, a wrong length, or a number that is not finite; the goal then stays as it was.
+    /// A rhythmic primitive, a wrong length, or a number that is not finite. The goal then remains unchanged.
     pub fn set_goal(&mut self, goal: &[f64]) -> Result<()> {
         self.set(&Command { goal: Some(goal), ..Command::default() })
     }
 
-    /// Sets the anchor y_a (D,) of a rhythmic movement.
+    /// Sets the anchor y_a (D,) of a rhythmic movement, in the unit of each DoF.
     ///
     /// # Errors
-    /// A discrete primitive, a wrong length, or a number that is not finite; the anchor then stays as it was.
+    /// A discrete primitive, a wrong length, or a number that is not finite. The anchor then remains unchanged.
     pub fn set_anchor(&mut self, anchor: &[f64]) -> Result<()> {
         self.set(&Command { anchor: Some(anchor), ..Command::default() })
     }
 
-    /// Sets the time constant τ, in seconds; the rate 1/τ is what passes the filter.
+    /// Sets the time constant τ, in seconds. The rate 1/τ is filtered.
     ///
     /// # Errors
-    /// A number that is not positive, or more than a millionfold from the model's τ; τ then stays as it was.
+    /// A number that is not positive, or that differs from the model's τ by a factor of more than 1e6. τ then remains
+    /// unchanged.
     pub fn set_tau(&mut self, tau: f64) -> Result<()> {
         self.set(&Command { tau: Some(tau), ..Command::default() })
     }
 
-    /// Sets the amplitude r₀ of a rhythmic movement; r follows by Eq. (4), r₀ a filter.
+    /// Sets the amplitude r₀ of a rhythmic movement. r₀ is filtered, and r converges to it by Eq. (4).
     ///
     /// # Errors
-    /// A discrete primitive, a negative number or one that is not finite; r₀ then stays as it was.
+    /// A discrete primitive, a negative number or one that is not finite. r₀ then remains unchanged.
     pub fn set_amplitude(&mut self, amplitude: f64) -> Result<()> {
         self.set(&Command { amplitude: Some(amplitude), ..Command::default() })
     }
 
-    /// Sets the speed: the share of the rate 1/τ at which the path is followed, 1 at the start. 0 pauses on the path; the
-    /// change passes the filter of τ. A speed stays in force over [`Controller::reset`].
+    /// Sets the speed, a factor of the rate 1/τ: 1 by default, 0 for a pause on the path. The change is filtered as that of
+    /// τ. The speed remains in force after [`Controller::reset`].
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), Some(0.0))?;
+    /// controller.set_speed(0.0)?;
+    /// let phase = controller.phase();
+    /// controller.step()?;
+    /// assert_eq!(controller.phase(), phase);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
-    /// A speed outside [0, 1e6]; it then stays as it was.
+    /// A speed outside [0, 1e6]. It then remains unchanged.
     pub fn set_speed(&mut self, speed: f64) -> Result<()> {
         if !(0.0..=1e6).contains(&speed) {
             return Err(Error::Range { name: "speed", value: speed, allowed: "must lie between 0, a pause, and 1e6" });
@@ -59,99 +74,101 @@ impl Controller {
         self.speed = speed;
         let rate = [speed / self.conditions.tau];
         if self.started {
-            self.rate.follow(&rate, &self.rate_filter);
+            self.rate.set_target(&rate, &self.rate_gains);
         } else {
-            self.rate.jump(&rate);
+            self.rate.reset(&rate);
         }
         self.read_out();
         Ok(())
     }
 
-    /// Sets how much a measured position stops the phase, k_s, and pulls the movement, k_t per unit of the clock.
+    /// Sets the gains of a measured position: k_s of phase stopping, and k_t of tracking, per unit of the clock.
     ///
-    /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 over the
-    /// demonstrated stretch of the clock, T/τ or 2π; 0 is without.
+    /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 divided by
+    /// the demonstrated clock interval T/τ or 2π. A gain of 0 disables its term.
     ///
     /// # Errors
-    /// A gain that is negative, not finite or above 1e100; both then stay as they were.
+    /// A gain that is negative, not finite or above 1e100. Both then remain unchanged.
     pub fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
-        self.held.set_compliance(stopping, tracking)
+        self.perturbation.set_compliance(stopping, tracking)
     }
 
-    /// Forgets the measured position: no robot follows any more, until the next one is measured.
+    /// Discards the measured position and the expected error, so that no perturbation acts until the next measurement.
     pub fn release(&mut self) {
-        self.held.release();
+        self.perturbation.clear();
         self.read_out();
     }
 
+    /// Checks and applies a command.
     fn set(&mut self, command: &Command) -> Result<()> {
         command.check(&self.primitive)?;
         self.apply(command);
         Ok(())
     }
 
-    /// Takes a command that has been checked. What is commanded already changes nothing.
+    /// Applies a valid command. A repeated command has no effect.
     ///
-    /// Commands given before the first tick hold from the start; later ones set a settled movement going.
+    /// Commands before the first tick apply from the start; later ones resume a settled movement.
     pub(super) fn apply(&mut self, command: &Command) {
-        let filter = self.filter;
-        let mut news = false;
+        let gains = self.command_gains;
+        let mut changed = false;
         if let Some(style) = command.style.filter(|style| *style != self.conditions.style) {
             self.conditions.style.copy_from_slice(style);
-            self.style.follow(style, &filter);
-            news = true;
+            self.style.set_target(style, &gains);
+            changed = true;
         }
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
-            self.centre_filter = self.centre_filter();
-            self.centre_course = FilterStep::START;
-            self.centre.follow(centre, &self.centre_filter);
+            self.centre_gains = self.centre_gains();
+            self.centre_step = FilterStep::IDENTITY;
+            self.centre.set_target(centre, &self.centre_gains);
             self.set_tolerance();
-            news = true;
+            changed = true;
         }
         if let Some(tau) = command.tau.filter(|tau| *tau != self.conditions.tau) {
             self.conditions.tau = tau;
-            self.rate.follow(&[self.speed / tau], &self.rate_filter);
-            news = true;
+            self.rate.set_target(&[self.speed / tau], &self.rate_gains);
+            changed = true;
         }
         if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != self.conditions.amplitude) {
             self.conditions.amplitude = amplitude;
-            self.amplitude.follow(&[amplitude], &filter);
-            news = true;
+            self.amplitude.set_target(&[amplitude], &gains);
+            changed = true;
         }
-        if !news {
+        if !changed {
             return;
         }
         self.status = Status::Working;
         if !self.started {
             return self.begin();
         }
-        // A style that was switched to at once.
-        if filter.immediate() {
+        // A style without transition changes the forcing at once.
+        if gains.is_immediate() {
             self.read_forcing();
         }
     }
-    /// The filter of a goal commanded now.
+
+    /// Returns the filter gains of a goal or anchor commanded now.
     ///
-    /// Such a goal enters Eq. (1) alone, as in the paper, but over what remains of the movement: the filter takes so long,
-    /// less the time 1/β_z by which the output system lags behind, and never less than a transition. A goal at once is
-    /// what immediate transport has, an anchor, and any goal from shortly before the end on.
-    fn centre_filter(&self) -> FilterGains {
+    /// A commanded goal enters Eq. (1) alone, as in the paper. Its transition lasts for the rest of the movement, less the
+    /// time 1/β_z by which the output system lags, and never less than that of other commands. The latter serves for
+    /// anchors, for immediate transport, and for goals near or past the end.
+    fn centre_gains(&self) -> FilterGains {
         match self.primitive.canonical() {
             Canonical::Discrete { u_end, .. } if !self.primitive.transport.is_immediate() => {
                 let remaining = u_end - self.clock.value() - 1.0 / self.primitive.attractor().beta_z;
-                self.filter.lasting(remaining)
+                self.command_gains.at_least(remaining)
             }
-            _ => self.filter,
+            _ => self.command_gains,
         }
     }
 
-    /// Sets the distances at which the way from here to the goal counts as gone, not below what rounding leaves of it.
+    /// Sets the tolerance of settling to a share of the present distance from the goal, at least to its rounding error.
     pub(super) fn set_tolerance(&mut self) {
-        let ends = self.centre.target().iter().zip(&self.position);
-        for (group, (&centre, &position)) in self.groups.iter_mut().zip(ends) {
+        let distances = self.centre.target().iter().zip(&self.position);
+        for (group, (&centre, &position)) in self.groups.iter_mut().zip(distances) {
             let rounding = centre.abs().max(position.abs()) * (8.0 * f64::EPSILON);
-            group.tolerance = group.least.max(((centre - position).abs() * SETTLED).max(rounding));
+            group.tolerance = group.min_tolerance.max(((centre - position).abs() * SETTLING_RATIO).max(rounding));
         }
     }
 }

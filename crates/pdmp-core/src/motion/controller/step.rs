@@ -1,118 +1,120 @@
-//! One tick.
+//! One tick of the control loop.
 
-use super::group::{Forcing, Gate, Group, carried};
+use super::group::{ForcingSample, Gate, Group, add_frame_motion};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum, amplitude, faded};
 use crate::dynamics::forcing_table::Fade;
 use crate::dynamics::output_system::{Attractor, CubicSample, State};
-use crate::dynamics::transport::Lag;
+use crate::dynamics::transport::TransportSample;
 use crate::error::{Error, Result};
 use crate::motion::perturbation::PerturbationTerms;
 use crate::numerics::simd::{F64x4, Register, flush, unpack};
 
-/// Most pieces of a tick; a longer one is still stable, only less exact.
-const MAX_PIECES: f64 = 1000.0;
-/// Lowest rate, relative to the nominal one, at which terms of the user's own act in full.
+/// Maximum number of substeps of a tick. A tick that needs more is still stable, but less accurate.
+const MAX_SUBSTEPS: f64 = 1000.0;
+/// Rate ρ, relative to the nominal one, below which coupling terms fade: τ = 1/ρ would exceed every τ that can be commanded.
 const MIN_RATE: f64 = 1e-6;
-/// Longest tick, in units of τ.
+/// Maximum length of a tick, in units of τ.
 const MAX_TICK: f64 = 1000.0;
+/// Relative rounding error of a substep that ends at u_end.
+const ROUNDING: f64 = 1e-9;
 
 impl Controller {
-    /// Checks that a tick is not too long for the rates at which it starts and to which it goes.
-    pub(super) fn check_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
-        let commanded = tau.map_or(first(self.rate.target()), |tau| self.speed / tau);
-        let at_once = !self.started || self.filter.immediate();
-        let fastest = if at_once { commanded } else { commanded.max(first(self.rate.value())) };
-        if dt * fastest > MAX_TICK {
+    /// Checks that a tick is not too long for the present rate and the commanded one.
+    pub(super) fn check_tick_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
+        let commanded = tau.map_or(first_element(self.rate.target()), |tau| self.speed / tau);
+        let at_once = !self.started || self.command_gains.is_immediate();
+        let max_rate = if at_once { commanded } else { commanded.max(first_element(self.rate.value())) };
+        if dt * max_rate > MAX_TICK {
             return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
         }
         Ok(())
     }
 
-    /// One tick of `dt` seconds, `h` on the clock.
+    /// Performs one tick of `dt` seconds and `h` on the clock, in substeps that cubics describe.
     pub(super) fn tick(&mut self, dt: f64, h: f64) -> Status {
         self.started = true;
-        let mut parts = h / self.finest;
-        if !(self.style.settled() && self.amplitude.settled()) {
-            parts = parts.max(self.filter.parts(h));
+        let mut substeps = h / self.max_clock_step;
+        if !(self.style.is_settled() && self.amplitude.is_settled()) {
+            substeps = substeps.max(self.command_gains.substeps(h));
         }
-        if !self.centre.settled() {
-            parts = parts.max(self.centre_filter.parts(h));
+        if !self.centre.is_settled() {
+            substeps = substeps.max(self.centre_gains.substeps(h));
         }
-        if !self.rate.settled() {
-            parts = parts.max(self.rate_filter.parts(dt));
+        if !self.rate.is_settled() {
+            substeps = substeps.max(self.rate_gains.substeps(dt));
         }
-        if parts <= 1.0 {
-            self.piece(dt, h);
+        if substeps <= 1.0 {
+            self.substep(dt, h);
         } else {
-            let pieces = parts.ceil().min(MAX_PIECES);
-            for _ in 0..pieces as u32 {
-                let h = self.stretch(dt / pieces);
-                self.piece(dt / pieces, h);
+            let n_substeps = substeps.ceil().min(MAX_SUBSTEPS);
+            for _ in 0..n_substeps as u32 {
+                let h = self.clock_step(dt / n_substeps);
+                self.substep(dt / n_substeps, h);
             }
         }
         self.time.add(dt);
-        // What has settled stays settled, unless it is pushed or commanded.
-        if self.status == Status::Working || self.held.push().is_some() {
+        // A settled movement remains settled until it is perturbed or commanded.
+        if self.status == Status::Working || self.perturbation.terms().is_some() {
             let past = self.primitive.forcing_table().is_past(self.clock.value());
             self.status = if past { self.settled() } else { Status::Working };
         }
         self.status
     }
 
-    /// The stretch of the clock that `dt` seconds from now on cover.
+    /// Returns the clock interval of the next `dt` seconds, ∫ρ dt.
     #[inline(always)]
-    pub(super) fn stretch(&mut self, dt: f64) -> f64 {
-        if self.rate.settled() {
-            return first(self.rate.value()) * dt;
+    pub(super) fn clock_step(&mut self, dt: f64) -> f64 {
+        if self.rate.is_settled() {
+            return first_element(self.rate.value()) * dt;
         }
-        self.measure(dt);
-        self.rate.integral(&self.glide)
+        self.update_rate_step(dt);
+        self.rate.integral(&self.rate_step)
     }
 
-    /// Gets the filter of the rate ready for `dt` seconds.
-    fn measure(&mut self, dt: f64) {
-        if dt != self.glide.dt() {
-            self.glide = self.rate_filter.glide(dt);
-        }
-    }
-
-    /// Gets the filters on the clock that are at work ready for a stretch `h` of it.
-    #[inline(always)]
-    fn measure_clock(&mut self, h: f64) {
-        if !(self.style.settled() && self.amplitude.settled()) && h != self.course.dt() {
-            self.course = self.filter.pass(h);
-        }
-        if !self.centre.settled() && h != self.centre_course.dt() {
-            self.centre_course = self.centre_filter.pass(h);
+    /// Computes the filter step of the rate for `dt` seconds, unless the last one had that length.
+    fn update_rate_step(&mut self, dt: f64) {
+        if dt != self.rate_step.dt() {
+            self.rate_step = self.rate_gains.step_with_integral(dt);
         }
     }
 
-    /// Moves on by `dt` seconds, `h` on the clock, stopping at the demonstrated end, where the forcing has a kink.
+    /// Computes the filter steps of commands in transition for a clock interval `h`, unless the last ones had that length.
     #[inline(always)]
-    fn piece(&mut self, dt: f64, h: f64) {
+    fn update_command_steps(&mut self, h: f64) {
+        if !(self.style.is_settled() && self.amplitude.is_settled()) && h != self.command_step.dt() {
+            self.command_step = self.command_gains.step(h);
+        }
+        if !self.centre.is_settled() && h != self.centre_step.dt() {
+            self.centre_step = self.centre_gains.step(h);
+        }
+    }
+
+    /// Advances by `dt` seconds and `h` on the clock, split at u_end, where the forcing has a kink.
+    #[inline(always)]
+    fn substep(&mut self, dt: f64, h: f64) {
         let Canonical::Discrete { u_end, .. } = self.primitive.canonical() else {
             return self.advance(dt, h);
         };
-        let (left, way) = (u_end - self.clock.value(), self.held.pace() * h);
-        // A tick that ends here but for rounding is one that does.
-        if left <= 0.0 || left > way * (1.0 + 1e-9) {
+        let (remaining, advance) = (u_end - self.clock.value(), self.perturbation.phase_rate() * h);
+        // The substep that ends at u_end up to rounding is one that reaches it.
+        if remaining <= 0.0 || remaining > advance * (1.0 + ROUNDING) {
             return self.advance(dt, h);
         }
-        let before = self.rate.time_to(left / self.held.pace(), dt, &self.rate_filter);
-        // What rounding left of a tick that should have ended here is not worth a piece of its own.
-        if left > 1e-9 * way {
-            let h = self.stretch(before);
+        let before = self.rate.integral_time(remaining / self.perturbation.phase_rate(), dt, &self.rate_gains);
+        // A remainder of rounding, where the last substep ended at u_end, is skipped.
+        if remaining > ROUNDING * advance {
+            let h = self.clock_step(before);
             self.advance(before, h);
         }
         self.clock = CompensatedSum::at(u_end);
         self.read_frame();
         self.read_forcing();
-        let h = self.stretch(dt - before);
+        let h = self.clock_step(dt - before);
         self.advance(dt - before, h);
     }
 
-    /// Moves on by `dt` seconds, `h` on the clock.
+    /// Advances by `dt` seconds and `h` on the clock.
     #[inline(always)]
     pub(super) fn advance(&mut self, dt: f64, h: f64) {
         if h <= 0.0 {
@@ -122,104 +124,106 @@ impl Controller {
         if super::avx::advance(self, dt, h) {
             return;
         }
-        self.advance_anywhere(dt, h);
+        self.advance_portable(dt, h);
     }
 
-    /// A pause: nothing moves but the rate.
+    /// Advances the rate alone, in a pause.
     fn pause(&mut self, dt: f64) {
-        self.measure(dt);
-        self.rate.advance::<F64x4>(&self.glide);
-        self.held.rest();
+        self.update_rate_step(dt);
+        self.rate.advance::<F64x4>(&self.rate_step);
+        self.perturbation.clear_terms();
         self.read_out();
     }
 
-    /// Moves on as any processor can. A call of its own, so that [`Controller::advance`] stays small.
+    /// Advances with the instructions of every processor. It stays a call, so that [`Controller::advance`] stays small.
     #[inline(never)]
-    fn advance_anywhere(&mut self, dt: f64, h: f64) {
-        self.advance_in::<F64x4>(dt, h);
+    fn advance_portable(&mut self, dt: f64, h: f64) {
+        self.advance_with::<F64x4>(dt, h);
     }
 
-    /// The same in registers of one kind.
+    /// Advances by `dt` seconds and `h` > 0 on the clock, in registers of type `T`.
     #[inline(always)]
-    pub(super) fn advance_in<T: Register>(&mut self, dt: f64, h: f64) {
-        self.measure(dt);
-        self.measure_clock(h);
+    pub(super) fn advance_with<T: Register>(&mut self, dt: f64, h: f64) {
+        self.update_rate_step(dt);
+        self.update_command_steps(h);
         if h != self.propagator.step() {
             self.propagator = self.series.propagator::<T>(h);
         }
         let demonstrated = !self.primitive.forcing_table().is_past(self.clock.value());
-        let levers = self.held.push().map(|_| self.levers());
-        if self.held.pace() != self.paced {
-            self.open_gate();
+        let inputs = self.perturbation.terms().map(|_| self.unit_inputs());
+        if self.perturbation.phase_rate() != self.forcing_phase_rate {
+            self.update_forcing();
         }
-        self.style.advance::<T>(&self.course);
-        self.rate.advance::<T>(&self.glide);
-        let moving = self.centre.elapse(&self.centre_course);
-        self.clock.add(self.held.pace() * h);
+        self.style.advance::<T>(&self.command_step);
+        self.rate.advance::<T>(&self.rate_step);
+        let moving = self.centre.begin_step(&self.centre_step);
+        self.clock.add(self.perturbation.phase_rate() * h);
         if let Canonical::Rhythmic { mu } = self.primitive.canonical() {
             self.clock.wrap();
-            self.r = if self.amplitude.settled() {
+            self.r = if self.amplitude.is_settled() {
                 amplitude(mu, self.r, self.conditions.amplitude, h)
             } else {
-                let r = faded(self.filter.lag(&self.amplitude, self.r, mu, h));
-                self.amplitude.advance::<T>(&self.course);
+                let r = faded(self.command_gains.first_order_response(&self.amplitude, self.r, mu, h));
+                self.amplitude.advance::<T>(&self.command_step);
                 r
             };
         }
-        if !self.stretch.reaches(self.clock.value()) {
-            self.stretch = self.primitive.transport.stretch(self.clock.value());
+        if !self.transport_segment.reaches(self.clock.value()) {
+            self.transport_segment = self.primitive.transport.stretch(self.clock.value());
         }
-        let Lag { value, slope, bend } = self.stretch.lag(self.clock.value());
-        let lags = [std::mem::replace(&mut self.lag, value), value];
-        let carry = self.carry(slope, bend);
-        // A piece that reaches u_end has the slopes of the demonstrated side at both its ends.
-        let after = if demonstrated { self.gate_within() } else { self.gate() };
+        let TransportSample { value, slope, bend } = self.transport_segment.lag(self.clock.value());
+        let lags = [std::mem::replace(&mut self.frame_lag, value), value];
+        let frame_slopes = self.frame_slopes(slope, bend);
+        // At u_end the substep that reaches it takes the slopes from the demonstrated side.
+        let gate = if demonstrated { self.demonstrated_gate() } else { self.gate() };
 
         let (primitive, propagator) = (&*self.primitive, &self.propagator);
         let (forcing_table, attractor, clock) = (primitive.forcing_table(), primitive.attractor(), self.clock.value());
-        let place = if demonstrated { forcing_table.place_within(clock) } else { forcing_table.place(clock) };
+        let table_index =
+            if demonstrated { forcing_table.demonstrated_index(clock) } else { forcing_table.index(clock) };
         let style = unpack(self.style.value(), primitive.n_styles());
-        let swing = (!self.style.settled()).then(|| unpack(self.style.rate(), primitive.n_styles()));
-        let (n, rest, centre) = (self.groups.len(), T::splat(self.rest), &mut self.centre);
+        let style_rate = (!self.style.is_settled()).then(|| unpack(self.style.rate(), primitive.n_styles()));
+        let (n, flush_level, centre) = (self.groups.len(), T::splat(self.flush_level), &mut self.centre);
         let (position, velocity, acceleration) =
             (&mut self.position[..n], &mut self.velocity[..n], &mut self.acceleration[..n]);
         for (index, group) in self.groups.iter_mut().enumerate() {
             let from = CubicSample { value: T::load(&group.w.value), slope: T::load(&group.w.slope) };
-            group.forcing = Forcing::read::<T>(forcing_table, place, index, style, swing);
-            let to = after.jet::<T>(&group.forcing);
+            group.forcing = ForcingSample::read::<T>(forcing_table, table_index, index, style, style_rate);
+            let to = gate.forcing::<T>(&group.forcing);
             group.w = CubicSample { value: to.value.store(), slope: to.slope.store() };
 
-            let (goal, way) = (T::load(&centre.value()[index]), T::load(&group.way));
-            let [start, mut origin] = lags.map(|lag| goal + way * lag);
+            let (goal, displacement) = (T::load(&centre.value()[index]), T::load(&group.displacement));
+            let [start, mut origin] = lags.map(|lag| goal + displacement * lag);
             let state = State { e: T::load(&position[index]) - start, z: T::load(&group.z) };
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
-                let set_out = CubicSample { value: T::default(), slope: T::load(&centre.rate()[index]) };
-                let [arrived, slope] = centre.advance_group::<T>(index, &self.centre_course);
-                let moved = propagator.follow([set_out, CubicSample { value: arrived - goal, slope }]);
-                y = y + moved.e;
-                origin = arrived + way * lags[1];
-                next.z = next.z + moved.z;
+                let before = CubicSample { value: T::default(), slope: T::load(&centre.rate()[index]) };
+                let [new_goal, slope] = centre.advance_group::<T>(index, &self.centre_step);
+                let response = propagator.follow([before, CubicSample { value: new_goal - goal, slope }]);
+                y = y + response.e;
+                origin = new_goal + displacement * lags[1];
+                next.z = next.z + response.z;
             }
-            let (y, z) = (flush(y, rest), flush(next.z, rest));
+            let (y, z) = (flush(y, flush_level), flush(next.z, flush_level));
             (position[index], group.z) = (y.store(), z.store());
-            let [speed, change] = after.motion(attractor, State { e: y - origin, z }, carried(to, way, carry));
-            (velocity[index], acceleration[index]) = (speed.store(), change.store());
+            let w = add_frame_motion(to, displacement, frame_slopes);
+            let [y_dot, y_ddot] = gate.motion(attractor, State { e: y - origin, z }, w);
+            (velocity[index], acceleration[index]) = (y_dot.store(), y_ddot.store());
         }
-        forcing_table.prefetch(clock + self.lead * self.held.pace() * h);
-        if let Some(before) = levers {
-            self.add_perturbation(before);
+        forcing_table.prefetch(clock + self.prefetch_ticks * self.perturbation.phase_rate() * h);
+        if let Some(inputs) = inputs {
+            self.add_perturbation(inputs);
             self.read_out();
         }
     }
 
-    /// Adds what a perturbation does; the system is linear.
+    /// Adds the response to the perturbation, by superposition; `before` are the unit inputs at the start of the substep.
     fn add_perturbation(&mut self, before: [CubicSample; 2]) {
-        let after = self.levers();
+        let after = self.unit_inputs();
         let by_velocity = self.propagator.advance(State::default(), [before[0], after[0]]);
         let by_acceleration = self.propagator.follow([before[1], after[1]]);
-        let Some(PerturbationTerms { velocity, acceleration }) = self.held.push() else { return };
+        let Some(PerturbationTerms { velocity, acceleration }) = self.perturbation.terms() else { return };
         for (index, group) in self.groups.iter_mut().enumerate() {
             let (v, a) = (velocity[index], acceleration[index]);
             self.position[index] += v * by_velocity.e + a * by_acceleration.e;
@@ -227,85 +231,88 @@ impl Controller {
         }
     }
 
-    /// What a unit of c_v adds to the forcing, τ, and a unit of c_a to the centre: τ²/(α_zβ_z), for that is how far the
-    /// centre must move to add τ² to the row of Eq. (1).
-    fn levers(&self) -> [CubicSample; 2] {
+    /// Returns the inputs of the output system for unit coupling terms: the forcing τ for c_v, and the displacement
+    /// τ²/(α_zβ_z) of the centre for c_a, which adds τ² to the right-hand side of Eq. (1).
+    fn unit_inputs(&self) -> [CubicSample; 2] {
         let Attractor { alpha_z, beta_z } = self.primitive.attractor();
-        // On the way into a pause the terms fade with it once τ lies beyond all that can be commanded.
-        let least = MIN_RATE / self.primitive.tau();
-        let (rate, change) = (first(self.rate.value()), first(self.rate.rate()));
-        let tau = 1.0 / rate.max(least);
+        // On the transition into a pause τ is bounded, so that the terms fade with the rate.
+        let min_rate = MIN_RATE / self.primitive.tau();
+        let (rate, rate_change) = (first_element(self.rate.value()), first_element(self.rate.rate()));
+        let tau = 1.0 / rate.max(min_rate);
         // dτ/du = τ·dτ/dt.
-        let slope = if rate < least { 0.0 } else { -change * tau.powi(3) };
+        let slope = if rate < min_rate { 0.0 } else { -rate_change * tau.powi(3) };
         let centre = tau / (alpha_z * beta_z);
         [CubicSample { value: tau, slope }, CubicSample { value: tau * centre, slope: 2.0 * slope * centre }]
     }
 
-    /// The gate at the clock, at u_end with the slope of what follows.
+    /// Returns the gate at the clock, at u_end with the slope past the end.
     #[inline(always)]
     pub(super) fn gate(&self) -> Gate {
-        let within = self.gate_within();
-        match self.primitive.forcing_table().fading(self.clock.value()) {
-            Some(Fade { value, growth, along, .. }) => {
-                let pace = self.held.pace();
-                Gate { r: value, pace: pace * along, growth: pace * growth, ..within }
+        let demonstrated = self.demonstrated_gate();
+        match self.primitive.forcing_table().fade(self.clock.value()) {
+            Some(Fade { r, r_slope, p_slope, .. }) => {
+                let phase_rate = self.perturbation.phase_rate();
+                Gate { r, r_slope: phase_rate * r_slope, phase_rate: phase_rate * p_slope, ..demonstrated }
             }
-            None => within,
+            None => demonstrated,
         }
     }
 
-    /// The gate of the demonstrated stretch.
+    /// Returns the gate of the demonstrated interval.
     #[inline(always)]
-    fn gate_within(&self) -> Gate {
-        let (r, rate) = (self.r, [self.rate.value(), self.rate.rate()].map(first));
-        let growth = match self.primitive.canonical() {
+    fn demonstrated_gate(&self) -> Gate {
+        let (r, rate) = (self.r, [self.rate.value(), self.rate.rate()].map(first_element));
+        let r_slope = match self.primitive.canonical() {
             Canonical::Discrete { .. } => 0.0,
-            Canonical::Rhythmic { mu } => mu * (first(self.amplitude.value()) - r),
+            Canonical::Rhythmic { mu } => mu * (first_element(self.amplitude.value()) - r),
         };
-        Gate { r, pace: self.held.pace(), growth, rate }
+        Gate { r, r_slope, phase_rate: self.perturbation.phase_rate(), rate }
     }
 
-    /// m′ and m″ with respect to the output system's clock, from those with respect to the phase's.
+    /// Returns m′ and m″ on the clock of the output system from those on the clock of the phase.
     #[inline(always)]
-    fn carry(&self, slope: f64, bend: f64) -> [f64; 2] {
-        let pace = self.held.pace();
-        [slope * pace, bend * (pace * pace)]
+    fn frame_slopes(&self, slope: f64, bend: f64) -> [f64; 2] {
+        let phase_rate = self.perturbation.phase_rate();
+        [slope * phase_rate, bend * (phase_rate * phase_rate)]
     }
 
-    /// Reads the frame at a clock that was set.
+    /// Evaluates the frame after the clock was set.
     pub(super) fn read_frame(&mut self) {
-        self.stretch = self.primitive.transport.stretch(self.clock.value());
-        self.lag = self.stretch.lag(self.clock.value()).value;
+        self.transport_segment = self.primitive.transport.stretch(self.clock.value());
+        self.frame_lag = self.transport_segment.lag(self.clock.value()).value;
     }
 
-    /// Reads the forcing at a clock or style that was set.
+    /// Evaluates the forcing after clock or style was set.
     pub(super) fn read_forcing(&mut self) {
-        let (primitive, place) = (&self.primitive, self.primitive.forcing_table().place(self.clock.value()));
-        let [style, swing] = [self.style.value(), self.style.rate()].map(|style| unpack(style, primitive.n_styles()));
+        let primitive = &self.primitive;
+        let table_index = primitive.forcing_table().index(self.clock.value());
+        let [style, style_rate] =
+            [self.style.value(), self.style.rate()].map(|style| unpack(style, primitive.n_styles()));
         for (index, group) in self.groups.iter_mut().enumerate() {
-            group.forcing = Forcing::read::<F64x4>(primitive.forcing_table(), place, index, style, Some(swing));
+            let forcing_table = primitive.forcing_table();
+            group.forcing = ForcingSample::read::<F64x4>(forcing_table, table_index, index, style, Some(style_rate));
         }
-        self.open_gate();
+        self.update_forcing();
     }
 
-    /// Computes w at the clock for the pace at work. A tick does so for its end, where the next one starts.
-    fn open_gate(&mut self) {
-        self.paced = self.held.pace();
+    /// Computes w and w′ at the start of a tick for the present phase rate; otherwise those of the last end serve.
+    fn update_forcing(&mut self) {
+        self.forcing_phase_rate = self.perturbation.phase_rate();
         let gate = self.gate();
-        self.groups.iter_mut().for_each(|group| group.w = gate.jet(&group.forcing));
+        self.groups.iter_mut().for_each(|group| group.w = gate.forcing(&group.forcing));
     }
 
-    /// Velocity and acceleration of the present state.
+    /// Computes velocity and acceleration of the present state.
     pub(super) fn read_out(&mut self) {
         let (gate, attractor) = (self.gate(), self.primitive.attractor());
-        let Lag { value, slope, bend } = self.primitive.transport.lag(self.clock.value());
-        let carry = self.carry(slope, bend);
-        for (index, &Group { forcing, way, z, .. }) in self.groups.iter().enumerate() {
-            let w = carried(gate.jet(&forcing), way, carry);
-            let e = self.position[index] - (self.centre.value()[index] + way * value);
+        let TransportSample { value, slope, bend } = self.primitive.transport.lag(self.clock.value());
+        let frame_slopes = self.frame_slopes(slope, bend);
+        for (index, &Group { forcing, displacement, z, .. }) in self.groups.iter().enumerate() {
+            let w = add_frame_motion(gate.forcing(&forcing), displacement, frame_slopes);
+            let e = self.position[index] - (self.centre.value()[index] + displacement * value);
             [self.velocity[index], self.acceleration[index]] = gate.motion(attractor, State { e, z }, w);
         }
-        if let Some(PerturbationTerms { velocity, acceleration }) = self.held.push() {
+        if let Some(PerturbationTerms { velocity, acceleration }) = self.perturbation.terms() {
             for group in 0..self.groups.len() {
                 self.velocity[group] += velocity[group];
                 self.acceleration[group] += acceleration[group];
@@ -313,35 +320,39 @@ impl Controller {
         }
     }
 
-    /// Whether a movement is over: how far a DoF may still go is at most about |y − g| + 2|z + w|/α_z + |w|/β_z, what is
-    /// left of its way, of its speed at critical damping, and of its forcing, be it of the style that is on its way, and
-    /// as far as the goal itself still goes.
+    /// Returns [`Status::Finished`] past the end if the remaining displacement of every DoF is within its tolerance.
+    ///
+    /// The displacement is bounded by about |y − g| + 2|z + w|/α_z + |w|/β_z: distance from the goal, overshoot at critical
+    /// damping, and forcing, the larger of those of the present and the commanded style. The remaining displacement of the
+    /// goal is added.
     fn settled(&self) -> Status {
-        let Some(fade) = self.primitive.forcing_table().fading(self.clock.value()) else {
+        let Some(fade) = self.primitive.forcing_table().fade(self.clock.value()) else {
             return Status::Working;
         };
         let Attractor { alpha_z, beta_z } = self.primitive.attractor();
         let (forcing_table, target) =
             (self.primitive.forcing_table(), unpack(self.style.target(), self.primitive.n_styles()));
-        let place = forcing_table.place(self.clock.value());
-        let over = self.groups.iter().enumerate().all(|(index, group)| {
-            let way = (self.position[index] - self.centre.target()[index]).abs();
-            let Forcing { shape, slope, .. } = group.forcing;
-            let forcing = shape * fade.value;
-            let flow = (group.z + forcing).abs() * (2.0 / alpha_z);
-            let mut push = fade.push(CubicSample { value: shape, slope });
-            if !self.style.settled() {
-                push = push.max(fade.push(forcing_table.blend(place, index, target)));
+        let table_index = forcing_table.index(self.clock.value());
+        let settled = self.groups.iter().enumerate().all(|(index, group)| {
+            let distance = (self.position[index] - self.centre.target()[index]).abs();
+            let ForcingSample { value, slope, .. } = group.forcing;
+            let overshoot = (group.z + value * fade.r).abs() * (2.0 / alpha_z);
+            let mut residual = fade.residual(CubicSample { value, slope });
+            if !self.style.is_settled() {
+                residual = residual.max(fade.residual(forcing_table.sample(table_index, index, target)));
             }
-            let left = way + flow + push * (1.0 / beta_z) + self.centre_filter.left(&self.centre, index);
-            left.simd_le(group.tolerance).all()
+            let bound = distance
+                + overshoot
+                + residual * (1.0 / beta_z)
+                + self.centre_gains.max_displacement(&self.centre, index);
+            bound.simd_le(group.tolerance).all()
         });
-        if over { Status::Finished } else { Status::Working }
+        if settled { Status::Finished } else { Status::Working }
     }
 }
 
-/// The first of several commands, or the only one.
-fn first(lanes: &[F64x4]) -> f64 {
+/// Returns the first command of a filter, or its only one.
+fn first_element(lanes: &[F64x4]) -> f64 {
     lanes[0].as_array()[0]
 }
 
@@ -354,9 +365,9 @@ mod tests {
     use super::*;
     use crate::{Conditions, Demonstration, FitOptions, Kind, Sampling, fit};
 
-    /// Registers of any width round alike: the motion is the same to the last bit.
+    /// AVX2 and portable registers yield the same motion to the last bit.
     #[test]
-    fn every_width_moves_alike() {
+    fn motion_does_not_depend_on_the_register_width() {
         let reach = |h: f64| {
             let position = Array2::from_shape_fn((101, 6), |(c, d)| {
                 let s = c as f64 / 100.0;
@@ -365,10 +376,8 @@ mod tests {
             Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
         };
         let demos = [0.0, 0.4, 1.0].map(reach);
-        let options = FitOptions {
-            basis: crate::learning::regression::Basis::NGnet(Default::default()),
-            ..FitOptions::new(Kind::Discrete)
-        };
+        let options =
+            FitOptions::new(Kind::Discrete).basis(crate::learning::regression::Basis::NGnet(Default::default()));
         let model = Arc::new(fit(&demos, &options).unwrap());
         let mut any = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
         any.step().unwrap();
@@ -377,10 +386,10 @@ mod tests {
         any.set_style(&vec![0.5; any.primitive.n_styles()]).unwrap();
         let mut four = any.clone();
         for _ in 0..1500 {
-            let h = any.stretch(1e-3);
+            let h = any.clock_step(1e-3);
             any.advance(1e-3, h);
-            four.stretch(1e-3);
-            four.advance_in::<F64x4>(1e-3, h);
+            four.clock_step(1e-3);
+            four.advance_with::<F64x4>(1e-3, h);
             assert_eq!(any.position(), four.position());
             assert_eq!(any.acceleration(), four.acceleration());
         }

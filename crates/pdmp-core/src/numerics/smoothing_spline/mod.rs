@@ -1,14 +1,14 @@
-//! The cubic smoothing spline, which takes measurement noise off samples before they are interpolated and differentiated.
+//! Cubic smoothing spline, which removes measurement noise from samples before interpolation and differentiation.
 //!
-//! It minimises Σ(y_i − f(t_i))² + λ∫f̈². With Q (n, n−2) the second divided differences and R (n−2, n−2) the Gram
-//! matrix of the hat functions, both banded, the second derivatives γ and the values f at the knots are
+//! It minimises Σ(y_i − f(t_i))² + λ∫f̈². With the second divided differences Q (n, n−2) and the Gram matrix R (n−2, n−2)
+//! of the hat functions, both banded, the second derivatives γ and the values f at the knots are
 //!
 //! ```text
 //! M γ = Qᵀy,   M = R + λQᵀQ,   f = y − λQγ
 //! ```
 //!
-//! solved in O(n) by LDLᵀ. On a uniform grid it is a low-pass filter without phase lag, 1/(1 + λω⁴) for slow signals,
-//! which is why λ can be given as the frequency of half gain. Time is counted in mean intervals throughout.
+//! solved in O(n) by LDLᵀ. On a uniform grid the spline is a low-pass filter without phase lag, with the gain 1/(1 + λω⁴)
+//! for slow signals. The frequency of half gain, the cut-off, therefore determines λ. The unit of time is the mean interval.
 //!
 //! - C. H. Reinsch, Smoothing by spline functions, Numerische Mathematik 10, 1967, doi:10.1007/BF02162161;
 //! - P. Craven, G. Wahba, Smoothing noisy data with spline functions: generalised cross-validation, Numerische
@@ -16,6 +16,7 @@
 //! - M. F. Hutchinson, F. R. de Hoog, Smoothing noisy data with spline functions, Numerische Mathematik 47, 1985,
 //!   doi:10.1007/BF01389878 (the trace in O(n)).
 
+mod cross_validation;
 mod noise;
 mod roughness;
 #[cfg(test)]
@@ -23,49 +24,58 @@ mod tests;
 
 use std::f64::consts::PI;
 
-use ndarray::{Array2, ArrayView1, ArrayView2};
+use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::numerics::simd::{F64x4, WIDTH};
 use crate::numerics::threads::Threads;
-use crate::validate::check_positive;
+use crate::validate::{check_positive, row_major, row_major_mut};
 pub use noise::Noise;
-pub(crate) use noise::{MIN_THINNED, pool};
+pub(crate) use noise::{MIN_DECIMATED, pooled};
 use roughness::Roughness;
 
 /// Treatment of measurement noise before demonstrations are differentiated.
+///
+/// ```
+/// # #[cfg(feature = "learning")] {
+/// use pdmp_core::FitOptions;
+/// use pdmp_core::numerics::Smoothing;
+///
+/// let options = FitOptions::discrete().smoothing(Smoothing::CutOff { hz: 6.0 });
+/// assert_eq!(options.smoothing, Smoothing::CutOff { hz: 6.0 });
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Smoothing {
-    /// Every sample is met.
+    /// Interpolation of every sample.
     Interpolate,
-    /// A sine of frequency `hz` keeps half its amplitude; the fall-off is of fourth order and without phase lag.
+    /// Low-pass filter of fourth order without phase lag.
     CutOff {
-        /// Cut-off frequency in Hz.
+        /// Cut-off frequency in Hz, at which a sine keeps half its amplitude.
         hz: f64,
     },
-    /// The cut-off of each degree of freedom by generalised cross-validation over all recordings together. The noise is
-    /// taken to be white. Where cross-validation finds none, every sample is met.
+    /// Low-pass filter with the cut-off of each degree of freedom by generalised cross-validation over all recordings
+    /// together, which assumes white noise. Where it detects none, every sample is interpolated.
     #[default]
     Auto,
 }
 
-/// Lowest cut-off, in cycles per sample. Rounding errors grow with λ, that is with the inverse fourth power of the
-/// cut-off; here they are 1e-3 of the gain, and at ten times the cut-off 1e-7.
-const MIN_PER_SAMPLE: f64 = 1e-4;
+/// Lowest cut-off, in cycles per sample. Rounding errors grow with λ, the inverse fourth power of the cut-off: they are 1e-3
+/// of the gain here, and 1e-7 at ten times this cut-off.
+const MIN_CUT_OFF: f64 = 1e-4;
 
-/// Reach of a sample's influence in periods of the cut-off: it decays as exp(−√2π·hz·|Δt|), here to 3e-14.
-const REACH: f64 = 7.0;
+/// Range of influence of a sample, in periods of the cut-off. The influence decays as exp(−√2π·hz·|Δt|), here to 3e-14.
+const INFLUENCE_PERIODS: f64 = 7.0;
 
-/// Most copies of a cycle on either side of it: at the lowest cut-off that is allowed, one cycle per period, a sample's
-/// influence decays to 1e-4 over two periods.
+/// Most copies of a cycle on either side of it. At the lowest valid cut-off, one cycle per period, the influence of a sample
+/// decays to 1e-4 over two periods.
 const MAX_COPIES: usize = 2;
 
-/// Samples of one recording, or of one cycle where it has a period.
+/// Samples of a recording, or of one cycle if they have a period.
 ///
-/// The caller has checked that there are at least 4, that the times increase, t_0 < … < t_{n−1} < t_0 + period, and
-/// that the values are finite.
+/// The caller ensures at least 4 samples, increasing times t_0 < … < t_{n−1} < t_0 + period, and finite values.
 #[derive(Clone, Copy)]
 pub(crate) struct Samples<'a> {
     /// Times (n,) in seconds.
@@ -77,56 +87,58 @@ pub(crate) struct Samples<'a> {
 }
 
 impl Samples<'_> {
-    /// Number of samples n.
+    /// Returns the number of samples n.
     fn len(&self) -> usize {
         self.time.len()
     }
 
-    /// Seconds from the first sample to the last one, or to the next cycle.
+    /// Returns the time from the first sample to the last one or to the next cycle, in seconds.
     fn duration(&self) -> f64 {
         self.period.unwrap_or_else(|| self.time[self.len() - 1] - self.time[0])
     }
 
-    /// Mean interval in seconds.
+    /// Returns the mean interval in seconds.
     fn interval(&self) -> f64 {
         let n = self.len();
         self.duration() / if self.period.is_some() { n } else { n - 1 } as f64
     }
 
-    /// Knots in mean intervals: the samples, and of a cycle `pad` of its copies on either side.
+    /// Returns the times of the samples, and of `pad` periodic copies on either side, in mean intervals.
     fn knots(&self, pad: usize) -> Vec<f64> {
         let (n, interval) = (self.len(), self.interval());
         let knot = |k: usize| (self.time[k % n] - self.time[0]) / interval + (k / n * n) as f64;
-        // Whole turns ahead, so that counts stay positive.
+        // The offset of whole cycles keeps indices positive.
         (0..n + 2 * pad).map(|k| knot(k + MAX_COPIES * n - pad)).collect()
     }
 
-    /// Copies of samples on either side of a cycle that tell in it at a cut-off in Hz.
+    /// Returns the number of periodic copies on either side of a cycle that influence it at a cut-off in Hz.
     fn pad(&self, hz: f64) -> usize {
-        let reach = (REACH / (hz * self.interval())).ceil();
+        let reach = (INFLUENCE_PERIODS / (hz * self.interval())).ceil();
         if self.period.is_some() { (MAX_COPIES * self.len()).min(reach as usize) } else { 0 }
     }
 
-    /// Deviations of up to four columns from their first values (n,), with the largest of each.
+    /// Returns the deviations (n,) of one to four columns from their first values, and the largest magnitude of each.
+    ///
+    /// Unused lanes repeat the last column.
     fn deviations(&self, columns: &[usize]) -> (Vec<F64x4>, F64x4) {
-        let mut largest = F64x4::ZERO;
-        let mut first = [0.0; WIDTH];
-        columns.iter().zip(&mut first).for_each(|(&d, first)| *first = self.values[[0, d]]);
-        let deviation = |row: ArrayView1<f64>| {
-            let mut value = first;
-            columns.iter().zip(&mut value).for_each(|(&d, value)| *value = row[d]);
-            let deviation = F64x4::new(value) - F64x4::new(first);
+        let rows = self.values.as_standard_layout();
+        let rows = row_major(&rows);
+        let columns: [usize; WIDTH] = std::array::from_fn(|lane| columns[lane.min(columns.len() - 1)]);
+        let at = |row: &[f64]| F64x4::new(columns.map(|d| row[d]));
+        let (first, mut largest) = (at(rows), F64x4::ZERO);
+        let deviation = |row: &[f64]| {
+            let deviation = at(row) - first;
             largest = largest.fast_max(deviation.abs());
             deviation
         };
-        (self.values.outer_iter().map(deviation).collect(), largest)
+        (rows.chunks_exact(self.values.ncols()).map(deviation).collect(), largest)
     }
 
-    /// The smoothed values (n, D) by rows, each column at its cut-off in Hz; columns without one stay.
+    /// Smooths each column at its cut-off in Hz. Returns values (n, D), row-major; columns without cut-off are unchanged.
     pub(crate) fn smoothed(&self, cut_offs: &[Option<f64>]) -> Array2<f64> {
         let mut smoothed = self.values.as_standard_layout().into_owned();
         let Some(lowest) = cut_offs.iter().flatten().copied().reduce(f64::min) else { return smoothed };
-        let (n, pad) = (self.len(), self.pad(lowest));
+        let pad = self.pad(lowest);
         let roughness = Roughness::new(&self.knots(pad));
         let columns: Vec<usize> = (0..cut_offs.len()).filter(|&d| cut_offs[d].is_some()).collect();
         for columns in columns.chunks(WIDTH) {
@@ -134,37 +146,38 @@ impl Samples<'_> {
             let hz = columns.iter().filter_map(|&d| cut_offs[d]);
             lambdas.iter_mut().zip(hz).for_each(|(to, hz)| *to = lambda(hz * self.interval()));
             let lambda = F64x4::new(lambdas);
-            // A column is smoothed as shares of its largest deviation.
+            // Scaling by the largest deviation avoids overflow and underflow.
             let (deviations, largest) = self.deviations(columns);
             let scale = largest.fast_max(F64x4::splat(f64::MIN_POSITIVE));
-            let mut shares: Vec<F64x4> = deviations.into_iter().map(|deviation| deviation / scale).collect();
-            copy_cycle(&mut shares, pad);
-            roughness.bend(&mut shares);
-            roughness.factor(lambda).solve(&mut shares);
-            roughness.residual(&mut shares);
-            for (mut row, residual) in smoothed.outer_iter_mut().zip(&shares[pad..pad + n]) {
-                let off = (*residual * lambda * scale).to_array();
-                columns.iter().zip(off).for_each(|(&d, off)| row[d] -= off);
+            let mut scaled: Vec<F64x4> = deviations.into_iter().map(|deviation| deviation / scale).collect();
+            extend_periodically(&mut scaled, pad);
+            roughness.second_differences(&mut scaled);
+            roughness.factorize(lambda).solve(&mut scaled);
+            let rows = row_major_mut(&mut smoothed).chunks_exact_mut(self.values.ncols());
+            for (row, residual) in rows.zip(roughness.residuals(&scaled).skip(pad)) {
+                let noise = (residual * lambda * scale).to_array();
+                columns.iter().zip(noise).for_each(|(&d, noise)| row[d] -= noise);
             }
         }
         smoothed
     }
 }
 
-/// Puts `pad` samples of the copies of a cycle on either side of it.
-fn copy_cycle(cycle: &mut Vec<F64x4>, pad: usize) {
+/// Extends a cycle by `pad` periodic copies of samples on either side.
+fn extend_periodically<T: Copy>(cycle: &mut Vec<T>, pad: usize) {
     let n = cycle.len();
     if pad > 0 {
         *cycle = (0..n + 2 * pad).map(|k| cycle[(k + MAX_COPIES * n - pad) % n]).collect();
     }
 }
 
-/// The smoothed values (n, D) of one recording, each column for itself. Noise is searched in all samples: a jump, which
-/// blocks spread, does not pass for it.
+/// Smooths the columns of one recording separately. Returns values (n, D).
+///
+/// The noise is estimated from all samples: a jump, which averages over blocks would spread, is not mistaken for noise.
 ///
 /// # Errors
-/// A cut-off that is not positive and finite, above the Nyquist frequency, below [`MIN_PER_SAMPLE`] or below one per
-/// period.
+/// A cut-off that is not positive and finite, at or above half the sampling rate, below [`MIN_CUT_OFF`] or below one cycle
+/// per period.
 pub(crate) fn smooth(
     smoothing: Smoothing,
     time: &[f64],
@@ -173,21 +186,24 @@ pub(crate) fn smooth(
 ) -> Result<Array2<f64>> {
     let samples = Samples { time, period, values };
     smoothing.check(&samples)?;
-    Ok(samples.smoothed(Noise::of(smoothing, &[samples], usize::MAX, Threads::ONE)?.cut_offs()))
+    Ok(samples.smoothed(Noise::estimate(smoothing, &[samples], usize::MAX, Threads::ONE)?.cut_offs()))
 }
 
 impl Smoothing {
-    /// Checks that a given cut-off suits a recording.
+    /// Checks a given cut-off against the sampling rate and period of a recording.
+    ///
+    /// # Errors
+    /// As of [`smooth`].
     pub(crate) fn check(self, samples: &Samples) -> Result<()> {
         let Self::CutOff { hz } = self else { return Ok(()) };
         check_positive("smoothing", hz)?;
         let per_sample = hz * samples.interval();
         let allowed = if per_sample >= 0.5 {
             "must lie below half the sampling rate"
-        } else if per_sample < MIN_PER_SAMPLE {
+        } else if per_sample < MIN_CUT_OFF {
             "must be at least a ten-thousandth of the sampling rate"
         } else if samples.period.is_some_and(|period| hz * period < 1.0 - 1e-9) {
-            "must be at least one cycle per period: a lower cut-off takes the movement away"
+            "must be at least one cycle per period: a lower cut-off removes the movement"
         } else {
             return Ok(());
         };
@@ -195,11 +211,12 @@ impl Smoothing {
     }
 }
 
-/// The λ that halves a sine of `frequency` cycles per sample on a uniform grid, where λQR⁻¹Qᵀ has the eigenvalue
-/// λ(2 sin ω/2)⁴/(1 − ⅔sin² ω/2): the 1/(1 + λω⁴) of the continuous case up to terms of the order ω⁴. Past the Nyquist
-/// frequency, where there is no such sine, it goes on falling with the fourth power.
+/// Computes the λ that halves a sine of `frequency` cycles per sample on a uniform grid.
+///
+/// There λQR⁻¹Qᵀ has the eigenvalue λ(2 sin ω/2)⁴/(1 − ⅔sin² ω/2), and the gain is the 1/(1 + λω⁴) of the continuous case up
+/// to terms of order ω⁴. Beyond the Nyquist frequency λ continues to decrease with the fourth power.
 fn lambda(frequency: f64) -> f64 {
-    let inside = frequency.clamp(MIN_PER_SAMPLE, 0.5);
-    let sin_squared = (PI * inside).sin().powi(2);
-    (1.0 - sin_squared / 1.5) / (16.0 * sin_squared * sin_squared) * (inside / frequency).min(1.0).powi(4)
+    let below_nyquist = frequency.clamp(MIN_CUT_OFF, 0.5);
+    let sin_squared = (PI * below_nyquist).sin().powi(2);
+    (1.0 - sin_squared / 1.5) / (16.0 * sin_squared * sin_squared) * (below_nyquist / frequency).min(1.0).powi(4)
 }

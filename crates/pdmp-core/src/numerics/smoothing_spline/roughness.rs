@@ -1,79 +1,81 @@
-//! The banded matrices of the smoothing spline, for four penalties side by side.
+//! Banded matrices of the smoothing spline, factorised for four values of λ at once.
 
 use std::ops::Range;
 
-use crate::numerics::simd::F64x4;
+use crate::numerics::simd::{F64x4, Real};
 
-/// Columns of Q, and the upper bands of R and QᵀQ: (diagonal, first, second) in each row.
+/// Matrices of the roughness penalty ∫f̈² of splines with n knots.
 pub(super) struct Roughness {
+    /// Nonzero elements of each column of Q (n, n−2), padded to n columns with zeros.
     q: Vec<[f64; 3]>,
+    /// Diagonal and superdiagonal of R (n−2, n−2).
     r: Vec<[f64; 2]>,
+    /// Diagonal and two superdiagonals of QᵀQ (n−2, n−2).
     qq: Vec<[f64; 3]>,
 }
 
-/// M = LDLᵀ: in row i, 1/d_i and the elements of L in rows i + 1 and i + 2 of column i.
-pub(super) struct Factor(Vec<[F64x4; 3]>);
+/// Factorisation M = LDLᵀ: 1/d_i, and the elements (i+1, i) and (i+2, i) of L.
+pub(super) struct Factorization(Vec<[F64x4; 3]>);
 
 impl Roughness {
-    /// The matrices of splines with these knots (n,), at least three.
+    /// Computes the matrices for at least three increasing knots (n,).
     pub(super) fn new(knots: &[f64]) -> Self {
         let h: Vec<f64> = knots.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let q: Vec<[f64; 3]> = h.windows(2).map(|h| [1.0 / h[0], -1.0 / h[0] - 1.0 / h[1], 1.0 / h[1]]).collect();
+        let inverse: Vec<f64> = h.iter().map(|h| 1.0 / h).collect();
+        let columns = inverse.windows(2).map(|inverse| [inverse[0], -inverse[0] - inverse[1], inverse[1]]);
+        let q: Vec<[f64; 3]> = columns.chain([[0.0; 3]; 2]).collect();
         let r = h.windows(2).map(|h| [(h[0] + h[1]) / 3.0, h[1] / 6.0]).collect();
-        let column = |i: usize| q.get(i).copied().unwrap_or_default();
-        let qq = (0..q.len())
-            .map(|i| {
-                let [a, b, c] = q[i];
-                let ([a1, b1, _], [a2, ..]) = (column(i + 1), column(i + 2));
-                [a * a + b * b + c * c, b * a1 + c * b1, c * a2]
-            })
-            .collect();
+        let product = |q: &[[f64; 3]]| {
+            let [[a, b, c], [a1, b1, _], [a2, ..]] = [q[0], q[1], q[2]];
+            [a * a + b * b + c * c, b * a1 + c * b1, c * a2]
+        };
+        let qq = q.windows(3).map(product).collect();
         Self { q, r, qq }
     }
 
-    /// M = R + λQᵀQ, factorised.
-    pub(super) fn factor(&self, lambda: F64x4) -> Factor {
-        let mut rows: Vec<[F64x4; 3]> = Vec::with_capacity(self.q.len());
-        // Of the two rows before: L's elements, and these times d.
+    /// Factorises M = R + λQᵀQ.
+    pub(super) fn factorize(&self, lambda: F64x4) -> Factorization {
+        // Elements of L in the two previous columns, alone and times d.
         let ([mut first, mut second, mut earlier], [mut first_d, mut second_d, mut earlier_d]) =
             ([F64x4::ZERO; 3], [F64x4::ZERO; 3]);
-        for (r, qq) in self.r.iter().zip(&self.qq) {
+        let row = |(r, qq): (&[f64; 2], &[f64; 3])| {
             let d = lambda * qq[0] + r[0] - first * first_d - earlier * earlier_d;
             let inverse = F64x4::splat(1.0) / d;
             let next_d = lambda * qq[1] + r[1] - first_d * second;
             let after_d = lambda * qq[2];
             (earlier, earlier_d) = (second, second_d);
             (first, second, first_d, second_d) = (next_d * inverse, after_d * inverse, next_d, after_d);
-            rows.push([inverse, first, second]);
-        }
-        Factor(rows)
+            [inverse, first, second]
+        };
+        Factorization(self.r.iter().zip(&self.qq).map(row).collect())
     }
 
-    /// Qᵀy of samples (n,), in their place; the last two become zero.
-    pub(super) fn bend(&self, y: &mut [F64x4]) {
-        for (i, q) in self.q.iter().enumerate() {
+    /// Replaces samples y (n,) by their second divided differences Qᵀy (n−2,), followed by two zeros.
+    pub(super) fn second_differences<T: Real>(&self, y: &mut [T]) {
+        let n_differences = self.r.len();
+        for (i, q) in self.q[..n_differences].iter().enumerate() {
             y[i] = (y[i] - y[i + 1]) * q[0] + (y[i + 2] - y[i + 1]) * q[2];
         }
-        y[self.q.len()..].fill(F64x4::ZERO);
+        y[n_differences..].fill(T::default());
     }
 
-    /// Qγ (n,) of γ = M⁻¹Qᵀy, in its place: λ times it is taken off the samples.
-    pub(super) fn residual(&self, gamma: &mut [F64x4]) {
+    /// Returns Qγ = (y − f)/λ (n,) for γ = M⁻¹Qᵀy padded with two zeros.
+    pub(super) fn residuals(&self, gamma: &[F64x4]) -> impl Iterator<Item = F64x4> {
         let [mut next, mut after] = [F64x4::ZERO; 2];
-        for (gamma, q) in gamma.iter_mut().zip(&self.q) {
-            let here = *gamma;
-            *gamma = here * q[0] + next;
+        gamma.iter().zip(&self.q).map(move |(&here, q)| {
+            let residual = here * q[0] + next;
             (next, after) = (here * q[1] + after, here * q[2]);
-        }
-        gamma[self.q.len()..].copy_from_slice(&[next, after]);
+            residual
+        })
     }
 
-    /// tr(QᵀQ M⁻¹) = tr(I − A)/λ, the terms of some columns of Q, from the elements (i, i), (i, i + 1) and (i, i + 2) of M⁻¹ = L⁻ᵀD⁻¹ + M⁻¹(I − L)
-    /// (Hutchinson and de Hoog).
-    pub(super) fn trace(&self, factor: &Factor, columns: Range<usize>) -> F64x4 {
+    /// Computes tr(QᵀQM⁻¹) = tr(I − A)/λ, restricted to the terms of some columns of Q.
+    ///
+    /// The elements (i, i), (i, i + 1) and (i, i + 2) of M⁻¹ follow from M⁻¹ = L⁻ᵀD⁻¹ + M⁻¹(I − L) (Hutchinson and de Hoog).
+    pub(super) fn trace(&self, factors: &Factorization, columns: Range<usize>) -> F64x4 {
         let [mut next, mut after] = [[F64x4::ZERO; 3]; 2];
         let mut trace = F64x4::ZERO;
-        for (i, (q, &[inverse, first, second])) in self.qq.iter().zip(&factor.0).enumerate().rev() {
+        for (i, (q, &[inverse, first, second])) in self.qq.iter().zip(&factors.0).enumerate().rev() {
             let one = F64x4::ZERO - first * next[0] - second * next[1];
             let two = F64x4::ZERO - first * next[1] - second * after[0];
             let here = [inverse - first * one - second * two, one, two];
@@ -86,8 +88,8 @@ impl Roughness {
     }
 }
 
-impl Factor {
-    /// M⁻¹b, in place (n−2, at least).
+impl Factorization {
+    /// Replaces the first n−2 elements of b by M⁻¹b.
     pub(super) fn solve(&self, b: &mut [F64x4]) {
         let [mut before, mut last, mut beyond] = [F64x4::ZERO; 3];
         for (x, [_, first, second]) in b.iter_mut().zip(&self.0) {

@@ -1,10 +1,11 @@
+use super::cross_validation::{Decimated, Scores};
 use super::*;
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
-/// Standard normal numbers: Box and Muller's from a linear congruential generator.
+/// Returns a generator of standard normal numbers: the Box–Muller transform of a linear congruential generator.
 fn noise(mut state: u64) -> impl FnMut() -> f64 {
     let mut uniform = move || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -21,7 +22,7 @@ fn uniform(n: usize, step: f64) -> Vec<f64> {
     (0..n).map(|i| i as f64 * step).collect()
 }
 
-/// Times whose steps vary by half to three halves of `step`.
+/// Returns times with steps between half and three halves of `step`.
 fn irregular(n: usize, step: f64) -> Vec<f64> {
     let mut normal = noise(11);
     (0..n).map(|i| (i as f64 + 0.25 * normal().clamp(-1.0, 1.0)) * step).collect()
@@ -32,12 +33,12 @@ fn smooth_column(smoothing: Smoothing, time: &[f64], period: Option<f64>, y: &[f
     smooth(smoothing, time, period, values.view()).unwrap().into_raw_vec_and_offset().0
 }
 
-/// Root mean square of the difference.
+/// Computes the root mean square difference.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
 }
 
-/// What is left of a sine of `hz`, sampled at 100 Hz for 20 s, between 5 and 15 s.
+/// Computes the gain of a cosine of `hz`, sampled at 100 Hz for 20 s, between 5 and 15 s.
 fn gain(hz: f64, cut_off: f64) -> f64 {
     let time = uniform(2001, 0.01);
     let sine: Vec<f64> = time.iter().map(|t| (TAU * hz * t).cos()).collect();
@@ -54,14 +55,14 @@ fn a_sine_at_the_cut_off_is_halved() {
 }
 
 #[test]
-fn slower_sines_pass_and_faster_ones_fall_off_with_the_fourth_power() {
+fn the_gain_falls_with_the_fourth_power_of_frequency() {
     for ratio in [0.25f64, 0.5, 2.0, 4.0, 8.0] {
         assert_relative_eq!(gain(2.0 * ratio, 2.0), 1.0 / (1.0 + ratio.powi(4)), max_relative = 0.03);
     }
 }
 
 #[test]
-fn irregular_stamps_are_filtered_alike() {
+fn irregular_time_stamps_have_the_gain_of_uniform_ones() {
     let slow = |t: f64| (TAU * t).sin();
     for time in [uniform(1000, 0.01), irregular(1000, 0.01)] {
         let y: Vec<f64> = time.iter().map(|&t| slow(t) + 0.1 * (TAU * 17.0 * t).sin()).collect();
@@ -72,7 +73,7 @@ fn irregular_stamps_are_filtered_alike() {
     }
 }
 
-/// f = (I + λQR⁻¹Qᵀ)⁻¹y with dense matrices, and the score n‖y − f‖²/tr(I − A)² as it is defined.
+/// Computes f = (I + λQR⁻¹Qᵀ)⁻¹y with dense matrices, and the score n‖y − f‖²/tr(I − A)².
 fn dense(knots: &[f64], y: &[f64], lambda: f64) -> (DVector<f64>, f64) {
     let (n, h) = (knots.len(), |i: usize| knots[i + 1] - knots[i]);
     let (mut q, mut r) = (DMatrix::zeros(n, n - 2), DMatrix::zeros(n - 2, n - 2));
@@ -94,9 +95,9 @@ fn dense(knots: &[f64], y: &[f64], lambda: f64) -> (DVector<f64>, f64) {
     (f, score)
 }
 
-/// Scores of one recording over a grid of cut-offs, with every sample.
-fn scores(samples: &Samples, grid: &[f64]) -> noise::Scores {
-    noise::Scores::of(&[noise::Thinned::of(samples, usize::MAX)], &[0], grid, Threads::ONE).unwrap()
+/// Computes the scores of one recording with all samples.
+fn scores(samples: &Samples, cut_offs: &[f64]) -> Scores {
+    Scores::compute(&[Decimated::new(samples, usize::MAX)], &[0], cut_offs, Threads::ONE).unwrap()
 }
 
 #[test]
@@ -106,28 +107,28 @@ fn values_and_scores_are_those_of_the_dense_formulas() {
     let samples = Samples { time: &time, period: None, values: y.view() };
     let knots: Vec<f64> = time.iter().map(|t| t / samples.interval()).collect();
     let grid = [0.8, 3.0, 20.0, 60.0];
-    let found = scores(&samples, &grid);
-    let mut scale = None;
+    let scores = scores(&samples, &grid);
+    let mut constant = None;
     for (k, hz) in grid.into_iter().enumerate() {
         let (f, score) = dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval()));
         let smoothed = samples.smoothed(&[Some(hz)]);
         for i in 0..40 {
             assert_abs_diff_eq!(smoothed[[i, 0]], f[i], epsilon = 1e-10);
         }
-        // Scores are compared in a unit of their own.
-        let unit = found.logarithms[[0, k]] - score.ln();
-        assert_abs_diff_eq!(unit, *scale.get_or_insert(unit), epsilon = 1e-8);
+        // Logarithmic scores are defined up to a constant.
+        let offset = scores.logarithms[[0, k]] - score.ln();
+        assert_abs_diff_eq!(offset, *constant.get_or_insert(offset), epsilon = 1e-8);
         let squares = (0..40).map(|i| (y[[i, 0]] - f[i]).powi(2)).sum::<f64>();
-        assert_relative_eq!(found.squares[[0, k]], squares, max_relative = 1e-8);
-        assert_relative_eq!(found.traces[[0, k]], (40.0 * squares / score).sqrt(), max_relative = 1e-8);
+        assert_relative_eq!(scores.squares[[0, k]], squares, max_relative = 1e-8);
+        assert_relative_eq!(scores.traces[[0, k]], (40.0 * squares / score).sqrt(), max_relative = 1e-8);
     }
     let of = |hz: f64| dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval())).1;
     let least = (0..400).map(|k| of(0.5 * 10f64.powf(k as f64 / 160.0))).fold(f64::MAX, f64::min);
-    let noise = Noise::of(Smoothing::Auto, &[samples], MIN_THINNED, Threads::ONE).unwrap();
+    let noise = Noise::estimate(Smoothing::Auto, &[samples], MIN_DECIMATED, Threads::ONE).unwrap();
     assert_relative_eq!(of(noise.cut_offs()[0].unwrap()), least, max_relative = 1e-2);
 }
 
-/// On a uniform circle the penalty is diagonal in Fourier components, of the eigenvalues that [`lambda`] inverts.
+/// For uniform periodic samples the penalty is diagonal in the Fourier basis, with the eigenvalues that [`lambda`] inverts.
 #[test]
 fn scores_of_a_cycle_are_those_of_its_fourier_components() {
     let (n, mut normal) = (48, noise(5));
@@ -136,7 +137,7 @@ fn scores_of_a_cycle_are_those_of_its_fourier_components() {
     let period = Some(n as f64 * 0.02);
     let samples = Samples { time: &time, period, values: y.view() };
     let grid = [4.0, 8.0, 15.0, 24.0];
-    let found = scores(&samples, &grid);
+    let scores = scores(&samples, &grid);
     for (k, hz) in grid.into_iter().enumerate() {
         let (mut squares, mut trace) = (0.0, 0.0);
         for j in 0..n {
@@ -149,14 +150,14 @@ fn scores_of_a_cycle_are_those_of_its_fourier_components() {
             squares += off * off * (re * re + im * im) / n as f64;
             trace += off;
         }
-        assert_relative_eq!(found.squares[[0, k]], squares, max_relative = 1e-6);
-        assert_relative_eq!(found.traces[[0, k]], trace, max_relative = 1e-6);
+        assert_relative_eq!(scores.squares[[0, k]], squares, max_relative = 1e-6);
+        assert_relative_eq!(scores.traces[[0, k]], trace, max_relative = 1e-6);
     }
 }
 
-/// Recordings are few or many, dense or thin, and of one kind of movement or the other.
+/// The level is estimated for few and many recordings and samples, discrete and rhythmic.
 #[test]
-fn the_size_of_white_noise_is_found() {
+fn the_level_of_white_noise_is_estimated() {
     for (n, n_recordings) in [(101, 1), (101, 30), (1001, 10), (5001, 2)] {
         for periodic in [false, true] {
             let time = uniform(n, 1.0 / (n - 1) as f64);
@@ -173,19 +174,19 @@ fn the_size_of_white_noise_is_found() {
                 .collect();
             let samples: Vec<Samples> =
                 recordings.iter().map(|y| Samples { time: &time, period, values: y.view() }).collect();
-            let found = Noise::of(Smoothing::Auto, &samples, MIN_THINNED, Threads::ONE).unwrap();
-            let case = format!("{n} samples, {n_recordings} recordings, periodic {periodic}: {found:?}");
-            // Four standard errors, from the 64 samples that thinned recordings have at least.
+            let estimate = Noise::estimate(Smoothing::Auto, &samples, MIN_DECIMATED, Threads::ONE).unwrap();
+            let case = format!("{n} samples, {n_recordings} recordings, periodic {periodic}: {estimate:?}");
+            // Four standard errors, for the 64 samples that decimated recordings have at least.
             let accuracy = 4.0 / (2.0 * (n.min(64) * n_recordings.min(24)) as f64).sqrt();
-            assert!((found.levels()[0] / 0.01 - 1.0).abs() < accuracy, "{case}");
-            assert!(found.cut_offs()[0].is_some_and(|hz| (1.0..15.0).contains(&hz)), "{case}");
-            assert_eq!((found.levels()[1], found.cut_offs()[1]), (0.0, None), "{case}");
+            assert!((estimate.levels()[0] / 0.01 - 1.0).abs() < accuracy, "{case}");
+            assert!(estimate.cut_offs()[0].is_some_and(|hz| (1.0..15.0).contains(&hz)), "{case}");
+            assert_eq!((estimate.levels()[1], estimate.cut_offs()[1]), (0.0, None), "{case}");
         }
     }
 }
 
 #[test]
-fn auto_takes_more_than_half_of_white_noise_off_whatever_its_seed() {
+fn auto_removes_more_than_half_of_white_noise() {
     let n = 200;
     let time = uniform(n, 0.01);
     let reach: Vec<f64> = time.iter().map(|t| minimum_jerk(t / time[n - 1])).collect();
@@ -195,14 +196,14 @@ fn auto_takes_more_than_half_of_white_noise_off_whatever_its_seed() {
             let mut normal = noise(seed);
             let noisy: Vec<f64> = clean.iter().map(|y| y + 0.01 * normal()).collect();
             let smoothed = smooth_column(Smoothing::Auto, &time, period, &noisy);
-            let left = distance(&smoothed, clean) / distance(&noisy, clean);
-            assert!(left < 0.5, "seed {seed}, period {period:?}: {left}");
+            let remaining = distance(&smoothed, clean) / distance(&noisy, clean);
+            assert!(remaining < 0.5, "seed {seed}, period {period:?}: {remaining}");
         }
     }
 }
 
 #[test]
-fn auto_leaves_clean_samples_alone_to_the_last_bit() {
+fn auto_leaves_clean_samples_bitwise_unchanged() {
     for n in [20, 31, 100, 1000] {
         let time = uniform(n, 0.01);
         let share = |t: f64, steps: usize| t / (steps as f64 * 0.01);
@@ -215,19 +216,19 @@ fn auto_leaves_clean_samples_alone_to_the_last_bit() {
 }
 
 #[test]
-fn a_cycle_may_begin_anywhere() {
+fn the_phase_of_the_first_sample_does_not_matter() {
     let (n, mut normal) = (60, noise(3));
     let time = irregular(n, 0.02);
     let (period, first) = (n as f64 * 0.02, 23);
     let y: Vec<f64> = time.iter().map(|t| (TAU * t / period).cos() + 0.1 * normal()).collect();
-    let turned_time: Vec<f64> = (0..n).map(|i| time[(i + first) % n] + ((i + first) / n) as f64 * period).collect();
-    let turned_y: Vec<f64> = (0..n).map(|i| y[(i + first) % n]).collect();
+    let rotated_time: Vec<f64> = (0..n).map(|i| time[(i + first) % n] + ((i + first) / n) as f64 * period).collect();
+    let rotated_y: Vec<f64> = (0..n).map(|i| y[(i + first) % n]).collect();
     for (cycles, tolerance) in [(1.0, 2e-3), (4.0, 1e-12)] {
         let smoothing = Smoothing::CutOff { hz: cycles / period };
         let smoothed = smooth_column(smoothing, &time, Some(period), &y);
-        let turned = smooth_column(smoothing, &turned_time, Some(period), &turned_y);
+        let rotated = smooth_column(smoothing, &rotated_time, Some(period), &rotated_y);
         for i in 0..n {
-            assert_abs_diff_eq!(turned[i], smoothed[(i + first) % n], epsilon = tolerance);
+            assert_abs_diff_eq!(rotated[i], smoothed[(i + first) % n], epsilon = tolerance);
         }
     }
 }
@@ -245,7 +246,7 @@ fn samples_at_almost_the_same_time_are_averaged() {
 }
 
 #[test]
-fn columns_do_not_mix_and_constant_ones_stay() {
+fn columns_are_independent_and_constant_ones_unchanged() {
     let (n, mut normal) = (80, noise(9));
     let time = uniform(n, 0.01);
     let noisy: Vec<f64> = time.iter().map(|t| t * t + 0.01 * normal()).collect();
@@ -259,7 +260,7 @@ fn columns_do_not_mix_and_constant_ones_stay() {
 
 proptest! {
     #[test]
-    fn a_straight_line_passes_at_every_cut_off(per_sample in -4.0..-0.302, a in -1.0..1.0, b in -1.0..1.0) {
+    fn a_straight_line_is_unchanged_at_every_cut_off(per_sample in -4.0..-0.302, a in -1.0..1.0, b in -1.0..1.0) {
         let time = irregular(50, 0.01);
         let line: Vec<f64> = time.iter().map(|t| a + b * t).collect();
         let hz = 10f64.powf(per_sample) * 49.0 / (time[49] - time[0]);
@@ -279,28 +280,28 @@ proptest! {
         let expected = smooth_column(of(8.0), &time, period, &y);
         let scaled_time: Vec<f64> = time.iter().map(|t| t * second).collect();
         let scaled: Vec<f64> = y.iter().map(|y| y * unit).collect();
-        let found = smooth_column(of(8.0 / second), &scaled_time, period.map(|p| p * second), &scaled);
-        let found: Vec<f64> = found.iter().map(|y| y / unit).collect();
-        prop_assert!(distance(&found, &expected) < 1e-6);
+        let rescaled = smooth_column(of(8.0 / second), &scaled_time, period.map(|p| p * second), &scaled);
+        let rescaled: Vec<f64> = rescaled.iter().map(|y| y / unit).collect();
+        prop_assert!(distance(&rescaled, &expected) < 1e-6);
     }
 }
 
 #[test]
-fn impossible_cut_offs_are_refused_in_clear_words() {
+fn invalid_cut_offs_are_rejected() {
     let time = uniform(100, 0.01);
     let values = Array2::zeros((100, 1));
-    let refusal =
+    let message =
         |hz: f64, period| smooth(Smoothing::CutOff { hz }, &time, period, values.view()).unwrap_err().to_string();
     for hz in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(refusal(hz, None).contains("must be positive and finite"));
+        assert!(message(hz, None).contains("must be positive and finite"));
     }
-    assert_eq!(refusal(51.0, None), "smoothing = 51: must lie below half the sampling rate");
-    assert!(refusal(0.009, None).contains("ten-thousandth of the sampling rate"));
-    assert!(refusal(0.9, Some(1.0)).contains("at least one cycle per period"));
+    assert_eq!(message(51.0, None), "smoothing = 51: must lie below half the sampling rate");
+    assert!(message(0.009, None).contains("ten-thousandth of the sampling rate"));
+    assert!(message(0.9, Some(1.0)).contains("at least one cycle per period"));
 }
 
 #[test]
-fn the_names_in_files_are_lower_case() {
+fn names_in_files_are_lower_case() {
     let json = [Smoothing::Interpolate, Smoothing::CutOff { hz: 5.0 }, Smoothing::Auto]
         .map(|smoothing| serde_json::to_string(&smoothing).unwrap());
     assert_eq!(json, ["\"interpolate\"", "{\"cutoff\":{\"hz\":5.0}}", "\"auto\""]);

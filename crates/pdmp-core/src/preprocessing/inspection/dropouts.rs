@@ -1,18 +1,18 @@
-//! Samples that were lost and written as exact zeros.
+//! Lost samples that were written as exact zeros.
 //!
-//! A movement that passes through exactly zero does so with steps like the others. Where a sample was lost, the steps to
-//! zero and back are many times the largest between the others.
+//! A movement that passes through exactly zero has steps of usual size there. At a lost sample the steps to zero and back
+//! are many times the largest step elsewhere.
 
 use ndarray::ArrayView1;
 
 use super::{Finding, MIN_SAMPLES, Survey};
 
-/// Steps to and from zero this many times the largest elsewhere are no movement.
+/// Maximum step to or from zero in a movement, relative to the largest step elsewhere.
 const MAX_RATIO: f64 = 4.0;
-/// Share of the steps between other samples that are not zero: a gripper that opens and closes rests most of the time.
+/// Minimum fraction of non-zero steps between the other samples: a gripper that opens and closes rests most of the time.
 const MIN_MOVING: f64 = 0.5;
 
-/// Exact zeros of one degree of freedom.
+/// Consecutive exact zeros of one degree of freedom.
 struct Run {
     dof: usize,
     from: usize,
@@ -20,7 +20,7 @@ struct Run {
     ratio: f64,
 }
 
-/// The runs of zeros of a demonstration; degrees of freedom that are lost together are reported together.
+/// Finds the runs of zeros of a demonstration; degrees of freedom that were lost simultaneously share one finding.
 pub(super) fn zeros(demo: usize, survey: &Survey) -> Vec<Finding> {
     let n = survey.n_samples();
     if n < MIN_SAMPLES || !survey.zero || survey.step == 0.0 {
@@ -39,26 +39,26 @@ pub(super) fn zeros(demo: usize, survey: &Survey) -> Vec<Finding> {
         dofs: runs.iter().map(|run| survey.name(run.dof)).collect(),
         from: survey.place(runs[0].from),
         to: survey.place(runs[0].to),
-        ratio: runs.iter().fold(0.0, |most, run| most.max(run.ratio)),
+        ratio: runs.iter().fold(0.0, |max, run| max.max(run.ratio)),
     };
     together.map(finding).collect()
 }
 
-/// Runs of zeros in a column with steps to and from them that are far larger than those elsewhere.
+/// Returns the runs of zeros in a column whose steps to and from them are far larger than those elsewhere.
 fn runs(dof: usize, column: ArrayView1<f64>) -> Vec<Run> {
     let n = column.len();
-    let mut found: Vec<Run> = Vec::new();
+    let mut zero_runs: Vec<Run> = Vec::new();
     for (c, _) in column.iter().enumerate().filter(|(_, y)| **y == 0.0) {
-        match found.last_mut() {
+        match zero_runs.last_mut() {
             Some(run) if run.to + 1 == c => run.to = c,
-            _ => found.push(Run { dof, from: c, to: c, ratio: 0.0 }),
+            _ => zero_runs.push(Run { dof, from: c, to: c, ratio: 0.0 }),
         }
     }
-    // A movement may start or end with one sample at zero, or rest there.
+    // A movement may start or end with one sample at zero, or be zero throughout.
     let inside = |run: &Run| run.from > 0 && run.to + 1 < n;
-    found.retain(|run| inside(run) || (run.from < run.to && run.to - run.from + 1 < n));
-    if found.is_empty() {
-        return found;
+    zero_runs.retain(|run| inside(run) || (run.from < run.to && run.to - run.from + 1 < n));
+    if zero_runs.is_empty() {
+        return zero_runs;
     }
     let (mut largest, mut moving, mut steps) = (0.0f64, 0, 0);
     for c in (1..n).filter(|&c| column[c] != 0.0 && column[c - 1] != 0.0) {
@@ -70,12 +70,12 @@ fn runs(dof: usize, column: ArrayView1<f64>) -> Vec<Run> {
     if steps < MIN_SAMPLES / 2 || (moving as f64) < MIN_MOVING * steps as f64 {
         return Vec::new();
     }
-    found.retain_mut(|run| {
+    zero_runs.retain_mut(|run| {
         let before = (run.from > 0).then(|| column[run.from - 1].abs());
         let after = (run.to + 1 < n).then(|| column[run.to + 1].abs());
         let jump = before.into_iter().chain(after).fold(f64::INFINITY, f64::min);
         run.ratio = jump / largest;
         run.ratio > MAX_RATIO
     });
-    found
+    zero_runs
 }

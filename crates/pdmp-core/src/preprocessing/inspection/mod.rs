@@ -1,15 +1,15 @@
-//! Inspection of demonstrations for samples that no movement makes: what is found is reported, with its place.
+//! Inspection of demonstrations for implausible samples, which are reported with their location.
 //!
 //! | module | finding |
 //! |---|---|
 //! | `time_stamps` | two time stamps far closer than the others |
-//! | `dropouts` | samples that were lost and written as exact zeros |
-//! | `padding` | rows appended to bring recordings to one length |
+//! | `dropouts` | lost samples that were written as exact zeros |
+//! | `padding` | rows that were appended to make recordings equally long |
 //! | `counters` | a column that counts samples, or repeats the time stamps |
-//! | `turns` | angles that jump by a full turn, or lie whole turns apart in different demonstrations |
+//! | `turns` | angles that jump by a full turn, or that are offset by whole turns between demonstrations |
 //!
-//! One pass over the samples finds the largest step and whether there are zeros; what these exclude is not examined
-//! further. A fit adds its own finding, gains whose transients the samples do not resolve, in `learning/stiffness.rs`.
+//! One pass over the samples computes the largest step and detects zeros, which rules out most faults cheaply. A fit adds
+//! its own findings, such as gains whose transients the samples do not resolve (`learning/stiffness.rs`).
 
 mod counters;
 mod dropouts;
@@ -22,18 +22,32 @@ use ndarray::ArrayView1;
 use crate::demonstration::{Demonstration, Sampling};
 use crate::model::finding::SampleLocation;
 pub use crate::model::finding::{Finding, Padding};
+use crate::validate::row_major;
 
 pub use turns::{turn_of, unwound};
 
-/// Fewest samples of which the usual step of a degree of freedom is known.
+/// Minimum number of samples for an estimate of the usual step of a degree of freedom.
 const MIN_SAMPLES: usize = 10;
 
-/// Values that are examined side by side.
+/// Number of values that are processed in parallel, for vector registers.
 const LANES: usize = 8;
 
-/// Returns what is implausible about the samples of demonstrations of one skill.
+/// Returns the implausible samples of demonstrations of one skill.
 ///
-/// `dt` in seconds is the sampling interval of those that carry none; without it places are given by sample alone.
+/// `dt` is the sampling interval in seconds of demonstrations without times; locations lack the time if it is `None`.
+///
+/// ```
+/// # use ndarray::Array2;
+/// # use pdmp_core::{Demonstration, Sampling};
+/// # use pdmp_core::preprocessing::inspection::{Finding, inspect};
+/// # fn main() -> pdmp_core::Result<()> {
+/// let mut position = Array2::from_shape_fn((100, 1), |(c, _)| 2.0 + (0.05 * c as f64).sin());
+/// position[[40, 0]] = 0.0;
+/// let demo = Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?;
+/// assert!(matches!(inspect(&[demo], None)[..], [Finding::Zeros { demo: 0, .. }]));
+/// # Ok(())
+/// # }
+/// ```
 pub fn inspect(demos: &[Demonstration], dt: Option<f64>) -> Vec<Finding> {
     let surveys: Vec<Survey> = demos.iter().map(|demo| Survey::new(demo, dt)).collect();
     let mut findings = Vec::new();
@@ -48,18 +62,18 @@ pub fn inspect(demos: &[Demonstration], dt: Option<f64>) -> Vec<Finding> {
     findings
 }
 
-/// A demonstration with what one pass over all samples tells.
+/// Demonstration with statistics from one pass over its samples.
 struct Survey<'a> {
     demo: &'a Demonstration,
     dt: Option<f64>,
     n_dofs: usize,
     /// Largest step of any degree of freedom from one sample to the next.
     step: f64,
-    /// Whether any sample is exactly zero.
+    /// True if any sample is exactly zero.
     zero: bool,
 }
 
-/// The values of one degree of freedom.
+/// Range and largest step of one degree of freedom.
 #[derive(Clone, Copy, Debug)]
 struct Extent {
     low: f64,
@@ -73,7 +87,7 @@ impl<'a> Survey<'a> {
         let n_dofs = demo.n_dofs();
         let position = demo.position();
         let position = position.as_standard_layout();
-        let values = position.as_slice().unwrap_or_default();
+        let values = row_major(&position);
         let (mut steps, mut zero) = ([0.0f64; LANES], false);
         let mut add = |lane: usize, value: f64, before: f64| {
             let step = (value - before).abs();
@@ -90,6 +104,7 @@ impl<'a> Survey<'a> {
         Self { demo, dt, n_dofs, step: steps.into_iter().fold(0.0, f64::max), zero }
     }
 
+    /// Returns range and largest step of a degree of freedom.
     fn extent(&self, d: usize) -> Extent {
         let column = self.column(d);
         let start = Extent { low: column[0], high: column[0], step: 0.0 };
@@ -104,17 +119,18 @@ impl<'a> Survey<'a> {
         self.demo.n_samples()
     }
 
+    /// Returns the positions (T,) of a degree of freedom.
     fn column(&self, d: usize) -> ArrayView1<'a, f64> {
-        // A view lives as long as the demonstration.
+        // `column` of a temporary view would not live as long as the demonstration.
         self.demo.position().index_axis_move(ndarray::Axis(1), d)
     }
 
-    /// Name of a degree of freedom, that of a model where it has none.
+    /// Returns the name of a degree of freedom; the default is that of a model.
     fn name(&self, d: usize) -> String {
         self.demo.names().map_or_else(|| format!("y{d}"), |names| names[d].clone())
     }
 
-    /// The time of a sample in seconds, where it is known.
+    /// Returns the time of a sample in seconds, if known.
     fn time(&self, sample: usize) -> Option<f64> {
         match self.demo.sampling() {
             Sampling::Unknown => self.dt.map(|dt| dt * sample as f64),
@@ -123,6 +139,7 @@ impl<'a> Survey<'a> {
         }
     }
 
+    /// Returns the location of a sample.
     fn place(&self, sample: usize) -> SampleLocation {
         SampleLocation { sample, time: self.time(sample) }
     }

@@ -1,15 +1,15 @@
-//! The posterior of a Matérn process at any time.
+//! Posterior of a Matérn process at any point of the clock.
 //!
-//! Between samples i and j, with the steps A, Q from i to u and A′ from u to j, the smoothed state and the adjoint and
-//! precision at the samples give
+//! Let u lie between samples i and j, with transition A, Q from i to u and A′ from u to j. The smoothed state xᵢ, and the
+//! adjoint rⱼ and precision Nⱼ of the smoother, give
 //!
 //! ```text
 //! x(u) = A·xᵢ + Q·A′ᵀrⱼ        cov(u) = P − P·A′ᵀNⱼA′·P,   P = A·PᵢAᵀ + Q
 //! ```
 //!
-//! with Pᵢ of the filter. Before the first sample of an interval A is zero and Q is Q(∞), after the last one r and N are
-//! zero; on the circle the first sample comes after the last, and the directions in which the first state stays
-//! uncertain add their squares to the covariance.
+//! with the filtered covariance Pᵢ. Before the first sample of an interval, A is zero and Q is Q(∞); after the last
+//! sample, r and N are zero. On the circle the first sample follows the last, and the covariance gains the squares of
+//! the columns along which the initial state stays uncertain.
 
 use std::f64::consts::TAU;
 
@@ -17,32 +17,32 @@ use super::kalman_filter::States;
 use super::matern_sde::{Square, Transition};
 use crate::numerics::simd::{F64x4, WIDTH};
 
-/// What all samples say about the state.
+/// Posterior of the state given all samples.
 #[derive(Clone, Debug)]
-pub(super) struct Trajectory<const D: usize> {
+pub(super) struct StatePosterior<const D: usize> {
     pub(super) circle: bool,
-    /// Rate λ of the clock a = λu.
+    /// Rate λ of the scaled clock a = λu.
     pub(super) rate: f64,
-    /// What the chain's kernel is at 0.
+    /// Value of the state-space kernel at 0.
     pub(super) norm: f64,
-    /// Clock of the samples (C,), in order.
+    /// Clock of the samples (C,), ascending.
     pub(super) u: Vec<f64>,
-    /// P after each sample, as far as they differ: the last stands for the rest.
+    /// Filtered covariances P; the last one holds for the remaining samples.
     pub(super) covariances: Vec<Square<D>>,
-    /// N before each sample, and where the chain ends (C + 1,).
+    /// Precisions N before each sample and at the end of the process (C + 1,).
     pub(super) precisions: Vec<Square<D>>,
-    /// x at each sample (C, groups).
+    /// Smoothed states x (C, groups).
     pub(super) states: Vec<States<D>>,
-    /// r before each sample, and where the chain ends (C + 1, groups).
+    /// Adjoints r before each sample and at the end of the process (C + 1, groups).
     pub(super) adjoints: Vec<States<D>>,
     pub(super) n_outputs: usize,
 }
 
-/// A time between two samples.
-struct Place<const D: usize> {
-    /// The sample before; any, where there is none.
+/// Neighbouring samples of a point, and the transitions from and to them.
+struct Neighbours<const D: usize> {
+    /// Sample before the point; 0 where there is none.
     before: usize,
-    /// The sample after, or C.
+    /// Sample after the point, or C.
     after: usize,
     /// A and Q.
     since: Transition<D>,
@@ -50,8 +50,8 @@ struct Place<const D: usize> {
     until: Square<D>,
 }
 
-impl<const D: usize> Trajectory<D> {
-    fn place(&self, u: f64) -> Place<D> {
+impl<const D: usize> StatePosterior<D> {
+    fn neighbours(&self, u: f64) -> Neighbours<D> {
         let first = self.u[0];
         let u = if self.circle { first + (u - first).rem_euclid(TAU) } else { u };
         let after = self.u.partition_point(|sample| *sample <= u);
@@ -59,7 +59,7 @@ impl<const D: usize> Trajectory<D> {
         let since = if after > 0 { u - self.u[before] } else { f64::INFINITY };
         let next = self.u.get(after).copied().unwrap_or(if self.circle { first + TAU } else { u });
         let until = (next - u).max(0.0);
-        Place {
+        Neighbours {
             before,
             after,
             since: Transition::new(self.rate * since),
@@ -67,43 +67,43 @@ impl<const D: usize> Trajectory<D> {
         }
     }
 
-    /// f and its derivative with respect to u, in groups, the columns behind the outputs included.
-    fn groups(&self, place: &Place<D>) -> impl Iterator<Item = (F64x4, F64x4)> {
+    /// Returns f and df/du by groups of columns: the outputs, then the columns of the periodic boundary.
+    fn groups(&self, at: &Neighbours<D>) -> impl Iterator<Item = (F64x4, F64x4)> {
         let groups = self.states.len() / self.u.len();
-        let (a, q) = (place.since.matrix, place.since.noise * place.until.transpose());
+        let (a, q) = (at.since.matrix, at.since.noise * at.until.transpose());
         let rate = self.rate;
         // f is the first component of the state, f′ = λ(v₁ − v₀).
         let read = move |m: &Square<D>, x: &States<D>| {
             let row = |i: usize| (0..D).fold(F64x4::ZERO, |sum, j| sum + x[j] * m[(i, j)]);
             (row(0), (row(1) - row(0)) * rate)
         };
-        let states = &self.states[place.before * groups..][..groups];
-        states.iter().zip(&self.adjoints[place.after * groups..][..groups]).map(move |(x, r)| {
-            let ((value, slope), (more, steeper)) = (read(&a, x), read(&q, r));
-            (value + more, slope + steeper)
+        let states = &self.states[at.before * groups..][..groups];
+        states.iter().zip(&self.adjoints[at.after * groups..][..groups]).map(move |(x, r)| {
+            let ((value, slope), (value_ahead, slope_ahead)) = (read(&a, x), read(&q, r));
+            (value + value_ahead, slope + slope_ahead)
         })
     }
 
-    /// Means and their derivatives.
+    /// Writes the means and their derivatives.
     pub(super) fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
         let pairs = value.chunks_mut(WIDTH).zip(slope.chunks_mut(WIDTH));
-        for ((value, slope), (v, s)) in pairs.zip(self.groups(&self.place(u))) {
+        for ((value, slope), (v, s)) in pairs.zip(self.groups(&self.neighbours(u))) {
             value.copy_from_slice(&v.to_array()[..value.len()]);
             slope.copy_from_slice(&s.to_array()[..slope.len()]);
         }
     }
 
-    /// Variance of f, in units of the signal variance.
+    /// Returns the variance of f in units of the signal variance.
     pub(super) fn variance(&self, u: f64) -> f64 {
-        let place = self.place(u);
-        let a = place.since.matrix;
-        let covariance = self.covariances[place.before.min(self.covariances.len() - 1)];
-        let p = a * covariance * a.transpose() + place.since.noise;
-        let row = place.until * p.column(0);
-        let known = row.dot(&(self.precisions[place.after] * row));
-        let columns = self.groups(&place).flat_map(|(value, _)| value.to_array());
-        let open: f64 = columns.skip(self.n_outputs).map(|f| f * f).sum();
-        // Rounding may take a variance of nearly zero below it.
-        (p[(0, 0)] - known + open).max(0.0) / self.norm
+        let at = self.neighbours(u);
+        let a = at.since.matrix;
+        let covariance = self.covariances[at.before.min(self.covariances.len() - 1)];
+        let p = a * covariance * a.transpose() + at.since.noise;
+        let row = at.until * p.column(0);
+        let reduction = row.dot(&(self.precisions[at.after] * row));
+        let columns = self.groups(&at).flat_map(|(value, _)| value.to_array());
+        let boundary: f64 = columns.skip(self.n_outputs).map(|f| f * f).sum();
+        // Rounding can make a variance near zero negative.
+        (p[(0, 0)] - reduction + boundary).max(0.0) / self.norm
     }
 }

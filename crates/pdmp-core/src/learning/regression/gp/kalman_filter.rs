@@ -1,6 +1,6 @@
-//! The Kalman filter: from what the samples before it say about the state at each sample.
+//! Kalman filter: the state at each sample given the samples before it.
 //!
-//! The covariances are those of all outputs, and are filtered once. The means take four outputs at a time.
+//! The covariances are the same for all outputs and are filtered once. The means are filtered four outputs at a time.
 //!
 //! R. E. Kalman, Journal of Basic Engineering 82 (1960) 35–45.
 
@@ -11,56 +11,56 @@ use super::{PORTION, Progress};
 use crate::error::Result;
 use crate::numerics::simd::F64x4;
 
-/// The states of four outputs.
+/// States of four outputs.
 pub(super) type States<const D: usize> = [F64x4; D];
 
-/// The steps from each sample to the next, and from the last one on.
-pub(super) struct Path<const D: usize> {
-    /// One, if all are alike.
+/// Transitions from each sample to the next, and from the last one to the end of the process.
+pub(super) struct Transitions<const D: usize> {
+    /// A single one where the intervals are equal.
     transitions: Vec<Transition<D>>,
     n_samples: usize,
 }
 
-impl<const D: usize> Path<D> {
-    pub(super) fn new(gaps: &Gaps, rate: f64) -> Self {
-        let transitions = match gaps {
-            Gaps::Even { gap, .. } => vec![Transition::new(rate * gap)],
-            Gaps::Uneven(gaps) => gaps.iter().map(|gap| Transition::new(rate * gap)).collect(),
+impl<const D: usize> Transitions<D> {
+    pub(super) fn new(intervals: &Intervals, rate: f64) -> Self {
+        let transitions = match intervals {
+            Intervals::Even { interval, .. } => vec![Transition::new(rate * interval)],
+            Intervals::Uneven(intervals) => intervals.iter().map(|interval| Transition::new(rate * interval)).collect(),
         };
-        Self { transitions, n_samples: gaps.n_samples() }
+        Self { transitions, n_samples: intervals.n_samples() }
     }
 
     pub(super) fn n_samples(&self) -> usize {
         self.n_samples
     }
 
-    pub(super) fn is_even(&self) -> bool {
+    pub(super) fn are_even(&self) -> bool {
         self.transitions.len() == 1
     }
 
-    /// The step from sample i on.
+    /// Returns the transition that starts at sample i.
     pub(super) fn after(&self, i: usize) -> &Transition<D> {
-        if self.is_even() { &self.transitions[0] } else { &self.transitions[i] }
+        if self.are_even() { &self.transitions[0] } else { &self.transitions[i] }
     }
 }
 
-/// Distances from each sample to the next, and from the last one to what closes the chain.
-pub(super) enum Gaps {
-    /// Equal but for the rounding of the clock.
-    Even { gap: f64, n_samples: usize },
-    /// Any, one a sample.
+/// Intervals of the clock from each sample to the next, and from the last one to the end of the process.
+pub(super) enum Intervals {
+    /// Equal intervals, up to rounding of the clock.
+    Even { interval: f64, n_samples: usize },
+    /// One interval per sample.
     Uneven(Vec<f64>),
 }
 
-impl Gaps {
-    /// Between samples `u` in order; `end` is where the circle closes, if it does.
+impl Intervals {
+    /// Returns the intervals of ascending samples `u`; `end` is the first sample one turn later, on the circle.
     pub(super) fn new(u: &[f64], end: Option<f64>) -> Self {
         let (n_samples, first, last) = (u.len(), u[0], u[u.len() - 1]);
         let (intervals, end) = end.map_or((n_samples - 1, last), |end| (n_samples, end));
-        let gap = (end - first) / intervals.max(1) as f64;
+        let interval = (end - first) / intervals.max(1) as f64;
         let rounding = 4.0 * f64::EPSILON * first.abs().max(end.abs());
-        if u.iter().enumerate().all(|(i, u)| (u - (first + gap * i as f64)).abs() <= rounding) {
-            return Self::Even { gap, n_samples };
+        if u.iter().enumerate().all(|(i, u)| (u - (first + interval * i as f64)).abs() <= rounding) {
+            return Self::Even { interval, n_samples };
         }
         Self::Uneven(u.iter().zip(u[1..].iter().chain([&end])).map(|(from, to)| (to - from).max(0.0)).collect())
     }
@@ -68,139 +68,144 @@ impl Gaps {
     fn n_samples(&self) -> usize {
         match self {
             Self::Even { n_samples, .. } => *n_samples,
-            Self::Uneven(gaps) => gaps.len(),
+            Self::Uneven(intervals) => intervals.len(),
         }
     }
 }
 
-/// What the filter knows of a sample before it is seen.
-pub(super) struct Step<const D: usize> {
-    /// P, covariance of the state.
+/// Prediction of a sample from the samples before it.
+pub(super) struct FilterStep<const D: usize> {
+    /// Covariance P of the predicted state.
     pub(super) covariance: Square<D>,
-    /// S, variance of the sample: P₀₀ + ν.
-    pub(super) spread: f64,
-    /// Share of the innovation that each component of the state takes, P₀/S.
+    /// Innovation variance S = P₀₀ + ν.
+    pub(super) variance: f64,
+    /// Kalman gain P₀/S.
     pub(super) gain: SVector<f64, D>,
 }
 
-impl<const D: usize> Step<D> {
+impl<const D: usize> FilterStep<D> {
     fn new(covariance: Square<D>, noise: f64) -> Self {
-        let spread = covariance[(0, 0)] + noise;
-        Self { covariance, spread, gain: covariance.column(0) / spread }
+        let variance = covariance[(0, 0)] + noise;
+        Self { covariance, variance, gain: covariance.column(0) / variance }
     }
 
-    /// Covariance once the sample is seen, P − P₀P₀ᵀ/S.
+    /// Returns the covariance after the measurement update, P − P₀P₀ᵀ/S.
     pub(super) fn updated(&self, noise: f64) -> Square<D> {
         let p = &self.covariance;
         Square::from_fn(|i, j| {
-            // In the first row and column the difference is P₀ν/S: no digit is lost.
-            if i.min(j) == 0 { p[(i, j)] * (noise / self.spread) } else { p[(i, j)] - self.gain[i] * p[(0, j)] }
+            // In the first row and column the difference is P₀ν/S, which avoids cancellation.
+            if i.min(j) == 0 { p[(i, j)] * (noise / self.variance) } else { p[(i, j)] - self.gain[i] * p[(0, j)] }
         })
     }
 }
 
-/// What the filter goes through along a path: a step for each sample, and one where the path ends.
+/// Filter steps of all samples, and one at the end of the process.
 ///
-/// On an even path they settle.
-pub(super) struct Steps<const D: usize> {
-    /// Those that differ; the last stands for all that follow.
-    different: Vec<Step<D>>,
+/// With equal intervals they converge to a steady state.
+pub(super) struct FilterSteps<const D: usize> {
+    /// Steps up to the steady state; the last one holds from there on.
+    transient: Vec<FilterStep<D>>,
 }
 
-impl<const D: usize> Steps<D> {
-    pub(super) fn new(path: &Path<D>, start: Square<D>, noise: f64, progress: &mut Progress) -> Result<Self> {
-        let mut different = Vec::new();
-        let mut step = Step::new(start, noise);
-        for i in 0..path.n_samples() {
+impl<const D: usize> FilterSteps<D> {
+    pub(super) fn new(
+        transitions: &Transitions<D>,
+        start: Square<D>,
+        noise: f64,
+        progress: &mut Progress,
+    ) -> Result<Self> {
+        let mut transient = Vec::new();
+        let mut step = FilterStep::new(start, noise);
+        for i in 0..transitions.n_samples() {
             if (i + 1) % PORTION == 0 {
-                progress.ask()?;
+                progress.report()?;
             }
-            let transition = path.after(i);
+            let transition = transitions.after(i);
             let next = transition.matrix * step.updated(noise) * transition.matrix.transpose() + transition.noise;
-            let next = Step::new(0.5 * (next + next.transpose()), noise);
-            let settled = path.is_even() && have_settled(&step.covariance, &next.covariance);
-            different.push(step);
+            let next = FilterStep::new(0.5 * (next + next.transpose()), noise);
+            let settled = transitions.are_even() && have_settled(&step.covariance, &next.covariance);
+            transient.push(step);
             step = next;
             if settled {
                 break;
             }
         }
-        different.push(step);
-        Ok(Self { different })
+        transient.push(step);
+        Ok(Self { transient })
     }
 
-    /// Sample from which all steps are alike.
+    /// Returns the first sample of the steady state.
     pub(super) fn settled(&self) -> usize {
-        self.different.len() - 1
+        self.transient.len() - 1
     }
 
-    pub(super) fn at(&self, i: usize) -> &Step<D> {
-        &self.different[i.min(self.settled())]
+    pub(super) fn at(&self, i: usize) -> &FilterStep<D> {
+        &self.transient[i.min(self.settled())]
     }
 
-    /// Those of the first `n` samples that differ: the last stands for the rest.
-    fn first(&self, n: usize) -> &[Step<D>] {
-        &self.different[..n.min(self.different.len())]
+    /// Returns the distinct steps of the first `n` samples.
+    fn first(&self, n: usize) -> &[FilterStep<D>] {
+        &self.transient[..n.min(self.transient.len())]
     }
 
-    /// Σ ln S over the first `n` samples.
-    pub(super) fn log_spreads(&self, n: usize) -> f64 {
+    /// Returns Σ ln S over the first `n` samples.
+    pub(super) fn log_variances(&self, n: usize) -> f64 {
         let first = self.first(n);
-        let sum: f64 = first.iter().map(|step| step.spread.ln()).sum();
-        sum + (n - first.len()) as f64 * self.at(n).spread.ln()
+        let sum: f64 = first.iter().map(|step| step.variance.ln()).sum();
+        sum + (n - first.len()) as f64 * self.at(n).variance.ln()
     }
 
-    /// Covariances of the first `n` states once their samples are seen, as far as they differ.
+    /// Returns the distinct covariances of the first `n` states after their measurement updates.
     pub(super) fn updated(&self, n: usize, noise: f64) -> Vec<Square<D>> {
         self.first(n).iter().map(|step| step.updated(noise)).collect()
     }
 }
 
-/// Whether nothing but rounding distinguishes two covariances, or two precisions.
+/// Returns true if two covariances, or two precisions, are equal up to rounding.
 pub(super) fn have_settled<const D: usize>(a: &Square<D>, b: &Square<D>) -> bool {
     let rounding = |i, j| 2.0 * f64::EPSILON * (a[(i, i)] * a[(j, j)]).abs().sqrt();
     (0..D).all(|i| (0..=i).all(|j| (a[(i, j)] - b[(i, j)]).abs() <= rounding(i, j)))
 }
 
-/// The states that the filter expects at each sample and where the path ends, (C + 1, groups), from zero on.
+/// Returns the predicted states at each sample and at the end of the process, (C + 1, groups), from zero.
 pub(super) fn means<const D: usize>(
-    path: &Path<D>,
-    steps: &Steps<D>,
+    transitions: &Transitions<D>,
+    steps: &FilterSteps<D>,
     targets: &[F64x4],
     progress: &mut Progress,
 ) -> Result<Vec<States<D>>> {
-    let n_samples = path.n_samples();
+    let n_samples = transitions.n_samples();
     let groups = targets.len() / n_samples;
     let mut means = vec![[F64x4::ZERO; D]; (n_samples + 1) * groups];
     for i in 0..n_samples {
         if (i + 1) % PORTION == 0 {
-            progress.ask()?;
+            progress.report()?;
         }
         let step = steps.at(i);
-        let matrix = &path.after(i).matrix;
+        let matrix = &transitions.after(i).matrix;
         let (now, next) = means[i * groups..(i + 2) * groups].split_at_mut(groups);
         for ((x, next), y) in now.iter().zip(next).zip(&targets[i * groups..]) {
             let innovation = *y - x[0];
-            let seen: States<D> = std::array::from_fn(|k| x[k] + innovation * step.gain[k]);
-            *next = upper(matrix, &seen);
+            let updated: States<D> = std::array::from_fn(|k| x[k] + innovation * step.gain[k]);
+            *next = upper(matrix, &updated);
         }
     }
     Ok(means)
 }
 
-/// A·x of an upper triangular A.
+/// Returns A·x for an upper triangular A.
 #[inline(always)]
-pub(super) fn upper<const D: usize>(matrix: &Square<D>, x: &States<D>) -> States<D> {
+fn upper<const D: usize>(matrix: &Square<D>, x: &States<D>) -> States<D> {
     std::array::from_fn(|i| (i..D).fold(F64x4::ZERO, |sum, j| sum + x[j] * matrix[(i, j)]))
 }
 
-/// Aᵀ·x of an upper triangular A.
+/// Returns Aᵀ·x for an upper triangular A.
 #[inline(always)]
 pub(super) fn transposed<const D: usize>(matrix: &Square<D>, x: &States<D>) -> States<D> {
     std::array::from_fn(|j| (0..=j).fold(F64x4::ZERO, |sum, i| sum + x[i] * matrix[(i, j)]))
 }
 
-/// M·x.
+/// Returns M·x.
 #[inline(always)]
 pub(super) fn product<const D: usize>(matrix: &Square<D>, x: &States<D>) -> States<D> {
     std::array::from_fn(|i| (0..D).fold(F64x4::ZERO, |sum, j| sum + x[j] * matrix[(i, j)]))

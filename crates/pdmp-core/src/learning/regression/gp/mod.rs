@@ -1,71 +1,75 @@
-//! Gaussian process regression, with hyperparameters by marginal likelihood.
+//! Gaussian process regression with hyperparameters of maximum marginal likelihood.
 
-mod dense;
 mod interpolation;
 mod kalman_filter;
 mod kernel;
+mod likelihood;
 mod matern_sde;
 mod periodic;
 mod posterior;
 mod rts_smoother;
-mod squared_exponential;
 mod state_space;
 
 use std::f64::consts::TAU;
 
 use ndarray::{Array2, ArrayView2};
 
-use self::dense::Dense;
 pub use self::kernel::Kernel;
-use self::posterior::Form;
+use self::likelihood::{Gradient, Likelihood, Profile};
 pub use self::posterior::GpPosterior;
-use self::state_space::Chain;
-use super::hyperparameter_search::{Axis, Objective, Score, maximise};
+use self::state_space::StateSpace;
+use super::hyperparameter_search::{Axis, maximise};
 use super::{Domain, magnitude};
 use crate::error::{Error, Result};
 use crate::validate::check_positive;
 
-/// Smallest ratio of noise to signal variance: below, rounding makes the covariance matrix indefinite.
+/// Smallest ratio of noise to signal variance: below it, rounding makes the covariance matrix indefinite.
 const MIN_NOISE: f64 = 1e-10;
-/// Largest ratio that the search considers: the signal is a hundredth of the noise, in deviations, and what more there is
-/// of noise no longer changes the likelihood.
+/// Largest ratio that the search considers. The signal's deviation is then a hundredth of the noise's, and more noise no
+/// longer changes the likelihood.
 const MAX_NOISE: f64 = 1e4;
-/// Weight, in halves of the number of values, of the square by which the logarithm of the noise exceeds its bound. The
-/// likelihood pulls by no more than half of that number: it is exceeded by a twentieth at most.
-const BARRIER: f64 = 20.0;
-/// Largest ratio that a failing factorisation is helped with.
-const MAX_HELPERS: f64 = 1.0;
-/// Samples that the scan for the neighbourhood of the likeliest hyperparameters looks at.
+/// Largest ratio that an ill-conditioned factorisation is regularised with.
+const MAX_REGULARISATION: f64 = 1.0;
+/// Samples of which the search scans the likelihood.
 const SCANNED: usize = 256;
-/// Most samples of the squared exponential, whose covariance matrix is dense.
-const MAX_SAMPLES: usize = 10_000;
-/// Samples between two questions whether to go on.
+/// Samples between two progress reports.
 const PORTION: usize = 4096;
 
 /// Gaussian process regression.
 ///
-/// The P outputs are independent Gaussian processes of mean zero over the clock with one covariance σ²K,
-/// K = k(u, u′; ℓ) + νI. The signal variance has the maximum-likelihood value σ̂² = Σ fᵀK⁻¹f/(CP). Length ℓ and noise
-/// ratio ν, where not given, maximise the log marginal likelihood with that value put in, −CP/2·ln σ̂² − P/2·ln|K|,
-/// over ν from 1e-10 to 1e4 and ℓ from the distance of the samples to twice the extent of the clock. Noise in the
-/// landscape of a primitive is bounded further, by [`NoiseBound::LANDSCAPE`].
+/// The P outputs are independent zero-mean Gaussian processes over the clock with one covariance σ²K,
+/// K = k(u, u′; ℓ) + νI. The signal variance has its maximum-likelihood value σ̂² = Σ fᵀK⁻¹f/(CP). Length scale ℓ and
+/// noise ratio ν, unless given, maximise the profile log likelihood −CP/2·ln σ̂² − P/2·ln|K| over ν from 1e-10 to 1e4
+/// and over ℓ from the sampling interval to twice the extent of the clock. In the landscape of a primitive,
+/// [`NoiseBound::LANDSCAPE`] bounds the noise further.
 ///
-/// The variance is shared because basis targets share their noise: S has orthonormal columns, so equal noise on the
-/// demonstrations is equal noise on every row of ΣVᵀ, strong or weak. With a variance each, the weak factors of real
-/// recordings, which are mostly noise, would choose the hyperparameters of the strong ones.
+/// The outputs share one variance because basis targets share their noise: S has orthonormal columns, so that equal
+/// noise on the demonstrations is equal noise on every row of ΣVᵀ, strong or weak. With one variance per output, the
+/// weak factors of real recordings, which are mostly noise, would determine the hyperparameters of the strong ones.
 ///
-/// The Matérn processes are Markov: a Kalman filter and smoother give the likelihood, its gradient and the posterior
-/// exactly, in O(CP) time and memory, on any inputs. The squared exponential factorises its dense matrix once for all
-/// outputs, in O(C³) time and O(C²) memory, for at most 10 000 samples. The search scans the likelihood of at most 256
-/// samples, evenly thinned, and climbs from its best places with the gradient for all samples (squared exponential:
-/// at most 400).
+/// Matérn processes are Markov: a Kalman filter and smoother give the likelihood, its gradient and the posterior
+/// exactly, in O(CP) time and memory, for any inputs. The search scans the likelihood of at most 256 samples, evenly
+/// thinned, and ascends from its best points with the gradient for all samples.
 ///
-/// Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), Sections 2.2 and 5.4.1,
-/// <https://gaussianprocess.org/gpml>; Hartikainen and Särkkä, MLSP 2010,
+/// Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), Sections 2.2 and 5.4; J. Hartikainen and
+/// S. Särkkä, Kalman filtering and smoothing solutions to temporal Gaussian process regression models, MLSP 2010,
 /// <https://doi.org/10.1109/MLSP.2010.5589113>.
+///
+/// ```
+/// # use ndarray::Array2;
+/// use pdmp_core::learning::regression::{Domain, Gp, Regression};
+///
+/// let u: Vec<f64> = (0..50).map(|i| f64::from(i) / 49.0).collect();
+/// let targets = Array2::from_shape_fn((50, 1), |(i, _)| (3.0 * u[i]).sin());
+/// let posterior = Gp::default().regress(Domain::Interval { end: 1.0 }, &u, targets.view(), &mut |_| Ok(()))?;
+/// let (mut value, mut slope) = ([0.0], [0.0]);
+/// posterior.evaluate(0.5, &mut value, &mut slope);
+/// assert!((value[0] - 1.5f64.sin()).abs() < 1e-3);
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gp {
-    /// The covariance function.
+    /// Covariance function.
     pub kernel: Kernel,
     /// Length scale ℓ in units of u, from 1e-6 to 1e6 times the extent of the clock.
     pub length: Option<f64>,
@@ -73,34 +77,34 @@ pub struct Gp {
     pub noise: Option<f64>,
 }
 
-/// How much of the targets a search may take for noise.
+/// Upper bound of the noise that a hyperparameter search may attribute to the targets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseBound {
     /// Largest ratio ν of noise to signal variance.
     ratio: f64,
     /// Largest noise νσ̂² as a share of the targets' mean square, where it is bounded.
     share: Option<f64>,
-    /// Ratios that the scan looks at.
+    /// Number of ratios that the scan evaluates.
     points: usize,
 }
 
 impl NoiseBound {
-    /// As much as is likeliest, up to a ratio of 1e4.
+    /// Noise of maximum likelihood, up to a ratio of 1e4.
     pub const NONE: Self = Self { ratio: MAX_NOISE, share: None, points: 15 };
 
-    /// The bound in the landscape of a primitive: a thousandth of the signal's deviation, and of the targets.
+    /// Bound in the landscape of a primitive: a thousandth of the deviation of the signal, and of the targets.
     ///
-    /// What the landscape takes for noise, no style brings back, and noise on the demonstrations is what smoothing is
-    /// for. With ratios up to 1 the likelihood took the impact in recorded walking forces for noise, and with it half of
-    /// the signal: reproductions were off by 23 % of the range, against 6 % with three styles and 3 % with all below
-    /// 1e-4. Handwriting is met to 1e-4 at worst below 1e-6. The ratio alone is no bound: long lengths have signal
-    /// variances far beyond the targets' mean square, and with 1e-6 of it recorded robot paths were reproduced worse
-    /// than by a network.
+    /// No style restores what the landscape treats as noise, and noise of the demonstrations is removed by smoothing.
+    /// With ratios up to 1 the likelihood took the impact in recorded walking forces for noise, and half of the signal
+    /// with it: reproductions were off by 23 % of the range, against 6 % with three styles and 3 % with all of them
+    /// below 1e-4. Below 1e-6 handwriting is reproduced to 1e-4 at worst. The ratio alone is no bound: with long
+    /// lengths the signal variance is far larger than the targets' mean square, and at a ratio of 1e-6 recorded robot
+    /// paths were reproduced worse than by a network.
     pub const LANDSCAPE: Self = Self { ratio: 1e-6, share: Some(1e-6), points: 3 };
 }
 
 impl Gp {
-    /// A process with the given kernel, and hyperparameters where they are not to be found.
+    /// Returns a process with the given kernel and hyperparameters; those that are `None` are estimated.
     ///
     /// # Errors
     /// A length that is not positive, or noise outside [1e-10, 1e6].
@@ -110,7 +114,7 @@ impl Gp {
         Ok(Self { kernel, length, noise })
     }
 
-    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease, with the likeliest noise.
+    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease, with noise of maximum likelihood.
     ///
     /// # Errors
     /// As for [`Gp::regress_within`].
@@ -124,17 +128,17 @@ impl Gp {
         self.regress_within(NoiseBound::NONE, domain, u, targets, progress)
     }
 
-    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease, with the likeliest noise within
-    /// a bound. A noise that is given is used as it is.
+    /// Regresses `targets` (C, outputs) on the clock `u` (C,), which must not decrease, with noise of maximum likelihood
+    /// within a bound. A given noise is not bounded.
     ///
-    /// `progress` is asked before each evaluation of the likelihood, and now and then in a long one, with the share done
-    /// in [0, 1].
+    /// `progress` is called before each evaluation of the likelihood, and every 4096 samples within one, with the
+    /// completed fraction; an error it returns cancels the regression.
     ///
-    /// If rounding makes K indefinite, ν is raised tenfold, up to 1 at most; [`GpPosterior::noise`] is what was used.
+    /// If rounding makes K indefinite, ν is raised tenfold, at most to 1; [`GpPosterior::noise`] returns the value used.
     ///
     /// # Errors
-    /// Hyperparameters out of range, arrays that do not match, numbers that are not finite; more samples than a dense
-    /// matrix can have; a covariance matrix that stays indefinite; whatever `progress` returns.
+    /// Hyperparameters out of range, arrays that do not match, values that are not finite; a covariance matrix that
+    /// stays indefinite; the error that `progress` returned.
     pub fn regress_within(
         &self,
         bound: NoiseBound,
@@ -147,17 +151,12 @@ impl Gp {
         self.check(domain)?;
         let progress = &mut Progress { progress, share: 0.0 };
         match self.kernel {
-            Kernel::Matern32 => self.learn::<Chain<2>>(bound, domain, u, targets, progress),
-            Kernel::Matern52 => self.learn::<Chain<3>>(bound, domain, u, targets, progress),
-            Kernel::SquaredExponential if u.len() > MAX_SAMPLES => {
-                let allowed = "a squared exponential takes at most 10000; pass a smaller n_samples, or a Matérn kernel";
-                Err(Error::Range { name: "samples", value: u.len() as f64, allowed })
-            }
-            Kernel::SquaredExponential => self.learn::<Dense>(bound, domain, u, targets, progress),
+            Kernel::Matern32 => self.learn::<2>(bound, domain, u, targets, progress),
+            Kernel::Matern52 => self.learn::<3>(bound, domain, u, targets, progress),
         }
     }
 
-    fn learn<P: Process>(
+    fn learn<const D: usize>(
         &self,
         bound: NoiseBound,
         domain: Domain,
@@ -166,13 +165,13 @@ impl Gp {
         progress: &mut Progress,
     ) -> Result<GpPosterior> {
         let samples = Samples::new(u, targets);
-        let mut at = self.hyperparameters::<P>(bound, domain, &samples, progress)?;
-        let process = P::new(domain, &samples);
+        let process = StateSpace::<D>::new(domain, &samples);
+        let mut at = self.hyperparameters(bound, domain, &samples, &process, progress)?;
         progress.reach(0.9)?;
-        let fitted = loop {
+        let (profile, posterior) = loop {
             match process.fit(at, progress)? {
                 Some(fitted) => break fitted,
-                None if at.noise < MAX_HELPERS => at.noise = (10.0 * at.noise).min(MAX_HELPERS),
+                None if at.noise < MAX_REGULARISATION => at.noise = (10.0 * at.noise).min(MAX_REGULARISATION),
                 None => {
                     let (kernel, Hyperparameters { length, noise }) = (self.kernel, at);
                     return Err(Error::Fit(format!(
@@ -184,13 +183,12 @@ impl Gp {
         };
         progress.reach(1.0)?;
 
-        let Fitted { profile, form } = fitted;
         let deviation = profile.variance.sqrt() * samples.scale;
-        // What the search may leave out: that the densities are per unit of the outputs.
+        // The terms that the search omits: densities are per unit of the outputs.
         let constant = if deviation > 0.0 { (TAU.sqrt() * samples.scale).ln() + 0.5 } else { 0.0 };
         let log_likelihood = profile.value() - targets.len() as f64 * constant;
         let (kernel, scale, n_outputs) = (self.kernel, samples.scale, targets.ncols());
-        Ok(GpPosterior { kernel, at, form, scale, n_outputs, deviation, log_likelihood })
+        Ok(GpPosterior { kernel, at, function: Box::new(posterior), scale, n_outputs, deviation, log_likelihood })
     }
 
     fn check(&self, domain: Domain) -> Result<()> {
@@ -203,12 +201,13 @@ impl Gp {
         check_noise(self.noise)
     }
 
-    /// Length and noise: what is given, and for the rest what makes the targets most likely.
-    fn hyperparameters<P: Process>(
+    /// Returns the given hyperparameters; those not given maximise the likelihood of the samples.
+    fn hyperparameters<const D: usize>(
         &self,
         within: NoiseBound,
         domain: Domain,
         samples: &Samples,
+        process: &StateSpace<D>,
         progress: &mut Progress,
     ) -> Result<Hyperparameters> {
         let extent = domain.extent();
@@ -217,21 +216,20 @@ impl Gp {
             return Ok(Hyperparameters { length, noise });
         }
         if samples.targets.iter().all(|&value| value == 0.0) {
-            // Nothing to learn, and nothing to learn from.
+            // Every hyperparameter has the same likelihood.
             let length = self.length.unwrap_or((lengths.0 * lengths.1).sqrt());
             return Ok(Hyperparameters { length, noise: self.noise.unwrap_or(MIN_NOISE) });
         }
         let axis = |given: Option<f64>, (low, high): (f64, f64), points| {
-            given.map_or(Axis { low: low.ln(), high: high.ln(), points }, |given| Axis::given(given.ln()))
+            given.map_or(Axis { low: low.ln(), high: high.ln(), points }, |given| Axis::fixed(given.ln()))
         };
         let noises = (MIN_NOISE, within.ratio);
         let axes = [axis(self.length, lengths, 12), axis(self.noise, noises, within.points)];
         let mean_square = || samples.targets.iter().map(|f| f * f).sum::<f64>() / samples.targets.len() as f64;
         let bound = within.share.filter(|_| self.noise.is_none()).map(|share| share * mean_square());
-        let process = |most: usize| P::new(domain, &samples.thinned(most));
-        let mut likelihood = Likelihood { scanned: process(SCANNED), searched: process(P::SEARCHED), bound, progress };
-        let [length, noise] = maximise(&axes, &mut likelihood)?;
-        // What is given comes out as it was.
+        let scanned = StateSpace::new(domain, &samples.thinned(SCANNED));
+        let [length, noise] = maximise(&axes, &mut Likelihood { scanned, process, bound, progress })?;
+        // Given values are returned without the rounding of exp(ln x).
         Ok(Hyperparameters {
             length: self.length.unwrap_or(length.exp()),
             noise: self.noise.unwrap_or(noise.exp().clamp(noises.0, noises.1)),
@@ -248,14 +246,14 @@ fn check_noise(noise: Option<f64>) -> Result<()> {
     }
 }
 
-/// ℓ and ν.
+/// Length scale ℓ and noise ratio ν.
 #[derive(Clone, Copy, Debug)]
 struct Hyperparameters {
     length: f64,
     noise: f64,
 }
 
-/// What is regressed, divided by its largest magnitude.
+/// Samples divided by their largest magnitude.
 struct Samples {
     u: Vec<f64>,
     scale: f64,
@@ -269,129 +267,32 @@ impl Samples {
         Self { u: u.to_vec(), scale, targets: targets.mapv(|value| value / scale) }
     }
 
-    /// At most so many of them, evenly chosen.
-    fn thinned(&self, most: usize) -> Self {
-        let step = self.u.len().div_ceil(most);
+    /// Returns every k-th sample, with the smallest k that leaves at most `n`.
+    fn thinned(&self, n: usize) -> Self {
+        let step = self.u.len().div_ceil(n);
         let targets = self.targets.slice(ndarray::s![..;step, ..]).to_owned();
         Self { u: self.u.iter().copied().step_by(step).collect(), scale: self.scale, targets }
     }
 }
 
-/// A way to compute with samples of a process.
-trait Process {
-    /// Most samples that the search climbs with.
-    const SEARCHED: usize;
-
-    fn new(domain: Domain, samples: &Samples) -> Self;
-
-    /// How likely the samples are; nothing where rounding makes K indefinite.
-    fn profile(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<Profile>>;
-
-    /// The same, and how it changes with ln ℓ and ln ν.
-    fn slope(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<(Profile, Slope)>>;
-
-    /// The process given the samples; nothing where rounding makes K indefinite.
-    fn fit(&self, at: Hyperparameters, progress: &mut Progress) -> Result<Option<Fitted>>;
-}
-
-/// The likelihood of samples whose signal has its likeliest variance.
-#[derive(Clone, Copy, Debug)]
-struct Profile {
-    /// CP.
-    n_values: f64,
-    /// σ̂² = Σ fᵀK⁻¹f/(CP).
-    variance: f64,
-    /// P·ln|K|.
-    log_determinant: f64,
-}
-
-/// Derivatives with respect to (ln ℓ, ln ν).
-#[derive(Clone, Copy, Debug)]
-struct Slope {
-    /// ½Σ αᵀdKα/σ̂², α = K⁻¹f.
-    pull: [f64; 2],
-    /// P/2·tr(K⁻¹dK).
-    spread: [f64; 2],
-}
-
-impl Profile {
-    /// −CP/2·ln σ̂² − P/2·ln|K|, the log likelihood but for a constant; nothing is said by outputs that are all zero.
-    fn value(&self) -> f64 {
-        if self.variance == 0.0 { 0.0 } else { -0.5 * (self.n_values * self.variance.ln() + self.log_determinant) }
-    }
-
-    fn gradient(&self, slope: &Slope) -> [f64; 2] {
-        [0, 1].map(|k| if self.variance == 0.0 { 0.0 } else { slope.pull[k] - slope.spread[k] })
-    }
-}
-
-/// A process given its samples.
-struct Fitted {
-    profile: Profile,
-    form: Form,
-}
-
-/// The likelihood as a function of (ln ℓ, ln ν), less what keeps the noise within its bound.
-struct Likelihood<'a, 'b, P> {
-    scanned: P,
-    searched: P,
-    /// Largest νσ̂², if it has one.
-    bound: Option<f64>,
-    progress: &'a mut Progress<'b>,
-}
-
-impl<P> Likelihood<'_, '_, P> {
-    /// ln(νσ̂²) above its bound.
-    fn excess(&self, profile: &Profile, noise: f64) -> f64 {
-        self.bound.map_or(0.0, |bound| (noise * profile.variance / bound).ln().max(0.0))
-    }
-}
-
-impl<P: Process> Objective for Likelihood<'_, '_, P> {
-    fn glance(&mut self, at: [f64; 2]) -> Result<f64> {
-        self.progress.advance()?;
-        let [length, noise] = at.map(f64::exp);
-        let found = self.scanned.profile(Hyperparameters { length, noise }, self.progress)?;
-        Ok(found.map_or(f64::NEG_INFINITY, |profile| {
-            profile.value() - 0.25 * BARRIER * profile.n_values * self.excess(&profile, noise).powi(2)
-        }))
-    }
-
-    fn score(&mut self, at: [f64; 2]) -> Result<Score> {
-        self.progress.advance()?;
-        let [length, noise] = at.map(f64::exp);
-        let Some((profile, slope)) = self.searched.slope(Hyperparameters { length, noise }, self.progress)? else {
-            return Ok(Score::IMPOSSIBLE);
-        };
-        // σ̂² falls where K pulls: d ln σ̂² = −2·pull/(CP).
-        let (excess, weight) = (self.excess(&profile, noise), 0.5 * BARRIER * profile.n_values);
-        let rise = [0, 1].map(|k| k as f64 - 2.0 * slope.pull[k] / profile.n_values);
-        let gradient = profile.gradient(&slope);
-        Ok(Score {
-            value: profile.value() - 0.5 * weight * excess * excess,
-            gradient: [0, 1].map(|k| gradient[k] - weight * excess * rise[k]),
-        })
-    }
-}
-
-/// Whom to ask whether to go on.
+/// Progress callback of a regression.
 struct Progress<'a> {
     progress: &'a mut dyn FnMut(f64) -> Result<()>,
     share: f64,
 }
 
 impl Progress<'_> {
-    /// Asks, no further than before.
-    fn ask(&mut self) -> Result<()> {
+    /// Reports the current share again.
+    fn report(&mut self) -> Result<()> {
         (self.progress)(self.share)
     }
 
     fn reach(&mut self, share: f64) -> Result<()> {
         self.share = share;
-        self.ask()
+        self.report()
     }
 
-    /// Asks before another evaluation of the likelihood. How many there will be is open, but rarely more than 100.
+    /// Reports another evaluation of the likelihood. Their number is not known in advance, but rarely exceeds 100.
     fn advance(&mut self) -> Result<()> {
         self.reach(self.share + 0.03 * (0.9 - self.share))
     }

@@ -1,116 +1,105 @@
-//! A Gaussian process given its samples.
+//! Gaussian process conditioned on its samples.
+
+use std::fmt;
 
 use ndarray::Array2;
 
 use super::Hyperparameters;
-use super::dense::Expansion;
-use super::interpolation::Trajectory;
+use super::interpolation::StatePosterior;
 use super::kernel::Kernel;
 use crate::learning::regression::Regression;
 
-/// Points whose covariances with the samples are held in memory at once.
-const CHUNK: usize = 256;
-
-/// A Gaussian process given its samples.
-#[derive(Clone, Debug)]
+/// Gaussian process conditioned on its samples.
+///
+/// ```
+/// # use ndarray::array;
+/// use pdmp_core::learning::regression::{Domain, Gp};
+///
+/// let gp = Gp { length: Some(0.5), noise: Some(1e-6), ..Gp::default() };
+/// let targets = array![[0.0], [1.0], [0.0]];
+/// let posterior = gp.regress(Domain::Interval { end: 1.0 }, &[0.0, 0.5, 1.0], targets.view(), &mut |_| Ok(()))?;
+/// let (mean, variance) = posterior.predict(&[0.5]);
+/// assert!((mean[[0, 0]] - 1.0).abs() < 1e-3 && variance[[0, 0]] < 1e-3);
+/// # Ok::<(), pdmp_core::Error>(())
+/// ```
+#[derive(Debug)]
 pub struct GpPosterior {
     pub(super) kernel: Kernel,
     pub(super) at: Hyperparameters,
-    /// Of the outputs divided by `scale`, in units of the signal variance.
-    pub(super) form: Form,
+    /// Posterior of the outputs divided by `scale`, with variances in units of the signal variance.
+    pub(super) function: Box<dyn Posterior>,
     pub(super) scale: f64,
     pub(super) n_outputs: usize,
-    /// σ̂, in the unit of the outputs.
+    /// Signal standard deviation σ̂, in the unit of the outputs.
     pub(super) deviation: f64,
     pub(super) log_likelihood: f64,
 }
 
-/// How a posterior is held.
-#[derive(Clone, Debug)]
-pub(super) enum Form {
-    Matern32(Trajectory<2>),
-    Matern52(Trajectory<3>),
-    SquaredExponential(Expansion),
+/// Posterior of the outputs as functions of the clock.
+pub(super) trait Posterior: fmt::Debug + Send + Sync {
+    /// Writes the means and their derivatives with respect to u, each (outputs,).
+    fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]);
+
+    /// Returns the variance, which is the same for every output, in units of the signal variance.
+    fn variance(&self, u: f64) -> f64;
 }
 
-impl From<Trajectory<2>> for Form {
-    fn from(trajectory: Trajectory<2>) -> Self {
-        Self::Matern32(trajectory)
-    }
-}
-
-impl From<Trajectory<3>> for Form {
-    fn from(trajectory: Trajectory<3>) -> Self {
-        Self::Matern52(trajectory)
-    }
-}
-
-impl Form {
+impl<const D: usize> Posterior for StatePosterior<D> {
     fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
-        match self {
-            Self::Matern32(trajectory) => trajectory.evaluate(u, value, slope),
-            Self::Matern52(trajectory) => trajectory.evaluate(u, value, slope),
-            Self::SquaredExponential(expansion) => expansion.evaluate(u, value, slope),
-        }
+        self.evaluate(u, value, slope);
     }
 
-    /// Variances of f at each point, in units of the signal variance.
-    fn variances(&self, u: &[f64]) -> Vec<f64> {
-        match self {
-            Self::Matern32(trajectory) => u.iter().map(|&u| trajectory.variance(u)).collect(),
-            Self::Matern52(trajectory) => u.iter().map(|&u| trajectory.variance(u)).collect(),
-            Self::SquaredExponential(expansion) => u.chunks(CHUNK).flat_map(|u| expansion.variances(u)).collect(),
-        }
+    fn variance(&self, u: f64) -> f64 {
+        self.variance(u)
     }
 }
 
 impl GpPosterior {
-    /// The covariance function.
+    /// Returns the covariance function.
     pub fn kernel(&self) -> Kernel {
         self.kernel
     }
 
-    /// Length scale ℓ in units of u.
+    /// Returns the length scale ℓ in units of u.
     pub fn length(&self) -> f64 {
         self.at.length
     }
 
-    /// Ratio ν of noise to signal variance.
+    /// Returns the ratio ν of noise to signal variance.
     pub fn noise(&self) -> f64 {
         self.at.noise
     }
 
-    /// Signal variance σ̂², in the squared unit of the outputs; that of the noise is νσ̂².
+    /// Returns the signal variance σ̂² in the squared unit of the outputs; the noise variance is νσ̂².
     pub fn signal_variance(&self) -> f64 {
         self.deviation * self.deviation
     }
 
-    /// ln p(f | u, ℓ, ν, σ̂²), summed over the outputs; 0 where all are zero.
+    /// Returns ln p(f | u, ℓ, ν, σ̂²), summed over the outputs; 0 where all of them are zero.
     pub fn log_likelihood(&self) -> f64 {
         self.log_likelihood
     }
 
-    /// Mean and variance of the noise-free outputs at `u` (n,), each (n, outputs): kᵀK⁻¹f and σ̂²(1 − kᵀK⁻¹k),
-    /// the same for every output.
+    /// Returns mean kᵀK⁻¹f and variance σ̂²(1 − kᵀK⁻¹k) of the noise-free outputs at `u` (n,), each (n, outputs).
     ///
-    /// Takes O(ln C + P) a point with a Matérn kernel, O(C² + CP) with the squared exponential.
+    /// The variance is the same for every output. A point costs O(ln C + P).
     pub fn predict(&self, u: &[f64]) -> (Array2<f64>, Array2<f64>) {
         let shape = (u.len(), self.n_outputs);
         let (mut mean, mut variance) = (Array2::zeros(shape), Array2::zeros(shape));
         let (mut value, mut slope) = (vec![0.0; self.n_outputs], vec![0.0; self.n_outputs]);
-        for (row, (&u, share)) in u.iter().zip(self.form.variances(u)).enumerate() {
+        for (row, &u) in u.iter().enumerate() {
             self.evaluate(u, &mut value, &mut slope);
             mean.row_mut(row).assign(&ndarray::aview1(&value));
-            variance.row_mut(row).fill(self.deviation * share * self.deviation);
+            variance.row_mut(row).fill(self.deviation * self.function.variance(u) * self.deviation);
         }
         (mean, variance)
     }
 }
 
 impl Regression for GpPosterior {
-    /// Takes O(ln C + P) with a Matérn kernel, O(CP) with the squared exponential.
+    /// Writes the means and their derivatives in O(ln C + P).
     fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
-        self.form.evaluate(u, value, slope);
+        self.function.evaluate(u, value, slope);
         value.iter_mut().chain(slope).for_each(|number| *number *= self.scale);
     }
 
@@ -120,7 +109,7 @@ impl Regression for GpPosterior {
     }
 }
 
-/// Rounded to three significant digits, for printing.
+/// Rounds to three significant digits, for printing.
 fn significant(x: f64) -> f64 {
     let unit = 10f64.powi(2 - x.log10().floor() as i32);
     (x * unit).round() / unit

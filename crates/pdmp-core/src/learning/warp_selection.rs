@@ -1,51 +1,51 @@
-//! Whether a warp of time foresees movements better than linear scaling.
+//! Selection between a time warp and linear time scaling by cross-validation over the contexts.
 //!
-//! The mean square of what is foreseen, over linear time, is least for movements averaged over linear time: a warp pays
-//! where contexts tell of the timing, or fewer styles remain, and costs where they do not. Both are tried at contexts held
-//! out, with as many principal components of the positions in place of a landscape as the fit has styles.
+//! The mean squared prediction error over linear time is lowest for movements averaged over linear time. A warp lowers it
+//! where contexts predict the timing, or where fewer styles remain, and raises it otherwise. Both are validated on
+//! held-out contexts, with principal components of the positions in place of styles and landscape, equal in number to
+//! the styles of the fit.
 
 use ndarray::{Array2, ArrayView1, Axis, s};
 
-use crate::context::{ContextColumn, ContextMap, MapSelection, group_equal_contexts};
+use crate::context::{ContextColumn, ContextMap, MapSelection};
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
+use crate::learning::context_folds::{Fold, folds};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::model::sensitivity::STEPS;
 
-/// Most folds that contexts are dealt to, and the fewest different ones.
-const FOLDS: usize = 10;
-const FEWEST: usize = 3;
-
-/// Contexts (M, Q), how they are mapped, and what gives the number of styles of aligned demonstrations.
-pub(super) struct Contexts<'a> {
+/// Cross-validation of a time warp.
+pub(super) struct WarpSelection<'a> {
+    /// Number of styles of aligned demonstrations.
     pub(super) n_styles: &'a dyn Fn(&Aligned) -> Result<usize>,
+    /// Types of the context columns (Q,).
     pub(super) columns: &'a [ContextColumn],
+    /// Contexts (M, Q).
     pub(super) numbers: &'a Array2<f64>,
+    /// Map from contexts to movements.
     pub(super) map: MapSelection,
 }
 
-impl Contexts<'_> {
-    /// Whether the warp of demonstrations lowers the error at contexts held out, by more than its standard error; true
-    /// where there are too few contexts to hold one out.
+impl WarpSelection<'_> {
+    /// Returns true if the warp lowers the cross-validation error by more than its standard error, or if there are fewer
+    /// than three different contexts.
     ///
     /// # Errors
-    /// A map that does not suit the contexts, or whatever `progress` returns.
-    pub(super) fn favour(
+    /// A map that does not suit the contexts, or the error that `progress` returned.
+    pub(super) fn favours_warp(
         &self,
         warped: &Aligned,
         linear: &Aligned,
         kind: Kind,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<bool> {
-        if group_equal_contexts(self.numbers).len() < FEWEST {
-            return Ok(true);
-        }
-        let recorded = positions(linear, kind)?;
+        let Some(folds) = folds(self.numbers) else { return Ok(true) };
+        let recorded = positions(linear, kind);
         let mut share = 0.0;
         let mut errors = |aligned: &Aligned| {
-            let errors = self.errors(aligned, &recorded, kind, &mut |done| progress(share + 0.5 * done));
+            let errors = self.errors(&folds, aligned, &recorded, kind, &mut |done| progress(share + 0.5 * done));
             share = 0.5;
             errors
         };
@@ -55,33 +55,29 @@ impl Contexts<'_> {
         Ok(gains.mean().unwrap_or(0.0) > gains.std(1.0) / (gains.len() as f64).sqrt())
     }
 
-    /// Mean squared error over linear time of each condition held out.
+    /// Returns the mean squared error over linear time of each held-out context.
     fn errors(
         &self,
+        folds: &[Fold],
         aligned: &Aligned,
         recorded: &Array2<f64>,
         kind: Kind,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Vec<f64>> {
-        let positions = positions(aligned, kind)?;
+        let positions = positions(aligned, kind);
         let n_styles = (self.n_styles)(aligned)?;
-        let conditions = group_equal_contexts(self.numbers);
-        let n_folds = conditions.len().min(FOLDS);
         let mut errors = Vec::new();
-        for fold in 0..n_folds {
-            progress(fold as f64 / n_folds as f64)?;
-            let held_out: Vec<&Vec<usize>> = conditions.iter().skip(fold).step_by(n_folds).collect();
-            let kept: Vec<usize> =
-                (0..positions.nrows()).filter(|m| !held_out.iter().any(|group| group.contains(m))).collect();
-            let shown = positions.select(Axis(0), &kept);
-            let factors = Factors::of(shown.view(), Truncation::Rank(n_styles.min(kept.len())), &mut |_| Ok(()))?;
-            let (outputs, metric) = outputs(&factors, &aligned.segment_durations.select(Axis(0), &kept));
-            let numbers = self.numbers.select(Axis(0), &kept);
+        for (k, Fold { training, held_out }) in folds.iter().enumerate() {
+            progress(k as f64 / folds.len() as f64)?;
+            let rows = positions.select(Axis(0), training);
+            let factors = Factors::of(rows.view(), Truncation::Rank(n_styles.min(training.len())), &mut |_| Ok(()))?;
+            let (outputs, metric) = outputs(&factors, &aligned.segment_durations.select(Axis(0), training));
+            let numbers = self.numbers.select(Axis(0), training);
             let map = ContextMap::learn(self.columns.to_vec(), &numbers, outputs.view(), metric.view(), self.map)?;
             for group in held_out {
-                let expected = map.expect(&self.numbers.row(group[0]).to_vec());
-                let foreseen = foreseen(&expected, &factors, aligned, kind);
-                let error = |m: &usize| (&recorded.row(*m) - &foreseen).mapv(|x| x * x).sum();
+                let expected = map.predict_mean(&self.numbers.row(group[0]).to_vec());
+                let predicted = predicted(&expected, &factors, aligned, kind);
+                let error = |m: &usize| (&recorded.row(*m) - &predicted).mapv(|x| x * x).sum();
                 errors.push(group.iter().map(error).sum::<f64>() / (group.len() * recorded.ncols()) as f64);
             }
         }
@@ -89,19 +85,19 @@ impl Contexts<'_> {
     }
 }
 
-/// Positions (M, S·D) over the phase.
-fn positions(aligned: &Aligned, kind: Kind) -> Result<Array2<f64>> {
+/// Returns the positions (M, S·D) over the phase.
+fn positions(aligned: &Aligned, kind: Kind) -> Array2<f64> {
     let n_samples = kind.samples(STEPS);
     let sampled = aligned.clone().resampled(n_samples);
     let mut positions = Array2::zeros((aligned.n_demos(), n_samples * aligned.demo(0).n_dofs()));
     for (m, mut row) in positions.rows_mut().into_iter().enumerate() {
-        sampled.sample(m, row.as_slice_mut().unwrap_or_default());
+        sampled.sample(m, crate::validate::row_major_mut(&mut row));
     }
-    Ok(positions)
+    positions
 }
 
-/// The components and the logarithms of the segment_durations, as the map foresees them, and what errors of them weigh: those of the
-/// timing as much as the movement about its mean.
+/// Returns the outputs of the map, which are the component scores and the logarithms of the segment durations, and the
+/// metric of their errors. An error of 1 in the timing weighs as much as the movement about its mean.
 fn outputs(factors: &Factors, segment_durations: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
     let (n, last) = (factors.styles.ncols(), segment_durations.ncols() - 1);
     let sizes: Vec<f64> = factors.basis.rows().into_iter().map(|row| row.dot(&row)).collect();
@@ -118,8 +114,8 @@ fn outputs(factors: &Factors, segment_durations: &Array2<f64>) -> (Array2<f64>, 
     (outputs, metric)
 }
 
-/// The movement (S·D) over linear time that is expected.
-fn foreseen(expected: &[f64], factors: &Factors, aligned: &Aligned, kind: Kind) -> ndarray::Array1<f64> {
+/// Returns the predicted movement (S·D) over linear time.
+fn predicted(expected: &[f64], factors: &Factors, aligned: &Aligned, kind: Kind) -> ndarray::Array1<f64> {
     let (styles, segment_durations) = expected.split_at(factors.styles.ncols());
     let curve = ArrayView1::from(styles).dot(&factors.basis);
     let last = segment_durations.len() - 1;
@@ -131,17 +127,17 @@ fn foreseen(expected: &[f64], factors: &Factors, aligned: &Aligned, kind: Kind) 
     let time = WarpingFunction::new(kind, &aligned.breaks, &segment_durations);
     let n_dofs = aligned.demo(0).n_dofs();
     let n_samples = curve.len() / n_dofs;
-    let mut moved = curve.clone();
+    let mut warped = curve.clone();
     for c in 0..n_samples {
-        let place = (time.phase(time.duration() * c as f64 / STEPS as f64)[0] * STEPS as f64).max(0.0);
-        let (near, share) = (place.floor() as usize, place.fract());
+        let position = (time.phase(time.duration() * c as f64 / STEPS as f64)[0] * STEPS as f64).max(0.0);
+        let (near, share) = (position.floor() as usize, position.fract());
         let row = |c: usize| {
             let c = if kind == Kind::Rhythmic { c % n_samples } else { c.min(n_samples - 1) };
             curve.slice(s![c * n_dofs..(c + 1) * n_dofs])
         };
-        moved
+        warped
             .slice_mut(s![c * n_dofs..(c + 1) * n_dofs])
             .assign(&(&row(near) * (1.0 - share) + &row(near + 1) * share));
     }
-    moved
+    warped
 }

@@ -1,0 +1,42 @@
+//! Formats of numbers and gaps in error texts.
+
+use std::fmt;
+
+/// A ratio.
+pub(super) struct Times(pub(super) f64);
+
+impl fmt::Display for Times {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.0 < 1e4 { write!(f, "{:.1} times", self.0) } else { f.write_str("over 10 000 times") }
+    }
+}
+
+/// A stretch without samples, and its remedy.
+pub(super) struct Gap(pub(super) f64, pub(super) f64, pub(super) f64);
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Gap(from, to, max_gap) = *self;
+        match (from.is_finite(), to.is_finite()) {
+            (true, true) => write!(
+                f,
+                "no sample between t = {from} s and t = {to} s: that is longer than max_gap = {max_gap} s; raise max_gap, \
+                 or cut the recording there"
+            ),
+            (false, true) => write!(f, "no sample before t = {to} s, where none can be interpolated: cut the rows out"),
+            (true, false) => {
+                write!(f, "no sample after t = {from} s, where none can be interpolated: cut the rows out")
+            }
+            (false, false) => write!(f, "no sample at all: leave the column out"),
+        }
+    }
+}
+
+/// A number in its shortest form: integers plainly, very large and small numbers with an exponent.
+pub(super) struct Number(pub(super) f64);
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.0.fract() == 0.0 && self.0.abs() < 1e9 { write!(f, "{}", self.0) } else { write!(f, "{:?}", self.0) }
+    }
+}

@@ -1,0 +1,214 @@
+//! Movements of a model: rollouts, controllers and Jacobians.
+
+use std::sync::Arc;
+
+use numpy::IntoPyArray;
+use pdmp_core::model::Derivative;
+use pdmp_core::motion::{TimeGrid, WithRespectTo, jacobian, rollout_with};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::conditions::conditions_of;
+use crate::controller::Controller;
+use crate::convert::Cube;
+use crate::demonstration::Trajectory;
+use crate::error::{interruptible, raise};
+use crate::model::Model;
+use crate::scalar::{Scalar, optional_number};
+
+#[pymethods]
+impl Model {
+    /// Compute the movement under constant conditions.
+    ///
+    /// Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb
+    /// (discrete) or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
+    ///
+    /// Parameters
+    /// ----------
+    /// conditions : Conditions, optional
+    ///     Conditions at the start.
+    /// dt : float
+    ///     Interval between samples in s.
+    /// duration : float, optional
+    ///     Length in s. By default the demonstrated duration scaled by `tau`, the sum of `segment_durations`, or one
+    ///     period of a rhythmic movement.
+    /// context : array_like or list, (Q,), optional
+    ///     Context whose prediction supplies absent conditions: style, goal, start or anchor, and duration.
+    /// **changes
+    ///     Single conditions by name, which replace those of `conditions`; see `Conditions`.
+    ///
+    /// Returns
+    /// -------
+    /// Trajectory
+    ///     n + 1 samples, where n is duration / dt rounded down.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A length is wrong, a number is not finite, or a condition belongs to the other kind of primitive.
+    /// TypeError
+    ///     A keyword is unknown, or `conditions` has another type.
+    ///
+    /// Examples
+    /// --------
+    /// >>> trajectory = model.rollout(goal=[1.1, 0.0], tau=2.0, dt=0.001)
+    /// >>> trajectory.position.shape
+    /// (2001, 2)
+    /// >>> np.allclose(trajectory.position[-1], [1.1, 0.0], atol=1e-3)
+    /// True
+    #[pyo3(
+        signature = (conditions=None, *, dt=Scalar::Number(0.01), duration=None, context=None, **changes),
+        text_signature = "($self, conditions=None, *, dt=0.01, duration=None, context=None, **changes)"
+    )]
+    fn rollout(
+        &self,
+        py: Python<'_>,
+        conditions: Option<&Bound<'_, PyAny>>,
+        dt: Scalar<'_>,
+        duration: Option<Scalar<'_>>,
+        context: Option<&Bound<'_, PyAny>>,
+        changes: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Trajectory> {
+        let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
+        let conditions = conditions_of(&self.0, conditions, context, changes)?;
+        let trajectory = interruptible(py, |progress| rollout_with(self.0.primitive(), &conditions, grid, progress))?;
+        Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
+    }
+
+    /// Start a movement that is computed tick by tick in a control loop.
+    ///
+    /// Parameters
+    /// ----------
+    /// dt : float
+    ///     Length of a tick in s.
+    /// conditions : Conditions, optional
+    ///     Conditions at the start. The controller takes the sum of segment durations; see `tau_at` to follow them.
+    /// transition : float, optional
+    ///     Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0
+    ///     switches immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of
+    ///     the period (rhythmic). A new goal takes the remaining time of the movement if that is longer, unless
+    ///     transport is immediate.
+    /// context : array_like or list, (Q,), optional
+    ///     Context whose prediction supplies absent conditions.
+    /// **changes
+    ///     Single conditions by name, as in `rollout`.
+    ///
+    /// Returns
+    /// -------
+    /// Controller
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     `dt` or `transition` is out of range, or `rollout` rejects the conditions.
+    /// TypeError
+    ///     A keyword is unknown, or `conditions` has another type.
+    ///
+    /// Examples
+    /// --------
+    /// >>> controller = model.controller(dt=0.01, goal=[1.0, 0.1])
+    /// >>> controller.step()
+    /// Status.WORKING
+    /// >>> controller.goal = [1.1, 0.0]
+    /// >>> while controller.step():
+    /// ...     pass
+    /// >>> np.allclose(controller.position, [1.1, 0.0], atol=0.01)
+    /// True
+    #[pyo3(
+        signature = (dt=Scalar::Number(0.001), conditions=None, *, transition=None, context=None, **changes),
+        text_signature = "($self, dt=0.001, conditions=None, *, transition=None, context=None, **changes)"
+    )]
+    fn controller(
+        &self,
+        py: Python<'_>,
+        dt: Scalar<'_>,
+        conditions: Option<&Bound<'_, PyAny>>,
+        transition: Option<Scalar<'_>>,
+        context: Option<&Bound<'_, PyAny>>,
+        changes: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Controller> {
+        let (dt, transition) = (dt.number("dt")?, optional_number("transition", transition)?);
+        let conditions = conditions_of(&self.0, conditions, context, changes)?;
+        let controller = pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
+        Controller::new(py, Arc::clone(&self.0), controller)
+    }
+
+    /// Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
+    ///
+    /// A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
+    /// Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start` and
+    /// `velocity`.
+    ///
+    /// Parameters
+    /// ----------
+    /// wrt : {"style", "goal", "anchor", "start"}
+    ///     Condition v.
+    /// conditions : Conditions, optional
+    ///     Conditions at the start.
+    /// derivative : int
+    ///     Order of the time derivative of y: 0 for positions, 1 for velocities, 2 for accelerations.
+    /// dt : float
+    ///     Interval between samples in s.
+    /// duration : float, optional
+    ///     Length in s, as in `rollout`.
+    /// context : array_like or list, (Q,), optional
+    ///     Context whose prediction supplies absent conditions.
+    /// **changes
+    ///     Single conditions by name, as in `rollout`.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, (T, D, J) or (T, D, D)
+    ///     ∂y/∂v in the unit of y per unit of v, at the samples of `rollout`; (T, D, J) for the style.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Conditions that `rollout` rejects, a condition of the other kind of primitive, or several segment durations.
+    ///
+    /// Examples
+    /// --------
+    /// >>> jacobian = model.jacobian("goal", dt=0.1)
+    /// >>> shift = np.array([0.1, 0.0])
+    /// >>> base, moved = (model.rollout(goal=model.goals[0] + k * shift, dt=0.1).position for k in (0, 1))
+    /// >>> np.allclose(moved - base, jacobian @ shift)
+    /// True
+    #[pyo3(
+        signature = (
+            wrt, conditions=None, *, derivative=Scalar::Count(0), dt=Scalar::Number(0.01), duration=None, context=None,
+            **changes
+        ),
+        text_signature = "($self, wrt, conditions=None, *, derivative=0, dt=0.01, duration=None, context=None, \
+                          **changes)"
+    )]
+    #[allow(clippy::too_many_arguments)]
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        wrt: &str,
+        conditions: Option<&Bound<'py, PyAny>>,
+        derivative: Scalar<'py>,
+        dt: Scalar<'py>,
+        duration: Option<Scalar<'py>>,
+        context: Option<&Bound<'py, PyAny>>,
+        changes: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Cube<'py>> {
+        let wrt = match wrt {
+            "style" => WithRespectTo::Style,
+            "goal" => WithRespectTo::Goal,
+            "anchor" => WithRespectTo::Anchor,
+            "start" => WithRespectTo::Start,
+            _ => {
+                let text = format!("wrt = '{wrt}': must be 'style', 'goal', 'anchor' or 'start'");
+                return Err(PyValueError::new_err(text));
+            }
+        };
+        let derivative = Derivative::of_order("derivative", derivative.count("derivative")?).map_err(raise)?;
+        let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
+        let conditions = conditions_of(&self.0, conditions, context, changes)?;
+        let jacobian =
+            interruptible(py, |progress| jacobian(self.0.primitive(), wrt, derivative, &conditions, grid, progress))?;
+        Ok(jacobian.into_pyarray(py))
+    }
+}
