@@ -218,9 +218,12 @@ def test_tables_may_have_thousands_of_columns(tmp_path: Path) -> None:
         row = ",".join(["1.5"] * n)
         lines = [",".join(["t", *(f"c{k}" for k in range(n))])]
         path.write_text("\n".join([*lines, *(f"{k / 10},{row}" for k in range(4))]))
-        begin = clock.process_time()
-        assert pdmp.io.read_csv(path).n_dofs == n
-        elapsed.append(clock.process_time() - begin)
+        runs = []
+        for _ in range(5):  # the least of several: other processes disturb single ones
+            begin = clock.process_time()
+            assert pdmp.io.read_csv(path).n_dofs == n
+            runs.append(clock.process_time() - begin)
+        elapsed.append(min(runs))
     # Eight times as much work; 64 times as much if quadratic.
     assert elapsed[1] < 25 * elapsed[0] + 0.05
 
