@@ -1,7 +1,16 @@
 //! The tick with four degrees of freedom in one AVX2 register, chosen at run time.
 //!
 //! Intrinsics are inlined only into functions with their target feature, hence `inline(always)` on every operation.
-//! GAIN
+//!
+//! Instructions per tick at D = 7, J = 3 (`cargo bench --bench instructions`):
+//!
+//! | registers                       | settled | in transition | commanded |
+//! |---------------------------------|--------:|--------------:|----------:|
+//! | these                           |     790 |          1313 |      2277 |
+//! | [`F64x4`], compiled for AVX2    |    1070 |          2078 |      3125 |
+//! | [`F64x4`], baseline of x86-64   |    1187 |          2466 |      3596 |
+//!
+//! The time of a tick is less than a third of that of the baseline (`cargo bench --bench step`).
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::{

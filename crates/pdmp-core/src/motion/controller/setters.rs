@@ -33,6 +33,19 @@ impl Controller {
 
     /// Sets the time constant τ, in seconds. The rate 1/τ is filtered.
     ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+    /// controller.set_tau(2.0 * model.tau())?;
+    /// assert_eq!(controller.tau(), 2.0 * model.tau());
+    /// assert!(controller.set_tau(-1.0).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A number that is not positive, or that differs from the model's τ by a factor of more than 1e6. τ then remains
     /// unchanged.
@@ -86,6 +99,21 @@ impl Controller {
     ///
     /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 divided by
     /// the demonstrated clock interval T/τ or 2π. A gain of 0 disables its term.
+    ///
+    /// ```
+    /// # use pdmp_core::{Command, Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+    /// controller.set_compliance(1e6, 0.0)?;
+    /// let measured = [1.0, 0.0];
+    /// controller.step_with(&Command { measured: Some(&measured), ..Command::default() })?;
+    /// assert!(controller.phase() > 0.9999);
+    /// controller.release();
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A gain that is negative, not finite or above 1e100. Both then remain unchanged.
