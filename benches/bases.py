@@ -108,7 +108,7 @@ def held_out(group: Group, basis: Basis) -> tuple[float, float]:
     mean, variance = learnt.predict(u[hidden])
     error = factors[hidden] - mean
     if variance is None:
-        variance = np.mean(left_out(basis, u[training], factors[training], periodic) ** 2)
+        variance = np.mean(skipped(basis, u[training], factors[training], periodic) ** 2)
     else:
         variance = variance + learnt.noise * learnt.signal_variance
     unit = np.mean(factors**2)
@@ -116,7 +116,7 @@ def held_out(group: Group, basis: Basis) -> tuple[float, float]:
     return rmse(error, group) / extent, float(np.mean(density))
 
 
-def left_out(net: pdmp.NGnet, u: np.ndarray, targets: np.ndarray, periodic: bool) -> np.ndarray:
+def skipped(net: pdmp.NGnet, u: np.ndarray, targets: np.ndarray, periodic: bool) -> np.ndarray:
     """Returns the leave-one-out residuals (C, P) of a network.
 
     The network is linear, f̂ = Hf; its leave-one-out residual is (fᵢ − f̂ᵢ)/(1 − Hᵢᵢ).

@@ -96,7 +96,7 @@ def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
 
 def relative(evaluation: Evaluation, name: str, reach: str) -> str:
     """Returns E over that of the mean demonstration."""
-    if name in evaluation.left_out:
+    if name in evaluation.skipped:
         return "–"
     summary = evaluation.summary(name, reach)
     return f"{summary.relative:.2g} ± {summary.relative_error:.1g}"
@@ -108,7 +108,7 @@ def primitive(question: Question, evaluation: Evaluation, reach: str) -> Iterabl
     yield f"{summary.error:.2g} ± {summary.deviation:.1g} {question.unit}²"
     yield f"{summary.coverage:.0%}"
     yield f"{summary.duration:.0%}"
-    others = [name for name in baselines() | library_baselines() if name not in evaluation.left_out]
+    others = [name for name in baselines() | library_baselines() if name not in evaluation.skipped]
     best = min(others, key=lambda name: evaluation.summary(name, reach).error)
     yield best
     yield difference(evaluation, PRIMITIVE, best, reach)

@@ -3,7 +3,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
-pub use crate::validate::LARGEST;
+pub use crate::validate::MAX_MAGNITUDE;
 use crate::validate::{check_matrix, check_number, check_positive, check_time, check_vector};
 
 /// Minimum number of samples of a demonstration: a cubic spline with not-a-knot ends needs four.
@@ -93,7 +93,7 @@ impl Demonstration {
     /// Creates a demonstration from positions (T, D), in the unit of each degree of freedom.
     ///
     /// # Errors
-    /// Fewer than [`MIN_SAMPLES_PER_DEMONSTRATION`] samples, no DoF, a number that is not finite or exceeds [`LARGEST`],
+    /// Fewer than [`MIN_SAMPLES_PER_DEMONSTRATION`] samples, no DoF, a number that is not finite or exceeds [`MAX_MAGNITUDE`],
     /// an interval that is not positive, time stamps that do not increase, or a number of time stamps other than T.
     pub fn new(position: Array2<f64>, sampling: Sampling) -> Result<Self> {
         check_matrix("position", position.view())?;
@@ -115,7 +115,7 @@ impl Demonstration {
     /// Sets the goal of this movement (D,). The default is the last sample.
     ///
     /// # Errors
-    /// A length other than D, or a number that is not finite or exceeds [`LARGEST`].
+    /// A length other than D, or a number that is not finite or exceeds [`MAX_MAGNITUDE`].
     pub fn with_goal(mut self, goal: Vec<f64>) -> Result<Self> {
         check_vector("goal", &goal, self.n_dofs(), "DoF")?;
         self.goal = Some(goal);
@@ -125,7 +125,7 @@ impl Demonstration {
     /// Sets the context in which this movement was recorded (Q,), such as the height of an obstacle.
     ///
     /// # Errors
-    /// No value, or a number that is not finite or exceeds [`LARGEST`].
+    /// No value, or a number that is not finite or exceeds [`MAX_MAGNITUDE`].
     pub fn with_context<V: Into<ContextValue>>(mut self, context: Vec<V>) -> Result<Self> {
         let context: Vec<ContextValue> = context.into_iter().map(Into::into).collect();
         check_context(&context)?;

@@ -5,7 +5,7 @@ use ndarray::{Array, ArrayBase, ArrayView2, Data, DataMut, Dimension, IntoDimens
 use crate::error::{Error, Result};
 
 /// Largest magnitude of a position: its square, summed over a recording, stays finite.
-pub const LARGEST: f64 = 1e150;
+pub const MAX_MAGNITUDE: f64 = 1e150;
 
 /// Checks that `value` has `expected` elements, one per `per`, and passes [`check_finite`].
 pub(crate) fn check_vector(name: &'static str, value: &[f64], expected: usize, per: &'static str) -> Result<()> {
@@ -15,16 +15,16 @@ pub(crate) fn check_vector(name: &'static str, value: &[f64], expected: usize, p
     check_finite(name, value)
 }
 
-/// Checks that every element is finite and no larger than [`LARGEST`].
+/// Checks that every element is finite and no larger than [`MAX_MAGNITUDE`].
 pub(crate) fn check_finite(name: &'static str, value: &[f64]) -> Result<()> {
     value.iter().enumerate().try_for_each(|(index, &value)| check_number(name, index, value))
 }
 
-/// Checks that the element `value` at `index` is finite and no larger than [`LARGEST`].
+/// Checks that the element `value` at `index` is finite and no larger than [`MAX_MAGNITUDE`].
 pub(crate) fn check_number(name: &'static str, index: usize, value: f64) -> Result<()> {
     match value.abs() {
-        size if size <= LARGEST => Ok(()),
-        size if size.is_finite() => Err(Error::TooLarge { name, index, value, limit: LARGEST }),
+        size if size <= MAX_MAGNITUDE => Ok(()),
+        size if size.is_finite() => Err(Error::TooLarge { name, index, value, limit: MAX_MAGNITUDE }),
         _ => Err(Error::NotFinite { name, index, value }),
     }
 }
@@ -74,18 +74,18 @@ pub(crate) fn row_major_mut<S: DataMut, D: Dimension>(array: &mut ArrayBase<S, D
     array.as_slice_mut().expect(NOT_ROW_MAJOR)
 }
 
-/// Checks that every element of a matrix is finite and no larger than [`LARGEST`].
+/// Checks that every element of a matrix is finite and no larger than [`MAX_MAGNITUDE`].
 pub(crate) fn check_matrix(name: &'static str, matrix: ArrayView2<f64>) -> Result<()> {
     // A pass without branches runs in vector registers; the bad element is located only if there is one.
-    if matrix.fold(true, |valid, value| valid & (value.abs() <= LARGEST)) {
+    if matrix.fold(true, |valid, value| valid & (value.abs() <= MAX_MAGNITUDE)) {
         return Ok(());
     }
     for ((row, column), &value) in matrix.indexed_iter() {
         if !value.is_finite() {
             return Err(Error::NotFiniteAt { name, row, column, value });
         }
-        if value.abs() > LARGEST {
-            return Err(Error::Magnitude { name, row, column, value, limit: LARGEST });
+        if value.abs() > MAX_MAGNITUDE {
+            return Err(Error::Magnitude { name, row, column, value, limit: MAX_MAGNITUDE });
         }
     }
     Ok(())

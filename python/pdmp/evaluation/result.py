@@ -96,7 +96,7 @@ class Evaluation:
         Forecasts by predictor, split and held-out demonstration.
     scores : dict of str to Scores
         Scores of each predictor.
-    left_out : dict of str to str
+    skipped : dict of str to str
         Predictors that raised an ImportError, and its text.
     """
 
@@ -105,7 +105,7 @@ class Evaluation:
     predictors: dict[str, Predictor]
     forecasts: dict[str, list[list[Forecast]]]
     scores: dict[str, Scores]
-    left_out: dict[str, str]
+    skipped: dict[str, str]
 
     def score(self, predictor: str) -> Scores:
         """Returns the scores of one predictor."""
@@ -186,7 +186,7 @@ class Evaluation:
     def _notes(self) -> list[str]:
         return [
             f"left out: {printable(name)}: {printable(reason)}"
-            for name, reason in self.left_out.items()
+            for name, reason in self.skipped.items()
         ]
 
     def _rows(self, reach: Reach | None) -> list[int]:

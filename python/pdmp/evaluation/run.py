@@ -137,7 +137,7 @@ def evaluate(
     if not isinstance(selected.get(REFERENCE, MeanDemonstration()), MeanDemonstration):
         raise value_error(f"predictors: '{REFERENCE}' is always included: rename yours")
     evaluated = {REFERENCE: MeanDemonstration()} | selected
-    forecasts, left_out = {}, {}
+    forecasts, skipped = {}, {}
     for k, (name, predictor) in enumerate(evaluated.items()):
 
         def report(share: float, k: int = k, name: str = name) -> None:
@@ -147,9 +147,9 @@ def evaluate(
         try:
             forecasts[name] = _forecasts(name, predictor, data, folds, report)
         except ImportError as reason:
-            left_out[name] = str(reason)
+            skipped[name] = str(reason)
     scores = {name: score(data, folds, made) for name, made in forecasts.items()}
-    return Evaluation(data, tuple(folds), evaluated, forecasts, scores, left_out)
+    return Evaluation(data, tuple(folds), evaluated, forecasts, scores, skipped)
 
 
 def _forecasts(

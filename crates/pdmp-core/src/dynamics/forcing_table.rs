@@ -141,7 +141,7 @@ impl ForcingTable {
     }
 
     /// Returns the table with [`Ending::Braked`], for the `z` at the end of unit styles, by groups of DoFs and styles.
-    pub(crate) fn braked(mut self, alpha_z: f64, braking: f64, z: &[F64x4]) -> Self {
+    pub(crate) fn with_braking(mut self, alpha_z: f64, braking: f64, z: &[F64x4]) -> Self {
         let [end, beyond] = [self.cells, self.cells + 1].map(|row| row * self.knot_stride);
         for (i, z) in z.iter().enumerate() {
             let value = self.cubics[end + i].0[0];

@@ -53,7 +53,7 @@ impl KnotTable {
 
     /// Returns the largest deviation of the cubics over every second knot from the values at the knots between them;
     /// `width` is the distance of neighbouring knots.
-    pub(crate) fn error_of_every_second(&self, width: f64) -> f64 {
+    pub(crate) fn midpoint_error(&self, width: f64) -> f64 {
         let n = self.n_outputs;
         let cells = self.values.windows(3 * n).zip(self.slopes.windows(3 * n)).step_by(2 * n);
         let mut error = 0.0f64;

@@ -51,7 +51,7 @@ pub(super) fn truncation_error(
         if all > 0.0 { share } else { 0.0 }
     };
     let worst = (0..n_dofs).filter(small).map(|d| (d, share(d))).max_by(|a, b| a.1.total_cmp(&b.1));
-    worst.filter(|(_, share)| *share > MIN_TRUNCATION_ERROR).map(|(d, share)| Finding::LeftOut {
+    worst.filter(|(_, share)| *share > MIN_TRUNCATION_ERROR).map(|(d, share)| Finding::TruncatedDof {
         dof: names[d].clone(),
         range: ranges[d],
         largest,

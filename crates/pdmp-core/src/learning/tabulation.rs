@@ -77,7 +77,7 @@ fn tabulate(
             Ok(())
         };
         let mut reporting = |share: f64| progress((done as f64 + share * n as f64) / (MAX_CELLS + 1) as f64);
-        threads.try_for_each_told(
+        threads.try_for_each_with_progress(
             knots.rows_mut(step * PORTION).enumerate().collect(),
             scratch,
             evaluate,
@@ -95,7 +95,7 @@ fn tabulate(
         let mut finer = knots.spread();
         cells *= 2;
         evaluate_rows(&mut finer, (1, 2), extent / cells as f64)?;
-        let error = finer.error_of_every_second(extent / cells as f64) / largest;
+        let error = finer.midpoint_error(extent / cells as f64) / largest;
         if error <= TOLERANCE {
             return Ok((knots, error));
         }

@@ -91,7 +91,7 @@ impl Targets {
             inversion.compute(rows, aligned.demo(m).goal(), columns);
             Ok(())
         };
-        threads.try_for_each_told(targets.rows().enumerate().collect(), columns, compute, progress)?;
+        threads.try_for_each_with_progress(targets.rows().enumerate().collect(), columns, compute, progress)?;
         Ok(targets)
     }
 

@@ -219,7 +219,7 @@ pub(crate) fn check_tau(tau: f64, own: f64) -> Result<()> {
 
 /// Checks an amplitude: zero is rest.
 pub(crate) fn check_amplitude(value: f64) -> Result<()> {
-    if (0.0..=crate::validate::LARGEST).contains(&value) {
+    if (0.0..=crate::validate::MAX_MAGNITUDE).contains(&value) {
         Ok(())
     } else {
         Err(Error::Range { name: "amplitude", value, allowed: "must lie between 0, which is rest, and 1e150" })

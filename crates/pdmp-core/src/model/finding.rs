@@ -108,7 +108,7 @@ pub enum Finding {
         cut_off: f64,
     },
     /// A degree of freedom of small range that the styles do not describe.
-    LeftOut {
+    TruncatedDof {
         /// Name of the degree of freedom.
         dof: String,
         /// Range of the degree of freedom, in its unit.
@@ -221,7 +221,7 @@ impl fmt::Display for Finding {
                 short(100.0 * share),
                 short(*cut_off)
             ),
-            Self::LeftOut { dof, range, largest, share, n_styles } => write!(
+            Self::TruncatedDof { dof, range, largest, share, n_styles } => write!(
                 f,
                 "{n_styles} styles leave out {} % of {dof:?}, whose range of {} is small relative to {}: if its unit differs, \
                  give units or dof_scale = \"range\"; otherwise raise n_styles",

@@ -95,7 +95,7 @@ impl Primitive {
                 if let Some(braking) = braking {
                     let end = from_rest(attractor, &forcing_table, shape);
                     let z: Vec<F64x4> = end.iter().map(|state| state.z).collect();
-                    forcing_table = forcing_table.braked(attractor.alpha_z, braking, &z);
+                    forcing_table = forcing_table.with_braking(attractor.alpha_z, braking, &z);
                 }
                 vec![State::default(); groups(shape.0) * shape.1]
             }

@@ -110,7 +110,7 @@ pub fn rollout_with(
         ));
     }
     let conditions = clock.conditions(conditions);
-    let mut controller = Controller::new(primitive, grid.dt, &conditions, Some(0.0))?.looking_ahead(PREFETCH_TICKS);
+    let mut controller = Controller::new(primitive, grid.dt, &conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
     let shape = (steps + 1, primitive.n_dofs());
     let mut trajectory = Trajectory {
         time: (0..=steps).map(|k| k as f64 * grid.dt).collect(),

@@ -56,7 +56,7 @@ impl Threads {
     /// # Errors
     /// The error of the first item that has one, by position; later items may remain unprocessed.
     pub(crate) fn try_for_each<T: Send>(self, items: Vec<T>, work: impl Fn(T) -> Result<()> + Sync) -> Result<()> {
-        self.try_for_each_told(items, || (), |(), item| work(item), &mut |_| Ok(()))
+        self.try_for_each_with_progress(items, || (), |(), item| work(item), &mut |_| Ok(()))
     }
 
     /// Calls `work` with every item and the `scratch` memory of the thread, as [`Self::try_for_each`] does, and reports
@@ -69,7 +69,7 @@ impl Threads {
     ///
     /// # Errors
     /// The error of `progress`; otherwise the error of the first item that has one, by position.
-    pub(crate) fn try_for_each_told<T: Send, S: Send>(
+    pub(crate) fn try_for_each_with_progress<T: Send, S: Send>(
         self,
         items: Vec<T>,
         scratch: impl Fn() -> S,

@@ -52,7 +52,7 @@ impl Aligned<'_> {
         let mut paths = Array2::from_elem((n_demos, warp.n_segments), STEPS);
 
         let aligned: &Self = self;
-        threads.try_for_each_told(
+        threads.try_for_each_with_progress(
             shapes.axis_iter_mut(Axis(0)).enumerate().collect(),
             || (),
             |(), (m, mut shape)| {
@@ -65,7 +65,7 @@ impl Aligned<'_> {
         let mut template = shapes.row(nominal).to_vec();
         for pass in 1..=2 {
             let rows = shapes.rows().into_iter().zip(paths.rows_mut()).enumerate();
-            threads.try_for_each_told(
+            threads.try_for_each_with_progress(
                 rows.filter(|(m, _)| *m != nominal).map(|(_, rows)| rows).collect(),
                 || Scratch::new(&search),
                 |scratch, (shape, mut path)| {

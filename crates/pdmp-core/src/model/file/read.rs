@@ -21,7 +21,7 @@ use crate::model::sensitivity::STEPS;
 use crate::model::template::{TimeWarp, WarpTemplate};
 use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::numerics::smoothing_spline::Noise;
-use crate::validate::LARGEST;
+use crate::validate::MAX_MAGNITUDE;
 
 impl Model {
     /// Reads a model from the bytes of a file.
@@ -277,8 +277,8 @@ impl Reader<'_> {
 fn max_magnitude(name: &str) -> f64 {
     match name {
         "styles" => MAX_STYLE_MAGNITUDE,
-        "residual_variance" => LARGEST * LARGEST,
-        _ => LARGEST,
+        "residual_variance" => MAX_MAGNITUDE * MAX_MAGNITUDE,
+        _ => MAX_MAGNITUDE,
     }
 }
 

@@ -188,7 +188,7 @@ impl Controller {
     }
 
     /// Returns the controller with another prefetch distance, for ticks without waiting time between them.
-    pub(crate) fn looking_ahead(self, prefetch_ticks: f64) -> Self {
+    pub(crate) fn with_prefetch(self, prefetch_ticks: f64) -> Self {
         Self { prefetch_ticks, ..self }
     }
 
