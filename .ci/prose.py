@@ -49,7 +49,7 @@ def lines(path: Path) -> Iterator[tuple[int, str, bool]]:
 
 
 def main() -> int:
-    """Print each violation, and return whether there is one."""
+    """Prints each violation; returns 1 if there is any, else 0."""
     listed = subprocess.run(
         ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
     )
