@@ -8,9 +8,9 @@ use std::sync::{Arc, LazyLock};
 use ndarray::Array2;
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::jacobian;
-use pdmp_core::motion::prediction_band;
 use pdmp_core::motion::rollouts;
 use pdmp_core::motion::{BatchConditions, TimeGrid, WithRespectTo};
+use pdmp_core::motion::{PredictionBand, prediction_band};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, Controller, Model};
@@ -297,7 +297,7 @@ fn exercise(model: &Arc<Model>) {
         assert_finite("prediction", style.iter().chain(times).flatten().chain([&prediction.duration]));
         assert_finite("covariance", prediction.covariance.iter().flatten());
         assert_finite("distance", &prediction.extrapolation);
-        if let Ok([lower, upper]) = prediction_band(model, &prediction, 0.9, grid) {
+        if let Ok(PredictionBand { lower, upper }) = prediction_band(model, &prediction, 0.9, grid) {
             assert_finite("band", lower.iter().chain(&upper));
         }
         if let Ok(trajectory) = rollout(model.primitive(), &prediction.conditions, grid) {

@@ -3,6 +3,7 @@
 use std::mem::{MaybeUninit, align_of, size_of};
 use std::ptr;
 
+use pdmp_core::motion::Compliance;
 use pdmp_core::{Command, Controller};
 
 use crate::buffers::{pdmp_memory, pdmp_text, pdmp_vector};
@@ -263,7 +264,9 @@ pub extern "C" fn pdmp_controller_set_compliance(
     stopping: f64,
     tracking: f64,
 ) -> pdmp_status {
-    call_on(controller, |controller| Ok(controller.inner.set_compliance(stopping, tracking).map(|()| PDMP_OK)?))
+    call_on(controller, |controller| {
+        Ok(controller.inner.set_compliance(Compliance { stopping, tracking }).map(|()| PDMP_OK)?)
+    })
 }
 
 /// Discards the measured position; the movement is unperturbed until the next measurement. Errors: PDMP_NULL.

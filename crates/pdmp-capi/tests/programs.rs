@@ -12,6 +12,7 @@ use std::process::{Command as Process, Output};
 
 use common::*;
 use ndarray::Array2;
+use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status};
 use tempfile::TempDir;
@@ -208,7 +209,7 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
                 100 => controller.set_style(&conditions_of(&model, 0).style.unwrap()).unwrap(),
                 150 => controller.set_goal(&goal).unwrap(),
                 200 => controller.set_tau(1.5).unwrap(),
-                250 => controller.set_compliance(100.0, 5.0).unwrap(),
+                250 => controller.set_compliance(Compliance { stopping: 100.0, tracking: 5.0 }).unwrap(),
                 _ => {}
             }
             // The program sends commands at even ticks.

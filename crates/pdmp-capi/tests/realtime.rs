@@ -12,6 +12,7 @@ use std::ptr;
 use common::*;
 use counting::{Random, allocations};
 use pdmp::*;
+use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
@@ -105,7 +106,10 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                     2 => (rust.set_anchor(per_dof), pdmp_controller_set_anchor(c.as_mut(), vector(Some(per_dof)))),
                     3 => (rust.set_tau(tau), pdmp_controller_set_tau(c.as_mut(), tau)),
                     4 => (rust.set_amplitude(tau), pdmp_controller_set_amplitude(c.as_mut(), tau)),
-                    5 => (rust.set_compliance(tau, tau), pdmp_controller_set_compliance(c.as_mut(), tau, tau)),
+                    5 => (
+                        rust.set_compliance(Compliance { stopping: tau, tracking: tau }),
+                        pdmp_controller_set_compliance(c.as_mut(), tau, tau),
+                    ),
                     _ => (Ok(()), pdmp_status::PDMP_OK),
                 }
             };

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use accepted::mostly_accepted;
 use common::*;
+use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
 use proptest::prelude::*;
@@ -104,7 +105,7 @@ fn perturbed_movement_solves_the_stated_equations() {
     for (model, tracking_error) in [(&*REACH, true), (&*REACH, false), (&*CYCLE, true), (&*CYCLE, false)] {
         let n = model.n_dofs();
         let mut controller = controller(model);
-        controller.set_compliance(stopping, tracking).unwrap();
+        controller.set_compliance(Compliance { stopping, tracking }).unwrap();
         // The initial z follows from the initial velocity, since the controller does not expose it.
         let start: Vec<f64> = (0..n).map(|d| controller.position()[d] - frame_offset(model, d, 0.0)).collect();
         let rest = controller.velocity().iter().map(|v| v * model.tau());
@@ -152,7 +153,7 @@ fn velocity_and_acceleration_stay_derivatives() {
         let (n, dt) = (model.n_dofs(), 1e-5);
         let mut controller = controller(model);
         // The tracking velocity is constant over a tick and would jump between ticks.
-        controller.set_compliance(1000.0, 0.0).unwrap();
+        controller.set_compliance(Compliance { stopping: 1000.0, tracking: 0.0 }).unwrap();
         (0..200).for_each(|_| _ = controller.step().unwrap());
         controller.set_tau(0.6 * model.tau()).unwrap();
         let (velocity, acceleration) = (vec![0.4; n], vec![-5.0; n]);
@@ -330,7 +331,7 @@ fn errors_of_angles_are_wrapped() {
 #[test]
 fn stopped_phase_does_not_finish() {
     let mut controller = controller(&REACH);
-    controller.set_compliance(1e12, 0.0).unwrap();
+    controller.set_compliance(Compliance { stopping: 1e12, tracking: 0.0 }).unwrap();
     for _ in 0..5000 {
         let far: Vec<f64> = controller.position().iter().map(|y| y + 0.1).collect();
         assert_eq!(tick(&mut controller, &measured(&far)).unwrap(), Status::Working);
@@ -375,7 +376,10 @@ fn rejected_perturbations_leave_the_state() {
         }
         assert!(tick(&mut rejecting, &Command { dt: Some(-1.0), ..measured(&valid) }).is_err());
         for gains in [(-1.0, 1.0), (1.0, -1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)] {
-            assert!(matches!(rejecting.set_compliance(gains.0, gains.1), Err(Error::Range { .. })));
+            assert!(matches!(
+                rejecting.set_compliance(Compliance { stopping: gains.0, tracking: gains.1 }),
+                Err(Error::Range { .. })
+            ));
         }
         assert_eq!(rejecting.compliance(), reference.compliance());
         assert_eq!((rejecting.position(), rejecting.time()), (reference.position(), reference.time()));
@@ -396,7 +400,7 @@ proptest! {
     fn tracking_is_stable_at_any_tick(dt in 1e-6..100.0f64, tracking in 1e-3..1e6f64, ticks in 1..200usize) {
         for model in [&*REACH, &*CYCLE] {
             let mut controller = controller(model);
-            controller.set_compliance(1000.0, tracking).unwrap();
+            controller.set_compliance(Compliance { stopping: 1000.0, tracking }).unwrap();
             let robot = vec![100.0; model.n_dofs()];
             for _ in 0..ticks {
                 tick(&mut controller, &Command { dt: Some(dt), ..measured(&robot) }).unwrap();
@@ -421,7 +425,9 @@ fn any_perturbation_leaves_the_state_finite() {
                     0 => tick(&mut controller, &Command { dt: Some(dt), ..measured(&values) }),
                     1 => tick(&mut controller, &Command { dt: Some(dt), ..terms }),
                     2 => tick(&mut controller, &Command { dt: Some(dt), ..both }),
-                    _ => controller.set_compliance(gain, gain).and_then(|()| controller.step()),
+                    _ => controller
+                        .set_compliance(Compliance { stopping: gain, tracking: gain })
+                        .and_then(|()| controller.step()),
                 });
                 for values in [controller.position(), controller.velocity(), controller.acceleration()] {
                     prop_assert!(values.iter().all(|x| x.is_finite()));

@@ -14,6 +14,7 @@ use std::hint::black_box;
 
 use common::*;
 use counting::{Random, allocations};
+use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
@@ -62,7 +63,7 @@ impl Loop {
             2 => controller.set_anchor(vector),
             3 => controller.set_tau(tau),
             4 => controller.set_amplitude(size),
-            5 => controller.set_compliance(1e3 * size, 10.0 * size),
+            5 => controller.set_compliance(Compliance { stopping: 1e3 * size, tracking: 10.0 * size }),
             6 => controller.step().map(drop),
             _ => Ok(()),
         });

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Kind};
 use pyo3::exceptions::PyValueError;
@@ -337,7 +338,8 @@ impl Controller {
     /// Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each.
     #[getter]
     fn compliance(&self) -> (f64, f64) {
-        self.inner.compliance()
+        let Compliance { stopping, tracking } = self.inner.compliance();
+        (stopping, tracking)
     }
 
     #[setter]
@@ -347,7 +349,7 @@ impl Controller {
             let text = format!("compliance = {}: expected two gains (k_s, k_t)", quoted(compliance));
             return Err(PyValueError::new_err(text));
         };
-        self.inner.set_compliance(stopping, tracking).map_err(raise)
+        self.inner.set_compliance(Compliance { stopping, tracking }).map_err(raise)
     }
 
     /// Return an independent controller in the same state, with the same model.

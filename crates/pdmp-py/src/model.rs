@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ndarray::Array3;
 use numpy::IntoPyArray;
 use pdmp_core::learning::style_of;
-use pdmp_core::motion::{TimeGrid, prediction_band};
+use pdmp_core::motion::{PredictionBand, TimeGrid, prediction_band};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyString};
@@ -305,7 +305,8 @@ impl Model {
         let (level, dt) = (level.number("level")?, dt.number("dt")?);
         let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
         let grid = TimeGrid { dt, duration: None };
-        let [lower, upper] = py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;
+        let PredictionBand { lower, upper } =
+            py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 

@@ -15,6 +15,7 @@ pub use batch::{Batch, BatchChunks, BatchConditions, PerMovement, batch, rollout
 pub use command::{Command, Coupling, Motion};
 pub use controller::{Controller, Status};
 pub use jacobian::{WithRespectTo, jacobian};
-pub use prediction_band::prediction_band;
+pub use perturbation::Compliance;
+pub use prediction_band::{PredictionBand, prediction_band};
 pub use rollout::{TimeGrid, rollout, rollout_with};
 pub use trajectory::Trajectory;

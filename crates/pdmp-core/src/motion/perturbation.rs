@@ -46,6 +46,15 @@ pub(crate) const MIN_RANGE_RATIO: f64 = 1e-6;
 /// Range up to which a DoF is stationary, since the square of its inverse may overflow.
 const MIN_RANGE: f64 = 1e-140;
 
+/// Gains of a measured position; a gain of 0 disables its term.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compliance {
+    /// k_s of phase stopping, from 0 to 1e100.
+    pub stopping: f64,
+    /// k_t of tracking, per unit of the clock, from 0 to 1e100.
+    pub tracking: f64,
+}
+
 /// Velocity and acceleration that are added over a tick, by groups of DoFs.
 #[derive(Clone, Debug)]
 pub(crate) struct PerturbationTerms {
@@ -62,7 +71,7 @@ pub(crate) struct Perturbation {
     /// κ.
     phase_rate: f64,
     /// k_s and k_t.
-    compliance: (f64, f64),
+    compliance: Compliance,
     /// True while a measurement is in force.
     measured: bool,
     /// Tracking error e of the last measurement, by groups of DoFs.
@@ -99,7 +108,7 @@ impl Perturbation {
             terms: PerturbationTerms { velocity: zeros.clone(), acceleration: zeros.clone() },
             active: false,
             phase_rate: 1.0,
-            compliance: (STOPPING_GAIN, TRACKING_GAIN / extent),
+            compliance: Compliance { stopping: STOPPING_GAIN, tracking: TRACKING_GAIN / extent },
             measured: false,
             error: zeros.clone(),
             expected_error: zeros,
@@ -157,7 +166,7 @@ impl Perturbation {
 
     /// Adds the tracking term, computes the phase rate and adapts the expected error.
     fn add_tracking(&mut self, dt: f64, h: f64) {
-        let (stopping, tracking) = self.compliance;
+        let Compliance { stopping, tracking } = self.compliance;
         // The share of the error that k_t alone would correct over the tick, so that the pull does not overshoot ỹ. It is
         // stable for every tick and gain up to β_z = 4α_z at least, far above the critical damping of α_z/4.
         let share = -(-tracking * h).exp_m1();
@@ -189,7 +198,7 @@ impl Perturbation {
     }
 
     /// Returns k_s and k_t.
-    pub(crate) fn compliance(&self) -> (f64, f64) {
+    pub(crate) fn compliance(&self) -> Compliance {
         self.compliance
     }
 
@@ -197,8 +206,8 @@ impl Perturbation {
     ///
     /// # Errors
     /// A gain outside [0, 1e100]. Both then remain unchanged.
-    pub(crate) fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
-        for (name, value) in [("stopping", stopping), ("tracking", tracking)] {
+    pub(crate) fn set_compliance(&mut self, compliance: Compliance) -> Result<()> {
+        for (name, value) in [("stopping", compliance.stopping), ("tracking", compliance.tracking)] {
             if !(0.0..=MAX_GAIN).contains(&value) {
                 return Err(Error::Range {
                     name,
@@ -207,7 +216,7 @@ impl Perturbation {
                 });
             }
         }
-        self.compliance = (stopping, tracking);
+        self.compliance = compliance;
         Ok(())
     }
 }

@@ -51,8 +51,16 @@ fn duration_sensitivities(
     (0..segment_durations.len()).map(sensitivity).collect()
 }
 
-/// Computes the pointwise prediction band of a new movement under predicted conditions: lower and upper bound (T, D), in the
-/// unit of each DoF, at the samples of [`rollout`],
+/// Pointwise prediction band of a new movement, in the unit of each DoF.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PredictionBand {
+    /// Lower bounds (T, D).
+    pub lower: Array2<f64>,
+    /// Upper bounds (T, D).
+    pub upper: Array2<f64>,
+}
+
+/// Computes the pointwise prediction band of a new movement under predicted conditions, at the samples of [`rollout`],
 ///
 /// ```text
 /// y ± t·√(aᵀΣa + v),
@@ -69,15 +77,15 @@ fn duration_sensitivities(
 /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
 /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
 /// let prediction = model.predict(&[0.25])?;
-/// let [lower, upper] = prediction_band(&model, &prediction, 0.95, TimeGrid { dt: 0.01, duration: None })?;
-/// assert!(lower.iter().zip(&upper).all(|(lower, upper)| lower <= upper));
+/// let band = prediction_band(&model, &prediction, 0.95, TimeGrid { dt: 0.01, duration: None })?;
+/// assert!(band.lower.iter().zip(&band.upper).all(|(lower, upper)| lower <= upper));
 /// # Ok(())
 /// # }
 /// ```
 ///
 /// # Errors
 /// A prediction without covariance, a `level` outside (0, 1), a band that overflows, or an error of the rollout.
-pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid: TimeGrid) -> Result<[Array2<f64>; 2]> {
+pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid: TimeGrid) -> Result<PredictionBand> {
     if !(level > 0.0 && level < 1.0) {
         return Err(Error::Range { name: "level", value: level, allowed: "must lie between 0 and 1" });
     }
@@ -109,11 +117,11 @@ pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid:
         .map_err(|_| Error::Arguments("a band needs at least one degree of freedom"))?;
     let quantile = student.inverse_cdf(0.5 * (1.0 + level));
     let width = variance.mapv(|variance| quantile * variance.sqrt());
-    let bounds = [&centre - &width, &centre + &width];
-    if bounds.iter().flatten().any(|bound| !bound.is_finite()) {
+    let band = PredictionBand { lower: &centre - &width, upper: &centre + &width };
+    if band.lower.iter().chain(&band.upper).any(|bound| !bound.is_finite()) {
         return Err(Error::Arguments("the prediction band overflows: pass a context closer to the demonstrations"));
     }
-    Ok(bounds)
+    Ok(band)
 }
 
 /// Interpolates curves (S, D) linearly at a fractional sample: constant past the end of a discrete movement, periodic for a

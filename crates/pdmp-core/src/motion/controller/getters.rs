@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{Controller, Status};
 use crate::model::primitive::Primitive;
+use crate::motion::perturbation::Compliance;
 use crate::numerics::simd::unpack;
 
 impl Controller {
@@ -68,7 +69,7 @@ impl Controller {
     }
 
     /// Returns the gains k_s and k_t of a measured position; see [`Controller::set_compliance`].
-    pub fn compliance(&self) -> (f64, f64) {
+    pub fn compliance(&self) -> Compliance {
         self.perturbation.compliance()
     }
 

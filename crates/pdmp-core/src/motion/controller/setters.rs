@@ -5,6 +5,7 @@ use crate::dynamics::canonical::Canonical;
 use crate::dynamics::command_filter::{FilterGains, FilterStep};
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
+use crate::motion::perturbation::Compliance;
 
 impl Controller {
     /// Sets the style s (J,).
@@ -106,7 +107,9 @@ impl Controller {
     /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
     /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
     /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
-    /// controller.set_compliance(1e6, 0.0)?;
+    /// use pdmp_core::motion::Compliance;
+    ///
+    /// controller.set_compliance(Compliance { stopping: 1e6, tracking: 0.0 })?;
     /// let measured = [1.0, 0.0];
     /// controller.step_with(&Command { measured: Some(&measured), ..Command::default() })?;
     /// assert!(controller.phase() > 0.9999);
@@ -117,8 +120,8 @@ impl Controller {
     ///
     /// # Errors
     /// A gain that is negative, not finite or above 1e100. Both then remain unchanged.
-    pub fn set_compliance(&mut self, stopping: f64, tracking: f64) -> Result<()> {
-        self.perturbation.set_compliance(stopping, tracking)
+    pub fn set_compliance(&mut self, compliance: Compliance) -> Result<()> {
+        self.perturbation.set_compliance(compliance)
     }
 
     /// Discards the measured position and the expected error, so that no perturbation acts until the next measurement.
