@@ -120,7 +120,7 @@ def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) 
     for goal, color in zip(goals(reaching), PALETTE[3:], strict=False):
         for m in DRAWN_TRIALS:
             moved = model.rollout(
-                model.styles[m],
+                style=model.styles[m],
                 goal=goal,
                 start=reaching.start,
                 velocity=np.zeros(model.n_dofs),
