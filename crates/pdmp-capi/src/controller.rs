@@ -32,8 +32,8 @@ pub struct pdmp_settings {
     pub dt: f64,
     /// Time, in seconds, after which 99 % of a commanded change of style, tau, goal, anchor or amplitude has taken
     /// effect; 0 is the immediate switch of the paper. NULL for the default: a tenth of the nominal duration (discrete)
-    /// or a quarter of the nominal period (rhythmic). A goal takes the remaining time of the movement if that is
-    /// longer, unless the transport of the model is immediate.
+    /// or a quarter of the nominal period (rhythmic). Unless the transport of the model is immediate, a goal takes the
+    /// remaining time of the movement instead, near and past its end the time that the attractor would take.
     pub transition: *const f64,
     /// Memory for the controller: pdmp_controller_size bytes, aligned to pdmp_controller_alignment, that nothing else
     /// uses until pdmp_controller_free. The arrays of the controller are allocated by the library in any case.
@@ -209,6 +209,21 @@ pub unsafe extern "C" fn pdmp_controller_set_goal(
         // SAFETY: the contract of the C ABI covers the pointers of this argument.
         let goal = unsafe { goal.require("goal", controller.inner.primitive().n_dofs(), "DoF") }?;
         controller.inner.set_goal(goal)?;
+        Ok(PDMP_OK)
+    })
+}
+
+/// Sets the final velocity (n_dofs) with which a discrete movement passes its goal at the end, in the unit of each DoF per
+/// second; `{NULL, 0}` for that of the demonstrations. Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE, PDMP_ABSENT.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pdmp_controller_set_goal_velocity(
+    controller: Option<&mut pdmp_controller>,
+    velocity: pdmp_vector,
+) -> pdmp_status {
+    call_on(controller, |controller| {
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
+        let velocity = unsafe { velocity.get("goal_velocity", controller.inner.primitive().n_dofs(), "DoF") }?;
+        controller.inner.set_goal_velocity(velocity)?;
         Ok(PDMP_OK)
     })
 }

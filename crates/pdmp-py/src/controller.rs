@@ -55,8 +55,8 @@ struct Arguments {
 /// Running movement, returned by `Model.controller`.
 ///
 /// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-/// valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
-/// is rejected leaves the present one in force.
+/// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any
+/// tick; a value that is rejected leaves the present one in force.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,
@@ -281,6 +281,22 @@ impl Controller {
     fn set_style(&mut self, style: &Bound<'_, PyAny>) -> PyResult<()> {
         refill("style", style, &mut self.arguments.command)?;
         let result = self.inner.set_style(&self.arguments.command);
+        self.command(result)
+    }
+
+    /// Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
+    /// demonstrations; a read-only copy. Assign all values at once.
+    #[getter]
+    fn goal_velocity<'py>(&self, py: Python<'py>) -> PyResult<Option<Vector<'py>>> {
+        self.inner.goal_velocity().map(|velocity| read_only(py, velocity)).transpose()
+    }
+
+    #[setter]
+    fn set_goal_velocity(&mut self, velocity: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        if let Some(velocity) = velocity {
+            refill("goal_velocity", velocity, &mut self.arguments.command)?;
+        }
+        let result = self.inner.set_goal_velocity(velocity.map(|_| &*self.arguments.command));
         self.command(result)
     }
 

@@ -82,7 +82,7 @@ struct Cubic([F64x4; 4]);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TableIndex {
     first: usize,
-    t: f64,
+    pub(crate) t: f64,
 }
 
 impl Cubic {
@@ -166,14 +166,21 @@ impl ForcingTable {
     pub(crate) fn knots(&self) -> KnotTable {
         let mut knots = KnotTable::zeros(self.cells + 1, self.n_outputs());
         for (k, (values, slopes)) in knots.rows_mut(1).enumerate() {
-            self.scatter(|group, j| self.knot(k, group, j), values, slopes);
+            self.scatter(|group, j| self.cubics(k * self.knot_stride, group)[j].at(0.0), values, slopes);
         }
         knots
     }
 
-    /// Returns the forcing of unit style `j` at knot `k`, for one group of DoFs.
-    pub(crate) fn knot(&self, k: usize, group: usize, j: usize) -> CubicSample<F64x4> {
-        self.cubics(k * self.knot_stride, group)[j].at(0.0)
+    /// Returns the forcing of unit styles at knot `k`, by groups of DoFs and styles.
+    pub(crate) fn knot(&self, k: usize) -> impl ExactSizeIterator<Item = CubicSample<F64x4>> {
+        self.cubics[k * self.knot_stride..(k + 1) * self.knot_stride].iter().map(|cubic| cubic.at(0.0))
+    }
+
+    /// Returns the index of the first unit style at a knot, by knots, groups of DoFs and styles, and the forcing of a style
+    /// at the knot and at the position itself.
+    pub(crate) fn cell(&self, index: TableIndex, group: usize, style: &[f64]) -> (usize, [CubicSample<F64x4>; 2]) {
+        let forcing = [TableIndex { t: 0.0, ..index }, index].map(|index| self.sample(index, group, style));
+        (index.first + group * self.n_styles, forcing)
     }
 
     /// Returns the cubics of all styles for one group of DoFs at the knot whose first cubic has index `first`.

@@ -58,6 +58,11 @@ impl Controller {
         &self.conditions.centre
     }
 
+    /// Returns the commanded final velocity (D,), per second; `None` for that of the demonstrations.
+    pub fn goal_velocity(&self) -> Option<&[f64]> {
+        self.conditions.has_goal_velocity.then_some(&*self.conditions.goal_velocity)
+    }
+
     /// Returns the commanded time constant τ, in seconds.
     pub fn tau(&self) -> f64 {
         self.conditions.tau

@@ -1,11 +1,11 @@
 //! Real-time control loop: one tick of the primitive per call, with every command adjustable between ticks.
 //!
-//! Over a tick the forcing w, the goal and the clock are given by values and slopes at both ends; the cubics between them
-//! are propagated exactly ([`crate::dynamics::Attractor`]). Style, goal or anchor, and amplitude pass critically damped
-//! filters on the clock, the rate ρ = 1/τ one in seconds, so that position and velocity stay continuous: ẏ = ρy′ and
-//! ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′. The frame c of a discrete movement is evaluated exactly at both ends of a tick
-//! (`transport`) and is not propagated. A perturbation ([`Command::measured`], [`Command::coupling`]) slows the clock of
-//! the phase relative to that of the output system, and adds to ẏ and ÿ.
+//! Over a tick the forcing w, the centre and the clock are given by values and slopes at both ends; the cubics between them
+//! are propagated exactly ([`crate::dynamics::Attractor`]). Style, anchor and amplitude pass critically damped filters on
+//! the clock, the rate ρ = 1/τ one in seconds, so that position and velocity stay continuous: ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′
+//! with y′ = z + w + c′. The frame c of a discrete movement, transport and transition to a new goal (`goal`), is evaluated
+//! exactly at both ends of a tick and is not propagated. A perturbation ([`Command::measured`], [`Command::coupling`]) slows
+//! the clock of the phase relative to that of the output system, and adds to ẏ and ÿ.
 //!
 //! [`Controller::update`] and the setters neither allocate nor lock nor panic. A tick costs O(J·D), independent of the
 //! training data, in one step if it is shorter than 1/500 of the movement and 1/95 of each transition in progress, and in
@@ -14,6 +14,7 @@
 #[cfg(target_arch = "x86_64")]
 mod avx;
 mod getters;
+mod goal;
 mod group;
 mod setters;
 mod step;
@@ -22,6 +23,7 @@ use std::sync::Arc;
 
 use crate::dynamics::canonical::CompensatedSum;
 use crate::dynamics::command_filter::{CommandFilter, FilterGains, FilterStep};
+use crate::dynamics::goal_transition::{GoalTransition, MinDurations};
 use crate::dynamics::output_system::{Propagator, State};
 use crate::dynamics::propagator_series::Series;
 use crate::dynamics::transport::TransportSegment;
@@ -79,17 +81,18 @@ pub struct Controller {
     clock: CompensatedSum,
     /// Amplitude r; 1 for a discrete movement.
     r: f64,
-    /// Filter gains of style and amplitude, on the clock.
+    /// Filter gains of style, anchor and amplitude, on the clock.
     command_gains: FilterGains,
     style: CommandFilter,
     /// Filter gains of ρ, in seconds.
     rate_gains: FilterGains,
     /// ρ = 1/τ.
     rate: CommandFilter,
-    /// Goal or anchor.
+    /// Goal or anchor. With learnt transport the value is the goal before `goal_transition`.
     centre: CommandFilter,
-    /// Filter gains of goal or anchor, on the clock.
-    centre_gains: FilterGains,
+    /// Transition of the frame to a commanded goal and final velocity.
+    goal_transition: GoalTransition,
+    min_durations: MinDurations,
     /// r₀.
     amplitude: CommandFilter,
     /// Factor of the rate 1/τ.
@@ -111,10 +114,8 @@ pub struct Controller {
     max_clock_step: f64,
     /// Filter step of the rate over the last substep, reused for the next one of that length.
     rate_step: FilterStep,
-    /// Filter step of style and amplitude over the last substep.
+    /// Filter step of style, anchor and amplitude over the last substep.
     command_step: FilterStep,
-    /// Filter step of goal or anchor over the last substep.
-    centre_step: FilterStep,
     propagator: Propagator,
     series: Series,
     /// Number of ticks by which the forcing table is prefetched.
@@ -127,8 +128,8 @@ impl Controller {
     /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal, anchor or amplitude,
     /// both in seconds. The transition of the rate 1/τ takes this time; the others take the equivalent clock interval at the
     /// model's τ, so that the path does not depend on the rate. 0 is the paper's immediate switch. The default is a tenth of
-    /// the nominal duration of a discrete movement, a quarter of the nominal period of a rhythmic one. A new goal takes the
-    /// rest of the movement if that is longer, unless transport is immediate.
+    /// the nominal duration of a discrete movement, a quarter of the nominal period of a rhythmic one. With learnt transport
+    /// a new goal takes the rest of the movement instead; see [`Controller::set_goal`].
     ///
     /// # Errors
     /// Conditions that do not fit the primitive, a `dt` that is not positive, or a `transition` that is negative or longer
@@ -161,7 +162,8 @@ impl Controller {
             rate_gains,
             rate: CommandFilter::new(&[1.0 / conditions.tau]),
             centre: CommandFilter::new(&conditions.centre),
-            centre_gains: command_gains,
+            goal_transition: GoalTransition::inactive(groups.len()),
+            min_durations: MinDurations::new(primitive.attractor(), transition / primitive.tau()),
             amplitude: CommandFilter::new(&[conditions.amplitude]),
             speed: 1.0,
             groups,
@@ -176,7 +178,6 @@ impl Controller {
             max_clock_step,
             rate_step: rate_gains.step_with_integral(dt),
             command_step: FilterStep::IDENTITY,
-            centre_step: FilterStep::IDENTITY,
             propagator: series.propagator::<F64x4>(0.0),
             series,
             prefetch_ticks: 1.0,
@@ -232,9 +233,13 @@ impl Controller {
                 group.displacement = *goal - padded(start);
             }
         }
+        self.goal_transition.clear();
         self.read_frame();
         self.read_forcing();
         self.set_initial_state();
+        if self.conditions.has_goal_velocity {
+            self.start_goal_transition();
+        }
         self.set_tolerance();
         self.read_out();
     }
