@@ -322,6 +322,16 @@ pub enum Error {
     /// Arguments that are missing or exclude each other.
     #[error("{0}")]
     Arguments(&'static str),
+    /// A lower limit of the position that is not below the upper one.
+    #[error("limits of DoF {dof}: the lower limit {lower} must be below the upper limit {upper}")]
+    LimitOrder {
+        /// Index of the DoF.
+        dof: usize,
+        /// Its lower limit.
+        lower: f64,
+        /// Its upper limit.
+        upper: f64,
+    },
     /// A well-formed problem without a numerical solution.
     #[error("{0}")]
     Fit(String),
@@ -378,6 +388,7 @@ impl Error {
             | Self::Label { .. }
             | Self::NoNumber { .. }
             | Self::Kind { .. }
+            | Self::LimitOrder { .. }
             | Self::Arguments(_) => ErrorKind::Argument,
         }
     }

@@ -70,6 +70,8 @@ pub(crate) struct Perturbation {
     active: bool,
     /// κ.
     phase_rate: f64,
+    /// Factor of κ due to the limits that bound the last tick.
+    limited_rate: f64,
     /// k_s and k_t.
     compliance: Compliance,
     /// True while a measurement is in force.
@@ -108,6 +110,7 @@ impl Perturbation {
             terms: PerturbationTerms { velocity: zeros.clone(), acceleration: zeros.clone() },
             active: false,
             phase_rate: 1.0,
+            limited_rate: 1.0,
             compliance: Compliance { stopping: STOPPING_GAIN, tracking: TRACKING_GAIN / extent },
             measured: false,
             error: zeros.clone(),
@@ -122,11 +125,12 @@ impl Perturbation {
 
     /// Removes the terms of the tick; a measurement remains in force.
     pub(crate) fn clear_terms(&mut self) {
-        (self.active, self.phase_rate) = (false, 1.0);
+        (self.active, self.phase_rate) = (false, self.limited_rate);
     }
 
     /// Discards terms, measurement and expected error.
     pub(crate) fn clear(&mut self) {
+        self.limited_rate = 1.0;
         self.clear_terms();
         self.measured = false;
         self.expected_error.fill(F64x4::ZERO);
@@ -182,14 +186,21 @@ impl Perturbation {
             let error = self.error[group];
             let unexpected = error - self.expected_error[group].max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
             *velocity += unexpected * pull;
-            let scaled = unexpected * self.inverse_range[group] * stopping.sqrt();
+            let scaled = unexpected * self.inverse_range[group];
             squares += scaled * scaled;
         }
-        self.phase_rate = 1.0 / (1.0 + squares.to_array().iter().sum::<f64>());
+        self.phase_rate = self.limited_rate * stopped(squares * stopping);
         let adapted = -(-self.adaptation_rate * self.phase_rate * h).exp_m1();
         for (expected_error, &error) in self.expected_error.iter_mut().zip(&self.error) {
             *expected_error += (error - *expected_error) * adapted;
         }
+    }
+
+    /// Sets the displacements (D,) of the goal that are equivalent to the accelerations beyond the limits.
+    pub(crate) fn set_excess(&mut self, excess: impl Iterator<Item = F64x4>) {
+        let scaled = excess.zip(&self.inverse_range).map(|(excess, inverse_range)| excess * *inverse_range);
+        let squares = scaled.fold(F64x4::ZERO, |sum, scaled| sum + scaled * scaled);
+        self.limited_rate = stopped(squares * self.compliance.stopping);
     }
 
     /// Returns the terms of the tick, `None` without a perturbation.
@@ -224,6 +235,11 @@ impl Perturbation {
         self.compliance = compliance;
         Ok(())
     }
+}
+
+/// Returns 1/(1 + Σ) for the squares of a group of DoFs.
+fn stopped(squares: F64x4) -> f64 {
+    1.0 / (1.0 + squares.to_array().iter().sum::<f64>())
 }
 
 /// Returns a full turn in a unit of angle, and zero for any other unit.

@@ -53,9 +53,10 @@ impl Controller {
         &self.conditions.style
     }
 
-    /// Returns the commanded goal g or anchor y_a (D,), in the unit of each DoF.
+    /// Returns the goal g or anchor y_a (D,) in force, in the unit of each DoF: the commanded one, moved inside the limits of
+    /// [`Controller::set_limits`].
     pub fn centre(&self) -> &[f64] {
-        &self.conditions.centre
+        unpack(self.centre.target(), self.primitive.n_dofs())
     }
 
     /// Returns the commanded final velocity (D,), per second; `None` for that of the demonstrations.

@@ -16,6 +16,8 @@ mod avx;
 mod getters;
 mod goal;
 mod group;
+mod limiter;
+mod limiting;
 mod setters;
 mod settling;
 mod step;
@@ -37,6 +39,7 @@ use crate::motion::perturbation::{Perturbation, largest_range};
 use crate::numerics::simd::{F64x4, WIDTH, copy, padded, repack};
 use crate::validate::check_positive;
 use group::Group;
+use limiter::Limiter;
 
 /// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
@@ -114,6 +117,7 @@ pub struct Controller {
     /// Level relative to which tiny states are flushed to zero.
     flush_level: f64,
     perturbation: Perturbation,
+    limiter: Limiter,
     /// Maximum clock step of a substep.
     max_clock_step: f64,
     /// Filter step of the rate over the last substep, reused for the next one of that length.
@@ -180,6 +184,7 @@ impl Controller {
             acceleration: zeros,
             flush_level: FLUSH_RATIO * largest_range(primitive.ranges()),
             perturbation: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
+            limiter: Limiter::none(primitive.ranges()),
             max_clock_step,
             rate_step: rate_gains.step_with_integral(dt),
             command_step: FilterStep::IDENTITY,
@@ -226,13 +231,14 @@ impl Controller {
         self.started = false;
         self.status = Status::Working;
         self.perturbation.clear();
+        self.limiter.clear();
         (self.time, self.clock) = (CompensatedSum::default(), CompensatedSum::default());
         let conditions = &self.conditions;
         self.r = conditions.amplitude;
         self.style.reset(&conditions.style);
         self.rate.reset(&[self.speed / conditions.tau]);
         self.amplitude.reset(&[conditions.amplitude]);
-        self.centre.reset(&conditions.centre);
+        self.centre.reset(self.limiter.accept(&conditions.centre));
         if let (Kind::Discrete, Some(start)) = (self.primitive.kind(), &conditions.start) {
             for ((group, goal), start) in self.groups.iter_mut().zip(self.centre.value()).zip(start.chunks(WIDTH)) {
                 group.displacement = *goal - padded(start);
@@ -247,6 +253,7 @@ impl Controller {
         }
         self.update_lengths();
         self.read_out();
+        self.limiter.begin(&self.position, &self.velocity);
     }
 
     /// Sets position and z at the start: z = 0 for a discrete movement, the limit cycle of the style for a rhythmic one.

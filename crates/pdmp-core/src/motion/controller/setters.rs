@@ -221,13 +221,8 @@ impl Controller {
         let mut goal_changed = false;
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
-            if self.has_frame() {
-                goal_changed = true;
-                self.centre.set_target_only(centre);
-            } else {
-                self.centre.set_target(centre, &gains);
-            }
-            self.update_lengths();
+            goal_changed = self.has_frame();
+            self.command_centre();
             changed = true;
         }
         if let Some(velocity) = command.goal_velocity
@@ -262,5 +257,16 @@ impl Controller {
         if goal_changed || self.approaches_goal_velocity() {
             self.start_goal_transition();
         }
+    }
+
+    /// Commands the goal or anchor, moved inside the limits.
+    pub(super) fn command_centre(&mut self) {
+        let accepted = self.limiter.accept(&self.conditions.centre);
+        if self.primitive.transport.is_immediate() {
+            self.centre.set_target(accepted, &self.command_gains);
+        } else {
+            self.centre.set_target_only(accepted);
+        }
+        self.update_lengths();
     }
 }

@@ -51,6 +51,9 @@ impl Controller {
             }
         }
         self.time.add(dt);
+        if self.limiter.is_active() {
+            self.enforce_limits(dt);
+        }
         // The style's transition and perturbations change the arrival that the final velocity compensates for.
         if self.approaches_goal_velocity() && !(self.style.is_settled() && self.perturbation.terms().is_none()) {
             self.start_goal_transition();
@@ -340,7 +343,7 @@ impl Controller {
 }
 
 /// Returns the first command of a filter, or its only one.
-fn first_element(lanes: &[F64x4]) -> f64 {
+pub(super) fn first_element(lanes: &[F64x4]) -> f64 {
     lanes[0].as_array()[0]
 }
 

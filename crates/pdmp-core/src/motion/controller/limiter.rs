@@ -1,0 +1,138 @@
+//! Limits of all groups of DoFs in the control loop.
+
+use crate::error::{Error, Result};
+use crate::motion::limits::{Limit, Limits};
+use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
+use crate::motion::viability::Bounds;
+use crate::numerics::simd::{F64x4, WIDTH, groups, padded, unpad};
+
+/// Maximum number of substeps in which a tick is limited, each so short that it changes ẏ by half of V at most.
+pub(super) const MAX_SUBSTEPS: f64 = 1000.0;
+/// Without a limit of the acceleration, a DoF brakes over this share of the range between its limits.
+const BRAKING_SHARE: f64 = 0.01;
+/// Velocity, in demonstrated ranges per duration, from which a DoF without limits of velocity and acceleration can brake.
+const FREE_VELOCITY: f64 = 10.0;
+
+/// Limits of all groups of DoFs, and the motion at the start of the tick that they apply to.
+#[derive(Clone, Debug)]
+pub(super) struct Limiter {
+    active: bool,
+    /// True if no DoF was limited in the last tick.
+    pub(super) is_free: bool,
+    pub(super) bounds: Vec<Bounds>,
+    /// Position and velocity at the start of the tick.
+    pub(super) before: Vec<[F64x4; 2]>,
+    /// Limit that determined the acceleration of each DoF in the last tick.
+    pub(super) limited: Vec<Option<Limit>>,
+    /// Displacement of the goal that is equivalent to the excess of the acceleration over its limit in the last tick.
+    pub(super) excess: Vec<F64x4>,
+    /// Demonstrated range of each DoF, of stationary ones a small share of the others'.
+    ranges: Vec<f64>,
+    /// Commanded goal or anchor (D,), moved inside the limits.
+    centre: Vec<f64>,
+    /// max 2A/V and max √(A/(u − l)), in 1/s: with n substeps of a tick of length h, n ≥ h·max.
+    pub(super) substep_rate: f64,
+}
+
+impl Limiter {
+    /// Returns no limits for DoFs with the given ranges.
+    pub(super) fn none(ranges: &[f64]) -> Self {
+        let n_dofs = ranges.len();
+        let min_range = MIN_RANGE_RATIO * largest_range(ranges);
+        let infinite = F64x4::splat(f64::INFINITY);
+        let none =
+            Bounds { lower: -infinite, upper: infinite, velocity: infinite, acceleration: infinite, braking: infinite };
+        Self {
+            active: false,
+            is_free: true,
+            bounds: vec![none; groups(n_dofs)],
+            before: vec![[F64x4::ZERO; 2]; groups(n_dofs)],
+            limited: vec![None; n_dofs],
+            excess: vec![F64x4::ZERO; groups(n_dofs)],
+            ranges: ranges.iter().map(|range| range.max(min_range)).collect(),
+            centre: vec![0.0; n_dofs],
+            substep_rate: 0.0,
+        }
+    }
+
+    /// Sets the limits, for movements of a `duration` and ticks of `dt` seconds.
+    ///
+    /// # Errors
+    /// Limits that [`Limits::check`] rejects, or that are too tight for the tick. They then remain unchanged.
+    pub(super) fn set(&mut self, limits: &Limits, duration: f64, dt: f64) -> Result<()> {
+        let n_dofs = self.centre.len();
+        limits.check(n_dofs)?;
+        let limit =
+            |limits: &Option<Vec<f64>>, dof: usize, none: f64| limits.as_ref().map_or(none, |limits| limits[dof]);
+        let infinity = f64::INFINITY;
+        let distance = |dof: usize| limit(&limits.upper, dof, infinity) - limit(&limits.lower, dof, -infinity);
+        let braking = |dof: usize| {
+            let velocity = limit(&limits.velocity, dof, infinity).min(FREE_VELOCITY * self.ranges[dof] / duration);
+            let free = velocity * velocity / (2.0 * BRAKING_SHARE * distance(dof).min(self.ranges[dof]));
+            limit(&limits.acceleration, dof, free)
+        };
+        let substep_rate = (0..n_dofs).fold(0.0, |rate: f64, dof| {
+            let by_velocity = 2.0 * braking(dof) / limit(&limits.velocity, dof, infinity);
+            rate.max(by_velocity).max((braking(dof) / distance(dof)).sqrt())
+        });
+        if dt * substep_rate > MAX_SUBSTEPS {
+            return Err(Error::Range {
+                name: "dt",
+                value: dt,
+                allowed: "is too long for these limits: within a tick, the limit of the acceleration must neither change the \
+                          velocity by 500 times its limit nor move a million times the distance between the limits",
+            });
+        }
+        for (group, bounds) in self.bounds.iter_mut().enumerate() {
+            let lanes = |number: &dyn Fn(usize) -> f64, none: f64| {
+                F64x4::new(std::array::from_fn(|lane| {
+                    let dof = group * WIDTH + lane;
+                    if dof < n_dofs { number(dof) } else { none }
+                }))
+            };
+            *bounds = Bounds {
+                lower: lanes(&|dof| limit(&limits.lower, dof, -infinity), -infinity),
+                upper: lanes(&|dof| limit(&limits.upper, dof, infinity), infinity),
+                velocity: lanes(&|dof| limit(&limits.velocity, dof, infinity), infinity),
+                acceleration: lanes(&|dof| limit(&limits.acceleration, dof, infinity), infinity),
+                braking: lanes(&braking, infinity),
+            };
+        }
+        self.active = *limits != Limits::default();
+        self.substep_rate = substep_rate;
+        Ok(())
+    }
+
+    /// Returns whether there are limits.
+    #[inline(always)]
+    pub(super) fn is_active(&self) -> bool {
+        self.active
+    }
+
+    /// Returns the limit that determined the acceleration of each DoF in the last tick.
+    pub(super) fn limited(&self) -> &[Option<Limit>] {
+        &self.limited
+    }
+
+    /// Returns the goal or anchor closest to the commanded one inside the limits.
+    pub(super) fn accept(&mut self, commanded: &[f64]) -> &[f64] {
+        for (group, (accepted, commanded)) in self.centre.chunks_mut(WIDTH).zip(commanded.chunks(WIDTH)).enumerate() {
+            let Bounds { lower, upper, .. } = self.bounds[group];
+            unpad(padded(commanded).max(lower).min(upper), accepted);
+        }
+        &self.centre
+    }
+
+    /// Sets the motion at the start of a tick.
+    pub(super) fn begin(&mut self, position: &[F64x4], velocity: &[F64x4]) {
+        for (before, (y, v)) in self.before.iter_mut().zip(position.iter().zip(velocity)) {
+            *before = [*y, *v];
+        }
+    }
+
+    /// Forgets which DoFs were limited.
+    pub(super) fn clear(&mut self) {
+        self.is_free = true;
+        self.limited.fill(None);
+    }
+}

@@ -1,0 +1,203 @@
+//! Viability of a DoF inside its limits: the states from which it can still brake.
+//!
+//! With limits l ≤ y ≤ u, |ẏ| ≤ V and |ÿ| ≤ A, a state can be braked to rest inside the limits if and only if
+//!
+//! ```text
+//! |ẏ| ≤ V,    max(ẏ, 0)² ≤ 2A(u − y),    max(−ẏ, 0)² ≤ 2A(y − l).
+//! ```
+//!
+//! The set is viable in continuous time, and hence for any sequence of tick lengths. [`Bounds::interval`] are the constant
+//! accelerations over a tick of length h that end inside it and do not leave the limits on the way. At a distance d from
+//! the upper limit, the largest is
+//!
+//! ```text
+//! d ≥ hẏ/2:  [−ẏ − Ah/2 + ½√(A²h² + 8Ad − 4Ahẏ)]/h     the end lies on the boundary of the set
+//! d < hẏ/2:  −ẏ²/(2d)                                    the DoF turns round at the limit within the tick
+//! ```
+//!
+//! and at most (V − ẏ)/h and A. It follows A. Del Prete, *Joint position and velocity bounds in discrete-time acceleration
+//! or torque control of robot manipulators*, IEEE RA-L 3(1), 2018. A DoF beyond the limit returns to it: its velocity is at
+//! most −√(A|d|), which half of A brakes to rest at the limit.
+
+use crate::motion::limits::Limit;
+use crate::numerics::simd::F64x4;
+
+/// Limits of a group of DoFs, infinite where there are none.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bounds {
+    pub(crate) lower: F64x4,
+    pub(crate) upper: F64x4,
+    pub(crate) velocity: F64x4,
+    pub(crate) acceleration: F64x4,
+    /// Deceleration in front of the limits of the position: the limit of the acceleration where there is one.
+    pub(crate) braking: F64x4,
+}
+
+impl Bounds {
+    /// Returns the lanes in which the motion over a tick of length `h` keeps the limits and ends in a viable state, where
+    /// `from` and `to` are position and velocity at its ends, and `acceleration` that at the end.
+    #[inline(always)]
+    pub(crate) fn admits(&self, from: [F64x4; 2], to: [F64x4; 2], acceleration: F64x4, h: f64) -> F64x4 {
+        let [[y, v], [y_end, v_end]] = [from, to];
+        let (above, below) = (self.upper - y_end, y_end - self.lower);
+        let (ahead, braking) = (v_end.max(F64x4::ZERO), self.braking * 2.0);
+        let behind = (-v_end).max(F64x4::ZERO);
+        let kept = (v_end - v).abs().simd_le(self.acceleration * h)
+            & acceleration.abs().simd_le(self.acceleration)
+            & v_end.abs().simd_le(self.velocity)
+            & (ahead * ahead).simd_le(braking * above)
+            & (behind * behind).simd_le(braking * below)
+            & above.simd_ge(F64x4::ZERO)
+            & below.simd_ge(F64x4::ZERO);
+        if (v * v_end).simd_ge(F64x4::ZERO).all() {
+            return kept;
+        }
+        let turning = turning_point([y, v], [y_end, v_end], h);
+        kept & turning.simd_le(self.upper) & turning.simd_ge(self.lower)
+    }
+
+    /// Returns the constant accelerations over a tick of length `h` that keep the limits and end in a viable state.
+    pub(crate) fn interval(&self, y: F64x4, v: F64x4, h: f64) -> Interval {
+        let position = [
+            -max_acceleration(y - self.lower, -v, self.braking, h),
+            max_acceleration(self.upper - y, v, self.braking, h),
+        ];
+        let velocity = [(-self.velocity - v) * (1.0 / h), (self.velocity - v) * (1.0 / h)];
+        Interval { position, velocity, acceleration: self.acceleration }
+    }
+}
+
+/// Accelerations that keep the limits over a tick, from the smallest to the largest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Interval {
+    /// Ends due to the limits of the position.
+    position: [F64x4; 2],
+    /// Ends due to the limit of the velocity.
+    velocity: [F64x4; 2],
+    /// Limit of the acceleration.
+    acceleration: F64x4,
+}
+
+impl Interval {
+    /// Returns the smallest and the largest acceleration.
+    fn ends(&self) -> [F64x4; 2] {
+        let clamp = |bound: F64x4| bound.max(-self.acceleration).min(self.acceleration);
+        [clamp(self.position[0].max(self.velocity[0])), clamp(self.position[1].min(self.velocity[1]))]
+    }
+
+    /// Returns the acceleration closest to the wanted one.
+    pub(crate) fn clamp(&self, wanted: F64x4) -> F64x4 {
+        let [least, most] = self.ends();
+        wanted.max(least).min(most)
+    }
+
+    /// Returns the limit that determines the acceleration of one DoF. Inside the interval it is that of the acceleration,
+    /// which the motion within the tick exceeds.
+    pub(crate) fn limit(&self, wanted: F64x4, lane: usize) -> Limit {
+        let [least, most] = self.ends();
+        let (side, sign) = if (wanted.as_array()[lane]) > most.as_array()[lane] {
+            (1, 1.0)
+        } else if wanted.as_array()[lane] < least.as_array()[lane] {
+            (0, -1.0)
+        } else {
+            return Limit::Acceleration;
+        };
+        let [position, velocity] = [self.position, self.velocity].map(|ends| sign * ends[side].as_array()[lane]);
+        let acceleration = self.acceleration.as_array()[lane];
+        if position <= velocity.min(acceleration) {
+            Limit::Position
+        } else if velocity <= acceleration {
+            Limit::Velocity
+        } else {
+            Limit::Acceleration
+        }
+    }
+}
+
+/// Returns the largest acceleration over `h` at a distance `d` from the upper limit and a velocity `v` towards it.
+fn max_acceleration(d: F64x4, v: F64x4, braking: F64x4, h: f64) -> F64x4 {
+    let ah = braking * h;
+    let root = (ah * ah + braking * d * 8.0 - ah * v * 4.0).max(F64x4::ZERO).sqrt();
+    let arriving = (root * 0.5 - v - ah * 0.5) * (1.0 / h);
+    let turning = -(v * v) / (d * 2.0);
+    let returning = (-(-braking * d).max(F64x4::ZERO).sqrt() - v) * (1.0 / h);
+    let inside = (d * 2.0).simd_ge(v * h).select(arriving, turning);
+    let finite = d.simd_lt(F64x4::splat(f64::INFINITY)).select(inside, F64x4::splat(f64::INFINITY));
+    d.simd_ge(F64x4::ZERO).select(finite, returning)
+}
+
+/// Returns the position at which the cubic between two states turns round, or that of its end where it does not.
+fn turning_point(from: [F64x4; 2], to: [F64x4; 2], h: f64) -> F64x4 {
+    let [[y, v], [y_end, v_end]] = [from, to];
+    // ẏ(s) = v + bs + cs² with s = t/h, whose root in (0, 1) is unique if the signs of v and v_end differ.
+    let mean = (y_end - y) * (1.0 / h);
+    let b = mean * 6.0 - v * 4.0 - v_end * 2.0;
+    let c = (v + v_end - mean * 2.0) * 3.0;
+    let root = (b * b - c * v * 4.0).max(F64x4::ZERO).sqrt();
+    // The root of larger sum in the denominator avoids cancellation; at the other one ẏ has the same sign at both ends.
+    let denominator = b + v.simd_gt(F64x4::ZERO).select(-root, root);
+    let s = (v * -2.0) / denominator;
+    let turning = y + (v + (b * 0.5 + c * s * (1.0 / 3.0)) * s) * s * h;
+    (v * v_end).simd_lt(F64x4::ZERO).select(turning, y_end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Generator of uniform numbers in [0, 1) (Knuth's MMIX).
+    struct Random(u64);
+
+    impl Random {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+
+        fn lanes(&mut self, number: impl Fn(f64) -> f64) -> F64x4 {
+            F64x4::new([(); 4].map(|()| number(self.next())))
+        }
+    }
+
+    /// Any sequence of wanted accelerations and tick lengths keeps every limit, between ticks too, and leaves an interval.
+    #[test]
+    fn clamped_motion_keeps_the_limits() {
+        let mut random = Random(1);
+        let mut ticks = 0;
+        for case in 0..400 {
+            let acceleration = random.lanes(|x| 10f64.powf(4.0 * x - 1.0));
+            let velocity = random.lanes(|x| 10f64.powf(2.0 * x - 1.0));
+            // The longest tick takes half of the velocity's limit.
+            let shortest = (velocity * 0.5 / acceleration).to_array().into_iter().fold(0.1, f64::min);
+            let free = case % 4 == 3;
+            let lower = random.lanes(|x| -x);
+            let range = random.lanes(|x| 10f64.powf(3.0 * x - 2.0)).max(acceleration * (2.0 * shortest * shortest));
+            let braking = acceleration;
+            let acceleration = if free { F64x4::splat(f64::INFINITY) } else { acceleration };
+            let bounds = Bounds { lower, upper: lower + range, velocity, acceleration, braking };
+            let (mut y, mut v) = (lower + range * random.lanes(|x| x), F64x4::ZERO);
+            for _ in 0..2000 {
+                let h = shortest * 10f64.powf(-4.0 * random.next() * f64::from(case % 2));
+                let interval = bounds.interval(y, v, h);
+                let [least, most] = interval.ends();
+                assert!(least.simd_le(most).all(), "{bounds:?} {y} {v} {h}");
+                let size = if free { 1.0 } else { 10f64.powf(6.0 * random.next() - 3.0) };
+                let scale = if free { velocity * (1.0 / h) } else { bounds.acceleration };
+                let wanted = (random.lanes(|x| 2.0 * x - 1.0) + F64x4::splat(random.next() - 0.5)) * scale * size;
+                let a = interval.clamp(wanted);
+                let next = [y + v * h + a * (0.5 * h * h), v + a * h];
+                let turning = turning_point([y, v], next, h);
+                let tolerance = range * 1e-12;
+                for position in [next[0], turning] {
+                    assert!(position.simd_le(bounds.upper + tolerance).all(), "{bounds:?} {y} {v} {h} {a}");
+                    assert!(position.simd_ge(bounds.lower - tolerance).all(), "{bounds:?} {y} {v} {h} {a}");
+                }
+                assert!(next[1].abs().simd_le(velocity * (1.0 + 1e-12)).all());
+                assert!(a.abs().simd_le(bounds.acceleration).all());
+                [y, v] = [next[0].max(bounds.lower).min(bounds.upper), next[1]];
+                ticks += 4;
+            }
+        }
+        assert_eq!(ticks, 3_200_000);
+    }
+}

@@ -1,0 +1,233 @@
+//! Limits of position, velocity and acceleration in the control loop.
+#![cfg(feature = "learning")]
+#![allow(missing_docs)]
+
+mod common;
+
+use std::sync::Arc;
+
+use common::*;
+use pdmp_core::motion::{Coupling, Limit, Limits};
+use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
+
+/// Generator of uniform numbers in [0, 1) (Knuth's MMIX).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn between(&mut self, a: f64, b: f64) -> f64 {
+        a + (b - a) * self.next()
+    }
+
+    /// Returns a number between `a` and `b`, uniform in its logarithm.
+    fn scale(&mut self, a: f64, b: f64) -> f64 {
+        a * (b / a).powf(self.next())
+    }
+}
+
+fn controller(model: &Arc<Model>) -> Controller {
+    Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap()
+}
+
+/// Position and velocity after a tick.
+type Motion = (Vec<f64>, Vec<f64>);
+
+fn motion(controller: &Controller) -> Motion {
+    (controller.position().to_vec(), controller.velocity().to_vec())
+}
+
+/// Returns the largest violation of the limits: of the velocity, relative to it, and of the position at which the DoF can
+/// brake to rest, relative to the range between the limits.
+fn violation(limits: &Limits, (position, velocity): &Motion) -> f64 {
+    let [lower, upper, limit, acceleration] =
+        [&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration].map(|limit| limit.as_ref().unwrap());
+    let of_dof = |d: usize| {
+        let (y, v, range) = (position[d], velocity[d], upper[d] - lower[d]);
+        let stop = y + v * v.abs() / (2.0 * acceleration[d]);
+        let past = (stop.max(y) - upper[d]).max(lower[d] - stop.min(y));
+        (past / range).max(v.abs() / limit[d] - 1.0)
+    };
+    (0..position.len()).map(of_dof).fold(0.0, f64::max)
+}
+
+/// Random limits around the present position, in which a tick of up to 0.1 s changes the velocity by a few limits at most.
+fn limits_around(controller: &Controller, ranges: &[f64], random: &mut Random) -> Limits {
+    let position = controller.position().iter().zip(ranges);
+    let sides: Vec<[f64; 2]> =
+        position.map(|(y, r)| [0, 1].map(|s| y + (2.0 * f64::from(s) - 1.0) * r * random.scale(0.03, 3.0))).collect();
+    let velocity: Vec<f64> = ranges.iter().map(|range| range * random.scale(0.1, 10.0)).collect();
+    let acceleration = velocity.iter().map(|velocity| velocity * random.scale(1.0, 100.0)).collect();
+    Limits {
+        lower: Some(sides.iter().map(|side| side[0]).collect()),
+        upper: Some(sides.iter().map(|side| side[1]).collect()),
+        velocity: Some(velocity),
+        acceleration: Some(acceleration),
+    }
+}
+
+/// No sequence of commands, measurements, coupling terms and tick lengths leaves the limits.
+#[test]
+fn no_command_leaves_the_limits() {
+    let mut random = Random(7);
+    let (mut joint_ticks, mut limited) = (0, 0);
+    for case in 0..60 {
+        let model = [&*REACH, &*CYCLE][case % 2];
+        let (n, j) = (model.n_dofs(), model.n_styles());
+        let conditions =
+            Conditions { velocity: (model.kind() == Kind::Discrete).then(|| vec![0.0; n]), ..Conditions::default() };
+        let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, None).unwrap();
+        let limits = limits_around(&controller, model.ranges(), &mut random);
+        controller.set_limits(&limits).unwrap();
+        // A command before the first tick would restart the movement.
+        controller.step().unwrap();
+        let mut before = motion(&controller);
+        // A rhythmic movement may start faster than its limits, and is inside them once it has braked.
+        let mut inside = model.kind() == Kind::Discrete;
+        for tick in 0..3000 {
+            let h = if case % 3 == 0 { 1e-3 } else { random.scale(1e-6, 0.1) };
+            let vector = |random: &mut Random, scale: f64| {
+                (0..n)
+                    .map(|d| controller.centre()[d] + model.ranges()[d] * scale * random.between(-1.0, 1.0))
+                    .collect::<Vec<f64>>()
+            };
+            let scale = random.scale(0.1, 100.0);
+            let (goal, measured) = (vector(&mut random, scale), vector(&mut random, 1.0));
+            let terms = vector(&mut random, scale);
+            let style: Vec<f64> = (0..j).map(|_| random.between(-2.0, 2.0)).collect();
+            let rare = |random: &mut Random| random.next() < 0.01;
+            let discrete = model.kind() == Kind::Discrete;
+            let command = Command {
+                dt: Some(h),
+                goal: (discrete && rare(&mut random)).then_some(&goal),
+                anchor: (!discrete && rare(&mut random)).then_some(&goal),
+                style: rare(&mut random).then_some(&style),
+                tau: rare(&mut random).then(|| model.tau() * random.scale(0.1, 10.0)),
+                measured: rare(&mut random).then_some(&measured),
+                coupling: rare(&mut random).then_some(Coupling { velocity: &terms, acceleration: &terms }),
+                ..Command::default()
+            };
+            controller.step_with(&command).unwrap();
+            let after = motion(&controller);
+            assert!(after.0.iter().chain(&after.1).all(|x| x.is_finite()), "{case} {tick}");
+            let change = |d: usize| (after.1[d] - before.1[d]).abs() / h;
+            for (d, acceleration) in limits.acceleration.iter().flatten().enumerate() {
+                assert!(change(d) <= acceleration * (1.0 + 1e-9), "{case} {tick}: {} > {acceleration}", change(d));
+            }
+            let violation = violation(&limits, &after);
+            if inside {
+                assert!(violation <= 1e-12, "{case} {tick}: {violation}, {before:?} to {after:?} in {h}");
+            }
+            inside |= violation == 0.0;
+            before = after;
+            joint_ticks += n;
+            limited += controller.limited().iter().flatten().count();
+            if rare(&mut random) {
+                controller.set_speed(random.between(0.0, 2.0).floor()).unwrap();
+            }
+            if rare(&mut random) {
+                controller.release();
+            }
+        }
+        assert!(inside);
+    }
+    assert!(limited > joint_ticks / 10, "{limited} of {joint_ticks}");
+}
+
+/// Limits that do not bind leave the motion as it is, to the last bit.
+#[test]
+fn wide_limits_change_nothing() {
+    for model in [&*REACH, &*CYCLE] {
+        let n = model.n_dofs();
+        let (mut free, mut limited) = (controller(model), controller(model));
+        let wide = |factor: f64| Some(model.ranges().iter().map(|range| factor * range).collect::<Vec<f64>>());
+        let limits = Limits { lower: wide(-1e3), upper: wide(1e3), velocity: wide(1e3), acceleration: wide(1e5) };
+        limited.set_limits(&limits).unwrap();
+        for tick in 0..3000 {
+            let goal = vec![0.3; n];
+            let command = match model.kind() {
+                Kind::Discrete => Command { goal: (tick == 300).then_some(&goal), ..Command::default() },
+                Kind::Rhythmic => Command { anchor: (tick == 300).then_some(&goal), ..Command::default() },
+            };
+            assert_eq!(free.step_with(&command).unwrap(), limited.step_with(&command).unwrap());
+            assert_eq!(motion(&free), motion(&limited));
+            assert_eq!(free.acceleration(), limited.acceleration());
+            assert!(limited.limited().iter().all(Option::is_none));
+        }
+    }
+}
+
+/// A goal beyond the limits is moved to them; the movement ends there and is finished.
+#[test]
+fn goal_outside_is_moved_to_the_limit() {
+    let mut controller = controller(&REACH);
+    let start = controller.position().to_vec();
+    let upper: Vec<f64> = start.iter().zip(REACH.ranges()).map(|(y, range)| y + range / 2.0).collect();
+    let limits = Limits { upper: Some(upper.clone()), acceleration: Some(vec![50.0; 3]), ..Limits::default() };
+    controller.set_limits(&limits).unwrap();
+    controller.set_goal(&upper.iter().map(|u| u + 10.0).collect::<Vec<f64>>()).unwrap();
+    assert_eq!(controller.centre(), upper);
+    while controller.step().unwrap() == Status::Working {
+        assert!(controller.time() < 5.0);
+        assert!(controller.position().iter().zip(&upper).all(|(y, u)| y <= u));
+    }
+    for ((y, u), range) in controller.position().iter().zip(&upper).zip(REACH.ranges()) {
+        assert!((y - u).abs() < 0.01 * range);
+    }
+}
+
+/// A movement that starts or is caught outside its limits brakes with A and comes back; the limits are named.
+#[test]
+fn movement_outside_comes_back() {
+    let mut controller = controller(&REACH);
+    for _ in 0..400 {
+        controller.step().unwrap();
+    }
+    let (y, v) = motion(&controller);
+    // The limit lies behind the present position of the DoF that moves.
+    let upper: Vec<f64> = y.iter().zip(&v).map(|(y, v)| if *v > 0.1 { y - 0.05 } else { y + 1.0 }).collect();
+    let limits = Limits { upper: Some(upper.clone()), acceleration: Some(vec![20.0; 3]), ..Limits::default() };
+    controller.set_limits(&limits).unwrap();
+    let outside: Vec<usize> = (0..3).filter(|&d| y[d] > upper[d]).collect();
+    assert!(!outside.is_empty());
+    let mut before = motion(&controller);
+    controller.step().unwrap();
+    for &d in &outside {
+        assert_eq!(controller.limited()[d], Some(Limit::Position));
+    }
+    for _ in 0..3000 {
+        let after = motion(&controller);
+        for d in 0..3 {
+            assert!((after.1[d] - before.1[d]).abs() <= 20.0 * 1e-3 * (1.0 + 1e-9));
+        }
+        before = after;
+        controller.step().unwrap();
+    }
+    assert!(controller.position().iter().zip(&upper).all(|(y, u)| y <= u));
+}
+
+/// Bad limits are named with their DoF and numbers, and leave the last ones in force.
+#[test]
+fn bad_limits_are_rejected() {
+    let mut controller = controller(&REACH);
+    let limits = |lower, upper, velocity, acceleration| Limits { lower, upper, velocity, acceleration };
+    let error = controller.set_limits(&limits(Some(vec![0.0, 1.0, 0.0]), Some(vec![1.0; 3]), None, None)).unwrap_err();
+    assert!(matches!(error, Error::LimitOrder { dof: 1, lower: 1.0, upper: 1.0 }));
+    let bad = [
+        (limits(Some(vec![0.0; 2]), None, None, None), "lower"),
+        (limits(None, Some(vec![f64::NAN; 3]), None, None), "upper"),
+        (limits(None, None, Some(vec![1.0, 0.0, 1.0]), None), "velocity"),
+        (limits(None, None, None, Some(vec![1.0, -1.0, 1.0])), "acceleration"),
+        (limits(None, None, Some(vec![1e-3; 3]), Some(vec![1e6; 3])), "dt"),
+    ];
+    for (limits, name) in bad {
+        let text = controller.set_limits(&limits).unwrap_err().to_string();
+        assert!(text.starts_with(name), "{text}");
+    }
+    while controller.step().unwrap() == Status::Working {
+        assert!(controller.limited().iter().all(Option::is_none));
+    }
+}
