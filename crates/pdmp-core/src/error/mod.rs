@@ -332,6 +332,24 @@ pub enum Error {
         /// Its upper limit.
         upper: f64,
     },
+    /// A path that leaves the limits of the position.
+    #[error(
+        "limits of DoF {dof}: the path reaches {value:.6} at {:.1} % of its clock, outside {lower} to {upper}; change goal or \
+         style, or let a controller with these limits bend the path",
+        100.0 * phase
+    )]
+    LeavesLimits {
+        /// Index of the DoF.
+        dof: usize,
+        /// Its position.
+        value: f64,
+        /// Its lower limit.
+        lower: f64,
+        /// Its upper limit.
+        upper: f64,
+        /// Fraction of the clock.
+        phase: f64,
+    },
     /// A well-formed problem without a numerical solution.
     #[error("{0}")]
     Fit(String),
@@ -389,6 +407,7 @@ impl Error {
             | Self::NoNumber { .. }
             | Self::Kind { .. }
             | Self::LimitOrder { .. }
+            | Self::LeavesLimits { .. }
             | Self::Arguments(_) => ErrorKind::Argument,
         }
     }

@@ -1,25 +1,26 @@
 //! Kinematic limits of a robot.
 
 use crate::error::{Error, Result};
+use crate::motion::trajectory::Trajectory;
 
-/// Limits of position, velocity and acceleration of each DoF; `None` or an infinite element is no limit.
+/// Limits of position, velocity and acceleration: one number for all DoFs, or one for each. `None` or infinity is no limit.
 ///
 /// ```
 /// use pdmp_core::motion::Limits;
 ///
-/// let limits = Limits { velocity: Some(vec![2.0, 1.5]), acceleration: Some(vec![8.0; 2]), ..Limits::default() };
+/// let limits = Limits { velocity: Some(vec![2.0, 1.5]), acceleration: Some(vec![8.0]), ..Limits::default() };
 /// assert!(limits.check(2).is_ok());
 /// assert!(limits.check(3).is_err());
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Limits {
-    /// Lower limits of the position (D,), in the unit of each DoF.
+    /// Lower limits of the position (1,) or (D,), in the unit of each DoF.
     pub lower: Option<Vec<f64>>,
-    /// Upper limits of the position (D,), in the unit of each DoF.
+    /// Upper limits of the position (1,) or (D,), in the unit of each DoF.
     pub upper: Option<Vec<f64>>,
-    /// Limits of |ẏ| (D,), per second.
+    /// Limits of |ẏ| (1,) or (D,), per second.
     pub velocity: Option<Vec<f64>>,
-    /// Limits of |ÿ| (D,), per second squared.
+    /// Limits of |ÿ| (1,) or (D,), per second squared.
     pub acceleration: Option<Vec<f64>>,
 }
 
@@ -48,7 +49,7 @@ impl Limits {
         ];
         for (name, vector) in vectors {
             let Some(vector) = vector else { continue };
-            if vector.len() != n_dofs {
+            if vector.len() != 1 && vector.len() != n_dofs {
                 return Err(Error::Length { name, expected: n_dofs, found: vector.len(), per: "DoF" });
             }
             if let Some(index) = vector.iter().position(|limit| limit.is_nan()) {
@@ -68,7 +69,35 @@ impl Limits {
 
     /// Returns the lower and upper limits of the position, infinite where there is none.
     pub(crate) fn position(&self, n_dofs: usize) -> [Vec<f64>; 2] {
-        let limits = |limits: &Option<Vec<f64>>, none: f64| limits.clone().unwrap_or_else(|| vec![none; n_dofs]);
-        [limits(&self.lower, f64::NEG_INFINITY), limits(&self.upper, f64::INFINITY)]
+        [of_dofs(&self.lower, f64::NEG_INFINITY, n_dofs), of_dofs(&self.upper, f64::INFINITY, n_dofs)]
+    }
+
+    /// Returns the limits of velocity and acceleration, infinite where there is none.
+    pub(crate) fn rates(&self, n_dofs: usize) -> [Vec<f64>; 2] {
+        [&self.velocity, &self.acceleration].map(|limits| of_dofs(limits, f64::INFINITY, n_dofs))
+    }
+
+    /// Checks that every position keeps the limits.
+    ///
+    /// # Errors
+    /// The first position outside.
+    pub(crate) fn check_positions(&self, trajectory: &Trajectory) -> Result<()> {
+        let [lower, upper] = self.position(trajectory.position.ncols());
+        for ((sample, dof), &value) in trajectory.position.indexed_iter() {
+            if value < lower[dof] || value > upper[dof] {
+                let phase = trajectory.time[sample] / trajectory.time[trajectory.time.len() - 1];
+                return Err(Error::LeavesLimits { dof, value, lower: lower[dof], upper: upper[dof], phase });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns limits by DoFs.
+fn of_dofs(limits: &Option<Vec<f64>>, none: f64, n_dofs: usize) -> Vec<f64> {
+    match limits.as_deref() {
+        None => vec![none; n_dofs],
+        Some([limit]) => vec![*limit; n_dofs],
+        Some(limits) => limits.to_vec(),
     }
 }

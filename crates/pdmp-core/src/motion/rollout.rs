@@ -10,6 +10,7 @@ use crate::model::conditions::{Conditions, check_tau};
 use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::controller::Controller;
+use crate::motion::time_law::TimeLaw;
 use crate::motion::trajectory::Trajectory;
 use crate::validate::{check_positive, row_major_mut, zeros};
 
@@ -103,17 +104,38 @@ pub fn rollout_with(
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Trajectory> {
     let steps = grid.steps(primitive, conditions.time_constant(primitive)?)?;
-    let mut clock = Clock::of(primitive, conditions)?;
+    let clock = Clock::of(primitive, conditions)?;
     if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
         return Err(Error::Arguments(
             "pass phase or segment_durations of several segments, not both: warped time starts at phase 0",
         ));
     }
     let conditions = clock.conditions(conditions);
-    let mut controller = Controller::new(primitive, grid.dt, &conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
+    sample(primitive, &conditions, clock, grid.dt, steps, progress)
+}
+
+/// Computes the movement that follows a time law: samples at t = 0, dt, … up to the first one at its end or past it.
+pub(crate) fn follow(primitive: &Arc<Primitive>, conditions: &Conditions, law: TimeLaw, dt: f64) -> Result<Trajectory> {
+    let duration = Some((law.duration() / dt).ceil() * dt);
+    let steps = TimeGrid { dt, duration }.steps(primitive, primitive.tau())?;
+    let rate = law.at(0.0);
+    let clock = Clock::Warped { function: ClockFunction::Law(law), extent: primitive.tau(), phase: rate };
+    sample(primitive, conditions, clock, dt, steps, &mut |_| Ok(()))
+}
+
+/// Samples the movement on a clock.
+fn sample(
+    primitive: &Arc<Primitive>,
+    conditions: &Conditions,
+    mut clock: Clock,
+    dt: f64,
+    steps: usize,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Trajectory> {
+    let mut controller = Controller::new(primitive, dt, conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
     let shape = (steps + 1, primitive.n_dofs());
     let mut trajectory = Trajectory {
-        time: (0..=steps).map(|k| k as f64 * grid.dt).collect(),
+        time: (0..=steps).map(|k| k as f64 * dt).collect(),
         position: zeros("rollout", shape)?,
         velocity: zeros("rollout", shape)?,
         acceleration: zeros("rollout", shape)?,
@@ -141,14 +163,30 @@ pub fn rollout_with(
 enum Clock {
     /// Time of the controller.
     Linear,
-    /// Time warped by segment durations.
+    /// Time warped by segment durations or a time law.
     Warped {
-        warp: WarpingFunction,
+        function: ClockFunction,
         /// Nominal time per unit of phase, in seconds.
         extent: f64,
         /// Phase p, ṗ and p̈.
         phase: [f64; 3],
     },
+}
+
+/// Phase p, ṗ and p̈ as a function of time.
+enum ClockFunction {
+    Warp(WarpingFunction),
+    /// Its phase is the clock u.
+    Law(TimeLaw),
+}
+
+impl ClockFunction {
+    fn phase(&self, time: f64) -> [f64; 3] {
+        match self {
+            Self::Warp(warp) => warp.phase(time),
+            Self::Law(law) => law.at(time),
+        }
+    }
 }
 
 impl Clock {
@@ -160,13 +198,14 @@ impl Clock {
         };
         let warp = primitive.warping_function(segment_durations)?;
         let phase = warp.phase(0.0);
-        Ok(Self::Warped { warp, extent: primitive.tau * primitive.canonical().extent(), phase })
+        let extent = primitive.tau * primitive.canonical().extent();
+        Ok(Self::Warped { function: ClockFunction::Warp(warp), extent, phase })
     }
 
     /// Converts conditions to the time of the controller.
     fn conditions(&self, conditions: &Conditions) -> Conditions {
         let mut conditions = conditions.clone();
-        if let Self::Warped { warp, extent, phase: [_, rate, _] } = self {
+        if let Self::Warped { function: ClockFunction::Warp(warp), extent, phase: [_, rate, _] } = self {
             conditions.segment_durations = None;
             conditions.velocity.iter_mut().flatten().for_each(|v| *v /= extent * rate);
             let end_rate = warp.slope(1.0).recip();
@@ -179,9 +218,9 @@ impl Clock {
     fn step(&mut self, controller: &mut Controller, time: f64) -> Result<()> {
         match self {
             Self::Linear => controller.step(),
-            Self::Warped { warp, extent, phase } => {
+            Self::Warped { function, extent, phase } => {
                 let before = phase[0];
-                *phase = warp.phase(time);
+                *phase = function.phase(time);
                 let dt = Some((phase[0] - before) * *extent);
                 controller.step_with(&Command { dt, ..Command::default() })
             }
