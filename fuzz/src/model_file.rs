@@ -139,7 +139,7 @@ impl EditableFile {
             }
             6..9 => self.constant(input),
             9 => {
-                // Another number of demonstrations, up to 1024 times as many.
+                // Another number of demonstrations, up to 1024-fold.
                 let n = self.arrays[0].shape[0];
                 let resized = match input.byte() {
                     0 => n.saturating_sub(1),

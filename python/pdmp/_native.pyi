@@ -786,7 +786,7 @@ class Model:
         derivatives: int = 1,  # at most 2
         out: Sequence[_Array] | None = None,
         threads: int | None = None,
-    ) -> tuple[_Array, ...]:  # positions and as many derivatives (B, T, D)
+    ) -> tuple[_Array, ...]:  # position and its `derivatives`, each (B, T, D)
         """Compute the movements of many styles.
 
         A movement under constant conditions is linear in them, so that a batch is one product of coefficients with

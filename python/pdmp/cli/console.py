@@ -9,7 +9,7 @@ from typing import TextIO
 
 from pdmp._messages import printable
 
-# Arguments of Python that a message asks for, and those that it reports, at its beginning or behind
+# Arguments of Python that a message recommends, and those that it reports, at its beginning or behind
 # a file or demonstration.
 _ARGUMENT = re.compile(
     r"\b(contexts|dt|max_gap|period|time)="

@@ -202,7 +202,7 @@ impl ContextMap {
         let SelectedMap { kind, model, line, errors } = selected;
         let (noise, degrees_of_freedom) = match (model.kriging.degrees_of_freedom(), &data.within) {
             (0, None) => (None, 0),
-            // With as many coefficients as contexts, repetitions alone have noise.
+            // With one coefficient per context, repetitions alone have noise.
             (0, Some((within, n))) => (Some(within * data.averaged_share), *n),
             (n, _) => {
                 let n = n - usize::from(model.kernel.is_some() && n > MIN_DEGREES_OF_FREEDOM);

@@ -17,7 +17,7 @@ const SETTLING_TIME: f64 = 6.638_352_067_993_813;
 const DECAY_TIME: f64 = 45.0;
 /// Maximum ωt of a substep: a cubic then deviates from the filter by about 1e-9 of the step.
 const MAX_SUBSTEP: f64 = 0.07;
-/// Maximum number of substeps that a filter asks for.
+/// Maximum number of substeps that a filter requires.
 const MAX_SUBSTEPS: f64 = 32.0;
 /// Number of terms of the series of an exponential that is exact to the last digit up to [`MAX_SUBSTEP`].
 const N_TERMS: usize = 10;

@@ -20,7 +20,7 @@ pub enum ErrorKind {
     Data,
     /// Change the problem: it is well-formed, but has no numerical solution.
     Numerical,
-    /// Ask for less, or provide more memory.
+    /// Reduce the amount, or provide more memory.
     Memory,
     /// Use another model file.
     ModelFile,
@@ -143,7 +143,7 @@ pub enum Error {
         limit: f64,
     },
     /// Arrays that do not fit into memory.
-    #[error("{name} would take {} numbers: not enough memory; ask for fewer samples", Number(*numbers))]
+    #[error("{name} would take {} numbers: not enough memory; reduce the number of samples", Number(*numbers))]
     Memory {
         /// The requested arrays.
         name: &'static str,

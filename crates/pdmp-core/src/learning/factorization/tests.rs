@@ -214,7 +214,7 @@ fn slow_and_clustered_spectra_are_factorised() {
     }
 }
 
-/// The share rule keeps as many styles as the exact singular values require, and they are accurate.
+/// The share rule keeps the number of styles that the exact singular values require, and they are accurate.
 #[test]
 fn the_share_rule_follows_the_exact_singular_values() {
     for (rows, columns) in [(100, 700), (400, 90)] {

@@ -18,8 +18,8 @@ const MARGIN: f64 = 2.0;
 
 /// Ridge penalty on the weights, relative to the scale of the design matrix.
 ///
-/// With about as many samples as functions, weights that alternate in sign hardly change the values at the samples: with
-/// noise of 1e-3 on 50 samples, the error of 50 functions was 0.35 of the range at a penalty of 1e-8, and 5e-4 at 1e-5
+/// With about equal numbers of samples and functions, weights that alternate in sign hardly change the values at the
+/// samples: with noise of 1e-3 on 50 samples, the error of 50 functions was 0.35 of the range at a penalty of 1e-8, and 5e-4 at 1e-5
 /// and at 1e-4. A penalty of up to 1e-4 does not affect a well-posed fit: handwriting 4e-4, minimum jerk 1e-6.
 ///
 /// The penalty also bounds the condition number of the normal equations by 1e8. Their rounding then changes the outputs
