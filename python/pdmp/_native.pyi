@@ -165,7 +165,7 @@ def fit(
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model:
-    """Fit a movement primitive to demonstrations.
+    """Fits a movement primitive to demonstrations.
 
     The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets f = τẏ − z exactly,
     factorise them, F ≈ S·F_basis (Eq. 7), and regress the attractor landscape on the phase.
@@ -282,7 +282,7 @@ def fit(
 def inspected(
     demos: Sequence[Demonstration], *, dt: float | None = None
 ) -> tuple[list[Demonstration], list[str]]:
-    """Inspect demonstrations as `fit` does.
+    """Inspects demonstrations as `fit` does.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def factorise(
     n_styles: int | None = None,
     singular_value_share: float = 0.9,
 ) -> Factors:
-    """Factorise stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
+    """Factorises stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
 
     F = UΣVᵀ; S is the first J columns of U and F_basis the first J rows of ΣVᵀ, the best approximation of F of rank J.
     `fit` factorises its targets so. A few factors of many demonstrations are computed by Krylov iteration, others from
@@ -341,7 +341,7 @@ def factorise(
     """
 
 def load(path: str | PathLike[str]) -> Model:
-    """Read a model file.
+    """Reads a model file.
 
     Parameters
     ----------
@@ -372,7 +372,7 @@ def load(path: str | PathLike[str]) -> Model:
     """
 
 def resample(demo: Demonstration, dt: float) -> Demonstration:
-    """Resample a recording at even intervals.
+    """Resamples a recording at even intervals.
 
     The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no
     denser than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the
@@ -398,7 +398,7 @@ def resample(demo: Demonstration, dt: float) -> Demonstration:
     """
 
 def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration:
-    """Trim the rests before and after the movement of a recording.
+    """Trims the rests before and after the movement of a recording.
 
     The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed,
     where v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise
@@ -424,7 +424,7 @@ def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration:
     """
 
 def cut(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fewer than times
-    """Cut a recording at given times.
+    """Cuts a recording at given times.
 
     Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the
     recording. As with `resample`, noise stays white.
@@ -449,7 +449,7 @@ def cut(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fe
     """
 
 def lowpass(demo: Demonstration, cut_off: float) -> Demonstration:
-    """Filter a recording with a low-pass of zero phase.
+    """Filters a recording with a low-pass of zero phase.
 
     The filter is the cubic smoothing spline, with gain 1/(1 + (f/f_c)⁴) at frequency f: one half at the cut-off f_c.
     `pdmp.plot.cut_off` plots residuals over the cut-off.
@@ -477,7 +477,7 @@ def lowpass(demo: Demonstration, cut_off: float) -> Demonstration:
     """
 
 def residuals(demo: Demonstration, cut_offs: ArrayLike) -> _Array:  # (K, D)
-    """Compute the residuals of `lowpass` over its cut-off.
+    """Computes the residuals of `lowpass` over its cut-off.
 
     Parameters
     ----------
@@ -498,7 +498,7 @@ def residuals(demo: Demonstration, cut_offs: ArrayLike) -> _Array:  # (K, D)
     """
 
 def period(demo: Demonstration) -> float:
-    """Estimate the period of a cyclic recording by autocorrelation.
+    """Estimates the period of a cyclic recording by autocorrelation.
 
     A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal
     of linear trends. The period is the first peak of A that equals the highest peak within the variation between
@@ -533,7 +533,7 @@ def fill(
     turns: Sequence[float],  # D of them; 0 where no angle
     max_gap: float,
 ) -> _Array:  # (T, D)
-    """Interpolate missing samples.
+    """Interpolates missing samples.
 
     Parameters
     ----------
@@ -571,7 +571,7 @@ def cycles(
     list[tuple[int, float, float, str, bool]],
     list[tuple[int, int, float, int]],
 ]:
-    """Cut recordings into cycles, for `pdmp.preprocessing.cycles`.
+    """Cuts recordings into cycles, for `pdmp.preprocessing.cycles`.
 
     Parameters
     ----------
@@ -708,7 +708,7 @@ class Model:
         context: _Context | None = None,  # (Q,)
         **changes: Unpack[_Changes],
     ) -> Trajectory:
-        """Compute the movement under constant conditions.
+        """Computes the movement under constant conditions.
 
         Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb
         (discrete) or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
@@ -748,7 +748,7 @@ class Model:
         True
         """
     def conditions(self, demos: int | Sequence[int]) -> Conditions:
-        """Return the conditions of one demonstration, or the mean of several.
+        """Returns the conditions of one demonstration, or the mean of several.
 
         Parameters
         ----------
@@ -787,7 +787,7 @@ class Model:
         out: Sequence[_Array] | None = None,
         threads: int | None = None,
     ) -> tuple[_Array, ...]:  # position and its `derivatives`, each (B, T, D)
-        """Compute the movements of many styles.
+        """Computes the movements of many styles.
 
         A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
         response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
@@ -855,7 +855,7 @@ class Model:
         derivatives: int = 1,
         threads: int | None = None,
     ) -> RolloutChunks:
-        """Compute the movements of many styles in chunks.
+        """Computes the movements of many styles in chunks.
 
         Memory holds one chunk at a time. Results equal those of `rollouts` bit for bit. This call checks all arguments.
 
@@ -892,7 +892,7 @@ class Model:
         """
     def jacobian(
         self,
-        wrt: Literal["style", "goal", "anchor", "start"],
+        wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
         conditions: Conditions | None = None,
         *,
         derivative: int = 0,  # at most 2
@@ -901,7 +901,7 @@ class Model:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> _Array:  # (T, D, J) or (T, D, D)
-        """Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
+        """Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
 
         A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
         Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,
@@ -950,7 +950,7 @@ class Model:
         period: float | None = None,
         landmarks: ArrayLike | None = None,  # (E,)
     ) -> _Array:  # (J,)
-        """Estimate the style of a new demonstration.
+        """Estimates the style of a new demonstration.
 
         The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of
         the styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A
@@ -988,7 +988,7 @@ class Model:
         True
         """
     def landscape(self, u: ArrayLike) -> _Array:  # (len(u), J, D)
-        """Compute the attractor landscape b(u) of each style dimension and degree of freedom.
+        """Computes the attractor landscape b(u) of each style dimension and degree of freedom.
 
         Parameters
         ----------
@@ -1006,7 +1006,7 @@ class Model:
             A clock value is not finite, or negative for a discrete movement.
         """
     def transport(self, u: ArrayLike) -> _Array:  # (n,)
-        """Compute the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
+        """Computes the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
 
         The frame of the output system is c(u) = y₀ + (g − y₀)·m(u). m increases from 0 at the start to 1 at the end and
         stays 1; with `transport="immediate"`, m = 1 everywhere.
@@ -1027,7 +1027,7 @@ class Model:
             The primitive is rhythmic, or a clock value is negative or not finite.
         """
     def tau_at(self, phase: float, segment_durations: ArrayLike) -> float:  # (K,)
-        """Compute the time constant τ at a phase for given segment durations.
+        """Computes the time constant τ at a phase for given segment durations.
 
         A control loop follows segment durations, as `rollout` does, if it sets
         `controller.tau = model.tau_at(controller.phase, segment_durations)` before each tick, with `transition=0`.
@@ -1050,7 +1050,7 @@ class Model:
             `segment_durations` has a wrong length or is not positive, or `phase` is out of range.
         """
     def predict(self, context: _Context) -> Prediction:
-        """Predict the movement for a context (Section 4.1.2).
+        """Predicts the movement for a context (Section 4.1.2).
 
         Parameters
         ----------
@@ -1081,7 +1081,7 @@ class Model:
         level: float = 0.9,
         dt: float = 0.01,
     ) -> tuple[_Array, _Array]:  # lower, upper (T, D)
-        """Compute the prediction band of a new movement for a context.
+        """Computes the prediction band of a new movement for a context.
 
         y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
         conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
@@ -1107,7 +1107,7 @@ class Model:
             `level` is not in (0, 1), `predict` rejects `context`, or the demonstrations are too few for a covariance.
         """
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a model file.
+        """Writes a model file.
 
         The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary
         file `.pdmp-*.draft` beside it.
@@ -1139,7 +1139,7 @@ class Model:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> Controller:
-        """Start a movement that is computed tick by tick in a control loop.
+        """Starts a movement that is computed tick by tick in a control loop.
 
         Parameters
         ----------
@@ -1180,10 +1180,10 @@ class Model:
         True
         """
     def to_bytes(self) -> bytes:
-        """Return the contents of a model file as bytes."""
+        """Returns the contents of a model file as bytes."""
     @staticmethod
     def from_bytes(data: bytes) -> Model:
-        """Read a model from the contents of a model file.
+        """Reads a model from the contents of a model file.
 
         Parameters
         ----------
@@ -1228,6 +1228,7 @@ class _Changes(TypedDict, total=False):
     goal: ArrayLike | None  # (D,), as are start, velocity and anchor
     start: ArrayLike | None
     velocity: ArrayLike | None
+    goal_velocity: ArrayLike | None
     anchor: ArrayLike | None
     amplitude: float | None
     tau: float | None
@@ -1286,7 +1287,7 @@ class Conditions:
     """
     def __new__(cls, **conditions: Unpack[_Changes]) -> Conditions: ...
     def replace(self, **changes: Unpack[_Changes]) -> Conditions:
-        """Return a copy with some conditions replaced.
+        """Returns a copy with some conditions replaced.
 
         Parameters
         ----------
@@ -1316,6 +1317,9 @@ class Conditions:
     def velocity(self) -> _Array | None:
         """Start velocity (D,) per s, or None."""
     @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s of a discrete movement, or None."""
+    @property
     def anchor(self) -> _Array | None:
         """Anchor y_a (D,) of a rhythmic movement, or None."""
     @property
@@ -1335,7 +1339,7 @@ class Conditions:
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
 
 def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
-    """Compute the conditions (1 − share)·a + share·b.
+    """Computes the conditions (1 − share)·a + share·b.
 
     Parameters
     ----------
@@ -1437,7 +1441,7 @@ class ContextMap:
     def degrees_of_freedom(self) -> int:
         """Degrees of freedom of the covariance estimate."""
     def predict(self, contexts: _Contexts) -> tuple[_Array, _Array | None]:
-        """Compute the predictive mean and covariance of new outputs.
+        """Computes the predictive mean and covariance of new outputs.
 
         Parameters
         ----------
@@ -1482,7 +1486,7 @@ class Trajectory:
     def units(self) -> list[str]:  # "" where unknown
         """Units of the degrees of freedom (D,); "" if unknown."""
     def to_dict(self) -> dict[str, Any]:
-        """Return the arrays, names and units in a dictionary.
+        """Returns the arrays, names and units in a dictionary.
 
         `io.read_npz` reads the file that `numpy.savez(path, **trajectory.to_dict())` writes.
 
@@ -1492,7 +1496,7 @@ class Trajectory:
             Keys are the names of the attributes.
         """
     def to_dataframe(self) -> Any:  # pandas.DataFrame
-        """Return a data frame of positions, velocities and accelerations.
+        """Returns a data frame of positions, velocities and accelerations.
 
         `Demonstration(frame[names], time=frame.index)` makes a demonstration of it.
 
@@ -1508,7 +1512,7 @@ class Trajectory:
             pandas is not installed.
         """
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write a CSV file as `io.write_csv` does.
+        """Writes a CSV file as `io.write_csv` does.
 
         Parameters
         ----------
@@ -1552,7 +1556,7 @@ class Controller:
         measured: ArrayLike | None = None,  # (D,)
         coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
     ) -> Status:
-        """Advance the movement by one tick.
+        """Advances the movement by one tick.
 
         A measured position and coupling terms perturb the equations::
 
@@ -1605,7 +1609,7 @@ class Controller:
         Pastor, Hoffmann, Asfour, Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385 (terms in z').
         """
     def release(self) -> None:
-        """Discard the measured position.
+        """Discards the measured position.
 
         The movement is unperturbed until the next measurement.
         """
@@ -1616,7 +1620,7 @@ class Controller:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> None:
-        """Restart the movement.
+        """Restarts the movement.
 
         Parameters
         ----------
@@ -1659,6 +1663,13 @@ class Controller:
     @goal.setter
     def goal(self, goal: ArrayLike, /) -> None: ...
     @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
+        demonstrations; a read-only copy. Assign all values at once.
+        """
+    @goal_velocity.setter
+    def goal_velocity(self, velocity: ArrayLike | None, /) -> None: ...
+    @property
     def style(self) -> _Array:
         """Style s (J,); a read-only copy. Assign all values at once."""
     @style.setter
@@ -1686,6 +1697,15 @@ class Controller:
         """
     @speed.setter
     def speed(self, speed: float, /) -> None: ...
+    @property
+    def tolerance(self) -> float:
+        """Tolerance within which the movement has settled on its goal, 0.005 by default, at most 1.
+
+        It is relative to the larger of two lengths of each degree of freedom: its largest demonstrated range, and its
+        distance from the goal when this was last set. It stays in force after `reset`.
+        """
+    @tolerance.setter
+    def tolerance(self, tolerance: float, /) -> None: ...
     @property
     def compliance(self) -> tuple[float, float]:  # stopping k_s, tracking k_t
         """Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each."""
@@ -1738,7 +1758,7 @@ class GP:
         *,
         periodic: bool = False,
     ) -> GPRegression:
-        """Condition the process on targets over the clock.
+        """Conditions the process on targets over the clock.
 
         Parameters
         ----------
@@ -1787,7 +1807,7 @@ class GPRegression:
         Densities are in the unit of the outputs. It is 0 if all outputs are zero.
         """
     def predict(self, u: ArrayLike) -> tuple[_Array, _Array]:  # mean, variance (len(u), P)
-        """Compute the posterior mean and variance of the outputs without noise.
+        """Computes the posterior mean and variance of the outputs without noise.
 
         Parameters
         ----------
@@ -1881,7 +1901,7 @@ class NGnet:
         *,
         periodic: bool = False,
     ) -> NGnetRegression:
-        """Fit the network to targets over the clock by least squares.
+        """Fits the network to targets over the clock by least squares.
 
         Parameters
         ----------
@@ -1906,7 +1926,7 @@ class NGnet:
 class NGnetRegression:
     """Normalised Gaussian network fitted to data, returned by `NGnet.regress`."""
     def predict(self, u: ArrayLike) -> tuple[_Array, None]:  # mean (len(u), P), no variance
-        """Compute the outputs.
+        """Computes the outputs.
 
         Parameters
         ----------

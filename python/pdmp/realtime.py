@@ -87,8 +87,12 @@ class PacedLoop:
 
     Examples
     --------
-    >>> for tick in pdmp.PacedLoop(model.controller(dt=0.001)):
-    ...     robot.move(controller.position, controller.velocity)
+    >>> controller = model.controller(dt=0.001, goal=[1.2, 0.1])
+    >>> commands = []
+    >>> for tick in pdmp.PacedLoop(controller, duration=0.01):
+    ...     commands.append(controller.position.copy())
+    >>> len(commands)
+    10
     """
 
     def __init__(

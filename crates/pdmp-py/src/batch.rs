@@ -20,7 +20,7 @@ use crate::scalar::{Scalar, optional_number};
 
 #[pymethods]
 impl Model {
-    /// Compute the movements of many styles.
+    /// Computes the movements of many styles.
     ///
     /// A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
     /// response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
@@ -107,7 +107,7 @@ impl Model {
         work.write(py, movements, out)
     }
 
-    /// Compute the movements of many styles in chunks.
+    /// Computes the movements of many styles in chunks.
     ///
     /// Memory holds one chunk at a time. Results equal those of `rollouts` bit for bit. This call checks all arguments.
     ///

@@ -77,7 +77,7 @@ impl Conditions {
         changed(Inner::default(), conditions).map(Self)
     }
 
-    /// Return a copy with some conditions replaced.
+    /// Returns a copy with some conditions replaced.
     ///
     /// Parameters
     /// ----------
@@ -172,7 +172,7 @@ impl Conditions {
     }
 }
 
-/// Compute the conditions (1 − share)·a + share·b.
+/// Computes the conditions (1 − share)·a + share·b.
 ///
 /// Parameters
 /// ----------

@@ -74,7 +74,7 @@ impl ContextMap {
         self.0.degrees_of_freedom()
     }
 
-    /// Compute the predictive mean and covariance of new outputs.
+    /// Computes the predictive mean and covariance of new outputs.
     ///
     /// Parameters
     /// ----------

@@ -27,7 +27,7 @@ pub(crate) enum Status {
 
 #[pymethods]
 impl Status {
-    /// Return whether the movement is in progress, so that a loop is `while controller.step()`.
+    /// Returns whether the movement is in progress, so that a loop is `while controller.step()`.
     fn __bool__(&self) -> bool {
         *self == Self::Working
     }
@@ -103,7 +103,7 @@ impl Controller {
 
 #[pymethods]
 impl Controller {
-    /// Advance the movement by one tick.
+    /// Advances the movement by one tick.
     ///
     /// A measured position and coupling terms perturb the equations::
     ///
@@ -183,7 +183,7 @@ impl Controller {
         Ok(self.status(py))
     }
 
-    /// Restart the movement.
+    /// Restarts the movement.
     ///
     /// Parameters
     /// ----------
@@ -383,7 +383,7 @@ impl Controller {
         self.inner.set_compliance(Compliance { stopping, tracking }).map_err(raise)
     }
 
-    /// Return an independent controller in the same state, with the same model.
+    /// Returns an independent controller in the same state, with the same model.
     fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
         Self::new(py, Arc::clone(&self.model), self.inner.clone())
     }
@@ -392,7 +392,7 @@ impl Controller {
         self.__copy__(py)
     }
 
-    /// Discard the measured position.
+    /// Discards the measured position.
     ///
     /// The movement is unperturbed until the next measurement.
     fn release(&mut self) {

@@ -153,7 +153,7 @@ impl Demonstration {
         self.0.n_dofs()
     }
 
-    /// Return the arguments that rebuild the demonstration.
+    /// Returns the arguments that rebuild the demonstration.
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((Matrix<'py>,), Bound<'py, PyDict>)> {
         let options = PyDict::new(py);
         match self.0.sampling() {
@@ -311,7 +311,7 @@ impl Trajectory {
         Ok((py.get_type::<Self>().getattr("_of")?, arguments))
     }
 
-    /// Return the arrays, names and units in a dictionary.
+    /// Returns the arrays, names and units in a dictionary.
     ///
     /// `io.read_npz` reads the file that `numpy.savez(path, **trajectory.to_dict())` writes.
     ///
@@ -330,7 +330,7 @@ impl Trajectory {
         Ok(values)
     }
 
-    /// Return a data frame of positions, velocities and accelerations.
+    /// Returns a data frame of positions, velocities and accelerations.
     ///
     /// `Demonstration(frame[names], time=frame.index)` makes a demonstration of it.
     ///
@@ -348,7 +348,7 @@ impl Trajectory {
         slf.py().import("pdmp._labels")?.call_method1("to_dataframe", (slf,))
     }
 
-    /// Write a CSV file as `io.write_csv` does.
+    /// Writes a CSV file as `io.write_csv` does.
     ///
     /// Parameters
     /// ----------

@@ -32,7 +32,7 @@ impl Model {
         ascii(&format!("{text}; landscape {}>", model.learnt().regression))
     }
 
-    /// Return a table for notebooks.
+    /// Returns a table for notebooks.
     fn _repr_html_(&self) -> String {
         let model = &self.0;
         let mut rows = vec![
@@ -64,7 +64,7 @@ impl Trajectory {
         ascii(&format!("<pdmp.Trajectory: {}>", self.summary(py)))
     }
 
-    /// Return a table of the first and last samples for notebooks.
+    /// Returns a table of the first and last samples for notebooks.
     fn _repr_html_(&self, py: Python<'_>) -> String {
         let (time, position) = (self.time.bind(py).readonly(), self.position.bind(py).readonly());
         let (time, position) = (time.as_array(), position.as_array());

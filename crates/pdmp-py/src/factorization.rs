@@ -33,7 +33,7 @@ impl Factors {
     }
 }
 
-/// Factorise stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
+/// Factorises stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
 ///
 /// F = UΣVᵀ; S is the first J columns of U and F_basis the first J rows of ΣVᵀ, the best approximation of F of rank J.
 /// `fit` factorises its targets so. A few factors of many demonstrations are computed by Krylov iteration, others from

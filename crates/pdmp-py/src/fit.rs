@@ -23,7 +23,7 @@ use crate::regression::{Gp, NGnet};
 use crate::scalar::{Scalar, optional_count, optional_number};
 use crate::warp::TimeWarp;
 
-/// Fit a movement primitive to demonstrations.
+/// Fits a movement primitive to demonstrations.
 ///
 /// The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets f = τẏ − z exactly,
 /// factorise them, F ≈ S·F_basis (Eq. 7), and regress the attractor landscape on the phase.

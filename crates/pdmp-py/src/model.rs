@@ -24,7 +24,7 @@ use crate::scalar::{Scalar, optional_number};
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
 
-/// Read a model file.
+/// Reads a model file.
 ///
 /// Parameters
 /// ----------
@@ -59,7 +59,7 @@ pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
 
 #[pymethods]
 impl Model {
-    /// Return the conditions of one demonstration, or the mean of several.
+    /// Returns the conditions of one demonstration, or the mean of several.
     ///
     /// Parameters
     /// ----------
@@ -105,7 +105,7 @@ impl Model {
         self.0.conditions(&indices).map(Conditions).map_err(raise)
     }
 
-    /// Estimate the style of a new demonstration.
+    /// Estimates the style of a new demonstration.
     ///
     /// The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of
     /// the styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A
@@ -161,7 +161,7 @@ impl Model {
         Ok(to_numpy(py, &style))
     }
 
-    /// Compute the attractor landscape b(u) of each style dimension and degree of freedom.
+    /// Computes the attractor landscape b(u) of each style dimension and degree of freedom.
     ///
     /// Parameters
     /// ----------
@@ -189,7 +189,7 @@ impl Model {
         Ok(landscape.into_pyarray(py))
     }
 
-    /// Compute the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
+    /// Computes the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
     ///
     /// The frame of the output system is c(u) = y₀ + (g − y₀)·m(u). m increases from 0 at the start to 1 at the end and
     /// stays 1; with `transport="immediate"`, m = 1 everywhere.
@@ -213,7 +213,7 @@ impl Model {
         Ok(shares?.into_pyarray(py))
     }
 
-    /// Compute the time constant τ at a phase for given segment durations.
+    /// Computes the time constant τ at a phase for given segment durations.
     ///
     /// A control loop follows segment durations, as `rollout` does, if it sets
     /// `controller.tau = model.tau_at(controller.phase, segment_durations)` before each tick, with `transition=0`.
@@ -239,7 +239,7 @@ impl Model {
         self.0.tau_at(phase, &vector("segment_durations", segment_durations)?).map_err(raise)
     }
 
-    /// Predict the movement for a context (Section 4.1.2).
+    /// Predicts the movement for a context (Section 4.1.2).
     ///
     /// Parameters
     /// ----------
@@ -267,7 +267,7 @@ impl Model {
         Prediction::new(py, prediction)
     }
 
-    /// Compute the prediction band of a new movement for a context.
+    /// Computes the prediction band of a new movement for a context.
     ///
     /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
     /// conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
@@ -310,7 +310,7 @@ impl Model {
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 
-    /// Write a model file.
+    /// Writes a model file.
     ///
     /// The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary
     /// file `.pdmp-*.draft` beside it.
@@ -336,12 +336,12 @@ impl Model {
         py.detach(|| self.0.save(&path)).map_err(raise)
     }
 
-    /// Return the contents of a model file as bytes.
+    /// Returns the contents of a model file as bytes.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &py.detach(|| self.0.to_bytes()).map_err(raise)?))
     }
 
-    /// Read a model from the contents of a model file.
+    /// Reads a model from the contents of a model file.
     ///
     /// Parameters
     /// ----------

@@ -19,7 +19,7 @@ use crate::scalar::{Scalar, optional_number};
 
 #[pymethods]
 impl Model {
-    /// Compute the movement under constant conditions.
+    /// Computes the movement under constant conditions.
     ///
     /// Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb
     /// (discrete) or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
@@ -76,7 +76,7 @@ impl Model {
         Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
     }
 
-    /// Start a movement that is computed tick by tick in a control loop.
+    /// Starts a movement that is computed tick by tick in a control loop.
     ///
     /// Parameters
     /// ----------
@@ -134,7 +134,7 @@ impl Model {
         Controller::new(py, Arc::clone(&self.0), controller)
     }
 
-    /// Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
+    /// Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
     ///
     /// A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
     /// Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,

@@ -11,7 +11,7 @@ use crate::error::raise;
 use crate::fit::demonstrations;
 use crate::scalar::Scalar;
 
-/// Resample a recording at even intervals.
+/// Resamples a recording at even intervals.
 ///
 /// The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no
 /// denser than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the
@@ -40,7 +40,7 @@ pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: Scalar<'_>) -> 
     py.detach(|| preprocessing::resample(&demo.0, dt)).map(Demonstration).map_err(raise)
 }
 
-/// Trim the rests before and after the movement of a recording.
+/// Trims the rests before and after the movement of a recording.
 ///
 /// The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed,
 /// where v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise
@@ -70,7 +70,7 @@ pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) 
     py.detach(|| preprocessing::trim(&demo.0, threshold)).map(Demonstration).map_err(raise)
 }
 
-/// Cut a recording at given times.
+/// Cuts a recording at given times.
 ///
 /// Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the
 /// recording. As with `resample`, noise stays white.
@@ -99,7 +99,7 @@ pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>
     Ok(parts.into_iter().map(Demonstration).collect())
 }
 
-/// Filter a recording with a low-pass of zero phase.
+/// Filters a recording with a low-pass of zero phase.
 ///
 /// The filter is the cubic smoothing spline, with gain 1/(1 + (f/f_c)⁴) at frequency f: one half at the cut-off f_c.
 /// `pdmp.plot.cut_off` plots residuals over the cut-off.
@@ -130,7 +130,7 @@ pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: Scalar<'_>)
     py.detach(|| preprocessing::lowpass(&demo.0, cut_off)).map(Demonstration).map_err(raise)
 }
 
-/// Compute the residuals of `lowpass` over its cut-off.
+/// Computes the residuals of `lowpass` over its cut-off.
 ///
 /// Parameters
 /// ----------
@@ -159,7 +159,7 @@ pub(crate) fn residuals<'py>(
     Ok(residuals.into_pyarray(py))
 }
 
-/// Estimate the period of a cyclic recording by autocorrelation.
+/// Estimates the period of a cyclic recording by autocorrelation.
 ///
 /// A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal
 /// of linear trends. The period is the first peak of A that equals the highest peak within the variation between
@@ -190,7 +190,7 @@ pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
     py.detach(|| preprocessing::period(&demo.0)).map_err(raise)
 }
 
-/// Interpolate missing samples.
+/// Interpolates missing samples.
 ///
 /// Parameters
 /// ----------
@@ -239,7 +239,7 @@ type Growth = (usize, usize, f64, i32);
 /// Cycles, their periods (K,) in s, their gains (K, D), the indices of their recordings, rejections and growths.
 type CutCycles<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, Vec<Rejected>, Vec<Growth>);
 
-/// Cut recordings into cycles, for `pdmp.preprocessing.cycles`.
+/// Cuts recordings into cycles, for `pdmp.preprocessing.cycles`.
 ///
 /// Parameters
 /// ----------

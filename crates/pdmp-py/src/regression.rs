@@ -64,7 +64,7 @@ impl Gp {
         self.0.noise
     }
 
-    /// Condition the process on targets over the clock.
+    /// Conditions the process on targets over the clock.
     ///
     /// Parameters
     /// ----------
@@ -149,7 +149,7 @@ impl GpRegression {
         self.0.log_likelihood()
     }
 
-    /// Compute the posterior mean and variance of the outputs without noise.
+    /// Computes the posterior mean and variance of the outputs without noise.
     ///
     /// Parameters
     /// ----------
@@ -229,7 +229,7 @@ impl NGnet {
         self.0.overlap
     }
 
-    /// Fit the network to targets over the clock by least squares.
+    /// Fits the network to targets over the clock by least squares.
     ///
     /// Parameters
     /// ----------
@@ -274,7 +274,7 @@ pub(crate) struct NGnetRegression {
 
 #[pymethods]
 impl NGnetRegression {
-    /// Compute the outputs.
+    /// Computes the outputs.
     ///
     /// Parameters
     /// ----------

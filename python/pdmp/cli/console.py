@@ -9,8 +9,8 @@ from typing import TextIO
 
 from pdmp._messages import printable
 
-# Arguments of Python that a message recommends, and those that it reports, at its beginning or behind
-# a file or demonstration.
+# Arguments of Python that a message recommends, and those that it reports, at its beginning or
+# behind a file or demonstration.
 _ARGUMENT = re.compile(
     r"\b(contexts|dt|max_gap|period|time)="
     r"|(?:^|(?<=: ))(dt|max_gap|period|smoothing)(?= = | does not )"

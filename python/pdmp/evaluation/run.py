@@ -124,8 +124,7 @@ def evaluate(
     Examples
     --------
     >>> evaluation = pdmp.evaluate(demos, contexts=heights)
-    >>> print(evaluation)
-    >>> evaluation.compare("PDMP", "PCA, linear map")
+    >>> comparison = evaluation.compare("PDMP", "PCA, linear map")
     """
     data = recordings(demos, contexts, kind=kind, dt=dt, period=period, n_samples=n_samples)
     if splits is None:
