@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from pdmp import plot
-from pdmp.files import atomic_write
+from pdmp._files import atomic_write
 from pdmp.plot.canvas import ensure_figure
 from reproduction.section import SEED, Section
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
+from pdmp._markdown import markdown_table
 from pdmp.io import read_csv
-from pdmp.markdown import markdown_table
 from pdmp.plot.canvas import BLUE, ORANGE, ensure_figure, label_axes
 from pdmp.preprocessing import cycles
 from reproduction import film

@@ -137,7 +137,7 @@ def test_rollout_of_a_context_is_its_prediction(model_file: Path, tmp_path: Path
 def test_warped_models_are_described_and_reproduce_demonstrations(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With --alignment and --styles auto the fit is the library's; --tau overrides a timing."""
+    """--alignment and --styles auto select the library's fit; --tau replaces segment durations."""
     path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"
     options = ("--context", "bend", "--alignment", "warp", "--styles", "auto")
     assert run("fit", folder, *options, "-o", path) == 0
@@ -150,7 +150,7 @@ def test_warped_models_are_described_and_reproduce_demonstrations(
     model = pdmp.load(path)
     np.testing.assert_array_equal(model.styles, expected.styles)
     assert run("info", path) == 0
-    assert re.search(r"timing +8 segments", capsys.readouterr().out)
+    assert re.search(r"segments +8", capsys.readouterr().out)
     assert run("rollout", path, "--demo", 2, "-o", out) == 0
     made = model.rollout(model.conditions(2))
     np.testing.assert_array_equal(pdmp.io.read_csv(out, columns=["x", "y"]).position, made.position)
@@ -246,8 +246,11 @@ def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
         (["rollout", "{model}", "--style", "1", "-o", "o"], "--style has length 1, expected 2"),
         (["rollout", "{model}", "--goal", "1", "-o", "o"], "--goal has length 1, expected 2"),
         (["rollout", "{model}", "--tau", "-1", "-o", "o"], "--tau = -1: must be positive"),
-        (["rollout", "{model}", "--demo", "9", "-o", "o"], "--demo.* 9 must lie between 0 and 4"),
-        (["rollout", "{model}", "--demo", "-1", "-o", "o"], "--demo.* -1 must lie between 0 and 4"),
+        (["rollout", "{model}", "--demo", "9", "-o", "o"], "--demo = 9: must lie between 0 and 4"),
+        (
+            ["rollout", "{model}", "--demo", "-1", "-o", "o"],
+            "--demo = -1: must lie between",
+        ),
         (["fit", "{folder}", "--styles", "9", "-o", "m"], "--styles = 9: must lie between 1 and 5"),
         (
             ["fit", "{folder}", "--styles", "1", "--singular-value-share", "0.5", "-o", "m"],
@@ -306,14 +309,59 @@ def test_negative_exponents_are_numbers(model_file: Path, tmp_path: Path) -> Non
     np.testing.assert_allclose(end, [-1e-3, 2], atol=0.2)
 
 
-def test_missing_folder_is_reported_before_learning(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("command", ["fit", "rollout", "plot", "evaluate"])
+def test_missing_folder_is_reported_before_the_work(
+    folder: Path,
+    model_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
 ) -> None:
-    """A missing output folder is reported before the fit."""
-    assert run("fit", folder, "-o", tmp_path / "nowhere" / "model.safetensors") == 1
+    """An output in a folder that does not exist is rejected; no folder is created."""
+    source = folder if command in ("fit", "evaluate") else model_file
+    assert run(command, source, "-o", tmp_path / "nowhere" / "output") == 1
     reported = capsys.readouterr().err
-    assert "no such folder" in reported
-    assert "learning" not in reported
+    assert reported == f"pdmp: error: {tmp_path / 'nowhere'}: no such folder; create it first\n"
+    assert not (tmp_path / "nowhere").exists()
+
+
+def test_numbers_of_recordings_are_reported(
+    folder: Path, model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Figures need all demonstrations of a fit."""
+    assert run("plot", model_file, folder / "demos" / "0.csv", "-o", tmp_path / "figures") == 1
+    assert "1 recording given, expected 5: one per demonstration" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--kind", "rhythmic", "--transport", "learnt"], "--transport does not apply to"),
+        (["--kind", "rhythmic"], "a time-stamped cycle has no known period: pass --period in"),
+        (["--styles", "auto"], "needs contexts: pass --context, or a number"),
+        (["--styles", "9"], "--styles = 9: must lie between 1 and 5"),
+    ],
+)
+def test_messages_name_the_options_of_the_command(
+    folder: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    message: str,
+) -> None:
+    """Arguments that an error reports or recommends have the form of options."""
+    assert run("fit", folder, "-o", tmp_path / "m", *arguments) == 1
+    assert message in capsys.readouterr().err
+
+
+def test_recommended_conditions_are_options(
+    model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An anchor of a discrete model is rejected with the option of its goal."""
+    assert run("rollout", model_file, "--anchor", 1, 2, "-o", tmp_path / "out.csv") == 1
+    reported = capsys.readouterr().err
+    assert "--anchor does not apply to a discrete primitive" in reported
+    assert "set --goal" in reported
 
 
 def test_extrapolated_contexts_are_reported(

@@ -1,6 +1,7 @@
 """Contents of figures, on axes with quantity and unit."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def test_only_a_plane_has_a_path_panel(n_dofs: int) -> None:
 
 def test_demonstrations_must_be_those_of_the_fit(model: pdmp.Model) -> None:
     """A wrong number of demonstrations is rejected."""
-    with pytest.raises(ValueError, match="demos has length 4, expected 5"):
+    with pytest.raises(ValueError, match="4 recordings given, expected 5"):
         plot.demonstrations(model, reaches()[:4])
 
 
@@ -170,10 +171,26 @@ def test_given_figure_is_drawn_on(model: pdmp.Model) -> None:
 
 
 def test_saved_figure_is_a_png(model: pdmp.Model, tmp_path: Path) -> None:
-    """Saving creates the folder and writes a PNG only."""
-    plot.save(plot.spectrum(model), tmp_path / "new" / "spectrum.png")
-    (file,) = (tmp_path / "new").iterdir()
+    """Saving writes a PNG only."""
+    plot.save(plot.spectrum(model), tmp_path / "spectrum.png")
+    (file,) = tmp_path.iterdir()
     assert file.read_bytes().startswith(b"\x89PNG")
+
+
+def test_missing_folders_are_not_created(model: pdmp.Model, tmp_path: Path) -> None:
+    """Figures, trajectories and models are written into existing folders only."""
+    path = tmp_path / "new" / "file"
+    writers: list[Callable[[], object]] = [
+        lambda: plot.save(plot.spectrum(model), path),
+        lambda: pdmp.io.write_csv(path, model.rollout()),
+        lambda: model.rollout().to_csv(path),
+        lambda: model.save(path),
+    ]
+    for write in writers:
+        with pytest.raises(FileNotFoundError, match="no such folder; create it first") as error:
+            write()
+        assert error.value.filename == str(tmp_path / "new")
+    assert not list(tmp_path.iterdir())
 
 
 def test_suffix_selects_the_format(model: pdmp.Model, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 import pdmp
-from pdmp.markdown import markdown_table
+from pdmp._markdown import markdown_table
 from reproduction.demo.loop import Run
 from reproduction.metrics import reproduction_error
 

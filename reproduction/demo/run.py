@@ -10,8 +10,8 @@ import numpy as np
 
 import pdmp
 from pdmp import plot
+from pdmp._files import atomic_write
 from pdmp.datasets import handwriting
-from pdmp.files import atomic_write
 from reproduction.demo.loop import DT, control, draw_control
 from reproduction.demo.report import error_table, loop_table, spectrum_table, time_table
 

@@ -6,12 +6,11 @@ example: pdmp plot reach.safetensors recordings/ --columns q1 q2 q3 -o figures
 """
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
 import pdmp
 from pdmp import plot
 from pdmp.cli.console import say
-from pdmp.cli.options import add_reader_options, file_path, reader_arguments
+from pdmp.cli.options import add_reader_options, file_path, made_folder, reader_arguments
 from pdmp.io import read
 
 
@@ -38,6 +37,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Loads a model and writes its figures."""
+    folder = made_folder(options.output)
     model = pdmp.load(options.model)
     first = model.styles[:, 0]
     ends = [int(first.argmin()), int(first.argmax())]
@@ -56,6 +56,6 @@ def run(options: Namespace) -> None:
         recordings = read(options.paths, **reader_arguments(options))
         figures["demonstrations"] = plot.demonstrations(model, recordings)
     for name, figure in figures.items():
-        path = Path(options.output, f"{name}.png")
+        path = folder / f"{name}.png"
         plot.save(figure, path)
         say(path)

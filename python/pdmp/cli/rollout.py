@@ -10,7 +10,7 @@ from argparse import ArgumentParser, Namespace
 
 import pdmp
 from pdmp.cli.console import say
-from pdmp.cli.options import file_path
+from pdmp.cli.options import check_file, file_path
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -44,6 +44,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Loads a model, computes a rollout and writes it."""
+    check_file(options.output)
     model = pdmp.load(options.model)
     conditions = None if options.demo is None else model.conditions(options.demo)
     names = ("style", "context", "goal", "start", "anchor", "amplitude", "tau", "dt", "duration")

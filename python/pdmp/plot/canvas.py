@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from pdmp._files import atomic_write
 from pdmp._native import Model
-from pdmp.files import atomic_write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,7 +137,7 @@ def save(figure: Figure, path: str | PathLike[str]) -> None:
     ValueError
         A suffix that matplotlib does not support.
     OSError
-        A file that cannot be written.
+        A file that cannot be written, or whose folder does not exist.
     """
     with atomic_write(path) as draft:
         figure.savefig(draft, format=Path(path).suffix[1:] or "png")

@@ -48,11 +48,11 @@ def demonstrations(
     """
     demos = list(demos.values()) if isinstance(demos, Mapping) else demos
     labels = [""] * len(demos) if labels is None else labels
-    for name, length in (("demos", len(demos)), ("labels", len(labels))):
+    for name, length in (("recording", len(demos)), ("label", len(labels))):
         if length != model.n_demos:
             raise ValueError(
-                f"{name} has length {length}, expected {model.n_demos}: "
-                "one per demonstration of the fit"
+                f"{length} {name}{'s' * (length != 1)} given, expected {model.n_demos}: "
+                "one per demonstration of the fit, in its order"
             )
     for m, demo in enumerate(demos):
         _check(model, m, demo)

@@ -15,7 +15,7 @@ mod read;
 mod write;
 
 use std::fs;
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -99,25 +99,29 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// A path that cannot be written.
+    /// A path that cannot be written, or whose folder does not exist.
     pub fn save(&self, path: &Path) -> Result<()> {
         let bytes = self.to_bytes()?;
-        let io = |source| Error::Io { path: path.to_path_buf(), source };
+        let failed = |source| Error::Io { path: path.to_path_buf(), source };
         let target = fs::canonicalize(path)
             // The target of a link need not exist.
             .or_else(|_| fs::read_link(path).map(|to| path.parent().unwrap_or(Path::new("")).join(to)))
             .unwrap_or_else(|_| path.to_path_buf());
         if fs::metadata(&target).is_ok_and(|existing| !existing.is_file() && !existing.is_dir()) {
-            return fs::write(&target, &bytes).map_err(io);
+            return fs::write(&target, &bytes).map_err(failed);
         }
         let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let (draft, mut file) = Draft::create(folder).map_err(io)?;
-        file.write_all(&bytes).map_err(io)?;
-        file.sync_all().map_err(io)?;
-        if let Ok(existing) = fs::metadata(&target) {
-            file.set_permissions(existing.permissions()).map_err(io)?;
+        if !folder.is_dir() {
+            let source = io::Error::new(io::ErrorKind::NotFound, "no such folder; create it first");
+            return Err(Error::Io { path: folder.to_path_buf(), source });
         }
-        draft.persist(&target).map_err(io)
+        let (draft, mut file) = Draft::create(folder).map_err(failed)?;
+        file.write_all(&bytes).map_err(failed)?;
+        file.sync_all().map_err(failed)?;
+        if let Ok(existing) = fs::metadata(&target) {
+            file.set_permissions(existing.permissions()).map_err(failed)?;
+        }
+        draft.persist(&target).map_err(failed)
     }
 
     /// Reads a model file.
@@ -125,17 +129,17 @@ impl Model {
     /// # Errors
     /// A path that cannot be read, or a file that is damaged, not a model, or of another version.
     pub fn load(path: &Path) -> Result<Self> {
-        let io = |source| Error::Io { path: path.to_path_buf(), source };
+        let failed = |source| Error::Io { path: path.to_path_buf(), source };
         let with_path = |error| match error {
             Error::File(reason) => Error::File(format!("{}: {reason}", path.display())),
             other => other,
         };
-        let mut file = fs::File::open(path).map_err(io)?;
+        let mut file = fs::File::open(path).map_err(failed)?;
         let mut bytes = Vec::new();
         // The length of the header comes first: a large file of another format is rejected without reading it.
-        Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(io)?;
+        Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(failed)?;
         check_size(&bytes).map_err(with_path)?;
-        file.take(MAX_FILE_SIZE).read_to_end(&mut bytes).map_err(io)?;
+        file.take(MAX_FILE_SIZE).read_to_end(&mut bytes).map_err(failed)?;
         Self::from_bytes(&bytes).map_err(with_path)
     }
 }
