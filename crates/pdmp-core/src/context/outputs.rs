@@ -23,8 +23,7 @@ pub(crate) fn outputs(
         Kind::Discrete => vec![styles, goals, starts, logarithms.view()],
         Kind::Rhythmic => vec![styles, anchors, logarithms.view()],
     };
-    // Row counts are equal by construction.
-    concatenate(Axis(1), &parts).unwrap_or_default()
+    concatenate(Axis(1), &parts).expect("each part has one row per movement")
 }
 
 /// Computes the Jacobian (K, K) ∂ln T_k/∂o_i of the K segment durations by the outputs o of time.
