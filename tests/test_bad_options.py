@@ -41,7 +41,7 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"nominal": 5}, "nominal = 5: must be the index of a demonstration, from 0"),
     ({"n_samples": 3}, "n_samples = 3: must lie between 4 and 1e6"),
     ({"n_samples": -1}, "n_samples = -1: must not be negative"),
-    ({"smoothing": 25.1}, "smoothing = 25.1: must lie below half the sampling rate"),
+    ({"smoothing": 25.1}, "smoothing = 25.1 Hz: must lie below half the sampling rate of 50 Hz"),
     ({"smoothing": True}, 'smoothing = True: must be None, "auto" or a cut-off in Hz'),
     ({"mu": 3.0}, "mu does not apply to a discrete"),
     ({"smoothing": "strong"}, "smoothing = 'strong': must be None, \"auto\" or a cut-off in Hz"),
@@ -169,7 +169,7 @@ def test_goals_of_cycles_are_rejected() -> None:
 
 def test_duplicate_names_are_rejected() -> None:
     """Names of degrees of freedom must be unique."""
-    with pytest.raises(ValueError, match="names must differ"):
+    with pytest.raises(ValueError, match=r'names\[1\] = "a": repeats a name: the names'):
         Demonstration(POSITION, dt=0.02, names=["a", "a"])
 
 

@@ -151,7 +151,7 @@ def test_unknown_labels_are_rejected(context: list[object], message: str) -> Non
 
 def test_labels_and_numbers_do_not_mix_in_a_column() -> None:
     """A context value is a label in all demonstrations or in none."""
-    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 1 labels and 2 numbers"):
+    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 1 label and 2 numbers"):
         pdmp.fit([BASE] * 3, dt=0.02, contexts=[[0.1], ["high"], [0.2]])
 
 

@@ -379,5 +379,5 @@ def test_labels_without_training_demonstrations_are_rejected() -> None:
     with pytest.raises(ValueError, match="has no training demonstration"):
         pdmp.evaluate(movements, contexts=manners, dt=0.01)
     mixed = [[0.1], *manners[1:]]
-    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 numbers"):
+    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 number:"):
         pdmp.evaluate(movements, contexts=mixed, dt=0.01)

@@ -11,6 +11,8 @@ pub const MIN_SAMPLES_PER_DEMONSTRATION: usize = 4;
 
 /// Maximum length of the name or unit of a DoF, in bytes: it bounds the header of a model file.
 const MAX_NAME_LENGTH: usize = 1000;
+/// Largest number of characters of a name in an error text.
+const MAX_QUOTED_LENGTH: usize = 60;
 
 /// Sampling times of a demonstration.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,8 +144,14 @@ impl Demonstration {
             let (expected, found) = (self.n_dofs(), names.len());
             return Err(Error::Length { name: "names", expected, found, per: "DoF" });
         }
-        if names.iter().enumerate().any(|(d, name)| names[..d].contains(name) || name.len() > MAX_NAME_LENGTH) {
-            return Err(Error::Arguments("names must differ from each other and have at most 1000 bytes each"));
+        for (index, value) in names.iter().enumerate() {
+            let allowed = match value {
+                value if names[..index].contains(value) => "repeats a name: the names must differ from each other",
+                value if value.len() > MAX_NAME_LENGTH => "must have at most 1000 bytes",
+                _ => continue,
+            };
+            let value = value.chars().take(MAX_QUOTED_LENGTH).collect();
+            return Err(Error::DofLabel { name: "names", index, value, allowed });
         }
         self.names = Some(names);
         Ok(self)

@@ -9,7 +9,7 @@ mod format;
 use std::path::PathBuf;
 
 use crate::kind::Kind;
-use format::{Gap, Number, Times};
+use format::{Count, Gap, Number, Power, Rounded, Times};
 
 /// The caller's next step after an [`Error`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -87,6 +87,18 @@ pub enum Error {
         /// Owner of one element.
         per: &'static str,
     },
+    /// A name or unit of a degree of freedom that is repeated or too long.
+    #[error("{name}[{index}] = {value:?}: {allowed}")]
+    DofLabel {
+        /// The argument.
+        name: &'static str,
+        /// Index of the degree of freedom.
+        index: usize,
+        /// The name or unit.
+        value: String,
+        /// The allowed values, as the end of the sentence.
+        allowed: &'static str,
+    },
     /// A number of vectors that differs from the number of movements.
     #[error("{name} has {found} rows, but there are {expected} styles: pass one row for each, or one vector for all")]
     Rows {
@@ -112,6 +124,30 @@ pub enum Error {
         value: f64,
         /// The allowed range, as the end of the sentence.
         allowed: &'static str,
+    },
+    /// A number outside an interval.
+    #[error("{name} = {}: must lie between {} and {}", Number(*value), Power(*min), Power(*max))]
+    Bounds {
+        /// The argument.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The smallest value that is accepted.
+        min: f64,
+        /// The largest value that is accepted.
+        max: f64,
+    },
+    /// A cut-off frequency outside its range.
+    #[error("{name} = {} Hz: {allowed} of {} Hz", Number(*hz), Rounded(*rate))]
+    CutOff {
+        /// The argument.
+        name: &'static str,
+        /// Its value, in Hz.
+        hz: f64,
+        /// The allowed range, as the end of a sentence about the sampling rate.
+        allowed: &'static str,
+        /// The sampling rate, in Hz.
+        rate: f64,
     },
     /// A number so large that its square overflows.
     #[error(
@@ -277,7 +313,7 @@ pub enum Error {
         label: String,
     },
     /// A context value that is a label in one demonstration and a number in another.
-    #[error("contexts[:, {column}] holds {labels} labels and {numbers} numbers: give one or the other")]
+    #[error("contexts[:, {column}] holds {} and {}: give one or the other", Count(*labels, "label"), Count(*numbers, "number"))]
     Mixed {
         /// Index of the context value.
         column: usize,
@@ -367,9 +403,12 @@ impl Error {
             | Self::StyleSize { .. } => ErrorKind::Data,
             Self::NotFinite { .. }
             | Self::Length { .. }
+            | Self::DofLabel { .. }
             | Self::Rows { .. }
             | Self::Single { .. }
             | Self::Range { .. }
+            | Self::Bounds { .. }
+            | Self::CutOff { .. }
             | Self::TooLarge { .. }
             | Self::Landmark { .. }
             | Self::Segments { .. }

@@ -1,7 +1,7 @@
 //! Selection between a time warp and linear time scaling by cross-validation over the contexts.
 //!
 //! The mean squared prediction error over linear time is lowest for movements averaged over linear time. A warp lowers it
-//! where contexts predict the timing, or where fewer styles remain, and raises it otherwise. Both are validated on
+//! where contexts predict the segment durations, or where fewer styles remain, and raises it otherwise. Both are validated on
 //! held-out contexts, with principal components of the positions in place of styles and landscape, equal in number to
 //! the styles of the fit.
 
@@ -97,7 +97,7 @@ fn positions(aligned: &Aligned, kind: Kind) -> Array2<f64> {
 }
 
 /// Returns the outputs of the map, which are the component scores and the logarithms of the segment durations, and the
-/// metric of their errors. An error of 1 in the timing weighs as much as the movement about its mean.
+/// metric of their errors. An error of 1 in the relative segment durations weighs as much as the movement about its mean.
 fn outputs(factors: &Factors, segment_durations: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
     let (n, last) = (factors.styles.ncols(), segment_durations.ncols() - 1);
     let sizes: Vec<f64> = factors.basis.rows().into_iter().map(|row| row.dot(&row)).collect();

@@ -157,10 +157,10 @@ impl Conditions {
         })
     }
 
-    /// τ in seconds: as given, that of a movement as long as the timing, or the nominal demonstration's.
+    /// Returns τ in seconds: the given one, that of a movement as long as the sum of the segment durations, or the nominal demonstration's.
     ///
     /// # Errors
-    /// Both of them, a τ that is not positive, or a timing that does not fit the primitive.
+    /// Both of them, a τ that is not positive, or segment durations that do not fit the primitive.
     pub fn time_constant(&self, primitive: &Primitive) -> Result<f64> {
         let tau = match (self.tau, &self.segment_durations) {
             (Some(_), Some(_)) => {
