@@ -324,7 +324,7 @@ def test_mappings_of_readers_are_accepted(tmp_path: Path) -> None:
             expected = function(demo, *arguments).position
             np.testing.assert_array_equal(one.position, expected)
             np.testing.assert_array_equal(other.position, expected)
-    parts = pdmp.preprocessing.cut(named, [0.1, 0.5, 0.9])
+    parts = pdmp.preprocessing.split_at(named, [0.1, 0.5, 0.9])
     assert [len(part) for part in parts.values()] == [2] * len(named)
     with pytest.raises(ValueError, match="^d0: cut_off = -1"):
         pdmp.preprocessing.lowpass(named, -1.0)

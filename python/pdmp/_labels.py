@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pdmp._messages import value_error
+from pdmp._messages import quoted, value_error
 
 if TYPE_CHECKING:
     from pdmp._native import Trajectory
@@ -28,7 +28,10 @@ def name_list(argument: str, names: Sequence[str]) -> list[str]:
     """Returns names as a list; rejects a single text, which would become a list of letters."""
     if isinstance(names, str):
         raise value_error(f"{argument} = '{names}': pass a list of names, ['{names}']")
-    return list(names)
+    listed = list(names) if isinstance(names, Iterable) else [None]
+    if not all(isinstance(name, str) for name in listed):
+        raise TypeError(f"{argument} = {quoted(names)}: expected a list of names")
+    return listed
 
 
 def names_and_units(value: Any) -> tuple[list[str] | None, list[str] | None]:

@@ -41,10 +41,10 @@ __all__ = [
     "Trajectory",
     "__version__",
     "blend",
-    "cut",
+    "split_at",
     "cycles",
     "factorise",
-    "fill",
+    "fill_gaps",
     "fit",
     "inspected",
     "load",
@@ -423,7 +423,7 @@ def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration:
         `threshold` is out of range, or the recording has no movement, fewer than four samples of it, or no times.
     """
 
-def cut(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fewer than times
+def split_at(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fewer than times
     """Cuts a recording at given times.
 
     Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the
@@ -526,7 +526,7 @@ def period(demo: Demonstration) -> float:
     P. McLeod, G. Wyvill, A smarter way to find pitch, International Computer Music Conference 2005
     """
 
-def fill(
+def fill_gaps(
     position: ArrayLike,  # (T, D)
     time: ArrayLike,  # (T,)
     names: Sequence[str],  # D of them

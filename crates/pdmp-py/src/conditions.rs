@@ -6,8 +6,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::{quoted, to_numpy, vector};
+use crate::convert::{to_numpy, vector};
 use crate::error::{ascii, raise};
+use crate::instance;
 use crate::scalar::{Scalar, number};
 
 /// Names of all conditions, which are their keywords.
@@ -196,8 +197,9 @@ impl Conditions {
 /// >>> np.allclose(between.goal, 0.75 * model.goals[0] + 0.25 * model.goals[1])
 /// True
 #[pyfunction]
-pub(crate) fn blend(a: &Conditions, b: &Conditions, share: Scalar<'_>) -> PyResult<Conditions> {
-    a.0.blend(&b.0, share.number("share")?).map(Conditions).map_err(raise)
+pub(crate) fn blend(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>, share: Scalar<'_>) -> PyResult<Conditions> {
+    let (a, b) = (instance::conditions("a", a)?, instance::conditions("b", b)?);
+    a.blend(b, share.number("share")?).map(Conditions).map_err(raise)
 }
 
 /// Returns the conditions of a call: `conditions`, single ones replaced by `changes`, those absent from both predicted
@@ -208,19 +210,8 @@ pub(crate) fn conditions_of(
     context: Option<&Bound<'_, PyAny>>,
     changes: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Inner> {
-    let base = match conditions {
-        None => Inner::default(),
-        Some(object) => match object.cast::<Conditions>() {
-            Ok(conditions) => conditions.get().0.clone(),
-            Err(_) => {
-                let text = format!(
-                    "conditions = {}: expected pdmp.Conditions; pass single ones by name, such as style=",
-                    quoted(object)
-                );
-                return Err(PyTypeError::new_err(text));
-            }
-        },
-    };
+    let base =
+        conditions.map(|object| instance::conditions("conditions", object).cloned()).transpose()?.unwrap_or_default();
     let own = changed(base, changes)?;
     let Some(context) = context else { return Ok(own) };
     if own.style.is_some() {

@@ -112,6 +112,10 @@ impl ContextMap {
     }
 
     fn __repr__(&self) -> String {
-        ascii(&format!("<pdmp.ContextMap: {}>", self.0))
+        format!("<pdmp.ContextMap: {}>", self.__str__())
+    }
+
+    fn __str__(&self) -> String {
+        ascii(&self.0.to_string())
     }
 }

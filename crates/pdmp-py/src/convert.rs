@@ -36,7 +36,7 @@ pub(crate) fn items<'py, T>(
     value: &Bound<'py, PyAny>,
     convert: impl Fn(&str, &Bound<'py, PyAny>) -> PyResult<T>,
 ) -> PyResult<Vec<T>> {
-    let expected = || PyTypeError::new_err(format!("{name} must be a list"));
+    let expected = || PyTypeError::new_err(format!("{name} = {}: expected a list", quoted(value)));
     if value.is_instance_of::<PyString>() {
         return Err(expected());
     }

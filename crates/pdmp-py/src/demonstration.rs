@@ -292,7 +292,7 @@ impl Trajectory {
 
 #[pymethods]
 impl Trajectory {
-    /// Rebuild a pickled trajectory.
+    /// Rebuilds a pickled trajectory.
     #[staticmethod]
     fn _of(
         time: Py<PyArray1<f64>>,

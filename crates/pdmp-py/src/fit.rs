@@ -18,6 +18,7 @@ use pyo3::types::{PyBool, PyList, PyMapping};
 use crate::convert::{items, matrix, numbers, quoted};
 use crate::demonstration::{Demonstration, Source, Trajectory};
 use crate::error::{detached, raise};
+use crate::instance;
 use crate::model::Model;
 use crate::regression::{Gp, NGnet};
 use crate::scalar::{Scalar, optional_count, optional_number};
@@ -173,7 +174,7 @@ pub(crate) fn fit(
     alpha_x: Option<Scalar<'_>>,
     mu: Option<Scalar<'_>>,
     threads: Option<Scalar<'_>>,
-    progress: Option<Py<PyAny>>,
+    progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Model> {
     let demos = demonstrations("demos", demos)?;
     let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
@@ -192,6 +193,7 @@ pub(crate) fn fit(
     options.alpha_z = alpha_z.number("alpha_z")?;
     options.beta_z = optional_number("beta_z", beta_z)?;
     options.threads = crate::convert::threads(threads)?;
+    let progress = instance::callback("progress", progress)?.map(|progress| progress.clone().unbind());
     let report = |py: Python<'_>, stage: Stage, fraction| match &progress {
         Some(progress) => progress.call1(py, (stage.name(), fraction)).map(drop),
         None => Ok(()),

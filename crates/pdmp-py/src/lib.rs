@@ -12,6 +12,7 @@ mod error;
 mod factorization;
 mod fit;
 mod inspection;
+mod instance;
 mod model;
 mod model_getters;
 mod motion;
@@ -54,11 +55,11 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(model::load, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::resample, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::trim, module)?)?;
-    module.add_function(wrap_pyfunction!(preprocessing::cut, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::split_at, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::lowpass, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::residuals, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::period, module)?)?;
-    module.add_function(wrap_pyfunction!(preprocessing::fill, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::fill_gaps, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::cycles, module)?)?;
     Ok(())
 }

@@ -13,8 +13,8 @@ use pyo3::types::{PyBytes, PyString};
 
 use crate::conditions::Conditions;
 use crate::convert::{Cube, Matrix, Reduced, Vector, optional, quoted, to_numpy, vector};
-use crate::demonstration::Demonstration;
 use crate::error::raise;
+use crate::instance;
 use crate::prediction::Prediction;
 use crate::scalar::{Scalar, optional_number};
 
@@ -96,9 +96,12 @@ impl Model {
             let text = format!("demos = {}: pass the index of a demonstration, or a list of them", quoted(demos));
             return Err(PyValueError::new_err(text));
         };
+        if indices.is_empty() {
+            return Err(PyValueError::new_err("demos = []: pass the index of at least one demonstration"));
+        }
         let last = self.0.n_demos() - 1;
         let index = |index: isize| {
-            let text = || format!("demos: {index} must lie between 0 and {last}");
+            let text = || format!("demos = {index}: must lie between 0 and {last}");
             usize::try_from(index).ok().filter(|index| *index <= last).ok_or_else(|| PyValueError::new_err(text()))
         };
         let indices = indices.into_iter().map(index).collect::<PyResult<Vec<usize>>>()?;
@@ -145,19 +148,19 @@ impl Model {
     fn style_of<'py>(
         &self,
         py: Python<'py>,
-        demonstration: &Demonstration,
+        demonstration: &Bound<'py, PyAny>,
         dt: Option<Scalar<'py>>,
         period: Option<Scalar<'py>>,
         landmarks: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
+        let demonstration = instance::demonstration("demonstration", demonstration)?;
         let (dt, period) = (optional_number("dt", dt)?, optional_number("period", period)?);
         let landmarks = optional("landmarks", landmarks)?;
         crate::inspection::warn(
             py,
-            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(&demonstration.0), dt),
+            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(demonstration), dt),
         )?;
-        let style =
-            py.detach(|| style_of(&self.0, &demonstration.0, dt, period, landmarks.as_deref())).map_err(raise)?;
+        let style = py.detach(|| style_of(&self.0, demonstration, dt, period, landmarks.as_deref())).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
 

@@ -8,7 +8,7 @@ use pyo3::types::PyList;
 
 use crate::context::ContextMap;
 use crate::convert::{Matrix, Vector, context_to_python, to_numpy};
-use crate::error::raise;
+use crate::error::{ascii, raise};
 use crate::model::Model;
 
 #[pymethods]
@@ -200,8 +200,8 @@ impl Model {
 
     /// Description of the regression of the landscape.
     #[getter]
-    fn regression(&self) -> &str {
-        &self.0.learnt().regression
+    fn regression(&self) -> String {
+        ascii(&self.0.learnt().regression)
     }
 
     /// Estimated interpolation error of the tabulated landscape, relative to its largest value.

@@ -9,6 +9,7 @@ use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
 use crate::demonstration::Demonstration;
 use crate::error::raise;
 use crate::fit::demonstrations;
+use crate::instance;
 use crate::scalar::Scalar;
 
 /// Resamples a recording at even intervals.
@@ -35,9 +36,10 @@ use crate::scalar::Scalar;
 /// ValueError
 ///     `dt` is not positive or leaves fewer than four samples, or the recording has no times.
 #[pyfunction]
-pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: Scalar<'_>) -> PyResult<Demonstration> {
+pub(crate) fn resample(py: Python<'_>, demo: &Bound<'_, PyAny>, dt: Scalar<'_>) -> PyResult<Demonstration> {
+    let demo = instance::demonstration("demo", demo)?;
     let dt = dt.number("dt")?;
-    py.detach(|| preprocessing::resample(&demo.0, dt)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::resample(demo, dt)).map(Demonstration).map_err(raise)
 }
 
 /// Trims the rests before and after the movement of a recording.
@@ -65,9 +67,10 @@ pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: Scalar<'_>) -> 
 ///     `threshold` is out of range, or the recording has no movement, fewer than four samples of it, or no times.
 #[pyfunction]
 #[pyo3(signature = (demo, threshold=Scalar::Number(0.05)), text_signature = "(demo, threshold=0.05)")]
-pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) -> PyResult<Demonstration> {
+pub(crate) fn trim(py: Python<'_>, demo: &Bound<'_, PyAny>, threshold: Scalar<'_>) -> PyResult<Demonstration> {
+    let demo = instance::demonstration("demo", demo)?;
     let threshold = threshold.number("threshold")?;
-    py.detach(|| preprocessing::trim(&demo.0, threshold)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::trim(demo, threshold)).map(Demonstration).map_err(raise)
 }
 
 /// Cuts a recording at given times.
@@ -93,9 +96,14 @@ pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) 
 ///     `times` do not increase or lie outside the recording, a part is shorter than three sampling intervals, or the
 ///     recording has no times.
 #[pyfunction]
-pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>) -> PyResult<Vec<Demonstration>> {
+pub(crate) fn split_at(
+    py: Python<'_>,
+    demo: &Bound<'_, PyAny>,
+    times: &Bound<'_, PyAny>,
+) -> PyResult<Vec<Demonstration>> {
+    let demo = instance::demonstration("demo", demo)?;
     let times = vector("times", times)?;
-    let parts = py.detach(|| preprocessing::split_at(&demo.0, &times)).map_err(raise)?;
+    let parts = py.detach(|| preprocessing::split_at(demo, &times)).map_err(raise)?;
     Ok(parts.into_iter().map(Demonstration).collect())
 }
 
@@ -125,9 +133,10 @@ pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>
 /// ----------
 /// C. H. Reinsch, Smoothing by spline functions, Numerische Mathematik 10 (1967), https://doi.org/10.1007/BF02162161
 #[pyfunction]
-pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: Scalar<'_>) -> PyResult<Demonstration> {
+pub(crate) fn lowpass(py: Python<'_>, demo: &Bound<'_, PyAny>, cut_off: Scalar<'_>) -> PyResult<Demonstration> {
+    let demo = instance::demonstration("demo", demo)?;
     let cut_off = cut_off.number("cut_off")?;
-    py.detach(|| preprocessing::lowpass(&demo.0, cut_off)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::lowpass(demo, cut_off)).map(Demonstration).map_err(raise)
 }
 
 /// Computes the residuals of `lowpass` over its cut-off.
@@ -151,11 +160,12 @@ pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: Scalar<'_>)
 #[pyfunction]
 pub(crate) fn residuals<'py>(
     py: Python<'py>,
-    demo: &Demonstration,
+    demo: &Bound<'_, PyAny>,
     cut_offs: &Bound<'py, PyAny>,
 ) -> PyResult<Matrix<'py>> {
+    let demo = instance::demonstration("demo", demo)?;
     let cut_offs = vector("cut_offs", cut_offs)?;
-    let residuals = py.detach(|| preprocessing::residuals(&demo.0, &cut_offs)).map_err(raise)?;
+    let residuals = py.detach(|| preprocessing::residuals(demo, &cut_offs)).map_err(raise)?;
     Ok(residuals.into_pyarray(py))
 }
 
@@ -186,8 +196,9 @@ pub(crate) fn residuals<'py>(
 /// ----------
 /// P. McLeod, G. Wyvill, A smarter way to find pitch, International Computer Music Conference 2005
 #[pyfunction]
-pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
-    py.detach(|| preprocessing::period(&demo.0)).map_err(raise)
+pub(crate) fn period(py: Python<'_>, demo: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let demo = instance::demonstration("demo", demo)?;
+    py.detach(|| preprocessing::period(demo)).map_err(raise)
 }
 
 /// Interpolates missing samples.
@@ -215,7 +226,7 @@ pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
 /// ValueError
 ///     A gap is longer than `max_gap`, or lies at an end.
 #[pyfunction]
-pub(crate) fn fill<'py>(
+pub(crate) fn fill_gaps<'py>(
     py: Python<'py>,
     position: &Bound<'py, PyAny>,
     time: &Bound<'py, PyAny>,

@@ -37,12 +37,14 @@ def run(options: Namespace) -> None:
         "styles": f"{model.n_styles}; truncation error {model.truncation_error:.1%} of the targets",
         "singular values": _several(model.singular_values),
         "noise": _noise(model),
-        "basis": f"{model.regression}; table error {model.table_error:.1e}",
-        "tau": f"{model.tau:g} s",
+        "regression": f"{model.regression}; table error {model.table_error:.1e}",
+        "time": f"tau {model.tau:g} s",
         "constants": constants,
     }
+    if model.kind == "rhythmic":
+        lines["time"] = f"period {2 * np.pi * model.tau:g} s (tau {model.tau:g} s)"
     if len(model.breaks) > 2:
-        lines["timing"] = f"{len(model.breaks) - 1} segments"
+        lines["segments"] = f"{len(model.breaks) - 1}"
     if model.contexts is not None:
         columns = zip(*model.contexts, strict=True)
         lines["contexts"] = ", ".join(_extent(column) for column in columns)

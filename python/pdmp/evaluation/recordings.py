@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp._messages import value_error, warn
+from pdmp._messages import check_number, check_type, value_error, warn
 from pdmp._native import Demonstration, Trajectory, inspected
 
 Array: TypeAlias = NDArray[Any]  # of float64
@@ -106,10 +106,12 @@ def recordings(
     """Checks demonstrations and contexts, and resamples each over normalised time."""
     if kind not in ("discrete", "rhythmic"):
         raise value_error(f'kind = "{kind}": must be "discrete" or "rhythmic"')
+    check_number("n_samples", n_samples)
     if n_samples < 4:
         raise value_error(f"n_samples = {n_samples}: must be at least 4")
     if isinstance(demos, (Demonstration, Trajectory)):
         raise ValueError("demos is a single demonstration: put it into a list")
+    check_type("demos", demos, Iterable, "a list of demonstrations, or a mapping of names to them")
     values = demos.values() if isinstance(demos, Mapping) else demos
     valid = tuple(_with_interval(demo, dt) for demo in values)  # type: ignore[union-attr]
     if not valid:

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdmp._files import atomic_write
 from pdmp._labels import DERIVATIVES, name_list, split_label
-from pdmp._messages import value_error
+from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration, Trajectory
-from pdmp.files import atomic_write
 from pdmp.io import _fields, _time_units
 from pdmp.io._csv_layout import CsvTable, parse_layout
-from pdmp.io._demonstration import make_demonstration
+from pdmp.io._demonstration import check_options, make_demonstration
 
 THOUSANDS = re.compile(r"[^,]*|[-+]?[1-9]\d{0,2}(,\d{3})+")
 CLOCKS = ("t", "time", "Time", "TIME")
@@ -71,6 +71,7 @@ def read_csv(
         A file that cannot be read.
     """
     path = Path(path)
+    check_options(dt, max_gap, time)
     times = CLOCKS if time == CLOCKS[0] else (time, split_label(time)[0])
     table = parse_layout(path, times if dt is None else ())
     header, units = _labels(table)
@@ -212,6 +213,7 @@ def write_csv(
         A file that cannot be written.
     """
     path = Path(path)
+    check_type("trajectory", trajectory, Trajectory, "pdmp.Trajectory")
     names = trajectory.names if names is None else name_list("names", names)
     units = trajectory.units if units is None else name_list("units", units)
     n_dofs = trajectory.position.shape[1]
