@@ -1,4 +1,4 @@
-//! Time of the factorisation for few and for many demonstrations, by rank and by share of the spectrum.
+//! Time of the factorisation for few and for many demonstrations, by rank and by share of the singular values.
 #![allow(missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -83,7 +83,7 @@ fn main() {
     let before = peak_memory();
     print_heading("Milliseconds of a fit, M = 5000, C = 200, D = 7");
     print_row("NGnet, J = 5", 3, &demos, &network.clone().n_styles(Truncation::Rank(5)));
-    print_row("NGnet, J from spectrum", 3, &demos, &network.n_styles(Truncation::Share(0.9)));
+    print_row("NGnet, J from singular values", 3, &demos, &network.n_styles(Truncation::Share(0.9)));
     if let (Some(before), Some(after)) = (before, peak_memory()) {
         println!("\nPeak memory: {after}; {before} before these fits.");
     }

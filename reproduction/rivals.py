@@ -132,7 +132,7 @@ def components(reaching: Reaching) -> Callable[[float], Movement]:
 
     def play(height: float) -> Movement:
         weights = chosen.predict([[height]])[0][0]
-        path = (mean + weights @ factors.basis).reshape(N_SAMPLES, -1)
+        path = (mean + weights @ factors.basis_targets).reshape(N_SAMPLES, -1)
         spline = CubicSpline(np.linspace(0, duration, N_SAMPLES), path, bc_type="clamped")
         # A recording does not wait for the robot; it stays at its last sample.
         times = np.minimum(np.arange(0, duration + 1.0, DT), duration)

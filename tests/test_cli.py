@@ -202,7 +202,7 @@ def test_plot_writes_every_figure(model_file: Path, folder: Path, tmp_path: Path
     figures = tmp_path / "figures"
     assert run("plot", model_file, folder, "-o", figures) == 0
     written = {path.name for path in figures.iterdir()}
-    assert written == {"demonstrations.png", "fan.png", "spectrum.png", "styles.png"}
+    assert written == {"demonstrations.png", "fan.png", "singular_values.png", "styles.png"}
 
 
 def test_plot_draws_the_phase_portrait_of_a_rhythmic_model(tmp_path: Path) -> None:

@@ -1214,7 +1214,7 @@ class Factors:
     def styles(self) -> _Array:  # (M, J)
         """Styles S (M, J) with orthonormal columns. The entry of largest magnitude in each column is positive."""
     @property
-    def basis(self) -> _Array:  # (J, C*D)
+    def basis_targets(self) -> _Array:  # (J, C*D)
         """Basis targets F_basis = SᵀF (J, C·D). Their rows are orthogonal with the singular values as norms."""
     @property
     def singular_values(self) -> _Array:  # decreasing: all, or of a large library the first J

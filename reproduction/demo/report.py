@@ -10,7 +10,7 @@ from reproduction.demo.loop import Run
 from reproduction.metrics import reproduction_error
 
 
-def spectrum_table(model: pdmp.Model) -> str:
+def singular_value_table(model: pdmp.Model) -> str:
     """Returns the share of each singular value in their sum, up to two beyond J."""
     shares = model.singular_values / model.singular_values.sum()
     sums = shares.cumsum()

@@ -13,7 +13,7 @@ from pdmp import plot
 from pdmp._files import atomic_write
 from pdmp.datasets import handwriting
 from reproduction.demo.loop import DT, control, draw_control
-from reproduction.demo.report import error_table, loop_table, spectrum_table, time_table
+from reproduction.demo.report import error_table, loop_table, singular_value_table, time_table
 
 SHAPES = ("CShape", "GShape", "NShape", "Sshape", "WShape")
 BLENDED = ("CShape", "Sshape")
@@ -52,7 +52,7 @@ def run_demo(
         recordings = handwriting(SHAPES)
     demos = [demo for shape in SHAPES for demo in recordings[shape]]
     labels = [shape for shape in SHAPES for _ in recordings[shape]]
-    with timed(times, "learn, J by the spectrum"):
+    with timed(times, "learn, J by the singular values"):
         model = pdmp.fit(demos, progress=progress)
     with timed(times, "learn, J = M"):
         model_of_all = pdmp.fit(demos, n_styles=len(demos), progress=progress)
@@ -74,7 +74,7 @@ def run_demo(
     with timed(times, "draw"):
         figures = {
             "demonstrations": plot.demonstrations(model, demos, labels=labels),
-            "spectrum": plot.spectrum(model),
+            "singular_values": plot.singular_values(model),
             "styles": plot.styles(model, labels),
             "fan": plot.fan(model, here, there, ends=BLENDED),
             "control": draw_control(model, means[RUN], runs),
@@ -87,7 +87,7 @@ def run_demo(
             f"# {len(SHAPES)} handwritten shapes in one primitive",
             f"{len(demos)} human demonstrations, J = {model.n_styles}. An error is the RMSE of a "
             "reproduction over the range of the demonstration, averaged over those of the shape.",
-            spectrum_table(model),
+            singular_value_table(model),
             error_table([model, model_of_all], demos, members),
             loop_table(runs),
             time_table(times),

@@ -42,7 +42,7 @@ def run(options: Namespace) -> None:
     first = model.styles[:, 0]
     ends = [int(first.argmin()), int(first.argmax())]
     figures = {
-        "spectrum": plot.spectrum(model),
+        "singular_values": plot.singular_values(model),
         "styles": plot.styles(model),
         "fan": plot.fan(
             model,

@@ -41,15 +41,6 @@ impl fmt::Display for Number {
     }
 }
 
-/// A bound of an interval, large powers of ten with an exponent.
-pub(super) struct Power(pub(super) f64);
-
-impl fmt::Display for Power {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        if self.0.abs() >= 1e4 { write!(f, "{:e}", self.0) } else { Number(self.0).fmt(f) }
-    }
-}
-
 /// A measured number, to six significant digits.
 pub(super) struct Rounded(pub(super) f64);
 

@@ -9,7 +9,7 @@ mod format;
 use std::path::PathBuf;
 
 use crate::kind::Kind;
-use format::{Count, Gap, Number, Power, Rounded, Times};
+use format::{Count, Gap, Number, Rounded, Times};
 
 /// The caller's next step after an [`Error`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -124,18 +124,6 @@ pub enum Error {
         value: f64,
         /// The allowed range, as the end of the sentence.
         allowed: &'static str,
-    },
-    /// A number outside an interval.
-    #[error("{name} = {}: must lie between {} and {}", Number(*value), Power(*min), Power(*max))]
-    Bounds {
-        /// The argument.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The smallest value that is accepted.
-        min: f64,
-        /// The largest value that is accepted.
-        max: f64,
     },
     /// A cut-off frequency outside its range.
     #[error("{name} = {} Hz: {allowed} of {} Hz", Number(*hz), Rounded(*rate))]
@@ -407,7 +395,6 @@ impl Error {
             | Self::Rows { .. }
             | Self::Single { .. }
             | Self::Range { .. }
-            | Self::Bounds { .. }
             | Self::CutOff { .. }
             | Self::TooLarge { .. }
             | Self::Landmark { .. }

@@ -68,6 +68,9 @@ impl Constants {
 
 /// Checks a rate; the bounds keep products of rates far from overflow and underflow.
 fn check_rate(name: &'static str, value: f64) -> Result<()> {
-    let (min, max) = (1.0 / MAX_RATE, MAX_RATE);
-    if (min..=max).contains(&value) { Ok(()) } else { Err(Error::Bounds { name, value, min, max }) }
+    if (1.0 / MAX_RATE..=MAX_RATE).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::Range { name, value, allowed: "must lie between 1e-6 and 1e6" })
+    }
 }

@@ -23,7 +23,7 @@ use super::movement_metric::{metric, residual_variance};
 use super::noise_findings;
 use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
 use super::stiffness::stiffness;
-use super::style_selection::spectrum;
+use super::style_selection::singular_values;
 use super::tabulation::compile;
 use super::warp_selection::WarpSelection;
 
@@ -110,12 +110,12 @@ pub fn fit_with(
 
     progress(Stage::Regress, 0.0)?;
     let clock = constants.canonical.clock(aligned.n_samples);
-    let basis_targets = by_clock(&factors.basis, &dof_scale);
+    let basis_targets = by_clock(&factors.basis_targets, &dof_scale);
     let mut regressing = |share| progress(Stage::Regress, share);
     let regression = options.basis.regress(constants.domain(), &clock, basis_targets.view(), &mut regressing)?;
 
     let mut compiling = |share| progress(Stage::Compile, share);
-    let shape = (factors.basis.nrows(), demos[0].n_dofs());
+    let shape = (factors.basis_targets.nrows(), demos[0].n_dofs());
     let n_samples = clock.len();
     let forcing_table = compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
 
@@ -216,8 +216,8 @@ impl Training<'_> {
         let forcing = targets.forcing.view();
         match options.n_styles {
             NStyles::AboveNoise => {
-                let noise = spectrum::noise_limit(aligned, constants, transport, dof_scale, options.threads)?;
-                spectrum::systematic(forcing, noise, contexts, progress)
+                let noise = singular_values::noise_limit(aligned, constants, transport, dof_scale, options.threads)?;
+                singular_values::systematic(forcing, noise, contexts, progress)
             }
             NStyles::Truncated(count) => Factors::of(forcing, count, progress),
             NStyles::CrossValidated => {

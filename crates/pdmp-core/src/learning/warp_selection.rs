@@ -100,9 +100,9 @@ fn positions(aligned: &Aligned, kind: Kind) -> Array2<f64> {
 /// metric of their errors. An error of 1 in the relative segment durations weighs as much as the movement about its mean.
 fn outputs(factors: &Factors, segment_durations: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
     let (n, last) = (factors.styles.ncols(), segment_durations.ncols() - 1);
-    let sizes: Vec<f64> = factors.basis.rows().into_iter().map(|row| row.dot(&row)).collect();
-    let movement =
-        factors.basis.var_axis(Axis(1), 0.0).sum() * factors.basis.ncols() as f64 / segment_durations.nrows() as f64;
+    let sizes: Vec<f64> = factors.basis_targets.rows().into_iter().map(|row| row.dot(&row)).collect();
+    let movement = factors.basis_targets.var_axis(Axis(1), 0.0).sum() * factors.basis_targets.ncols() as f64
+        / segment_durations.nrows() as f64;
     let outputs = Array2::from_shape_fn((segment_durations.nrows(), n + last + 1), |(m, p)| match p.checked_sub(n) {
         None => factors.styles[[m, p]],
         Some(k) if k < last => (segment_durations[[m, k]] / segment_durations[[m, last]]).ln(),
@@ -117,7 +117,7 @@ fn outputs(factors: &Factors, segment_durations: &Array2<f64>) -> (Array2<f64>, 
 /// Returns the predicted movement (S·D) over linear time.
 fn predicted(expected: &[f64], factors: &Factors, aligned: &Aligned, kind: Kind) -> ndarray::Array1<f64> {
     let (styles, segment_durations) = expected.split_at(factors.styles.ncols());
-    let curve = ArrayView1::from(styles).dot(&factors.basis);
+    let curve = ArrayView1::from(styles).dot(&factors.basis_targets);
     let last = segment_durations.len() - 1;
     if last == 0 {
         return curve;

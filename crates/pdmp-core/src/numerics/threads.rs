@@ -34,11 +34,10 @@ impl Threads {
     /// # Errors
     /// A number outside 1 to 1024.
     pub fn new(n: usize) -> Result<Self> {
-        NonZeroUsize::new(n).filter(|n| n.get() <= MAX_THREADS).map(Self).ok_or(Error::Bounds {
+        NonZeroUsize::new(n).filter(|n| n.get() <= MAX_THREADS).map(Self).ok_or(Error::Range {
             name: "threads",
             value: n as f64,
-            min: 1.0,
-            max: MAX_THREADS as f64,
+            allowed: "must lie between 1 and 1024",
         })
     }
 

@@ -28,8 +28,6 @@ const MIN_NOISE: f64 = 1e-10;
 /// Largest ratio that the search considers. The signal's deviation is then a hundredth of the noise's, and more noise no
 /// longer changes the likelihood.
 const MAX_NOISE: f64 = 1e4;
-/// Maximum noise ratio that a caller can set; a larger one is taken for a mistake.
-const MAX_GIVEN_NOISE: f64 = 1e6;
 /// Largest ratio that an ill-conditioned factorisation is regularised with.
 const MAX_REGULARISATION: f64 = 1.0;
 /// Samples of which the search scans the likelihood.
@@ -241,8 +239,8 @@ impl Gp {
 
 fn check_noise(noise: Option<f64>) -> Result<()> {
     match noise {
-        Some(value) if !(MIN_NOISE..=MAX_GIVEN_NOISE).contains(&value) => {
-            Err(Error::Bounds { name: "noise", value, min: MIN_NOISE, max: MAX_GIVEN_NOISE })
+        Some(value) if !(MIN_NOISE..=1e6).contains(&value) => {
+            Err(Error::Range { name: "noise", value, allowed: "must lie between 1e-10 and 1e6" })
         }
         _ => Ok(()),
     }
