@@ -116,6 +116,18 @@ impl Demonstration {
 
     /// Sets the goal of this movement (D,). The default is the last sample.
     ///
+    /// ```
+    /// # use ndarray::Array2;
+    /// # use pdmp_core::{Demonstration, Sampling};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let position = Array2::from_shape_fn((50, 1), |(c, _)| c as f64 / 50.0);
+    /// // The recording stops short of the target.
+    /// let demo = Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?.with_goal(vec![1.0])?;
+    /// assert_eq!(demo.goal(), Some(&[1.0][..]));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A length other than D, or a number that is not finite or exceeds [`MAX_MAGNITUDE`].
     pub fn with_goal(mut self, goal: Vec<f64>) -> Result<Self> {

@@ -247,6 +247,18 @@ impl ContextMap {
 
     /// Returns the context that numbers (Q,) encode, where a label is its index in [`ContextMap::columns`].
     ///
+    /// ```
+    /// # use ndarray::array;
+    /// # use pdmp_core::context::{ContextMap, MapSelection};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// let contexts = [vec!["left".into()], vec!["right".into()], vec!["left".into()]];
+    /// let outputs = array![[1.0], [2.0], [1.2]];
+    /// let map = ContextMap::fit(&contexts, outputs.view(), MapSelection::Auto)?;
+    /// assert_eq!(map.context(&[1.0])?, contexts[1]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A number that is not the index of a label.
     pub fn context(&self, numbers: &[f64]) -> Result<Vec<ContextValue>> {

@@ -65,6 +65,20 @@ impl Conditions {
 
     /// Returns the conditions (1 − share)·self + share·other; a share outside [0, 1] extrapolates.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit, rollout};
+    /// # use pdmp_core::motion::TimeGrid;
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let (low, high) = (model.conditions(&[0])?, model.conditions(&[2])?);
+    /// let between = low.blend(&high, 0.5)?;
+    /// let trajectory = rollout(model.primitive(), &between, TimeGrid { dt: 0.01, duration: None })?;
+    /// assert_eq!(trajectory.position.nrows(), 101);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A condition that one of the two lacks, lengths that differ, or a share that is not finite.
     pub fn blend(&self, other: &Self, share: f64) -> Result<Self> {
@@ -158,6 +172,17 @@ impl Conditions {
     }
 
     /// Returns τ in seconds: the given one, that of a movement as long as the sum of the segment durations, or the nominal demonstration's.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let slow = Conditions { segment_durations: Some(vec![2.0]), ..Conditions::default() };
+    /// assert!((slow.time_constant(model.primitive())? - 2.0 * model.tau()).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// Both of them, a τ that is not positive, or segment durations that do not fit the primitive.

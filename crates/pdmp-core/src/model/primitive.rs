@@ -246,6 +246,18 @@ impl Primitive {
     /// Returns the transport profile m(u) of a discrete movement at clock `u`, the position of its frame as a fraction of the
     /// displacement from start to goal. Immediate transport is m ≡ 1.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let primitive = model.primitive();
+    /// assert_eq!(primitive.transport(0.0)?, 0.0);
+    /// assert!((primitive.transport(1.0)? - 1.0).abs() < 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A rhythmic primitive, or a clock that is negative or not finite.
     pub fn transport(&self, u: f64) -> Result<f64> {
@@ -284,6 +296,17 @@ impl Primitive {
     }
 
     /// Returns the attractor landscape b (J, D) by rows at clock `u`, without its gate.
+    ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let landscape = model.primitive().landscape(0.5)?;
+    /// assert_eq!(landscape.len(), model.n_styles() * model.n_dofs());
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A clock that is not finite, or negative for a discrete movement.

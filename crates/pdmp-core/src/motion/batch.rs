@@ -211,6 +211,17 @@ impl Batch {
     ///
     /// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
     ///
+    /// ```
+    /// # use ndarray::Array3;
+    /// # use pdmp_core::motion::Batch;
+    /// # use pdmp_core::numerics::Threads;
+    /// fn positions(batch: &Batch) -> pdmp_core::Result<Array3<f64>> {
+    ///     let mut positions = Array3::zeros(batch.shape());
+    ///     batch.write(0..batch.shape().0, vec![positions.view_mut()], Threads::available(), &mut |_| Ok(()))?;
+    ///     Ok(positions)
+    /// }
+    /// ```
+    ///
     /// # Errors
     /// A range beyond the batch, outputs of another shape or number, or the error of `progress`.
     pub fn write(

@@ -126,6 +126,21 @@ impl Model {
 
     /// Reads a model file.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, Model, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let folder = tempfile::tempdir().unwrap();
+    /// # let path = folder.path().join("reach.safetensors");
+    /// # model.save(&path)?;
+    /// let loaded = Model::load(&path)?;
+    /// assert_eq!(loaded.n_dofs(), 2);
+    /// assert!(Model::load(folder.path()).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A path that cannot be read, or a file that is damaged, not a model, or of another version.
     pub fn load(path: &Path) -> Result<Self> {

@@ -8,6 +8,19 @@ use crate::motion::perturbation::Compliance;
 impl Controller {
     /// Sets the style s (J,).
     ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 0.01, &Conditions::default(), None)?;
+    /// let style = model.demonstrated().styles.row(2).to_vec();
+    /// controller.set_style(&style)?;
+    /// assert_eq!(controller.style(), style);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A wrong length or a number that is not finite. The style then remains unchanged.
     pub fn set_style(&mut self, style: &[f64]) -> Result<()> {
@@ -66,6 +79,19 @@ impl Controller {
 
     /// Sets the anchor y_a (D,) of a rhythmic movement, in the unit of each DoF.
     ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Sampling, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let position = ndarray::Array2::from_shape_fn((100, 1), |(c, _)| (0.02 * std::f64::consts::PI * c as f64).sin());
+    /// # let demos = [Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?];
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Rhythmic))?;
+    /// # let mut controller = Controller::new(model.primitive(), 0.01, &Conditions::default(), None)?;
+    /// controller.set_anchor(&[0.5])?;
+    /// assert_eq!(controller.centre(), [0.5]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A discrete primitive, a wrong length, or a number that is not finite. The anchor then remains unchanged.
     pub fn set_anchor(&mut self, anchor: &[f64]) -> Result<()> {
@@ -95,6 +121,19 @@ impl Controller {
     }
 
     /// Sets the amplitude r₀ of a rhythmic movement. r₀ is filtered, and r converges to it by Eq. (4).
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Sampling, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let position = ndarray::Array2::from_shape_fn((100, 1), |(c, _)| (0.02 * std::f64::consts::PI * c as f64).sin());
+    /// # let demos = [Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?];
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Rhythmic))?;
+    /// # let mut controller = Controller::new(model.primitive(), 0.01, &Conditions::default(), None)?;
+    /// controller.set_amplitude(0.5)?;
+    /// assert_eq!(controller.amplitude(), 0.5);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A discrete primitive, a negative number or one that is not finite. r₀ then remains unchanged.

@@ -106,6 +106,15 @@ impl NoiseBound {
 impl Gp {
     /// Returns a process with the given kernel and hyperparameters; those that are `None` are estimated.
     ///
+    /// ```
+    /// # use pdmp_core::learning::regression::{Gp, Kernel};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// let given = Gp::new(Kernel::Matern52, Some(0.5), None)?;
+    /// assert!(Gp::new(Kernel::Matern52, Some(-0.5), None).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A length that is not positive, or noise outside [1e-10, 1e6].
     pub fn new(kernel: Kernel, length: Option<f64>, noise: Option<f64>) -> Result<Self> {
@@ -135,6 +144,17 @@ impl Gp {
     /// completed fraction; an error it returns cancels the regression.
     ///
     /// If rounding makes K indefinite, ν is raised tenfold, at most to 1; [`GpPosterior::noise`] returns the value used.
+    ///
+    /// ```
+    /// # use ndarray::Array2;
+    /// # use pdmp_core::learning::regression::{Domain, Gp, NoiseBound};
+    /// # let u: Vec<f64> = (0..50).map(|i| f64::from(i) / 49.0).collect();
+    /// # let targets = Array2::from_shape_fn((50, 1), |(i, _)| (3.0 * u[i]).sin() + 0.1 * (i % 2) as f64);
+    /// # let (domain, bound) = (Domain::Interval { end: 1.0 }, NoiseBound::LANDSCAPE);
+    /// let posterior = Gp::default().regress_within(bound, domain, &u, targets.view(), &mut |_| Ok(()))?;
+    /// assert!(posterior.noise() <= 1e-6);
+    /// # Ok::<(), pdmp_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Hyperparameters out of range, arrays that do not match, values that are not finite; a covariance matrix that
