@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ndarray::{Array2, s};
 
-use crate::context::{ContextColumn, ContextMap, tabulate};
+use crate::context::{ContextColumn, ContextMap, MapSelection, tabulate};
 use crate::demonstration::{ContextValue, Demonstration};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
@@ -119,29 +119,31 @@ pub fn fit_with(
     let n_samples = clock.len();
     let forcing_table = compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
 
-    let (segment_durations, nominal) = (aligned.segment_durations.clone(), aligned.nominal);
+    let segment_durations = aligned.segment_durations.clone();
     let (columns, contexts) = contexts.unzip();
     let truncation_error = factors.truncation_error();
     let Factors { styles, singular_values, .. } = factors;
     let durations = aligned.durations();
-    let demonstrated =
-        DemonstrationParameters { styles, goals, starts, anchors, segment_durations, durations, contexts, nominal };
+    let demonstrated = DemonstrationParameters {
+        styles,
+        goals,
+        starts,
+        anchors,
+        segment_durations,
+        durations,
+        contexts,
+        nominal: aligned.nominal,
+    };
     let Constants { attractor, canonical, tau } = constants;
     let breaks = aligned.breaks.clone();
-    let nominal = demonstrated.nominal(canonical.kind());
+    let nominal = demonstrated.nominal_conditions(canonical.kind());
     let parts = Parts { attractor, forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal };
     let primitive = Arc::new(Primitive::new(parts));
     findings.extend(stiffness(&primitive, &aligned)?);
     let noise = aligned.noise.clone();
-    let (map, residual_variance) = match (columns, &demonstrated.contexts) {
-        (Some(columns), Some(contexts)) => {
-            let outputs = demonstrated.outputs(canonical.kind());
-            let metric = metric(&primitive, outputs.view(), demonstrated.segment_durations.view())?;
-            let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
-            (Some(map), Some(residual_variance(&primitive, outputs.view(), aligned)?))
-        }
-        _ => (None, None),
-    };
+    let contexts = columns.zip(demonstrated.contexts.as_ref());
+    let learn = |contexts| learn_map(contexts, &primitive, &demonstrated, aligned, options.map);
+    let (map, residual_variance) = contexts.map(learn).transpose()?.unzip();
     let regression = regression.describe();
     let learnt = FitSummary {
         n_samples,
@@ -155,6 +157,20 @@ pub fn fit_with(
         findings,
     };
     Ok(Model { primitive, demonstrated, learnt, map })
+}
+
+/// Learns the map from contexts (M, Q) to movements, and the residual variance (S, D) of the movements.
+fn learn_map(
+    (columns, contexts): (Vec<ContextColumn>, &Array2<f64>),
+    primitive: &Arc<Primitive>,
+    demonstrated: &DemonstrationParameters,
+    aligned: Aligned,
+    selection: MapSelection,
+) -> Result<(ContextMap, Array2<f64>)> {
+    let outputs = demonstrated.outputs(primitive.kind());
+    let metric = metric(primitive, outputs.view(), demonstrated.segment_durations.view())?;
+    let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), selection)?;
+    Ok((map, residual_variance(primitive, outputs.view(), aligned)?))
 }
 
 /// Types of the context columns (Q,), and the contexts (M, Q) as numbers.

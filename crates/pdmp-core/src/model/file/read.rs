@@ -204,7 +204,7 @@ impl Reader<'_> {
             units: constants.units.clone(),
             ranges,
             breaks,
-            nominal: demonstrated.nominal(kind),
+            nominal: demonstrated.nominal_conditions(kind),
         });
         let model = Model { primitive: Arc::new(primitive), demonstrated, learnt, map };
         self.verify(&constants, &model, crc32)?;
