@@ -203,9 +203,9 @@ impl CommandFilter {
         repack(&mut self.target, target);
     }
 
-    /// Sets the values without a transition and leaves the targets.
-    pub(crate) fn set_value(&mut self, value: &[F64x4]) {
-        self.value.copy_from_slice(value);
+    /// Sets the value of a group without a transition and leaves its target.
+    pub(crate) fn set_value(&mut self, group: usize, value: F64x4) {
+        self.value[group] = value;
     }
 
     /// Sets targets and values.

@@ -44,7 +44,7 @@ pub(crate) struct TransportSegment {
     cubic: [f64; 4],
 }
 
-/// TransportSample ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
+/// Lag ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TransportSample {
     pub(crate) value: f64,

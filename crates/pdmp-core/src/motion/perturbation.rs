@@ -78,6 +78,8 @@ pub(crate) struct Perturbation {
     error: Vec<F64x4>,
     /// Expected error o, by groups of DoFs.
     expected_error: Vec<F64x4>,
+    /// Velocity of the tracking term in the last tick, by groups of DoFs.
+    pull: Vec<F64x4>,
     /// λ, per unit of the clock.
     adaptation_rate: f64,
     /// Share of the last measured error that the ticks since then have not yet corrected.
@@ -111,7 +113,8 @@ impl Perturbation {
             compliance: Compliance { stopping: STOPPING_GAIN, tracking: TRACKING_GAIN / extent },
             measured: false,
             error: zeros.clone(),
-            expected_error: zeros,
+            expected_error: zeros.clone(),
+            pull: zeros,
             adaptation_rate: ADAPTATION_RATE / extent,
             remaining_pull: 1.0,
             turn: pack(&turn),
@@ -130,6 +133,12 @@ impl Perturbation {
         self.clear_terms();
         self.measured = false;
         self.expected_error.fill(F64x4::ZERO);
+        self.pull.fill(F64x4::ZERO);
+    }
+
+    /// Returns the velocity of the tracking term in the last tick, by groups of DoFs.
+    pub(crate) fn pull(&self) -> &[F64x4] {
+        &self.pull
     }
 
     /// Returns whether a measurement is in force.
@@ -137,7 +146,8 @@ impl Perturbation {
         self.measured
     }
 
-    /// Sets the perturbation of a tick of `dt` seconds and `h` on the clock that starts at `position`. The command is valid.
+    /// Sets the perturbation of a tick that starts at `position`, of `h` on the clock and a pull over `dt` seconds. The command
+    /// is valid.
     ///
     /// The error of a measurement before the first tick is expected: nothing has moved, so that the robot is not blocked.
     pub(crate) fn set(&mut self, command: &Command, position: &[F64x4], dt: f64, h: f64, started: bool) {
@@ -175,13 +185,14 @@ impl Perturbation {
         // The share of the error that k_t alone would correct over the tick, so that the pull does not overshoot ỹ. It is
         // stable for every tick and gain up to β_z = 4α_z at least, far above the critical damping of α_z/4.
         let share = -(-tracking * h).exp_m1();
-        let pull = self.remaining_pull * share / dt;
+        let pull = if dt > 0.0 { self.remaining_pull * share / dt } else { 0.0 };
         self.remaining_pull *= 1.0 - share;
         let mut squares = F64x4::ZERO;
         for (group, velocity) in self.terms.velocity.iter_mut().enumerate() {
             let error = self.error[group];
             let unexpected = error - self.expected_error[group].max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
-            *velocity += unexpected * pull;
+            self.pull[group] = unexpected * pull;
+            *velocity += self.pull[group];
             let scaled = unexpected * self.inverse_range[group] * stopping.sqrt();
             squares += scaled * scaled;
         }

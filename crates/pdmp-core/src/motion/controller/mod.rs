@@ -95,8 +95,14 @@ pub struct Controller {
     /// Transition of the frame to a commanded goal and final velocity.
     goal_transition: GoalTransition,
     min_durations: MinDurations,
+    /// True while the transition ends with the final velocity.
+    approaching: bool,
+    /// y′ at the end of a transition to the final velocity.
+    arrival_slope: Vec<F64x4>,
     /// r₀.
     amplitude: CommandFilter,
+    /// Largest τ commanded since the start.
+    max_tau: f64,
     /// Factor of the rate 1/τ.
     speed: f64,
     /// Tolerance of a settled movement, relative to the range of each DoF.
@@ -168,7 +174,10 @@ impl Controller {
             centre: CommandFilter::new(&conditions.centre),
             goal_transition: GoalTransition::inactive(groups.len()),
             min_durations: MinDurations::new(primitive.attractor(), transition / primitive.tau()),
+            approaching: false,
+            arrival_slope: zeros.clone(),
             amplitude: CommandFilter::new(&[conditions.amplitude]),
+            max_tau: conditions.tau,
             speed: 1.0,
             tolerance: DEFAULT_TOLERANCE,
             groups,
@@ -228,6 +237,7 @@ impl Controller {
         self.perturbation.clear();
         (self.time, self.clock) = (CompensatedSum::default(), CompensatedSum::default());
         let conditions = &self.conditions;
+        self.max_tau = conditions.tau;
         self.r = conditions.amplitude;
         self.style.reset(&conditions.style);
         self.rate.reset(&[self.speed / conditions.tau]);
@@ -239,6 +249,7 @@ impl Controller {
             }
         }
         self.goal_transition.clear();
+        self.approaching = false;
         self.read_frame();
         self.read_forcing();
         self.set_initial_state();
@@ -287,7 +298,7 @@ impl Controller {
         self.check_tick_length(self.dt, None)?;
         let h = self.clock_step(self.dt);
         if self.perturbation.has_measurement() {
-            self.perturbation.set(&Command::default(), &self.position, self.dt, h, self.started);
+            self.perturb(&Command::default(), self.dt, h);
         } else {
             self.perturbation.clear_terms();
         }
@@ -366,7 +377,14 @@ impl Controller {
             return Ok(self.status);
         }
         let h = self.clock_step(dt);
-        self.perturbation.set(command, &self.position, dt, h, self.started);
+        self.perturb(command, dt, h);
         Ok(self.tick(dt, h))
+    }
+
+    /// Sets the perturbation of a tick of `dt` seconds and `h` on the clock.
+    fn perturb(&mut self, command: &Command, dt: f64, h: f64) {
+        // The terms fade where the rate is below 1/max_tau, while the pull of a measurement is one on the clock.
+        let full = dt.min(h * self.max_tau);
+        self.perturbation.set(command, &self.position, full, h, self.started);
     }
 }
