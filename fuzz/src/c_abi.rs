@@ -170,12 +170,14 @@ impl Caller<'_> {
                 8 => return self.reset(slot, input),
                 9 => return self.update(slot, input),
                 10 => return self.call_model(input),
-                11 => {
-                    if input.byte().is_multiple_of(2) {
+                11 => match input.byte() % 4 {
+                    1 => pdmp_controller_set_phase(controller, input.number()),
+                    3 => pdmp_controller_set_phase_gain(controller, input.number()),
+                    _ => {
                         self.slots[slot] = None;
+                        return;
                     }
-                    return;
-                }
+                },
                 _ => {
                     let mut status = PDMP_OK;
                     let mut controller = controller;
@@ -248,6 +250,7 @@ impl Caller<'_> {
             dt: pointer(&dt),
             measured: measured.vector(),
             coupling: pdmp_coupling { velocity: velocity.vector(), acceleration: acceleration.vector() },
+            phase: pointer(&amplitude),
         };
         let mut outputs: [Numbers; 3] = std::array::from_fn(|_| Numbers::new(n_dofs, input));
         let [position, velocity, acceleration] = outputs.each_mut().map(Numbers::buffer);

@@ -1537,8 +1537,8 @@ class Controller:
     """Running movement, returned by `Model.controller`.
 
     `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-    valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
-    is rejected leaves the present one in force.
+    valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `compliance` and `phase_gain` can be set at
+    any tick; a value that is rejected leaves the present one in force.
     """
     def __copy__(self) -> Controller: ...
     def __deepcopy__(self, _memo: Any, /) -> Controller: ...
@@ -1548,6 +1548,7 @@ class Controller:
         *,
         measured: ArrayLike | None = None,  # (D,)
         coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
+        phase: float | None = None,
     ) -> Status:
         """Advance the movement by one tick.
 
@@ -1555,7 +1556,7 @@ class Controller:
 
             tau y' = z + w(u) + k_t d + tau c_v
             tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
-            tau u' = k = 1 / (1 + k_s |d / range|**2)
+            tau u' = max(0, k + k_phi sin(phase - phi))     k = 1 / (1 + k_s |d / range|**2)
             tau o' = 5 k (e - o) / extent
 
         with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
@@ -1563,7 +1564,8 @@ class Controller:
         terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
         m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
         there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
-        finishes.
+        finishes. A measured phase pulls the phase of a rhythmic movement with the gain k_phi of `phase_gain`, without
+        overshoot for a tick of any length.
 
         Parameters
         ----------
@@ -1575,6 +1577,9 @@ class Controller:
             `release`, so that a sensor may be slower than the loop.
         coupling : tuple of two array_like, (D,), optional
             Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
+        phase : float, optional
+            Measured phase in rad of a rhythmic movement, for this tick only. A sensor slower than the loop passes its
+            last phase plus the time since then over tau.
 
         Returns
         -------
@@ -1584,8 +1589,8 @@ class Controller:
         Raises
         ------
         ValueError
-            The tick is negative or longer than 1000 tau, a length is wrong, or a number is not finite. The state then
-            stays as it was.
+            The tick is negative or longer than 1000 tau, a length is wrong, a number is not finite, or a phase is passed
+            to a discrete movement. The state then stays as it was.
 
         Examples
         --------
@@ -1600,6 +1605,7 @@ class Controller:
         Ijspeert, Nakanishi, Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739 (phase stopping, term in y').
         Schaal, Mohajerian, Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9.
         Pastor, Hoffmann, Asfour, Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385 (terms in z').
+        Acebrón, Bonilla, Pérez Vicente, Ritort, Spigler, Reviews of Modern Physics 77, 137, 2005 (pull of the phase).
         """
     def release(self) -> None:
         """Discard the measured position.
@@ -1646,7 +1652,45 @@ class Controller:
         """Result of the last `step`, or `WORKING` after a later command."""
     @property
     def phase(self) -> float:  # x in (0, 1], or phi in [0, 2 pi)
-        """Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one."""
+        """Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one.
+
+        Assigning the phase of a rhythmic movement resets it, for example at the heel strike of a gait. Position and
+        velocity are continuous, the acceleration jumps, and the deviation from the cycle at the new phase decays. Before
+        the first tick the movement starts at this phase. A discrete movement rejects it.
+
+        Examples
+        --------
+        Reset the phase at each heel strike, and adapt the frequency by the measured stride:
+
+        >>> walk = np.sin(2 * np.pi * np.arange(100) / 100)[:, None]
+        >>> gait = pdmp.fit([pdmp.Demonstration(walk, dt=0.01)], kind="rhythmic")
+        >>> controller = gait.controller(dt=0.01)
+        >>> stride, heel, gain = 1.25, 0.0, 0.5
+        >>> for _ in range(12):
+        ...     for _ in range(125):
+        ...         _ = controller.step()
+        ...     controller.phase = heel
+        ...     omega = 1 / controller.tau
+        ...     controller.tau = 1 / (omega + gain * (2 * np.pi / stride - omega))
+        >>> round(2 * np.pi * controller.tau, 2)
+        1.25
+
+        References
+        ----------
+        Nakanishi, Morimoto, Endo, Cheng, Schaal, Kawato, Robotics and Autonomous Systems 47 (2004) 79-91 (the rule).
+        The same authors, IROS 2004, doi:10.1109/IROS.2004.1389470 (phase resetting).
+        """
+    @phase.setter
+    def phase(self, phase: float, /) -> None: ...
+    @property
+    def phase_gain(self) -> float:
+        """Gain k_phi of a measured phase in `step`, per unit of u, from 0 to 1000; 1 by default, 0 disables the pull.
+
+        An error of the phase decays with exp(-k_phi t / tau). A movement whose frequency differs from the measured one
+        by the share e lags by asin(e / k_phi), and is synchronised for e < k_phi. The gain stays in force after `reset`.
+        """
+    @phase_gain.setter
+    def phase_gain(self, gain: float, /) -> None: ...
     @property
     def time(self) -> float:
         """Time since the start in s."""

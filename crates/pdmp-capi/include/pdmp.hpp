@@ -177,6 +177,13 @@ public:
         controller_.reset(controller);
     }
 
+    /// Copies the controller with its state, see pdmp_controller_clone.
+    Controller clone() const {
+        pdmp_controller *copy = nullptr;
+        detail::check([&](pdmp_text error) { return pdmp_controller_clone(get(), {}, &copy, error); });
+        return Controller(copy);
+    }
+
     /// Starts a new movement, see pdmp_controller_reset.
     void reset(const Conditions &conditions = {}) {
         const pdmp_conditions c = detail::to_c(conditions);
@@ -194,6 +201,8 @@ public:
         return pdmp_controller_set_compliance(get(), stopping, tracking);
     }
 
+    pdmp_status set_phase(double phase) noexcept { return pdmp_controller_set_phase(get(), phase); }
+    pdmp_status set_phase_gain(double gain) noexcept { return pdmp_controller_set_phase_gain(get(), gain); }
     pdmp_status set_speed(double speed) noexcept { return pdmp_controller_set_speed(get(), speed); }
     pdmp_status release() noexcept { return pdmp_controller_release(get()); }
 
@@ -228,6 +237,8 @@ public:
     pdmp_controller *get() const noexcept { return controller_.get(); }
 
 private:
+    explicit Controller(pdmp_controller *controller) noexcept : controller_(controller) {}
+
     struct Free {
         void operator()(pdmp_controller *controller) const noexcept { pdmp_controller_free(controller); }
     };

@@ -245,6 +245,21 @@ pub extern "C" fn pdmp_controller_set_amplitude(
     call_on(controller, |controller| Ok(controller.inner.set_amplitude(amplitude).map(|()| PDMP_OK)?))
 }
 
+/// Sets the phase phi of a rhythmic movement, in rad, for example at the heel strike of a gait. Position and velocity are
+/// continuous, and the deviation from the cycle at the new phase decays. Before the first tick the movement starts at this
+/// phase. Errors: PDMP_NULL, PDMP_RANGE, PDMP_ABSENT.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_set_phase(controller: Option<&mut pdmp_controller>, phase: f64) -> pdmp_status {
+    call_on(controller, |controller| Ok(controller.inner.set_phase(phase).map(|()| PDMP_OK)?))
+}
+
+/// Sets the gain k_phi in [0, 1000] of a measured phase, pdmp_command.phase, per unit of the clock u: an error of the phase
+/// decays with exp(-k_phi t/tau). 1 by default, 0 disables the pull. Errors: PDMP_NULL, PDMP_RANGE.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_set_phase_gain(controller: Option<&mut pdmp_controller>, gain: f64) -> pdmp_status {
+    call_on(controller, |controller| Ok(controller.inner.set_phase_gain(gain).map(|()| PDMP_OK)?))
+}
+
 /// Sets the speed in [0, 1e6], a factor of the rate 1/tau: 0 pauses the movement on its path, 1 is the default. The
 /// change is filtered like tau, and persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
 #[unsafe(no_mangle)]
@@ -292,12 +307,13 @@ pub extern "C" fn pdmp_controller_step(controller: Option<&mut pdmp_controller>)
 ///
 ///     tau y' = z + w(u) + k_t d + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
-///     tau u' = k = 1 / (1 + k_s |d / range|^2)
+///     tau u' = max(0, k + k_phi sin(phi* - phi))      k = 1 / (1 + k_s |d / range|^2)
 ///     tau o' = 5 k (e - o) / extent
 ///
 /// with the coupling terms c_v and c_a, the tracking error e = m - y at the measured position m, the expected error o,
 /// and d, the part of e beyond o: d = e - min(max(o, min(e, 0)), max(e, 0)) for each DoF. The last e stays in force
-/// until the next measurement or pdmp_controller_release.
+/// until the next measurement or pdmp_controller_release. A measured phase phi* pulls the phase of a rhythmic movement; the
+/// pull is the mean over the tick of the exact solution, so that it does not overshoot phi*.
 ///
 /// Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE; PDMP_ABSENT if a command does not apply to the kind of model.
 #[unsafe(no_mangle)]

@@ -38,6 +38,7 @@ fn to_c(command: &Command) -> pdmp_command {
             velocity: vector(command.coupling.map(|terms| terms.velocity)),
             acceleration: vector(command.coupling.map(|terms| terms.acceleration)),
         },
+        phase: pointer(&command.phase),
     }
 }
 
@@ -89,6 +90,7 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                 amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(values[0].abs()),
                 measured: random.rarely().then_some(per_dof),
                 coupling: random.rarely().then_some(Coupling { velocity: per_dof, acceleration: per_dof }),
+                phase: (random.rarely() && kind == Kind::Rhythmic).then_some(10.0 * values[0]),
             };
             let mut motion =
                 Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
@@ -110,6 +112,8 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                         rust.set_compliance(Compliance { stopping: tau, tracking: tau }),
                         pdmp_controller_set_compliance(c.as_mut(), tau, tau),
                     ),
+                    6 => (rust.set_phase(tau), pdmp_controller_set_phase(c.as_mut(), tau)),
+                    7 => (rust.set_phase_gain(tau), pdmp_controller_set_phase_gain(c.as_mut(), tau)),
                     _ => (Ok(()), pdmp_status::PDMP_OK),
                 }
             };

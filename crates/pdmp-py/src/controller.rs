@@ -55,8 +55,8 @@ struct Arguments {
 /// Running movement, returned by `Model.controller`.
 ///
 /// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-/// valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
-/// is rejected leaves the present one in force.
+/// valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `compliance` and `phase_gain` can be set at
+/// any tick; a value that is rejected leaves the present one in force.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,
@@ -109,7 +109,7 @@ impl Controller {
     ///
     ///     tau y' = z + w(u) + k_t d + tau c_v
     ///     tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
-    ///     tau u' = k = 1 / (1 + k_s |d / range|**2)
+    ///     tau u' = max(0, k + k_phi sin(phase - phi))     k = 1 / (1 + k_s |d / range|**2)
     ///     tau o' = 5 k (e - o) / extent
     ///
     /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
@@ -117,7 +117,8 @@ impl Controller {
     /// terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
     /// m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
     /// there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
-    /// finishes.
+    /// finishes. A measured phase pulls the phase of a rhythmic movement with the gain k_phi of `phase_gain`, without
+    /// overshoot for a tick of any length.
     ///
     /// Parameters
     /// ----------
@@ -129,6 +130,9 @@ impl Controller {
     ///     `release`, so that a sensor may be slower than the loop.
     /// coupling : tuple of two array_like, (D,), optional
     ///     Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
+    /// phase : float, optional
+    ///     Measured phase in rad of a rhythmic movement, for this tick only. A sensor slower than the loop passes its
+    ///     last phase plus the time since then over tau.
     ///
     /// Returns
     /// -------
@@ -138,8 +142,8 @@ impl Controller {
     /// Raises
     /// ------
     /// ValueError
-    ///     The tick is negative or longer than 1000 tau, a length is wrong, or a number is not finite. The state then
-    ///     stays as it was.
+    ///     The tick is negative or longer than 1000 tau, a length is wrong, a number is not finite, or a phase is passed
+    ///     to a discrete movement. The state then stays as it was.
     ///
     /// Examples
     /// --------
@@ -154,16 +158,18 @@ impl Controller {
     /// Ijspeert, Nakanishi, Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739 (phase stopping, term in y').
     /// Schaal, Mohajerian, Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9.
     /// Pastor, Hoffmann, Asfour, Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385 (terms in z').
-    #[pyo3(signature = (dt=None, *, measured=None, coupling=None))]
+    /// Acebrón, Bonilla, Pérez Vicente, Ritort, Spigler, Reviews of Modern Physics 77, 137, 2005 (pull of the phase).
+    #[pyo3(signature = (dt=None, *, measured=None, coupling=None, phase=None))]
     fn step(
         &mut self,
         py: Python<'_>,
         dt: Option<Scalar<'_>>,
         measured: Option<&Bound<'_, PyAny>>,
         coupling: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+        phase: Option<Scalar<'_>>,
     ) -> PyResult<Py<PyAny>> {
         let Self { inner, arguments, .. } = self;
-        let dt = optional_number("dt", dt)?;
+        let (dt, phase) = (optional_number("dt", dt)?, optional_number("phase", phase)?);
         if let Some(measured) = measured {
             refill("measured", measured, &mut arguments.measured)?;
         }
@@ -176,6 +182,7 @@ impl Controller {
             dt,
             measured: measured.map(|_| arguments.measured.as_slice()),
             coupling: coupling.map(|_| terms),
+            phase,
             ..Command::default()
         };
         inner.step_with(&command).map_err(raise)?;
@@ -232,9 +239,55 @@ impl Controller {
     }
 
     /// Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one.
+    ///
+    /// Assigning the phase of a rhythmic movement resets it, for example at the heel strike of a gait. Position and
+    /// velocity are continuous, the acceleration jumps, and the deviation from the cycle at the new phase decays. Before
+    /// the first tick the movement starts at this phase. A discrete movement rejects it.
+    ///
+    /// Examples
+    /// --------
+    /// Reset the phase at each heel strike, and adapt the frequency by the measured stride:
+    ///
+    /// >>> walk = np.sin(2 * np.pi * np.arange(100) / 100)[:, None]
+    /// >>> gait = pdmp.fit([pdmp.Demonstration(walk, dt=0.01)], kind="rhythmic")
+    /// >>> controller = gait.controller(dt=0.01)
+    /// >>> stride, heel, gain = 1.25, 0.0, 0.5
+    /// >>> for _ in range(12):
+    /// ...     for _ in range(125):
+    /// ...         _ = controller.step()
+    /// ...     controller.phase = heel
+    /// ...     omega = 1 / controller.tau
+    /// ...     controller.tau = 1 / (omega + gain * (2 * np.pi / stride - omega))
+    /// >>> round(2 * np.pi * controller.tau, 2)
+    /// 1.25
+    ///
+    /// References
+    /// ----------
+    /// Nakanishi, Morimoto, Endo, Cheng, Schaal, Kawato, Robotics and Autonomous Systems 47 (2004) 79-91 (the rule).
+    /// The same authors, IROS 2004, doi:10.1109/IROS.2004.1389470 (phase resetting).
     #[getter]
     fn phase(&self) -> f64 {
         self.inner.phase()
+    }
+
+    #[setter]
+    fn set_phase(&mut self, phase: Scalar<'_>) -> PyResult<()> {
+        let result = self.inner.set_phase(phase.number("phase")?);
+        self.command(result)
+    }
+
+    /// Gain k_phi of a measured phase in `step`, per unit of u, from 0 to 1000; 1 by default, 0 disables the pull.
+    ///
+    /// An error of the phase decays with exp(-k_phi t / tau). A movement whose frequency differs from the measured one
+    /// by the share e lags by asin(e / k_phi), and is synchronised for e < k_phi. The gain stays in force after `reset`.
+    #[getter]
+    fn phase_gain(&self) -> f64 {
+        self.inner.phase_gain()
+    }
+
+    #[setter]
+    fn set_phase_gain(&mut self, gain: Scalar<'_>) -> PyResult<()> {
+        self.inner.set_phase_gain(gain.number("phase_gain")?).map_err(raise)
     }
 
     /// Result of the last `step`, or `WORKING` after a later command.

@@ -197,6 +197,11 @@ impl Perturbation {
         self.phase_rate
     }
 
+    /// Adds the pull of a measured phase to the phase rate, which stays at least 0.
+    pub(crate) fn add_phase_pull(&mut self, pull: f64) {
+        self.phase_rate = (self.phase_rate + pull).max(0.0);
+    }
+
     /// Returns k_s and k_t.
     pub(crate) fn compliance(&self) -> Compliance {
         self.compliance

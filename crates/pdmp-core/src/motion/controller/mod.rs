@@ -15,6 +15,7 @@
 mod avx;
 mod getters;
 mod group;
+mod phase;
 mod setters;
 mod step;
 
@@ -107,6 +108,8 @@ pub struct Controller {
     /// Level relative to which tiny states are flushed to zero.
     flush_level: f64,
     perturbation: Perturbation,
+    /// k_φ.
+    phase_gain: f64,
     /// Maximum clock step of a substep.
     max_clock_step: f64,
     /// Filter step of the rate over the last substep, reused for the next one of that length.
@@ -173,6 +176,7 @@ impl Controller {
             acceleration: zeros,
             flush_level: FLUSH_RATIO * largest_range(primitive.ranges()),
             perturbation: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
+            phase_gain: phase::PHASE_GAIN,
             max_clock_step,
             rate_step: rate_gains.step_with_integral(dt),
             command_step: FilterStep::IDENTITY,
@@ -292,7 +296,7 @@ impl Controller {
     /// ```text
     /// τẏ = z + w(u) + k_t d + τc_v
     /// τż = α_z(β_z(g − y) − z) + τ²c_a
-    /// τu̇ = κ = 1/(1 + k_s‖d/range‖²)
+    /// τu̇ = max(0, κ + k_φ sin(φ* − φ)),     κ = 1/(1 + k_s‖d/range‖²)
     /// τȯ = λκ(e − o)
     /// ```
     ///
@@ -304,6 +308,9 @@ impl Controller {
     /// that a sensor may be slower than the loop. Coupling terms add c_v to the velocity and c_a to the acceleration. The
     /// pull over a tick of `dt` seconds and h on the clock is the velocity d(1 − exp(−k_t h))/dt: for any length of the tick
     /// it does not overshoot ỹ.
+    ///
+    /// A measured phase φ* pulls the phase of a rhythmic movement with the gain of [`Controller::set_phase_gain`]; the pull
+    /// is the mean over the tick of the exact solution, so that it does not overshoot φ*.
     ///
     /// Phase stopping and tracking: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
     /// Mohajerian and Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9. Terms in ż:
@@ -356,6 +363,9 @@ impl Controller {
         }
         let h = self.clock_step(dt);
         self.perturbation.set(command, &self.position, dt, h);
+        if let Some(phase) = command.phase {
+            self.pull_phase(phase, h);
+        }
         Ok(self.tick(dt, h))
     }
 }
