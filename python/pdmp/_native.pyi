@@ -1612,6 +1612,44 @@ class Controller:
 
         The movement is unperturbed until the next measurement.
         """
+    def forecast(self, horizon: float, dt: float | None = None) -> Trajectory:
+        """Compute the motion over the next seconds under the present commands, without a change of the controller.
+
+        Commands in transition continue. A measured position remains in force as in `step`; coupling terms and a measured
+        phase, which apply to one tick, do not. Ticks are exact for any length, so that a coarse `dt` is as accurate as a
+        fine one, except for a measured position, whose terms are constant over a tick. The call allocates and belongs
+        outside the real-time loop, which another thread may step meanwhile.
+
+        Parameters
+        ----------
+        horizon : float
+            Length in s.
+        dt : float, optional
+            Interval between samples in s; by default that of the controller, for which the samples are those of the loop
+            to the bit.
+
+        Returns
+        -------
+        Trajectory
+            n + 1 samples, where n is horizon / dt rounded down. Times are from now, and the first sample is the present
+            motion.
+
+        Raises
+        ------
+        ValueError
+            `horizon` is negative or not finite, `dt` is not positive or longer than 1000 tau, or there are more than 1e7
+            samples.
+
+        Examples
+        --------
+        >>> controller = model.controller(dt=0.01)
+        >>> controller.goal = [1.1, 0.0]
+        >>> ahead = controller.forecast(0.5)
+        >>> for _ in range(50):
+        ...     _ = controller.step()
+        >>> np.array_equal(ahead.position[-1], controller.position)
+        True
+        """
     def reset(
         self,
         conditions: Conditions | None = None,

@@ -11,7 +11,8 @@ use pyo3::types::PyDict;
 
 use crate::conditions::conditions_of;
 use crate::convert::{Reduced, Vector, items, quoted, read_only, refill};
-use crate::error::raise;
+use crate::demonstration::Trajectory;
+use crate::error::{interruptible, raise};
 use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
 
@@ -218,6 +219,51 @@ impl Controller {
         let conditions = conditions_of(&self.model, conditions, context, changes)?;
         let result = self.inner.reset(&conditions);
         self.command(result)
+    }
+
+    /// Compute the motion over the next seconds under the present commands, without a change of the controller.
+    ///
+    /// Commands in transition continue. A measured position remains in force as in `step`; coupling terms and a measured
+    /// phase, which apply to one tick, do not. Ticks are exact for any length, so that a coarse `dt` is as accurate as a
+    /// fine one, except for a measured position, whose terms are constant over a tick. The call allocates and belongs
+    /// outside the real-time loop, which another thread may step meanwhile.
+    ///
+    /// Parameters
+    /// ----------
+    /// horizon : float
+    ///     Length in s.
+    /// dt : float, optional
+    ///     Interval between samples in s; by default that of the controller, for which the samples are those of the loop
+    ///     to the bit.
+    ///
+    /// Returns
+    /// -------
+    /// Trajectory
+    ///     n + 1 samples, where n is horizon / dt rounded down. Times are from now, and the first sample is the present
+    ///     motion.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     `horizon` is negative or not finite, `dt` is not positive or longer than 1000 tau, or there are more than 1e7
+    ///     samples.
+    ///
+    /// Examples
+    /// --------
+    /// >>> controller = model.controller(dt=0.01)
+    /// >>> controller.goal = [1.1, 0.0]
+    /// >>> ahead = controller.forecast(0.5)
+    /// >>> for _ in range(50):
+    /// ...     _ = controller.step()
+    /// >>> np.array_equal(ahead.position[-1], controller.position)
+    /// True
+    #[pyo3(signature = (horizon, dt=None))]
+    fn forecast(slf: &Bound<'_, Self>, horizon: Scalar<'_>, dt: Option<Scalar<'_>>) -> PyResult<Trajectory> {
+        let (horizon, dt) = (horizon.number("horizon")?, optional_number("dt", dt)?);
+        // A copy, so that a loop in another thread may step the controller meanwhile.
+        let (inner, model) = (slf.borrow().inner.clone(), Arc::clone(&slf.borrow().model));
+        let trajectory = interruptible(slf.py(), |progress| inner.forecast_with(horizon, dt, progress))?;
+        Ok(Trajectory::new(slf.py(), trajectory, model.names(), model.units()))
     }
 
     /// Position y (D,) in the unit of each degree of freedom; a read-only view.

@@ -10,6 +10,7 @@
 
 use crate::dynamics::output_system::INVERSE_FACTORIAL;
 use crate::numerics::simd::{F64x4, Register, pack, repack};
+use crate::numerics::state::clone_in_place;
 
 /// ωt at which 99 % of a step are done: the root of (1 + s)exp(−s) = 0.01.
 const SETTLING_TIME: f64 = 6.638_352_067_993_813;
@@ -159,7 +160,7 @@ impl FilterStep {
 }
 
 /// Filtered commands with a common transition, in groups of four, padded with zeros.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct CommandFilter {
     value: Vec<F64x4>,
     rate: Vec<F64x4>,
@@ -167,6 +168,8 @@ pub(crate) struct CommandFilter {
     /// Time until the values are set to their targets.
     remaining: f64,
 }
+
+clone_in_place!(CommandFilter { value, rate, target, remaining });
 
 impl CommandFilter {
     /// Returns commands at rest on their targets.

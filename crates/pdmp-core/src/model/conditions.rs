@@ -4,6 +4,7 @@ use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::primitive::Primitive;
+use crate::numerics::state::clone_in_place;
 use crate::validate::{check_positive, check_vector};
 
 /// Conditions under which a movement starts. A condition that is `None` is that of the nominal demonstration.
@@ -166,7 +167,7 @@ impl Conditions {
 }
 
 /// Conditions with nothing left open but a start on the cycle and a demonstrated start velocity.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct ResolvedConditions {
     pub(crate) style: Vec<f64>,
     /// Goal or anchor.
@@ -178,6 +179,8 @@ pub(crate) struct ResolvedConditions {
     /// φ in [0, 2π); 0 where discrete.
     pub(crate) phase: f64,
 }
+
+clone_in_place!(ResolvedConditions { style, centre, start, velocity, amplitude, tau, phase });
 
 /// Refuses an argument that this kind of primitive does not have.
 pub(crate) fn reject_for_kind(kind: Kind, name: &'static str, given: bool) -> Result<()> {

@@ -30,6 +30,7 @@
 use crate::error::{Error, Result};
 use crate::motion::command::{Command, Coupling};
 use crate::numerics::simd::{F64x4, groups, pack, repack};
+use crate::numerics::state::clone_in_place;
 
 /// Default k_s: an error of a tenth of the range slows the phase elevenfold.
 const STOPPING_GAIN: f64 = 1000.0;
@@ -56,14 +57,16 @@ pub struct Compliance {
 }
 
 /// Velocity and acceleration that are added over a tick, by groups of DoFs.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct PerturbationTerms {
     pub(crate) velocity: Vec<F64x4>,
     pub(crate) acceleration: Vec<F64x4>,
 }
 
+clone_in_place!(PerturbationTerms { velocity, acceleration });
+
 /// Perturbation of the current tick, and the gains of the movement's response.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Perturbation {
     terms: PerturbationTerms,
     /// True if the terms apply to the tick.
@@ -89,6 +92,21 @@ pub(crate) struct Perturbation {
     /// Inverse of the range; zero for a stationary DoF, whose error does not stop the phase.
     inverse_range: Vec<F64x4>,
 }
+
+clone_in_place!(Perturbation {
+    terms,
+    active,
+    phase_rate,
+    compliance,
+    measured,
+    error,
+    expected_error,
+    adaptation_rate,
+    remaining_pull,
+    turn,
+    inverse_turn,
+    inverse_range,
+});
 
 /// Returns the largest range of a DoF.
 pub(crate) fn largest_range(ranges: &[f64]) -> f64 {

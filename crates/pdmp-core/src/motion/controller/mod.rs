@@ -13,6 +13,7 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx;
+mod forecast;
 mod getters;
 mod group;
 mod phase;
@@ -33,6 +34,7 @@ use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::perturbation::{Perturbation, largest_range};
 use crate::numerics::simd::{F64x4, WIDTH, copy, padded, repack};
+use crate::numerics::state::clone_in_place;
 use crate::validate::check_positive;
 use group::Group;
 
@@ -68,7 +70,7 @@ pub enum Status {
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Controller {
     primitive: Arc<Primitive>,
     dt: f64,
@@ -123,6 +125,44 @@ pub struct Controller {
     /// Number of ticks by which the forcing table is prefetched.
     prefetch_ticks: f64,
 }
+
+// A copy moves as the original does, to the bit. `clone_from` allocates nothing if the destination is an earlier copy, unless
+// a later reset added a start or a start velocity.
+clone_in_place!(Controller {
+    primitive,
+    dt,
+    conditions,
+    started,
+    status,
+    time,
+    clock,
+    r,
+    command_gains,
+    style,
+    rate_gains,
+    rate,
+    centre,
+    centre_gains,
+    amplitude,
+    speed,
+    groups,
+    forcing_phase_rate,
+    frame_lag,
+    transport_segment,
+    position,
+    velocity,
+    acceleration,
+    flush_level,
+    perturbation,
+    phase_gain,
+    max_clock_step,
+    rate_step,
+    command_step,
+    centre_step,
+    propagator,
+    series,
+    prefetch_ticks,
+});
 
 impl Controller {
     /// Starts a movement.
