@@ -9,8 +9,9 @@
 //! positive, so that a filtered positive command stays positive for any sequence of changes.
 
 use crate::dynamics::output_system::INVERSE_FACTORIAL;
+use crate::error::Result;
 use crate::numerics::simd::{F64x4, Register, pack, repack};
-use crate::numerics::state::clone_in_place;
+use crate::numerics::state::{Visitor, clone_in_place, visit_number};
 
 /// ωt at which 99 % of a step are done: the root of (1 + s)exp(−s) = 0.01.
 const SETTLING_TIME: f64 = 6.638_352_067_993_813;
@@ -24,6 +25,10 @@ const MAX_SUBSTEPS: f64 = 32.0;
 const N_TERMS: usize = 10;
 /// Minimum transition, in seconds, that is filtered. A shorter one is immediate, since its ω² may overflow.
 const MIN_TRANSITION: f64 = 1e-15;
+/// Maximum ω of a restored filter, above that of every transition that is filtered.
+const MAX_OMEGA: f64 = 1e20;
+/// Maximum rate of a restored command; its products with gains stay finite.
+const MAX_COMMAND_RATE: f64 = 1e220;
 /// Maximum ωt in exponents: exp(−ωt) is zero, and ωt·exp(−ωt) must not become ∞·0.
 const MAX_EXPONENT: f64 = 1e4;
 
@@ -53,6 +58,14 @@ impl FilterGains {
     pub(crate) fn new(transition: f64) -> Self {
         let transition = if transition < MIN_TRANSITION { 0.0 } else { transition };
         Self { omega: SETTLING_TIME / transition, decay_time: DECAY_TIME / SETTLING_TIME * transition }
+    }
+
+    /// Visits the gain; 0 stands for an immediate switch.
+    pub(crate) fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+        let mut omega = if self.is_immediate() { 0.0 } else { self.omega };
+        visit_number(visit, &mut omega, [0.0, MAX_OMEGA])?;
+        self.omega = if omega == 0.0 { f64::INFINITY } else { omega };
+        visit_number(visit, &mut self.decay_time, [0.0, 1e300])
     }
 
     /// Returns the gain on a clock of rate 1/τ.
@@ -213,6 +226,16 @@ impl CommandFilter {
         self.value.copy_from_slice(&self.target);
         self.rate.fill(F64x4::ZERO);
         self.remaining = 0.0;
+    }
+
+    /// Visits values, targets and rates, for commands up to `limit`.
+    pub(crate) fn walk(&mut self, visit: &mut Visitor, gains: &FilterGains, limit: f64) -> Result<()> {
+        // Value and rate of a chain of steps between ±limit are bounded by 2·limit and 2ω·limit.
+        let rate = if gains.is_immediate() { 0.0 } else { (2.0 * limit * gains.omega).min(MAX_COMMAND_RATE) };
+        for (lanes, bound) in [(&mut self.value, 2.0 * limit), (&mut self.target, limit), (&mut self.rate, rate)] {
+            visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), [-bound, bound])?;
+        }
+        visit_number(visit, &mut self.remaining, [-1e300, gains.decay_time])
     }
 
     /// Advances all groups by a tick.

@@ -30,7 +30,7 @@
 use crate::error::{Error, Result};
 use crate::motion::command::{Command, Coupling};
 use crate::numerics::simd::{F64x4, groups, pack, repack};
-use crate::numerics::state::clone_in_place;
+use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Default k_s: an error of a tenth of the range slows the phase elevenfold.
 const STOPPING_GAIN: f64 = 1000.0;
@@ -218,6 +218,33 @@ impl Perturbation {
     /// Adds the pull of a measured phase to the phase rate, which stays at least 0.
     pub(crate) fn add_phase_pull(&mut self, pull: f64) {
         self.phase_rate = (self.phase_rate + pull).max(0.0);
+    }
+
+    /// Visits the state, with the bounds of a quantity in units of a DoF.
+    pub(crate) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2]) -> Result<()> {
+        let Self {
+            terms: PerturbationTerms { velocity, acceleration },
+            active,
+            phase_rate,
+            compliance: Compliance { stopping, tracking },
+            measured,
+            error,
+            expected_error,
+            remaining_pull,
+            adaptation_rate: _,
+            turn: _,
+            inverse_turn: _,
+            inverse_range: _,
+        } = self;
+        for lanes in [velocity, acceleration, error, expected_error] {
+            visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), quantity)?;
+        }
+        visit_flag(visit, active)?;
+        visit_flag(visit, measured)?;
+        visit_number(visit, phase_rate, [0.0, 1e4])?;
+        visit_number(visit, stopping, [0.0, MAX_GAIN])?;
+        visit_number(visit, tracking, [0.0, MAX_GAIN])?;
+        visit_number(visit, remaining_pull, [0.0, 1.0])
     }
 
     /// Returns k_s and k_t.

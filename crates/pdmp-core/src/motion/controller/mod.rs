@@ -18,6 +18,7 @@ mod getters;
 mod group;
 mod phase;
 mod setters;
+mod snapshot;
 mod step;
 
 use std::sync::Arc;
@@ -74,6 +75,8 @@ pub enum Status {
 pub struct Controller {
     primitive: Arc<Primitive>,
     dt: f64,
+    /// Transition of commands, in seconds.
+    transition: f64,
     conditions: ResolvedConditions,
     started: bool,
     status: Status,
@@ -131,6 +134,7 @@ pub struct Controller {
 clone_in_place!(Controller {
     primitive,
     dt,
+    transition,
     conditions,
     started,
     status,
@@ -194,6 +198,7 @@ impl Controller {
         let series = Series::new(primitive.attractor(), max_clock_step);
         let mut controller = Self {
             dt,
+            transition,
             started: false,
             status: Status::Working,
             time: CompensatedSum::default(),

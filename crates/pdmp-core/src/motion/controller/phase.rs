@@ -34,7 +34,7 @@ use crate::model::conditions::check_phase;
 pub(super) const PHASE_GAIN: f64 = 1.0;
 /// Maximum k_φ. Its time constant is less than a tenth of the maximum substep, so that a larger gain acts no faster, and w′
 /// stays finite.
-const MAX_PHASE_GAIN: f64 = 1000.0;
+pub(super) const MAX_PHASE_GAIN: f64 = 1000.0;
 
 impl Controller {
     /// Sets the phase φ of a rhythmic movement, in rad, for example at the heel strike of a gait.

@@ -1,0 +1,229 @@
+//! Snapshots: the state of a controller as numbers, from which it continues to the bit.
+//!
+//! One function, `walk`, visits every number of the state; it serves for saving and for restoring. Quantities that follow
+//! from the primitive, the tick length and the transition are computed anew, and so are cached solutions over a tick.
+
+use std::sync::Arc;
+
+use super::group::{ForcingSample, Group};
+use super::{Controller, Status};
+use crate::dynamics::command_filter::FilterStep;
+use crate::dynamics::output_system::CubicSample;
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, ResolvedConditions, check_tau};
+use crate::model::primitive::Primitive;
+use crate::numerics::simd::F64x4;
+use crate::numerics::state::{Visitor, visit_flag, visit_number};
+use crate::validate::MAX_MAGNITUDE;
+
+/// Version of the snapshot; a change of `walk` increments it.
+const VERSION: f64 = 1.0;
+/// Length of the header: version, numbers of the primitive, tick length and transition.
+const HEADER: usize = 10;
+/// Bounds of a quantity in units of a DoF. Its products with every gain and rate stay finite.
+const QUANTITY: [f64; 2] = [-1e200, 1e200];
+/// Bounds of a clock or a time, finite under any further tick.
+const CLOCK: [f64; 2] = [0.0, 1e300];
+
+impl Controller {
+    /// Returns the state as numbers, from which [`Controller::restore`] continues the movement to the bit.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+    /// controller.step()?;
+    /// let mut restored = Controller::restore(model.primitive(), &controller.snapshot())?;
+    /// controller.step()?;
+    /// restored.step()?;
+    /// assert_eq!(restored.position(), controller.position());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn snapshot(&self) -> Vec<f64> {
+        let mut numbers = header(&self.primitive).to_vec();
+        numbers.extend([self.dt, self.transition]);
+        let saved = self.clone().walk(&mut |quantity, _| {
+            numbers.extend_from_slice(quantity);
+            Ok(())
+        });
+        debug_assert!(saved.is_ok(), "saving refuses no number");
+        numbers
+    }
+
+    /// Returns a controller in the state of a [`Controller::snapshot`], for the primitive of the snapshot.
+    ///
+    /// # Errors
+    /// A snapshot of another version, primitive or length, or with a number that is not finite or that no state has.
+    pub fn restore(primitive: &Arc<Primitive>, snapshot: &[f64]) -> Result<Self> {
+        let length =
+            |expected| Error::Length { name: "snapshot", expected, found: snapshot.len(), per: "number of the state" };
+        let Some((head, mut rest)) = snapshot.split_at_checked(HEADER) else { return Err(length(HEADER)) };
+        if head[0] != VERSION {
+            return Err(Error::Range { name: "snapshot version", value: head[0], allowed: "must be 1" });
+        }
+        if head[..HEADER - 2] != header(primitive) {
+            return Err(Error::Arguments(
+                "the snapshot belongs to another model: restore it with the model of its controller",
+            ));
+        }
+        let mut controller = Self::new(primitive, head[HEADER - 2], &Conditions::default(), Some(head[HEADER - 1]))?;
+        let mut expected = HEADER;
+        controller.clone().walk(&mut |quantity, _| {
+            expected += quantity.len();
+            Ok(())
+        })?;
+        if snapshot.len() != expected {
+            return Err(length(expected));
+        }
+        controller.walk(&mut |quantity, [least, greatest]| {
+            let (saved, remaining) = rest.split_at_checked(quantity.len()).ok_or_else(|| length(expected))?;
+            if let Some(index) = saved.iter().position(|number| !(least..=greatest).contains(number)) {
+                let (value, index) = (saved[index], snapshot.len() - rest.len() + index);
+                return Err(match value.is_finite() {
+                    true => {
+                        Error::Range { name: "snapshot", value, allowed: "no state of a controller has this number" }
+                    }
+                    false => Error::NotFinite { name: "snapshot", index, value },
+                });
+            }
+            quantity.copy_from_slice(saved);
+            rest = remaining;
+            Ok(())
+        })?;
+        controller.check_restored()?;
+        Ok(controller)
+    }
+
+    /// Visits every number of the state, in the order of the snapshot.
+    fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+        // The pattern names every field, so that a new one is saved or listed as derived.
+        let Self {
+            primitive,
+            conditions,
+            started,
+            status,
+            time,
+            clock,
+            r,
+            command_gains,
+            style,
+            rate_gains,
+            rate,
+            centre,
+            centre_gains,
+            amplitude,
+            speed,
+            groups,
+            forcing_phase_rate,
+            frame_lag,
+            transport_segment,
+            position,
+            velocity,
+            acceleration,
+            perturbation,
+            phase_gain,
+            command_step,
+            centre_step,
+            dt: _,
+            transition: _,
+            flush_level: _,
+            max_clock_step: _,
+            rate_step: _,
+            propagator: _,
+            series: _,
+            prefetch_ticks: _,
+        } = self;
+        let rhythmic = primitive.kind() == Kind::Rhythmic;
+        let phase = [0.0, if rhythmic { std::f64::consts::TAU.next_down() } else { CLOCK[1] }];
+
+        let ResolvedConditions { style: s, centre: g, start, velocity: v, amplitude: r_0, tau, phase: phi } =
+            conditions;
+        visit(s, [-MAX_STYLE_MAGNITUDE, MAX_STYLE_MAGNITUDE])?;
+        visit(g, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
+        visit_optional(visit, start, primitive.n_dofs())?;
+        visit_optional(visit, v, primitive.n_dofs())?;
+        visit_number(visit, r_0, [0.0, MAX_MAGNITUDE])?;
+        visit_number(visit, tau, [f64::MIN_POSITIVE, f64::MAX])?;
+        visit_number(visit, phi, [0.0, phase[1].min(std::f64::consts::TAU)])?;
+
+        visit_flag(visit, started)?;
+        let mut finished = *status == Status::Finished;
+        visit_flag(visit, &mut finished)?;
+        *status = if finished { Status::Finished } else { Status::Working };
+        time.walk(visit, CLOCK)?;
+        clock.walk(visit, phase)?;
+        visit_number(visit, r, [0.0, MAX_MAGNITUDE])?;
+        visit_number(visit, speed, [0.0, 1e6])?;
+        visit_number(visit, phase_gain, [0.0, super::phase::MAX_PHASE_GAIN])?;
+
+        style.walk(visit, command_gains, MAX_STYLE_MAGNITUDE)?;
+        let max_rate = 1e12 / primitive.tau();
+        rate.walk(visit, rate_gains, max_rate)?;
+        centre_gains.walk(visit)?;
+        centre.walk(visit, centre_gains, QUANTITY[1])?;
+        amplitude.walk(visit, command_gains, MAX_MAGNITUDE)?;
+
+        visit_number(visit, forcing_phase_rate, [0.0, 1e4])?;
+        visit_number(visit, frame_lag, [-2.0, 2.0])?;
+        let mut cell = primitive.transport.cell(transport_segment) as f64;
+        visit_number(visit, &mut cell, [0.0, 1e6])?;
+        *transport_segment = primitive.transport.segment(cell as usize);
+
+        for group in groups {
+            let Group { forcing, w, z, displacement, tolerance, min_tolerance: _ } = group;
+            let ForcingSample { value, slope, style_slope } = forcing;
+            let CubicSample { value: w, slope: w_slope } = w;
+            for lanes in [value, slope, style_slope, w, w_slope, z, displacement, tolerance] {
+                visit(lanes.as_mut_array(), QUANTITY)?;
+            }
+        }
+        for lanes in [position, velocity, acceleration] {
+            visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), QUANTITY)?;
+        }
+        perturbation.walk(visit, QUANTITY)?;
+        // Solutions over the last tick depend on the gains, which may have changed.
+        (*command_step, *centre_step) = (FilterStep::IDENTITY, FilterStep::IDENTITY);
+        Ok(())
+    }
+
+    /// Checks quantities that depend on several numbers of a snapshot.
+    fn check_restored(&self) -> Result<()> {
+        check_tau(self.conditions.tau, self.primitive.tau())?;
+        let gate = self.gate();
+        let forcing = self.groups.iter().map(|group| gate.forcing::<F64x4>(&group.forcing));
+        let bounded = |lanes: F64x4| lanes.to_array().iter().all(|x| (QUANTITY[0]..=QUANTITY[1]).contains(x));
+        if forcing.flat_map(|w| [w.value, w.slope]).all(bounded) {
+            return Ok(());
+        }
+        Err(Error::Arguments("snapshot: its style and amplitude make the forcing overflow"))
+    }
+}
+
+/// Returns the numbers that identify the version and the primitive of a snapshot.
+fn header(primitive: &Primitive) -> [f64; HEADER - 2] {
+    let (attractor, kind) = (primitive.attractor(), primitive.kind());
+    [
+        VERSION,
+        f64::from(u8::from(kind == Kind::Rhythmic)),
+        primitive.n_dofs() as f64,
+        primitive.n_styles() as f64,
+        primitive.tau(),
+        primitive.canonical().extent(),
+        attractor.alpha_z,
+        attractor.beta_z,
+    ]
+}
+
+/// Visits a vector that may be absent, as a flag and `n` numbers.
+fn visit_optional(visit: &mut Visitor, vector: &mut Option<Vec<f64>>, n: usize) -> Result<()> {
+    let mut present = vector.is_some();
+    visit_flag(visit, &mut present)?;
+    let mut numbers = vector.take().unwrap_or_else(|| vec![0.0; n]);
+    visit(&mut numbers, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
+    *vector = present.then_some(numbers);
+    Ok(())
+}
