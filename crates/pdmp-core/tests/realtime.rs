@@ -57,7 +57,7 @@ impl Loop {
         }
         let (vector, style, size) = (&values[..n_dofs], &values[..n_styles], values[0].abs());
         let tau = nominal_tau * (0.5 + random.next());
-        let _ = black_box(match (random.next() * 10.0) as u8 {
+        let _ = black_box(match (random.next() * 12.0) as u8 {
             0 => controller.set_style(style),
             1 => controller.set_goal(vector),
             2 => controller.set_anchor(vector),
@@ -67,12 +67,14 @@ impl Loop {
             6 => controller.step().map(drop),
             7 => controller.set_phase(10.0 * size),
             8 => controller.set_phase_gain(10.0 * size),
+            9 => controller.set_goal_velocity((size < 0.5).then_some(vector)),
             _ => Ok(()),
         });
         let command = Command {
             dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
             style: random.rarely().then_some(style),
             goal: (random.rarely() && kind == Kind::Discrete).then_some(vector),
+            goal_velocity: (random.rarely() && kind == Kind::Discrete).then_some(vector),
             anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(vector),
             tau: random.rarely().then_some(tau),
             amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(size),
@@ -80,7 +82,7 @@ impl Loop {
             coupling: random.rarely().then_some(Coupling { velocity: vector, acceleration: vector }),
             phase: (random.rarely() && kind == Kind::Rhythmic).then_some(10.0 * values[0]),
         };
-        let vectors = [command.style, command.goal, command.anchor, command.measured];
+        let vectors = [command.style, command.goal, command.goal_velocity, command.anchor, command.measured];
         let uses_values = vectors.iter().any(Option::is_some)
             || command.amplitude.or(command.phase).is_some()
             || command.coupling.is_some();

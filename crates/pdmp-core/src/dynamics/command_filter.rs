@@ -25,8 +25,6 @@ const MAX_SUBSTEPS: f64 = 32.0;
 const N_TERMS: usize = 10;
 /// Minimum transition, in seconds, that is filtered. A shorter one is immediate, since its ω² may overflow.
 const MIN_TRANSITION: f64 = 1e-15;
-/// Maximum ω of a restored filter, above that of every transition that is filtered.
-const MAX_OMEGA: f64 = 1e20;
 /// Maximum rate of a restored command; its products with gains stay finite.
 const MAX_COMMAND_RATE: f64 = 1e220;
 /// Maximum ωt in exponents: exp(−ωt) is zero, and ωt·exp(−ωt) must not become ∞·0.
@@ -60,23 +58,9 @@ impl FilterGains {
         Self { omega: SETTLING_TIME / transition, decay_time: DECAY_TIME / SETTLING_TIME * transition }
     }
 
-    /// Visits the gain; 0 stands for an immediate switch.
-    pub(crate) fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
-        let mut omega = if self.is_immediate() { 0.0 } else { self.omega };
-        visit_number(visit, &mut omega, [0.0, MAX_OMEGA])?;
-        self.omega = if omega == 0.0 { f64::INFINITY } else { omega };
-        visit_number(visit, &mut self.decay_time, [0.0, 1e300])
-    }
-
     /// Returns the gain on a clock of rate 1/τ.
     pub(crate) fn on_clock(&self, tau: f64) -> Self {
         Self { omega: self.omega * tau, decay_time: self.decay_time / tau }
-    }
-
-    /// Returns the gain for the longer of this transition and the given one.
-    pub(crate) fn at_least(&self, transition: f64) -> Self {
-        let longer = Self::new(transition.max(0.0));
-        if longer.omega < self.omega { longer } else { *self }
     }
 
     /// Returns whether commands take effect at once.
@@ -218,6 +202,16 @@ impl CommandFilter {
         }
         repack(&mut self.target, target);
         self.remaining = gains.decay_time;
+    }
+
+    /// Sets the targets and leaves the values, which do not move.
+    pub(crate) fn set_target_only(&mut self, target: &[f64]) {
+        repack(&mut self.target, target);
+    }
+
+    /// Sets the values without a transition and leaves the targets.
+    pub(crate) fn set_value(&mut self, value: &[F64x4]) {
+        self.value.copy_from_slice(value);
     }
 
     /// Sets targets and values.

@@ -3,12 +3,11 @@
 //! One function, `walk`, visits every number of the state; it serves for saving and for restoring. Quantities that follow
 //! from the primitive, the tick length and the transition are computed anew, and so are cached solutions over a tick.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use super::group::{ForcingSample, Group};
 use super::{Controller, Status};
 use crate::dynamics::command_filter::FilterStep;
-use crate::dynamics::output_system::CubicSample;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, ResolvedConditions, check_tau};
@@ -23,8 +22,12 @@ const VERSION: f64 = 1.0;
 const HEADER: usize = 10;
 /// Bounds of a quantity in units of a DoF. Its products with every gain and rate stay finite.
 const QUANTITY: [f64; 2] = [-1e200, 1e200];
-/// Bounds of a clock or a time, finite under any further tick.
-const CLOCK: [f64; 2] = [0.0, 1e300];
+/// Bounds of a time, finite under any further tick.
+const TIME: [f64; 2] = [0.0, 1e300];
+/// Maximum clock of a discrete movement, relative to its extent; a transition from there still has a length.
+const MAX_CLOCK: f64 = 1e9;
+/// Maximum rate, relative to the nominal one: the product of the largest speed and the largest 1/τ, with a margin for rounding.
+const MAX_RATE: f64 = 1.001e12;
 
 impl Controller {
     /// Returns the state as numbers, from which [`Controller::restore`] continues the movement to the bit.
@@ -114,9 +117,10 @@ impl Controller {
             rate_gains,
             rate,
             centre,
-            centre_gains,
+            goal_transition,
             amplitude,
             speed,
+            tolerance,
             groups,
             forcing_phase_rate,
             frame_lag,
@@ -127,7 +131,7 @@ impl Controller {
             perturbation,
             phase_gain,
             command_step,
-            centre_step,
+            min_durations: _,
             dt: _,
             transition: _,
             flush_level: _,
@@ -137,34 +141,46 @@ impl Controller {
             series: _,
             prefetch_ticks: _,
         } = self;
+        let (turn, n_dofs) = (TAU.next_down(), primitive.n_dofs());
         let rhythmic = primitive.kind() == Kind::Rhythmic;
-        let phase = [0.0, if rhythmic { std::f64::consts::TAU.next_down() } else { CLOCK[1] }];
+        let clocks = [0.0, if rhythmic { turn } else { MAX_CLOCK * primitive.canonical().extent() }];
 
-        let ResolvedConditions { style: s, centre: g, start, velocity: v, amplitude: r_0, tau, phase: phi } =
-            conditions;
+        let ResolvedConditions {
+            style: s,
+            centre: g,
+            start,
+            velocity: v,
+            goal_velocity,
+            has_goal_velocity,
+            amplitude: r_0,
+            tau,
+            phase: phi,
+        } = conditions;
         visit(s, [-MAX_STYLE_MAGNITUDE, MAX_STYLE_MAGNITUDE])?;
         visit(g, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
-        visit_optional(visit, start, primitive.n_dofs())?;
-        visit_optional(visit, v, primitive.n_dofs())?;
+        visit_optional(visit, start, n_dofs)?;
+        visit_optional(visit, v, n_dofs)?;
+        visit(goal_velocity, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
+        visit_flag(visit, has_goal_velocity)?;
         visit_number(visit, r_0, [0.0, MAX_MAGNITUDE])?;
         visit_number(visit, tau, [f64::MIN_POSITIVE, f64::MAX])?;
-        visit_number(visit, phi, [0.0, phase[1].min(std::f64::consts::TAU)])?;
+        visit_number(visit, phi, [0.0, turn])?;
 
         visit_flag(visit, started)?;
         let mut finished = *status == Status::Finished;
         visit_flag(visit, &mut finished)?;
         *status = if finished { Status::Finished } else { Status::Working };
-        time.walk(visit, CLOCK)?;
-        clock.walk(visit, phase)?;
+        time.walk(visit, TIME)?;
+        clock.walk(visit, clocks)?;
         visit_number(visit, r, [0.0, MAX_MAGNITUDE])?;
         visit_number(visit, speed, [0.0, 1e6])?;
+        visit_number(visit, tolerance, [f64::MIN_POSITIVE, 1.0])?;
         visit_number(visit, phase_gain, [0.0, super::phase::MAX_PHASE_GAIN])?;
 
         style.walk(visit, command_gains, MAX_STYLE_MAGNITUDE)?;
-        let max_rate = 1e12 / primitive.tau();
-        rate.walk(visit, rate_gains, max_rate)?;
-        centre_gains.walk(visit)?;
-        centre.walk(visit, centre_gains, QUANTITY[1])?;
+        rate.walk(visit, rate_gains, MAX_RATE / primitive.tau())?;
+        centre.walk(visit, command_gains, MAX_MAGNITUDE)?;
+        goal_transition.walk(visit, clocks, QUANTITY)?;
         amplitude.walk(visit, command_gains, MAX_MAGNITUDE)?;
 
         visit_number(visit, forcing_phase_rate, [0.0, 1e4])?;
@@ -173,20 +189,12 @@ impl Controller {
         visit_number(visit, &mut cell, [0.0, 1e6])?;
         *transport_segment = primitive.transport.segment(cell as usize);
 
-        for group in groups {
-            let Group { forcing, w, z, displacement, tolerance, min_tolerance: _ } = group;
-            let ForcingSample { value, slope, style_slope } = forcing;
-            let CubicSample { value: w, slope: w_slope } = w;
-            for lanes in [value, slope, style_slope, w, w_slope, z, displacement, tolerance] {
-                visit(lanes.as_mut_array(), QUANTITY)?;
-            }
-        }
+        groups.iter_mut().try_for_each(|group| group.walk(visit, QUANTITY))?;
         for lanes in [position, velocity, acceleration] {
             visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), QUANTITY)?;
         }
         perturbation.walk(visit, QUANTITY)?;
-        // Solutions over the last tick depend on the gains, which may have changed.
-        (*command_step, *centre_step) = (FilterStep::IDENTITY, FilterStep::IDENTITY);
+        *command_step = FilterStep::IDENTITY;
         Ok(())
     }
 
