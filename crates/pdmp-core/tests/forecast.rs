@@ -2,46 +2,19 @@
 #![cfg(feature = "learning")]
 #![allow(missing_docs)]
 
+#[path = "common/commands.rs"]
+mod commands;
 mod common;
 #[path = "common/counting.rs"]
 mod counting;
 
+use commands::{motion, random_tick};
 use common::*;
 use counting::{Random, allocations};
 use pdmp_core::{Command, Conditions, Controller, Kind, Model};
 
 fn started(model: &Model) -> Controller {
     Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap()
-}
-
-/// Performs one tick under random commands that suit the primitive.
-fn random_tick(controller: &mut Controller, random: &mut Random) {
-    let (n_dofs, n_styles) = (controller.primitive().n_dofs(), controller.primitive().n_styles());
-    let kind = controller.primitive().kind();
-    let values: Vec<f64> = (0..n_dofs.max(n_styles)).map(|_| 2.0 * random.next() - 1.0).collect();
-    let (vector, style) = (&values[..n_dofs], &values[..n_styles]);
-    let rhythmic = kind == Kind::Rhythmic;
-    let command = Command {
-        style: random.rarely().then_some(style),
-        goal: (random.rarely() && !rhythmic).then_some(vector),
-        anchor: (random.rarely() && rhythmic).then_some(vector),
-        tau: random.rarely().then_some(controller.primitive().tau() * (0.5 + random.next())),
-        amplitude: (random.rarely() && rhythmic).then_some(values[0].abs()),
-        measured: random.rarely().then_some(vector),
-        phase: (random.rarely() && rhythmic).then_some(values[0]),
-        ..Command::default()
-    };
-    tick(controller, &command).unwrap();
-    if random.rarely() {
-        controller.release();
-    }
-    if random.rarely() {
-        controller.set_speed(random.next()).unwrap();
-    }
-}
-
-fn motion(controller: &Controller) -> [&[f64]; 3] {
-    [controller.position(), controller.velocity(), controller.acceleration()]
 }
 
 /// A forecast with the ticks of the loop is its future to the bit, after any commands, and leaves the loop unchanged.

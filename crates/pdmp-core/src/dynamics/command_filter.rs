@@ -222,12 +222,13 @@ impl CommandFilter {
         self.remaining = 0.0;
     }
 
-    /// Visits values, targets and rates, for commands up to `limit`.
-    pub(crate) fn walk(&mut self, visit: &mut Visitor, gains: &FilterGains, limit: f64) -> Result<()> {
+    /// Visits values, targets and rates, for commands from `least` to `limit`.
+    pub(crate) fn walk(&mut self, visit: &mut Visitor, gains: &FilterGains, [least, limit]: [f64; 2]) -> Result<()> {
         // Value and rate of a chain of steps between ±limit are bounded by 2·limit and 2ω·limit.
         let rate = if gains.is_immediate() { 0.0 } else { (2.0 * limit * gains.omega).min(MAX_COMMAND_RATE) };
-        for (lanes, bound) in [(&mut self.value, 2.0 * limit), (&mut self.target, limit), (&mut self.rate, rate)] {
-            visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), [-bound, bound])?;
+        let Self { value, rate: slope, target, remaining: _ } = self;
+        for (lanes, bounds) in [(value, [2.0 * least, 2.0 * limit]), (target, [least, limit]), (slope, [-rate, rate])] {
+            visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), bounds)?;
         }
         visit_number(visit, &mut self.remaining, [-1e300, gains.decay_time])
     }

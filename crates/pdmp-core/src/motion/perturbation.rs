@@ -40,6 +40,8 @@ const TRACKING_GAIN: f64 = 10.0;
 /// λ times the demonstrated clock interval. A larger rate takes a blocked robot for one that sags; a smaller one adapts
 /// later to an error that is present from the start.
 const ADAPTATION_RATE: f64 = 5.0;
+/// Bound of κ, above the sum of 1 and the largest gain of a measured phase.
+pub(crate) const MAX_PHASE_RATE: f64 = 1e4;
 /// Maximum gain. It keeps products finite.
 const MAX_GAIN: f64 = 1e100;
 /// Range, relative to the largest one, up to which a DoF is stationary.
@@ -246,7 +248,7 @@ impl Perturbation {
         }
         visit_flag(visit, active)?;
         visit_flag(visit, measured)?;
-        visit_number(visit, phase_rate, [0.0, 1e4])?;
+        visit_number(visit, phase_rate, [0.0, MAX_PHASE_RATE])?;
         visit_number(visit, stopping, [0.0, MAX_GAIN])?;
         visit_number(visit, tracking, [0.0, MAX_GAIN])?;
         visit_number(visit, remaining_pull, [0.0, 1.0])

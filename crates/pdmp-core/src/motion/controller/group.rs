@@ -33,14 +33,14 @@ impl Group {
         pack(ranges).iter().map(group).collect()
     }
 
-    /// Visits the state, with the bounds of a quantity in units of a DoF.
-    pub(super) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2]) -> Result<()> {
+    /// Visits the state, with the bounds of a quantity in units of a DoF and the largest distance from start to goal.
+    pub(super) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2], distance: f64) -> Result<()> {
         let Self { forcing, w, z, displacement, length, rounding, range: _ } = self;
         let ForcingSample { value, slope, style_slope } = forcing;
-        for lanes in [value, slope, style_slope, &mut w.value, &mut w.slope, z, displacement, length, rounding] {
+        for lanes in [value, slope, style_slope, &mut w.value, &mut w.slope, z, length, rounding] {
             visit(lanes.as_mut_array(), quantity)?;
         }
-        Ok(())
+        visit(displacement.as_mut_array(), [-distance, distance])
     }
 }
 

@@ -6,12 +6,14 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use super::group::Gate;
 use super::{Controller, Status};
 use crate::dynamics::command_filter::FilterStep;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, ResolvedConditions, check_tau};
+use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, ResolvedConditions, check_tau, reject_goal_velocity};
 use crate::model::primitive::Primitive;
+use crate::motion::perturbation::MAX_PHASE_RATE;
 use crate::numerics::simd::F64x4;
 use crate::numerics::state::{Visitor, visit_flag, visit_number};
 use crate::validate::MAX_MAGNITUDE;
@@ -143,6 +145,7 @@ impl Controller {
         } = self;
         let (turn, n_dofs) = (TAU.next_down(), primitive.n_dofs());
         let rhythmic = primitive.kind() == Kind::Rhythmic;
+        let distance = if rhythmic { 0.0 } else { 2.0 * MAX_MAGNITUDE };
         let clocks = [0.0, if rhythmic { turn } else { MAX_CLOCK * primitive.canonical().extent() }];
 
         let ResolvedConditions {
@@ -177,19 +180,19 @@ impl Controller {
         visit_number(visit, tolerance, [f64::MIN_POSITIVE, 1.0])?;
         visit_number(visit, phase_gain, [0.0, super::phase::MAX_PHASE_GAIN])?;
 
-        style.walk(visit, command_gains, MAX_STYLE_MAGNITUDE)?;
-        rate.walk(visit, rate_gains, MAX_RATE / primitive.tau())?;
-        centre.walk(visit, command_gains, MAX_MAGNITUDE)?;
+        style.walk(visit, command_gains, [-MAX_STYLE_MAGNITUDE, MAX_STYLE_MAGNITUDE])?;
+        rate.walk(visit, rate_gains, [0.0, MAX_RATE / primitive.tau()])?;
+        centre.walk(visit, command_gains, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
         goal_transition.walk(visit, clocks, QUANTITY)?;
-        amplitude.walk(visit, command_gains, MAX_MAGNITUDE)?;
+        amplitude.walk(visit, command_gains, [0.0, MAX_MAGNITUDE])?;
 
-        visit_number(visit, forcing_phase_rate, [0.0, 1e4])?;
+        visit_number(visit, forcing_phase_rate, [0.0, MAX_PHASE_RATE])?;
         visit_number(visit, frame_lag, [-2.0, 2.0])?;
         let mut cell = primitive.transport.cell(transport_segment) as f64;
         visit_number(visit, &mut cell, [0.0, 1e6])?;
         *transport_segment = primitive.transport.segment(cell as usize);
 
-        groups.iter_mut().try_for_each(|group| group.walk(visit, QUANTITY))?;
+        groups.iter_mut().try_for_each(|group| group.walk(visit, QUANTITY, distance))?;
         for lanes in [position, velocity, acceleration] {
             visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), QUANTITY)?;
         }
@@ -201,7 +204,21 @@ impl Controller {
     /// Checks quantities that depend on several numbers of a snapshot.
     fn check_restored(&self) -> Result<()> {
         check_tau(self.conditions.tau, self.primitive.tau())?;
-        let gate = self.gate();
+        reject_goal_velocity(&self.primitive, self.conditions.has_goal_velocity)?;
+        if self.goal_transition.is_active() && !self.has_frame() {
+            return Err(Error::Arguments("snapshot: a transition of the goal needs learnt transport"));
+        }
+        if self.status == Status::Finished && self.primitive.kind() == Kind::Rhythmic {
+            return Err(Error::Arguments("snapshot: a rhythmic movement never finishes"));
+        }
+        // The next tick may have any phase rate.
+        let gate = Gate { phase_rate: MAX_PHASE_RATE, ..self.gate() };
+        let at_once = !self.started || self.command_gains.is_immediate();
+        if at_once
+            && [&self.style, &self.rate, &self.amplitude].iter().any(|command| command.value() != command.target())
+        {
+            return Err(Error::Arguments("snapshot: a command that takes effect at once is in transition"));
+        }
         let forcing = self.groups.iter().map(|group| gate.forcing::<F64x4>(&group.forcing));
         let bounded = |lanes: F64x4| lanes.to_array().iter().all(|x| (QUANTITY[0]..=QUANTITY[1]).contains(x));
         if forcing.flat_map(|w| [w.value, w.slope]).all(bounded) {
