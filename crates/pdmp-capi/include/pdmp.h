@@ -15,7 +15,7 @@
 // - Lengths: n_dofs, n_styles, n_contexts and n_conditions are members of pdmp_info. Numbers are counted in elements,
 //   text and memory in bytes. All numbers are double precision, all strings UTF-8.
 // - Threads: any number of threads may use a model; one thread at a time may use a controller.
-// - Real time: pdmp_controller_step, _update, _set_..., _release, _read, _progress and _error neither allocate nor
+// - Real time: pdmp_controller_step, _update, _set_..., _release, _copy, _read, _progress and _error neither allocate nor
 //   lock.
 // - ABI: structs may grow between minor versions before 1.0; recompile for each.
 //
@@ -308,6 +308,16 @@ pdmp_status pdmp_controller_clone(const pdmp_controller *controller,
                                   pdmp_memory memory,
                                   pdmp_controller **copy,
                                   pdmp_text error);
+
+/// Copies the state of a controller into an earlier copy of it, without allocation, so that a control loop can look ahead:
+/// the copy is then advanced by pdmp_controller_step, or by pdmp_controller_update with ticks of any length.
+///
+/// `copy` becomes as by pdmp_controller_clone in its own memory; its error message remains. It allocates only if `copy` is
+/// of another model, or if `controller` was reset with a start or a velocity since `copy` was made without one.
+///
+/// Errors: PDMP_NULL.
+pdmp_status pdmp_controller_copy(const pdmp_controller *controller,
+                                 pdmp_controller *copy);
 
 /// Frees a controller; NULL is ignored. Memory that the caller provided may then be reused.
 void pdmp_controller_free(pdmp_controller *controller);

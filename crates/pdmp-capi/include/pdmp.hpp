@@ -186,6 +186,9 @@ public:
         return Controller(copy);
     }
 
+    /// Copies the state of another controller without allocation, see pdmp_controller_copy.
+    pdmp_status copy_from(const Controller &other) noexcept { return pdmp_controller_copy(other.get(), get()); }
+
     /// Starts a new movement, see pdmp_controller_reset.
     void reset(const Conditions &conditions = {}) {
         const pdmp_conditions c = detail::to_c(conditions);

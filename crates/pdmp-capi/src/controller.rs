@@ -139,6 +139,29 @@ pub unsafe extern "C" fn pdmp_controller_clone(
     unsafe { guard_with_text(error, call) }
 }
 
+/// Copies the state of a controller into an earlier copy of it, without allocation, so that a control loop can look ahead:
+/// the copy is then advanced by pdmp_controller_step, or by pdmp_controller_update with ticks of any length.
+///
+/// `copy` becomes as by pdmp_controller_clone in its own memory; its error message remains. It allocates only if `copy` is
+/// of another model, or if `controller` was reset with a start or a velocity since `copy` was made without one.
+///
+/// Errors: PDMP_NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pdmp_controller_copy(
+    controller: *const pdmp_controller,
+    copy: *mut pdmp_controller,
+) -> pdmp_status {
+    if ptr::eq(controller, copy) && !copy.is_null() {
+        return PDMP_OK;
+    }
+    // SAFETY: the contract of the C ABI guarantees NULL or live controllers, and these are two.
+    let (controller, copy) = unsafe { (controller.as_ref(), copy.as_mut()) };
+    call_on(copy, |copy| {
+        copy.inner.clone_from(&controller.ok_or(Fault::Null("controller"))?.inner);
+        Ok(PDMP_OK)
+    })
+}
+
 /// Frees a controller; NULL is ignored. Memory that the caller provided may then be reused.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_free(controller: *mut pdmp_controller) {

@@ -88,6 +88,12 @@ int main(int, char **argv) try {
     for (int tick = 0; tick < 100; ++tick) REQUIRE(controller.step() > 0);
     REQUIRE(controller.read(motion) > 0 && motion.position == ahead.position);
     REQUIRE(motion.velocity == ahead.velocity && motion.acceleration == ahead.acceleration);
+    for (int tick = 0; tick < 50; ++tick) REQUIRE(controller.step() > 0);
+    REQUIRE(copy.copy_from(controller) == PDMP_OK && copy.copy_from(copy) == PDMP_OK);
+    REQUIRE(controller.step() > 0 && copy.step() > 0 && controller.read(motion) > 0 && copy.read(ahead) > 0);
+    REQUIRE(motion.position == ahead.position && motion.acceleration == ahead.acceleration);
+    REQUIRE(copy.copy_from(first) == PDMP_NULL && first.copy_from(copy) == PDMP_NULL);
+    REQUIRE(copy.error() == "controller is NULL");
     REQUIRE(status_thrown_by([&] { first.clone(); }) == PDMP_NULL);
     return 0;
 } catch (const std::exception &error) {

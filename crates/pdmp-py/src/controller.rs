@@ -7,12 +7,13 @@ use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Kind};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::conditions::conditions_of;
 use crate::convert::{Reduced, Vector, items, quoted, read_only, refill};
 use crate::demonstration::Trajectory;
 use crate::error::{interruptible, raise};
+use crate::model::Model;
 use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
 
@@ -57,7 +58,8 @@ struct Arguments {
 ///
 /// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
 /// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `compliance` and
-/// `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force.
+/// `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
+/// copied (`copy`, `deepcopy`) and pickled, and continues from its state to the bit.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,
@@ -485,6 +487,25 @@ impl Controller {
     /// Return an independent controller in the same state, with the same model.
     fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
         Self::new(py, Arc::clone(&self.model), self.inner.clone())
+    }
+
+    /// Rebuild a pickled controller.
+    #[staticmethod]
+    fn _of(py: Python<'_>, model: &Model, state: &[u8]) -> PyResult<Self> {
+        let (numbers, rest) = state.as_chunks::<8>();
+        if !rest.is_empty() {
+            let length = state.len();
+            return Err(PyValueError::new_err(format!("state has {length} bytes, which is no multiple of 8")));
+        }
+        let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+        let inner = pdmp_core::Controller::restore(model.0.primitive(), &numbers).map_err(raise)?;
+        Self::new(py, Arc::clone(&model.0), inner)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        let state: Vec<u8> = self.inner.snapshot().into_iter().flat_map(f64::to_le_bytes).collect();
+        let arguments = (Model(Arc::clone(&self.model)), PyBytes::new(py, &state)).into_pyobject(py)?;
+        Ok((py.get_type::<Self>().getattr("_of")?, arguments))
     }
 
     fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> PyResult<Self> {
