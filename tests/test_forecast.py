@@ -1,6 +1,7 @@
 """Copies of a controller, and forecasts of its movement."""
 
 import copy
+import pickle
 import threading
 
 import numpy as np
@@ -52,15 +53,63 @@ def motion(controller: pdmp.Controller) -> np.ndarray:
     return np.stack([controller.position, controller.velocity, controller.acceleration])
 
 
-@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy])
+def pickled(controller: pdmp.Controller) -> pdmp.Controller:
+    """Returns the controller after a round trip through pickle."""
+    return pickle.loads(pickle.dumps(controller))
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickled])
 def test_a_copy_is_independent_and_continues_identically(model: pdmp.Model, duplicate) -> None:
     """Under the same commands the copy moves identically, and neither disturbs the other."""
     controller = start(model, seed=1)
     twin = duplicate(controller)
     before = motion(controller)
+    assert (twin.time, twin.status, twin.dt) == (controller.time, controller.status, controller.dt)
+    np.testing.assert_array_equal(motion(twin), before)
     expected = list(command(twin, model, 2, 100))
     np.testing.assert_array_equal(motion(controller), before)
     np.testing.assert_array_equal(list(command(controller, model, 2, 100)), expected)
+
+
+def test_a_forecast_equals_the_steps_of_a_copy(model: pdmp.Model) -> None:
+    """Also with coarse ticks; the controller stays as it was to the bit."""
+    controller = start(model, seed=6)
+    controller.release()
+    state = controller.__reduce__()[1][1]
+    forecast = controller.forecast(1.0, dt=0.1)
+    assert controller.__reduce__()[1][1] == state
+    twin = copy.copy(controller)
+    for k in range(1, 1001):
+        twin.step(dt=0.001)
+        if k % 100 == 0:
+            np.testing.assert_allclose(forecast.position[k // 100], twin.position, atol=1e-7)
+
+
+def test_a_pickle_of_another_model_or_forged_is_rejected(
+    reach: pdmp.Model, cycle: pdmp.Model
+) -> None:
+    """Every forged number is refused, or leaves a controller that moves by finite numbers."""
+    controller = start(reach, seed=5)
+    restore, (model, state) = controller.__reduce__()
+    with pytest.raises(ValueError, match="another model"):
+        restore(cycle, state)
+    for damaged in (b"", state[:-1], state[:-8], state + bytes(8)):
+        with pytest.raises(ValueError, match="snapshot|state"):
+            restore(model, damaged)
+    numbers = np.frombuffer(state)
+    refused = 0
+    for index in range(len(numbers)):
+        for value in (np.nan, np.inf, -1e300, 1e300):
+            forged = numbers.copy()
+            forged[index] = value
+            try:
+                moved = restore(model, forged.tobytes())
+                moved.step()
+            except ValueError:
+                refused += 1
+            else:
+                assert np.isfinite(motion(moved)).all()
+    assert refused > 3 * len(numbers)
 
 
 def test_a_forecast_is_the_future_of_the_loop(model: pdmp.Model) -> None:

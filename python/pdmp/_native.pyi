@@ -598,7 +598,7 @@ def cycles(
 class Model:
     """Parametric dynamic movement primitive, returned by `fit` and `load`.
 
-    Models are immutable and can be pickled.
+    Models are immutable, their arrays are read-only copies, and they can be pickled.
     """
     @property
     def kind(self) -> _Kind:
@@ -1541,7 +1541,8 @@ class Controller:
 
     `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
     valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `compliance` and
-    `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force.
+    `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
+    copied (`copy`, `deepcopy`) and pickled, and continues from its state to the bit.
     """
     def __copy__(self) -> Controller: ...
     def __deepcopy__(self, _memo: Any, /) -> Controller: ...

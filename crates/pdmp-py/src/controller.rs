@@ -374,7 +374,7 @@ impl Controller {
 
     /// Style s (J,); a read-only copy. Assign all values at once.
     #[getter]
-    fn style<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
+    fn style<'py>(&self, py: Python<'py>) -> Vector<'py> {
         read_only(py, self.inner.style())
     }
 
@@ -388,8 +388,8 @@ impl Controller {
     /// Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
     /// demonstrations; a read-only copy. Assign all values at once.
     #[getter]
-    fn goal_velocity<'py>(&self, py: Python<'py>) -> PyResult<Option<Vector<'py>>> {
-        self.inner.goal_velocity().map(|velocity| read_only(py, velocity)).transpose()
+    fn goal_velocity<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
+        self.inner.goal_velocity().map(|velocity| read_only(py, velocity))
     }
 
     #[setter]
@@ -531,6 +531,6 @@ impl Controller {
         if self.model.kind() != kind {
             return Err(PyValueError::new_err(other));
         }
-        read_only(py, self.inner.centre())
+        Ok(read_only(py, self.inner.centre()))
     }
 }
