@@ -41,7 +41,7 @@ def run(name: str, pull: bool = False, reset: bool = False) -> None:
         difference = controller.phase / (2 * np.pi) - cycles[k + 1]
         apart.append(abs(difference - np.round(difference)))
         speed = max(speed, np.abs(controller.velocity).max())
-    print(f"{name}: {apart[0]:.2f}, after 5 s at most {max(apart[-5000:]):.3f} cycles apart; ", end="")
+    print(f"{name}: {apart[0]:.2f}, later at most {max(apart[-5000:]):.3f} cycles apart; ", end="")
     print(f"fastest joint {speed:.1f} rad/s")
 
 

@@ -297,28 +297,6 @@ pdmp_status pdmp_controller_new(const pdmp_model *model,
                                 pdmp_controller **controller,
                                 pdmp_text error);
 
-/// Copies a controller with its state, for example to simulate the movement ahead. Under the same commands, copy and
-/// original move identically to the bit.
-///
-/// `memory` is memory for the copy as in pdmp_settings.memory, or `{NULL, 0}`. `*copy` is set to the new controller,
-/// which the caller frees with pdmp_controller_free, or to NULL on error.
-///
-/// Errors: PDMP_NULL, PDMP_MEMORY.
-pdmp_status pdmp_controller_clone(const pdmp_controller *controller,
-                                  pdmp_memory memory,
-                                  pdmp_controller **copy,
-                                  pdmp_text error);
-
-/// Copies the state of a controller into an earlier copy of it, without allocation, so that a control loop can look ahead:
-/// the copy is then advanced by pdmp_controller_step, or by pdmp_controller_update with ticks of any length.
-///
-/// `copy` becomes as by pdmp_controller_clone in its own memory; its error message remains. It allocates only if `copy` is
-/// of another model, or if `controller` was reset with a start or a velocity since `copy` was made without one.
-///
-/// Errors: PDMP_NULL.
-pdmp_status pdmp_controller_copy(const pdmp_controller *controller,
-                                 pdmp_controller *copy);
-
 /// Frees a controller; NULL is ignored. Memory that the caller provided may then be reused.
 void pdmp_controller_free(pdmp_controller *controller);
 
@@ -418,6 +396,28 @@ pdmp_status pdmp_controller_progress(const pdmp_controller *controller, double *
 /// the terminating zero, also if `text` is too short for it. The message is empty before the first error. The message
 /// of a NULL controller is empty.
 size_t pdmp_controller_error(const pdmp_controller *controller, pdmp_text text);
+
+/// Copies a controller with its state, for example to simulate the movement ahead. Under the same commands, copy and
+/// original move identically to the bit.
+///
+/// `memory` is memory for the copy as in pdmp_settings.memory, or `{NULL, 0}`. `*copy` is set to the new controller,
+/// which the caller frees with pdmp_controller_free, or to NULL on error.
+///
+/// Errors: PDMP_NULL, PDMP_MEMORY.
+pdmp_status pdmp_controller_clone(const pdmp_controller *controller,
+                                  pdmp_memory memory,
+                                  pdmp_controller **copy,
+                                  pdmp_text error);
+
+/// Copies the state of a controller into an earlier copy of it, without allocation, so that a control loop can look ahead:
+/// the copy is then advanced by pdmp_controller_step, or by pdmp_controller_update with ticks of any length.
+///
+/// `copy` becomes as by pdmp_controller_clone in its own memory; its error message remains. It allocates only if `copy` is
+/// of another model, or if `controller` was reset with a start or a velocity since `copy` was made without one.
+///
+/// Errors: PDMP_NULL.
+pdmp_status pdmp_controller_copy(const pdmp_controller *controller,
+                                 pdmp_controller *copy);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -17,7 +17,7 @@ use pdmp_status::PDMP_OK;
 
 /// Controller of one movement: a primitive, its commands and its state. One thread at a time may use it.
 pub struct pdmp_controller {
-    inner: Controller,
+    pub(crate) inner: Controller,
     /// Error of the last call that failed.
     fault: Option<Fault>,
     /// True if the library allocated the memory.
@@ -86,7 +86,7 @@ pub unsafe extern "C" fn pdmp_controller_new(
 }
 
 /// Checks size and alignment of the caller's memory, and returns it, or `None` if it is not given.
-fn aligned(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> {
+pub(crate) fn aligned(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> {
     let (needed, alignment) = (size_of::<pdmp_controller>(), align_of::<pdmp_controller>());
     let (address, size) = (memory.data.addr(), memory.size);
     match (address, size) {
@@ -101,7 +101,7 @@ fn aligned(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> {
 ///
 /// # Safety
 /// The memory comes from [`aligned`], and nothing else uses it.
-unsafe fn emplace(inner: Controller, memory: Option<*mut pdmp_controller>) -> *mut pdmp_controller {
+pub(crate) unsafe fn emplace(inner: Controller, memory: Option<*mut pdmp_controller>) -> *mut pdmp_controller {
     let controller = pdmp_controller { inner, fault: None, owned: memory.is_none() };
     match memory {
         // SAFETY: `aligned` has checked size and alignment, and the contract of this function excludes other users.
@@ -111,55 +111,6 @@ unsafe fn emplace(inner: Controller, memory: Option<*mut pdmp_controller>) -> *m
         },
         None => Box::into_raw(Box::new(controller)),
     }
-}
-
-/// Copies a controller with its state, for example to simulate the movement ahead. Under the same commands, copy and
-/// original move identically to the bit.
-///
-/// `memory` is memory for the copy as in pdmp_settings.memory, or `{NULL, 0}`. `*copy` is set to the new controller,
-/// which the caller frees with pdmp_controller_free, or to NULL on error.
-///
-/// Errors: PDMP_NULL, PDMP_MEMORY.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn pdmp_controller_clone(
-    controller: Option<&pdmp_controller>,
-    memory: pdmp_memory,
-    copy: Option<&mut MaybeUninit<*mut pdmp_controller>>,
-    error: pdmp_text,
-) -> pdmp_status {
-    let call = || {
-        let handle = copy.ok_or(Fault::Null("copy"))?.write(ptr::null_mut());
-        let inner = controller.ok_or(Fault::Null("controller"))?.inner.clone();
-        let memory = aligned(memory)?;
-        // SAFETY: `aligned` has checked the memory, and the contract of the C ABI guarantees that nothing else uses it.
-        *handle = unsafe { emplace(inner, memory) };
-        Ok(PDMP_OK)
-    };
-    // SAFETY: the contract of the C ABI covers `error`.
-    unsafe { guard_with_text(error, call) }
-}
-
-/// Copies the state of a controller into an earlier copy of it, without allocation, so that a control loop can look ahead:
-/// the copy is then advanced by pdmp_controller_step, or by pdmp_controller_update with ticks of any length.
-///
-/// `copy` becomes as by pdmp_controller_clone in its own memory; its error message remains. It allocates only if `copy` is
-/// of another model, or if `controller` was reset with a start or a velocity since `copy` was made without one.
-///
-/// Errors: PDMP_NULL.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn pdmp_controller_copy(
-    controller: *const pdmp_controller,
-    copy: *mut pdmp_controller,
-) -> pdmp_status {
-    if ptr::eq(controller, copy) && !copy.is_null() {
-        return PDMP_OK;
-    }
-    // SAFETY: the contract of the C ABI guarantees NULL or live controllers, and these are two.
-    let (controller, copy) = unsafe { (controller.as_ref(), copy.as_mut()) };
-    call_on(copy, |copy| {
-        copy.inner.clone_from(&controller.ok_or(Fault::Null("controller"))?.inner);
-        Ok(PDMP_OK)
-    })
 }
 
 /// Frees a controller; NULL is ignored. Memory that the caller provided may then be reused.
@@ -176,7 +127,7 @@ pub unsafe extern "C" fn pdmp_controller_free(controller: *mut pdmp_controller) 
 }
 
 /// Executes a call on a controller, and stores its error, if any, in the controller.
-fn call_on(
+pub(crate) fn call_on(
     controller: Option<&mut pdmp_controller>,
     call: impl FnOnce(&mut pdmp_controller) -> Result<pdmp_status, Fault>,
 ) -> pdmp_status {
