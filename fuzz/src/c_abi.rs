@@ -171,6 +171,11 @@ impl Caller<'_> {
                 9 => return self.update(slot, input),
                 10 => return self.call_model(input),
                 11 => match input.byte() % 4 {
+                    0 => {
+                        let source = usize::from(input.byte()) % N_SLOTS;
+                        let source = self.slots[source].as_ref().map_or(ptr::null_mut(), |x| x.controller);
+                        pdmp_controller_copy(source, controller.map_or(ptr::null_mut(), ptr::from_mut))
+                    }
                     1 => pdmp_controller_set_phase(controller, input.number()),
                     3 => pdmp_controller_set_phase_gain(controller, input.number()),
                     _ => {
