@@ -156,6 +156,9 @@ COMMANDS: list[tuple[str, str, Any]] = [
     *[("rhythmic", name, bad) for name in ("anchor", "style") for bad in ([NAN, 0], [0], [[0, 0]])],
     *[(kind, "tau", bad) for kind in ("discrete", "rhythmic") for bad in (NAN, 0.0, -1.0, INF)],
     *[("rhythmic", "amplitude", bad) for bad in (NAN, -1.0, INF)],
+    *[("rhythmic", "phase", bad) for bad in (NAN, INF, "a", [1.0])],
+    *[("discrete", "phase", bad) for bad in (0.5, NAN)],
+    *[("rhythmic", "phase_gain", bad) for bad in (NAN, -1.0, 1001.0, None)],
     ("discrete", "goal", [1e200, 0]),
     ("discrete", "goal", ["a", "b"]),
 ]

@@ -12,12 +12,16 @@
 //! Δ from rest to rest its peak velocity is 15/8·Δ/(u₁ − u₀) and its peak acceleration 10/√3·Δ/(u₁ − u₀)².
 
 use crate::dynamics::output_system::{Attractor, CubicSample};
+use crate::error::Result;
 use crate::numerics::simd::{F64x4, Real, Register};
+use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Peak velocity of a transition from rest to rest, in units of the displacement over the duration.
 const PEAK_VELOCITY: f64 = 15.0 / 8.0;
 /// Peak acceleration of a transition from rest to rest, in units of the displacement over the squared duration: 10/√3.
 const PEAK_ACCELERATION: f64 = 5.773_502_691_896_258;
+/// Minimum duration of a restored transition. The square of its inverse, times bounded coefficients, is finite.
+const MIN_DURATION: f64 = 1e-30;
 
 /// Displacement of the frame with its first and second derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,7 +32,7 @@ pub(crate) struct FrameSample<T = F64x4> {
 }
 
 /// Transition of the frame, by groups of DoFs.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct GoalTransition {
     active: bool,
     /// u₀.
@@ -50,6 +54,8 @@ pub(crate) struct TransitionEnd {
     pub(crate) value: F64x4,
     pub(crate) slope: F64x4,
 }
+
+clone_in_place!(GoalTransition { active, from, to, coefficients, value, ends });
 
 impl GoalTransition {
     /// Returns no transition of `n_groups` groups.
@@ -93,6 +99,21 @@ impl GoalTransition {
     #[inline(always)]
     pub(crate) fn has_reached_end(&self, u: f64) -> bool {
         self.active && u >= self.to
+    }
+
+    /// Visits the state, with the bounds of a clock and of a quantity in units of a DoF.
+    pub(crate) fn walk(&mut self, visit: &mut Visitor, clock: [f64; 2], quantity: [f64; 2]) -> Result<()> {
+        let Self { active, from, to, coefficients, value, ends } = self;
+        visit_flag(visit, active)?;
+        visit_number(visit, from, clock)?;
+        let after = if *active { from.next_up().max(*from + MIN_DURATION) } else { clock[0] };
+        // A transition may begin at the largest clock.
+        visit_number(visit, to, [after, 2.0 * clock[1]])?;
+        visit(bytemuck::cast_slice_mut::<[F64x4; 6], f64>(coefficients), quantity)?;
+        visit(bytemuck::cast_slice_mut::<F64x4, f64>(value), quantity)?;
+        ends.iter_mut().try_for_each(|TransitionEnd { goal, value, slope }| {
+            [goal, value, slope].into_iter().try_for_each(|lanes| visit(lanes.as_mut_array(), quantity))
+        })
     }
 
     /// Ends the transition: the displacement becomes zero.

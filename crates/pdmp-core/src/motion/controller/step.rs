@@ -68,7 +68,8 @@ impl Controller {
             return first_element(self.rate.value()) * dt;
         }
         self.update_rate_step(dt);
-        self.rate.integral(&self.rate_step)
+        // The integral is positive but for rounding.
+        self.rate.integral(&self.rate_step).max(0.0)
     }
 
     /// Computes the filter step of the rate for `dt` seconds, unless the last one had that length.
