@@ -180,9 +180,11 @@ impl Controller {
     /// use pdmp_core::motion::Compliance;
     ///
     /// controller.set_compliance(Compliance { stopping: 1e6, tracking: 0.0 })?;
+    /// controller.step()?;
+    /// let phase = controller.phase();
     /// let measured = [1.0, 0.0];
     /// controller.step_with(&Command { measured: Some(&measured), ..Command::default() })?;
-    /// assert!(controller.phase() > 0.9999);
+    /// assert!(controller.phase() > 0.9999 * phase);
     /// controller.release();
     /// # Ok(())
     /// # }
