@@ -1,5 +1,6 @@
 """Moves: a demonstration is moved to the start and goal of another one of its task."""
 
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,8 @@ class Errors:
     immediate: float
     unmoved: float
     minimum_jerk: float
+    hindsight: float  # of the profile that is learnt from the target too
+    standard_error: float  # of `ratio`, by the jackknife over the targets
 
     @property
     def ratio(self) -> float:
@@ -38,24 +41,34 @@ def errors(task: Task) -> Errors:
     """
     paths = aligned(task) / pdmp.fit(task.demos).dof_scale
     n_demos = len(paths)
-    sums = dict.fromkeys(("learnt", "immediate", "unmoved", "minimum_jerk"), 0.0)
-    targets = np.unique(np.linspace(0, n_demos - 1, min(n_demos, MAX_TARGETS)).astype(int))
-    for n in targets:
+    all_demos = responses(task.demos, "learnt")
+    found: dict[str, list[float]] = defaultdict(list)
+    for n in np.unique(np.linspace(0, n_demos - 1, min(n_demos, MAX_TARGETS)).astype(int)):
         others = [m for m in range(n_demos) if m != n]
         target, moved = paths[n], paths[others]
         by_start, by_goal = (target[row] - moved[:, row] for row in (0, -1))
-        for transport in ("learnt", "immediate"):
-            shares = responses([task.demos[m] for m in others], transport)
-            change = sum(
-                share[:, None] * by[:, None]
-                for share, by in zip(shares, (by_start, by_goal), strict=True)
-            )
-            sums[transport] += np.mean((moved + change - target) ** 2)
-        sums["unmoved"] += np.mean((moved - target) ** 2)
+        demos = [task.demos[m] for m in others]
+        profiles = {
+            "learnt": responses(demos, "learnt"),
+            "immediate": responses(demos, "immediate"),
+            "hindsight": all_demos,
+        }
+        for name, (of_start, of_goal) in profiles.items():
+            change = of_start[:, None] * by_start[:, None] + of_goal[:, None] * by_goal[:, None]
+            found[name].append(np.mean((moved + change - target) ** 2))
+        found["unmoved"].append(np.mean((moved - target) ** 2))
         straight = target[0] + MINIMUM_JERK[:, None] * (target[-1] - target[0])
-        sums["minimum_jerk"] += np.mean((straight - target) ** 2)
-    means = {name: total / len(targets) for name, total in sums.items()}
-    return Errors(task.source, task.name, n_demos, **means)
+        found["minimum_jerk"].append(np.mean((straight - target) ** 2))
+    means = {name: float(np.mean(values)) for name, values in found.items()}
+    error = jackknife(np.array(found["learnt"]), np.array(found["immediate"]))
+    return Errors(task.source, task.name, n_demos, **means, standard_error=error)
+
+
+def jackknife(upper: np.ndarray, lower: np.ndarray) -> float:
+    """Returns the standard error of the ratio of two sums."""
+    n = len(upper)
+    ratios = (upper.sum() - upper) / (lower.sum() - lower)
+    return float(np.sqrt((n - 1) * np.var(ratios)))
 
 
 def aligned(task: Task) -> np.ndarray:
