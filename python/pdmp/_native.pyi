@@ -892,7 +892,7 @@ class Model:
         """
     def jacobian(
         self,
-        wrt: Literal["style", "goal", "anchor", "start"],
+        wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
         conditions: Conditions | None = None,
         *,
         derivative: int = 0,  # at most 2
@@ -1225,9 +1225,10 @@ class Factors:
 
 class _Changes(TypedDict, total=False):
     style: ArrayLike | None  # (J,)
-    goal: ArrayLike | None  # (D,), as are start, velocity and anchor
+    goal: ArrayLike | None  # (D,), as are start, velocities and anchor
     start: ArrayLike | None
     velocity: ArrayLike | None
+    goal_velocity: ArrayLike | None
     anchor: ArrayLike | None
     amplitude: float | None
     tau: float | None
@@ -1315,6 +1316,9 @@ class Conditions:
     @property
     def velocity(self) -> _Array | None:
         """Start velocity (D,) per s, or None."""
+    @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s of a discrete movement, or None."""
     @property
     def anchor(self) -> _Array | None:
         """Anchor y_a (D,) of a rhythmic movement, or None."""
@@ -1659,6 +1663,13 @@ class Controller:
     @goal.setter
     def goal(self, goal: ArrayLike, /) -> None: ...
     @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
+        demonstrations; a read-only copy. Assign all values at once.
+        """
+    @goal_velocity.setter
+    def goal_velocity(self, goal_velocity: ArrayLike | None, /) -> None: ...
+    @property
     def style(self) -> _Array:
         """Style s (J,); a read-only copy. Assign all values at once."""
     @style.setter
@@ -1686,6 +1697,15 @@ class Controller:
         """
     @speed.setter
     def speed(self, speed: float, /) -> None: ...
+    @property
+    def tolerance(self) -> float:
+        """Tolerance within which the movement has settled on its goal, 0.005 by default, at most 1.
+
+        It is relative to the larger of two lengths of each degree of freedom: its largest demonstrated range, and its
+        distance from the goal when this was last set. It stays in force after `reset`.
+        """
+    @tolerance.setter
+    def tolerance(self, tolerance: float, /) -> None: ...
     @property
     def compliance(self) -> tuple[float, float]:  # stopping k_s, tracking k_t
         """Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each."""
