@@ -12,6 +12,8 @@ DT = 0.001  # s
 TRANSPORTS = ("learnt", "immediate")
 GREEN = PALETTE[2]
 ENDS = {"at rest": ("CShape", 1), "in motion": ("Sshape", 0)}  # shape and demonstration
+WRITTEN = "NShape"
+SHIFT = np.array([10.0, 15.0])  # mm
 SERVO = 25.0  # rad/s, natural frequency of the simulated joint
 SAG = 0.05  # rad
 HELD = (0.8, 1.8)  # s
@@ -22,6 +24,7 @@ TICKS_PER_MEASUREMENT = 10  # a sensor at 100 Hz
 def draw(folder: Path) -> None:
     """Draws all figures."""
     moved_goals(folder / "transport.png")
+    moved_writing(folder / "control.png")
     two_ends(folder / "end.png")
     perturbed(folder / "perturbation.png")
 
@@ -63,6 +66,43 @@ def goal_moved(model: pdmp.Model, goal: float, moved: float) -> tuple[np.ndarray
         controller.step()
         motion.append([tick * DT, controller.position[0], controller.acceleration[0]])
     return tuple(np.transpose(motion))
+
+
+def moved_writing(path: Path) -> None:
+    """Draws a handwritten shape whose goal moves half way, for both transports."""
+    figure = ensure_figure(None, 6.8, 4.6)
+    grid = figure.subplots(2, 2, sharex="row", sharey="row", height_ratios=[1.6, 1])
+    demos = list(handwriting()[WRITTEN])
+    for (upper, lower), transport in zip(grid.T, TRANSPORTS, strict=True):
+        model = pdmp.fit(demos, transport=transport)
+        conditions = model.conditions(range(model.n_demos))
+        duration = np.sum(conditions.segment_durations)
+        label_axes(upper, "x [mm]", "", f'transport="{transport}"')
+        label_axes(lower, "time [s]", "")
+        upper.set_aspect("equal")
+        for shift, label, style in (
+            (0 * SHIFT, "left alone", {"color": GREY, "linewidth": 3}),
+            (SHIFT, "goal moved half way", {"color": BLUE}),
+        ):
+            controller = model.controller(DT, conditions)
+            positions = []
+            for tick in range(round(1.5 * duration / DT)):
+                if tick == round(0.5 * duration / DT):
+                    controller.goal = conditions.goal + shift
+                    here = controller.position.copy()
+                controller.step()
+                positions.append(controller.position.copy())
+            x, y = np.transpose(positions)
+            upper.plot(x, y, label=label, **style)
+            lower.plot(DT * np.arange(1, 1 + len(y)), y, **style)
+            upper.plot(*controller.goal, "x", color=style["color"])
+        upper.plot(*here, "o", color=ORANGE, label="command")
+        lower.axvline(0.5 * duration, color=ORANGE, linewidth=1)
+        lower.axvline(duration, color="black", linewidth=0.6)
+    grid[0, 0].set_ylabel("y [mm]")
+    grid[1, 0].set_ylabel("y [mm]")
+    legend(figure, grid[0, 0])
+    save(figure, path)
 
 
 def two_ends(path: Path) -> None:

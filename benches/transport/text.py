@@ -22,6 +22,13 @@ A discrete movement y moves about c(u) = y₀ + (g − y₀)·m(u), where the tr
 learnt from the demonstrations. `transport="immediate"`, m ≡ 1, gives the paper's equations.
 
 ![Reaches with learnt and with immediate transport](transport.png)
+
+![A handwritten N whose goal moves half way, with learnt and with immediate transport](control.png)
+
+The goal of a handwritten N moves when half of the movement is done (orange). The black line is the
+end of the movement.
+
+In short:
 """
 SUMMARY = """\
 - Start and goal of another demonstration: the error is {ratio:.2f} of that of the paper's equations
@@ -30,8 +37,8 @@ SUMMARY = """\
   median of each set, and by {hand:.1f} % in that of handwriting.
 - They are `FINISHED` within {finished:.2f} of their duration in the median of each set of whole
   movements, those at rest within {at_rest:.2f} in the median of all.
-- A straight reach to half the distance leaves the interval between start and goal by {outside:.1f} %
-  of it. A goal ten ranges away causes no initial acceleration.
+- A straight reach to half the distance leaves the interval between start and goal by
+  {outside:.1f} % of it. A goal ten ranges away causes no initial acceleration.
 - A goal that moves causes at most {moved:.2f} of the acceleration that it causes in the paper.
 """
 MOVES = """\
