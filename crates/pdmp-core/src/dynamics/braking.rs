@@ -26,6 +26,16 @@ pub(crate) struct Braking {
     peak: f64,
 }
 
+/// Curve e(v) = v·exp(−λv) of a movement that brakes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BrakingCurve {
+    pub(crate) distance: f64,
+    /// e′.
+    pub(crate) velocity: f64,
+    /// Largest e + 2|e′|/α_z from v on.
+    pub(crate) farthest: f64,
+}
+
 impl Braking {
     /// Returns the braking with the largest deceleration κ per unit of velocity.
     pub(crate) fn new(Attractor { alpha_z, beta_z }: Attractor, kappa: f64) -> Self {
@@ -53,6 +63,20 @@ impl Braking {
     pub(crate) fn bound(&self, v: f64) -> f64 {
         let decayed = self.lambda * v;
         (1.0 + decayed) * (-decayed).exp() + self.stiffness * self.h(v.max(self.peak))
+    }
+
+    /// Returns the braking curve at v, for unit velocity at the end.
+    ///
+    /// With x = λv and q = 2λ/α_z ≥ 1, λ(e + 2|e′|/α_z) = (x + q|1 − x|)·exp(−x). It decreases to x = 1 and from
+    /// x = 1 + q/(1 + q) on, where it has the value (1 + q)·exp(−x).
+    pub(crate) fn curve(&self, v: f64) -> BrakingCurve {
+        let x = self.lambda * v;
+        let q = 2.0 * self.lambda / self.alpha_z;
+        let decay = (-x).exp();
+        let present = (x + q * (1.0 - x).abs()) * decay;
+        let peak = 1.0 + q / (1.0 + q);
+        let farthest = if x < peak { present.max((1.0 + q) * (-peak).exp()) } else { present };
+        BrakingCurve { distance: v * decay, velocity: (1.0 - x) * decay, farthest: farthest / self.lambda }
     }
 
     /// Returns h(v) = v²·ψ((α_z − λ)v)·exp(−α_z v).
@@ -97,6 +121,23 @@ mod tests {
                     state[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
                 }
                 assert_relative_eq!(state[0], (v + h) * (-lambda * (v + h)).exp(), epsilon = 1e-9);
+            }
+        }
+    }
+
+    /// The curve has its velocity as derivative, and its distance and velocity stay within the stated bound.
+    #[test]
+    fn curve_stays_within_its_bound() {
+        for kappa in [25.0, 60.0, 200.0] {
+            let braking = Braking::new(Attractor { alpha_z: 25.0, beta_z: 6.25 }, kappa);
+            let curves: Vec<_> = (0..20_000).map(|k| braking.curve(f64::from(k) * 1e-4)).collect();
+            let mut later = 0.0f64;
+            for k in (1..curves.len() - 1).rev() {
+                let BrakingCurve { distance, velocity, farthest } = curves[k];
+                let slope = (curves[k + 1].distance - curves[k - 1].distance) / 2e-4;
+                assert_relative_eq!(slope, velocity, epsilon = 1e-4);
+                later = later.max(distance + velocity.abs() * (2.0 / 25.0));
+                assert_relative_eq!(farthest, later, max_relative = 1e-4, epsilon = 1e-12);
             }
         }
     }

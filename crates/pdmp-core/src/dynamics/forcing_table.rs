@@ -3,7 +3,7 @@
 //! The forcing of each style dimension and DoF is stored as a piecewise cubic Hermite interpolant on a uniform grid of the
 //! clock, independently of the regressor that it was learnt by.
 
-use crate::dynamics::braking::Braking;
+use crate::dynamics::braking::{Braking, BrakingCurve};
 use crate::dynamics::canonical::{Canonical, faded, turn};
 use crate::dynamics::hermite_table::KnotTable;
 use crate::dynamics::output_system::{Attractor, CubicSample};
@@ -266,6 +266,14 @@ impl ForcingTable {
                 ForcingBound { value: (-alpha_x * v).exp(), slope: 0.0 }
             }
             (Canonical::Rhythmic { .. }, Ending::Phase) => ForcingBound { value: 1.0, slope: 0.0 },
+        }
+    }
+
+    /// Returns the braking curve at clock `u` past the end; `None` with [`Ending::Phase`].
+    pub(crate) fn braking_curve(&self, u: f64) -> Option<BrakingCurve> {
+        match self.ending {
+            Ending::Phase => None,
+            Ending::Braked { braking, .. } => Some(braking.curve(u - self.canonical.extent())),
         }
     }
 
