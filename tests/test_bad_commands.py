@@ -94,7 +94,7 @@ def test_invalid_conditions_of_a_rhythmic_one_are_rejected(
 
 
 def test_final_velocity_needs_learnt_transport() -> None:
-    """With the paper's transport there is no frame that could pass the goal, as the error states."""
+    """With the paper's transport no frame could pass the goal, as the error states."""
     model = pdmp.fit(reaches(), transport="immediate")
     for call in (model.rollout, model.controller, model.controller().reset):
         with pytest.raises(ValueError, match="goal_velocity needs learnt transport"):

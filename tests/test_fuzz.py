@@ -253,9 +253,9 @@ def test_loop_with_unusual_commands_is_finite(kind: str, request: pytest.Fixture
         | st.tuples(st.just("tau"), SIZES)
         | st.tuples(st.just("tolerance"), st.floats(1e-9, 1))
     )
-    odd = st.tuples(
-        st.sampled_from(["goal", "goal_velocity", "style", "anchor"]), ODD
-    ) | st.tuples(st.sampled_from(["tau", "amplitude", "tolerance"]), SCALARS)
+    odd = st.tuples(st.sampled_from(["goal", "goal_velocity", "style", "anchor"]), ODD) | st.tuples(
+        st.sampled_from(["tau", "amplitude", "tolerance"]), SCALARS
+    )
 
     @QUICK
     @given(

@@ -36,7 +36,7 @@ SUMMARY = """\
 - After the end, movements leave their goals by {excursion:.1f} % of their range or less in the
   median of each set, and by {hand:.1f} % in that of handwriting.
 - They are `FINISHED` within {finished:.2f} of their duration in the median of each set of whole
-  movements, those at rest within {at_rest:.2f} in the median of all.
+  movements, those at rest within {at_rest:.2f} in the median and {slowest:.2f} at most.
 - A straight reach to half the distance leaves the interval between start and goal by
   {outside:.1f} % of it. A goal ten ranges away causes no initial acceleration.
 - A goal that moves causes at most {moved:.2f} of the acceleration that it causes in the paper.
@@ -84,9 +84,9 @@ SETTLED = """\
 ## Time to finish
 
 *Finished*: time at which a controller is `FINISHED`, relative to the duration of the
-demonstration. The other columns have the median time from which |y − g| + 2τ|ẏ|/α_z stays below
-a share of the range of each degree of freedom: it bounds the displacement that remains at
-critical damping. Brackets: the maximum over the demonstrations at rest.
+demonstration, with the default `tolerance` of 0.5 %. The other columns have the median time from
+which |y − g| + 2τ|ẏ|/α_z stays below a share of the range of each degree of freedom: it bounds the
+displacement that remains at critical damping. Brackets: the maximum over the demonstrations at rest.
 """
 STRAIGHT = """\
 ## Straight reaches
@@ -169,6 +169,7 @@ def summary(ends: Sequence[End], errors: Sequence[Errors], reaches: dict[str, Re
         hand=100 * excursions.get("handwriting", np.nan),
         finished=max(time for source, time in finished.items() if "rise" not in source.split(", ")),
         at_rest=np.median([end.finished for end in ends if end.is_at_rest]),
+        slowest=max(end.finished for end in ends if end.is_at_rest),
         outside=100 * reaches["learnt"].outside,
         moved=(learnt / immediate).max(),
     )
