@@ -86,7 +86,8 @@ SETTLED = """\
 *Finished*: time at which a controller is `FINISHED`, relative to the duration of the
 demonstration, with the default `tolerance` of 0.5 %. The other columns have the median time from
 which |y − g| + 2τ|ẏ|/α_z stays below a share of the range of each degree of freedom: it bounds the
-displacement that remains at critical damping. Brackets: the maximum over the demonstrations at rest.
+displacement that remains at critical damping. Brackets: the maximum over the demonstrations at
+rest.
 """
 STRAIGHT = """\
 ## Straight reaches
