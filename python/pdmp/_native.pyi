@@ -892,7 +892,7 @@ class Model:
         """
     def jacobian(
         self,
-        wrt: Literal["style", "goal", "anchor", "start"],
+        wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
         conditions: Conditions | None = None,
         *,
         derivative: int = 0,  # at most 2
@@ -1746,6 +1746,13 @@ class Controller:
         """Goal g (D,) of a discrete movement; a read-only copy. Assign all values at once."""
     @goal.setter
     def goal(self, goal: ArrayLike, /) -> None: ...
+    @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
+        demonstrations; a read-only copy. Assign all values at once.
+        """
+    @goal_velocity.setter
+    def goal_velocity(self, goal_velocity: ArrayLike | None, /) -> None: ...
     @property
     def style(self) -> _Array:
         """Style s (J,); a read-only copy. Assign all values at once."""

@@ -14,8 +14,9 @@ from pdmp._messages import printable
 _ARGUMENT = re.compile(
     r"\b(contexts|dt|max_gap|period|time)="
     r"|(?:^|(?<=: ))(dt|max_gap|period|smoothing)(?= = | does not )"
-    r"|(?:^|(?<=^n_styles and ))(amplitude|anchor|context|demos|duration|goal|n_styles"
-    r"|singular_value_share|start|style|tau)(?= = | and |\[| has |: | does not )"
+    r"|(?:^|(?<=^n_styles and ))(amplitude|anchor|context|demos|duration|goal"
+    r"|goal_velocity|n_styles|singular_value_share|start|style|tau|velocity)"
+    r"(?= = | and |\[| has |: | does not )"
 )
 _RENAMED = {"contexts": "context", "demos": "demo", "n_styles": "styles"}
 

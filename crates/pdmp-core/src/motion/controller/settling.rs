@@ -22,7 +22,7 @@ impl Controller {
     ///
     /// The deviation from the goal is bounded by the sum of those of the frame, of the braking along its closed form, of the
     /// homogeneous rest (e, z) of the output system, |e| + |z|·exp(−ζa)/ω, and of a style in transition, whose forcing Δw
-    /// deviates by about |Δw|/β_z. With immediate transport the forcing w counts as a whole.
+    /// deviates by about |Δw|/β_z. With immediate transport, and while the phase is slowed, the forcing counts as a whole.
     pub(super) fn settled(&self) -> Status {
         let (forcing_table, clock) = (self.primitive.forcing_table(), self.clock.value());
         let Some(fade) = forcing_table.fade(clock) else { return Status::Working };
@@ -30,7 +30,7 @@ impl Controller {
         let (by_flow, by_forcing) = (attractor.impulse_peak(), 1.0 / attractor.beta_z);
         let target = unpack(self.style.target(), self.primitive.n_styles());
         let (bound, table_index) = (forcing_table.bound(clock), forcing_table.index(clock));
-        let braked = forcing_table.braked_motion(clock);
+        let braked = forcing_table.braked_motion(clock).filter(|_| self.perturbation.phase_rate() == 1.0);
         let settled = self.groups.iter().enumerate().all(|(index, group)| {
             let ForcingSample { value, slope, .. } = group.forcing;
             let forcing = CubicSample { value, slope };
