@@ -116,6 +116,18 @@ def test_rollout_writes_the_movement(model_file: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(made.position, expected.position)
 
 
+def test_rollout_passes_its_goal_with_the_given_velocity(model_file: Path, tmp_path: Path) -> None:
+    """--velocity is the start velocity, --goal-velocity that at the end."""
+    path = tmp_path / "out.csv"
+    ends = "--velocity", 0.2, 0, "--goal-velocity", -1, 0.5
+    assert run("rollout", model_file, *ends, "-o", path) == 0
+    model = pdmp.load(model_file)
+    expected = model.rollout(velocity=[0.2, 0.0], goal_velocity=[-1.0, 0.5])
+    made = pdmp.io.read_csv(path, columns=model.names)
+    np.testing.assert_array_equal(made.position, expected.position)
+    assert not np.allclose(made.position, model.rollout(velocity=[0.2, 0.0]).position, atol=1e-3)
+
+
 def test_rollout_reproduces_a_demonstration(model_file: Path, tmp_path: Path) -> None:
     """With --demo, style, goal, start and duration are those of the demonstration."""
     path = tmp_path / "out.csv"
@@ -245,6 +257,8 @@ def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
         (["fit", "none.csv", "-o", "m"], "none.csv: No such file"),
         (["rollout", "{model}", "--style", "1", "-o", "o"], "--style has length 1, expected 2"),
         (["rollout", "{model}", "--goal", "1", "-o", "o"], "--goal has length 1, expected 2"),
+        (["rollout", "{model}", "--goal-velocity", "1", "-o", "o"], "--goal-velocity has length 1"),
+        (["rollout", "{model}", "--velocity", "1", "-o", "o"], "--velocity has length 1, expec"),
         (["rollout", "{model}", "--tau", "-1", "-o", "o"], "--tau = -1: must be positive"),
         (["rollout", "{model}", "--demo", "9", "-o", "o"], "--demo = 9: must lie between 0 and 4"),
         (

@@ -598,7 +598,7 @@ def cycles(
 class Model:
     """Parametric dynamic movement primitive, returned by `fit` and `load`.
 
-    Models are immutable and can be pickled.
+    Models are immutable, their arrays are read-only copies, and they can be pickled.
     """
     @property
     def kind(self) -> _Kind:
@@ -1225,7 +1225,7 @@ class Factors:
 
 class _Changes(TypedDict, total=False):
     style: ArrayLike | None  # (J,)
-    goal: ArrayLike | None  # (D,), as are start, velocity and anchor
+    goal: ArrayLike | None  # (D,), as are start, velocities and anchor
     start: ArrayLike | None
     velocity: ArrayLike | None
     goal_velocity: ArrayLike | None
@@ -1544,17 +1544,20 @@ class Controller:
     """Running movement, returned by `Model.controller`.
 
     `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed`, `tolerance` and `compliance` can be set at any
-    tick; a value that is rejected leaves the present one in force.
+    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `compliance` and
+    `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
+    copied (`copy`, `deepcopy`) and pickled, and continues from its state to the bit.
     """
     def __copy__(self) -> Controller: ...
     def __deepcopy__(self, _memo: Any, /) -> Controller: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
     def step(
         self,
         dt: float | None = None,
         *,
         measured: ArrayLike | None = None,  # (D,)
         coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
+        phase: float | None = None,
     ) -> Status:
         """Advances the movement by one tick.
 
@@ -1562,7 +1565,7 @@ class Controller:
 
             tau y' = z + w(u) + k_t d + tau c_v
             tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
-            tau u' = k = 1 / (1 + k_s |d / range|**2)
+            tau u' = max(0, k + k_phi sin(phase - phi))     k = 1 / (1 + k_s |d / range|**2)
             tau o' = 5 k (e - o) / extent
 
         with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
@@ -1570,7 +1573,8 @@ class Controller:
         terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
         m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
         there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
-        finishes.
+        finishes. A measured phase pulls the phase of a rhythmic movement with the gain k_phi of `phase_gain`, without
+        overshoot for a tick of any length.
 
         Parameters
         ----------
@@ -1582,6 +1586,9 @@ class Controller:
             `release`, so that a sensor may be slower than the loop.
         coupling : tuple of two array_like, (D,), optional
             Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
+        phase : float, optional
+            Measured phase in rad of a rhythmic movement, for this tick only. A sensor slower than the loop passes its
+            last phase plus the time since then over tau.
 
         Returns
         -------
@@ -1591,8 +1598,8 @@ class Controller:
         Raises
         ------
         ValueError
-            The tick is negative or longer than 1000 tau, a length is wrong, or a number is not finite. The state then
-            stays as it was.
+            The tick is negative or longer than 1000 tau, a length is wrong, a number is not finite, or a phase is passed
+            to a discrete movement. The state then stays as it was.
 
         Examples
         --------
@@ -1607,11 +1614,50 @@ class Controller:
         Ijspeert, Nakanishi, Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739 (phase stopping, term in y').
         Schaal, Mohajerian, Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9.
         Pastor, Hoffmann, Asfour, Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385 (terms in z').
+        Acebrón, Bonilla, Pérez Vicente, Ritort, Spigler, Reviews of Modern Physics 77, 137, 2005 (pull of the phase).
         """
     def release(self) -> None:
         """Discards the measured position.
 
         The movement is unperturbed until the next measurement.
+        """
+    def forecast(self, horizon: float, dt: float | None = None) -> Trajectory:
+        """Computes the motion over the next seconds under the present commands, without a change of the controller.
+
+        Commands in transition continue. A measured position remains in force as in `step`; coupling terms and a measured
+        phase, which apply to one tick, do not. Ticks are exact for any length, so that a coarse `dt` is as accurate as a
+        fine one, except for a measured position, whose terms are constant over a tick. The call allocates and belongs
+        outside the real-time loop, which another thread may step meanwhile.
+
+        Parameters
+        ----------
+        horizon : float
+            Length in s.
+        dt : float, optional
+            Interval between samples in s; by default that of the controller, for which the samples are those of the loop
+            to the bit.
+
+        Returns
+        -------
+        Trajectory
+            n + 1 samples, where n is horizon / dt rounded down. Times are from now, and the first sample is the present
+            motion.
+
+        Raises
+        ------
+        ValueError
+            `horizon` is negative or not finite, `dt` is not positive or longer than 1000 tau, or there are more than 1e7
+            samples.
+
+        Examples
+        --------
+        >>> controller = model.controller(dt=0.01)
+        >>> controller.goal = [1.1, 0.0]
+        >>> ahead = controller.forecast(0.5)
+        >>> for _ in range(50):
+        ...     _ = controller.step()
+        >>> np.array_equal(ahead.position[-1], controller.position)
+        True
         """
     def reset(
         self,
@@ -1653,7 +1699,45 @@ class Controller:
         """Result of the last `step`, or `WORKING` after a later command."""
     @property
     def phase(self) -> float:  # x in (0, 1], or phi in [0, 2 pi)
-        """Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one."""
+        """Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one.
+
+        Assigning the phase of a rhythmic movement resets it, for example at the heel strike of a gait. Position and
+        velocity are continuous, the acceleration jumps, and the deviation from the cycle at the new phase decays. Before
+        the first tick the movement starts at this phase. A discrete movement rejects it.
+
+        Examples
+        --------
+        Reset the phase at each heel strike, and adapt the frequency by the measured stride:
+
+        >>> walk = np.sin(2 * np.pi * np.arange(100) / 100)[:, None]
+        >>> gait = pdmp.fit([pdmp.Demonstration(walk, dt=0.01)], kind="rhythmic")
+        >>> controller = gait.controller(dt=0.01)
+        >>> stride, heel, gain = 1.25, 0.0, 0.5
+        >>> for _ in range(12):
+        ...     for _ in range(125):
+        ...         _ = controller.step()
+        ...     controller.phase = heel
+        ...     omega = 1 / controller.tau
+        ...     controller.tau = 1 / (omega + gain * (2 * np.pi / stride - omega))
+        >>> round(2 * np.pi * controller.tau, 2)
+        1.25
+
+        References
+        ----------
+        Nakanishi, Morimoto, Endo, Cheng, Schaal, Kawato, Robotics and Autonomous Systems 47 (2004) 79-91 (the rule).
+        The same authors, IROS 2004, doi:10.1109/IROS.2004.1389470 (phase resetting).
+        """
+    @phase.setter
+    def phase(self, phase: float, /) -> None: ...
+    @property
+    def phase_gain(self) -> float:
+        """Gain k_phi of a measured phase in `step`, per unit of u, from 0 to 1000; 1 by default, 0 disables the pull.
+
+        An error of the phase decays with exp(-k_phi t / tau). A movement whose frequency differs from the measured one
+        by the share e lags by asin(e / k_phi), and is synchronised for e < k_phi. The gain stays in force after `reset`.
+        """
+    @phase_gain.setter
+    def phase_gain(self, gain: float, /) -> None: ...
     @property
     def time(self) -> float:
         """Time since the start in s."""
@@ -1663,17 +1747,17 @@ class Controller:
     @goal.setter
     def goal(self, goal: ArrayLike, /) -> None: ...
     @property
+    def style(self) -> _Array:
+        """Style s (J,); a read-only copy. Assign all values at once."""
+    @style.setter
+    def style(self, style: ArrayLike, /) -> None: ...
+    @property
     def goal_velocity(self) -> _Array | None:
         """Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
         demonstrations; a read-only copy. Assign all values at once.
         """
     @goal_velocity.setter
     def goal_velocity(self, velocity: ArrayLike | None, /) -> None: ...
-    @property
-    def style(self) -> _Array:
-        """Style s (J,); a read-only copy. Assign all values at once."""
-    @style.setter
-    def style(self, style: ArrayLike, /) -> None: ...
     @property
     def anchor(self) -> _Array:
         """Anchor y_a (D,) of a rhythmic movement; a read-only copy. Assign all values at once."""

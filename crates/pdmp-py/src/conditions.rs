@@ -6,7 +6,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::{to_numpy, vector};
+use crate::convert::{read_only, vector};
 use crate::error::{ascii, raise};
 use crate::instance;
 use crate::scalar::{Scalar, number};
@@ -272,5 +272,5 @@ fn present<'py>(conditions: &Bound<'py, Conditions>) -> PyResult<Bound<'py, PyDi
 }
 
 fn array<'py>(py: Python<'py>, values: &Option<Vec<f64>>) -> Option<Bound<'py, PyArray1<f64>>> {
-    values.as_ref().map(|values| to_numpy(py, values))
+    values.as_ref().map(|values| read_only(py, values))
 }

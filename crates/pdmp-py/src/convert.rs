@@ -1,15 +1,14 @@
 //! Conversion of Python arguments and results: anything that numpy converts to float64 in, float64 out.
 
-use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
+use ndarray::{Array1, Array2, ArrayD, Dimension, Ix1, Ix2};
 use numpy::{
-    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayLikeDyn,
-    PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
+    AllowTypeChange, IntoPyArray, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn,
+    PyArrayLikeDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pdmp_core::demonstration::ContextValue;
 use pdmp_core::numerics::Threads;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
-use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
 
@@ -287,7 +286,7 @@ pub(crate) fn context_to_python<'py>(py: Python<'py>, context: &[ContextValue]) 
         .map(|value| if let ContextValue::Number(number) = value { Some(*number) } else { None })
         .collect();
     if let Some(numbers) = numbers {
-        return Ok(to_numpy(py, &numbers).into_any());
+        return Ok(read_only(py, &numbers).into_any());
     }
     let values = context.iter().map(|value| match value {
         ContextValue::Number(number) => number.into_bound_py_any(py),
@@ -355,11 +354,18 @@ fn overlaps(shape: &[usize], strides: &[isize]) -> bool {
     })
 }
 
-/// Returns a new read-only numpy vector: assignment to an element would not reach the controller.
-pub(crate) fn read_only<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Vector<'py>> {
-    let vector = to_numpy(py, values);
-    vector.call_method(intern!(py, "setflags"), (false,), None)?;
-    Ok(vector)
+/// Returns a new read-only numpy vector: assignment to an element would not reach the object.
+pub(crate) fn read_only<'py>(py: Python<'py>, values: &[f64]) -> Vector<'py> {
+    locked(to_numpy(py, values))
+}
+
+/// Makes a new array read-only: assignment to an element of a copy would not reach the object.
+pub(crate) fn locked<D: Dimension>(array: Bound<'_, PyArray<f64, D>>) -> Bound<'_, PyArray<f64, D>> {
+    if let Ok(array) = array.try_readwrite() {
+        // The borrow ends, the flag remains.
+        drop(array.make_nonwriteable());
+    }
+    array
 }
 
 /// Returns a new numpy vector.

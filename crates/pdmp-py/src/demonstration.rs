@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::convert::{
-    Matrix, Reduced, Vector, array, context_to_python, optional, plain, quoted, texts, to_numpy, two_axes, vector,
+    Matrix, Reduced, Vector, array, context_to_python, locked, optional, plain, quoted, read_only, texts, to_numpy,
+    two_axes, vector,
 };
 use crate::error::raise;
 use crate::scalar::{Scalar, optional_number};
@@ -92,7 +93,7 @@ impl Demonstration {
     /// Positions (T, D) in the unit of each degree of freedom.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        self.0.position().to_pyarray(py)
+        locked(self.0.position().to_pyarray(py))
     }
 
     /// Times of the samples (T,) in s; None if unknown.
@@ -102,9 +103,9 @@ impl Demonstration {
             Sampling::Unknown => None,
             Sampling::Uniform { dt } => {
                 let time: Vec<f64> = (0..self.0.n_samples()).map(|c| c as f64 * dt).collect();
-                Some(to_numpy(py, &time))
+                Some(read_only(py, &time))
             }
-            Sampling::Stamped { time } => Some(to_numpy(py, time)),
+            Sampling::Stamped { time } => Some(read_only(py, time)),
         }
     }
 
@@ -120,7 +121,7 @@ impl Demonstration {
     /// Goal g (D,); None if not given.
     #[getter]
     fn goal<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
-        self.0.goal().map(|goal| to_numpy(py, goal))
+        self.0.goal().map(|goal| read_only(py, goal))
     }
 
     /// Context (Q,), an array of numbers or a list with labels; None if not given.

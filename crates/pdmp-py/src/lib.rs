@@ -5,6 +5,7 @@ mod batch;
 mod conditions;
 mod context;
 mod controller;
+mod controller_state;
 mod convert;
 mod demonstration;
 mod display;
@@ -21,6 +22,7 @@ mod prediction;
 mod preprocessing;
 mod regression;
 mod scalar;
+mod status;
 mod warp;
 
 use pyo3::prelude::*;
@@ -46,7 +48,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<context::ContextMap>()?;
     module.add_class::<conditions::Conditions>()?;
     module.add_class::<prediction::Prediction>()?;
-    module.add_class::<controller::Status>()?;
+    module.add_class::<status::Status>()?;
     module.add_class::<controller::Controller>()?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
     module.add_function(wrap_pyfunction!(conditions::blend, module)?)?;

@@ -20,7 +20,7 @@ use crate::scalar::{Scalar, optional_number};
 
 /// Parametric dynamic movement primitive, returned by `fit` and `load`.
 ///
-/// Models are immutable and can be pickled.
+/// Models are immutable, their arrays are read-only copies, and they can be pickled.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
 

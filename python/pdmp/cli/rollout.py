@@ -27,12 +27,14 @@ def arguments(parser: ArgumentParser) -> None:
     source.add_argument(
         "--demo", type=int, metavar="M", help="demonstration to reproduce, counted from 0"
     )
-    for name, text in (
-        ("goal", "goal of a discrete movement"),
-        ("start", "start position"),
-        ("anchor", "centre of a rhythmic movement"),
+    for name, metavar, text in (
+        ("goal", "Y", "goal of a discrete movement"),
+        ("goal-velocity", "V", "velocity [1/s] at the goal of a discrete movement"),
+        ("start", "Y", "start position"),
+        ("velocity", "V", "start velocity [1/s]"),
+        ("anchor", "Y", "centre of a rhythmic movement"),
     ):
-        parser.add_argument(f"--{name}", nargs="+", type=float, metavar="Y", help=text)
+        parser.add_argument(f"--{name}", nargs="+", type=float, metavar=metavar, help=text)
     for name, metavar, text in (
         ("amplitude", "R", "amplitude of a rhythmic movement, relative to the demonstrations"),
         ("tau", "S", "time constant [s]"),
@@ -47,7 +49,8 @@ def run(options: Namespace) -> None:
     check_file(options.output)
     model = pdmp.load(options.model)
     conditions = None if options.demo is None else model.conditions(options.demo)
-    names = ("style", "context", "goal", "start", "anchor", "amplitude", "tau", "dt", "duration")
+    positions = ("goal", "goal_velocity", "start", "velocity", "anchor")
+    names = ("style", "context", *positions, "amplitude", "tau", "dt", "duration")
     arguments = {name: value for name in names if (value := getattr(options, name)) is not None}
     trajectory = model.rollout(conditions, **arguments)
     if options.context is not None and model.predict(options.context).extrapolation.any():

@@ -44,7 +44,7 @@ pub(crate) struct TransportSegment {
     cubic: [f64; 4],
 }
 
-/// TransportSample ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
+/// Lag ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TransportSample {
     pub(crate) value: f64,
@@ -106,7 +106,16 @@ impl Transport {
     /// Returns the interval that contains clock `u`.
     pub(crate) fn stretch(&self, u: f64) -> TransportSegment {
         // The cast saturates: a negative clock is evaluated in the first cell.
-        let cell = (u * self.cells_per_clock) as usize;
+        self.segment((u * self.cells_per_clock) as usize)
+    }
+
+    /// Returns the index of the cell of an interval, the number of cells for that past the end.
+    pub(crate) fn cell(&self, segment: &TransportSegment) -> usize {
+        (segment.from * self.cells_per_clock).round() as usize
+    }
+
+    /// Returns the interval of a cell.
+    pub(crate) fn segment(&self, cell: usize) -> TransportSegment {
         let at = |knot: usize| self.width * knot as f64;
         match self.cubics.get(cell) {
             Some(&cubic) => TransportSegment { from: at(cell), to: at(cell + 1), cubic },

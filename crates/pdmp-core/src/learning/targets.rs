@@ -113,10 +113,10 @@ impl Targets {
         transport_profile(displacements, reaches, canonical)
     }
 
-    /// Returns the rate κ at which movements brake past their ends, y″ = −κy′ at the end.
+    /// Returns the rate κ at which movements brake past their ends: y″ is about −κy′ at most.
     ///
-    /// κ limits the deceleration of each DoF to its largest demonstrated acceleration, within [α_z, 8α_z]; it is 8α_z for
-    /// movements that end at rest.
+    /// From its fastest demonstrated end, each DoF decelerates by no more than its largest demonstrated acceleration. κ is
+    /// at least α_z, since the attractor itself decelerates so, and at most 8α_z, that of movements that end at rest.
     pub(crate) fn braking(&self, attractor: Attractor) -> f64 {
         let largest = |matrix: &Array2<f64>| matrix.fold_axis(Axis(0), 0.0f64, |most, x| most.max(*x));
         let ratio = |(acceleration, speed): (f64, f64)| if speed > 0.0 { acceleration / speed } else { f64::INFINITY };

@@ -4,6 +4,7 @@ use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::primitive::Primitive;
+use crate::numerics::state::clone_in_place;
 use crate::validate::{check_positive, check_vector};
 
 /// Conditions under which a movement starts. A condition that is `None` is that of the nominal demonstration.
@@ -153,11 +154,7 @@ impl Conditions {
             Some(style) => check_style(style, primitive.n_styles()).map(|()| style.clone())?,
             None => nominal.style.clone(),
         };
-        reject_for_kind(kind, "phase", kind == Kind::Discrete && self.phase.is_some())?;
-        let phase = self.phase.unwrap_or(0.0);
-        if !phase.is_finite() {
-            return Err(Error::Range { name: "phase", value: phase, allowed: "must be a finite angle in rad" });
-        }
+        self.phase.map_or(Ok(()), |phase| check_phase(kind, phase))?;
         Ok(ResolvedConditions {
             style,
             centre,
@@ -167,7 +164,7 @@ impl Conditions {
             has_goal_velocity: self.goal_velocity.is_some(),
             amplitude,
             tau,
-            phase: turn(phase),
+            phase: turn(self.phase.unwrap_or(0.0)),
         })
     }
 
@@ -204,7 +201,7 @@ impl Conditions {
 }
 
 /// Conditions with nothing left open but a start on the cycle and a demonstrated start velocity.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct ResolvedConditions {
     pub(crate) style: Vec<f64>,
     /// Goal or anchor.
@@ -220,11 +217,23 @@ pub(crate) struct ResolvedConditions {
     pub(crate) phase: f64,
 }
 
+clone_in_place!(ResolvedConditions {
+    style,
+    centre,
+    start,
+    velocity,
+    goal_velocity,
+    has_goal_velocity,
+    amplitude,
+    tau,
+    phase,
+});
+
 /// Refuses an argument that this kind of primitive does not have.
 pub(crate) fn reject_for_kind(kind: Kind, name: &'static str, given: bool) -> Result<()> {
     let instead = match (kind, name) {
         (Kind::Discrete, "anchor") => ": it moves to a goal; set goal",
-        (Kind::Discrete, "phase") => ": what it does later depends on where it started; it starts at its start",
+        (Kind::Discrete, "phase") => ": its state depends on its past; it starts at the start of its path",
         (Kind::Rhythmic, "goal") => ": it moves about an anchor; set anchor",
         _ => "",
     };
@@ -263,6 +272,16 @@ pub(crate) fn check_tau(tau: f64, own: f64) -> Result<()> {
     } else {
         let allowed = "must lie within a millionfold of the model's tau";
         Err(Error::Range { name: "tau", value: tau, allowed })
+    }
+}
+
+/// Checks a phase, in rad, of a rhythmic primitive.
+pub(crate) fn check_phase(kind: Kind, phase: f64) -> Result<()> {
+    reject_for_kind(kind, "phase", kind == Kind::Discrete)?;
+    if phase.is_finite() {
+        Ok(())
+    } else {
+        Err(Error::Range { name: "phase", value: phase, allowed: "must be a finite angle in rad" })
     }
 }
 

@@ -2,15 +2,17 @@
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{check_amplitude, check_style, check_tau, reject_for_kind, reject_goal_velocity};
+use crate::model::conditions::{
+    check_amplitude, check_phase, check_style, check_tau, reject_for_kind, reject_goal_velocity,
+};
 use crate::model::primitive::Primitive;
 use crate::validate::check_vector;
 
 /// Command of one tick. A field that is `None` leaves its quantity unchanged.
 ///
-/// Style, goal, final velocity, anchor, τ and amplitude remain in force until the next command, and a repeated command has no further
-/// effect. `measured` remains in force until the next measurement or [`crate::Controller::release`]. `dt` and `coupling`
-/// apply to this tick only.
+/// Style, goal, final velocity, anchor, τ and amplitude remain in force until the next command, and a repeated command has
+/// no further effect. `measured` remains in force until the next measurement or [`crate::Controller::release`]. `dt`,
+/// `coupling` and `phase` apply to this tick only.
 ///
 /// ```
 /// use pdmp_core::Command;
@@ -40,6 +42,10 @@ pub struct Command<'a> {
     pub measured: Option<&'a [f64]>,
     /// Coupling terms.
     pub coupling: Option<Coupling<'a>>,
+    /// Measured phase φ* of a rhythmic movement, in rad, which pulls the phase over this tick; see
+    /// [`crate::Controller::set_phase_gain`]. A sensor slower than the loop passes its last phase plus the time since then
+    /// over τ.
+    pub phase: Option<f64>,
 }
 
 /// Coupling terms of the user, constant over the tick. A jump of c_v makes the velocity jump.
@@ -111,7 +117,7 @@ impl Command<'_> {
             vector("coupling velocity", Some(velocity))?;
             vector("coupling acceleration", Some(acceleration))?;
         }
-        Ok(())
+        self.phase.map_or(Ok(()), |phase| check_phase(kind, phase))
     }
 }
 

@@ -2,23 +2,16 @@
 
 use std::sync::Arc;
 
-use ndarray::Ix2;
-
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
 use crate::model::conditions::{Conditions, check_tau};
 use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::controller::Controller;
-use crate::motion::trajectory::Trajectory;
-use crate::validate::{check_positive, row_major_mut, zeros};
+use crate::motion::trajectory::{Trajectory, step_count};
 
-/// Number of samples between two calls of `progress`.
-const PROGRESS_INTERVAL: usize = 4096;
 /// Number of ticks by which the forcing table is prefetched: about the latency of main memory.
 const PREFETCH_TICKS: f64 = 16.0;
-/// Maximum number of steps of a rollout.
-const MAX_STEPS: f64 = 1e7;
 
 /// Sampling times 0, dt, 2dt, … of a rollout.
 #[derive(Clone, Copy, Debug)]
@@ -31,27 +24,10 @@ pub struct TimeGrid {
 }
 
 impl TimeGrid {
-    /// Returns the number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋; the margins keep the last sample of a duration that
-    /// is a multiple of dt up to rounding.
+    /// Returns the number of steps.
     pub(crate) fn steps(&self, primitive: &Primitive, tau: f64) -> Result<usize> {
-        check_positive("dt", self.dt)?;
         check_tau(tau, primitive.tau)?;
-        let duration = match self.duration {
-            Some(duration) if duration.is_finite() && duration >= 0.0 => duration,
-            Some(value) => {
-                return Err(Error::Range { name: "duration", value, allowed: "must be finite and not negative" });
-            }
-            None => primitive.duration() * tau / primitive.tau,
-        };
-        let steps = (duration / self.dt * (1.0 + 1e-12) + 1e-9).floor();
-        if steps > MAX_STEPS {
-            return Err(Error::Range {
-                name: "dt",
-                value: self.dt,
-                allowed: "gives more than 1e7 samples: enlarge it",
-            });
-        }
-        Ok(steps as usize)
+        step_count("duration", self.duration.unwrap_or(primitive.duration() * tau / primitive.tau), self.dt)
     }
 }
 
@@ -111,28 +87,14 @@ pub fn rollout_with(
     }
     let conditions = clock.conditions(conditions);
     let mut controller = Controller::new(primitive, grid.dt, &conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
-    let shape = (steps + 1, primitive.n_dofs());
-    let mut trajectory = Trajectory {
-        time: (0..=steps).map(|k| k as f64 * grid.dt).collect(),
-        position: zeros("rollout", shape)?,
-        velocity: zeros("rollout", shape)?,
-        acceleration: zeros("rollout", shape)?,
-    };
-    let Trajectory { time, position, velocity, acceleration } = &mut trajectory;
-    let rows = |array| row_major_mut::<_, Ix2>(array).chunks_exact_mut(primitive.n_dofs());
-    let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
-    for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
-        if k % PROGRESS_INTERVAL == 0 {
-            progress(k as f64 / (steps + 1) as f64)?;
-        }
+    Trajectory::record("rollout", primitive.n_dofs(), steps, grid.dt, progress, |k, time, motion| {
         if k > 0 {
-            clock.step(&mut controller, *time)?;
+            clock.step(&mut controller, time)?;
         }
-        let mut motion = Motion { position, velocity, acceleration };
-        controller.read(&mut motion);
-        clock.rescale(&mut motion);
-    }
-    Ok(trajectory)
+        controller.read(motion);
+        clock.rescale(motion);
+        Ok(())
+    })
 }
 
 /// Clock of a rollout.

@@ -4,6 +4,7 @@ pub(crate) mod linear_algebra;
 pub(crate) mod simd;
 pub(crate) mod smoothing_spline;
 pub(crate) mod spline;
+pub(crate) mod state;
 pub(crate) mod threads;
 
 pub use smoothing_spline::{Noise, Smoothing};
