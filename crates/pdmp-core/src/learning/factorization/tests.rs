@@ -56,7 +56,7 @@ fn decaying(n: usize, ratio: f64) -> Vec<f64> {
 /// Asserts the claims about all factors: S is orthonormal with fixed signs, the rows of F_basis = SᵀF are orthogonal and
 /// as long as the singular values, and the stated error bounds the truncation error closely.
 fn check(targets: &Array2<f64>, factors: &Factors) {
-    let Factors { styles, basis, singular_values, error } = factors;
+    let Factors { styles, basis_targets: basis, singular_values, error } = factors;
     let n_styles = styles.ncols();
     assert_eq!((styles.nrows(), basis.dim()), (targets.nrows(), (n_styles, targets.ncols())));
     assert!(singular_values.windows(2).all(|pair| pair[0] >= pair[1]));
