@@ -230,6 +230,6 @@ mod tests {
         assert!(message(&["old".into(), "young".into()]).contains("context[1] = \"young\": a number is expected"));
         assert!(message(&["old".into()]).contains("length 1, expected 2"));
         let mixed = tabulate(&[&context("old", 1.0), &[1.0.into(), 1.0.into()]]).unwrap_err().to_string();
-        assert!(mixed.contains("1 labels and 1 numbers"), "{mixed}");
+        assert!(mixed.contains("1 label and 1 number"), "{mixed}");
     }
 }
