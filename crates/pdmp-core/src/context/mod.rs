@@ -35,7 +35,7 @@ use training_data::GroupedData;
 
 use crate::demonstration::ContextValue;
 use crate::error::{Error, Result};
-use crate::validate::check_matrix;
+use crate::validate::{check_length, check_matrix};
 
 /// Degrees of freedom that the estimated signal-to-noise ratio leaves at least; with fewer, it costs none.
 ///
@@ -149,10 +149,7 @@ impl ContextMap {
     /// more than 1024 distinct contexts for a kind other than [`ContextMapKind::Linear`].
     pub fn fit(contexts: &[Vec<ContextValue>], outputs: ArrayView2<f64>, selection: MapSelection) -> Result<Self> {
         check_matrix("outputs", outputs)?;
-        if contexts.len() != outputs.nrows() {
-            let (expected, found) = (outputs.nrows(), contexts.len());
-            return Err(Error::Length { name: "contexts", expected, found, per: "row of the outputs" });
-        }
+        check_length("contexts", contexts.len(), outputs.nrows(), "row of the outputs")?;
         let contexts: Vec<&[ContextValue]> = contexts.iter().map(Vec::as_slice).collect();
         let (columns, table) = tabulate(&contexts)?;
         Self::learn(columns, &table, outputs, Array2::eye(outputs.ncols()).view(), selection)

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION;
 use crate::error::{Error, Result};
 use crate::numerics::spline::Knots;
-use crate::validate::check_time;
+use crate::validate::{check_length, check_range, check_time};
 
 /// Fills the gaps of `position` (T, D), samples that are NaN, by the cubic spline through the other samples of the column.
 ///
@@ -37,15 +37,10 @@ pub fn fill_gaps(
     turns: &[f64],
     max_gap: f64,
 ) -> Result<Array2<f64>> {
-    if max_gap.is_nan() || max_gap < 0.0 {
-        return Err(Error::Range { name: "max_gap", value: max_gap, allowed: "must not be negative; 0 fills none" });
-    }
+    check_range("max_gap", max_gap, max_gap >= 0.0, "must not be negative; 0 fills none")?;
     let (n_samples, n_dofs) = position.dim();
-    for (name, found) in [("names", names.len()), ("turns", turns.len())] {
-        if found != n_dofs {
-            return Err(Error::Length { name, expected: n_dofs, found, per: "DoF" });
-        }
-    }
+    check_length("names", names.len(), n_dofs, "DoF")?;
+    check_length("turns", turns.len(), n_dofs, "DoF")?;
     if !position.iter().any(|y| y.is_nan()) {
         return Ok(position);
     }
