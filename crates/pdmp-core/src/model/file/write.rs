@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
-use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header};
+use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header, unreadable};
 use crate::context::{ContextMap, MapParameters, StackingWeights};
 use crate::dynamics::hermite_table::KnotTable;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::Model;
 
 /// Array of a file: its name, shape and elements by rows.
@@ -51,14 +51,14 @@ impl Model {
             .collect();
         let crc32 = checksum(&constants, arrays.iter().map(|(name, _, bytes)| (*name, bytes.as_slice())))?;
         let sealed = Sealed { schema: SCHEMA, crc32, model: constants };
-        let json = serde_json::to_string(&sealed).map_err(|error| Error::File(error.to_string()))?;
+        let json = serde_json::to_string(&sealed).map_err(unreadable)?;
         let views = arrays
             .iter()
             .map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F64, shape.clone(), bytes)?)))
             .collect::<std::result::Result<Vec<_>, safetensors::SafeTensorError>>()
-            .map_err(|error| Error::File(error.to_string()))?;
+            .map_err(unreadable)?;
         let metadata = HashMap::from([(KEY.to_string(), json)]);
-        let bytes = serialize(views, Some(metadata)).map_err(|error| Error::File(error.to_string()))?;
+        let bytes = serialize(views, Some(metadata)).map_err(unreadable)?;
         header::constants(&bytes)?;
         Ok(bytes)
     }
