@@ -228,7 +228,8 @@ def test_jacobians_of_the_other_kind_are_rejected(reach: pdmp.Model, cycle: pdmp
         with pytest.raises(ValueError, match="derivative = 3: must be 0"):
             reach.jacobian(wrt, derivative=3)
     with pytest.raises(
-        ValueError, match="wrt = 'tau': must be 'style', 'goal', 'anchor' or 'start'"
+        ValueError,
+        match="wrt = 'tau': must be 'style', 'goal', 'anchor', 'start' or 'goal_velocity'",
     ):
         reach.jacobian("tau")
 

@@ -125,8 +125,9 @@ def integrated(
 ) -> np.ndarray:
     """Returns positions (T, D) at times; commands pass critically damped filters.
 
-    Shares of the demonstrations, centre and amplitude pass theirs on the clock, in seconds at the
-    nominal rate; the rate 1/tau passes its own in seconds.
+    Shares of the demonstrations, anchor or goal of immediate transport, and amplitude pass theirs
+    on the clock, in seconds at the nominal rate; the rate 1/tau passes its own in seconds. With
+    learnt transport a goal moves the frame with minimum jerk.
     """
     nominal, discrete = family.model.tau, family.model.kind == "discrete"
     # 99 % of a step are reached after a transition.
@@ -137,11 +138,18 @@ def integrated(
         "amplitude": np.ones(1),
         "rate": np.array([1 / nominal]),
     }
-    omegas = dict.fromkeys(target, settling / TRANSITION)
+    omega = settling / TRANSITION
+    way_to_goal: Any = None  # of the frame to a later goal, over the clock
     sizes = [len(value) for value in target.values()]
     parts = np.cumsum([1, 1, 2, 2, *sizes, *sizes])[:-1]
-    # The frame includes changes of the start; a goal or anchor that moves later enters separately.
+    # The frame includes changes of the start.
     way = start["centre"] - start["position"] if discrete else np.zeros(2)
+
+    def moved(u: float, order: int) -> np.ndarray:
+        """Returns the displacement of the frame by a later goal, or its derivative."""
+        if way_to_goal is None:
+            return np.zeros(2)
+        return np.asarray(way_to_goal.derivative(order)(np.clip(u, *way_to_goal.x)))
 
     def flow(t: float, state: np.ndarray) -> np.ndarray:
         u, r, y, z, *filtered = np.split(state, parts)
@@ -150,14 +158,14 @@ def integrated(
         rate = value["rate"][0]
         m, rise = family.frame(u[0])
         w = value["shares"] @ family.forcing(u[0]) * (1 if discrete else r)
-        pull = BETA * (y - value["centre"] - way * (m - 1)) + z
+        pull = BETA * (y - value["centre"] - way * (m - 1) - moved(u[0], 0)) + z
         slopes = [[rate], rate * MU * (value["amplitude"] - r)]
-        slopes += [rate * (z + w + way * rise), -rate * ALPHA * pull]
+        slopes += [rate * (z + w + way * rise + moved(u[0], 1)), -rate * ALPHA * pull]
         seconds = {name: 1.0 if name == "rate" else rate * nominal for name in target}
         slopes += [seconds[name] * speed[name] for name in target]
         slopes += [
             seconds[name] * omega * (omega * (target[name] - value[name]) - 2 * speed[name])
-            for name, omega in omegas.items()
+            for name in target
         ]
         return np.concatenate(slopes)
 
@@ -175,11 +183,15 @@ def integrated(
         )  # fmt: skip
         found.append(solution.y[2:4, : len(inside)].T)
         state, last = solution.y[:, -1], until
-        target |= commands.get(until, {})
-        if "centre" in commands.get(until, {}) and family.model.braking is not None:
-            # A goal is reached in the rest of the movement, less the lag of the output system.
-            remaining = (1 - state[0] - 1 / BETA) * nominal
-            omegas["centre"] = settling / max(TRANSITION, remaining)
+        command = commands.get(until, {})
+        if "centre" in command and family.model.braking is not None:
+            # The peak velocity is at most that of the attractor after a step, ALPHA / 2e.
+            here, change = state[0], command["centre"] - target["centre"]
+            there = max(1.0, here + TRANSITION / nominal + 15 / 8 * 2 * np.e / ALPHA)
+            ends = [[0 * change] * 3, [change, 0 * change, 0 * change]]
+            way_to_goal = interpolate.BPoly.from_derivatives([here, there], ends)
+            command = {key: value for key, value in command.items() if key != "centre"}
+        target |= command
     return np.concatenate(found)
 
 

@@ -176,6 +176,7 @@ impl Caller<'_> {
                     }
                     return;
                 }
+                12 => pdmp_controller_set_goal_velocity(controller, Numbers::new(n_dofs, input).vector()),
                 _ => {
                     let mut status = PDMP_OK;
                     let mut controller = controller;
@@ -237,11 +238,13 @@ impl Caller<'_> {
     fn update(&mut self, slot: usize, input: &mut Input) {
         let (n_dofs, n_styles) = (self.info.n_dofs, self.info.n_styles);
         let style = Numbers::new(n_styles, input);
-        let [goal, anchor, measured, velocity, acceleration] = std::array::from_fn(|_| Numbers::new(n_dofs, input));
+        let [goal, anchor, measured, velocity, acceleration, goal_velocity] =
+            std::array::from_fn(|_| Numbers::new(n_dofs, input));
         let [tau, amplitude, dt] = std::array::from_fn(|_| scalar(input));
         let command = pdmp_command {
             style: style.vector(),
             goal: goal.vector(),
+            goal_velocity: goal_velocity.vector(),
             anchor: anchor.vector(),
             tau: pointer(&tau),
             amplitude: pointer(&amplitude),
@@ -342,7 +345,7 @@ impl Caller<'_> {
 
 /// Conditions of a movement with the memory of their vectors.
 struct Conditions {
-    vectors: [Numbers; 5],
+    vectors: [Numbers; 6],
     amplitude: Option<Box<f64>>,
     tau: Option<Box<f64>>,
     phase: Option<Box<f64>>,
@@ -353,14 +356,15 @@ impl Conditions {
         if input.byte() < 64 {
             return None;
         }
-        let lengths = [info.n_styles, info.n_dofs, info.n_dofs, info.n_dofs, info.n_dofs];
+        let n_dofs = info.n_dofs;
+        let lengths = [info.n_styles, n_dofs, n_dofs, n_dofs, n_dofs, n_dofs];
         let vectors = lengths.map(|length| Numbers::new(length, input));
         Some(Self { vectors, amplitude: scalar(input), tau: scalar(input), phase: scalar(input) })
     }
 
     fn get(&self) -> pdmp_conditions {
-        let [style, goal, anchor, start, velocity] = self.vectors.each_ref().map(Numbers::vector);
+        let [style, goal, anchor, start, velocity, goal_velocity] = self.vectors.each_ref().map(Numbers::vector);
         let [amplitude, tau, phase] = [&self.amplitude, &self.tau, &self.phase].map(pointer);
-        pdmp_conditions { style, goal, anchor, start, velocity, amplitude, tau, phase }
+        pdmp_conditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau, phase }
     }
 }

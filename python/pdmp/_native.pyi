@@ -904,12 +904,12 @@ class Model:
         """Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
 
         A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
-        Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start` and
-        `velocity`.
+        Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,
+        `velocity` and `goal_velocity`.
 
         Parameters
         ----------
-        wrt : {"style", "goal", "anchor", "start"}
+        wrt : {"style", "goal", "anchor", "start", "goal_velocity"}
             Condition v.
         conditions : Conditions, optional
             Conditions at the start.
@@ -1253,6 +1253,9 @@ class Conditions:
         default.
     velocity : array_like, (D,), optional
         Start velocity per s; by default that of the demonstrations.
+    goal_velocity : array_like, (D,), optional
+        Final velocity per s with which a discrete movement passes its goal at the end, such as that of a strike; by
+        default that of the demonstrations. It needs learnt transport.
     anchor : array_like, (D,), optional
         Anchor y_a, the centre of oscillation, in the unit of each degree of freedom; rhythmic.
     amplitude : float, optional
@@ -1537,8 +1540,8 @@ class Controller:
     """Running movement, returned by `Model.controller`.
 
     `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-    valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
-    is rejected leaves the present one in force.
+    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed`, `tolerance` and `compliance` can be set at any
+    tick; a value that is rejected leaves the present one in force.
     """
     def __copy__(self) -> Controller: ...
     def __deepcopy__(self, _memo: Any, /) -> Controller: ...

@@ -120,6 +120,9 @@ typedef struct {
     pdmp_vector start;
     /// Start velocity (n_dofs), in the unit of each DoF per second; that of the demonstrations by default.
     pdmp_vector velocity;
+    /// Final velocity (n_dofs) at the goal, in the unit of each DoF per second; that of the demonstrations by default;
+    /// discrete models with learnt transport only.
+    pdmp_vector goal_velocity;
     /// Amplitude r_0 >= 0; 1 by default, the only value that a discrete model accepts.
     const double *amplitude;
     /// Time constant tau > 0, in seconds.
@@ -151,8 +154,8 @@ typedef struct {
     double dt;
     /// Time, in seconds, after which 99 % of a commanded change of style, tau, goal, anchor or amplitude has taken
     /// effect; 0 is the immediate switch of the paper. NULL for the default: a tenth of the nominal duration (discrete)
-    /// or a quarter of the nominal period (rhythmic). A goal takes the remaining time of the movement if that is
-    /// longer, unless the transport of the model is immediate.
+    /// or a quarter of the nominal period (rhythmic). Unless the transport of the model is immediate, a goal takes the
+    /// remaining time of the movement instead, near and past its end the time that the attractor would take.
     const double *transition;
     /// Memory for the controller: pdmp_controller_size bytes, aligned to pdmp_controller_alignment, that nothing else
     /// uses until pdmp_controller_free. The arrays of the controller are allocated by the library in any case.
@@ -169,13 +172,16 @@ typedef struct {
 
 /// Command of one tick. A member that is `{NULL, 0}` or NULL leaves the present value unchanged.
 ///
-/// Style, goal, anchor, tau and amplitude stay in force until the next command, and a measurement until the next one or
+/// Style, goal, final velocity, anchor, tau and amplitude stay in force until the next command, and a measurement until the next one or
 /// until pdmp_controller_release. dt and the coupling terms hold for this tick only.
 typedef struct {
     /// Style parameter s (n_styles).
     pdmp_vector style;
     /// Goal g (n_dofs), in the unit of each DoF; discrete models only.
     pdmp_vector goal;
+    /// Final velocity (n_dofs) at the goal, in the unit of each DoF per second; discrete models with learnt transport
+    /// only.
+    pdmp_vector goal_velocity;
     /// Anchor y_a (n_dofs), in the unit of each DoF; rhythmic models only.
     pdmp_vector anchor;
     /// Time constant tau > 0, in seconds.
@@ -317,6 +323,11 @@ pdmp_status pdmp_controller_set_style(pdmp_controller *controller, pdmp_vector s
 /// PDMP_RANGE, PDMP_ABSENT.
 pdmp_status pdmp_controller_set_goal(pdmp_controller *controller, pdmp_vector goal);
 
+/// Sets the final velocity (n_dofs) with which a discrete movement passes its goal at the end, in the unit of each DoF per
+/// second; `{NULL, 0}` for that of the demonstrations. Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE, PDMP_ABSENT.
+pdmp_status pdmp_controller_set_goal_velocity(pdmp_controller *controller,
+                                              pdmp_vector velocity);
+
 /// Sets the anchor y_a (n_dofs) of a rhythmic movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
 /// PDMP_RANGE, PDMP_ABSENT.
 pdmp_status pdmp_controller_set_anchor(pdmp_controller *controller, pdmp_vector anchor);
@@ -332,6 +343,11 @@ pdmp_status pdmp_controller_set_amplitude(pdmp_controller *controller, double am
 /// Sets the speed in [0, 1e6], a factor of the rate 1/tau: 0 pauses the movement on its path, 1 is the default. The
 /// change is filtered like tau, and persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
 pdmp_status pdmp_controller_set_speed(pdmp_controller *controller, double speed);
+
+/// Sets the tolerance in (0, 1] of a movement that has settled, PDMP_FINISHED; 0.005 by default. It is relative to the
+/// larger of two lengths of each DoF: its largest demonstrated range, and its distance from the goal when this was last
+/// commanded. It persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
+pdmp_status pdmp_controller_set_tolerance(pdmp_controller *controller, double tolerance);
 
 /// Sets the gains of the response to a measured position, see pdmp_controller_update: `stopping` k_s of phase stopping
 /// and `tracking` k_t of the pull towards the measurement, per unit of the clock u; both at least 0.

@@ -42,7 +42,7 @@ pdmp_vector view(const Numbers &&) = delete;
 
 /// Conditions of a movement, see pdmp_conditions. An empty member takes the value of the nominal demonstration.
 struct Conditions {
-    std::vector<double> style, goal, anchor, start, velocity;
+    std::vector<double> style, goal, anchor, start, velocity, goal_velocity;
     std::optional<double> amplitude, tau, phase;
 };
 
@@ -71,8 +71,9 @@ inline pdmp_vector to_c(const std::vector<double> &numbers) noexcept {
 inline const double *to_c(const std::optional<double> &number) noexcept { return number ? &*number : nullptr; }
 
 inline pdmp_conditions to_c(const Conditions &c) noexcept {
-    return {to_c(c.style),    to_c(c.goal),      to_c(c.anchor), to_c(c.start),
-            to_c(c.velocity), to_c(c.amplitude), to_c(c.tau),    to_c(c.phase)};
+    return {to_c(c.style),    to_c(c.goal),          to_c(c.anchor),    to_c(c.start),
+            to_c(c.velocity), to_c(c.goal_velocity), to_c(c.amplitude), to_c(c.tau),
+            to_c(c.phase)};
 }
 
 inline std::vector<double> copy(pdmp_vector numbers) { return {numbers.data, numbers.data + numbers.length}; }
@@ -150,8 +151,9 @@ private:
         pdmp_conditions c{};
         detail::check([&](pdmp_text error) { return call(&c, detail::buffer(numbers), error); });
         using detail::copy;
-        return {copy(c.style),    copy(c.goal), copy(c.anchor), copy(c.start),
-                copy(c.velocity), std::nullopt, *c.tau,         std::nullopt};
+        return {copy(c.style),    copy(c.goal),          copy(c.anchor), copy(c.start),
+                copy(c.velocity), copy(c.goal_velocity), std::nullopt,   *c.tau,
+                std::nullopt};
     }
 
     struct Free {
@@ -187,6 +189,9 @@ public:
     // Commands, see the functions pdmp_controller_set_... and pdmp_controller_release.
     pdmp_status set_style(pdmp_vector style) noexcept { return pdmp_controller_set_style(get(), style); }
     pdmp_status set_goal(pdmp_vector goal) noexcept { return pdmp_controller_set_goal(get(), goal); }
+    pdmp_status set_goal_velocity(pdmp_vector velocity) noexcept {
+        return pdmp_controller_set_goal_velocity(get(), velocity);
+    }
     pdmp_status set_anchor(pdmp_vector anchor) noexcept { return pdmp_controller_set_anchor(get(), anchor); }
     pdmp_status set_tau(double tau) noexcept { return pdmp_controller_set_tau(get(), tau); }
     pdmp_status set_amplitude(double amplitude) noexcept { return pdmp_controller_set_amplitude(get(), amplitude); }
@@ -195,6 +200,7 @@ public:
     }
 
     pdmp_status set_speed(double speed) noexcept { return pdmp_controller_set_speed(get(), speed); }
+    pdmp_status set_tolerance(double tolerance) noexcept { return pdmp_controller_set_tolerance(get(), tolerance); }
     pdmp_status release() noexcept { return pdmp_controller_release(get()); }
 
     /// Advances the movement by one tick without a new command.

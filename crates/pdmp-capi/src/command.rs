@@ -22,6 +22,9 @@ pub struct pdmp_conditions {
     pub start: pdmp_vector,
     /// Start velocity (n_dofs), in the unit of each DoF per second; that of the demonstrations by default.
     pub velocity: pdmp_vector,
+    /// Final velocity (n_dofs) at the goal, in the unit of each DoF per second; that of the demonstrations by default;
+    /// discrete models with learnt transport only.
+    pub goal_velocity: pdmp_vector,
     /// Amplitude r_0 >= 0; 1 by default, the only value that a discrete model accepts.
     pub amplitude: *const f64,
     /// Time constant tau > 0, in seconds.
@@ -42,7 +45,7 @@ pub struct pdmp_coupling {
 
 /// Command of one tick. A member that is `{NULL, 0}` or NULL leaves the present value unchanged.
 ///
-/// Style, goal, anchor, tau and amplitude stay in force until the next command, and a measurement until the next one or
+/// Style, goal, final velocity, anchor, tau and amplitude stay in force until the next command, and a measurement until the next one or
 /// until pdmp_controller_release. dt and the coupling terms hold for this tick only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +54,9 @@ pub struct pdmp_command {
     pub style: pdmp_vector,
     /// Goal g (n_dofs), in the unit of each DoF; discrete models only.
     pub goal: pdmp_vector,
+    /// Final velocity (n_dofs) at the goal, in the unit of each DoF per second; discrete models with learnt transport
+    /// only.
+    pub goal_velocity: pdmp_vector,
     /// Anchor y_a (n_dofs), in the unit of each DoF; rhythmic models only.
     pub anchor: pdmp_vector,
     /// Time constant tau > 0, in seconds.
@@ -95,6 +101,7 @@ impl pdmp_conditions {
             anchor: per_dof("anchor", self.anchor)?,
             start: per_dof("start", self.start)?,
             velocity: per_dof("velocity", self.velocity)?,
+            goal_velocity: per_dof("goal_velocity", self.goal_velocity)?,
             // SAFETY: the caller guarantees that the pointer is NULL or valid.
             amplitude: unsafe { self.amplitude.as_ref() }.copied(),
             // SAFETY: the caller guarantees that the pointer is NULL or valid.
@@ -126,6 +133,7 @@ impl pdmp_conditions {
             anchor: optional(&conditions.anchor),
             start: optional(&conditions.start),
             velocity: optional(&conditions.velocity),
+            goal_velocity: optional(&conditions.goal_velocity),
             amplitude: ptr::null(),
             tau: conditions.tau.map_or(ptr::null(), |tau| append(&[tau]).data),
             phase: ptr::null(),
@@ -158,6 +166,7 @@ impl pdmp_command {
             dt,
             style: vector("style", self.style, primitive.n_styles(), "style dimension")?,
             goal: per_dof("goal", self.goal)?,
+            goal_velocity: per_dof("goal_velocity", self.goal_velocity)?,
             anchor: per_dof("anchor", self.anchor)?,
             tau,
             amplitude,

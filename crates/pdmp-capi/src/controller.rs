@@ -32,8 +32,8 @@ pub struct pdmp_settings {
     pub dt: f64,
     /// Time, in seconds, after which 99 % of a commanded change of style, tau, goal, anchor or amplitude has taken
     /// effect; 0 is the immediate switch of the paper. NULL for the default: a tenth of the nominal duration (discrete)
-    /// or a quarter of the nominal period (rhythmic). A goal takes the remaining time of the movement if that is
-    /// longer, unless the transport of the model is immediate.
+    /// or a quarter of the nominal period (rhythmic). Unless the transport of the model is immediate, a goal takes the
+    /// remaining time of the movement instead, near and past its end the time that the attractor would take.
     pub transition: *const f64,
     /// Memory for the controller: pdmp_controller_size bytes, aligned to pdmp_controller_alignment, that nothing else
     /// uses until pdmp_controller_free. The arrays of the controller are allocated by the library in any case.
@@ -213,6 +213,21 @@ pub unsafe extern "C" fn pdmp_controller_set_goal(
     })
 }
 
+/// Sets the final velocity (n_dofs) with which a discrete movement passes its goal at the end, in the unit of each DoF per
+/// second; `{NULL, 0}` for that of the demonstrations. Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE, PDMP_ABSENT.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pdmp_controller_set_goal_velocity(
+    controller: Option<&mut pdmp_controller>,
+    velocity: pdmp_vector,
+) -> pdmp_status {
+    call_on(controller, |controller| {
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
+        let velocity = unsafe { velocity.get("goal_velocity", controller.inner.primitive().n_dofs(), "DoF") }?;
+        controller.inner.set_goal_velocity(velocity)?;
+        Ok(PDMP_OK)
+    })
+}
+
 /// Sets the anchor y_a (n_dofs) of a rhythmic movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
 /// PDMP_RANGE, PDMP_ABSENT.
 #[unsafe(no_mangle)]
@@ -250,6 +265,17 @@ pub extern "C" fn pdmp_controller_set_amplitude(
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_set_speed(controller: Option<&mut pdmp_controller>, speed: f64) -> pdmp_status {
     call_on(controller, |controller| Ok(controller.inner.set_speed(speed).map(|()| PDMP_OK)?))
+}
+
+/// Sets the tolerance in (0, 1] of a movement that has settled, PDMP_FINISHED; 0.005 by default. It is relative to the
+/// larger of two lengths of each DoF: its largest demonstrated range, and its distance from the goal when this was last
+/// commanded. It persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_set_tolerance(
+    controller: Option<&mut pdmp_controller>,
+    tolerance: f64,
+) -> pdmp_status {
+    call_on(controller, |controller| Ok(controller.inner.set_tolerance(tolerance).map(|()| PDMP_OK)?))
 }
 
 /// Sets the gains of the response to a measured position, see pdmp_controller_update: `stopping` k_s of phase stopping

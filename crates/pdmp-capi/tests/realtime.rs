@@ -29,6 +29,7 @@ fn to_c(command: &Command) -> pdmp_command {
     pdmp_command {
         style: vector(command.style),
         goal: vector(command.goal),
+        goal_velocity: vector(command.goal_velocity),
         anchor: vector(command.anchor),
         tau: pointer(&command.tau),
         amplitude: pointer(&command.amplitude),
@@ -84,6 +85,7 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                 dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
                 style: random.rarely().then_some(&values[..n_styles]),
                 goal: (random.rarely() && kind == Kind::Discrete).then_some(per_dof),
+                goal_velocity: (random.rarely() && kind == Kind::Discrete).then_some(per_dof),
                 anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(per_dof),
                 tau: random.rarely().then_some(own * (0.5 + random.next())),
                 amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(values[0].abs()),
@@ -103,6 +105,11 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                 match (random.next() * 20.0) as u8 {
                     0 => (rust.set_style(style), pdmp_controller_set_style(c.as_mut(), vector(Some(style)))),
                     1 => (rust.set_goal(per_dof), pdmp_controller_set_goal(c.as_mut(), vector(Some(per_dof)))),
+                    6 => {
+                        let velocity = (tau > own).then_some(per_dof);
+                        let rust = rust.set_goal_velocity(velocity);
+                        (rust, pdmp_controller_set_goal_velocity(c.as_mut(), vector(velocity)))
+                    }
                     2 => (rust.set_anchor(per_dof), pdmp_controller_set_anchor(c.as_mut(), vector(Some(per_dof)))),
                     3 => (rust.set_tau(tau), pdmp_controller_set_tau(c.as_mut(), tau)),
                     4 => (rust.set_amplitude(tau), pdmp_controller_set_amplitude(c.as_mut(), tau)),
@@ -110,6 +117,7 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                         rust.set_compliance(Compliance { stopping: tau, tracking: tau }),
                         pdmp_controller_set_compliance(c.as_mut(), tau, tau),
                     ),
+                    7 => (rust.set_tolerance(tau - own), pdmp_controller_set_tolerance(c.as_mut(), tau - own)),
                     _ => (Ok(()), pdmp_status::PDMP_OK),
                 }
             };

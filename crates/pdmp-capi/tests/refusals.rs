@@ -22,6 +22,7 @@ const NO_BUFFER: pdmp_buffer = pdmp_buffer { data: ptr::null_mut(), length: 0 };
 const NO_COMMAND: pdmp_command = pdmp_command {
     style: NO_VECTOR,
     goal: NO_VECTOR,
+    goal_velocity: NO_VECTOR,
     anchor: NO_VECTOR,
     tau: ptr::null(),
     amplitude: ptr::null(),
@@ -35,6 +36,7 @@ const NO_CONDITIONS: pdmp_conditions = pdmp_conditions {
     anchor: NO_VECTOR,
     start: NO_VECTOR,
     velocity: NO_VECTOR,
+    goal_velocity: NO_VECTOR,
     amplitude: ptr::null(),
     tau: ptr::null(),
     phase: ptr::null(),
@@ -186,12 +188,14 @@ fn null_for_a_required_argument_is_an_error() {
             pdmp_controller_set_amplitude(None, 1.0),
             pdmp_controller_set_compliance(None, 1.0, 1.0),
             pdmp_controller_set_speed(None, 1.0),
+            pdmp_controller_set_tolerance(None, 0.1),
             pdmp_controller_release(None),
             pdmp_controller_clone(None, SETTINGS.memory, Some(&mut out), NO_TEXT),
             pdmp_controller_clone(running.handle().as_deref(), SETTINGS.memory, None, NO_TEXT),
             pdmp_controller_set_style(running.handle(), NO_VECTOR),
             pdmp_controller_set_goal(running.handle(), NO_VECTOR),
             pdmp_controller_set_goal(running.handle(), pdmp_vector { data: ptr::null(), length: 3 }),
+            pdmp_controller_set_goal_velocity(running.handle(), pdmp_vector { data: ptr::null(), length: 3 }),
             pdmp_controller_step(None),
             pdmp_controller_update(None, None, None),
             pdmp_controller_read(None, None),
@@ -276,6 +280,7 @@ fn an_invalid_command_changes_nothing_and_leaves_a_message() {
     assert_eq!(pdmp_controller_set_amplitude(running.handle(), 1.0), PDMP_ABSENT);
     assert_eq!(pdmp_controller_set_tau(running.handle(), -1.0), PDMP_RANGE);
     assert_eq!(pdmp_controller_set_compliance(running.handle(), -1.0, 0.0), PDMP_RANGE);
+    assert_eq!(pdmp_controller_set_tolerance(running.handle(), 0.0), PDMP_RANGE);
     assert_eq!(running.state(3), before);
 }
 
@@ -390,6 +395,7 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
             anchor: read(c.anchor),
             start: read(c.start),
             velocity: read(c.velocity),
+            goal_velocity: read(c.goal_velocity),
             // SAFETY: NULL or in `numbers`.
             amplitude: unsafe { c.amplitude.as_ref() }.copied(),
             // SAFETY: as above.

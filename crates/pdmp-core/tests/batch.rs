@@ -66,7 +66,7 @@ proptest! {
     #[test]
     fn batch_is_the_loop(
         styles in each(2),
-        rows in (rows(3), rows(3), rows(3)),
+        rows in (rows(3), rows(3), rows(3), rows(3)),
         amplitude in prop_oneof![Just(0.0), 0.1..3.0f64],
         dt in prop_oneof![Just(1e-3), Just(1e-2), 2e-3..3e-2f64],
         factor in 0.3..3.0f64,
@@ -80,6 +80,7 @@ proptest! {
             });
             let (centres, starts, velocities) = (cut(&rows.0), cut(&rows.1), cut(&rows.2));
             let discrete = kind == Kind::Discrete;
+            let goal_velocities = cut(&rows.3).filter(|_| discrete);
             let tau = Some(factor * model.tau());
             let conditions = BatchConditions {
                 styles: styles.clone(),
@@ -87,6 +88,7 @@ proptest! {
                 anchors: centres.clone().filter(|_| !discrete),
                 starts: starts.clone(),
                 velocities: velocities.clone(),
+                goal_velocities: goal_velocities.clone(),
                 amplitude: Some(amplitude).filter(|_| !discrete),
                 tau,
             };
@@ -99,6 +101,7 @@ proptest! {
                     anchor: row(&centres, b).filter(|_| !discrete),
                     start: row(&starts, b),
                     velocity: row(&velocities, b),
+                    goal_velocity: row(&goal_velocities, b),
                     amplitude: conditions.amplitude,
                     tau,
                     segment_durations: None,
@@ -219,14 +222,21 @@ fn jacobians_are_differences_of_rollouts() {
     for model in [&*REACH, &*CYCLE] {
         let (n, discrete) = (model.n_dofs(), model.kind() == Kind::Discrete);
         let vector = |x: f64| Some((0..n).map(|d| x + d as f64).collect::<Vec<_>>());
-        for (start, velocity) in [(None, None), (vector(0.4), None), (None, vector(-0.3)), (vector(0.4), vector(-0.3))]
-        {
+        let cases = [
+            (None, None, None),
+            (vector(0.4), None, None),
+            (None, vector(-0.3), vector(0.6)),
+            (vector(0.4), vector(-0.3), vector(0.6)),
+        ];
+        for (start, velocity, goal_velocity) in cases {
+            let goal_velocity = goal_velocity.filter(|_| discrete);
             let base = Conditions {
                 style: Some(vec![0.2, -0.3]),
                 goal: vector(0.1).filter(|_| discrete),
                 anchor: vector(0.1).filter(|_| !discrete),
                 start,
                 velocity,
+                goal_velocity,
                 amplitude: (!discrete).then_some(0.7),
                 tau: Some(1.4 * model.tau()),
                 segment_durations: None,
@@ -234,8 +244,13 @@ fn jacobians_are_differences_of_rollouts() {
             };
             let rollout = |conditions: &Conditions| rollout(model.primitive(), conditions, grid(0.01, 1.5)).unwrap();
             let centre = if discrete { WithRespectTo::Goal } else { WithRespectTo::Anchor };
-            for variable in [WithRespectTo::Style, centre, WithRespectTo::Start] {
-                if variable == WithRespectTo::Start && base.start.is_none() && !discrete {
+            for variable in [WithRespectTo::Style, centre, WithRespectTo::Start, WithRespectTo::GoalVelocity] {
+                let absent = match variable {
+                    WithRespectTo::Start => base.start.is_none() && !discrete,
+                    WithRespectTo::GoalVelocity => base.goal_velocity.is_none(),
+                    _ => false,
+                };
+                if absent {
                     continue;
                 }
                 let entries = if variable == WithRespectTo::Style { 2 } else { n };
@@ -246,6 +261,7 @@ fn jacobians_are_differences_of_rollouts() {
                         WithRespectTo::Goal => &mut moved.goal,
                         WithRespectTo::Anchor => &mut moved.anchor,
                         WithRespectTo::Start => &mut moved.start,
+                        WithRespectTo::GoalVelocity => &mut moved.goal_velocity,
                     };
                     let nominal = || model.demonstrated().starts.row(model.demonstrated().nominal).to_vec();
                     condition.get_or_insert_with(nominal)[entry] += 0.5;

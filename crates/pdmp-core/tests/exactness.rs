@@ -20,7 +20,7 @@ fn omega(transition: f64) -> f64 {
 
 /// Reference solution of the equations by RK4.
 ///
-/// The state is y − (g − y₀)(m − 1), z, u and r, then the filtered style, rate 1/τ, centre and r₀, then the derivatives of
+/// The state is y relative to the frame, z, u and r, then the filtered style, rate 1/τ, centre and r₀, then the derivatives of
 /// these: that of the rate with respect to time, of the others with respect to the clock in seconds at the τ of the model.
 struct Reference<'a> {
     model: &'a Model,
@@ -29,8 +29,10 @@ struct Reference<'a> {
     state: Vec<f64>,
     /// Targets of the filters of style, rate, centre and r₀.
     target: Vec<f64>,
-    /// ω of the filters, that of the centre last.
-    omega: [f64; 2],
+    /// ω of the filters.
+    omega: f64,
+    /// Clock and displacement of a goal that the frame moves to with minimum jerk until the end.
+    goal_change: Option<(f64, Vec<f64>)>,
 }
 
 impl Reference<'_> {
@@ -55,10 +57,11 @@ impl Reference<'_> {
         let (value, speed) = filters.split_at(self.target.len());
         let clock_rate = |i: usize| if i == n_styles { 1.0 } else { rate * self.model.tau() };
         slope.extend(speed.iter().enumerate().map(|(i, v)| clock_rate(i) * v));
-        slope.extend(value.iter().zip(speed).zip(&self.target).enumerate().map(|(i, ((x, v), target))| {
-            let omega = self.omega[usize::from((n_styles + 1..n_styles + 1 + n).contains(&i))];
-            clock_rate(i) * (-2.0 * omega * v - omega.powi(2) * (x - target))
-        }));
+        slope.extend(
+            value.iter().zip(speed).zip(&self.target).enumerate().map(|(i, ((x, v), target))| {
+                clock_rate(i) * (-2.0 * self.omega * v - self.omega.powi(2) * (x - target))
+            }),
+        );
         slope
     }
 
@@ -66,7 +69,11 @@ impl Reference<'_> {
     fn position(&self, d: usize) -> f64 {
         let u = self.state[2 * self.model.n_dofs()];
         let lag = if self.model.kind() == Kind::Discrete { self.model.transport(u).unwrap() - 1.0 } else { 0.0 };
-        self.state[d] + self.displacement[d] * lag
+        let moved = self.goal_change.as_ref().map_or(0.0, |(from, change)| {
+            let s = ((u - from) / (self.model.canonical().extent() - from)).min(1.0);
+            change[d] * s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
+        });
+        self.state[d] + self.displacement[d] * lag + moved
     }
 
     fn rk4(&mut self, dt: f64) {
@@ -104,8 +111,9 @@ fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
     let displacement: Vec<f64> = centre.iter().zip(&start).map(|(g, y)| if discrete { g - y } else { 0.0 }).collect();
     let lag = if discrete { model.transport(0.0).unwrap() - 1.0 } else { 0.0 };
     let state = start.iter().zip(&displacement).map(|(y, displacement)| y - displacement * lag).collect();
-    let omegas = [omega(transition); 2];
-    let mut reference = Reference { model, displacement, state, target: target.clone(), omega: omegas };
+    let omega = omega(transition);
+    let goal_change = None;
+    let mut reference = Reference { model, displacement, state, target: target.clone(), omega, goal_change };
     reference.state.extend(vec![0.0; n]);
     reference.state.extend([0.0, 1.0]);
     reference.state.extend(&target);
@@ -130,10 +138,12 @@ fn error(model: &Arc<Model>, tau: f64, dt: f64, live: bool) -> f64 {
                 controller.set_anchor(&centre).unwrap();
                 controller.set_amplitude(1.4).unwrap();
             }
+            let mut centre = centre;
             if discrete && model.transport(0.0).unwrap() == 0.0 {
-                let response_time = 1.0 / model.attractor().beta_z;
-                let remaining = model.canonical().extent() - reference.state[2 * n] - response_time;
-                reference.omega[1] = omega(transition.max(remaining * model.tau()));
+                let goal = row(&demonstrated.goals);
+                let change = centre.iter().zip(&goal).map(|(to, from)| to - from).collect();
+                reference.goal_change = Some((reference.state[2 * n], change));
+                centre = goal;
             }
             let amplitude = if discrete { 1.0 } else { 1.4 };
             reference.target =

@@ -357,6 +357,7 @@ fn commands_at_all_limits_leave_the_motion_finite() {
                     dt: Some(dt),
                     style: Some(&style),
                     goal: discrete.then_some(&centre),
+                    goal_velocity: discrete.then_some(&centre),
                     anchor: (!discrete).then_some(&centre),
                     tau: Some(tau * model.tau()),
                     amplitude: (!discrete).then_some(1e45),

@@ -65,19 +65,21 @@ impl Loop {
             4 => controller.set_amplitude(size),
             5 => controller.set_compliance(Compliance { stopping: 1e3 * size, tracking: 10.0 * size }),
             6 => controller.step().map(drop),
+            7 => controller.set_goal_velocity((size < 0.5).then_some(vector)),
             _ => Ok(()),
         });
         let command = Command {
             dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
             style: random.rarely().then_some(style),
             goal: (random.rarely() && kind == Kind::Discrete).then_some(vector),
+            goal_velocity: (random.rarely() && kind == Kind::Discrete).then_some(vector),
             anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(vector),
             tau: random.rarely().then_some(tau),
             amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(size),
             measured: random.rarely().then_some(vector),
             coupling: random.rarely().then_some(Coupling { velocity: vector, acceleration: vector }),
         };
-        let vectors = [command.style, command.goal, command.anchor, command.measured];
+        let vectors = [command.style, command.goal, command.goal_velocity, command.anchor, command.measured];
         let uses_values =
             vectors.iter().any(Option::is_some) || command.amplitude.is_some() || command.coupling.is_some();
         let mut motion = Motion { position, velocity, acceleration };

@@ -291,6 +291,7 @@ impl Arguments<'_, '_> {
             velocities: rows("velocities", self.velocities)?,
             amplitude: optional_number("amplitude", self.amplitude)?,
             tau: optional_number("tau", self.tau)?,
+            ..BatchConditions::default()
         })
     }
 }

@@ -11,8 +11,8 @@ use crate::error::{ascii, raise};
 use crate::scalar::{Scalar, number};
 
 /// Names of all conditions, which are their keywords.
-const NAMES: [&str; 9] =
-    ["style", "goal", "start", "velocity", "anchor", "amplitude", "tau", "segment_durations", "phase"];
+const NAMES: [&str; 10] =
+    ["style", "goal", "start", "velocity", "goal_velocity", "anchor", "amplitude", "tau", "segment_durations", "phase"];
 
 /// Conditions of a movement.
 ///
@@ -31,6 +31,9 @@ const NAMES: [&str; 9] =
 ///     default.
 /// velocity : array_like, (D,), optional
 ///     Start velocity per s; by default that of the demonstrations.
+/// goal_velocity : array_like, (D,), optional
+///     Final velocity per s with which a discrete movement passes its goal at the end, such as that of a strike; by
+///     default that of the demonstrations. It needs learnt transport.
 /// anchor : array_like, (D,), optional
 ///     Anchor y_a, the centre of oscillation, in the unit of each degree of freedom; rhythmic.
 /// amplitude : float, optional
@@ -67,8 +70,8 @@ impl Conditions {
     #[new]
     #[pyo3(
         signature = (**conditions),
-        text_signature = "(*, style=None, goal=None, start=None, velocity=None, anchor=None, amplitude=None, tau=None, \
-                          segment_durations=None, phase=None)"
+        text_signature = "(*, style=None, goal=None, start=None, velocity=None, goal_velocity=None, anchor=None, amplitude=None, \
+                          tau=None, segment_durations=None, phase=None)"
     )]
     fn new(conditions: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         changed(Inner::default(), conditions).map(Self)
@@ -117,6 +120,12 @@ impl Conditions {
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         array(py, &self.0.velocity)
+    }
+
+    /// Final velocity (D,) per s of a discrete movement, or None.
+    #[getter]
+    fn goal_velocity<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        array(py, &self.0.goal_velocity)
     }
 
     /// Anchor y_a (D,) of a rhythmic movement, or None.
@@ -234,6 +243,7 @@ fn changed(mut conditions: Inner, changes: Option<&Bound<'_, PyDict>>) -> PyResu
             "goal" => conditions.goal = numbers("goal")?,
             "start" => conditions.start = numbers("start")?,
             "velocity" => conditions.velocity = numbers("velocity")?,
+            "goal_velocity" => conditions.goal_velocity = numbers("goal_velocity")?,
             "anchor" => conditions.anchor = numbers("anchor")?,
             "amplitude" => conditions.amplitude = scalar("amplitude")?,
             "tau" => {

@@ -55,8 +55,8 @@ struct Arguments {
 /// Running movement, returned by `Model.controller`.
 ///
 /// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-/// valid. `goal`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any tick; a value that
-/// is rejected leaves the present one in force.
+/// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed`, `tolerance` and `compliance` can be set at any
+/// tick; a value that is rejected leaves the present one in force.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
     inner: pdmp_core::Controller,
@@ -284,6 +284,22 @@ impl Controller {
         self.command(result)
     }
 
+    /// Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
+    /// demonstrations; a read-only copy. Assign all values at once.
+    #[getter]
+    fn goal_velocity<'py>(&self, py: Python<'py>) -> PyResult<Option<Vector<'py>>> {
+        self.inner.goal_velocity().map(|velocity| read_only(py, velocity)).transpose()
+    }
+
+    #[setter]
+    fn set_goal_velocity(&mut self, velocity: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        if let Some(velocity) = velocity {
+            refill("goal_velocity", velocity, &mut self.arguments.command)?;
+        }
+        let result = self.inner.set_goal_velocity(velocity.map(|_| &*self.arguments.command));
+        self.command(result)
+    }
+
     /// Anchor y_a (D,) of a rhythmic movement; a read-only copy. Assign all values at once.
     #[getter]
     fn anchor<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
@@ -332,6 +348,21 @@ impl Controller {
     #[setter]
     fn set_speed(&mut self, speed: Scalar<'_>) -> PyResult<()> {
         let result = self.inner.set_speed(speed.number("speed")?);
+        self.command(result)
+    }
+
+    /// Tolerance within which the movement has settled on its goal, 0.005 by default, at most 1.
+    ///
+    /// It is relative to the larger of two lengths of each degree of freedom: its largest demonstrated range, and its
+    /// distance from the goal when this was last set. It stays in force after `reset`.
+    #[getter]
+    fn tolerance(&self) -> f64 {
+        self.inner.tolerance()
+    }
+
+    #[setter]
+    fn set_tolerance(&mut self, tolerance: Scalar<'_>) -> PyResult<()> {
+        let result = self.inner.set_tolerance(tolerance.number("tolerance")?);
         self.command(result)
     }
 

@@ -137,12 +137,12 @@ impl Model {
     /// Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
     ///
     /// A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
-    /// Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start` and
-    /// `velocity`.
+    /// Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,
+    /// `velocity` and `goal_velocity`.
     ///
     /// Parameters
     /// ----------
-    /// wrt : {"style", "goal", "anchor", "start"}
+    /// wrt : {"style", "goal", "anchor", "start", "goal_velocity"}
     ///     Condition v.
     /// conditions : Conditions, optional
     ///     Conditions at the start.
@@ -199,8 +199,9 @@ impl Model {
             "goal" => WithRespectTo::Goal,
             "anchor" => WithRespectTo::Anchor,
             "start" => WithRespectTo::Start,
+            "goal_velocity" => WithRespectTo::GoalVelocity,
             _ => {
-                let text = format!("wrt = '{wrt}': must be 'style', 'goal', 'anchor' or 'start'");
+                let text = format!("wrt = '{wrt}': must be 'style', 'goal', 'anchor', 'start' or 'goal_velocity'");
                 return Err(PyValueError::new_err(text));
             }
         };

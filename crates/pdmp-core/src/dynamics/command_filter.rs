@@ -59,12 +59,6 @@ impl FilterGains {
         Self { omega: self.omega * tau, decay_time: self.decay_time / tau }
     }
 
-    /// Returns the gain for the longer of this transition and the given one.
-    pub(crate) fn at_least(&self, transition: f64) -> Self {
-        let longer = Self::new(transition.max(0.0));
-        if longer.omega < self.omega { longer } else { *self }
-    }
-
     /// Returns whether commands take effect at once.
     pub(crate) fn is_immediate(&self) -> bool {
         self.omega.is_infinite()
@@ -202,6 +196,16 @@ impl CommandFilter {
         }
         repack(&mut self.target, target);
         self.remaining = gains.decay_time;
+    }
+
+    /// Sets the targets and leaves the values, which do not move.
+    pub(crate) fn set_target_only(&mut self, target: &[f64]) {
+        repack(&mut self.target, target);
+    }
+
+    /// Sets the values without a transition and leaves the targets.
+    pub(crate) fn set_value(&mut self, value: &[F64x4]) {
+        self.value.copy_from_slice(value);
     }
 
     /// Sets targets and values.

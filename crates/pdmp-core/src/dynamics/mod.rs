@@ -1,9 +1,11 @@
 //! Dynamical systems of a primitive: canonical system, output system, forcing term, transport, time warp and command
 //! filters.
 
+pub(crate) mod braking;
 pub(crate) mod canonical;
 pub(crate) mod command_filter;
 pub(crate) mod forcing_table;
+pub(crate) mod goal_transition;
 pub(crate) mod hermite_table;
 pub(crate) mod output_system;
 pub(crate) mod propagator_series;

@@ -28,6 +28,9 @@ pub struct Conditions {
     pub start: Option<Vec<f64>>,
     /// Start velocity (D,), per second; otherwise that of the demonstrations.
     pub velocity: Option<Vec<f64>>,
+    /// Final velocity (D,), per second, with which a discrete movement passes its goal at the end; otherwise that of the
+    /// demonstrations.
+    pub goal_velocity: Option<Vec<f64>>,
     /// Amplitude r₀, rhythmic; otherwise 1.
     pub amplitude: Option<f64>,
     /// Time constant τ, in seconds.
@@ -52,6 +55,7 @@ impl Conditions {
             anchor: self.anchor.or(other.anchor),
             start: self.start.or(other.start),
             velocity: self.velocity.or(other.velocity),
+            goal_velocity: self.goal_velocity.or(other.goal_velocity),
             amplitude: self.amplitude.or(other.amplitude),
             tau,
             segment_durations,
@@ -87,6 +91,7 @@ impl Conditions {
             anchor: vector("anchor", &self.anchor, &other.anchor)?,
             start: vector("start", &self.start, &other.start)?,
             velocity: vector("velocity", &self.velocity, &other.velocity)?,
+            goal_velocity: vector("goal_velocity", &self.goal_velocity, &other.goal_velocity)?,
             amplitude: number("amplitude", self.amplitude, other.amplitude)?,
             tau: number("tau", self.tau, other.tau)?,
             segment_durations: vector("segment_durations", &self.segment_durations, &other.segment_durations)?,
@@ -116,7 +121,9 @@ impl Conditions {
                 centre("anchor", &self.anchor)?
             }
         };
-        for (name, value) in [("start", &self.start), ("velocity", &self.velocity)] {
+        reject_goal_velocity(primitive, self.goal_velocity.is_some())?;
+        let vectors = [("start", &self.start), ("velocity", &self.velocity), ("goal_velocity", &self.goal_velocity)];
+        for (name, value) in vectors {
             if let Some(value) = value {
                 check_vector(name, value, primitive.n_dofs(), "DoF")?;
             }
@@ -142,6 +149,8 @@ impl Conditions {
             centre,
             start,
             velocity: self.velocity.clone(),
+            goal_velocity: self.goal_velocity.clone().unwrap_or_else(|| vec![0.0; primitive.n_dofs()]),
+            has_goal_velocity: self.goal_velocity.is_some(),
             amplitude,
             tau,
             phase: turn(phase),
@@ -177,6 +186,9 @@ pub(crate) struct ResolvedConditions {
     pub(crate) centre: Vec<f64>,
     pub(crate) start: Option<Vec<f64>>,
     pub(crate) velocity: Option<Vec<f64>>,
+    /// Final velocity; zero if none is in force.
+    pub(crate) goal_velocity: Vec<f64>,
+    pub(crate) has_goal_velocity: bool,
     pub(crate) amplitude: f64,
     pub(crate) tau: f64,
     /// φ in [0, 2π); 0 where discrete.
@@ -192,6 +204,18 @@ pub(crate) fn reject_for_kind(kind: Kind, name: &'static str, given: bool) -> Re
         _ => "",
     };
     if given { Err(Error::Kind { name, kind, instead }) } else { Ok(()) }
+}
+
+/// Refuses a final velocity where the frame cannot carry it.
+pub(crate) fn reject_goal_velocity(primitive: &Primitive, given: bool) -> Result<()> {
+    let kind = primitive.kind();
+    reject_for_kind(kind, "goal_velocity", kind == Kind::Rhythmic && given)?;
+    if given && primitive.transport.is_immediate() {
+        return Err(Error::Arguments(
+            "goal_velocity needs learnt transport: immediate transport ends with the velocity of the demonstrations",
+        ));
+    }
+    Ok(())
 }
 
 /// Largest magnitude of a style. Demonstrated ones are at most 1: the bound only keeps products finite.

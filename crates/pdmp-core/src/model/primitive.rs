@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use crate::dynamics::canonical::Canonical;
-use crate::dynamics::forcing_table::ForcingTable;
-use crate::dynamics::output_system::{Attractor, State};
+use crate::dynamics::forcing_table::{ForcingTable, TableIndex};
+use crate::dynamics::output_system::{Attractor, Propagator, State};
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
@@ -61,6 +61,9 @@ pub struct Primitive {
     /// State of the limit cycle at φ = 0 per unit of style and amplitude, by groups of DoFs and styles; zero for a discrete
     /// movement, which starts with z = 0.
     pub(crate) cycle: Vec<State<F64x4>>,
+    /// States at the knots of the forcing table for unit styles from rest, by knots, groups of DoFs and styles; only for
+    /// learnt transport.
+    unit_states: Vec<State<F64x4>>,
     pub(crate) responses: Cache,
 }
 
@@ -89,17 +92,19 @@ impl Primitive {
     pub(crate) fn new(parts: Parts) -> Self {
         let Parts { attractor, mut forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal } =
             parts;
-        let shape = (names.len(), nominal.style.len());
+        let n_outputs = groups(names.len()) * nominal.style.len();
+        let mut unit_states = Vec::new();
         let cycle = match forcing_table.canonical().kind() {
             Kind::Discrete => {
                 if let Some(braking) = braking {
-                    let end = from_rest(attractor, &forcing_table, shape);
+                    unit_states = from_rest(attractor, &forcing_table);
+                    let end = &unit_states[unit_states.len() - n_outputs..];
                     let z: Vec<F64x4> = end.iter().map(|state| state.z).collect();
-                    forcing_table = forcing_table.with_braking(attractor.alpha_z, braking, &z);
+                    forcing_table = forcing_table.with_braking(attractor, braking, &z);
                 }
-                vec![State::default(); groups(shape.0) * shape.1]
+                vec![State::default(); n_outputs]
             }
-            Kind::Rhythmic => steady_cycle(attractor, &forcing_table, shape),
+            Kind::Rhythmic => steady_cycle(attractor, &forcing_table, n_outputs),
         };
         let responses = Cache::default();
         Self {
@@ -114,6 +119,7 @@ impl Primitive {
             breaks,
             nominal,
             cycle,
+            unit_states,
             responses,
         }
     }
@@ -245,6 +251,24 @@ impl Primitive {
         Ok(1.0 + self.transport.lag(u).value)
     }
 
+    /// Returns the state of a style at clock `u` of a movement with learnt transport that starts at rest, for one group of
+    /// DoFs. `propagator` is that over the clock since the knot before `u`.
+    pub(crate) fn state(
+        &self,
+        index: TableIndex,
+        propagator: &Propagator,
+        group: usize,
+        style: &[f64],
+    ) -> State<F64x4> {
+        let (first, forcing) = self.forcing_table.cell(index, group, style);
+        let states = style.iter().zip(&self.unit_states[first..]);
+        let knot = states.fold(State::<F64x4>::default(), |sum, (s, state)| State {
+            e: sum.e + state.e * *s,
+            z: sum.z + state.z * *s,
+        });
+        propagator.advance(knot, forcing)
+    }
+
     /// Returns the braking rate κ of a discrete movement past its end, per unit of the clock; `None` for immediate transport,
     /// where the forcing decays with the phase, and for rhythmic movements.
     pub fn braking(&self) -> Option<f64> {
@@ -272,32 +296,31 @@ impl Primitive {
     }
 }
 
-/// Returns the states at the end of the demonstrated clock interval for unit styles, starting from zero, by groups of DoFs
-/// and styles.
-fn from_rest(
-    attractor: Attractor,
-    forcing_table: &ForcingTable,
-    (n_dofs, n_styles): (usize, usize),
-) -> Vec<State<F64x4>> {
+/// Returns the states at the knots of the forcing table for unit styles, starting from zero, by knots, groups of DoFs and
+/// styles.
+fn from_rest(attractor: Attractor, forcing_table: &ForcingTable) -> Vec<State<F64x4>> {
     let cells = forcing_table.cells();
     let cell = attractor.propagator(forcing_table.canonical().extent() / cells as f64);
-    let mut states = Vec::with_capacity(groups(n_dofs) * n_styles);
-    for group in 0..groups(n_dofs) {
-        states.extend((0..n_styles).map(|j| {
-            let knot = |k: usize| forcing_table.knot(k, group, j);
-            (0..cells).fold(State::default(), |state, k| cell.advance(state, [knot(k), knot(k + 1)]))
-        }));
+    let n_outputs = forcing_table.knot(0).len();
+    let mut states = vec![State::default(); (cells + 1) * n_outputs];
+    for k in 0..cells {
+        let (before, after) = states.split_at_mut((k + 1) * n_outputs);
+        let ends = forcing_table.knot(k).zip(forcing_table.knot(k + 1));
+        for ((state, next), (from, to)) in before[k * n_outputs..].iter().zip(after).zip(ends) {
+            *next = cell.advance(*state, [from, to]);
+        }
     }
     states
 }
 
 /// Returns the states of the limit cycle at φ = 0 for unit styles: (I − exp(2πA))⁻¹ times the response of one cycle from
 /// zero.
-fn steady_cycle(attractor: Attractor, forcing_table: &ForcingTable, shape: (usize, usize)) -> Vec<State<F64x4>> {
+fn steady_cycle(attractor: Attractor, forcing_table: &ForcingTable, n_outputs: usize) -> Vec<State<F64x4>> {
     let [[a, b], [c, d]] = attractor.propagator(TAU).transition;
     // All eigenvalues of exp(2πA) lie inside the unit circle, so that the determinant is positive.
     let scale = 1.0 / ((1.0 - a) * (1.0 - d) - b * c);
     let solve =
         |State { e, z }: State<F64x4>| State { e: (e * (1.0 - d) + z * b) * scale, z: (e * c + z * (1.0 - a)) * scale };
-    from_rest(attractor, forcing_table, shape).into_iter().map(solve).collect()
+    let states = from_rest(attractor, forcing_table);
+    states[states.len() - n_outputs..].iter().copied().map(solve).collect()
 }

@@ -55,6 +55,8 @@ pub(crate) struct Curves {
     pub(crate) start: Array2<f64>,
     /// Response V to the start velocity, equal for all DoFs.
     pub(crate) velocity: Array2<f64>,
+    /// Response G to the final velocity, equal for all DoFs, if one is in force.
+    pub(crate) goal_velocity: Option<Array2<f64>>,
 }
 
 /// Unit responses of positions, velocities and accelerations.
@@ -68,7 +70,7 @@ impl Responses {
     }
 
     fn bytes(&self) -> usize {
-        self.0.iter().map(|curves| (curves.styles.len() + 2) * curves.start.len() * size_of::<f64>()).sum()
+        self.0.iter().map(|curves| (curves.styles.len() + 3) * curves.start.len() * size_of::<f64>()).sum()
     }
 }
 
@@ -78,6 +80,8 @@ pub(crate) struct Key {
     pub(crate) dt: f64,
     pub(crate) tau: f64,
     pub(crate) steps: usize,
+    /// True if a final velocity is in force.
+    pub(crate) has_goal_velocity: bool,
 }
 
 /// Least-recently-used cache of responses. The cache of a cloned primitive is empty.
@@ -135,11 +139,12 @@ mod tests {
 
     fn responses(n: usize) -> Arc<Responses> {
         let curve = || Array2::zeros((n, 1));
-        Arc::new(Responses([(); 3].map(|()| Curves { styles: vec![curve()], start: curve(), velocity: curve() })))
+        let curves = || Curves { styles: vec![curve()], start: curve(), velocity: curve(), goal_velocity: None };
+        Arc::new(Responses([(); 3].map(|()| curves())))
     }
 
     fn key(steps: usize) -> Key {
-        Key { dt: 0.01, tau: 1.0, steps }
+        Key { dt: 0.01, tau: 1.0, steps, has_goal_velocity: false }
     }
 
     /// The most recently used entries are kept, up to the limits of number and memory.
@@ -153,7 +158,7 @@ mod tests {
         let kept = (0..100).filter(|&n| cache.find(key(n)).is_some()).collect::<Vec<_>>();
         assert_eq!(kept, [0, 93, 94, 95, 96, 97, 98, 99]);
         // Each takes three eighths of the memory.
-        let large = responses(MAX_BYTES / (9 * 8) * 3 / 8);
+        let large = responses(MAX_BYTES / (12 * 8) * 3 / 8);
         for n in 0..20 {
             cache.insert(key(n), &large);
             assert!(cache.with(|entries| entries.iter().map(|(_, r)| r.bytes()).sum::<usize>()) <= MAX_BYTES);
@@ -171,7 +176,8 @@ mod tests {
         cache.insert(key(5), &responses(6));
         cache.insert(key(5), &responses(6));
         assert_eq!(cache.with(|entries| entries.len()), 1);
-        for other in [Key { dt: 0.02, ..key(5) }, Key { tau: 1.1, ..key(5) }, key(6)] {
+        let with_velocity = Key { has_goal_velocity: true, ..key(5) };
+        for other in [Key { dt: 0.02, ..key(5) }, Key { tau: 1.1, ..key(5) }, with_velocity, key(6)] {
             assert!(cache.find(other).is_none());
         }
         assert!(cache.clone().find(key(5)).is_none());

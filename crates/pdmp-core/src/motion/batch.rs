@@ -7,7 +7,7 @@ use ndarray::{Array2, Array3, ArrayView1, ArrayViewMut3, Axis, aview1};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE};
+use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, reject_goal_velocity};
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::rollout::TimeGrid;
@@ -45,6 +45,8 @@ pub struct BatchConditions {
     pub starts: Option<PerMovement>,
     /// Start velocities, per second. The default is the velocity of the demonstrated movement.
     pub velocities: Option<PerMovement>,
+    /// Final velocities of discrete movements, per second. The default is the velocity of the demonstrated movement.
+    pub goal_velocities: Option<PerMovement>,
     /// Common amplitude r₀ of rhythmic movements. The default is 1.
     pub amplitude: Option<f64>,
     /// Common time constant τ, in seconds.
@@ -81,6 +83,7 @@ pub struct Batch {
     centres: PerMovement,
     starts: Option<PerMovement>,
     velocities: Option<PerMovement>,
+    goal_velocities: Option<PerMovement>,
     amplitude: f64,
 }
 
@@ -97,7 +100,8 @@ pub fn batch(
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Batch> {
-    let BatchConditions { styles, goals, anchors, starts, velocities, amplitude, tau } = conditions;
+    let BatchConditions { styles, goals, anchors, starts, velocities, goal_velocities, amplitude, tau } = conditions;
+    reject_goal_velocity(primitive, goal_velocities.is_some())?;
     check_styles(&styles, primitive.n_styles())?;
     let kind = primitive.kind();
     let (centres, (name, other, instead)) = match kind {
@@ -108,18 +112,21 @@ pub fn batch(
         return Err(Error::Kind { name, kind, instead });
     }
     let centre = if kind == Kind::Discrete { "goals" } else { "anchors" };
-    for (name, rows) in [(centre, &centres), ("starts", &starts), ("velocities", &velocities)] {
+    let vectors =
+        [(centre, &centres), ("starts", &starts), ("velocities", &velocities), ("goal_velocities", &goal_velocities)];
+    for (name, rows) in vectors {
         if let Some(rows) = rows {
             rows.check(name, styles.nrows(), primitive.n_dofs())?;
         }
     }
     let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(primitive)?;
     Ok(Batch {
-        responses: responses(primitive, nominal.tau, grid, progress)?,
+        responses: responses(primitive, nominal.tau, goal_velocities.is_some(), grid, progress)?,
         styles,
         centres: centres.unwrap_or(PerMovement::All(nominal.centre)),
         starts: starts.or(nominal.start.map(PerMovement::All)),
         velocities,
+        goal_velocities,
         amplitude: nominal.amplitude,
     })
 }
@@ -266,7 +273,8 @@ impl Batch {
         };
         let start = difference(&self.starts, Derivative::Position, &centre);
         let velocity = difference(&self.velocities, Derivative::Velocity, &vec![0.0; centre.len()]);
-        Combination::new(style, &centre, &start, &velocity)
+        let goal_velocity = self.goal_velocities.as_ref().map(|rows| rows.row(b).to_vec());
+        Combination::new(style, &centre, &start, &velocity).with_goal_velocity(goal_velocity.as_deref())
     }
 }
 

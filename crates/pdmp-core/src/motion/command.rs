@@ -2,13 +2,13 @@
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{check_amplitude, check_style, check_tau, reject_for_kind};
+use crate::model::conditions::{check_amplitude, check_style, check_tau, reject_for_kind, reject_goal_velocity};
 use crate::model::primitive::Primitive;
 use crate::validate::check_vector;
 
 /// Command of one tick. A field that is `None` leaves its quantity unchanged.
 ///
-/// Style, goal, anchor, τ and amplitude remain in force until the next command, and a repeated command has no further
+/// Style, goal, final velocity, anchor, τ and amplitude remain in force until the next command, and a repeated command has no further
 /// effect. `measured` remains in force until the next measurement or [`crate::Controller::release`]. `dt` and `coupling`
 /// apply to this tick only.
 ///
@@ -28,6 +28,8 @@ pub struct Command<'a> {
     pub style: Option<&'a [f64]>,
     /// New goal g (D,) of a discrete movement, in the unit of each DoF.
     pub goal: Option<&'a [f64]>,
+    /// New final velocity (D,) of a discrete movement, per second.
+    pub goal_velocity: Option<&'a [f64]>,
     /// New anchor y_a (D,) of a rhythmic movement, in the unit of each DoF.
     pub anchor: Option<&'a [f64]>,
     /// New time constant τ, in seconds.
@@ -100,6 +102,8 @@ impl Command<'_> {
         }
         reject_for_kind(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
         vector("goal", self.goal)?;
+        reject_goal_velocity(model, self.goal_velocity.is_some())?;
+        vector("goal_velocity", self.goal_velocity)?;
         reject_for_kind(kind, "anchor", kind == Kind::Discrete && self.anchor.is_some())?;
         vector("anchor", self.anchor)?;
         vector("measured", self.measured)?;

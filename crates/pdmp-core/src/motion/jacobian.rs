@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use ndarray::{Array3, Axis};
+use ndarray::{Array2, Array3, Axis};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{Conditions, ResolvedConditions, reject_for_kind};
+use crate::model::conditions::{Conditions, ResolvedConditions, reject_for_kind, reject_goal_velocity};
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::rollout::TimeGrid;
@@ -24,6 +24,8 @@ pub enum WithRespectTo {
     Anchor,
     /// Start position y(0) (D,).
     Start,
+    /// Final velocity ẏ_g (D,) of a discrete movement.
+    GoalVelocity,
 }
 
 /// Computes the Jacobian of a rollout: (T, D, J) with respect to the style, (T, D, D) otherwise.
@@ -35,9 +37,11 @@ pub enum WithRespectTo {
 /// ∂y/∂g = 1 − E
 /// ∂y/∂y_a = 1, or 1 − E if a start is given
 /// ∂y/∂y(0) = E
+/// ∂y/∂ẏ_g = G
 /// ```
 ///
-/// with the responses R to the unit styles, E to a unit start and V to a unit start velocity. The terms with E and V apply
+/// with the responses R to the unit styles, E to a unit start, V to a unit start velocity and G to a unit final velocity. If
+/// a final velocity is given, all responses keep it. The terms with E and V apply
 /// only if a start or a start velocity is given. `derivative` selects y, ẏ or ÿ. `progress` is called periodically with the
 /// completed fraction; an error it returns cancels the call.
 ///
@@ -76,16 +80,23 @@ pub fn jacobian(
         ));
     }
     let conditions = conditions.complete(primitive)?;
-    let responses = responses(primitive, conditions.tau, grid, progress)?;
+    let by_goal_velocity = variable == WithRespectTo::GoalVelocity;
+    reject_goal_velocity(primitive, by_goal_velocity)?;
+    let has_goal_velocity = conditions.has_goal_velocity || by_goal_velocity;
+    let responses = responses(primitive, conditions.tau, has_goal_velocity, grid, progress)?;
+    let curves = responses.of(derivative);
     // Derivative of the centre with respect to itself, and its derivatives with respect to time.
     let one = if derivative == Derivative::Position { 1.0 } else { 0.0 };
     match variable {
         WithRespectTo::Style => by_style(&responses, derivative, &conditions),
         WithRespectTo::Goal | WithRespectTo::Anchor if conditions.start.is_some() => {
-            by_dof(&responses, derivative, |response| one - response)
+            by_dof(&curves.start, |response| one - response)
         }
-        WithRespectTo::Goal | WithRespectTo::Anchor => by_dof(&responses, derivative, |_| one),
-        WithRespectTo::Start => by_dof(&responses, derivative, |response| response),
+        WithRespectTo::Goal | WithRespectTo::Anchor => by_dof(&curves.start, |_| one),
+        WithRespectTo::Start => by_dof(&curves.start, |response| response),
+        WithRespectTo::GoalVelocity => {
+            by_dof(curves.goal_velocity.as_ref().unwrap_or(&curves.velocity), |response| response)
+        }
     }
 }
 
@@ -110,9 +121,8 @@ fn by_style(responses: &Responses, derivative: Derivative, conditions: &Resolved
     Ok(jacobian)
 }
 
-/// Returns a Jacobian (T, D, D), diagonal in the DoFs, with entries as a function of the response to a unit start.
-fn by_dof(responses: &Responses, derivative: Derivative, entry: impl Fn(f64) -> f64) -> Result<Array3<f64>> {
-    let curve = &responses.of(derivative).start;
+/// Returns a Jacobian (T, D, D), diagonal in the DoFs, with entries as a function of a unit response.
+fn by_dof(curve: &Array2<f64>, entry: impl Fn(f64) -> f64) -> Result<Array3<f64>> {
     let (n_samples, n_dofs) = curve.dim();
     let mut jacobian = zeros("jacobian", (n_samples, n_dofs, n_dofs))?;
     for (mut jacobian, responses) in jacobian.outer_iter_mut().zip(curve.rows()) {

@@ -166,9 +166,11 @@ impl Clock {
     /// Converts conditions to the time of the controller.
     fn conditions(&self, conditions: &Conditions) -> Conditions {
         let mut conditions = conditions.clone();
-        if let Self::Warped { extent, phase: [_, rate, _], .. } = self {
+        if let Self::Warped { warp, extent, phase: [_, rate, _] } = self {
             conditions.segment_durations = None;
             conditions.velocity.iter_mut().flatten().for_each(|v| *v /= extent * rate);
+            let end_rate = warp.slope(1.0).recip();
+            conditions.goal_velocity.iter_mut().flatten().for_each(|v| *v /= extent * end_rate);
         }
         conditions
     }

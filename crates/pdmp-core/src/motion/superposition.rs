@@ -15,21 +15,31 @@ const MIN_PATTERN: usize = 64;
 /// Number of elements of a tile: its responses are read from cache for all movements of a block.
 const TILE: usize = 1024;
 
-/// Coefficients of a movement y = g + s·R + Δy(0)·E + Δẏ(0)·V.
+/// Coefficients of a movement y = g + s·R + Δy(0)·E + Δẏ(0)·V + ẏ_g·G.
 pub(crate) struct Combination {
     style: Vec<f64>,
     /// Coefficients g of the DoFs, repeated to at least [`MIN_PATTERN`] elements, as are the following.
     centre: Vec<f64>,
     start: Vec<f64>,
     velocity: Vec<f64>,
+    goal_velocity: Option<Vec<f64>>,
 }
 
 impl Combination {
     /// Returns the combination of the styles (J,) with centre, start and velocity coefficients (D,).
     pub(crate) fn new(style: Vec<f64>, centre: &[f64], start: &[f64], velocity: &[f64]) -> Self {
-        let pattern = |values: &[f64]| values.repeat(MIN_PATTERN.div_ceil(values.len()));
-        Self { style, centre: pattern(centre), start: pattern(start), velocity: pattern(velocity) }
+        Self { style, centre: pattern(centre), start: pattern(start), velocity: pattern(velocity), goal_velocity: None }
     }
+
+    /// Adds a final velocity (D,).
+    pub(crate) fn with_goal_velocity(self, velocity: Option<&[f64]>) -> Self {
+        Self { goal_velocity: velocity.map(pattern), ..self }
+    }
+}
+
+/// Repeats values (D,) to at least [`MIN_PATTERN`] elements.
+fn pattern(values: &[f64]) -> Vec<f64> {
+    values.repeat(MIN_PATTERN.div_ceil(values.len()))
 }
 
 /// Writes one derivative of movements (B, T, D).
@@ -68,6 +78,7 @@ struct Tile<'a> {
     styles: Vec<&'a [f64]>,
     start: &'a [f64],
     velocity: &'a [f64],
+    goal_velocity: Option<&'a [f64]>,
 }
 
 impl<'a> Tile<'a> {
@@ -77,6 +88,7 @@ impl<'a> Tile<'a> {
             styles: curves.styles.iter().map(part).collect(),
             start: part(&curves.start),
             velocity: part(&curves.velocity),
+            goal_velocity: curves.goal_velocity.as_ref().map(part),
         }
     }
 
@@ -89,6 +101,11 @@ impl<'a> Tile<'a> {
             let coefficients = centre.iter().zip(start).zip(velocity);
             for (((out, ((g, start), velocity)), e), v) in out.iter_mut().zip(coefficients).zip(e).zip(v) {
                 *out = g + start * e + velocity * v;
+            }
+        }
+        if let (Some(velocity), Some(responses)) = (&combination.goal_velocity, self.goal_velocity) {
+            for (out, responses) in out.chunks_mut(period).zip(responses.chunks(period)) {
+                out.iter_mut().zip(velocity).zip(responses).for_each(|((out, velocity), g)| *out += velocity * g);
             }
         }
         // Four styles per pass over the output reduce its loads and stores.

@@ -112,7 +112,8 @@ impl<'a> StyleSelection<'a> {
         let (n_samples, n_dofs) = (self.start.len(), self.targets.starts.ncols());
         let start = Array2::from_shape_fn((n_samples, n_dofs), |(k, _)| self.start[k]);
         let velocity = Array2::zeros(start.dim());
-        let curves = Curves { styles: styles.columns().into_iter().map(response).collect(), start, velocity };
+        let unit_styles = styles.columns().into_iter().map(response).collect();
+        let curves = Curves { styles: unit_styles, start, velocity, goal_velocity: None };
 
         let [goals, starts, anchors] = [&self.targets.goals, &self.targets.starts, &self.targets.anchors].map(of);
         let segment_durations = self.segment_durations.select(Axis(0), &fold.training);

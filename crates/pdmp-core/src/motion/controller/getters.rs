@@ -58,6 +58,11 @@ impl Controller {
         &self.conditions.centre
     }
 
+    /// Returns the commanded final velocity (D,), per second; `None` for that of the demonstrations.
+    pub fn goal_velocity(&self) -> Option<&[f64]> {
+        self.conditions.has_goal_velocity.then_some(&*self.conditions.goal_velocity)
+    }
+
     /// Returns the commanded time constant τ, in seconds.
     pub fn tau(&self) -> f64 {
         self.conditions.tau
@@ -66,6 +71,11 @@ impl Controller {
     /// Returns the commanded speed, a factor of the rate 1/τ.
     pub fn speed(&self) -> f64 {
         self.speed
+    }
+
+    /// Returns the tolerance of a settled movement; see [`Controller::set_tolerance`].
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
     }
 
     /// Returns the gains k_s and k_t of a measured position; see [`Controller::set_compliance`].

@@ -1,11 +1,11 @@
 //! Real-time control loop: one tick of the primitive per call, with every command adjustable between ticks.
 //!
-//! Over a tick the forcing w, the goal and the clock are given by values and slopes at both ends; the cubics between them
-//! are propagated exactly ([`crate::dynamics::Attractor`]). Style, goal or anchor, and amplitude pass critically damped
-//! filters on the clock, the rate ρ = 1/τ one in seconds, so that position and velocity stay continuous: ẏ = ρy′ and
-//! ÿ = ρ²y″ + ρ̇y′ with y′ = z + w + c′. The frame c of a discrete movement is evaluated exactly at both ends of a tick
-//! (`transport`) and is not propagated. A perturbation ([`Command::measured`], [`Command::coupling`]) slows the clock of
-//! the phase relative to that of the output system, and adds to ẏ and ÿ.
+//! Over a tick the forcing w, the centre and the clock are given by values and slopes at both ends; the cubics between them
+//! are propagated exactly ([`crate::dynamics::Attractor`]). Style, anchor and amplitude pass critically damped filters on
+//! the clock, the rate ρ = 1/τ one in seconds, so that position and velocity stay continuous: ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′
+//! with y′ = z + w + c′. The frame c of a discrete movement, transport and transition to a new goal (`goal`), is evaluated
+//! exactly at both ends of a tick and is not propagated. A perturbation ([`Command::measured`], [`Command::coupling`]) slows
+//! the clock of the phase relative to that of the output system, and adds to ẏ and ÿ.
 //!
 //! [`Controller::update`] and the setters neither allocate nor lock nor panic. A tick costs O(J·D), independent of the
 //! training data, in one step if it is shorter than 1/500 of the movement and 1/95 of each transition in progress, and in
@@ -14,14 +14,17 @@
 #[cfg(target_arch = "x86_64")]
 mod avx;
 mod getters;
+mod goal;
 mod group;
 mod setters;
+mod settling;
 mod step;
 
 use std::sync::Arc;
 
 use crate::dynamics::canonical::CompensatedSum;
 use crate::dynamics::command_filter::{CommandFilter, FilterGains, FilterStep};
+use crate::dynamics::goal_transition::{GoalTransition, MinDurations};
 use crate::dynamics::output_system::{Propagator, State};
 use crate::dynamics::propagator_series::Series;
 use crate::dynamics::transport::TransportSegment;
@@ -37,8 +40,9 @@ use group::Group;
 
 /// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
-/// Tolerance of a settled movement, relative to the range of each DoF.
-const SETTLING_RATIO: f64 = 1e-3;
+/// Default tolerance of a settled movement, relative to the range of each DoF. On the recordings of `docs/transport.md`,
+/// movements that end in motion settle to it at 1.0 to 1.35 durations (median of a set), to 1e-3 at up to 1.5.
+const DEFAULT_TOLERANCE: f64 = 5e-3;
 /// Flush level, relative to the largest range: values 1e-16 of it become zero. It lies far below the last digit of every
 /// movement, and its square is a normal number.
 const FLUSH_RATIO: f64 = 1e-150;
@@ -48,7 +52,7 @@ const FLUSH_RATIO: f64 = 1e-150;
 pub enum Status {
     /// In progress. A rhythmic movement never finishes.
     Working,
-    /// Past the demonstrated end, with position and velocity settled on the goal.
+    /// Past the demonstrated end, with position and velocity settled on the goal; see [`Controller::set_tolerance`].
     Finished,
 }
 
@@ -79,21 +83,24 @@ pub struct Controller {
     clock: CompensatedSum,
     /// Amplitude r; 1 for a discrete movement.
     r: f64,
-    /// Filter gains of style and amplitude, on the clock.
+    /// Filter gains of style, anchor and amplitude, on the clock.
     command_gains: FilterGains,
     style: CommandFilter,
     /// Filter gains of ρ, in seconds.
     rate_gains: FilterGains,
     /// ρ = 1/τ.
     rate: CommandFilter,
-    /// Goal or anchor.
+    /// Goal or anchor. With learnt transport the value is the goal before `goal_transition`.
     centre: CommandFilter,
-    /// Filter gains of goal or anchor, on the clock.
-    centre_gains: FilterGains,
+    /// Transition of the frame to a commanded goal and final velocity.
+    goal_transition: GoalTransition,
+    min_durations: MinDurations,
     /// r₀.
     amplitude: CommandFilter,
     /// Factor of the rate 1/τ.
     speed: f64,
+    /// Tolerance of a settled movement, relative to the range of each DoF.
+    tolerance: f64,
     groups: Vec<Group>,
     /// Phase rate κ for which w′ of the groups was computed.
     forcing_phase_rate: f64,
@@ -111,10 +118,8 @@ pub struct Controller {
     max_clock_step: f64,
     /// Filter step of the rate over the last substep, reused for the next one of that length.
     rate_step: FilterStep,
-    /// Filter step of style and amplitude over the last substep.
+    /// Filter step of style, anchor and amplitude over the last substep.
     command_step: FilterStep,
-    /// Filter step of goal or anchor over the last substep.
-    centre_step: FilterStep,
     propagator: Propagator,
     series: Series,
     /// Number of ticks by which the forcing table is prefetched.
@@ -127,8 +132,8 @@ impl Controller {
     /// `dt` is the length of a tick and `transition` the time to 99 % of a changed style, τ, goal, anchor or amplitude,
     /// both in seconds. The transition of the rate 1/τ takes this time; the others take the equivalent clock interval at the
     /// model's τ, so that the path does not depend on the rate. 0 is the paper's immediate switch. The default is a tenth of
-    /// the nominal duration of a discrete movement, a quarter of the nominal period of a rhythmic one. A new goal takes the
-    /// rest of the movement if that is longer, unless transport is immediate.
+    /// the nominal duration of a discrete movement, a quarter of the nominal period of a rhythmic one. With learnt transport
+    /// a new goal takes the rest of the movement instead; see [`Controller::set_goal`].
     ///
     /// # Errors
     /// Conditions that do not fit the primitive, a `dt` that is not positive, or a `transition` that is negative or longer
@@ -161,9 +166,11 @@ impl Controller {
             rate_gains,
             rate: CommandFilter::new(&[1.0 / conditions.tau]),
             centre: CommandFilter::new(&conditions.centre),
-            centre_gains: command_gains,
+            goal_transition: GoalTransition::inactive(groups.len()),
+            min_durations: MinDurations::new(primitive.attractor(), transition / primitive.tau()),
             amplitude: CommandFilter::new(&[conditions.amplitude]),
             speed: 1.0,
+            tolerance: DEFAULT_TOLERANCE,
             groups,
             forcing_phase_rate: 1.0,
             frame_lag: 0.0,
@@ -176,7 +183,6 @@ impl Controller {
             max_clock_step,
             rate_step: rate_gains.step_with_integral(dt),
             command_step: FilterStep::IDENTITY,
-            centre_step: FilterStep::IDENTITY,
             propagator: series.propagator::<F64x4>(0.0),
             series,
             prefetch_ticks: 1.0,
@@ -232,10 +238,14 @@ impl Controller {
                 group.displacement = *goal - padded(start);
             }
         }
+        self.goal_transition.clear();
         self.read_frame();
         self.read_forcing();
         self.set_initial_state();
-        self.set_tolerance();
+        if self.conditions.has_goal_velocity {
+            self.start_goal_transition();
+        }
+        self.update_lengths();
         self.read_out();
     }
 
@@ -277,7 +287,7 @@ impl Controller {
         self.check_tick_length(self.dt, None)?;
         let h = self.clock_step(self.dt);
         if self.perturbation.has_measurement() {
-            self.perturbation.set(&Command::default(), &self.position, self.dt, h);
+            self.perturbation.set(&Command::default(), &self.position, self.dt, h, self.started);
         } else {
             self.perturbation.clear_terms();
         }
@@ -355,7 +365,7 @@ impl Controller {
             return Ok(self.status);
         }
         let h = self.clock_step(dt);
-        self.perturbation.set(command, &self.position, dt, h);
+        self.perturbation.set(command, &self.position, dt, h, self.started);
         Ok(self.tick(dt, h))
     }
 }

@@ -1,8 +1,6 @@
 //! Commands between ticks. A rejected command leaves the last valid one in force.
 
-use super::{Controller, SETTLING_RATIO, Status};
-use crate::dynamics::canonical::Canonical;
-use crate::dynamics::command_filter::{FilterGains, FilterStep};
+use super::{Controller, Status};
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
 use crate::motion::perturbation::Compliance;
@@ -18,10 +16,52 @@ impl Controller {
 
     /// Sets the goal g (D,) of a discrete movement, in the unit of each DoF.
     ///
+    /// With learnt transport the frame moves to the goal with minimum jerk over the rest of the movement, near and past the
+    /// end over the time in which it is no faster than the paper's equations would be. With immediate transport the goal
+    /// passes the filter of the other commands into Eq. (1), as in the paper.
+    ///
     /// # Errors
     /// A rhythmic primitive, a wrong length, or a number that is not finite. The goal then remains unchanged.
     pub fn set_goal(&mut self, goal: &[f64]) -> Result<()> {
         self.set(&Command { goal: Some(goal), ..Command::default() })
+    }
+
+    /// Sets the final velocity (D,) with which a discrete movement passes its goal at the end, per second; `None` is that of
+    /// the demonstrations.
+    ///
+    /// At the commanded τ the movement is at its goal with this velocity when the clock reaches the end, to rounding, for
+    /// any sequence of goals, final velocities, τ and speeds; the speed scales it. Past the end the attractor brings it back
+    /// to its goal. A goal commanded later than the shortest transition before the end is taken up past the end.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), model.duration() / 100.0, &Conditions::default(), None)?;
+    /// controller.set_goal_velocity(Some(&[2.0, -0.5]))?;
+    /// for _ in 0..100 {
+    ///     controller.step()?;
+    /// }
+    /// assert!((controller.velocity()[0] - 2.0).abs() < 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A rhythmic primitive or one with immediate transport, a wrong length, or a number that is not finite. The final
+    /// velocity then remains unchanged.
+    pub fn set_goal_velocity(&mut self, velocity: Option<&[f64]>) -> Result<()> {
+        if velocity.is_none() && self.conditions.has_goal_velocity {
+            self.conditions.has_goal_velocity = false;
+            self.conditions.goal_velocity.fill(0.0);
+            if !self.started {
+                self.begin();
+            } else if !self.primitive.forcing_table().is_past(self.clock.value()) {
+                self.start_goal_transition();
+            }
+        }
+        self.set(&Command { goal_velocity: velocity, ..Command::default() })
     }
 
     /// Sets the anchor y_a (D,) of a rhythmic movement, in the unit of each DoF.
@@ -96,6 +136,36 @@ impl Controller {
         Ok(())
     }
 
+    /// Sets the tolerance of a settled movement, 0.005 by default, relative to the larger of two lengths of each DoF: its
+    /// largest demonstrated range, and its distance from the goal when this was last commanded.
+    ///
+    /// Past the demonstrated end a movement is [`Status::Finished`] when it is within the tolerance of its goal and will stay
+    /// there. The tolerance remains in force after [`Controller::reset`].
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Status, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+    /// controller.set_tolerance(1e-6)?;
+    /// while controller.step()? == Status::Working {}
+    /// assert!((controller.position()[0] - controller.centre()[0]).abs() <= 1e-6 * model.ranges()[0]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A tolerance outside (0, 1]. It then remains unchanged.
+    pub fn set_tolerance(&mut self, tolerance: f64) -> Result<()> {
+        if !(tolerance > 0.0 && tolerance <= 1.0) {
+            let allowed = "must be positive and at most 1, the range of the demonstrations";
+            return Err(Error::Range { name: "tolerance", value: tolerance, allowed });
+        }
+        self.tolerance = tolerance;
+        Ok(())
+    }
+
     /// Sets the gains of a measured position: k_s of phase stopping, and k_t of tracking, per unit of the clock.
     ///
     /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 divided by
@@ -148,12 +218,23 @@ impl Controller {
             self.style.set_target(style, &gains);
             changed = true;
         }
+        let mut goal_changed = false;
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
-            self.centre_gains = self.centre_gains();
-            self.centre_step = FilterStep::IDENTITY;
-            self.centre.set_target(centre, &self.centre_gains);
-            self.set_tolerance();
+            if self.has_frame() {
+                goal_changed = true;
+                self.centre.set_target_only(centre);
+            } else {
+                self.centre.set_target(centre, &gains);
+            }
+            self.update_lengths();
+            changed = true;
+        }
+        if let Some(velocity) = command.goal_velocity
+            && !(self.conditions.has_goal_velocity && velocity == self.conditions.goal_velocity)
+        {
+            self.conditions.goal_velocity.copy_from_slice(velocity);
+            self.conditions.has_goal_velocity = true;
             changed = true;
         }
         if let Some(tau) = command.tau.filter(|tau| *tau != self.conditions.tau) {
@@ -177,29 +258,9 @@ impl Controller {
         if gains.is_immediate() {
             self.read_forcing();
         }
-    }
-
-    /// Returns the filter gains of a goal or anchor commanded now.
-    ///
-    /// A commanded goal enters Eq. (1) alone, as in the paper. Its transition lasts for the rest of the movement, less the
-    /// time 1/β_z by which the output system lags, and never less than that of other commands. The latter serves for
-    /// anchors, for immediate transport, and for goals near or past the end.
-    fn centre_gains(&self) -> FilterGains {
-        match self.primitive.canonical() {
-            Canonical::Discrete { u_end, .. } if !self.primitive.transport.is_immediate() => {
-                let remaining = u_end - self.clock.value() - 1.0 / self.primitive.attractor().beta_z;
-                self.command_gains.at_least(remaining)
-            }
-            _ => self.command_gains,
-        }
-    }
-
-    /// Sets the tolerance of settling to a share of the present distance from the goal, at least to its rounding error.
-    pub(super) fn set_tolerance(&mut self) {
-        let distances = self.centre.target().iter().zip(&self.position);
-        for (group, (&centre, &position)) in self.groups.iter_mut().zip(distances) {
-            let rounding = centre.abs().max(position.abs()) * (8.0 * f64::EPSILON);
-            group.tolerance = group.min_tolerance.max(((centre - position).abs() * SETTLING_RATIO).max(rounding));
+        // The velocity at the end depends on style and τ.
+        if goal_changed || self.approaches_goal_velocity() {
+            self.start_goal_transition();
         }
     }
 }

@@ -35,11 +35,8 @@ impl Controller {
     pub(super) fn tick(&mut self, dt: f64, h: f64) -> Status {
         self.started = true;
         let mut substeps = h / self.max_clock_step;
-        if !(self.style.is_settled() && self.amplitude.is_settled()) {
+        if !self.are_commands_settled() {
             substeps = substeps.max(self.command_gains.substeps(h));
-        }
-        if !self.centre.is_settled() {
-            substeps = substeps.max(self.centre_gains.substeps(h));
         }
         if !self.rate.is_settled() {
             substeps = substeps.max(self.rate_gains.substeps(dt));
@@ -54,6 +51,10 @@ impl Controller {
             }
         }
         self.time.add(dt);
+        // The style's transition and perturbations change the arrival that the final velocity compensates for.
+        if self.approaches_goal_velocity() && !(self.style.is_settled() && self.perturbation.terms().is_none()) {
+            self.start_goal_transition();
+        }
         // A settled movement remains settled until it is perturbed or commanded.
         if self.status == Status::Working || self.perturbation.terms().is_some() {
             let past = self.primitive.forcing_table().is_past(self.clock.value());
@@ -82,12 +83,15 @@ impl Controller {
     /// Computes the filter steps of commands in transition for a clock interval `h`, unless the last ones had that length.
     #[inline(always)]
     fn update_command_steps(&mut self, h: f64) {
-        if !(self.style.is_settled() && self.amplitude.is_settled()) && h != self.command_step.dt() {
+        if !self.are_commands_settled() && h != self.command_step.dt() {
             self.command_step = self.command_gains.step(h);
         }
-        if !self.centre.is_settled() && h != self.centre_step.dt() {
-            self.centre_step = self.centre_gains.step(h);
-        }
+    }
+
+    /// Returns whether style, centre and amplitude rest on their targets.
+    #[inline(always)]
+    fn are_commands_settled(&self) -> bool {
+        self.style.is_settled() && self.centre.is_settled() && self.amplitude.is_settled()
     }
 
     /// Advances by `dt` seconds and `h` on the clock, split at u_end, where the forcing has a kink.
@@ -99,7 +103,8 @@ impl Controller {
         let (remaining, advance) = (u_end - self.clock.value(), self.perturbation.phase_rate() * h);
         // The substep that ends at u_end up to rounding is one that reaches it.
         if remaining <= 0.0 || remaining > advance * (1.0 + ROUNDING) {
-            return self.advance(dt, h);
+            self.advance(dt, h);
+            return self.end_goal_transition();
         }
         let before = self.rate.integral_time(remaining / self.perturbation.phase_rate(), dt, &self.rate_gains);
         // A remainder of rounding, where the last substep ended at u_end, is skipped.
@@ -108,6 +113,7 @@ impl Controller {
             self.advance(before, h);
         }
         self.clock = CompensatedSum::at(u_end);
+        self.end_goal_transition();
         self.read_frame();
         self.read_forcing();
         let h = self.clock_step(dt - before);
@@ -156,7 +162,7 @@ impl Controller {
         }
         self.style.advance::<T>(&self.command_step);
         self.rate.advance::<T>(&self.rate_step);
-        let moving = self.centre.begin_step(&self.centre_step);
+        let moving = self.centre.begin_step(&self.command_step);
         self.clock.add(self.perturbation.phase_rate() * h);
         if let Canonical::Rhythmic { mu } = self.primitive.canonical() {
             self.clock.wrap();
@@ -183,6 +189,7 @@ impl Controller {
             if demonstrated { forcing_table.demonstrated_index(clock) } else { forcing_table.index(clock) };
         let style = unpack(self.style.value(), primitive.n_styles());
         let style_rate = (!self.style.is_settled()).then(|| unpack(self.style.rate(), primitive.n_styles()));
+        let (transition, gate_phase_rate) = (self.goal_transition.is_active(), self.perturbation.phase_rate());
         let (n, flush_level, centre) = (self.groups.len(), T::splat(self.flush_level), &mut self.centre);
         let (position, velocity, acceleration) =
             (&mut self.position[..n], &mut self.velocity[..n], &mut self.acceleration[..n]);
@@ -193,13 +200,22 @@ impl Controller {
             group.w = CubicSample { value: to.value.store(), slope: to.slope.store() };
 
             let (goal, displacement) = (T::load(&centre.value()[index]), T::load(&group.displacement));
-            let [start, mut origin] = lags.map(|lag| goal + displacement * lag);
+            let [mut start, mut origin] = lags.map(|lag| goal + displacement * lag);
+            let mut w = add_frame_motion(to, displacement, frame_slopes);
+            if transition {
+                let frame = self.goal_transition.sample::<T>(index, clock);
+                start = start + T::load(&self.goal_transition.value[index]);
+                origin = origin + frame.value;
+                self.goal_transition.value[index] = frame.value.store();
+                let motion = frame.motion(gate_phase_rate);
+                w = CubicSample { value: w.value + motion.value, slope: w.slope + motion.slope };
+            }
             let state = State { e: T::load(&position[index]) - start, z: T::load(&group.z) };
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
             if moving {
                 let before = CubicSample { value: T::default(), slope: T::load(&centre.rate()[index]) };
-                let [new_goal, slope] = centre.advance_group::<T>(index, &self.centre_step);
+                let [new_goal, slope] = centre.advance_group::<T>(index, &self.command_step);
                 let response = propagator.follow([before, CubicSample { value: new_goal - goal, slope }]);
                 y = y + response.e;
                 origin = new_goal + displacement * lags[1];
@@ -207,7 +223,6 @@ impl Controller {
             }
             let (y, z) = (flush(y, flush_level), flush(next.z, flush_level));
             (position[index], group.z) = (y.store(), z.store());
-            let w = add_frame_motion(to, displacement, frame_slopes);
             let [y_dot, y_ddot] = gate.motion(attractor, State { e: y - origin, z }, w);
             (velocity[index], acceleration[index]) = (y_dot.store(), y_ddot.store());
         }
@@ -308,8 +323,11 @@ impl Controller {
         let TransportSample { value, slope, bend } = self.primitive.transport.lag(self.clock.value());
         let frame_slopes = self.frame_slopes(slope, bend);
         for (index, &Group { forcing, displacement, z, .. }) in self.groups.iter().enumerate() {
-            let w = add_frame_motion(gate.forcing(&forcing), displacement, frame_slopes);
-            let e = self.position[index] - (self.centre.value()[index] + displacement * value);
+            let frame = self.goal_transition.sample::<F64x4>(index, self.clock.value());
+            let motion = frame.motion(self.perturbation.phase_rate());
+            let mut w = add_frame_motion(gate.forcing(&forcing), displacement, frame_slopes);
+            w = CubicSample { value: w.value + motion.value, slope: w.slope + motion.slope };
+            let e = self.position[index] - (self.centre.value()[index] + displacement * value + frame.value);
             [self.velocity[index], self.acceleration[index]] = gate.motion(attractor, State { e, z }, w);
         }
         if let Some(PerturbationTerms { velocity, acceleration }) = self.perturbation.terms() {
@@ -318,36 +336,6 @@ impl Controller {
                 self.acceleration[group] += acceleration[group];
             }
         }
-    }
-
-    /// Returns [`Status::Finished`] past the end if the remaining displacement of every DoF is within its tolerance.
-    ///
-    /// The displacement is bounded by about |y − g| + 2|z + w|/α_z + |w|/β_z: distance from the goal, overshoot at critical
-    /// damping, and forcing, the larger of those of the present and the commanded style. The remaining displacement of the
-    /// goal is added.
-    fn settled(&self) -> Status {
-        let Some(fade) = self.primitive.forcing_table().fade(self.clock.value()) else {
-            return Status::Working;
-        };
-        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
-        let (forcing_table, target) =
-            (self.primitive.forcing_table(), unpack(self.style.target(), self.primitive.n_styles()));
-        let table_index = forcing_table.index(self.clock.value());
-        let settled = self.groups.iter().enumerate().all(|(index, group)| {
-            let distance = (self.position[index] - self.centre.target()[index]).abs();
-            let ForcingSample { value, slope, .. } = group.forcing;
-            let overshoot = (group.z + value * fade.r).abs() * (2.0 / alpha_z);
-            let mut residual = fade.residual(CubicSample { value, slope });
-            if !self.style.is_settled() {
-                residual = residual.max(fade.residual(forcing_table.sample(table_index, index, target)));
-            }
-            let bound = distance
-                + overshoot
-                + residual * (1.0 / beta_z)
-                + self.centre_gains.max_displacement(&self.centre, index);
-            bound.simd_le(group.tolerance).all()
-        });
-        if settled { Status::Finished } else { Status::Working }
     }
 }
 

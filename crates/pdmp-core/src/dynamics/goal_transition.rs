@@ -1,0 +1,235 @@
+//! Minimum-jerk transition of the moving frame to a commanded goal and final velocity.
+//!
+//! A goal commanded during a movement, and a final velocity, displace the frame (`transport`) by
+//!
+//! ```text
+//! q(u) = Σₖ aₖ sᵏ,     s = (u − u₀)/(u₁ − u₀),     k = 0 … 5,
+//! ```
+//!
+//! the trajectory of least ∫‖q‴‖²du between given values and first two derivatives at u₀ and u₁ (Flash and Hogan, Journal of
+//! Neuroscience 5, 1985, doi:10.1523/JNEUROSCI.05-07-01688.1985). It begins with the present value and derivatives, so that
+//! position, velocity and acceleration stay continuous for any sequence of commands, and ends with q″ = 0. From rest to rest
+//! its peak velocity is 15/8 and its peak acceleration 10/√3 times the mean ones over u₁ − u₀.
+
+use crate::dynamics::output_system::{Attractor, CubicSample};
+use crate::numerics::simd::{F64x4, Real, Register};
+
+/// Peak velocity of a transition from rest to rest, in units of the displacement over the duration.
+const PEAK_VELOCITY: f64 = 15.0 / 8.0;
+/// Peak acceleration of a transition from rest to rest, in units of the displacement over the squared duration: 10/√3.
+const PEAK_ACCELERATION: f64 = 5.773_502_691_896_258;
+
+/// Displacement of the frame with its first and second derivative with respect to the clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FrameSample<T = F64x4> {
+    pub(crate) value: T,
+    pub(crate) slope: T,
+    pub(crate) bend: T,
+}
+
+/// Transition of the frame, by groups of DoFs.
+#[derive(Clone, Debug)]
+pub(crate) struct GoalTransition {
+    active: bool,
+    /// u₀.
+    from: f64,
+    /// u₁.
+    to: f64,
+    /// aₖ.
+    coefficients: Vec<[F64x4; 6]>,
+    /// q at the clock.
+    pub(crate) value: Vec<F64x4>,
+    /// Goal at u₁.
+    pub(crate) goal: Vec<F64x4>,
+}
+
+impl GoalTransition {
+    /// Returns no transition of `n_groups` groups.
+    pub(crate) fn inactive(n_groups: usize) -> Self {
+        let zeros = vec![F64x4::ZERO; n_groups];
+        let coefficients = vec![[F64x4::ZERO; 6]; n_groups];
+        Self { active: false, from: 0.0, to: 0.0, coefficients, value: zeros.clone(), goal: zeros }
+    }
+
+    /// Returns whether a transition is in progress.
+    #[inline(always)]
+    pub(crate) fn is_active(&self) -> bool {
+        self.active
+    }
+
+    /// Returns whether a transition is in progress that ends at or before clock `u`.
+    #[inline(always)]
+    pub(crate) fn has_reached_end(&self, u: f64) -> bool {
+        self.active && u >= self.to
+    }
+
+    /// Ends the transition: the displacement becomes zero.
+    pub(crate) fn clear(&mut self) {
+        self.active = false;
+        self.value.fill(F64x4::ZERO);
+    }
+
+    /// Starts a transition from clock `from` to clock `to`. `ends` yields the goal, the displacement and its slope at `to`
+    /// for each group and its present displacement.
+    pub(crate) fn start(&mut self, from: f64, to: f64, ends: impl Fn(usize, F64x4) -> [F64x4; 3]) {
+        let duration = to - from;
+        for group in 0..self.coefficients.len() {
+            let FrameSample { value, slope, bend } = self.sample(group, from);
+            let [goal, end, end_slope] = ends(group, value);
+            let (rate, half_bend) = (slope * duration, bend * (0.5 * duration * duration));
+            let rest = end - value - rate - half_bend;
+            let rest_slope = end_slope * duration - rate - half_bend * 2.0;
+            // The second derivative at the end is zero.
+            let rest_bend = -half_bend;
+            self.coefficients[group] = [
+                value,
+                rate,
+                half_bend,
+                rest * 10.0 - rest_slope * 4.0 + rest_bend,
+                rest * -15.0 + rest_slope * 7.0 - rest_bend * 2.0,
+                rest * 6.0 - rest_slope * 3.0 + rest_bend,
+            ];
+            (self.value[group], self.goal[group]) = (value, goal);
+        }
+        (self.active, self.from, self.to) = (true, from, to);
+    }
+
+    /// Returns the displacement of a group at clock `u`.
+    #[inline(always)]
+    pub(crate) fn sample<T: Register>(&self, group: usize, u: f64) -> FrameSample<T> {
+        if !self.active {
+            return FrameSample::default();
+        }
+        let scale = 1.0 / (self.to - self.from);
+        let s = ((u - self.from) * scale).clamp(0.0, 1.0);
+        let [a, b, c, d, e, f] = &self.coefficients[group];
+        let [a, b, c, d, e, f] = [a, b, c, d, e, f].map(T::load);
+        let value = a + (b + (c + (d + (e + f * s) * s) * s) * s) * s;
+        let slope = b + (c * 2.0 + (d * 3.0 + (e * 4.0 + f * (5.0 * s)) * s) * s) * s;
+        let bend = c * 2.0 + (d * 6.0 + (e * 12.0 + f * (20.0 * s)) * s) * s;
+        FrameSample { value, slope: slope * scale, bend: bend * (scale * scale) }
+    }
+}
+
+impl<T: Real> FrameSample<T> {
+    /// Returns the motion q′ and q″ of the frame for a phase of the given rate on the clock of the output system.
+    #[inline(always)]
+    pub(crate) fn motion(&self, phase_rate: f64) -> CubicSample<T> {
+        CubicSample { value: self.slope * phase_rate, slope: self.bend * (phase_rate * phase_rate) }
+    }
+}
+
+/// Shortest transitions whose velocity and acceleration do not exceed those of the paper's equations, on the clock.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MinDurations {
+    /// Bound by the peak velocity.
+    pub(crate) by_velocity: f64,
+    /// Bound by the peak acceleration.
+    pub(crate) by_acceleration: f64,
+}
+
+impl MinDurations {
+    /// Returns the bounds for the gains of the output system and the transition of its commands on the clock.
+    ///
+    /// After a step of the goal the paper's output system has the peak velocity ω·exp(−ζa), a = arccos(ζ)/√(1 − ζ²), with
+    /// ω² = α_zβ_z and the damping ratio ζ = α_z/2ω, and the peak acceleration ω². A filtered step has smaller peaks, for
+    /// which the transition and 1.5 times the transition compensate, for any ratio of the two times and ζ ≤ 1.
+    pub(crate) fn new(Attractor { alpha_z, beta_z }: Attractor, transition: f64) -> Self {
+        let omega = (alpha_z * beta_z).sqrt();
+        let damping = 0.5 * alpha_z / omega;
+        let root = (damping * damping - 1.0).abs().sqrt();
+        let angle = if root < 1e-6 {
+            1.0
+        } else if damping < 1.0 {
+            damping.acos() / root
+        } else {
+            damping.acosh() / root
+        };
+        let peak_velocity = omega * (-damping * angle).exp();
+        Self {
+            by_velocity: transition + PEAK_VELOCITY / peak_velocity,
+            by_acceleration: 1.5 * transition + PEAK_ACCELERATION.sqrt() / omega,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    fn first(sample: FrameSample) -> [f64; 3] {
+        [sample.value, sample.slope, sample.bend].map(|lanes| lanes.as_array()[0])
+    }
+
+    fn splat(values: [f64; 3]) -> [F64x4; 3] {
+        values.map(F64x4::splat)
+    }
+
+    /// From rest to rest the transition is the minimum-jerk profile 10s³ − 15s⁴ + 6s⁵.
+    #[test]
+    fn rest_to_rest_is_minimum_jerk() {
+        let mut transition = GoalTransition::inactive(1);
+        transition.start(0.2, 0.7, |_, _| splat([2.0, 2.0, 0.0]));
+        for k in 0..=10 {
+            let s = f64::from(k) / 10.0;
+            let [value, ..] = first(transition.sample(0, 0.2 + 0.5 * s));
+            assert_relative_eq!(value, 2.0 * s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s), epsilon = 1e-14);
+        }
+        let grid = |k: i32| first(transition.sample(0, 0.2 + 0.5 * f64::from(k) / 1e4));
+        let peak = |i: usize| (0..=10_000).map(|k| grid(k)[i].abs()).fold(0.0, f64::max);
+        assert_relative_eq!(peak(1), PEAK_VELOCITY * 2.0 / 0.5, max_relative = 1e-6);
+        assert_relative_eq!(peak(2), PEAK_ACCELERATION * 2.0 / 0.25, max_relative = 1e-6);
+    }
+
+    proptest! {
+        /// Each transition continues from the last one and arrives at its ends.
+        #[test]
+        fn transitions_join_smoothly(
+            commands in prop::collection::vec((0.05..2.0f64, 0.1..0.9f64, -5.0..5.0f64, -5.0..5.0f64), 1..8),
+        ) {
+            let mut transition = GoalTransition::inactive(1);
+            let mut u = 0.0;
+            for (duration, share, end, slope) in commands {
+                let before = first(transition.sample(0, u));
+                transition.start(u, u + duration, |_, _| splat([end, end, slope]));
+                let after = first(transition.sample(0, u));
+                let arrival = first(transition.sample(0, u + duration));
+                for (found, expected) in after.into_iter().zip(before).chain(arrival.into_iter().zip([end, slope, 0.0])) {
+                    prop_assert!((found - expected).abs() <= 1e-9 * (1.0 + before[2].abs()) / (duration * duration));
+                }
+                u += share * duration;
+            }
+        }
+
+        /// The bounds hold against an integration of the filtered step of the paper's equations.
+        #[test]
+        fn peaks_do_not_exceed_those_of_the_output_system(
+            alpha_z in 1.0..60.0f64, ratio in 0.25..1.0f64, filter in prop_oneof![Just(0.0), 0.1..30.0f64],
+        ) {
+            let attractor = Attractor { alpha_z, beta_z: alpha_z * ratio };
+            let omega = (alpha_z * attractor.beta_z).sqrt();
+            let MinDurations { by_velocity, by_acceleration } = MinDurations::new(attractor, filter / omega);
+            // ωt at which 99 % of a filtered step are done.
+            let rate = if filter > 0.0 { 6.638_352 * omega / filter } else { 0.0 };
+            let slopes = |[x, v, e, z]: [f64; 4]| {
+                [v, -2.0 * rate * v - rate * rate * (x - 1.0), z, alpha_z * (attractor.beta_z * (x - e) - z)]
+            };
+            let add = |a: [f64; 4], b: [f64; 4], h: f64| std::array::from_fn(|i| a[i] + h * b[i]);
+            let h = 0.02 / rate.max(omega);
+            let mut state = [if filter > 0.0 { 0.0 } else { 1.0 }, 0.0, 0.0, 0.0];
+            let [mut peak_velocity, mut peak_acceleration] = [0.0f64; 2];
+            for _ in 0..((8.0 + filter) / (omega * h)) as usize {
+                let a = slopes(state);
+                (peak_velocity, peak_acceleration) = (peak_velocity.max(a[2].abs()), peak_acceleration.max(a[3].abs()));
+                let b = slopes(add(state, a, 0.5 * h));
+                let c = slopes(add(state, b, 0.5 * h));
+                let d = slopes(add(state, c, h));
+                state = add(state, std::array::from_fn(|i| a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]), h / 6.0);
+            }
+            prop_assert!(PEAK_VELOCITY / by_velocity <= 1.001 * peak_velocity);
+            prop_assert!(PEAK_ACCELERATION / (by_acceleration * by_acceleration) <= 1.001 * peak_acceleration);
+        }
+    }
+}
