@@ -4,7 +4,7 @@ use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::primitive::Primitive;
-use crate::validate::{check_positive, check_vector};
+use crate::validate::{check_length, check_positive, check_range, check_vector};
 
 /// Conditions under which a movement starts. A condition that is `None` is that of the nominal demonstration.
 ///
@@ -68,9 +68,7 @@ impl Conditions {
     /// # Errors
     /// A condition that one of the two lacks, lengths that differ, or a share that is not finite.
     pub fn blend(&self, other: &Self, share: f64) -> Result<Self> {
-        if !share.is_finite() {
-            return Err(Error::Range { name: "share", value: share, allowed: "must be finite" });
-        }
+        check_range("share", share, share.is_finite(), "must be finite")?;
         let mix = |a: f64, b: f64| (1.0 - share) * a + share * b;
         let number = |name, a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => Ok(Some(mix(a, b))),
@@ -78,10 +76,8 @@ impl Conditions {
             _ => Err(Error::Single { name }),
         };
         let vector = |name, a: &Option<Vec<f64>>, b: &Option<Vec<f64>>| match (a, b) {
-            (Some(a), Some(b)) if a.len() != b.len() => {
-                Err(Error::Length { name, expected: a.len(), found: b.len(), per: "element of the other conditions" })
-            }
-            (Some(a), Some(b)) => Ok(Some(a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect())),
+            (Some(a), Some(b)) => check_length(name, b.len(), a.len(), "element of the other conditions")
+                .map(|()| Some(a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect())),
             (None, None) => Ok(None),
             _ => Err(Error::Single { name }),
         };
@@ -141,9 +137,7 @@ impl Conditions {
         };
         reject_for_kind(kind, "phase", kind == Kind::Discrete && self.phase.is_some())?;
         let phase = self.phase.unwrap_or(0.0);
-        if !phase.is_finite() {
-            return Err(Error::Range { name: "phase", value: phase, allowed: "must be a finite angle in rad" });
-        }
+        check_range("phase", phase, phase.is_finite(), "must be a finite angle in rad")?;
         Ok(ResolvedConditions {
             style,
             centre,
@@ -233,19 +227,11 @@ pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
 /// Checks a time constant against the model's own, in seconds.
 pub(crate) fn check_tau(tau: f64, own: f64) -> Result<()> {
     check_positive("tau", tau)?;
-    if (1e-6..=1e6).contains(&(tau / own)) {
-        Ok(())
-    } else {
-        let allowed = "must lie within a millionfold of the model's tau";
-        Err(Error::Range { name: "tau", value: tau, allowed })
-    }
+    check_range("tau", tau, (1e-6..=1e6).contains(&(tau / own)), "must lie within a millionfold of the model's tau")
 }
 
 /// Checks an amplitude: zero is rest.
 pub(crate) fn check_amplitude(value: f64) -> Result<()> {
-    if (0.0..=crate::validate::MAX_MAGNITUDE).contains(&value) {
-        Ok(())
-    } else {
-        Err(Error::Range { name: "amplitude", value, allowed: "must lie between 0, which is rest, and 1e150" })
-    }
+    let valid = (0.0..=crate::validate::MAX_MAGNITUDE).contains(&value);
+    check_range("amplitude", value, valid, "must lie between 0, which is rest, and 1e150")
 }

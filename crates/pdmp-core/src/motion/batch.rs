@@ -14,7 +14,7 @@ use crate::motion::rollout::TimeGrid;
 use crate::motion::superposition::{self, Combination};
 use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
-use crate::validate::{check_matrix, check_vector, zeros};
+use crate::validate::{check_length, check_matrix, check_range, check_vector, zeros};
 
 /// Number of elements of each output that one thread writes per block.
 const BLOCK: usize = 1 << 17;
@@ -182,10 +182,8 @@ impl Batch {
     /// # Errors
     /// A size of zero.
     pub fn chunks(&self, size: usize) -> Result<BatchChunks> {
-        match size {
-            0 => Err(Error::Range { name: "size", value: 0.0, allowed: "must be at least 1" }),
-            _ => Ok(BatchChunks { remaining: 0..self.styles.nrows(), size }),
-        }
+        check_range("size", size as f64, size > 0, "must be at least 1")?;
+        Ok(BatchChunks { remaining: 0..self.styles.nrows(), size })
     }
 
     /// Computes a range of the movements: positions and their derivatives up to `highest`, each (n, T, D).
@@ -316,9 +314,7 @@ impl PerMovement {
 
 /// Checks that rows have `expected` finite elements, one per `per`.
 fn check_rows(name: &'static str, rows: &Array2<f64>, expected: usize, per: &'static str) -> Result<()> {
-    if rows.ncols() != expected {
-        return Err(Error::Length { name, expected, found: rows.ncols(), per });
-    }
+    check_length(name, rows.ncols(), expected, per)?;
     check_matrix(name, rows.view())
 }
 

@@ -11,7 +11,7 @@ use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::controller::Controller;
 use crate::motion::trajectory::Trajectory;
-use crate::validate::{check_positive, row_major_mut, zeros};
+use crate::validate::{check_positive, check_range, row_major_mut, zeros};
 
 /// Number of samples between two calls of `progress`.
 const PROGRESS_INTERVAL: usize = 4096;
@@ -36,21 +36,11 @@ impl TimeGrid {
     pub(crate) fn steps(&self, primitive: &Primitive, tau: f64) -> Result<usize> {
         check_positive("dt", self.dt)?;
         check_tau(tau, primitive.tau)?;
-        let duration = match self.duration {
-            Some(duration) if duration.is_finite() && duration >= 0.0 => duration,
-            Some(value) => {
-                return Err(Error::Range { name: "duration", value, allowed: "must be finite and not negative" });
-            }
-            None => primitive.duration() * tau / primitive.tau,
-        };
+        let duration = self.duration.unwrap_or(primitive.duration() * tau / primitive.tau);
+        let valid = self.duration.is_none_or(|duration| duration.is_finite() && duration >= 0.0);
+        check_range("duration", duration, valid, "must be finite and not negative")?;
         let steps = (duration / self.dt * (1.0 + 1e-12) + 1e-9).floor();
-        if steps > MAX_STEPS {
-            return Err(Error::Range {
-                name: "dt",
-                value: self.dt,
-                allowed: "gives more than 1e7 samples: enlarge it",
-            });
-        }
+        check_range("dt", self.dt, steps <= MAX_STEPS, "gives more than 1e7 samples: enlarge it")?;
         Ok(steps as usize)
     }
 }
