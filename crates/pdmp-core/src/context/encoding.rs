@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::demonstration::ContextValue;
 use crate::demonstration::check_context;
 use crate::error::{Error, Result};
+use crate::numerics::statistics::extremes;
 use crate::validate::{check_finite, check_length, check_range};
 
 /// Type of one context value, common to all contexts.
@@ -150,8 +151,7 @@ impl Encoder {
                     check_range("contexts", largest, valid, allowed)?;
                     let variance = values.map(|value| ((value - mean) / largest.max(1e-100)).powi(2)).mean();
                     let deviation = if largest > 0.0 { largest * variance.unwrap_or(1.0).sqrt() } else { 1.0 };
-                    let range = [f64::INFINITY, f64::NEG_INFINITY];
-                    let range = values.iter().fold(range, |[low, high], &value| [low.min(value), high.max(value)]);
+                    let range = extremes(values.iter().copied());
                     Ok(ColumnEncoder::Standardised { first, mean, deviation, range })
                 }
             }

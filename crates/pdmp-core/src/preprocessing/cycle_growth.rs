@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use ndarray::{Array1, Array2};
 
+use crate::numerics::statistics::extremes;
+
 /// Full turn in each unit of angle.
 const TURNS: [(&str, f64); 3] = [("rad", TAU), ("deg", 360.0), ("°", 360.0)];
 /// Maximum deviation of the gain of an angle from whole turns, in turns: cycle onsets are accurate to about a percent.
@@ -53,8 +55,7 @@ pub(super) fn median_gain(gains: &[Array1<f64>], dof: usize) -> f64 {
 /// Returns whether a gain exceeds the movement of a degree of freedom within every closed cycle (C, D), and rounding.
 pub(super) fn exceeds_movement(gain: f64, cycles: &[Array2<f64>], dof: usize) -> bool {
     let threshold = |cycle: &Array2<f64>| {
-        let column = cycle.column(dof);
-        let (low, high) = column.iter().fold((f64::MAX, f64::MIN), |(low, high), y| (y.min(low), y.max(high)));
+        let [low, high] = extremes(cycle.column(dof).iter().copied());
         f64::max(MIN_REPORTED * (high - low), ROUNDING * high.abs().max(low.abs()))
     };
     gain.abs() > cycles.iter().map(threshold).fold(0.0, f64::max)

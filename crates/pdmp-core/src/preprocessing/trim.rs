@@ -5,6 +5,7 @@ use ndarray::{ArrayView1, s};
 use super::Curve;
 use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
+use crate::numerics::statistics::range;
 use crate::validate::check_range;
 
 /// Threshold of the squared speed above its mean under noise, in standard deviations: noise in one degree of freedom
@@ -52,8 +53,7 @@ pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
     let slopes = curve.splines.slopes() * curve.interval();
     let (mut speeds, mut steps, mut noise) = (vec![0.0; slopes.nrows()], vec![0.0; slopes.nrows() - 1], Vec::new());
     for (d, column) in position.columns().into_iter().enumerate() {
-        let (low, high) = column.iter().fold((f64::MAX, f64::MIN), |(low, high), y| (y.min(low), y.max(high)));
-        let range = high - low;
+        let range = range(column);
         if range > 0.0 {
             let slopes = &slopes.column(d) / range;
             speeds.iter_mut().zip(&slopes).for_each(|(speed, slope)| *speed += slope * slope);
