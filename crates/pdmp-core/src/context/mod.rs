@@ -22,7 +22,7 @@ pub use encoding::ContextColumn;
 pub(crate) use encoding::tabulate;
 pub(crate) use kernel::Kernel;
 pub use model_selection::{ContextMapKind, MapSelection};
-pub(crate) use outputs::{log_duration_jacobian, outputs};
+pub(crate) use outputs::{log_duration_jacobian, log_durations, outputs};
 pub(crate) use stacking::StackingWeights;
 pub(crate) use training_data::group_equal_contexts;
 

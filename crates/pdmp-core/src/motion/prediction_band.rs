@@ -125,7 +125,7 @@ pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid:
 
 /// Interpolates curves (S, D) linearly at a fractional sample: constant past the end of a discrete movement, periodic for a
 /// rhythmic one.
-fn interpolate(curves: &Array2<f64>, sample: f64, kind: Kind) -> Array1<f64> {
+pub(crate) fn interpolate(curves: &Array2<f64>, sample: f64, kind: Kind) -> Array1<f64> {
     let n = curves.nrows();
     let (low, fraction) = (sample.floor(), sample.fract());
     let row = |k: f64| match kind {
