@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from pdmp import PdmpError
 from pdmp.cli.console import console, report, say
-from pdmp.cli.options import file_path
+from pdmp.cli.options import add_output
 
 
 def parser(module: str, description: str | None, output: str) -> ArgumentParser:
@@ -16,14 +16,8 @@ def parser(module: str, description: str | None, output: str) -> ArgumentParser:
         description=description,
         formatter_class=RawDescriptionHelpFormatter,
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        default=output,
-        type=file_path,
-        metavar="FOLDER",
-        help="folder for figures and tables; default: %(default)s",
-    )
+    text = "folder for figures and tables; default: %(default)s"
+    add_output(parser, "FOLDER", text, default=output)
     return parser
 
 

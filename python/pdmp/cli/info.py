@@ -11,14 +11,14 @@ import numpy as np
 import pdmp
 from pdmp._messages import printable
 from pdmp.cli.console import say
-from pdmp.cli.options import file_path
+from pdmp.cli.options import add_model
 
 MAX_VALUES = 40  # singular values to print
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
+    add_model(parser)
 
 
 def run(options: Namespace) -> None:
