@@ -14,6 +14,7 @@ import numpy as np
 from pdmp import Demonstration
 from pdmp.datasets import REGISTRY, folder, handwriting
 from pdmp.io import read_csv, read_folder
+from pdmp.markdown import markdown_table
 
 MAX_DEMOS = 10
 MAX_SAMPLES = 400
@@ -118,8 +119,7 @@ def sources(names: Iterable[str]) -> str:
         ]
         for recordings in map(REGISTRY.__getitem__, names)
     ]
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join([SOURCES, *(f"| {' | '.join(map(str, line))} |" for line in lines)])
+    return f"{SOURCES}\n{markdown_table(header, rows, n_names=len(header))}"
 
 
 def few(demos: list[Demonstration]) -> list[Demonstration]:
