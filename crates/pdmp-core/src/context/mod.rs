@@ -251,11 +251,6 @@ impl ContextMap {
         columns.zip(numbers).map(|((q, column), &number)| column.value(q, number)).collect()
     }
 
-    /// Returns the number of context values Q.
-    pub fn n_inputs(&self) -> usize {
-        self.columns.len()
-    }
-
     /// Returns the kind of the map.
     pub fn kind(&self) -> ContextMapKind {
         self.kind
