@@ -5,9 +5,8 @@ use std::f64::consts::TAU;
 use ndarray::{Array1, Array2};
 
 use crate::numerics::statistics::extremes;
+use crate::preprocessing::inspection::turn_of;
 
-/// Full turn in each unit of angle.
-const TURNS: [(&str, f64); 3] = [("rad", TAU), ("deg", 360.0), ("°", 360.0)];
 /// Maximum deviation of the gain of an angle from whole turns, in turns: cycle onsets are accurate to about a percent.
 const ANGLE_TOLERANCE: f64 = 0.05;
 /// Maximum deviation of the gain of a number without a unit from one turn, in turns, for it to count as an angle.
@@ -33,10 +32,9 @@ pub struct Growth {
 
 /// Returns the full turns in a gain per cycle, and the size of a turn in the unit; (0, 0) if there are none.
 pub(super) fn turns(gain: f64, unit: &str) -> (i32, f64) {
-    let known = TURNS.iter().filter(|(angle, _)| *angle == unit);
-    let known = known.map(|(_, turn)| (*turn, ANGLE_TOLERANCE, f64::from(i32::MAX)));
-    let guessed = TURNS[..2].iter().filter(|_| unit.is_empty()).map(|(_, turn)| (*turn, UNKNOWN_TOLERANCE, 1.0));
-    for (turn, tolerance, max_turns) in known.chain(guessed) {
+    let known = turn_of(unit).map(|turn| (turn, ANGLE_TOLERANCE, f64::from(i32::MAX)));
+    let guessed = [TAU, 360.0].into_iter().filter(|_| unit.is_empty()).map(|turn| (turn, UNKNOWN_TOLERANCE, 1.0));
+    for (turn, tolerance, max_turns) in known.into_iter().chain(guessed) {
         let whole = (gain / turn).round();
         if whole != 0.0 && whole.abs() <= max_turns && (gain / turn - whole).abs() <= tolerance {
             return (whole as i32, turn);
