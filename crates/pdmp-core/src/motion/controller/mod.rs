@@ -346,6 +346,7 @@ impl Controller {
     /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
     /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
     /// # use pdmp_core::Command;
+    /// controller.step()?;
     /// let measured = [0.0, 0.01];
     /// controller.step_with(&Command { measured: Some(&measured), ..Command::default() })?;
     /// assert!(controller.position()[1] > 0.0);
