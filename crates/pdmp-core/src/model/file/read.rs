@@ -217,8 +217,8 @@ impl Reader<'_> {
             ContextMapKind::Stacked => Some(self.stacked_line(outputs.ncols())?),
             _ => None,
         };
-        let parameters = MapParameters { kind: map.kind, kernel: map.kernel, directions, ratios, line, errors };
-        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), parameters).map_err(unreadable)
+        let parameters = MapParameters { kind: map.kind, kernel: map.kernel, ratios, line, errors };
+        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), directions, parameters).map_err(unreadable)
     }
 
     /// Returns the line of a stacked map: its signal-to-noise ratios (P,) and the stacking weights.

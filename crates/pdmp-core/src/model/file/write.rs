@@ -93,7 +93,7 @@ impl Model {
         if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
             arrays.push(matrix("contexts", contexts));
             let parameters = map.parameters();
-            arrays.push(matrix("map.directions", &parameters.directions));
+            arrays.push(matrix("map.directions", map.directions()));
             arrays.push(vector("map.ratios", &parameters.ratios));
             if let Some((ratios, StackingWeights { interpolation, extrapolation })) = &parameters.line {
                 arrays.push(vector("map.slopes", ratios));
@@ -115,7 +115,7 @@ impl Map {
     fn of(map: &ContextMap) -> Self {
         let MapParameters { kind, kernel, errors, .. } = map.parameters();
         // JSON has no infinity, the error of a map that no other contexts can predict.
-        let errors = errors.into_iter().map(|(kind, error)| (kind, error.is_finite().then_some(error))).collect();
-        Self { columns: map.columns().to_vec(), kind, kernel, errors }
+        let errors = errors.iter().map(|&(kind, error)| (kind, error.is_finite().then_some(error))).collect();
+        Self { columns: map.columns().to_vec(), kind: *kind, kernel: *kernel, errors }
     }
 }
