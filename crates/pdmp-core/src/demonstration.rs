@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
 pub use crate::validate::MAX_MAGNITUDE;
-use crate::validate::{check_matrix, check_number, check_positive, check_time, check_vector};
+use crate::validate::{check_length, check_matrix, check_number, check_positive, check_time, check_vector};
 
 /// Minimum number of samples of a demonstration: a cubic spline with not-a-knot ends needs four.
 pub const MIN_SAMPLES_PER_DEMONSTRATION: usize = 4;
@@ -138,10 +138,7 @@ impl Demonstration {
     /// # Errors
     /// A number of names other than D, a repeated name, or one longer than 1000 bytes.
     pub fn with_names(mut self, names: Vec<String>) -> Result<Self> {
-        if names.len() != self.n_dofs() {
-            let (expected, found) = (self.n_dofs(), names.len());
-            return Err(Error::Length { name: "names", expected, found, per: "DoF" });
-        }
+        check_length("names", names.len(), self.n_dofs(), "DoF")?;
         if names.iter().enumerate().any(|(d, name)| names[..d].contains(name) || name.len() > MAX_NAME_LENGTH) {
             return Err(Error::Arguments("names must differ from each other and have at most 1000 bytes each"));
         }
@@ -154,10 +151,7 @@ impl Demonstration {
     /// # Errors
     /// A number of units other than D, or one longer than 1000 bytes.
     pub fn with_units(mut self, units: Vec<String>) -> Result<Self> {
-        if units.len() != self.n_dofs() {
-            let (expected, found) = (self.n_dofs(), units.len());
-            return Err(Error::Length { name: "units", expected, found, per: "DoF" });
-        }
+        check_length("units", units.len(), self.n_dofs(), "DoF")?;
         if units.iter().any(|unit| unit.len() > MAX_NAME_LENGTH) {
             return Err(Error::Arguments("units must have at most 1000 bytes each"));
         }

@@ -10,7 +10,6 @@ use common::*;
 use ndarray::{Array2, Array3, Axis, array, s};
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::batch;
-use pdmp_core::motion::rollouts;
 use pdmp_core::motion::{self, BatchConditions, PerMovement, TimeGrid, Trajectory, WithRespectTo};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
@@ -18,8 +17,8 @@ use pdmp_core::{Conditions, Controller, Error, Kind, Model};
 use proptest::prelude::*;
 
 fn all(conditions: &BatchConditions, model: &Arc<Model>, grid: TimeGrid) -> Vec<Array3<f64>> {
-    let (highest, threads) = (Derivative::Acceleration, Threads::ONE);
-    rollouts(model.primitive(), conditions.clone(), grid, highest, threads, &mut |_| Ok(())).unwrap()
+    let batch = batch(model.primitive(), conditions.clone(), grid, &mut |_| Ok(())).unwrap();
+    batch.rollouts(0..batch.shape().0, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(())).unwrap()
 }
 
 fn jacobian(variable: WithRespectTo, order: Derivative, model: &Arc<Model>, conditions: &Conditions) -> Array3<f64> {

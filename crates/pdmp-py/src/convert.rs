@@ -1,6 +1,6 @@
 //! Conversion of Python arguments and results: anything that numpy converts to float64 in, float64 out.
 
-use ndarray::{Array1, Array2, ArrayD, Dimension, Ix1, Ix2};
+use ndarray::{Array1, Array2, ArrayD, Dimension, Ix1};
 use numpy::{
     AllowTypeChange, IntoPyArray, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn,
     PyArrayLikeDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
@@ -176,11 +176,11 @@ pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64
 }
 
 /// Returns positions (T, D).
-pub(crate) fn two_axes(name: &str, array: ArrayD<f64>) -> PyResult<Array2<f64>> {
+pub(crate) fn two_axes(name: &str, axes: &str, array: ArrayD<f64>) -> PyResult<Array2<f64>> {
     let shape = array.shape().to_vec();
     array
         .into_dimensionality()
-        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes (T, D)")))
+        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
 }
 
 /// Converts to a vector (n,).
@@ -309,11 +309,7 @@ pub(crate) fn numbers(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<
 /// Converts to a matrix with the named axes.
 pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
     // Copied: other threads may write to the caller's memory during a long call.
-    let array = array(name, value)?;
-    let shape = array.shape().to_vec();
-    array
-        .into_dimensionality::<Ix2>()
-        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
+    two_axes(name, axes, array(name, value)?)
 }
 
 /// Checks that an output is a writable float64 array of the given shape.

@@ -12,6 +12,16 @@ def file_path(text: str) -> str:
     return text
 
 
+def add_output(parser: ArgumentParser, metavar: str, text: str, **settings: Any) -> None:
+    """Adds the option for the file or folder to write, with further settings of the argument."""
+    parser.add_argument("-o", "--output", type=file_path, metavar=metavar, help=text, **settings)
+
+
+def add_model(parser: ArgumentParser) -> None:
+    """Adds the argument for the model file to read."""
+    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
+
+
 def add_reader_options(parser: ArgumentParser) -> None:
     """Adds the options of the readers of recordings."""
     parser.add_argument(

@@ -17,6 +17,7 @@ use crate::model::primitive::{Parts, Primitive};
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{inspect, unwound};
+use crate::validate::check_length;
 
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
@@ -250,11 +251,8 @@ fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
 
 /// Returns the given contexts, or those of the demonstrations; `None` if there are none.
 fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> Result<Option<Contexts>> {
-    if let Some(contexts) = given
-        && contexts.len() != demos.len()
-    {
-        let (expected, found) = (demos.len(), contexts.len());
-        return Err(Error::Length { name: "contexts", expected, found, per: "demonstration" });
+    if let Some(contexts) = given {
+        check_length("contexts", contexts.len(), demos.len(), "demonstration")?;
     }
     let contexts: Option<Vec<&[ContextValue]>> = match given {
         Some(contexts) => Some(contexts.iter().map(Vec::as_slice).collect()),

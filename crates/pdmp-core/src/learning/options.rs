@@ -2,14 +2,14 @@
 
 use crate::context::MapSelection;
 use crate::demonstration::ContextValue;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kind::Kind;
 use crate::learning::alignment::{Alignment, TimeScaling};
 use crate::learning::factorization::Truncation;
 use crate::learning::regression::{Basis, Gp};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
-use crate::validate::check_vector;
+use crate::validate::{check_range, check_vector};
 
 /// Scale of each degree of freedom in the factorisation.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,12 +34,10 @@ impl DofScaling {
     pub(super) fn given(&self, n_dofs: usize) -> Result<Option<&[f64]>> {
         let Self::Given(scale) = self else { return Ok(None) };
         check_vector("dof_scale", scale, n_dofs, "DoF")?;
-        match scale.iter().find(|value| !(1e-100..=1e100).contains(*value)) {
-            Some(&value) => {
-                Err(Error::Range { name: "dof_scale", value, allowed: "must lie between 1e-100 and 1e100" })
-            }
-            None => Ok(Some(scale)),
-        }
+        let check = |&value: &f64| {
+            check_range("dof_scale", value, (1e-100..=1e100).contains(&value), "must lie between 1e-100 and 1e100")
+        };
+        scale.iter().try_for_each(check).map(|()| Some(scale.as_slice()))
     }
 
     /// Returns the scales (D,) of DoFs with the given ranges and units.

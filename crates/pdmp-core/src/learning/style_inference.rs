@@ -15,6 +15,7 @@ use crate::model::conditions::Conditions;
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
+use crate::validate::check_length;
 
 /// Smallest standard deviation σ of the residuals relative to the target.
 const ROUNDING: f64 = 1e-9;
@@ -62,10 +63,7 @@ pub fn style_of(
     landmarks: Option<&[f64]>,
 ) -> Result<Vec<f64>> {
     let n_dofs = model.n_dofs();
-    if demo.n_dofs() != n_dofs {
-        let (expected, found) = (n_dofs, demo.n_dofs());
-        return Err(Error::Length { name: "demonstration", expected, found, per: "DoF" });
-    }
+    check_length("demonstration", demo.n_dofs(), n_dofs, "DoF")?;
     for (labels, own, conflict) in [
         (demo.names(), model.names(), "names differ from those of the model"),
         (demo.units(), model.units(), "units differ from those of the model"),

@@ -14,7 +14,7 @@ use crate::motion::rollout::TimeGrid;
 use crate::motion::superposition::{self, Combination};
 use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
-use crate::validate::{check_matrix, check_vector, zeros};
+use crate::validate::{check_length, check_matrix, check_range, check_vector, zeros};
 
 /// Number of elements of each output that one thread writes per block.
 const BLOCK: usize = 1 << 17;
@@ -131,44 +131,6 @@ pub fn batch(
     })
 }
 
-/// Computes the movements of a batch: positions and their derivatives up to `highest`, each (B, T, D).
-///
-/// `progress` is called as by [`batch()`] and [`Batch::write`].
-///
-/// ```
-/// # use ndarray::array;
-/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
-/// # use pdmp_core::model::Derivative;
-/// # use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, rollouts};
-/// # use pdmp_core::numerics::Threads;
-/// # fn main() -> pdmp_core::Result<()> {
-/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
-/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
-/// let goals = PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1], [0.8, 0.3]]);
-/// let styles = model.demonstrated().styles.clone();
-/// let conditions = BatchConditions { styles, goals: Some(goals), ..BatchConditions::default() };
-/// let grid = TimeGrid { dt: 0.01, duration: None };
-/// let threads = Threads::available();
-/// let outputs = rollouts(model.primitive(), conditions, grid, Derivative::Position, threads, &mut |_| Ok(()))?;
-/// assert_eq!(outputs[0].dim(), (3, 101, 2));
-/// # Ok(())
-/// # }
-/// ```
-///
-/// # Errors
-/// As for [`batch()`], or outputs that do not fit into memory.
-pub fn rollouts(
-    primitive: &Arc<Primitive>,
-    conditions: BatchConditions,
-    grid: TimeGrid,
-    highest: Derivative,
-    threads: Threads,
-    progress: &mut dyn FnMut(f64) -> Result<()>,
-) -> Result<Vec<Array3<f64>>> {
-    let batch = batch(primitive, conditions, grid, progress)?;
-    batch.rollouts(0..batch.shape().0, highest, threads, progress)
-}
-
 impl Batch {
     /// Returns the numbers of movements B, samples T and degrees of freedom D.
     pub fn shape(&self) -> (usize, usize, usize) {
@@ -182,13 +144,30 @@ impl Batch {
     /// # Errors
     /// A size of zero.
     pub fn chunks(&self, size: usize) -> Result<BatchChunks> {
-        match size {
-            0 => Err(Error::Range { name: "size", value: 0.0, allowed: "must be at least 1" }),
-            _ => Ok(BatchChunks { remaining: 0..self.styles.nrows(), size }),
-        }
+        check_range("size", size as f64, size > 0, "must be at least 1")?;
+        Ok(BatchChunks { remaining: 0..self.styles.nrows(), size })
     }
 
     /// Computes a range of the movements: positions and their derivatives up to `highest`, each (n, T, D).
+    ///
+    /// ```
+    /// # use ndarray::array;
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # use pdmp_core::model::Derivative;
+    /// # use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, batch};
+    /// # use pdmp_core::numerics::Threads;
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let goals = PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1], [0.8, 0.3]]);
+    /// let styles = model.demonstrated().styles.clone();
+    /// let conditions = BatchConditions { styles, goals: Some(goals), ..BatchConditions::default() };
+    /// let batch = batch(model.primitive(), conditions, TimeGrid { dt: 0.01, duration: None }, &mut |_| Ok(()))?;
+    /// let outputs = batch.rollouts(0..3, Derivative::Position, Threads::available(), &mut |_| Ok(()))?;
+    /// assert_eq!(outputs[0].dim(), (3, 101, 2));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// As for [`Batch::write`], or outputs that do not fit into memory.
@@ -274,7 +253,7 @@ impl Batch {
         let start = difference(&self.starts, Derivative::Position, &centre);
         let velocity = difference(&self.velocities, Derivative::Velocity, &vec![0.0; centre.len()]);
         let goal_velocity = self.goal_velocities.as_ref().map(|rows| rows.row(b).to_vec());
-        Combination::new(style, &centre, &start, &velocity).with_goal_velocity(goal_velocity.as_deref())
+        Combination::new(style, [&centre, &start, &velocity], goal_velocity.as_deref())
     }
 }
 
@@ -316,9 +295,7 @@ impl PerMovement {
 
 /// Checks that rows have `expected` finite elements, one per `per`.
 fn check_rows(name: &'static str, rows: &Array2<f64>, expected: usize, per: &'static str) -> Result<()> {
-    if rows.ncols() != expected {
-        return Err(Error::Length { name, expected, found: rows.ncols(), per });
-    }
+    check_length(name, rows.ncols(), expected, per)?;
     check_matrix(name, rows.view())
 }
 

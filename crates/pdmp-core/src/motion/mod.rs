@@ -11,7 +11,7 @@ pub(crate) mod superposition;
 pub(crate) mod trajectory;
 pub(crate) mod unit_responses;
 
-pub use batch::{Batch, BatchChunks, BatchConditions, PerMovement, batch, rollouts};
+pub use batch::{Batch, BatchChunks, BatchConditions, PerMovement, batch};
 pub use command::{Command, Coupling, Motion};
 pub use controller::{Controller, Status};
 pub use jacobian::{WithRespectTo, jacobian};

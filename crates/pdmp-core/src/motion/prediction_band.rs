@@ -19,6 +19,7 @@ use crate::model::responses::Derivative;
 use crate::model::sensitivity::{STEPS, Sensitivity};
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::motion::unit_responses::phases;
+use crate::validate::check_range;
 
 /// Computes the sensitivities ∂y/∂T_k (S, D) of the positions to each segment duration, in DoF units per second, at equal
 /// fractions s of the duration: y′ ∂p/∂T_k with the phase p and ∂p/∂T_k = −(∂s/∂T_k)/(∂s/∂p). Empty for linear time.
@@ -86,9 +87,7 @@ pub struct PredictionBand {
 /// # Errors
 /// A prediction without covariance, a `level` outside (0, 1), a band that overflows, or an error of the rollout.
 pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid: TimeGrid) -> Result<PredictionBand> {
-    if !(level > 0.0 && level < 1.0) {
-        return Err(Error::Range { name: "level", value: level, allowed: "must lie between 0 and 1" });
-    }
+    check_range("level", level, level > 0.0 && level < 1.0, "must lie between 0 and 1")?;
     let covariance = prediction.covariance.as_ref().ok_or(Error::Arguments(
         "the prediction has no covariance: a band needs more demonstrations, or more different contexts",
     ))?;
@@ -126,7 +125,7 @@ pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid:
 
 /// Interpolates curves (S, D) linearly at a fractional sample: constant past the end of a discrete movement, periodic for a
 /// rhythmic one.
-fn interpolate(curves: &Array2<f64>, sample: f64, kind: Kind) -> Array1<f64> {
+pub(crate) fn interpolate(curves: &Array2<f64>, sample: f64, kind: Kind) -> Array1<f64> {
     let n = curves.nrows();
     let (low, fraction) = (sample.floor(), sample.fract());
     let row = |k: f64| match kind {

@@ -12,7 +12,7 @@ use ndarray::ArrayView2;
 pub use self::gp::{Gp, GpPosterior, Kernel, NoiseBound};
 pub use self::ngnet::{NGnet, NGnetRegression};
 use crate::error::{Error, Result};
-use crate::validate::check_positive;
+use crate::validate::{check_length, check_positive};
 
 /// Domain of the clock on which the landscape is learnt.
 ///
@@ -112,9 +112,7 @@ fn check(domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<()> {
     if u.is_empty() {
         return Err(Error::Arguments("u is empty: at least one sample is needed"));
     }
-    if u.len() != targets.nrows() {
-        return Err(Error::Length { name: "u", expected: targets.nrows(), found: u.len(), per: "row of targets" });
-    }
+    check_length("u", u.len(), targets.nrows(), "row of targets")?;
     if let Some((index, &value)) = u.iter().enumerate().find(|(_, u)| !u.is_finite()) {
         return Err(Error::NotFinite { name: "u", index, value });
     }

@@ -5,7 +5,6 @@ use std::fmt;
 use ndarray::Array2;
 
 use super::Hyperparameters;
-use super::interpolation::StatePosterior;
 use super::kernel::Kernel;
 use crate::learning::regression::Regression;
 
@@ -42,16 +41,6 @@ pub(super) trait Posterior: fmt::Debug + Send + Sync {
 
     /// Returns the variance, which is the same for every output, in units of the signal variance.
     fn variance(&self, u: f64) -> f64;
-}
-
-impl<const D: usize> Posterior for StatePosterior<D> {
-    fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
-        self.evaluate(u, value, slope);
-    }
-
-    fn variance(&self, u: f64) -> f64 {
-        self.variance(u)
-    }
 }
 
 impl GpPosterior {

@@ -1,3 +1,4 @@
+use super::posterior::Posterior;
 use super::*;
 use crate::learning::regression::Regression;
 use crate::learning::regression::hyperparameter_search::Score;
