@@ -1747,13 +1747,6 @@ class Controller:
     @goal.setter
     def goal(self, goal: ArrayLike, /) -> None: ...
     @property
-    def goal_velocity(self) -> _Array | None:
-        """Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
-        demonstrations; a read-only copy. Assign all values at once.
-        """
-    @goal_velocity.setter
-    def goal_velocity(self, goal_velocity: ArrayLike | None, /) -> None: ...
-    @property
     def style(self) -> _Array:
         """Style s (J,); a read-only copy. Assign all values at once."""
     @style.setter
