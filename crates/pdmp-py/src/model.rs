@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ndarray::Array3;
 use numpy::IntoPyArray;
-use pdmp_core::learning::style_of;
+use pdmp_core::learning::{StyleOptions, style_of};
 use pdmp_core::motion::{PredictionBand, TimeGrid, prediction_band};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -150,14 +150,15 @@ impl Model {
         period: Option<Scalar<'py>>,
         landmarks: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
-        let (dt, period) = (optional_number("dt", dt)?, optional_number("period", period)?);
-        let landmarks = optional("landmarks", landmarks)?;
+        let mut options = StyleOptions::default();
+        options.dt = optional_number("dt", dt)?;
+        options.period = optional_number("period", period)?;
+        options.landmarks = optional("landmarks", landmarks)?;
         crate::inspection::warn(
             py,
-            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(&demonstration.0), dt),
+            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(&demonstration.0), options.dt),
         )?;
-        let style =
-            py.detach(|| style_of(&self.0, &demonstration.0, dt, period, landmarks.as_deref())).map_err(raise)?;
+        let style = py.detach(|| style_of(&self.0, &demonstration.0, &options)).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
 
