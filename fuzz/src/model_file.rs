@@ -283,10 +283,10 @@ fn exercise(model: &Arc<Model>) {
     }
     let styles = Array2::zeros((2, model.n_styles()));
     let batch = BatchConditions { styles, ..Default::default() };
-    if let Ok(outputs) =
+    if let Ok(trajectories) =
         rollouts(model.primitive(), batch, grid, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(()))
     {
-        outputs.iter().for_each(|output| assert_finite("batch", output));
+        trajectories.iter().for_each(|output| assert_finite("batch", output));
     }
     control(model);
     let demonstrated = model.demonstrated();

@@ -1,7 +1,7 @@
 //! Regressors of the attractor landscape: options of a fit, and stand-alone regression on the clock.
 
 use numpy::IntoPyArray;
-use pdmp_core::learning::regression::{self, Domain, GpPosterior, Kernel, Regression};
+use pdmp_core::learning::regression::{self, Domain, GpPosterior, GpPrediction, Kernel, Regression};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -169,7 +169,7 @@ impl GpRegression {
     ///     A clock value is not finite.
     fn predict<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let u = clock(u)?;
-        let (mean, variance) = self.0.predict(&u);
+        let GpPrediction { mean, variance } = self.0.predict(&u);
         Ok((mean.into_pyarray(py), variance.into_pyarray(py)))
     }
 

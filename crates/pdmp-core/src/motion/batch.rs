@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use ndarray::{Array2, Array3, ArrayView1, ArrayViewMut3, Axis, aview1};
+use ndarray::{Array2, ArrayView1, ArrayViewMut3, Axis, aview1};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -12,6 +12,7 @@ use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::rollout::TimeGrid;
 use crate::motion::superposition::{self, Combination};
+use crate::motion::trajectory::Trajectories;
 use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
 use crate::validate::{check_matrix, check_vector, zeros};
@@ -69,8 +70,8 @@ pub struct BatchConditions {
 /// let batch = batch(model.primitive(), conditions, TimeGrid { dt: 0.01, duration: None }, &mut |_| Ok(()))?;
 /// for movements in batch.chunks(300)? {
 ///     let n = movements.len();
-///     let outputs = batch.rollouts(movements, Derivative::Velocity, Threads::ONE, &mut |_| Ok(()))?;
-///     assert_eq!(outputs[1].dim(), (n, 101, 2));
+///     let trajectories = batch.rollouts(movements, Derivative::Velocity, Threads::ONE, &mut |_| Ok(()))?;
+///     assert_eq!(trajectories.position.dim(), (n, 101, 2));
 /// }
 /// # Ok(())
 /// # }
@@ -149,8 +150,8 @@ pub fn batch(
 /// let conditions = BatchConditions { styles, goals: Some(goals), ..BatchConditions::default() };
 /// let grid = TimeGrid { dt: 0.01, duration: None };
 /// let threads = Threads::available();
-/// let outputs = rollouts(model.primitive(), conditions, grid, Derivative::Position, threads, &mut |_| Ok(()))?;
-/// assert_eq!(outputs[0].dim(), (3, 101, 2));
+/// let trajectories = rollouts(model.primitive(), conditions, grid, Derivative::Position, threads, &mut |_| Ok(()))?;
+/// assert_eq!(trajectories.position.dim(), (3, 101, 2));
 /// # Ok(())
 /// # }
 /// ```
@@ -164,7 +165,7 @@ pub fn rollouts(
     highest: Derivative,
     threads: Threads,
     progress: &mut dyn FnMut(f64) -> Result<()>,
-) -> Result<Vec<Array3<f64>>> {
+) -> Result<Trajectories> {
     let batch = batch(primitive, conditions, grid, progress)?;
     batch.rollouts(0..batch.shape().0, highest, threads, progress)
 }
@@ -198,13 +199,17 @@ impl Batch {
         highest: Derivative,
         threads: Threads,
         progress: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Vec<Array3<f64>>> {
+    ) -> Result<Trajectories> {
         let (_, n_samples, n_dofs) = self.shape();
-        let mut outputs = (0..=highest as usize)
-            .map(|_| zeros("rollouts", (movements.len(), n_samples, n_dofs)))
-            .collect::<Result<Vec<Array3<f64>>>>()?;
-        self.write(movements, outputs.iter_mut().map(|output| output.view_mut()).collect(), threads, progress)?;
-        Ok(outputs)
+        let new = || zeros("rollouts", (movements.len(), n_samples, n_dofs));
+        let derivative = |order: Derivative| (order as usize <= highest as usize).then(new).transpose();
+        let mut position = new()?;
+        let (mut velocity, mut acceleration) =
+            (derivative(Derivative::Velocity)?, derivative(Derivative::Acceleration)?);
+        let outputs = [Some(&mut position), velocity.as_mut(), acceleration.as_mut()];
+        let outputs = outputs.into_iter().flatten().map(|output| output.view_mut()).collect();
+        self.write(movements, outputs, threads, progress)?;
+        Ok(Trajectories { position, velocity, acceleration })
     }
 
     /// Writes a range of n movements to up to three `outputs` (n, T, D): positions, velocities and accelerations.

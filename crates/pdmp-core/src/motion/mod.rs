@@ -18,4 +18,4 @@ pub use jacobian::{WithRespectTo, jacobian};
 pub use perturbation::Compliance;
 pub use prediction_band::{PredictionBand, prediction_band};
 pub use rollout::{TimeGrid, rollout, rollout_with};
-pub use trajectory::Trajectory;
+pub use trajectory::{Trajectories, Trajectory};

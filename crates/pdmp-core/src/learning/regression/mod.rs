@@ -9,7 +9,7 @@ use std::fmt;
 
 use ndarray::ArrayView2;
 
-pub use self::gp::{Gp, GpPosterior, Kernel, NoiseBound};
+pub use self::gp::{Gp, GpPosterior, GpPrediction, Kernel, NoiseBound};
 pub use self::ngnet::{NGnet, NGnetRegression};
 use crate::error::{Error, Result};
 use crate::validate::check_positive;
