@@ -74,7 +74,7 @@ RHYTHMIC: list[tuple[dict[str, Any], str]] = [
     *numbers("period", "positive and finite", 0, -1, NAN, INF),
     ({"period": 1.98}, "period = 1.98: must exceed the last time stamp"),
     ({"period": [2, 2]}, "period has length 2, expected 3: one value per demonstration"),
-    ({"period": None}, "time-stamped cycle .*: pass period in seconds"),
+    ({"period": None}, "period is missing: pass it in seconds"),
     ({"tau": 1.0}, "tau does not apply to a rhythmic primitive"),
     ({"alpha_x": 1.0}, "alpha_x does not apply to a rhythmic primitive"),
 ]
@@ -92,7 +92,7 @@ def test_invalid_options_of_a_rhythmic_fit_are_rejected(
 
 def test_missing_interval_is_reported() -> None:
     """Bare arrays need a sampling interval."""
-    with pytest.raises(ValueError, match=r"no sampling interval: pass dt in seconds"):
+    with pytest.raises(ValueError, match=r"dt is missing: pass the sampling interval in seconds"):
         pdmp.fit([POSITION])
 
 

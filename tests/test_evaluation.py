@@ -262,7 +262,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"n_samples": 3}, "n_samples = 3: must be at least 4"),
     ({"kind": "circular"}, 'kind = "circular": must be "discrete" or "rhythmic"'),
     ({"period": 1.0}, "period does not apply to discrete"),
-    ({"dt": None}, "no sampling interval: pass dt= in seconds"),
+    ({"dt": None}, "dt is missing: pass the sampling interval in seconds"),
     ({"splits": []}, "splits is empty"),
     ({"splits": [([0], [1])]}, r"splits\[0\]: must be \(train, test,"),
     ({"splits": [([0], [], "interpolation")]}, r"splits\[0\]: test must be one or more indices"),

@@ -99,7 +99,10 @@ impl Demonstration {
         check_matrix("position", position.view())?;
         let (found, n_dofs) = position.dim();
         if n_dofs == 0 {
-            return Err(Error::Arguments("position has no DoFs: pass an array of shape (T, D) with D of at least 1"));
+            return Err(Error::Argument {
+                name: "position",
+                problem: "has no DoFs: pass an array of shape (T, D) with D of at least 1",
+            });
         }
         if found < MIN_SAMPLES_PER_DEMONSTRATION {
             return Err(Error::Samples { found, least: MIN_SAMPLES_PER_DEMONSTRATION });
@@ -143,7 +146,10 @@ impl Demonstration {
             return Err(Error::Length { name: "names", expected, found, per: "DoF" });
         }
         if names.iter().enumerate().any(|(d, name)| names[..d].contains(name) || name.len() > MAX_NAME_LENGTH) {
-            return Err(Error::Arguments("names must differ from each other and have at most 1000 bytes each"));
+            return Err(Error::Argument {
+                name: "names",
+                problem: "must differ from each other and have at most 1000 bytes each",
+            });
         }
         self.names = Some(names);
         Ok(self)
@@ -159,7 +165,7 @@ impl Demonstration {
             return Err(Error::Length { name: "units", expected, found, per: "DoF" });
         }
         if units.iter().any(|unit| unit.len() > MAX_NAME_LENGTH) {
-            return Err(Error::Arguments("units must have at most 1000 bytes each"));
+            return Err(Error::Argument { name: "units", problem: "must have at most 1000 bytes each" });
         }
         self.units = Some(units);
         Ok(self)
@@ -231,7 +237,7 @@ impl Demonstration {
 /// Checks that a context has a value and that its numbers are finite.
 pub(crate) fn check_context(context: &[ContextValue]) -> Result<()> {
     if context.is_empty() {
-        return Err(Error::Arguments("context is empty: pass at least one value, or omit it"));
+        return Err(Error::Argument { name: "context", problem: "is empty: pass at least one value, or omit it" });
     }
     context.iter().enumerate().try_for_each(|(index, value)| match value {
         ContextValue::Number(number) => check_number("context", index, *number),

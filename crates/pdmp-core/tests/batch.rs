@@ -336,8 +336,9 @@ fn invalid_batches_are_rejected() {
     let batch = batch(REACH.primitive(), valid(), grid(0.1, 1.0), &mut |_| Ok(())).unwrap();
     assert!(matches!(batch.chunks(0), Err(Error::Range { name: "size", .. })));
     let (mut narrow, mut valid) = (Array3::zeros((4, 11, 2)), Array3::zeros((4, 11, 3)));
-    for (movements, output) in [(0..4, narrow.view_mut()), (1..5, valid.view_mut())] {
-        assert!(batch.write(movements, vec![output], Threads::ONE, &mut |_| Ok(())).is_err());
+    for (movements, output, argument) in [(0..4, narrow.view_mut(), "outputs"), (1..5, valid.view_mut(), "movements")] {
+        let error = batch.write(movements, vec![output], Threads::ONE, &mut |_| Ok(())).unwrap_err();
+        assert_eq!(error.argument(), Some(argument));
     }
 }
 

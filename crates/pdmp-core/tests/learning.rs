@@ -263,7 +263,7 @@ fn invalid_demonstrations_are_rejected_by_name() {
     let options = options(Kind::Discrete);
     assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
     assert!(message(&[], &options).contains("at least one demonstration"));
-    assert!(message(&demos[1..], &options).contains("pass dt in seconds"));
+    assert!(message(&demos[1..], &options).starts_with("demo 0: dt is missing"));
     let options = options.n_styles(Truncation::Rank(2));
     assert!(message(&demos[..1], &options).contains("n_styles = 2: must lie between 1 and 1"));
 }

@@ -399,7 +399,7 @@ fn the_jacobian_of_a_warped_movement_is_rejected() {
         grid,
         &mut |_| Ok(()),
     );
-    assert!(matches!(found, Err(Error::Arguments(_))));
+    assert!(matches!(found, Err(Error::Argument { name: "segment_durations", .. })));
 }
 
 /// Invalid warps, landmarks and segment durations are rejected with their numbers and the remedy.

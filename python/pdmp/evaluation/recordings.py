@@ -155,7 +155,7 @@ def _resample(
 ) -> tuple[float, Array]:
     """Returns the duration [s] and the linearly interpolated positions (C, D)."""
     if demo.time is None:
-        raise value_error(f"demo {m}: no sampling interval: pass dt= in seconds")
+        raise value_error(f"demo {m}: dt is missing: pass the sampling interval in seconds")
     time = demo.time - demo.time[0]
     duration, cycle = float(time[-1]), None
     if kind == "rhythmic":

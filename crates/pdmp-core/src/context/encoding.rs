@@ -79,7 +79,7 @@ fn unknown_label(column: usize, value: String, labels: &[String]) -> Error {
 /// Returns the column types (Q,) of contexts and the contexts as numbers (M, Q), with labels as their indices.
 pub(crate) fn tabulate(contexts: &[&[ContextValue]]) -> Result<(Vec<ContextColumn>, Array2<f64>)> {
     if contexts.is_empty() {
-        return Err(Error::Arguments("contexts is empty: pass one row per movement"));
+        return Err(Error::Argument { name: "contexts", problem: "is empty: pass one row per movement" });
     }
     let width = contexts.iter().map(|context| context.len()).find(|&width| width > 0).unwrap_or(0);
     if let Some(m) = contexts.iter().position(|context| context.len() != width) {

@@ -4,6 +4,7 @@
 //! Texts belong to no programming language: a binding appends its own hints. Errors of the control loop hold nothing that
 //! allocates.
 
+mod classification;
 mod format;
 
 use std::path::PathBuf;
@@ -319,9 +320,28 @@ pub enum Error {
         /// Its size over the largest of the demonstrations'.
         ratio: f64,
     },
-    /// Arguments that are missing or exclude each other.
-    #[error("{0}")]
-    Arguments(&'static str),
+    /// An argument that is missing, empty or unsuitable.
+    #[error("{name} {problem}")]
+    Argument {
+        /// The argument.
+        name: &'static str,
+        /// The problem and its remedy, as the end of the sentence.
+        problem: &'static str,
+    },
+    /// Two arguments that exclude each other.
+    #[error("pass {} or {}, not both: {reason}", names[0], names[1])]
+    Conflict {
+        /// The arguments.
+        names: [&'static str; 2],
+        /// The reason, as the end of the sentence.
+        reason: &'static str,
+    },
+    /// A recording without motion.
+    #[error("the recording stands still: {consequence}")]
+    Still {
+        /// The consequence, as the end of the sentence.
+        consequence: &'static str,
+    },
     /// A well-formed problem without a numerical solution.
     #[error("{0}")]
     Fit(String),
@@ -343,47 +363,3 @@ pub enum Error {
 
 /// Result of a fallible call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
-
-impl Error {
-    /// Returns the caller's next step; that of the inner error for one of several demonstrations.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Self::Demo { source, .. } => source.kind(),
-            Self::Memory { .. } => ErrorKind::Memory,
-            Self::Fit(_) => ErrorKind::Numerical,
-            Self::File(_) => ErrorKind::ModelFile,
-            Self::Io { .. } => ErrorKind::Io,
-            Self::Interrupted => ErrorKind::Interrupted,
-            Self::NotFiniteAt { .. }
-            | Self::Magnitude { .. }
-            | Self::Time { .. }
-            | Self::Gap { .. }
-            | Self::WrapInGap { .. }
-            | Self::Aperiodic { .. }
-            | Self::Samples { .. }
-            | Self::Dofs { .. }
-            | Self::Mixed { .. }
-            | Self::Undescribed { .. }
-            | Self::StyleSize { .. } => ErrorKind::Data,
-            Self::NotFinite { .. }
-            | Self::Length { .. }
-            | Self::Rows { .. }
-            | Self::Single { .. }
-            | Self::Range { .. }
-            | Self::TooLarge { .. }
-            | Self::Landmark { .. }
-            | Self::Segments { .. }
-            | Self::NoDemonstrations
-            | Self::Styles { .. }
-            | Self::Label { .. }
-            | Self::NoNumber { .. }
-            | Self::Kind { .. }
-            | Self::Arguments(_) => ErrorKind::Argument,
-        }
-    }
-
-    /// Names the demonstration in which this error arose.
-    pub fn in_demo(self, demo: usize) -> Self {
-        Error::Demo { demo, source: Box::new(self) }
-    }
-}

@@ -95,12 +95,9 @@ pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> 
         let (expected, found) = (n_dofs, demo.n_dofs());
         return Err(Error::Length { name: "demonstration", expected, found, per: "DoF" });
     }
-    for (labels, own, conflict) in [
-        (demo.names(), model.names(), "names differ from those of the model"),
-        (demo.units(), model.units(), "units differ from those of the model"),
-    ] {
+    for (name, labels, own) in [("names", demo.names(), model.names()), ("units", demo.units(), model.units())] {
         if labels.is_some_and(|labels| labels != own) {
-            return Err(Error::Arguments(conflict));
+            return Err(Error::Argument { name, problem: "differ from those of the model" });
         }
     }
     let alignment = Alignment {
@@ -117,12 +114,16 @@ pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> 
     match (&model.learnt.template, options.landmarks.as_deref()) {
         (None, Some(landmarks)) if by_landmarks => aligned.register_to(model.breaks(), landmarks)?,
         (None, None) if by_landmarks => {
-            return Err(Error::Arguments(
-                "the model was fitted with landmarks: pass the landmarks of this demonstration too",
-            ));
+            return Err(Error::Argument {
+                name: "landmarks",
+                problem: "is missing: the model was fitted with landmarks; pass those of this demonstration too",
+            });
         }
         (_, Some(_)) => {
-            return Err(Error::Arguments("the model was fitted without landmarks: leave out the landmarks"));
+            return Err(Error::Argument {
+                name: "landmarks",
+                problem: "does not apply: the model was fitted without landmarks",
+            });
         }
         (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}

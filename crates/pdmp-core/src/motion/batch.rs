@@ -227,10 +227,15 @@ impl Batch {
     ) -> Result<()> {
         let (n_movements, n_samples, n_dofs) = self.shape();
         let shape = (movements.len(), n_samples, n_dofs);
-        if movements.end > n_movements || outputs.len() > 3 || outputs.iter().any(|output| output.dim() != shape) {
-            return Err(Error::Arguments(
-                "outputs must be at most three, each (movements, samples, DoFs) of the batch",
-            ));
+        if movements.end > n_movements {
+            let value = movements.end as f64;
+            return Err(Error::Range { name: "movements", value, allowed: "exceeds the number of movements" });
+        }
+        if outputs.len() > 3 || outputs.iter().any(|output| output.dim() != shape) {
+            return Err(Error::Argument {
+                name: "outputs",
+                problem: "must be at most three, each (movements, samples, DoFs) of the batch",
+            });
         }
         let in_block = (BLOCK / (n_samples * n_dofs)).max(MIN_MOVEMENTS_PER_BLOCK);
         let mut chunks: Vec<_> =

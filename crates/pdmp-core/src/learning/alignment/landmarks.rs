@@ -25,9 +25,10 @@ impl Aligned<'_> {
             return Err(Error::Length { name: "landmarks", expected, found, per: "demonstration" });
         }
         if landmarks.ncols() == 0 {
-            return Err(Error::Arguments(
-                "landmarks has no columns: pass their times (M, E) in seconds, with E of at least 1",
-            ));
+            return Err(Error::Argument {
+                name: "landmarks",
+                problem: "has no columns: pass their times (M, E) in seconds, with E of at least 1",
+            });
         }
         let mut segment_durations = Array2::zeros((expected, landmarks.ncols() + 1));
         for (m, (row, mut segment_durations)) in
