@@ -64,7 +64,10 @@ RHYTHMIC: list[tuple[dict[str, Any], str]] = [
     ({"goal": [0, 0]}, "goal does not apply to a rhythmic primitive: .*; set anchor"),
     ({"amplitude": -1.0}, "amplitude = -1: must lie between 0, which is rest, and 1e150"),
     ({"amplitude": NAN}, "amplitude = NaN"),
-    ({"context": [1]}, "context does not apply: the model has no context map; fit it with contexts"),
+    (
+        {"context": [1]},
+        "context does not apply: the model has no context map; fit it with contexts",
+    ),
 ]
 
 

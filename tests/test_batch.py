@@ -229,7 +229,7 @@ def test_jacobians_of_the_other_kind_are_rejected(reach: pdmp.Model, cycle: pdmp
             reach.jacobian(wrt, derivative=3)
     with pytest.raises(
         ValueError,
-        match="wrt = 'tau': must be 'style', 'goal', 'anchor', 'start' or 'goal_velocity'",
+        match='wrt = .tau.: must be "style", "goal", "anchor", "start" or "goal_velocity"',
     ):
         reach.jacobian("tau")
 

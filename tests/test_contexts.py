@@ -304,7 +304,10 @@ def test_styles_are_those_of_cross_validation(kind: str) -> None:
     ("options", "message"),
     [
         ({"n_styles": "auto"}, "n_styles needs contexts"),
-        ({"n_styles": "auto", "contexts": [[0.0], [0.0], [1.0]]}, "n_styles needs at least three different contexts"),
+        (
+            {"n_styles": "auto", "contexts": [[0.0], [0.0], [1.0]]},
+            "n_styles needs at least three different contexts",
+        ),
         ({"n_styles": "most"}, 'n_styles = "most": must be a number, "auto" or None'),
     ],
 )

@@ -260,7 +260,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"contexts": [[1.0]] * 6}, "contexts: one condition in 6 demonstrations: at least 2"),
     ({"max_folds": 1}, "max_folds = 1: must be at least 2"),
     ({"n_samples": 3}, "n_samples = 3: must be at least 4"),
-    ({"kind": "circular"}, 'kind = "circular": must be "discrete" or "rhythmic"'),
+    ({"kind": "circular"}, 'kind = .circular.: must be "discrete" or "rhythmic"'),
     ({"period": 1.0}, "period does not apply to discrete"),
     ({"dt": None}, "dt is missing: pass the sampling interval in seconds"),
     ({"splits": []}, "splits is empty"),

@@ -5,6 +5,7 @@ use numpy::IntoPyArray;
 use pdmp_core::context::MapSelection;
 use pyo3::prelude::*;
 
+use crate::choice::Choice;
 use crate::convert::{Cube, Matrix, matrix};
 use crate::error::{ascii, raise};
 use crate::fit::map_of;
@@ -47,8 +48,11 @@ pub(crate) struct ContextMap(pub(crate) pdmp_core::context::ContextMap);
 #[pymethods]
 impl ContextMap {
     #[new]
-    #[pyo3(signature = (contexts, outputs, map="auto"))]
-    fn new(contexts: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>, map: &str) -> PyResult<Self> {
+    #[pyo3(
+        signature = (contexts, outputs, map=Choice::FIRST),
+        text_signature = "(contexts, outputs, map='auto')"
+    )]
+    fn new(contexts: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>, map: Choice<'_>) -> PyResult<Self> {
         let (rows, outputs) = (crate::convert::contexts(contexts)?, matrix("outputs", "(M, P)", outputs)?);
         let selection: MapSelection = map_of(map)?;
         pdmp_core::context::ContextMap::fit(&rows, outputs.view(), selection).map(Self).map_err(raise)

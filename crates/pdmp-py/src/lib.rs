@@ -2,6 +2,7 @@
 //! calls the core and converts the result.
 
 mod batch;
+mod choice;
 mod conditions;
 mod context;
 mod controller;

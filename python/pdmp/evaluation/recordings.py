@@ -105,7 +105,7 @@ def recordings(
 ) -> Recordings:
     """Checks demonstrations and contexts, and resamples each over normalised time."""
     if kind not in ("discrete", "rhythmic"):
-        raise value_error(f'kind = "{kind}": must be "discrete" or "rhythmic"')
+        raise value_error(f'kind = {kind!r}: must be "discrete" or "rhythmic"')
     if n_samples < 4:
         raise value_error(f"n_samples = {n_samples}: must be at least 4")
     if isinstance(demos, (Demonstration, Trajectory)):
