@@ -117,7 +117,7 @@ def test_impossible_transitions_are_rejected(discrete: pdmp.Model, transition: f
 
 def outputs(model: pdmp.Model) -> tuple[np.ndarray, np.ndarray]:
     """Returns output arrays for the rollouts of a model's styles at 0.1 s."""
-    shape = model.rollouts(model.styles, dt=0.1)[0].shape
+    shape = model.rollouts(style=model.styles, dt=0.1)[0].shape
     return np.zeros(shape), np.zeros(shape)
 
 
@@ -127,7 +127,7 @@ def test_outputs_of_another_shape_are_rejected_before_anything_is_written(
     """The error states both shapes, and neither array is changed."""
     positions, velocities = outputs(discrete)
     with pytest.raises(ValueError, match=r"out: shape \[5, 12, 2\]; expected .* \[5, 13, 2\]"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
+        discrete.rollouts(style=discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
     assert not positions.any()
 
 
@@ -135,7 +135,9 @@ def test_outputs_of_another_type_are_rejected(discrete: pdmp.Model) -> None:
     """Only float64 can be written in place, as the error states."""
     positions, velocities = outputs(discrete)
     with pytest.raises(ValueError, match="out.*float64"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions.astype(np.float32), velocities))
+        discrete.rollouts(
+            style=discrete.styles, dt=0.1, out=(positions.astype(np.float32), velocities)
+        )
 
 
 def test_read_only_outputs_are_rejected(discrete: pdmp.Model) -> None:
@@ -143,7 +145,7 @@ def test_read_only_outputs_are_rejected(discrete: pdmp.Model) -> None:
     positions, velocities = outputs(discrete)
     velocities.setflags(write=False)
     with pytest.raises(ValueError, match="out.* not writeable"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities))
+        discrete.rollouts(style=discrete.styles, dt=0.1, out=(positions, velocities))
     assert not velocities.any()
 
 

@@ -217,11 +217,11 @@ SCALARS: dict[str, tuple[Callable[..., Any], list[str]]] = {
         ["dt", "duration", "tau", "amplitude", "phase"],
     ),
     "rollouts": (
-        lambda model, **scalar: model.rollouts(model.styles, **scalar),
+        lambda model, **scalar: model.rollouts(style=model.styles, **scalar),
         ["dt", "duration", "tau", "amplitude", "derivatives", "threads"],
     ),
     "rollout_chunks": (
-        lambda model, **scalar: model.rollout_chunks(model.styles, **scalar),
+        lambda model, **scalar: model.rollout_chunks(style=model.styles, **scalar),
         ["dt", "duration", "tau", "amplitude", "derivatives", "threads", "size"],
     ),
     "controller": (

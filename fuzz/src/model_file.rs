@@ -9,7 +9,7 @@ use ndarray::Array2;
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::jacobian;
 use pdmp_core::motion::rollouts;
-use pdmp_core::motion::{BatchConditions, TimeGrid, WithRespectTo};
+use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, WithRespectTo};
 use pdmp_core::motion::{PredictionBand, prediction_band};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
@@ -282,7 +282,7 @@ fn exercise(model: &Arc<Model>) {
         assert_finite("Jacobian", &jacobian);
     }
     let styles = Array2::zeros((2, model.n_styles()));
-    let batch = BatchConditions { styles, ..Default::default() };
+    let batch = BatchConditions { style: Some(PerMovement::Each(styles)), ..Default::default() };
     if let Ok(trajectories) =
         rollouts(model.primitive(), batch, grid, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(()))
     {

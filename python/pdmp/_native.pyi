@@ -773,42 +773,31 @@ class Model:
         """
     def rollouts(
         self,
-        styles: ArrayLike,  # (B, J)
+        conditions: Conditions | Sequence[Conditions] | None = None,
         *,
-        goals: ArrayLike | None = None,  # (D,) or (B, D), as are starts, velocities and anchors
-        starts: ArrayLike | None = None,
-        velocities: ArrayLike | None = None,
-        anchors: ArrayLike | None = None,
-        amplitude: float | None = None,
-        tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
+        context: _Context | _Contexts | None = None,
         derivatives: int = 1,  # at most 2
         out: Sequence[_Array] | None = None,
         threads: int | None = None,
+        **changes: Unpack[_Changes],  # vectors (n,) or (B, n)
     ) -> tuple[_Array, ...]:  # positions and as many derivatives (B, T, D)
-        """Compute the movements of many styles.
+        """Compute the movements of many conditions.
 
         A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
         response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
         to rounding.
 
+        All movements share time constant and amplitude; they follow linear time and start at phase 0.
+
         Parameters
         ----------
-        styles : array_like, (B, J)
-            Style parameters s.
-        goals : array_like, (D,) or (B, D), optional
-            Goals g of all or of each movement, in the unit of each degree of freedom; discrete.
-        starts : array_like, (D,) or (B, D), optional
-            Start positions y₀ of all or of each movement. Rhythmic movements start on their limit cycles by default.
-        velocities : array_like, (D,) or (B, D), optional
-            Start velocities per s of all or of each movement; by default those of the demonstrations.
-        anchors : array_like, (D,) or (B, D), optional
-            Anchors y_a of all or of each movement; rhythmic.
-        amplitude : float, optional
-            Amplitude r₀ of all movements; rhythmic.
-        tau : float, optional
-            Time constant τ of all movements in s.
+        conditions : Conditions, or B Conditions, optional
+            Conditions of all movements, or of each.
+        context : array_like or list, (Q,) or (B, Q), optional
+            Context of all movements, or of each, whose prediction supplies absent conditions. Pass `tau` where the
+            predicted durations differ.
         dt : float
             Interval between samples in s.
         duration : float, optional
@@ -819,6 +808,9 @@ class Model:
             Writable float64 arrays for the results, one per order of derivative.
         threads : int, optional
             Largest number of threads; by default all that the system offers. Results do not depend on it.
+        **changes
+            Single conditions by name, which replace those of `conditions`; see `Conditions`. Style, goal, start,
+            velocity, goal_velocity and anchor may have a leading axis, with one row for each of B movements.
 
         Returns
         -------
@@ -828,48 +820,48 @@ class Model:
         Raises
         ------
         ValueError
-            An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit.
-            Nothing is written then.
+            An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit;
+            leading axes, time constants or amplitudes differ. Nothing is written then.
+        TypeError
+            A keyword is unknown, or `conditions` has another type.
         MemoryError
             The results do not fit into memory; use `rollout_chunks`.
 
         Examples
         --------
-        >>> positions, velocities = model.rollouts(model.styles, dt=0.1)
+        >>> positions, velocities = model.rollouts(style=model.styles, goal=model.goals, dt=0.1)
         >>> positions.shape
         (5, 13, 2)
         """
     def rollout_chunks(
         self,
-        styles: ArrayLike,  # (B, J)
+        conditions: Conditions | Sequence[Conditions] | None = None,
         *,
         size: int = 1000,
-        goals: ArrayLike | None = None,  # (D,) or (B, D), as are starts, velocities and anchors
-        starts: ArrayLike | None = None,
-        velocities: ArrayLike | None = None,
-        anchors: ArrayLike | None = None,
-        amplitude: float | None = None,
-        tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
+        context: _Context | _Contexts | None = None,
         derivatives: int = 1,
         threads: int | None = None,
+        **changes: Unpack[_Changes],
     ) -> RolloutChunks:
-        """Compute the movements of many styles in chunks.
+        """Compute the movements of many conditions in chunks.
 
         Memory holds one chunk at a time. Results equal those of `rollouts` bit for bit. This call checks all arguments.
 
         Parameters
         ----------
-        styles : array_like, (B, J)
-            Style parameters s.
+        conditions : Conditions, or B Conditions, optional
+            As in `rollouts`.
         size : int
             Number of movements in a chunk; the last may have fewer.
-        goals, starts, velocities, anchors : array_like, (D,) or (B, D), optional
+        context : array_like or list, (Q,) or (B, Q), optional
             As in `rollouts`.
-        amplitude, tau, dt, duration : float, optional
+        dt, duration : float, optional
             As in `rollouts`.
         derivatives, threads : int, optional
+            As in `rollouts`.
+        **changes
             As in `rollouts`.
 
         Returns
@@ -881,18 +873,20 @@ class Model:
         ------
         ValueError
             An argument that `rollouts` rejects, or a `size` below 1.
+        TypeError
+            As in `rollouts`.
 
         Examples
         --------
         >>> cost = []
-        >>> for positions, velocities in model.rollout_chunks(model.styles, size=2):
+        >>> for positions, velocities in model.rollout_chunks(style=model.styles, size=2):
         ...     cost.extend((velocities**2).sum(axis=(1, 2)))
         >>> len(cost) == model.n_demos
         True
         """
     def jacobian(
         self,
-        wrt: Literal["style", "goal", "anchor", "start"],
+        wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
         conditions: Conditions | None = None,
         *,
         derivative: int = 0,  # at most 2
@@ -1225,9 +1219,10 @@ class Factors:
 
 class _Changes(TypedDict, total=False):
     style: ArrayLike | None  # (J,)
-    goal: ArrayLike | None  # (D,), as are start, velocity and anchor
+    goal: ArrayLike | None  # (D,), as are start, both velocities and anchor
     start: ArrayLike | None
     velocity: ArrayLike | None
+    goal_velocity: ArrayLike | None
     anchor: ArrayLike | None
     amplitude: float | None
     tau: float | None
@@ -1316,6 +1311,9 @@ class Conditions:
     def velocity(self) -> _Array | None:
         """Start velocity (D,) per s, or None."""
     @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s of a discrete movement, or None."""
+    @property
     def anchor(self) -> _Array | None:
         """Anchor y_a (D,) of a rhythmic movement, or None."""
     @property
@@ -1351,7 +1349,7 @@ def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
     Raises
     ------
     ValueError
-        A condition is given for one of the two only, lengths differ, or `share` is not finite.
+        A condition is given for only one of the two, lengths differ, or `share` is not finite.
 
     Examples
     --------
@@ -1663,6 +1661,13 @@ class Controller:
         """Style s (J,); a read-only copy. Assign all values at once."""
     @style.setter
     def style(self, style: ArrayLike, /) -> None: ...
+    @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
+        demonstrations; a read-only copy. Assign all values at once.
+        """
+    @goal_velocity.setter
+    def goal_velocity(self, velocity: ArrayLike | None, /) -> None: ...
     @property
     def anchor(self) -> _Array:
         """Anchor y_a (D,) of a rhythmic movement; a read-only copy. Assign all values at once."""

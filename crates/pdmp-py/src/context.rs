@@ -53,7 +53,7 @@ impl ContextMap {
         text_signature = "(contexts, outputs, map='auto')"
     )]
     fn new(contexts: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>, map: Choice<'_>) -> PyResult<Self> {
-        let (rows, outputs) = (crate::convert::contexts(contexts)?, matrix("outputs", "(M, P)", outputs)?);
+        let (rows, outputs) = (crate::convert::contexts("contexts", contexts)?, matrix("outputs", "(M, P)", outputs)?);
         let selection: MapSelection = map_of(map)?;
         pdmp_core::context::ContextMap::fit(&rows, outputs.view(), selection).map(Self).map_err(raise)
     }
@@ -97,7 +97,7 @@ impl ContextMap {
     /// ValueError
     ///     A context has a wrong length, an unknown label, or a number that is not finite.
     fn predict<'py>(&self, py: Python<'py>, contexts: &Bound<'_, PyAny>) -> PyResult<(Matrix<'py>, Option<Cube<'py>>)> {
-        let predictions = crate::convert::contexts(contexts)?
+        let predictions = crate::convert::contexts("contexts", contexts)?
             .iter()
             .map(|context| self.0.predict(context))
             .collect::<pdmp_core::Result<Vec<_>>>()

@@ -256,20 +256,20 @@ fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue>
 }
 
 /// Converts contexts (M, Q) of numbers and labels.
-pub(crate) fn contexts(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
-    let value = &rows_of("contexts", value)?;
+pub(crate) fn contexts(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
+    let value = &rows_of(argument, value)?;
     if let Ok(shape) = value.getattr("shape")
         && let Ok(shape) = shape.cast::<PyTuple>()
         && shape.len() != 2
     {
         let shape: Vec<String> = shape.iter().map(|length| length.to_string()).collect();
         let shape = format!("[{}]", shape.join(", "));
-        return Err(PyValueError::new_err(format!("contexts has shape {shape}, expected two axes (M, Q)")));
+        return Err(PyValueError::new_err(format!("{argument} has shape {shape}, expected two axes (M, Q)")));
     }
     if value.try_iter().is_err() {
-        return Err(PyTypeError::new_err("contexts must be an array of shape (M, Q), or a list of M lists"));
+        return Err(PyTypeError::new_err(format!("{argument} must be an array of shape (M, Q), or a list of M lists")));
     }
-    items("contexts", value, |name, row| {
+    items(argument, value, |name, row| {
         if row.is_instance_of::<PyString>() || row.try_iter().is_err() {
             return Err(PyValueError::new_err(format!(
                 "{name} = {}: expected two axes (M, Q): put the values of each demonstration into a list",

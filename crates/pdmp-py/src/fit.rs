@@ -185,7 +185,7 @@ pub(crate) fn fit(
     options.nominal = optional_count("nominal", nominal)?;
     options.n_samples = optional_count("n_samples", n_samples)?;
     options.time_scaling = time_scaling_of(alignment, landmarks)?;
-    options.contexts = contexts.map(crate::convert::contexts).transpose()?;
+    options.contexts = contexts.map(|contexts| crate::convert::contexts("contexts", contexts)).transpose()?;
     options.map = map_of(map)?;
     options.n_styles = n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?;
     options.basis = basis_of(basis)?;

@@ -2,6 +2,7 @@
 //! calls the core and converts the result.
 
 mod batch;
+mod batch_conditions;
 mod choice;
 mod conditions;
 mod context;

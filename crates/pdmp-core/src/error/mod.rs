@@ -89,17 +89,19 @@ pub enum Error {
         per: &'static str,
     },
     /// A number of vectors that differs from the number of movements.
-    #[error("{name} has {found} rows, but there are {expected} styles: pass one row for each, or one vector for all")]
+    #[error(
+        "{name} has {found} rows, but there are {expected} movements: pass one row for each, or one vector for all"
+    )]
     Rows {
         /// The argument.
         name: &'static str,
-        /// The number of styles.
+        /// The number of movements.
         expected: usize,
         /// The number of rows.
         found: usize,
     },
-    /// A condition of only one of two conditions that are blended.
-    #[error("{name}: given for one of the two only; give it for both")]
+    /// A condition that only some of several conditions have.
+    #[error("{name}: given for some of the conditions only; give it for all")]
     Single {
         /// The condition.
         name: &'static str,
