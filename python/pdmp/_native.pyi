@@ -14,8 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Map: TypeAlias = Literal["auto", "stacked", "gp", "linear", "polynomial"]
-_Context: TypeAlias = ArrayLike | Sequence[float | str]
-_Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
+_Context: TypeAlias = ArrayLike | Sequence[float | str] | Mapping[str, float | str]
+_Contexts: TypeAlias = (
+    ArrayLike
+    | Sequence[Sequence[float | str]]
+    | Sequence[Mapping[str, float | str]]
+    | Mapping[str, Sequence[float | str] | ArrayLike]
+)
 _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
 _Kernel: TypeAlias = Literal["matern32", "matern52"]
@@ -106,7 +111,7 @@ class Demonstration:
         dt: float | None = None,
         time: ArrayLike | None = None,  # (T,)
         goal: ArrayLike | None = None,  # (D,)
-        context: _Context | None = None,  # (Q,)
+        context: ArrayLike | Sequence[float | str] | None = None,  # (Q,)
         names: Sequence[str] | None = None,  # D of them
         units: Sequence[str] | None = None,  # D of them
     ) -> Demonstration: ...
@@ -181,8 +186,10 @@ def fit(
         Sampling interval in s of demonstrations without one.
     period : float or array_like, (M,), optional
         Periods in s of time-stamped cycles.
-    contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
-        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
+    contexts : array_like, (M, Q), or M lists of Q numbers and labels, or mapping, optional
+        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
+        keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
+        (M,).
     map : {"auto", "stacked", "gp", "linear", "polynomial"}
         Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
         regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
@@ -691,6 +698,9 @@ class Model:
     def contexts(self) -> _Array | list[list[float | str]] | None:  # (M, Q)
         """Contexts (M, Q) of the demonstrations, an array of numbers or lists with labels; None without contexts."""
     @property
+    def context_names(self) -> list[str] | None:
+        """Names (Q,) of the context columns; None where the contexts had none."""
+    @property
     def map(self) -> ContextMap | None:
         """Map from contexts to style, goal, start or anchor, and duration; None without contexts."""
     @property
@@ -1048,8 +1058,8 @@ class Model:
 
         Parameters
         ----------
-        context : array_like or list, (Q,)
-            Numbers and labels, in the units of the demonstrations' contexts.
+        context : array_like, list or mapping, (Q,)
+            Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
 
         Returns
         -------
@@ -1083,8 +1093,8 @@ class Model:
 
         Parameters
         ----------
-        context : array_like or list, (Q,)
-            Numbers and labels, in the units of the demonstrations' contexts.
+        context : array_like, list or mapping, (Q,)
+            Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
         level : float
             Probability in (0, 1) that a position of the new movement lies within its bounds.
         dt : float

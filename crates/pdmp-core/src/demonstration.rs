@@ -4,13 +4,12 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
 pub use crate::validate::MAX_MAGNITUDE;
-use crate::validate::{check_matrix, check_number, check_positive, check_time, check_vector};
+use crate::validate::{
+    MAX_NAME_LENGTH, check_matrix, check_names, check_number, check_positive, check_time, check_vector,
+};
 
 /// Minimum number of samples of a demonstration: a cubic spline with not-a-knot ends needs four.
 pub const MIN_SAMPLES_PER_DEMONSTRATION: usize = 4;
-
-/// Maximum length of the name or unit of a DoF, in bytes: it bounds the header of a model file.
-const MAX_NAME_LENGTH: usize = 1000;
 
 /// Sampling times of a demonstration.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,16 +140,7 @@ impl Demonstration {
     /// # Errors
     /// A number of names other than D, a repeated name, or one longer than 1000 bytes.
     pub fn with_names(mut self, names: Vec<String>) -> Result<Self> {
-        if names.len() != self.n_dofs() {
-            let (expected, found) = (self.n_dofs(), names.len());
-            return Err(Error::Length { name: "names", expected, found, per: "DoF" });
-        }
-        if names.iter().enumerate().any(|(d, name)| names[..d].contains(name) || name.len() > MAX_NAME_LENGTH) {
-            return Err(Error::Argument {
-                name: "names",
-                problem: "must differ from each other and have at most 1000 bytes each",
-            });
-        }
+        check_names("names", &names, self.n_dofs(), "DoF")?;
         self.names = Some(names);
         Ok(self)
     }

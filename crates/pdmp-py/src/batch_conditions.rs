@@ -2,16 +2,16 @@
 
 use ndarray::{Array2, Ix2};
 use pdmp_core::Error;
-use pdmp_core::demonstration::ContextValue;
 use pdmp_core::model::Conditions as Inner;
 use pdmp_core::motion::{BatchConditions, PerMovement};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::PyDict;
 
 use crate::conditions::{Conditions, changed, given, reject_style};
-use crate::convert::{array, context, contexts, items};
+use crate::convert::{array, items};
 use crate::error::raise;
+use crate::named_contexts::contexts_for;
 
 /// Returns the conditions of a batch: `conditions` of all movements or of each, single ones replaced by `changes`, those
 /// absent from both predicted for the context of all movements or of each.
@@ -36,7 +36,7 @@ pub(crate) fn batch_conditions_of(
     if let Some(context) = context {
         let has_style = rows.iter().any(|(name, _)| name == "style") || bases.iter().any(|base| base.style.is_some());
         reject_style(has_style)?;
-        let (contexts, is_matrix) = contexts_of(context)?;
+        let (contexts, is_matrix) = contexts_for(model, context)?;
         let predict = || contexts.iter().map(|context| Ok(model.predict(context)?.conditions));
         let predicted: Vec<Inner> = py.detach(|| predict().collect::<pdmp_core::Result<_>>()).map_err(raise)?;
         let (found, expected) = (predicted.len(), bases.len());
@@ -101,14 +101,4 @@ fn vectors<'a>(conditions: &'a mut BatchConditions, name: &str) -> Option<&'a mu
         "anchor" => Some(&mut conditions.anchor),
         _ => None,
     }
-}
-
-/// Converts a context (Q,), or contexts (B, Q). The second value is true for contexts.
-fn contexts_of(value: &Bound<'_, PyAny>) -> PyResult<(Vec<Vec<ContextValue>>, bool)> {
-    let is_row = |item: &Bound<'_, PyAny>| !item.is_instance_of::<PyString>() && item.try_iter().is_ok();
-    let is_matrix = match value.getattr("ndim").and_then(|axes| axes.extract::<usize>()) {
-        Ok(axes) => axes > 1,
-        Err(_) => is_row(value) && value.get_item(0).is_ok_and(|first| is_row(&first)),
-    };
-    if is_matrix { Ok((contexts("context", value)?, true)) } else { Ok((vec![context("context", value)?], false)) }
 }

@@ -216,7 +216,7 @@ pub(crate) fn conditions_of(
     let own = changed(base, changes)?;
     let Some(context) = context else { return Ok(own) };
     reject_style(own.style.is_some())?;
-    let prediction = model.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+    let prediction = model.predict(&crate::named_contexts::context_for(model, context)?).map_err(raise)?;
     Ok(own.or(prediction.conditions))
 }
 

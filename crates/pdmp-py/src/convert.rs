@@ -11,7 +11,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
+use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple};
 
 use crate::error::{nested, printable, raise};
 use crate::scalar::{Scalar, optional_count};
@@ -226,6 +226,9 @@ pub(crate) fn context(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Cont
     if value.is_instance_of::<PyString>() || value.is_instance_of::<PyBytes>() {
         return Err(PyTypeError::new_err(format!("{name} is a single text: put it into a list, one value per column")));
     }
+    if value.is_instance_of::<PyMapping>() {
+        return Err(PyTypeError::new_err(format!("{name} is a mapping: pass its values in a list")));
+    }
     let value = &rows_of(name, value)?;
     if value.try_iter().is_err() {
         return Ok(vec![context_value(name, value)?]);
@@ -244,7 +247,7 @@ fn rows_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, Py
     Ok(plain(name, value)?.into_any())
 }
 
-fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue> {
+pub(crate) fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue> {
     if let Ok(label) = value.extract::<String>() {
         return Ok(ContextValue::Label(label));
     }

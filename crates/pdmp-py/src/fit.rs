@@ -40,8 +40,10 @@ use crate::warp::TimeWarp;
 ///     Sampling interval in s of demonstrations without one.
 /// period : float or array_like, (M,), optional
 ///     Periods in s of time-stamped cycles.
-/// contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
-///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
+/// contexts : array_like, (M, Q), or M lists of Q numbers and labels, or mapping, optional
+///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
+///     keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
+///     (M,).
 /// map : {"auto", "stacked", "gp", "linear", "polynomial"}
 ///     Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
 ///     regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
@@ -185,7 +187,10 @@ pub(crate) fn fit(
     options.nominal = optional_count("nominal", nominal)?;
     options.n_samples = optional_count("n_samples", n_samples)?;
     options.time_scaling = time_scaling_of(alignment, landmarks)?;
-    options.contexts = contexts.map(|contexts| crate::convert::contexts("contexts", contexts)).transpose()?;
+    if let Some(contexts) = contexts {
+        let (names, rows) = crate::named_contexts::named_contexts("contexts", contexts)?;
+        (options.contexts, options.context_names) = (Some(rows), names.unwrap_or_default());
+    }
     options.map = map_of(map)?;
     options.n_styles = n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?;
     options.basis = basis_of(basis)?;

@@ -17,6 +17,7 @@ mod inspection;
 mod model;
 mod model_getters;
 mod motion;
+mod named_contexts;
 mod output;
 mod prediction;
 mod preprocessing;

@@ -244,8 +244,8 @@ impl Model {
     ///
     /// Parameters
     /// ----------
-    /// context : array_like or list, (Q,)
-    ///     Numbers and labels, in the units of the demonstrations' contexts.
+    /// context : array_like, list or mapping, (Q,)
+    ///     Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
     ///
     /// Returns
     /// -------
@@ -264,7 +264,7 @@ impl Model {
     /// >>> np.allclose(trajectory.position, model.rollout(context=[0.05]).position)
     /// True
     fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
-        let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+        let prediction = self.0.predict(&crate::named_contexts::context_for(&self.0, context)?).map_err(raise)?;
         Prediction::new(py, prediction)
     }
 
@@ -276,8 +276,8 @@ impl Model {
     ///
     /// Parameters
     /// ----------
-    /// context : array_like or list, (Q,)
-    ///     Numbers and labels, in the units of the demonstrations' contexts.
+    /// context : array_like, list or mapping, (Q,)
+    ///     Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
     /// level : float
     ///     Probability in (0, 1) that a position of the new movement lies within its bounds.
     /// dt : float
@@ -304,7 +304,7 @@ impl Model {
         dt: Scalar<'py>,
     ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let (level, dt) = (level.number("level")?, dt.number("dt")?);
-        let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+        let prediction = self.0.predict(&crate::named_contexts::context_for(&self.0, context)?).map_err(raise)?;
         let grid = TimeGrid { dt, duration: None };
         let PredictionBand { lower, upper } =
             py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;

@@ -47,7 +47,9 @@ impl ContextColumn {
             (Self::Label(labels), ContextValue::Number(number)) => {
                 Err(unknown_label(column, number.to_string(), labels))
             }
-            (Self::Number, ContextValue::Label(label)) => Err(Error::NoNumber { column, label: label.clone() }),
+            (Self::Number, ContextValue::Label(label)) => {
+                Err(Error::NoNumber { column, name: None, label: label.clone() })
+            }
         }
     }
 
@@ -73,7 +75,7 @@ impl ContextColumn {
 }
 
 fn unknown_label(column: usize, value: String, labels: &[String]) -> Error {
-    Error::Label { column, value, known: labels.join(", ") }
+    Error::Label { column, name: None, value, known: labels.join(", ") }
 }
 
 /// Returns the column types (Q,) of contexts and the contexts as numbers (M, Q), with labels as their indices.

@@ -35,6 +35,7 @@ impl Error {
             | Self::NoDemonstrations
             | Self::Styles { .. }
             | Self::Label { .. }
+            | Self::ContextNames { .. }
             | Self::NoNumber { .. }
             | Self::Kind { .. }
             | Self::Argument { .. }
@@ -71,7 +72,7 @@ impl Error {
             Self::Samples { .. } | Self::Dofs { .. } => Some("position"),
             Self::NoDemonstrations => Some("demos"),
             Self::Styles { .. } => Some("n_styles"),
-            Self::Label { .. } | Self::NoNumber { .. } => Some("context"),
+            Self::Label { .. } | Self::NoNumber { .. } | Self::ContextNames { .. } => Some("context"),
             Self::Mixed { .. } => Some("contexts"),
             Self::Gap { .. }
             | Self::WrapInGap { .. }

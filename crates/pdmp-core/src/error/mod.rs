@@ -10,7 +10,7 @@ mod format;
 use std::path::PathBuf;
 
 use crate::kind::Kind;
-use format::{Gap, Number, Times};
+use format::{Column, Gap, Number, Times};
 
 /// The caller's next step after an [`Error`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -262,22 +262,34 @@ pub enum Error {
         of: &'static str,
     },
     /// A context value that is none of the demonstrated labels.
-    #[error("context[{column}] = {value}: not demonstrated; the labels are {known}")]
+    #[error("context[{}] = {value}: not demonstrated; the labels are {known}", Column(*column, name))]
     Label {
         /// Index of the context value.
         column: usize,
+        /// Name of its column, if known.
+        name: Option<String>,
         /// The value.
         value: String,
         /// The demonstrated labels.
         known: String,
     },
     /// A label in place of a number.
-    #[error("context[{column}] = {label:?}: a number is expected, as in the demonstrations")]
+    #[error("context[{}] = {label:?}: a number is expected, as in the demonstrations", Column(*column, name))]
     NoNumber {
         /// Index of the context value.
         column: usize,
+        /// Name of its column, if known.
+        name: Option<String>,
         /// The label.
         label: String,
+    },
+    /// A context with other names than the columns of the demonstrations' contexts.
+    #[error("context has the names {found}; expected one value for each of {expected}")]
+    ContextNames {
+        /// Names of the columns.
+        expected: String,
+        /// Names of the values.
+        found: String,
     },
     /// A context value that is a label in one demonstration and a number in another.
     #[error("contexts[:, {column}] holds {labels} labels and {numbers} numbers: give one or the other")]

@@ -17,6 +17,7 @@ use crate::model::primitive::{Parts, Primitive};
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{inspect, unwound};
+use crate::validate::check_names;
 
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
@@ -81,6 +82,10 @@ pub fn fit_with(
     let demos = &*whole;
     let mut aligned = options.alignment().align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
+    if !options.context_names.is_empty() {
+        let n_columns = contexts.as_ref().map_or(0, |(columns, _)| columns.len());
+        check_names("context_names", &options.context_names, n_columns, "context column")?;
+    }
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
     let mut aligning = |share| progress(Stage::Align, share);
@@ -138,6 +143,7 @@ pub fn fit_with(
             let outputs = demonstrated.outputs(canonical.kind());
             let metric = metric(&primitive, outputs.view(), demonstrated.segment_durations.view())?;
             let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
+            let map = map.with_names(options.context_names.clone())?;
             (Some(map), Some(residual_variance(&primitive, outputs.view(), aligned)?))
         }
         _ => (None, None),

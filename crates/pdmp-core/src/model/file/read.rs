@@ -245,6 +245,7 @@ impl Reader<'_> {
         };
         let parameters = MapParameters { kind: map.kind, kernel: map.kernel, directions, ratios, line, errors };
         ContextMap::restore(map.columns.clone(), contexts, outputs.view(), parameters)
+            .and_then(|restored| restored.with_names(map.names.clone()))
             .map_err(|error| Error::File(error.to_string()))
     }
 
