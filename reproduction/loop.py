@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 TAU = 0.6  # s, time constant on the robot, as printed; twice that of the fit
 MAX_DURATION = 30.0  # s
+TOLERANCE = 1e-3  # of the range of each joint, below 1 mm of the hand
 
 
 class Movement(Protocol):
@@ -115,7 +116,7 @@ def from_rest(
     model: pdmp.Model, reaching: Reaching, style: Array, tau: float = TAU
 ) -> pdmp.Controller:
     """Returns a controller that starts with the robot at rest and moves to the printed goal."""
-    return model.controller(
+    controller = model.controller(
         dt=DT,
         style=style,
         start=reaching.start,
@@ -123,3 +124,5 @@ def from_rest(
         goal=reaching.goal,
         tau=tau,
     )
+    controller.tolerance = TOLERANCE
+    return controller

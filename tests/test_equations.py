@@ -35,19 +35,30 @@ def solve(
     last = style @ model.landscape([u_end])[0] * np.exp(-(model.alpha_x or 0.0) * u_end)
 
     def flow(t: float, state: np.ndarray) -> np.ndarray:
-        y, z, extra = state[:n], state[n : 2 * n], state[2 * n]
+        y, z, gate, braking = state[:n], state[n : 2 * n], state[2 * n], state[2 * n + 1]
         discrete = model.kind == "discrete"
-        gate = extra  # x, or r
-        w = gate * (style @ model.landscape([t / tau])[0])
+        w = gate * (style @ model.landscape([t / tau])[0])  # gate: x, or r
+        braking_slope = 0.0
         if braked:
             late = t / tau - u_end
-            w = (z_start + last) * np.exp(-model.braking * late) - z_start * np.exp(-alpha * late)
+            decay = np.exp(-model.braking / 2 * late)
+            # z of the displacement late * decay from the goal, and the forcing that causes it.
+            braking_slope = -alpha * (beta * late * decay + braking)
+            forcing = (1 - model.braking / 2 * late) * decay - braking
+            w = (z_start + last) * forcing - z_start * np.exp(-alpha * late)
         growth = -model.alpha_x * gate if discrete else model.mu * (amplitude[1] - gate)
-        return np.concatenate([z + w, alpha * (beta * (centre - y) - z), [growth]]) / tau
+        slopes = [z + w, alpha * (beta * (centre - y) - z), [growth], [braking_slope]]
+        return np.concatenate(slopes) / tau
 
     gate = np.exp(-model.alpha_x * span[0] / tau) if model.kind == "discrete" else amplitude[0]
     solution = integrate.solve_ivp(
-        flow, span, [*start, *z_start, gate], "DOP853", rtol=1e-10, atol=1e-12, dense_output=True
+        flow,
+        span,
+        [*start, *z_start, gate, 0.0],
+        "DOP853",
+        rtol=1e-10,
+        atol=1e-12,
+        dense_output=True,
     )
     return lambda t: solution.sol(t)[:n].T, solution.y[: 2 * n, -1]
 

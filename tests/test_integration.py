@@ -139,11 +139,17 @@ def integrated(
         "rate": np.array([1 / nominal]),
     }
     omega = settling / TRANSITION
-    moved: Callable[..., Any] = lambda u, order=0: np.zeros(2)  # the frame by a later goal
+    way_to_goal: Any = None  # of the frame to a later goal, over the clock
     sizes = [len(value) for value in target.values()]
     parts = np.cumsum([1, 1, 2, 2, *sizes, *sizes])[:-1]
     # The frame includes changes of the start.
     way = start["centre"] - start["position"] if discrete else np.zeros(2)
+
+    def moved(u: float, order: int) -> np.ndarray:
+        """Returns the displacement of the frame by a later goal, or its derivative."""
+        if way_to_goal is None:
+            return np.zeros(2)
+        return np.asarray(way_to_goal.derivative(order)(np.clip(u, *way_to_goal.x)))
 
     def flow(t: float, state: np.ndarray) -> np.ndarray:
         u, r, y, z, *filtered = np.split(state, parts)
@@ -152,7 +158,7 @@ def integrated(
         rate = value["rate"][0]
         m, rise = family.frame(u[0])
         w = value["shares"] @ family.forcing(u[0]) * (1 if discrete else r)
-        pull = BETA * (y - value["centre"] - way * (m - 1) - moved(u[0])) + z
+        pull = BETA * (y - value["centre"] - way * (m - 1) - moved(u[0], 0)) + z
         slopes = [[rate], rate * MU * (value["amplitude"] - r)]
         slopes += [rate * (z + w + way * rise + moved(u[0], 1)), -rate * ALPHA * pull]
         seconds = {name: 1.0 if name == "rate" else rate * nominal for name in target}
@@ -183,8 +189,7 @@ def integrated(
             here, change = state[0], command["centre"] - target["centre"]
             there = max(1.0, here + TRANSITION / nominal + 15 / 8 * 2 * np.e / ALPHA)
             ends = [[0 * change] * 3, [change, 0 * change, 0 * change]]
-            path = interpolate.BPoly.from_derivatives([here, there], ends)
-            moved = lambda u, order=0: path(np.clip(u, here, there), order)  # noqa: E731
+            way_to_goal = interpolate.BPoly.from_derivatives([here, there], ends)
             command = {key: value for key, value in command.items() if key != "centre"}
         target |= command
     return np.concatenate(found)

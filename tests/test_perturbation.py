@@ -38,7 +38,7 @@ def test_blocked_robot_waits_and_then_arrives(reach: pdmp.Model) -> None:
     controller.release()
     while controller.step() == pdmp.Status.WORKING:
         assert controller.time < 6
-    np.testing.assert_allclose(controller.position, controller.goal, atol=2e-3)
+    np.testing.assert_allclose(controller.position, controller.goal, atol=controller.tolerance)
 
 
 def test_constant_tracking_error_is_kept_at_the_goal(reach: pdmp.Model) -> None:
@@ -47,7 +47,7 @@ def test_constant_tracking_error_is_kept_at_the_goal(reach: pdmp.Model) -> None:
     sag = np.array([0.0, 0.02])
     while controller.step(measured=controller.position - sag) == pdmp.Status.WORKING:
         assert controller.time < 6
-    np.testing.assert_allclose(controller.position, controller.goal, atol=2e-3)
+    np.testing.assert_allclose(controller.position, controller.goal, atol=controller.tolerance)
 
 
 @pytest.mark.parametrize(

@@ -1548,7 +1548,7 @@ class Controller:
     """Running movement, returned by `Model.controller`.
 
     `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any
+    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed`, `tolerance` and `compliance` can be set at any
     tick; a value that is rejected leaves the present one in force.
     """
     def __copy__(self) -> Controller: ...

@@ -344,6 +344,11 @@ pdmp_status pdmp_controller_set_amplitude(pdmp_controller *controller, double am
 /// change is filtered like tau, and persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
 pdmp_status pdmp_controller_set_speed(pdmp_controller *controller, double speed);
 
+/// Sets the tolerance in (0, 1] of a movement that has settled, PDMP_FINISHED; 0.005 by default. It is relative to the
+/// larger of two lengths of each DoF: its largest demonstrated range, and its distance from the goal when this was last
+/// commanded. It persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
+pdmp_status pdmp_controller_set_tolerance(pdmp_controller *controller, double tolerance);
+
 /// Sets the gains of the response to a measured position, see pdmp_controller_update: `stopping` k_s of phase stopping
 /// and `tracking` k_t of the pull towards the measurement, per unit of the clock u; both at least 0.
 ///

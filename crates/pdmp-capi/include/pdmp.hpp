@@ -200,6 +200,7 @@ public:
     }
 
     pdmp_status set_speed(double speed) noexcept { return pdmp_controller_set_speed(get(), speed); }
+    pdmp_status set_tolerance(double tolerance) noexcept { return pdmp_controller_set_tolerance(get(), tolerance); }
     pdmp_status release() noexcept { return pdmp_controller_release(get()); }
 
     /// Advances the movement by one tick without a new command.

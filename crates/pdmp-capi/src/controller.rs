@@ -267,6 +267,17 @@ pub extern "C" fn pdmp_controller_set_speed(controller: Option<&mut pdmp_control
     call_on(controller, |controller| Ok(controller.inner.set_speed(speed).map(|()| PDMP_OK)?))
 }
 
+/// Sets the tolerance in (0, 1] of a movement that has settled, PDMP_FINISHED; 0.005 by default. It is relative to the
+/// larger of two lengths of each DoF: its largest demonstrated range, and its distance from the goal when this was last
+/// commanded. It persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_set_tolerance(
+    controller: Option<&mut pdmp_controller>,
+    tolerance: f64,
+) -> pdmp_status {
+    call_on(controller, |controller| Ok(controller.inner.set_tolerance(tolerance).map(|()| PDMP_OK)?))
+}
+
 /// Sets the gains of the response to a measured position, see pdmp_controller_update: `stopping` k_s of phase stopping
 /// and `tracking` k_t of the pull towards the measurement, per unit of the clock u; both at least 0.
 ///

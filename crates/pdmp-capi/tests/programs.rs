@@ -209,6 +209,7 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
                 100 => controller.set_style(&conditions_of(&model, 0).style.unwrap()).unwrap(),
                 150 => controller.set_goal(&goal).unwrap(),
                 200 => controller.set_tau(1.5).unwrap(),
+                220 => controller.set_tolerance(0.05).unwrap(),
                 250 => controller.set_compliance(Compliance { stopping: 100.0, tracking: 5.0 }).unwrap(),
                 _ => {}
             }

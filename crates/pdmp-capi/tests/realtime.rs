@@ -117,6 +117,7 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                         rust.set_compliance(Compliance { stopping: tau, tracking: tau }),
                         pdmp_controller_set_compliance(c.as_mut(), tau, tau),
                     ),
+                    7 => (rust.set_tolerance(tau - own), pdmp_controller_set_tolerance(c.as_mut(), tau - own)),
                     _ => (Ok(()), pdmp_status::PDMP_OK),
                 }
             };

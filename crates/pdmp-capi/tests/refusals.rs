@@ -188,6 +188,7 @@ fn null_for_a_required_argument_is_an_error() {
             pdmp_controller_set_amplitude(None, 1.0),
             pdmp_controller_set_compliance(None, 1.0, 1.0),
             pdmp_controller_set_speed(None, 1.0),
+            pdmp_controller_set_tolerance(None, 0.1),
             pdmp_controller_release(None),
             pdmp_controller_clone(None, SETTINGS.memory, Some(&mut out), NO_TEXT),
             pdmp_controller_clone(running.handle().as_deref(), SETTINGS.memory, None, NO_TEXT),
@@ -279,6 +280,7 @@ fn an_invalid_command_changes_nothing_and_leaves_a_message() {
     assert_eq!(pdmp_controller_set_amplitude(running.handle(), 1.0), PDMP_ABSENT);
     assert_eq!(pdmp_controller_set_tau(running.handle(), -1.0), PDMP_RANGE);
     assert_eq!(pdmp_controller_set_compliance(running.handle(), -1.0, 0.0), PDMP_RANGE);
+    assert_eq!(pdmp_controller_set_tolerance(running.handle(), 0.0), PDMP_RANGE);
     assert_eq!(running.state(3), before);
 }
 

@@ -59,6 +59,7 @@ int main(int, char **argv) try {
         if (tick == 100) REQUIRE(controller.set_style(pdmp::view(style)) == PDMP_OK);
         if (tick == 150) REQUIRE(controller.set_goal(pdmp::view(goal)) == PDMP_OK);
         if (tick == 200) REQUIRE(controller.set_tau(1.5) == PDMP_OK);
+        if (tick == 220) REQUIRE(controller.set_tolerance(0.05) == PDMP_OK);
         if (tick == 250) REQUIRE(controller.set_compliance(100.0, 5.0) == PDMP_OK);
         if (tick >= 300 && tick < 350) command.measured = pdmp::view(measured);
         if (tick >= 400) command.coupling = {pdmp::view(measured), pdmp::view(goal)};

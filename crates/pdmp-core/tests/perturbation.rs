@@ -114,15 +114,17 @@ fn perturbed_movement_solves_the_stated_equations() {
         let mut reference: ReferenceState = (start, z, 0.0);
         let pull = if tracking_error { (1.0 - (-tracking * dt / model.tau()).exp()) / dt } else { 0.0 };
         let (mut total_velocity, mut phase_rate, mut expected) = (velocity[..n].to_vec(), 1.0, 0.0);
-        // Past the demonstrated end, which coincides with the end of a tick if the phase is not slowed.
-        for _ in 0..1500 {
+        // Past the demonstrated end, which coincides with the end of a tick if the phase is not slowed. The error begins
+        // with the second tick, since one from the first tick on would be expected.
+        for k in 0..1500 {
+            let behind = if k == 0 { [0.0; 3] } else { behind };
             let robot: Vec<f64> = controller.position().iter().zip(behind).map(|(y, e)| y + e).collect();
             let terms = coupling(&velocity[..n], &acceleration[..n]);
             let terms = if tracking_error { Command { measured: Some(&robot), ..terms } } else { terms };
             tick(&mut controller, &Command { dt: Some(dt), ..terms }).unwrap();
             // The expected error is the same share of the constant error for every DoF.
             let excess: Vec<f64> = behind[..n].iter().map(|e| e * (1.0 - expected)).collect();
-            if tracking_error {
+            if tracking_error && k > 0 {
                 let squares: f64 = excess.iter().zip(model.ranges()).map(|(d, range)| (d / range).powi(2)).sum();
                 phase_rate = 1.0 / (1.0 + stopping * squares);
                 expected += (1.0 - expected)
@@ -332,11 +334,31 @@ fn errors_of_angles_are_wrapped() {
 fn stopped_phase_does_not_finish() {
     let mut controller = controller(&REACH);
     controller.set_compliance(Compliance { stopping: 1e12, tracking: 0.0 }).unwrap();
+    controller.step().unwrap();
     for _ in 0..5000 {
         let far: Vec<f64> = controller.position().iter().map(|y| y + 0.1).collect();
         assert_eq!(tick(&mut controller, &measured(&far)).unwrap(), Status::Working);
     }
     assert!(controller.phase() > 0.99);
+}
+
+/// An error from the first tick on is expected at once: the movement takes its time, and ends no further off than the error.
+#[test]
+fn error_from_the_first_tick_neither_slows_nor_shifts_the_movement() {
+    let ticks = |error: f64| {
+        let mut controller = controller(&REACH);
+        for ticks in 1..5000 {
+            let robot: Vec<f64> = controller.position().iter().map(|y| y + error).collect();
+            if tick(&mut controller, &measured(&robot)).unwrap() == Status::Finished {
+                assert!(relative_distance(&REACH, controller.position(), controller.centre()) < 0.01);
+                return ticks;
+            }
+        }
+        5000
+    };
+    for error in [0.01, -0.1, 0.5] {
+        assert_eq!(ticks(error), ticks(0.0));
+    }
 }
 
 /// The error of a degree of freedom that is stationary in the demonstrations does not stop the phase.
@@ -349,6 +371,8 @@ fn stationary_dof_does_not_stop_the_phase() {
     });
     let model = learn(&stationary.collect::<Vec<_>>(), &options(Kind::Discrete));
     let (mut free, mut pulled, mut max_pull) = (controller(&model), controller(&model), 0.0f64);
+    free.step().unwrap();
+    pulled.step().unwrap();
     for _ in 0..500 {
         let mut robot = pulled.position().to_vec();
         robot[2] += 0.1;

@@ -55,7 +55,7 @@ struct Arguments {
 /// Running movement, returned by `Model.controller`.
 ///
 /// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-/// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed` and `compliance` can be set at any
+/// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed`, `tolerance` and `compliance` can be set at any
 /// tick; a value that is rejected leaves the present one in force.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
@@ -348,6 +348,21 @@ impl Controller {
     #[setter]
     fn set_speed(&mut self, speed: Scalar<'_>) -> PyResult<()> {
         let result = self.inner.set_speed(speed.number("speed")?);
+        self.command(result)
+    }
+
+    /// Tolerance within which the movement has settled on its goal, 0.005 by default, at most 1.
+    ///
+    /// It is relative to the larger of two lengths of each degree of freedom: its largest demonstrated range, and its
+    /// distance from the goal when this was last set. It stays in force after `reset`.
+    #[getter]
+    fn tolerance(&self) -> f64 {
+        self.inner.tolerance()
+    }
+
+    #[setter]
+    fn set_tolerance(&mut self, tolerance: Scalar<'_>) -> PyResult<()> {
+        let result = self.inner.set_tolerance(tolerance.number("tolerance")?);
         self.command(result)
     }
 

@@ -3,9 +3,10 @@
 //! The forcing of each style dimension and DoF is stored as a piecewise cubic Hermite interpolant on a uniform grid of the
 //! clock, independently of the regressor that it was learnt by.
 
+use crate::dynamics::braking::Braking;
 use crate::dynamics::canonical::{Canonical, faded, turn};
 use crate::dynamics::hermite_table::KnotTable;
-use crate::dynamics::output_system::CubicSample;
+use crate::dynamics::output_system::{Attractor, CubicSample};
 use crate::numerics::simd::{F64x4, Real, Register, WIDTH, groups};
 
 /// Forcing w of unit styles over the clock: x·b(x; W) for a discrete movement, b(φ; W) for a rhythmic one.
@@ -48,9 +49,9 @@ pub struct ForcingTable {
 enum Ending {
     /// Decay with the phase, w = w_end·exp(−α_x v), as in the paper.
     Phase,
-    /// w = −z_end·exp(−α_z v) + v_end·exp(−κv). The first part decays as z does, so that a movement which ends at rest on
-    /// its goal stays there; the second part brakes.
-    Braked { alpha_z: f64, braking: f64 },
+    /// w = −z_end·exp(−α_z v) + v_end·p(v). The first part decays as z does, so that a movement which ends at rest on its
+    /// goal stays there. The second part brakes.
+    Braked { alpha_z: f64, braking: Braking },
 }
 
 /// Factors of the forcing past the end, w = r·(a + b·p), and their derivatives with respect to the clock.
@@ -62,14 +63,19 @@ pub(crate) struct Fade {
     p: f64,
     /// p′.
     pub(crate) p_slope: f64,
-    braked: bool,
 }
 
-impl Fade {
-    /// Returns |w| without the part that decays as z does, from a + b·p as value and b as slope.
-    pub(crate) fn residual(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> F64x4 {
-        let residual = if self.braked { slope * (self.p * self.r) } else { value * self.r };
-        residual.abs()
+/// Upper bound of |w|, without the part that decays as z does, from a clock past the end on: of a + b·p and of b.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ForcingBound {
+    value: f64,
+    slope: f64,
+}
+
+impl ForcingBound {
+    /// Returns the bound for a + b·p as value and b as slope.
+    pub(crate) fn of(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> F64x4 {
+        value.abs() * self.value + slope.abs() * self.slope
     }
 }
 
@@ -141,13 +147,13 @@ impl ForcingTable {
     }
 
     /// Returns the table with [`Ending::Braked`], for the `z` at the end of unit styles, by groups of DoFs and styles.
-    pub(crate) fn with_braking(mut self, alpha_z: f64, braking: f64, z: &[F64x4]) -> Self {
+    pub(crate) fn with_braking(mut self, attractor: Attractor, rate: f64, z: &[F64x4]) -> Self {
         let [end, beyond] = [self.cells, self.cells + 1].map(|row| row * self.knot_stride);
         for (i, z) in z.iter().enumerate() {
             let value = self.cubics[end + i].0[0];
             self.cubics[beyond + i] = Cubic([-*z, value + *z, F64x4::ZERO, F64x4::ZERO]);
         }
-        self.ending = Ending::Braked { alpha_z, braking };
+        self.ending = Ending::Braked { alpha_z: attractor.alpha_z, braking: Braking::new(attractor, rate) };
         self
     }
 
@@ -202,8 +208,9 @@ impl ForcingTable {
 
     /// Writes the forcing of all J·D outputs, in the unit of each DoF, and its slope with respect to the clock.
     ///
-    /// Past the end of a discrete movement w(u) = −z_end·exp(−α_z(u − u_end)) + v_end·exp(−κ(u − u_end)), with z_end = z
-    /// and v_end = y′ at the end. With immediate transport the forcing decays with the phase, w(u) = w(u_end)·x(u)/x(u_end).
+    /// Past the end of a discrete movement w = −z_end·exp(−α_z v) + v_end·p(v), with v = u − u_end, z_end = z and
+    /// v_end = y′ at the end, and p such that the movement continues as y = g + v_end·v·exp(−κv/2). With immediate transport
+    /// the forcing decays with the phase, w(u) = w(u_end)·x(u)/x(u_end).
     /// `value` and `slope` are matrices (J, D) by rows.
     ///
     /// # Panics
@@ -234,14 +241,31 @@ impl ForcingTable {
     pub(crate) fn fade(&self, u: f64) -> Option<Fade> {
         match (self.canonical, self.ending) {
             (Canonical::Discrete { u_end, alpha_x }, ending) if u >= u_end => {
-                let (r_rate, p_rate, braked) = match ending {
-                    Ending::Phase => (alpha_x, 0.0, false),
-                    Ending::Braked { alpha_z, braking } => (alpha_z, braking - alpha_z, true),
+                let v = u - u_end;
+                let (r_rate, braking) = match ending {
+                    Ending::Phase => (alpha_x, None),
+                    Ending::Braked { alpha_z, braking } => (alpha_z, Some(braking)),
                 };
-                let [r, p] = [r_rate, p_rate].map(|rate| faded((-rate * (u - u_end)).exp()));
-                Some(Fade { r, r_slope: -r_rate * r, p, p_slope: -p_rate * p, braked })
+                let r = faded((-r_rate * v).exp());
+                let [p, p_slope] = match braking.filter(|_| r > 0.0) {
+                    Some(braking) => braking.forcing(v),
+                    None => [1.0, 0.0],
+                };
+                Some(Fade { r, r_slope: -r_rate * r, p, p_slope })
             }
             _ => None,
+        }
+    }
+
+    /// Returns the bound of the forcing from clock `u` past the end on.
+    pub(crate) fn bound(&self, u: f64) -> ForcingBound {
+        let v = u - self.canonical.extent();
+        match (self.canonical, self.ending) {
+            (_, Ending::Braked { braking, .. }) => ForcingBound { value: 0.0, slope: braking.bound(v) },
+            (Canonical::Discrete { alpha_x, .. }, Ending::Phase) => {
+                ForcingBound { value: (-alpha_x * v).exp(), slope: 0.0 }
+            }
+            (Canonical::Rhythmic { .. }, Ending::Phase) => ForcingBound { value: 1.0, slope: 0.0 },
         }
     }
 

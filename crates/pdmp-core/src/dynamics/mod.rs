@@ -1,6 +1,7 @@
 //! Dynamical systems of a primitive: canonical system, output system, forcing term, transport, time warp and command
 //! filters.
 
+pub(crate) mod braking;
 pub(crate) mod canonical;
 pub(crate) mod command_filter;
 pub(crate) mod forcing_table;

@@ -100,7 +100,7 @@ impl Primitive {
                     unit_states = from_rest(attractor, &forcing_table);
                     let end = &unit_states[unit_states.len() - n_outputs..];
                     let z: Vec<F64x4> = end.iter().map(|state| state.z).collect();
-                    forcing_table = forcing_table.with_braking(attractor.alpha_z, braking, &z);
+                    forcing_table = forcing_table.with_braking(attractor, braking, &z);
                 }
                 vec![State::default(); n_outputs]
             }

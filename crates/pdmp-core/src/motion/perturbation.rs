@@ -7,14 +7,14 @@
 //! τȯ = λκ(e − o)                                    expected error
 //! ```
 //!
-//! The coupling terms add c_v to ẏ and c_a to ÿ. Of the tracking error e = ỹ − y only the excess over the expected error o
-//! counts: per DoF, d = e − min(max(o, min(e, 0)), max(e, 0)), which has the sign of e and is not larger. A constant error
-//! (sag, friction) thus passes from d into o, and neither shifts the goal nor stops the phase permanently. The expected
-//! error adapts on the clock of the phase: a blocked robot stops this clock, so that its error remains unexpected. Between
-//! two measurements the robot is assumed to keep its distance: e is that of the last measurement, and the pull is
-//! distributed over the ticks such that their sum does not overshoot ỹ. The error of an angle is wrapped to half a turn. A
-//! blocked robot holds the movement at its position and almost stops the phase; after its release the movement continues
-//! from there.
+//! The coupling terms add c_v to ẏ and c_a to ÿ. Of the tracking error e = ỹ − y only the excess over the expected
+//! error o counts: per DoF, d = e − min(max(o, min(e, 0)), max(e, 0)), which has the sign of e and is not larger. A
+//! constant error (sag, friction) thus passes from d into o, and neither shifts the goal nor stops the phase
+//! permanently; the error before the first tick is expected at once. The expected error adapts on the clock of the
+//! phase: a blocked robot stops this clock, so that its error remains unexpected. Between two measurements the robot
+//! is assumed to keep its distance: e is that of the last measurement, and the pull is distributed over the ticks
+//! such that their sum does not overshoot ỹ. The error of an angle is wrapped to half a turn. A blocked robot holds
+//! the movement at its position and almost stops the phase; after its release the movement continues from there.
 //!
 //! Phase stopping and the tracking term in Eq. (2) are those of Ijspeert, Nakanishi and Schaal, ICRA 2002,
 //! [doi:10.1109/ROBOT.2002.1014739], and of Schaal, Mohajerian and Ijspeert, Progress in Brain Research 165, 2007,
@@ -138,7 +138,9 @@ impl Perturbation {
     }
 
     /// Sets the perturbation of a tick of `dt` seconds and `h` on the clock that starts at `position`. The command is valid.
-    pub(crate) fn set(&mut self, command: &Command, position: &[F64x4], dt: f64, h: f64) {
+    ///
+    /// The error of a measurement before the first tick is expected: nothing has moved, so that the robot is not blocked.
+    pub(crate) fn set(&mut self, command: &Command, position: &[F64x4], dt: f64, h: f64, started: bool) {
         self.clear_terms();
         if let Some(measured) = command.measured {
             (self.measured, self.remaining_pull) = (true, 1.0);
@@ -146,6 +148,9 @@ impl Perturbation {
             for (group, error) in self.error.iter_mut().enumerate() {
                 let difference = *error - position[group];
                 *error = difference - (difference * self.inverse_turn[group]).round() * self.turn[group];
+            }
+            if !started {
+                self.expected_error.copy_from_slice(&self.error);
             }
         }
         self.active = self.measured || command.coupling.is_some();

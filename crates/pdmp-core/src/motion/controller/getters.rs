@@ -73,6 +73,11 @@ impl Controller {
         self.speed
     }
 
+    /// Returns the tolerance of a settled movement; see [`Controller::set_tolerance`].
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
     /// Returns the gains k_s and k_t of a measured position; see [`Controller::set_compliance`].
     pub fn compliance(&self) -> Compliance {
         self.perturbation.compliance()

@@ -1,6 +1,5 @@
 //! State of a group of DoFs in the control loop, and its forcing term w.
 
-use super::SETTLING_RATIO;
 use crate::dynamics::forcing_table::{ForcingTable, TableIndex};
 use crate::dynamics::output_system::{Attractor, CubicSample, State};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
@@ -16,17 +15,19 @@ pub(super) struct Group {
     pub(super) z: F64x4,
     /// Displacement g − y₀ of the frame from start to goal; zero for a rhythmic movement.
     pub(super) displacement: F64x4,
-    /// Distance from the goal within which each DoF has settled.
-    pub(super) tolerance: F64x4,
-    /// Lower bound of the tolerance.
-    pub(super) min_tolerance: F64x4,
+    /// Length that the tolerance of a settled movement is relative to: the larger of range and distance from the goal.
+    pub(super) length: F64x4,
+    /// Rounding error of the distance from the goal.
+    pub(super) rounding: F64x4,
+    /// Largest demonstrated range of each DoF, of stationary ones a small share of the others'.
+    pub(super) range: F64x4,
 }
 
 impl Group {
     /// Returns the groups of DoFs with the given ranges.
     pub(super) fn all(ranges: &[f64]) -> Vec<Self> {
         let min_range = F64x4::splat(MIN_RANGE_RATIO * largest_range(ranges));
-        let group = |range: &F64x4| Self { min_tolerance: range.max(min_range) * SETTLING_RATIO, ..Self::default() };
+        let group = |range: &F64x4| Self { range: range.max(min_range), ..Self::default() };
         pack(ranges).iter().map(group).collect()
     }
 }

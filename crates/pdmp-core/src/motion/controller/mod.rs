@@ -17,6 +17,7 @@ mod getters;
 mod goal;
 mod group;
 mod setters;
+mod settling;
 mod step;
 
 use std::sync::Arc;
@@ -39,8 +40,9 @@ use group::Group;
 
 /// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
-/// Tolerance of a settled movement, relative to the range of each DoF.
-const SETTLING_RATIO: f64 = 1e-3;
+/// Default tolerance of a settled movement, relative to the range of each DoF. On the recordings of `docs/transport.md`,
+/// movements that end in motion settle to it at 1.0 to 1.35 durations (median of a set), to 1e-3 at up to 1.5.
+const DEFAULT_TOLERANCE: f64 = 5e-3;
 /// Flush level, relative to the largest range: values 1e-16 of it become zero. It lies far below the last digit of every
 /// movement, and its square is a normal number.
 const FLUSH_RATIO: f64 = 1e-150;
@@ -50,7 +52,7 @@ const FLUSH_RATIO: f64 = 1e-150;
 pub enum Status {
     /// In progress. A rhythmic movement never finishes.
     Working,
-    /// Past the demonstrated end, with position and velocity settled on the goal.
+    /// Past the demonstrated end, with position and velocity settled on the goal; see [`Controller::set_tolerance`].
     Finished,
 }
 
@@ -97,6 +99,8 @@ pub struct Controller {
     amplitude: CommandFilter,
     /// Factor of the rate 1/τ.
     speed: f64,
+    /// Tolerance of a settled movement, relative to the range of each DoF.
+    tolerance: f64,
     groups: Vec<Group>,
     /// Phase rate κ for which w′ of the groups was computed.
     forcing_phase_rate: f64,
@@ -166,6 +170,7 @@ impl Controller {
             min_durations: MinDurations::new(primitive.attractor(), transition / primitive.tau()),
             amplitude: CommandFilter::new(&[conditions.amplitude]),
             speed: 1.0,
+            tolerance: DEFAULT_TOLERANCE,
             groups,
             forcing_phase_rate: 1.0,
             frame_lag: 0.0,
@@ -240,7 +245,7 @@ impl Controller {
         if self.conditions.has_goal_velocity {
             self.start_goal_transition();
         }
-        self.set_tolerance();
+        self.update_lengths();
         self.read_out();
     }
 
@@ -282,7 +287,7 @@ impl Controller {
         self.check_tick_length(self.dt, None)?;
         let h = self.clock_step(self.dt);
         if self.perturbation.has_measurement() {
-            self.perturbation.set(&Command::default(), &self.position, self.dt, h);
+            self.perturbation.set(&Command::default(), &self.position, self.dt, h, self.started);
         } else {
             self.perturbation.clear_terms();
         }
@@ -341,6 +346,7 @@ impl Controller {
     /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
     /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
     /// # use pdmp_core::Command;
+    /// controller.step()?;
     /// let measured = [0.0, 0.01];
     /// controller.step_with(&Command { measured: Some(&measured), ..Command::default() })?;
     /// assert!(controller.position()[1] > 0.0);
@@ -360,7 +366,7 @@ impl Controller {
             return Ok(self.status);
         }
         let h = self.clock_step(dt);
-        self.perturbation.set(command, &self.position, dt, h);
+        self.perturbation.set(command, &self.position, dt, h, self.started);
         Ok(self.tick(dt, h))
     }
 }

@@ -1,6 +1,6 @@
 //! Commands between ticks. A rejected command leaves the last valid one in force.
 
-use super::{Controller, SETTLING_RATIO, Status};
+use super::{Controller, Status};
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
 use crate::motion::perturbation::Compliance;
@@ -136,6 +136,36 @@ impl Controller {
         Ok(())
     }
 
+    /// Sets the tolerance of a settled movement, 0.005 by default, relative to the larger of two lengths of each DoF: its
+    /// largest demonstrated range, and its distance from the goal when this was last commanded.
+    ///
+    /// Past the demonstrated end a movement is [`Status::Finished`] when it is within the tolerance of its goal and will stay
+    /// there. The tolerance remains in force after [`Controller::reset`].
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Status, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+    /// controller.set_tolerance(1e-6)?;
+    /// while controller.step()? == Status::Working {}
+    /// assert!((controller.position()[0] - controller.centre()[0]).abs() <= 1e-6 * model.ranges()[0]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A tolerance outside (0, 1]. It then remains unchanged.
+    pub fn set_tolerance(&mut self, tolerance: f64) -> Result<()> {
+        if !(tolerance > 0.0 && tolerance <= 1.0) {
+            let allowed = "must be positive and at most 1, the range of the demonstrations";
+            return Err(Error::Range { name: "tolerance", value: tolerance, allowed });
+        }
+        self.tolerance = tolerance;
+        Ok(())
+    }
+
     /// Sets the gains of a measured position: k_s of phase stopping, and k_t of tracking, per unit of the clock.
     ///
     /// By default k_s = 1000, so that an error of a tenth of the range slows the phase elevenfold, and k_t = 10 divided by
@@ -150,9 +180,10 @@ impl Controller {
     /// use pdmp_core::motion::Compliance;
     ///
     /// controller.set_compliance(Compliance { stopping: 1e6, tracking: 0.0 })?;
-    /// let measured = [1.0, 0.0];
+    /// controller.step()?;
+    /// let (phase, measured) = (controller.phase(), [1.0, 0.0]);
     /// controller.step_with(&Command { measured: Some(&measured), ..Command::default() })?;
-    /// assert!(controller.phase() > 0.9999);
+    /// assert!(phase - controller.phase() < 1e-6);
     /// controller.release();
     /// # Ok(())
     /// # }
@@ -197,7 +228,7 @@ impl Controller {
             } else {
                 self.centre.set_target(centre, &gains);
             }
-            self.set_tolerance();
+            self.update_lengths();
             changed = true;
         }
         if let Some(velocity) = command.goal_velocity
@@ -231,15 +262,6 @@ impl Controller {
         // The velocity at the end depends on style and τ.
         if goal_changed || self.approaches_goal_velocity() {
             self.start_goal_transition();
-        }
-    }
-
-    /// Sets the tolerance of settling to a share of the present distance from the goal, at least to its rounding error.
-    pub(super) fn set_tolerance(&mut self) {
-        let distances = self.centre.target().iter().zip(&self.position);
-        for (group, (&centre, &position)) in self.groups.iter_mut().zip(distances) {
-            let rounding = centre.abs().max(position.abs()) * (8.0 * f64::EPSILON);
-            group.tolerance = group.min_tolerance.max(((centre - position).abs() * SETTLING_RATIO).max(rounding));
         }
     }
 }

@@ -337,35 +337,6 @@ impl Controller {
             }
         }
     }
-
-    /// Returns [`Status::Finished`] past the end if the remaining displacement of every DoF is within its tolerance.
-    ///
-    /// The displacement is bounded by about |y − g| + 2|z + w|/α_z + |w|/β_z: distance from the goal, overshoot at critical
-    /// damping, and forcing, the larger of those of the present and the commanded style. The remaining displacement of the
-    /// goal is added.
-    fn settled(&self) -> Status {
-        let fade = self.primitive.forcing_table().fade(self.clock.value());
-        let Some(fade) = fade.filter(|_| !self.goal_transition.is_active()) else { return Status::Working };
-        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
-        let (forcing_table, target) =
-            (self.primitive.forcing_table(), unpack(self.style.target(), self.primitive.n_styles()));
-        let table_index = forcing_table.index(self.clock.value());
-        let settled = self.groups.iter().enumerate().all(|(index, group)| {
-            let distance = (self.position[index] - self.centre.target()[index]).abs();
-            let ForcingSample { value, slope, .. } = group.forcing;
-            let overshoot = (group.z + value * fade.r).abs() * (2.0 / alpha_z);
-            let mut residual = fade.residual(CubicSample { value, slope });
-            if !self.style.is_settled() {
-                residual = residual.max(fade.residual(forcing_table.sample(table_index, index, target)));
-            }
-            let bound = distance
-                + overshoot
-                + residual * (1.0 / beta_z)
-                + self.command_gains.max_displacement(&self.centre, index);
-            bound.simd_le(group.tolerance).all()
-        });
-        if settled { Status::Finished } else { Status::Working }
-    }
 }
 
 /// Returns the first command of a filter, or its only one.
