@@ -13,7 +13,7 @@ use pdmp_core::learning::regression::{Basis, NGnet};
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::batch;
 use pdmp_core::motion::jacobian;
-use pdmp_core::motion::{BatchConditions, TimeGrid, WithRespectTo};
+use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, WithRespectTo};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, FitOptions, Model, fit};
@@ -32,7 +32,7 @@ fn rollouts(criterion: &mut Criterion) {
     for n_styles in [3, 35] {
         let model = learn(n_styles);
         let styles = Array2::from_shape_fn((1000, n_styles), |(b, j)| (b + j) as f64 / 1000.0);
-        let conditions = BatchConditions { styles, ..BatchConditions::default() };
+        let conditions = BatchConditions { style: Some(PerMovement::Each(styles)), ..BatchConditions::default() };
         let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(())).expect("a batch");
         let mut outputs = [(); 2].map(|()| Array3::zeros(batch.shape()));
         for n_threads in [1, 2] {

@@ -63,7 +63,7 @@ def test_blend_rejects_unequal_lengths_and_shares_that_are_not_finite() -> None:
 
 def test_blend_rejects_a_condition_that_one_lacks() -> None:
     """A condition that only one of the two has is named."""
-    with pytest.raises(ValueError, match="goal: given for one of the two only"):
+    with pytest.raises(ValueError, match="goal: given for some of the conditions only"):
         pdmp.blend(pdmp.Conditions(style=[1.0]), pdmp.Conditions(style=[1.0], goal=[0.0]), 0.5)
 
 

@@ -31,7 +31,7 @@ def pydmps_rollout() -> Begin:
 def pdmp_rollouts() -> Begin:
     """Computes rollouts of many styles, with velocities."""
     styles = np.random.default_rng(0).normal(size=(N_ROLLOUTS, N_STYLES))
-    return lambda: partial(primitive().rollouts, styles, dt=DT, threads=1)
+    return lambda: partial(primitive().rollouts, style=styles, dt=DT, threads=1)
 
 
 def mp_pytorch_rollouts(kind: str) -> Begin:

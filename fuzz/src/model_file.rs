@@ -7,7 +7,7 @@ use std::sync::{Arc, LazyLock};
 
 use ndarray::Array2;
 use pdmp_core::model::Derivative;
-use pdmp_core::motion::{BatchConditions, TimeGrid, WithRespectTo};
+use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, WithRespectTo};
 use pdmp_core::motion::{PredictionBand, prediction_band};
 use pdmp_core::motion::{batch, jacobian};
 use pdmp_core::numerics::Threads;
@@ -281,10 +281,13 @@ fn exercise(model: &Arc<Model>) {
         assert_finite("Jacobian", &jacobian);
     }
     let styles = Array2::zeros((2, model.n_styles()));
-    let conditions = BatchConditions { styles, ..Default::default() };
+    let conditions = BatchConditions { style: Some(PerMovement::Each(styles)), ..Default::default() };
     let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(()));
-    let outputs = batch.and_then(|batch| batch.rollouts(0..2, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(())));
-    outputs.iter().flatten().for_each(|output| assert_finite("batch", output));
+    if let Ok(trajectories) =
+        batch.and_then(|batch| batch.rollouts(0..2, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(())))
+    {
+        trajectories.iter().for_each(|output| assert_finite("batch", output));
+    }
     control(model);
     let demonstrated = model.demonstrated();
     let (Some(map), Some(contexts)) = (model.map(), &demonstrated.contexts) else { return };

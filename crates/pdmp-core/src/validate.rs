@@ -113,3 +113,17 @@ pub(crate) fn check_duration(value: f64) -> Result<()> {
     let allowed = "seconds from start to end must lie between 1e-9 and 1e9; check dt or time";
     check_range("duration", value, (1e-9..=1e9).contains(&value), allowed)
 }
+
+/// Maximum length of the name of a DoF or context column, or of a unit, in bytes: it bounds the header of a model file.
+pub(crate) const MAX_NAME_LENGTH: usize = 1000;
+
+/// Checks the number of names, that they differ, and their lengths.
+pub(crate) fn check_names(name: &'static str, names: &[String], expected: usize, per: &'static str) -> Result<()> {
+    if names.len() != expected {
+        return Err(Error::Length { name, expected, found: names.len(), per });
+    }
+    if names.iter().enumerate().any(|(k, own)| names[..k].contains(own) || own.len() > MAX_NAME_LENGTH) {
+        return Err(Error::Argument { name, problem: "must differ from each other and have at most 1000 bytes each" });
+    }
+    Ok(())
+}

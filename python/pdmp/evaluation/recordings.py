@@ -105,7 +105,7 @@ def recordings(
 ) -> Recordings:
     """Checks demonstrations and contexts, and resamples each over normalised time."""
     if kind not in ("discrete", "rhythmic"):
-        raise value_error(f'kind = "{kind}": must be "discrete" or "rhythmic"')
+        raise value_error(f'kind = {kind!r}: must be "discrete" or "rhythmic"')
     if n_samples < 4:
         raise value_error(f"n_samples = {n_samples}: must be at least 4")
     if isinstance(demos, (Demonstration, Trajectory)):
@@ -155,7 +155,7 @@ def _resample(
 ) -> tuple[float, Array]:
     """Returns the duration [s] and the linearly interpolated positions (C, D)."""
     if demo.time is None:
-        raise value_error(f"demo {m}: no sampling interval: pass dt= in seconds")
+        raise value_error(f"demo {m}: dt is missing: pass the sampling interval in seconds")
     time = demo.time - demo.time[0]
     duration, cycle = float(time[-1]), None
     if kind == "rhythmic":

@@ -48,7 +48,9 @@ impl ContextColumn {
             (Self::Label(labels), ContextValue::Number(number)) => {
                 Err(unknown_label(column, number.to_string(), labels))
             }
-            (Self::Number, ContextValue::Label(label)) => Err(Error::NoNumber { column, label: label.clone() }),
+            (Self::Number, ContextValue::Label(label)) => {
+                Err(Error::NoNumber { column, name: None, label: label.clone() })
+            }
         }
     }
 
@@ -74,13 +76,13 @@ impl ContextColumn {
 }
 
 fn unknown_label(column: usize, value: String, labels: &[String]) -> Error {
-    Error::Label { column, value, known: labels.join(", ") }
+    Error::Label { column, name: None, value, known: labels.join(", ") }
 }
 
 /// Returns the column types (Q,) of contexts and the contexts as numbers (M, Q), with labels as their indices.
 pub(crate) fn tabulate(contexts: &[&[ContextValue]]) -> Result<(Vec<ContextColumn>, Array2<f64>)> {
     if contexts.is_empty() {
-        return Err(Error::Arguments("contexts is empty: pass one row per movement"));
+        return Err(Error::Argument { name: "contexts", problem: "is empty: pass one row per movement" });
     }
     let width = contexts.iter().map(|context| context.len()).find(|&width| width > 0).unwrap_or(0);
     let per = "context value, as in the other demonstrations";

@@ -9,6 +9,7 @@ mod encoding;
 mod kernel;
 mod kriging;
 mod model_selection;
+mod names;
 mod outputs;
 mod principal_axes;
 mod stacking;
@@ -66,6 +67,8 @@ const MIN_DEGREES_OF_FREEDOM: usize = 2;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContextMap {
     columns: Vec<ContextColumn>,
+    /// Names of the columns (Q,); empty where unknown.
+    names: Vec<String>,
     encoder: Encoder,
     axes: PrincipalAxes,
     /// Parameters of the components, to which all following fields refer too.
@@ -205,6 +208,7 @@ impl ContextMap {
             mean: data.means.mean_axis(Axis(0)).unwrap_or_default(),
             within: data.within.map(|(within, _)| within * (1.0 - data.averaged_share)),
             columns: data.columns,
+            names: Vec::new(),
             encoder: data.encoder,
             axes,
             parameters: MapParameters {
@@ -272,7 +276,7 @@ impl ContextMap {
     /// A context of another length, an unknown label, a number that is not finite, or a prediction that overflows.
     pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<ContextPrediction> {
         let context: Vec<ContextValue> = context.iter().cloned().map(Into::into).collect();
-        let context = to_numbers(&self.columns, &context)?;
+        let context = to_numbers(&self.columns, &context).map_err(|error| self.with_column_name(error))?;
         let features = self.encoder.features(&context);
         let extrapolation = self.encoder.extrapolation(&context);
         let (components, deviations) = self.components(&features, &extrapolation);

@@ -40,3 +40,15 @@ impl fmt::Display for Number {
         if self.0.fract() == 0.0 && self.0.abs() < 1e9 { write!(f, "{}", self.0) } else { write!(f, "{:?}", self.0) }
     }
 }
+
+/// Index of a context column, or its name.
+pub(super) struct Column<'a>(pub(super) usize, pub(super) &'a Option<String>);
+
+impl fmt::Display for Column<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.1 {
+            Some(name) => write!(f, "{name:?}"),
+            None => write!(f, "{}", self.0),
+        }
+    }
+}

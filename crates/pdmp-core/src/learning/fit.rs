@@ -17,7 +17,7 @@ use crate::model::primitive::{Parts, Primitive};
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{inspect, unwound};
-use crate::validate::check_length;
+use crate::validate::{check_length, check_names};
 
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
@@ -82,6 +82,10 @@ pub fn fit_with(
     let demos = &*whole;
     let mut aligned = options.alignment().align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
+    if !options.context_names.is_empty() {
+        let n_columns = contexts.as_ref().map_or(0, |(columns, _)| columns.len());
+        check_names("context_names", &options.context_names, n_columns, "context column")?;
+    }
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
     let mut aligning = |share| progress(Stage::Align, share);
@@ -139,6 +143,7 @@ pub fn fit_with(
             let outputs = demonstrated.outputs(canonical.kind());
             let metric = metric(&primitive, outputs.view(), demonstrated.segment_durations.view())?;
             let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
+            let map = map.with_names(options.context_names.clone())?;
             (Some(map), Some(residual_variance(&primitive, outputs.view(), aligned)?))
         }
         _ => (None, None),
@@ -222,9 +227,10 @@ impl Training<'_> {
             }
             NStyles::Truncated(count) => Factors::of(forcing, count, progress),
             NStyles::CrossValidated => {
-                let (columns, numbers) = contexts.ok_or(Error::Arguments(
-                    "cross-validation of the number of styles needs contexts: pass contexts, or a number of styles",
-                ))?;
+                let (columns, numbers) = contexts.ok_or(Error::Argument {
+                    name: "n_styles",
+                    problem: "needs contexts for cross-validation: pass contexts, or a number of styles",
+                })?;
                 let all = Factors::of(forcing, Truncation::Share(1.0), &mut |share| progress(0.5 * share))?;
                 let selection =
                     StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical);
@@ -265,8 +271,8 @@ fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> 
 /// Returns names and units of the DoFs; defaults where no demonstration carries any.
 fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
     let n_dofs = demos.first().map_or(0, Demonstration::n_dofs);
-    let names = common_labels(demos, Demonstration::names, "names differ from those of the other demonstrations")?;
-    let units = common_labels(demos, Demonstration::units, "units differ from those of the other demonstrations")?;
+    let names = common_labels(demos, Demonstration::names, "names")?;
+    let units = common_labels(demos, Demonstration::units, "units")?;
     Ok((
         names.unwrap_or_else(|| (0..n_dofs).map(|d| format!("y{d}")).collect()),
         units.unwrap_or_else(|| vec![String::new(); n_dofs]),
@@ -277,11 +283,11 @@ fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
 fn common_labels(
     demos: &[Demonstration],
     labels: impl Fn(&Demonstration) -> Option<&[String]>,
-    conflict: &'static str,
+    name: &'static str,
 ) -> Result<Option<Vec<String>>> {
     let Some(first) = demos.iter().find_map(&labels) else { return Ok(None) };
     match demos.iter().position(|demo| labels(demo).is_some_and(|other| other != first)) {
-        Some(m) => Err(Error::Arguments(conflict).in_demo(m)),
+        Some(m) => Err(Error::Argument { name, problem: "differ from those of the other demonstrations" }.in_demo(m)),
         None => Ok(Some(first.to_vec())),
     }
 }

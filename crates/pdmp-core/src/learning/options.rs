@@ -129,6 +129,8 @@ pub struct FitOptions {
     pub time_scaling: TimeScaling,
     /// Contexts of the demonstrations (M rows of Q); otherwise those that they carry.
     pub contexts: Option<Vec<Vec<ContextValue>>>,
+    /// Names of the context columns (Q,); empty where unknown.
+    pub context_names: Vec<String>,
     /// Map from contexts to movements.
     pub map: MapSelection,
     /// Style dimension J.
@@ -157,6 +159,7 @@ impl FitOptions {
             n_samples: None,
             time_scaling: TimeScaling::Linear,
             contexts: None,
+            context_names: Vec::new(),
             map: MapSelection::Auto,
             n_styles: NStyles::AboveNoise,
             basis: Basis::Gp(Gp::default()),
@@ -195,6 +198,11 @@ impl FitOptions {
     /// Sets the contexts of the demonstrations (M rows of Q).
     pub fn contexts(self, contexts: Vec<Vec<ContextValue>>) -> Self {
         Self { contexts: Some(contexts), ..self }
+    }
+
+    /// Sets the names of the context columns (Q,).
+    pub fn context_names(self, context_names: Vec<String>) -> Self {
+        Self { context_names, ..self }
     }
 
     /// Sets the map from contexts to movements.

@@ -157,9 +157,10 @@ impl Conditions {
     pub fn time_constant(&self, primitive: &Primitive) -> Result<f64> {
         let tau = match (self.tau, &self.segment_durations) {
             (Some(_), Some(_)) => {
-                return Err(Error::Arguments(
-                    "pass tau or segment_durations, not both: segment durations add up to the duration",
-                ));
+                return Err(Error::Conflict {
+                    names: ["tau", "segment_durations"],
+                    reason: "segment durations add up to the duration",
+                });
             }
             (None, Some(segment_durations)) => {
                 primitive.check_segment_durations(segment_durations)?;
@@ -216,9 +217,10 @@ pub(crate) fn reject_goal_velocity(primitive: &Primitive, given: bool) -> Result
     let kind = primitive.kind();
     reject_for_kind(kind, "goal_velocity", kind == Kind::Rhythmic && given)?;
     if given && primitive.transport.is_immediate() {
-        return Err(Error::Arguments(
-            "goal_velocity needs learnt transport: immediate transport ends with the velocity of the demonstrations",
-        ));
+        return Err(Error::Argument {
+            name: "goal_velocity",
+            problem: "needs learnt transport: immediate transport ends with the velocity of the demonstrations",
+        });
     }
     Ok(())
 }

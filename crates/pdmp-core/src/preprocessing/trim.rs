@@ -76,7 +76,7 @@ pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
     let surely_moves = |speed: &f64| moves(speed, certain_speed);
     let (Some(first), Some(last)) = (speeds.iter().position(surely_moves), speeds.iter().rposition(surely_moves))
     else {
-        return Err(Error::Arguments("the recording stands still: there is no movement to trim it to"));
+        return Err(Error::Still { consequence: "there is no movement to trim it to" });
     };
     let first = speeds[..first].iter().rposition(|v| !moves(v, min_speed)).map_or(0, |rest| rest + 1);
     let last = speeds[last..].iter().position(|v| !moves(v, min_speed)).map_or(speeds.len(), |rest| last + rest) - 1;

@@ -22,9 +22,10 @@ impl Aligned<'_> {
     pub(super) fn register(&mut self, landmarks: ArrayView2<f64>) -> Result<()> {
         check_length("landmarks", landmarks.nrows(), self.n_demos(), "demonstration")?;
         if landmarks.ncols() == 0 {
-            return Err(Error::Arguments(
-                "landmarks has no columns: pass their times (M, E) in seconds, with E of at least 1",
-            ));
+            return Err(Error::Argument {
+                name: "landmarks",
+                problem: "has no columns: pass their times (M, E) in seconds, with E of at least 1",
+            });
         }
         let mut segment_durations = Array2::zeros((landmarks.nrows(), landmarks.ncols() + 1));
         for (m, (row, mut segment_durations)) in

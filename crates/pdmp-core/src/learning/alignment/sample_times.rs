@@ -43,12 +43,16 @@ impl<'a> Clock<'a> {
                 even(dt)
             }
             (Sampling::Unknown, None) => {
-                return Err(Error::Arguments(
-                    "no sampling interval: pass dt in seconds, or demonstrations with time stamps",
-                ));
+                return Err(Error::Argument {
+                    name: "dt",
+                    problem: "is missing: pass the sampling interval in seconds, or demonstrations with time stamps",
+                });
             }
             (Sampling::Stamped { .. }, _) if alignment.kind == Kind::Rhythmic && period.is_none() => {
-                return Err(Error::Arguments("a time-stamped cycle has no known period: pass period in seconds"));
+                return Err(Error::Argument {
+                    name: "period",
+                    problem: "is missing: pass it in seconds for a cycle with time stamps",
+                });
             }
             (Sampling::Stamped { time }, _) => {
                 let duration = time[n - 1] - time[0];

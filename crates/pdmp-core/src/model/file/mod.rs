@@ -73,6 +73,9 @@ struct Constants {
 #[serde(deny_unknown_fields)]
 struct Map {
     columns: Vec<ContextColumn>,
+    /// Names of the columns; absent where unknown.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    names: Vec<String>,
     kind: ContextMapKind,
     kernel: Option<Kernel>,
     errors: Vec<(ContextMapKind, Option<f64>)>,

@@ -218,7 +218,9 @@ impl Reader<'_> {
             _ => None,
         };
         let parameters = MapParameters { kind: map.kind, kernel: map.kernel, ratios, line, errors };
-        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), directions, parameters).map_err(unreadable)
+        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), directions, parameters)
+            .and_then(|restored| restored.with_names(map.names.clone()))
+            .map_err(unreadable)
     }
 
     /// Returns the line of a stacked map: its signal-to-noise ratios (P,) and the stacking weights.

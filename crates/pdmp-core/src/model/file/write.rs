@@ -116,6 +116,6 @@ impl Map {
         let MapParameters { kind, kernel, errors, .. } = map.parameters();
         // JSON has no infinity, the error of a map that no other contexts can predict.
         let errors = errors.iter().map(|&(kind, error)| (kind, error.is_finite().then_some(error))).collect();
-        Self { columns: map.columns().to_vec(), kind: *kind, kernel: *kernel, errors }
+        Self { columns: map.columns().to_vec(), names: map.names().to_vec(), kind: *kind, kernel: *kernel, errors }
     }
 }

@@ -16,7 +16,7 @@ use ndarray::{Array2, ArrayView2};
 
 pub use self::kernel::Kernel;
 use self::likelihood::{Gradient, Likelihood, Profile};
-pub use self::posterior::GpPosterior;
+pub use self::posterior::{GpPosterior, GpPrediction};
 use self::state_space::StateSpace;
 use super::hyperparameter_search::{Axis, maximise};
 use super::{Domain, magnitude};

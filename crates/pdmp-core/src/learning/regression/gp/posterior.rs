@@ -12,12 +12,12 @@ use crate::learning::regression::Regression;
 ///
 /// ```
 /// # use ndarray::array;
-/// use pdmp_core::learning::regression::{Domain, Gp};
+/// use pdmp_core::learning::regression::{Domain, Gp, GpPrediction};
 ///
 /// let gp = Gp { length: Some(0.5), noise: Some(1e-6), ..Gp::default() };
 /// let targets = array![[0.0], [1.0], [0.0]];
 /// let posterior = gp.regress(Domain::Interval { end: 1.0 }, &[0.0, 0.5, 1.0], targets.view(), &mut |_| Ok(()))?;
-/// let (mean, variance) = posterior.predict(&[0.5]);
+/// let GpPrediction { mean, variance } = posterior.predict(&[0.5]);
 /// assert!((mean[[0, 0]] - 1.0).abs() < 1e-3 && variance[[0, 0]] < 1e-3);
 /// # Ok::<(), pdmp_core::Error>(())
 /// ```
@@ -32,6 +32,15 @@ pub struct GpPosterior {
     /// Signal standard deviation σ̂, in the unit of the outputs.
     pub(super) deviation: f64,
     pub(super) log_likelihood: f64,
+}
+
+/// Mean and variance of the noise-free outputs of a Gaussian process.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GpPrediction {
+    /// Means (n, outputs), in the unit of the outputs.
+    pub mean: Array2<f64>,
+    /// Variances (n, outputs), in the squared unit of the outputs.
+    pub variance: Array2<f64>,
 }
 
 /// Posterior of the outputs as functions of the clock.
@@ -72,7 +81,7 @@ impl GpPosterior {
     /// Returns mean kᵀK⁻¹f and variance σ̂²(1 − kᵀK⁻¹k) of the noise-free outputs at `u` (n,), each (n, outputs).
     ///
     /// The variance is the same for every output. A point costs O(ln C + P).
-    pub fn predict(&self, u: &[f64]) -> (Array2<f64>, Array2<f64>) {
+    pub fn predict(&self, u: &[f64]) -> GpPrediction {
         let shape = (u.len(), self.n_outputs);
         let (mut mean, mut variance) = (Array2::zeros(shape), Array2::zeros(shape));
         let (mut value, mut slope) = (vec![0.0; self.n_outputs], vec![0.0; self.n_outputs]);
@@ -81,7 +90,7 @@ impl GpPosterior {
             mean.row_mut(row).assign(&ndarray::aview1(&value));
             variance.row_mut(row).fill(self.deviation * self.function.variance(u) * self.deviation);
         }
-        (mean, variance)
+        GpPrediction { mean, variance }
     }
 }
 
