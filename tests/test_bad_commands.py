@@ -69,7 +69,10 @@ RHYTHMIC: list[tuple[dict[str, Any], str]] = [
     ({"goal_velocity": [0, 0]}, "goal_velocity does not apply to a rhythmic primitive"),
     ({"amplitude": -1.0}, "amplitude = -1: must lie between 0, which is rest, and 1e150"),
     ({"amplitude": NAN}, "amplitude = NaN"),
-    ({"context": [1]}, "the model has no context map: fit it with contexts="),
+    (
+        {"context": [1]},
+        "context does not apply: the model has no context map; fit it with contexts",
+    ),
 ]
 
 
@@ -131,7 +134,7 @@ def test_impossible_transitions_are_rejected(discrete: pdmp.Model, transition: f
 
 def outputs(model: pdmp.Model) -> tuple[np.ndarray, np.ndarray]:
     """Returns output arrays for the rollouts of a model's styles at 0.1 s."""
-    shape = model.rollouts(model.styles, dt=0.1)[0].shape
+    shape = model.rollouts(style=model.styles, dt=0.1)[0].shape
     return np.zeros(shape), np.zeros(shape)
 
 
@@ -141,7 +144,7 @@ def test_outputs_of_another_shape_are_rejected_before_anything_is_written(
     """The error states both shapes, and neither array is changed."""
     positions, velocities = outputs(discrete)
     with pytest.raises(ValueError, match=r"out: shape \[5, 12, 2\]; expected .* \[5, 13, 2\]"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
+        discrete.rollouts(style=discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
     assert not positions.any()
 
 
@@ -149,7 +152,9 @@ def test_outputs_of_another_type_are_rejected(discrete: pdmp.Model) -> None:
     """Only float64 can be written in place, as the error states."""
     positions, velocities = outputs(discrete)
     with pytest.raises(ValueError, match="out.*float64"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions.astype(np.float32), velocities))
+        discrete.rollouts(
+            style=discrete.styles, dt=0.1, out=(positions.astype(np.float32), velocities)
+        )
 
 
 def test_read_only_outputs_are_rejected(discrete: pdmp.Model) -> None:
@@ -157,7 +162,7 @@ def test_read_only_outputs_are_rejected(discrete: pdmp.Model) -> None:
     positions, velocities = outputs(discrete)
     velocities.setflags(write=False)
     with pytest.raises(ValueError, match="out.* not writeable"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities))
+        discrete.rollouts(style=discrete.styles, dt=0.1, out=(positions, velocities))
     assert not velocities.any()
 
 

@@ -351,8 +351,8 @@ def test_numbers_of_recordings_are_reported(
     ("arguments", "message"),
     [
         (["--kind", "rhythmic", "--transport", "learnt"], "--transport does not apply to"),
-        (["--kind", "rhythmic"], "a time-stamped cycle has no known period: pass --period in"),
-        (["--styles", "auto"], "needs contexts: pass --context, or a number"),
+        (["--kind", "rhythmic"], "demo 0: --period is missing: pass it in seconds"),
+        (["--styles", "auto"], "--styles needs contexts for cross-validation: pass --context, or"),
         (["--styles", "9"], "--styles = 9: must lie between 1 and 5"),
     ],
 )

@@ -216,23 +216,20 @@ def test_batch_with_unusual_arguments_is_finite_or_rejected(
     model = request.getfixturevalue(FIXTURES[kind])
     tally = Tally()
     three = arrays.arrays(np.float64, (3, 2), elements=st.floats(-2, 2))
-    plural = {"goal": "goals", "anchor": "anchors", "start": "starts", "velocity": "velocities"}
-    several = {plural.get(name, name): pair for name, pair in moves(kind).items()}
-    del several["goal_velocity"]
 
     @QUICK
     @given(
         mostly(
-            styles=(three, ODD),
+            style=(three, ODD),
             duration=(SHORT, SPANS),
             derivatives=(st.integers(0, 2), COUNTS),
             threads=(st.integers(1, 3), COUNTS),
             out=(None, ODD),
-            **several,
+            **moves(kind),
         )
     )
     def rolls_out(arguments: dict[str, Any]) -> None:
-        batch = {"styles": np.ones((3, 2))} | arguments
+        batch = {"style": np.ones((3, 2))} | arguments
         for values in tally.attempt(model.rollouts, **batch) or ():
             assert np.isfinite(values).all()
 

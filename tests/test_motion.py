@@ -207,10 +207,10 @@ def test_missing_files_are_missing_files(tmp_path: Path) -> None:
 
 def test_batch_is_written_in_place(model: pdmp.Model) -> None:
     """With `out`, positions and velocities are written into given arrays, strided ones too."""
-    expected = model.rollouts(model.styles, dt=0.05)
+    expected = model.rollouts(style=model.styles, dt=0.05)
     shape = expected[0].shape
     out = np.full(shape, np.nan), np.full((*shape[:2], 4), np.nan)[:, :, ::2]
-    returned = model.rollouts(model.styles, dt=0.05, out=out)
+    returned = model.rollouts(style=model.styles, dt=0.05, out=out)
     for mine, theirs, result in zip(out, returned, expected, strict=True):
         assert theirs is mine
         np.testing.assert_array_equal(mine, result)
@@ -218,7 +218,7 @@ def test_batch_is_written_in_place(model: pdmp.Model) -> None:
 
 def test_batch_is_the_rollouts_one_by_one(model: pdmp.Model) -> None:
     """Row b of a batch is the rollout of style b."""
-    positions, velocities = model.rollouts(model.styles, dt=0.05, tau=1.5 * model.tau)
+    positions, velocities = model.rollouts(style=model.styles, dt=0.05, tau=1.5 * model.tau)
     for style, position, velocity in zip(model.styles, positions, velocities, strict=True):
         single = model.rollout(style=style, dt=0.05, tau=1.5 * model.tau)
         np.testing.assert_allclose(position, single.position, atol=1e-12)

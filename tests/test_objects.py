@@ -161,8 +161,8 @@ def test_frames_are_demonstrations_and_contexts(frame: Callable[..., Any]) -> No
         found = pdmp.evaluate(given, dt=DT, contexts=contexts, predictors={})
         np.testing.assert_array_equal(found.recordings.contexts, scales)
         assert found.recordings.names == ["x", "y"]
-    batch = model.rollouts(frame(model.styles, [f"s{j}" for j in range(model.n_styles)]))
-    np.testing.assert_array_equal(batch[0], model.rollouts(model.styles)[0])
+    batch = model.rollouts(style=frame(model.styles, [f"s{j}" for j in range(model.n_styles)]))
+    np.testing.assert_array_equal(batch[0], model.rollouts(style=model.styles)[0])
 
 
 def test_frames_of_numbers_and_labels_are_contexts() -> None:
@@ -209,7 +209,7 @@ def test_text_is_never_read_as_numbers(text: Any) -> None:
         (lambda: Demonstration(POSITION, dt=DT, goal=text), "goal"),
         (lambda: model.rollout(goal=text), "goal"),
         (lambda: model.rollout(style=text), "style"),
-        (lambda: model.rollouts([text]), "styles"),
+        (lambda: model.rollouts(style=[text]), "style"),
         (lambda: setattr(controller, "goal", text), "goal"),
         (lambda: pdmp.fit(reaches(), dof_scale=text), "dof_scale"),
     ):

@@ -12,7 +12,20 @@ MAX_LINES = 400
 FOREIGN_METHODS = frozenset(
     {
         *("chunks", "clone", "column", "extend", "fill", "filter", "find", "first", "for_each"),
-        *("inverse", "last", "len", "load", "map", "next", "reduce", "row", "rows", "shape", "sum"),
+        *(
+            "inverse",
+            "iter",
+            "last",
+            "len",
+            "load",
+            "map",
+            "next",
+            "reduce",
+            "row",
+            "rows",
+            "shape",
+            "sum",
+        ),
         *("try_for_each", "update", "write"),
     }
 )

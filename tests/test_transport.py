@@ -197,7 +197,7 @@ def test_profile_does_not_depend_on_the_unit() -> None:
 
 def test_invalid_transport_is_rejected() -> None:
     """Unknown names, negative clocks and rhythmic primitives are rejected."""
-    with pytest.raises(ValueError, match='transport = "late": must be "learnt" or "immediate"'):
+    with pytest.raises(ValueError, match='transport = .late.: must be "learnt" or "immediate"'):
         pdmp.fit(reaches(), transport="late")  # type: ignore[arg-type]
     model = straight()
     for u in (-0.1, np.nan, np.inf):

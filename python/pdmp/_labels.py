@@ -24,6 +24,11 @@ def split_label(field: str) -> tuple[str, str]:
     return (match[1], match[2].strip()) if match else (field.strip(), "")
 
 
+def join_label(name: str, unit: str) -> str:
+    """Returns a name with its unit, which `split_label` splits again."""
+    return f"{name} [{unit}]" if unit else name
+
+
 def name_list(argument: str, names: Sequence[str]) -> list[str]:
     """Returns names as a list; rejects a single text, which would become a list of letters."""
     if isinstance(names, str):

@@ -24,6 +24,11 @@ def value_error(message: str) -> ValueError:
     return ValueError(printable(message))
 
 
+def counted(number: int, name: str) -> str:
+    """Returns a number of things with their name, in the singular or plural."""
+    return f"{number} {name}{'s' * (number != 1)}"
+
+
 def quoted(value: object) -> str:
     """Returns a value as text for a message, in one line and shortened."""
     text = printable(" ".join(repr(value).split()))

@@ -14,8 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Map: TypeAlias = Literal["auto", "stacked", "gp", "linear", "polynomial"]
-_Context: TypeAlias = ArrayLike | Sequence[float | str]
-_Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
+_Context: TypeAlias = ArrayLike | Sequence[float | str] | Mapping[str, float | str]
+_Contexts: TypeAlias = (
+    ArrayLike
+    | Sequence[Sequence[float | str]]
+    | Sequence[Mapping[str, float | str]]
+    | Mapping[str, Sequence[float | str] | ArrayLike]
+)
 _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
 _Kernel: TypeAlias = Literal["matern32", "matern52"]
@@ -106,7 +111,7 @@ class Demonstration:
         dt: float | None = None,
         time: ArrayLike | None = None,  # (T,)
         goal: ArrayLike | None = None,  # (D,)
-        context: _Context | None = None,  # (Q,)
+        context: ArrayLike | Sequence[float | str] | None = None,  # (Q,)
         names: Sequence[str] | None = None,  # D of them
         units: Sequence[str] | None = None,  # D of them
     ) -> Demonstration: ...
@@ -181,8 +186,10 @@ def fit(
         Sampling interval in s of demonstrations without one.
     period : float or array_like, (M,), optional
         Periods in s of time-stamped cycles.
-    contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
-        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
+    contexts : array_like, (M, Q), or M lists of Q numbers and labels, or mapping, optional
+        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
+        keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
+        (M,).
     map : {"auto", "stacked", "gp", "linear", "polynomial"}
         Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
         regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
@@ -691,6 +698,9 @@ class Model:
     def contexts(self) -> _Array | list[list[float | str]] | None:  # (M, Q)
         """Contexts (M, Q) of the demonstrations, an array of numbers or lists with labels; None without contexts."""
     @property
+    def context_names(self) -> list[str] | None:
+        """Names (Q,) of the context columns; None where the contexts had none."""
+    @property
     def map(self) -> ContextMap | None:
         """Map from contexts to style, goal, start or anchor, and duration; None without contexts."""
     @property
@@ -773,42 +783,31 @@ class Model:
         """
     def rollouts(
         self,
-        styles: ArrayLike,  # (B, J)
+        conditions: Conditions | Sequence[Conditions] | None = None,
         *,
-        goals: ArrayLike | None = None,  # (D,) or (B, D), as are starts, velocities and anchors
-        starts: ArrayLike | None = None,
-        velocities: ArrayLike | None = None,
-        anchors: ArrayLike | None = None,
-        amplitude: float | None = None,
-        tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
+        context: _Context | _Contexts | None = None,
         derivatives: int = 1,  # at most 2
         out: Sequence[_Array] | None = None,
         threads: int | None = None,
+        **changes: Unpack[_Changes],  # vectors (n,) or (B, n)
     ) -> tuple[_Array, ...]:  # position and its `derivatives`, each (B, T, D)
-        """Computes the movements of many styles.
+        """Computes the movements of many conditions.
 
         A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
         response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
         to rounding.
 
+        All movements share time constant and amplitude; they follow linear time and start at phase 0.
+
         Parameters
         ----------
-        styles : array_like, (B, J)
-            Style parameters s.
-        goals : array_like, (D,) or (B, D), optional
-            Goals g of all or of each movement, in the unit of each degree of freedom; discrete.
-        starts : array_like, (D,) or (B, D), optional
-            Start positions y₀ of all or of each movement. Rhythmic movements start on their limit cycles by default.
-        velocities : array_like, (D,) or (B, D), optional
-            Start velocities per s of all or of each movement; by default those of the demonstrations.
-        anchors : array_like, (D,) or (B, D), optional
-            Anchors y_a of all or of each movement; rhythmic.
-        amplitude : float, optional
-            Amplitude r₀ of all movements; rhythmic.
-        tau : float, optional
-            Time constant τ of all movements in s.
+        conditions : Conditions, or B Conditions, optional
+            Conditions of all movements, or of each.
+        context : array_like or list, (Q,) or (B, Q), optional
+            Context of all movements, or of each, whose prediction supplies absent conditions. Pass `tau` where the
+            predicted durations differ.
         dt : float
             Interval between samples in s.
         duration : float, optional
@@ -819,6 +818,9 @@ class Model:
             Writable float64 arrays for the results, one per order of derivative.
         threads : int, optional
             Largest number of threads; by default all that the system offers. Results do not depend on it.
+        **changes
+            Single conditions by name, which replace those of `conditions`; see `Conditions`. Style, goal, start,
+            velocity, goal_velocity and anchor may have a leading axis, with one row for each of B movements.
 
         Returns
         -------
@@ -828,48 +830,48 @@ class Model:
         Raises
         ------
         ValueError
-            An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit.
-            Nothing is written then.
+            An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit;
+            leading axes, time constants or amplitudes differ. Nothing is written then.
+        TypeError
+            A keyword is unknown, or `conditions` has another type.
         MemoryError
             The results do not fit into memory; use `rollout_chunks`.
 
         Examples
         --------
-        >>> positions, velocities = model.rollouts(model.styles, dt=0.1)
+        >>> positions, velocities = model.rollouts(style=model.styles, goal=model.goals, dt=0.1)
         >>> positions.shape
         (5, 13, 2)
         """
     def rollout_chunks(
         self,
-        styles: ArrayLike,  # (B, J)
+        conditions: Conditions | Sequence[Conditions] | None = None,
         *,
         size: int = 1000,
-        goals: ArrayLike | None = None,  # (D,) or (B, D), as are starts, velocities and anchors
-        starts: ArrayLike | None = None,
-        velocities: ArrayLike | None = None,
-        anchors: ArrayLike | None = None,
-        amplitude: float | None = None,
-        tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
+        context: _Context | _Contexts | None = None,
         derivatives: int = 1,
         threads: int | None = None,
+        **changes: Unpack[_Changes],
     ) -> RolloutChunks:
-        """Computes the movements of many styles in chunks.
+        """Computes the movements of many conditions in chunks.
 
         Memory holds one chunk at a time. Results equal those of `rollouts` bit for bit. This call checks all arguments.
 
         Parameters
         ----------
-        styles : array_like, (B, J)
-            Style parameters s.
+        conditions : Conditions, or B Conditions, optional
+            As in `rollouts`.
         size : int
             Number of movements in a chunk; the last may have fewer.
-        goals, starts, velocities, anchors : array_like, (D,) or (B, D), optional
+        context : array_like or list, (Q,) or (B, Q), optional
             As in `rollouts`.
-        amplitude, tau, dt, duration : float, optional
+        dt, duration : float, optional
             As in `rollouts`.
         derivatives, threads : int, optional
+            As in `rollouts`.
+        **changes
             As in `rollouts`.
 
         Returns
@@ -881,11 +883,13 @@ class Model:
         ------
         ValueError
             An argument that `rollouts` rejects, or a `size` below 1.
+        TypeError
+            As in `rollouts`.
 
         Examples
         --------
         >>> cost = []
-        >>> for positions, velocities in model.rollout_chunks(model.styles, size=2):
+        >>> for positions, velocities in model.rollout_chunks(style=model.styles, size=2):
         ...     cost.extend((velocities**2).sum(axis=(1, 2)))
         >>> len(cost) == model.n_demos
         True
@@ -1054,8 +1058,8 @@ class Model:
 
         Parameters
         ----------
-        context : array_like or list, (Q,)
-            Numbers and labels, in the units of the demonstrations' contexts.
+        context : array_like, list or mapping, (Q,)
+            Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
 
         Returns
         -------
@@ -1089,8 +1093,8 @@ class Model:
 
         Parameters
         ----------
-        context : array_like or list, (Q,)
-            Numbers and labels, in the units of the demonstrations' contexts.
+        context : array_like, list or mapping, (Q,)
+            Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
         level : float
             Probability in (0, 1) that a position of the new movement lies within its bounds.
         dt : float
@@ -1225,7 +1229,7 @@ class Factors:
 
 class _Changes(TypedDict, total=False):
     style: ArrayLike | None  # (J,)
-    goal: ArrayLike | None  # (D,), as are start, velocities and anchor
+    goal: ArrayLike | None  # (D,), as are start, both velocities and anchor
     start: ArrayLike | None
     velocity: ArrayLike | None
     goal_velocity: ArrayLike | None
@@ -1355,7 +1359,7 @@ def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
     Raises
     ------
     ValueError
-        A condition is given for one of the two only, lengths differ, or `share` is not finite.
+        A condition is given for only one of the two, lengths differ, or `share` is not finite.
 
     Examples
     --------

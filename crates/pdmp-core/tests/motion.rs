@@ -483,7 +483,7 @@ fn context_predicts_its_demonstration() {
     assert!((prediction.duration - REACH.demonstrated().durations[2]).abs() < 0.01);
     let conditions = prediction.conditions;
     assert!((conditions.time_constant(&REACH).unwrap() - prediction.duration).abs() < 1e-12);
-    assert!(matches!(CYCLE.predict(&[0.3]), Err(Error::Arguments(_))));
+    assert!(matches!(CYCLE.predict(&[0.3]), Err(Error::Argument { name: "context", .. })));
     assert!(REACH.predict(&[0.3, 0.1]).is_err() && REACH.predict(&[f64::NAN]).is_err());
 }
 

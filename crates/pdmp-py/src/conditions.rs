@@ -1,8 +1,9 @@
 //! Conditions of a movement, and the conversion of keywords to conditions.
 
 use numpy::PyArray1;
+use pdmp_core::Error;
 use pdmp_core::model::Conditions as Inner;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -189,7 +190,7 @@ impl Conditions {
 /// Raises
 /// ------
 /// ValueError
-///     A condition is given for one of the two only, lengths differ, or `share` is not finite.
+///     A condition is given for only one of the two, lengths differ, or `share` is not finite.
 ///
 /// Examples
 /// --------
@@ -210,19 +211,25 @@ pub(crate) fn conditions_of(
     context: Option<&Bound<'_, PyAny>>,
     changes: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Inner> {
-    let base =
-        conditions.map(|object| instance::conditions("conditions", object).cloned()).transpose()?.unwrap_or_default();
+    let base = match conditions {
+        None => Inner::default(),
+        Some(object) => instance::conditions("conditions", object)?.clone(),
+    };
     let own = changed(base, changes)?;
     let Some(context) = context else { return Ok(own) };
-    if own.style.is_some() {
-        return Err(PyValueError::new_err("pass style or context, not both: the context predicts the style"));
-    }
-    let prediction = model.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+    reject_style(own.style.is_some())?;
+    let prediction = model.predict(&crate::named_contexts::context_for(model, context)?).map_err(raise)?;
     Ok(own.or(prediction.conditions))
 }
 
+/// Rejects a style beside a context.
+pub(crate) fn reject_style(is_present: bool) -> PyResult<()> {
+    let reason = "the context predicts the style";
+    if is_present { Err(raise(Error::Conflict { names: ["style", "context"], reason })) } else { Ok(()) }
+}
+
 /// Returns conditions with the changes of a keyword dictionary.
-fn changed(mut conditions: Inner, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Inner> {
+pub(crate) fn changed(mut conditions: Inner, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Inner> {
     let Some(changes) = changes else { return Ok(conditions) };
     for (name, value) in changes {
         let name: String = name.extract()?;

@@ -73,7 +73,7 @@ impl Demonstration {
             (None, None) => Sampling::Unknown,
         };
         let mut demo =
-            pdmp_core::Demonstration::new(two_axes("position", source.position)?, sampling).map_err(raise)?;
+            pdmp_core::Demonstration::new(two_axes("position", "(T, D)", source.position)?, sampling).map_err(raise)?;
         if let Some(goal) = optional("goal", goal)? {
             demo = demo.with_goal(goal).map_err(raise)?;
         }
@@ -81,13 +81,8 @@ impl Demonstration {
             demo = demo.with_context(crate::convert::context("context", values)?).map_err(raise)?;
         }
         let labels = |name, value: Option<&Bound<'_, PyAny>>| value.map(|value| texts(name, value)).transpose();
-        if let Some(names) = labels("names", names)?.or(source.names) {
-            demo = demo.with_names(names).map_err(raise)?;
-        }
-        if let Some(units) = labels("units", units)?.or(source.units) {
-            demo = demo.with_units(units).map_err(raise)?;
-        }
-        Ok(Self(demo))
+        let (names, units) = (labels("names", names)?.or(source.names), labels("units", units)?.or(source.units));
+        labelled(demo, names, units).map(Self).map_err(raise)
     }
 
     /// Positions (T, D) in the unit of each degree of freedom.
@@ -155,17 +150,13 @@ impl Demonstration {
     }
 
     /// Returns the arguments that rebuild the demonstration.
-    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((Matrix<'py>,), Bound<'py, PyDict>)> {
-        let options = PyDict::new(py);
-        match self.0.sampling() {
-            Sampling::Stamped { .. } => options.set_item("time", self.time(py))?,
-            _ => options.set_item("dt", self.dt())?,
+    fn __getnewargs_ex__<'py>(slf: &Bound<'py, Self>) -> PyResult<((Bound<'py, PyAny>,), Bound<'py, PyDict>)> {
+        let stamped = matches!(slf.get().0.sampling(), Sampling::Stamped { .. });
+        let options = PyDict::new(slf.py());
+        for name in [if stamped { "time" } else { "dt" }, "goal", "context", "names", "units"] {
+            options.set_item(name, slf.getattr(name)?)?;
         }
-        options.set_item("goal", self.goal(py))?;
-        options.set_item("context", self.context(py)?)?;
-        options.set_item("names", self.names())?;
-        options.set_item("units", self.units())?;
-        Ok(((self.position(py),), options))
+        Ok(((slf.getattr("position")?,), options))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -241,15 +232,24 @@ impl Source {
     /// Returns demonstration `m` of a fit.
     pub(crate) fn demonstration(self, m: usize) -> PyResult<pdmp_core::Demonstration> {
         let sampling = self.time.map_or(Sampling::Unknown, |time| Sampling::Stamped { time });
-        let position = two_axes(&format!("demo {m}: position"), self.position)?;
-        let mut demo = pdmp_core::Demonstration::new(position, sampling);
-        if let Some(names) = self.names {
-            demo = demo.and_then(|demo| demo.with_names(names));
-        }
-        if let Some(units) = self.units {
-            demo = demo.and_then(|demo| demo.with_units(units));
-        }
-        demo.map_err(|error| raise(error.in_demo(m)))
+        let position = two_axes(&format!("demo {m}: position"), "(T, D)", self.position)?;
+        let demo = pdmp_core::Demonstration::new(position, sampling);
+        demo.and_then(|demo| labelled(demo, self.names, self.units)).map_err(|error| raise(error.in_demo(m)))
+    }
+}
+
+/// Sets the names and units that are given.
+fn labelled(
+    mut demo: pdmp_core::Demonstration,
+    names: Option<Vec<String>>,
+    units: Option<Vec<String>>,
+) -> pdmp_core::Result<pdmp_core::Demonstration> {
+    if let Some(names) = names {
+        demo = demo.with_names(names)?;
+    }
+    match units {
+        Some(units) => demo.with_units(units),
+        None => Ok(demo),
     }
 }
 
@@ -320,14 +320,11 @@ impl Trajectory {
     /// -------
     /// dict
     ///     Keys are the names of the attributes.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let values = PyDict::new(py);
-        values.set_item("time", &self.time)?;
-        values.set_item("position", &self.position)?;
-        values.set_item("velocity", &self.velocity)?;
-        values.set_item("acceleration", &self.acceleration)?;
-        values.set_item("names", self.names.clone())?;
-        values.set_item("units", self.units.clone())?;
+    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let values = PyDict::new(slf.py());
+        for name in ["time", "position", "velocity", "acceleration", "names", "units"] {
+            values.set_item(name, slf.getattr(name)?)?;
+        }
         Ok(values)
     }
 

@@ -163,10 +163,11 @@ fn largest_noise(model: &pdmp_core::Model) -> Option<(String, String)> {
 /// Returns the labels of each context column, or the range of its numbers.
 fn contexts(model: &pdmp_core::Model, map: &ContextMap) -> String {
     let columns = map.columns();
+    let column_name = |q: usize| map.names().get(q).map_or_else(|| format!("[{q}]"), String::clone);
     listed(
         columns.iter().enumerate().map(|(q, column)| match column {
             ContextColumn::Label(labels) => {
-                format!("[{q}] {}", listed(labels.iter().map(|label| format!("'{label}'")), " or "))
+                format!("{} {}", column_name(q), listed(labels.iter().map(|label| format!("'{label}'")), " or "))
             }
             ContextColumn::Number => {
                 let values = model.demonstrated().contexts.as_ref().map(|contexts| contexts.column(q).to_vec());
@@ -174,7 +175,7 @@ fn contexts(model: &pdmp_core::Model, map: &ContextMap) -> String {
                     .iter()
                     .flatten()
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| (low.min(value), high.max(value)));
-                format!("[{q}] from {} to {}", range.0, range.1)
+                format!("{} from {} to {}", column_name(q), range.0, range.1)
             }
         }),
         ", ",

@@ -37,6 +37,7 @@ fn hint(error: &Error) -> &'static str {
     match error {
         Error::Demo { source, .. } => hint(source),
         Error::Aperiodic { .. } => " (onsets=)",
+        Error::Argument { name: "time", .. } => " (dt= or time=)",
         _ => "",
     }
 }

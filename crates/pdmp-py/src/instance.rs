@@ -16,7 +16,7 @@ pub(crate) fn demonstration<'a>(name: &str, value: &'a Bound<'_, PyAny>) -> PyRe
 /// Returns the conditions that an argument holds.
 pub(crate) fn conditions<'a>(name: &str, value: &'a Bound<'_, PyAny>) -> PyResult<&'a pdmp_core::Conditions> {
     let expected = "pdmp.Conditions; pass single ones by name, such as style=";
-    let expected = if name == "conditions" { expected } else { "pdmp.Conditions" };
+    let expected = if name.starts_with("conditions") { expected } else { "pdmp.Conditions" };
     instance(name, value, expected).map(|conditions: &Conditions| &conditions.0)
 }
 

@@ -2,6 +2,8 @@
 //! calls the core and converts the result.
 
 mod batch;
+mod batch_conditions;
+mod choice;
 mod conditions;
 mod context;
 mod controller;
@@ -17,6 +19,7 @@ mod instance;
 mod model;
 mod model_getters;
 mod motion;
+mod named_contexts;
 mod output;
 mod prediction;
 mod preprocessing;

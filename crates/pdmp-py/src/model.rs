@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ndarray::Array3;
 use numpy::IntoPyArray;
-use pdmp_core::learning::style_of;
+use pdmp_core::learning::{StyleOptions, style_of};
 use pdmp_core::motion::{PredictionBand, TimeGrid, prediction_band};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -154,13 +154,15 @@ impl Model {
         landmarks: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
         let demonstration = instance::demonstration("demonstration", demonstration)?;
-        let (dt, period) = (optional_number("dt", dt)?, optional_number("period", period)?);
-        let landmarks = optional("landmarks", landmarks)?;
+        let mut options = StyleOptions::default();
+        options.dt = optional_number("dt", dt)?;
+        options.period = optional_number("period", period)?;
+        options.landmarks = optional("landmarks", landmarks)?;
         crate::inspection::warn(
             py,
-            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(demonstration), dt),
+            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(demonstration), options.dt),
         )?;
-        let style = py.detach(|| style_of(&self.0, demonstration, dt, period, landmarks.as_deref())).map_err(raise)?;
+        let style = py.detach(|| style_of(&self.0, demonstration, &options)).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
 
@@ -246,8 +248,8 @@ impl Model {
     ///
     /// Parameters
     /// ----------
-    /// context : array_like or list, (Q,)
-    ///     Numbers and labels, in the units of the demonstrations' contexts.
+    /// context : array_like, list or mapping, (Q,)
+    ///     Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
     ///
     /// Returns
     /// -------
@@ -266,7 +268,7 @@ impl Model {
     /// >>> np.allclose(trajectory.position, model.rollout(context=[0.05]).position)
     /// True
     fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
-        let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+        let prediction = self.0.predict(&crate::named_contexts::context_for(&self.0, context)?).map_err(raise)?;
         Prediction::new(py, prediction)
     }
 
@@ -278,8 +280,8 @@ impl Model {
     ///
     /// Parameters
     /// ----------
-    /// context : array_like or list, (Q,)
-    ///     Numbers and labels, in the units of the demonstrations' contexts.
+    /// context : array_like, list or mapping, (Q,)
+    ///     Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
     /// level : float
     ///     Probability in (0, 1) that a position of the new movement lies within its bounds.
     /// dt : float
@@ -306,7 +308,7 @@ impl Model {
         dt: Scalar<'py>,
     ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let (level, dt) = (level.number("level")?, dt.number("dt")?);
-        let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+        let prediction = self.0.predict(&crate::named_contexts::context_for(&self.0, context)?).map_err(raise)?;
         let grid = TimeGrid { dt, duration: None };
         let PredictionBand { lower, upper } =
             py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;

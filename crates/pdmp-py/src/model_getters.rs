@@ -192,6 +192,12 @@ impl Model {
         Ok(Some(PyList::new(py, rows.collect::<PyResult<Vec<_>>>()?)?.into_any()))
     }
 
+    /// Names (Q,) of the context columns; None where the contexts had none.
+    #[getter]
+    fn context_names(&self) -> Option<Vec<String>> {
+        self.0.map().map(|map| map.names().to_vec()).filter(|names| !names.is_empty())
+    }
+
     /// Map from contexts to style, goal, start or anchor, and duration; None without contexts.
     #[getter]
     fn map(&self) -> Option<ContextMap> {

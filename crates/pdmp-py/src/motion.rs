@@ -5,10 +5,10 @@ use std::sync::Arc;
 use numpy::IntoPyArray;
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::{TimeGrid, WithRespectTo, jacobian, rollout_with};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::choice::Choice;
 use crate::conditions::conditions_of;
 use crate::controller::Controller;
 use crate::convert::Cube;
@@ -186,7 +186,7 @@ impl Model {
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        wrt: &str,
+        wrt: Choice<'py>,
         conditions: Option<&Bound<'py, PyAny>>,
         derivative: Scalar<'py>,
         dt: Scalar<'py>,
@@ -194,17 +194,14 @@ impl Model {
         context: Option<&Bound<'py, PyAny>>,
         changes: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Cube<'py>> {
-        let wrt = match wrt {
-            "style" => WithRespectTo::Style,
-            "goal" => WithRespectTo::Goal,
-            "anchor" => WithRespectTo::Anchor,
-            "start" => WithRespectTo::Start,
-            "goal_velocity" => WithRespectTo::GoalVelocity,
-            _ => {
-                let text = format!("wrt = '{wrt}': must be 'style', 'goal', 'anchor', 'start' or 'goal_velocity'");
-                return Err(PyValueError::new_err(text));
-            }
-        };
+        let variables = [
+            ("style", WithRespectTo::Style),
+            ("goal", WithRespectTo::Goal),
+            ("anchor", WithRespectTo::Anchor),
+            ("start", WithRespectTo::Start),
+            ("goal_velocity", WithRespectTo::GoalVelocity),
+        ];
+        let wrt = wrt.of("wrt", &variables)?;
         let derivative = Derivative::of_order("derivative", derivative.count("derivative")?).map_err(raise)?;
         let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
         let conditions = conditions_of(&self.0, conditions, context, changes)?;

@@ -5,6 +5,7 @@ use pdmp_core::preprocessing;
 use pdmp_core::preprocessing::{CycleOutput, RejectionReason};
 use pyo3::prelude::*;
 
+use crate::choice::Choice;
 use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
 use crate::demonstration::Demonstration;
 use crate::error::raise;
@@ -276,11 +277,11 @@ pub(crate) fn cycles<'py>(
     py: Python<'py>,
     recordings: &Bound<'py, PyAny>,
     onsets: Option<&Bound<'py, PyAny>>,
-    average: bool,
+    average: Choice<'py>,
 ) -> PyResult<CutCycles<'py>> {
     let recordings = demonstrations("recordings", recordings)?;
     let onsets = onsets.map(|onsets| items("onsets", onsets, vector)).transpose()?;
-    let output = if average { CycleOutput::Mean } else { CycleOutput::Each };
+    let output = if average.flag("average")? { CycleOutput::Mean } else { CycleOutput::Each };
     let cycles = py.detach(|| preprocessing::cycles(&recordings, onsets.as_deref(), output)).map_err(raise)?;
     let periods: Vec<f64> = cycles.kept.iter().map(|cycle| cycle.period).collect();
     let indices = cycles.kept.iter().map(|cycle| cycle.recording).collect();

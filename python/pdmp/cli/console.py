@@ -49,7 +49,8 @@ def one_line(message: object, options: Mapping[str, str]) -> str:
     argument = re.compile(
         rf"\b({name})=(?!=)"
         rf"|(?<=: pass )({name})\b|(?<=; set )({name})\b"
-        rf"|(?:^|(?<=: )|(?<=^n_styles and ))({name})(?= = | and | has |: | does not )"
+        rf"|(?:^|(?<=: )|(?<=^n_styles and ))({name})"
+        r"(?= = | and | has |: | does not | is missing| needs )"
         rf"|^({name})(?=\[\d)"
     )
     return argument.sub(lambda match: options["".join(filter(None, match.groups()))], text)

@@ -11,6 +11,7 @@ from pdmp._files import atomic_write
 from pdmp.cli.console import report, say
 from pdmp.cli.options import (
     add_fit_options,
+    add_output,
     add_reader_options,
     file_path,
     fit_arguments,
@@ -28,13 +29,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "paths", nargs="+", type=file_path, metavar="PATH", help="folder with an index.csv"
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=file_path,
-        metavar="FOLDER",
-        help="folder for figures and tables",
-    )
+    add_output(parser, "FOLDER", "folder for figures and tables")
     add_reader_options(parser)
     add_fit_options(parser)
     parser.add_argument("--unit", default="", help="unit of the positions in the figures")

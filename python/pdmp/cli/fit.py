@@ -9,6 +9,7 @@ import pdmp
 from pdmp.cli.console import say
 from pdmp.cli.options import (
     add_fit_options,
+    add_output,
     add_reader_options,
     check_file,
     file_path,
@@ -28,9 +29,7 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="PATH",
         help="CSV or BVH file (one demonstration), NPZ file (several) or folder with an index.csv",
     )
-    parser.add_argument(
-        "-o", "--output", type=file_path, required=True, metavar="FILE", help="model to write"
-    )
+    add_output(parser, "FILE", "model to write", required=True)
     add_reader_options(parser)
     add_fit_options(parser)
 

@@ -15,6 +15,16 @@ def file_path(text: str) -> str:
     return text
 
 
+def add_output(parser: ArgumentParser, metavar: str, text: str, **settings: Any) -> None:
+    """Adds the option for the file or folder to write, with further settings of the argument."""
+    parser.add_argument("-o", "--output", type=file_path, metavar=metavar, help=text, **settings)
+
+
+def add_model(parser: ArgumentParser) -> None:
+    """Adds the argument for the model file to read."""
+    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
+
+
 def check_file(path: str) -> None:
     """Raises an error before a long call if its result could not be written to this file."""
     if Path(path).is_dir():

@@ -10,13 +10,20 @@ from argparse import ArgumentParser, Namespace
 import pdmp
 from pdmp import plot
 from pdmp.cli.console import say
-from pdmp.cli.options import add_reader_options, file_path, made_folder, reader_arguments
+from pdmp.cli.options import (
+    add_model,
+    add_output,
+    add_reader_options,
+    file_path,
+    made_folder,
+    reader_arguments,
+)
 from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
+    add_model(parser)
     parser.add_argument(
         "paths",
         nargs="*",
@@ -24,14 +31,7 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="PATH",
         help="its demonstrations, as for pdmp fit",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=file_path,
-        required=True,
-        metavar="FOLDER",
-        help="folder for the figures",
-    )
+    add_output(parser, "FOLDER", "folder for the figures", required=True)
     add_reader_options(parser)
 
 

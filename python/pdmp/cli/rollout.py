@@ -10,15 +10,13 @@ from argparse import ArgumentParser, Namespace
 
 import pdmp
 from pdmp.cli.console import say
-from pdmp.cli.options import check_file, file_path
+from pdmp.cli.options import add_model, add_output, check_file
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
-    parser.add_argument(
-        "-o", "--output", type=file_path, required=True, metavar="FILE", help="CSV to write"
-    )
+    add_model(parser)
+    add_output(parser, "FILE", "CSV to write", required=True)
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--style", nargs="+", type=float, metavar="S", help="style parameters")
     source.add_argument(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._files import atomic_write
-from pdmp._labels import DERIVATIVES, name_list, split_label
+from pdmp._labels import DERIVATIVES, join_label, name_list, split_label
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration, Trajectory
 from pdmp.io import _fields, _time_units
@@ -225,9 +225,7 @@ def write_csv(
     header = [f"{name}{suffix}" for suffix, _ in DERIVATIVES for name in names]
     _fields.check_names(path, 1, ["t", *header])
     units = [unit and f"{unit}{per}" for _, per in DERIVATIVES for unit in units]
-    fields = [
-        f"{name} [{unit}]" if unit else name for name, unit in zip(header, units, strict=True)
-    ]
+    fields = list(map(join_label, header, units))
     for name, unit, field in zip(header, units, fields, strict=True):
         if split_label(field) != (name, unit):
             raise value_error(f"{path}: '{field}' would not be read as '{name}' in '{unit}'")

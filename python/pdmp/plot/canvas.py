@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from pdmp._files import atomic_write
+from pdmp._labels import join_label
 from pdmp._native import Model
 
 if TYPE_CHECKING:
@@ -57,8 +58,7 @@ def label_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
 
 def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
     """Returns the names of the degrees of freedom with their units; long ones take two lines."""
-    labels = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
-    return [fill(label, MAX_LABEL) for label in labels]
+    return [fill(label, MAX_LABEL) for label in map(join_label, names, units)]
 
 
 def movement_panels(

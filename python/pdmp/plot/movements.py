@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pdmp._messages import counted
 from pdmp._native import Conditions, Demonstration, Model, blend
 from pdmp.plot.canvas import BLUE, GREY, colormap, draw_movement, legend, movement_panels
 
@@ -51,7 +52,7 @@ def demonstrations(
     for name, length in (("recording", len(demos)), ("label", len(labels))):
         if length != model.n_demos:
             raise ValueError(
-                f"{length} {name}{'s' * (length != 1)} given, expected {model.n_demos}: "
+                f"{counted(length, name)} given, expected {model.n_demos}: "
                 "one per demonstration of the fit, in its order"
             )
     for m, demo in enumerate(demos):

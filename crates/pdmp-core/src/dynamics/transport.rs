@@ -69,7 +69,10 @@ impl Transport {
             return Ok(Self::immediate());
         }
         let Canonical::Discrete { u_end, .. } = canonical else {
-            return Err(Error::Arguments("only a discrete movement has a transport profile"));
+            return Err(Error::Argument {
+                name: "transport",
+                problem: "must be empty: a rhythmic movement has no transport profile",
+            });
         };
         let constant = |end: &[f64], value: f64| end.iter().all(|c| *c == value);
         if !(MIN_CELLS + DEGREE..=MAX_CELLS + DEGREE).contains(&n)
@@ -77,7 +80,10 @@ impl Transport {
             || !constant(&coefficients[n - DEGREE..], 1.0)
             || !coefficients.windows(2).all(|pair| pair[0] <= pair[1])
         {
-            return Err(Error::Arguments("a transport profile must increase from 0 to 1 and be constant at both ends"));
+            return Err(Error::Argument {
+                name: "transport",
+                problem: "must increase from 0 to 1 and be constant at both ends",
+            });
         }
         let cells = n - DEGREE;
         let width = u_end / cells as f64;

@@ -58,3 +58,15 @@ impl fmt::Display for Count {
         write!(f, "{} {}{}", self.0, self.1, if self.0 == 1 { "" } else { "s" })
     }
 }
+
+/// Index of a context column, or its name.
+pub(super) struct Column<'a>(pub(super) usize, pub(super) &'a Option<String>);
+
+impl fmt::Display for Column<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.1 {
+            Some(name) => write!(f, "{name:?}"),
+            None => write!(f, "{}", self.0),
+        }
+    }
+}

@@ -4,14 +4,14 @@
 //! Texts belong to no programming language: a binding appends its own hints. Errors of the control loop hold nothing that
 //! allocates.
 
+mod classification;
 mod format;
-mod kind;
 
 use std::path::PathBuf;
 
 use crate::kind::Kind;
-use format::{Count, Gap, Number, Rounded, Times};
-pub use kind::ErrorKind;
+pub use classification::ErrorKind;
+use format::{Column, Count, Gap, Number, Rounded, Times};
 
 /// Any error of this crate.
 ///
@@ -70,30 +70,32 @@ pub enum Error {
         /// Owner of one element.
         per: &'static str,
     },
-    /// A name or unit of a degree of freedom that is repeated or too long.
+    /// A name that is repeated or too long.
     #[error("{name}[{index}] = {value:?}: {allowed}")]
-    DofLabel {
+    Name {
         /// The argument.
         name: &'static str,
-        /// Index of the degree of freedom.
+        /// Index of the name.
         index: usize,
-        /// The name or unit.
+        /// The name, shortened.
         value: String,
         /// The allowed values, as the end of the sentence.
         allowed: &'static str,
     },
     /// A number of vectors that differs from the number of movements.
-    #[error("{name} has {found} rows, but there are {expected} styles: pass one row for each, or one vector for all")]
+    #[error(
+        "{name} has {found} rows, but there are {expected} movements: pass one row for each, or one vector for all"
+    )]
     Rows {
         /// The argument.
         name: &'static str,
-        /// The number of styles.
+        /// The number of movements.
         expected: usize,
         /// The number of rows.
         found: usize,
     },
-    /// A condition of only one of two conditions that are blended.
-    #[error("{name}: given for one of the two only; give it for both")]
+    /// A condition that only some of several conditions have.
+    #[error("{name}: given for some of the conditions only; give it for all")]
     Single {
         /// The condition.
         name: &'static str,
@@ -266,22 +268,34 @@ pub enum Error {
         of: &'static str,
     },
     /// A context value that is none of the demonstrated labels.
-    #[error("context[{column}] = {value}: not demonstrated; the labels are {known}")]
+    #[error("context[{}] = {value}: not demonstrated; the labels are {known}", Column(*column, name))]
     Label {
         /// Index of the context value.
         column: usize,
+        /// Name of its column, if known.
+        name: Option<String>,
         /// The value.
         value: String,
         /// The demonstrated labels.
         known: String,
     },
     /// A label in place of a number.
-    #[error("context[{column}] = {label:?}: a number is expected, as in the demonstrations")]
+    #[error("context[{}] = {label:?}: a number is expected, as in the demonstrations", Column(*column, name))]
     NoNumber {
         /// Index of the context value.
         column: usize,
+        /// Name of its column, if known.
+        name: Option<String>,
         /// The label.
         label: String,
+    },
+    /// A context with other names than the columns of the demonstrations' contexts.
+    #[error("context has the names {found}; expected one value for each of {expected}")]
+    ContextNames {
+        /// Names of the columns.
+        expected: String,
+        /// Names of the values.
+        found: String,
     },
     /// A context value that is a label in one demonstration and a number in another.
     #[error("contexts[:, {column}] holds {} and {}: give one or the other", Count(*labels, "label"), Count(*numbers, "number"))]
@@ -326,9 +340,28 @@ pub enum Error {
         /// Its size over the largest of the demonstrations'.
         ratio: f64,
     },
-    /// Arguments that are missing or exclude each other.
-    #[error("{0}")]
-    Arguments(&'static str),
+    /// An argument that is missing, empty or unsuitable.
+    #[error("{name} {problem}")]
+    Argument {
+        /// The argument.
+        name: &'static str,
+        /// The problem and its remedy, as the end of the sentence.
+        problem: &'static str,
+    },
+    /// Two arguments that exclude each other.
+    #[error("pass {} or {}, not both: {reason}", names[0], names[1])]
+    Conflict {
+        /// The arguments.
+        names: [&'static str; 2],
+        /// The reason, as the end of the sentence.
+        reason: &'static str,
+    },
+    /// A recording without motion.
+    #[error("the recording stands still: {consequence}")]
+    Still {
+        /// The consequence, as the end of the sentence.
+        consequence: &'static str,
+    },
     /// A well-formed problem without a numerical solution.
     #[error("{0}")]
     Fit(String),
@@ -350,10 +383,3 @@ pub enum Error {
 
 /// Result of a fallible call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
-
-impl Error {
-    /// Names the demonstration in which this error arose.
-    pub fn in_demo(self, demo: usize) -> Self {
-        Error::Demo { demo, source: Box::new(self) }
-    }
-}

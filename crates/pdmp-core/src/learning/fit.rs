@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ndarray::{Array2, s};
 
-use crate::context::{ContextColumn, ContextMap, MapSelection, tabulate};
+use crate::context::{ContextColumn, ContextMap, tabulate};
 use crate::demonstration::{ContextValue, Demonstration};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
@@ -17,6 +17,7 @@ use crate::model::primitive::{Parts, Primitive};
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{inspect, unwound};
+use crate::validate::{check_length, check_names};
 
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
@@ -81,6 +82,10 @@ pub fn fit_with(
     let demos = &*whole;
     let mut aligned = options.alignment().align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
+    if !options.context_names.is_empty() {
+        let n_columns = contexts.as_ref().map_or(0, |(columns, _)| columns.len());
+        check_names("context_names", &options.context_names, n_columns, "context column")?;
+    }
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
     let mut aligning = |share| progress(Stage::Align, share);
@@ -142,7 +147,7 @@ pub fn fit_with(
     findings.extend(stiffness(&primitive, &aligned)?);
     let noise = aligned.noise.clone();
     let contexts = columns.zip(demonstrated.contexts.as_ref());
-    let learn = |contexts| learn_map(contexts, &primitive, &demonstrated, aligned, options.map);
+    let learn = |contexts| learn_map(contexts, &primitive, &demonstrated, aligned, options);
     let (map, residual_variance) = contexts.map(learn).transpose()?.unzip();
     let regression = regression.describe();
     let learnt = FitSummary {
@@ -165,12 +170,12 @@ fn learn_map(
     primitive: &Arc<Primitive>,
     demonstrated: &DemonstrationParameters,
     aligned: Aligned,
-    selection: MapSelection,
+    options: &FitOptions,
 ) -> Result<(ContextMap, Array2<f64>)> {
     let outputs = demonstrated.outputs(primitive.kind());
     let metric = metric(primitive, outputs.view(), demonstrated.segment_durations.view())?;
-    let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), selection)?;
-    Ok((map, residual_variance(primitive, outputs.view(), aligned)?))
+    let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
+    Ok((map.with_names(options.context_names.clone())?, residual_variance(primitive, outputs.view(), aligned)?))
 }
 
 /// Types of the context columns (Q,), and the contexts (M, Q) as numbers.
@@ -237,9 +242,10 @@ impl Training<'_> {
             }
             NStyles::Truncated(count) => Factors::of(forcing, count, progress),
             NStyles::CrossValidated => {
-                let (columns, numbers) = contexts.ok_or(Error::Arguments(
-                    "cross-validation of the number of styles needs contexts: pass contexts, or a number of styles",
-                ))?;
+                let (columns, numbers) = contexts.ok_or(Error::Argument {
+                    name: "n_styles",
+                    problem: "needs contexts for cross-validation: pass contexts, or a number of styles",
+                })?;
                 let all = Factors::of(forcing, Truncation::Share(1.0), &mut |share| progress(0.5 * share))?;
                 let selection =
                     StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical);
@@ -266,11 +272,8 @@ fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
 
 /// Returns the given contexts, or those of the demonstrations; `None` if there are none.
 fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> Result<Option<Contexts>> {
-    if let Some(contexts) = given
-        && contexts.len() != demos.len()
-    {
-        let (expected, found) = (demos.len(), contexts.len());
-        return Err(Error::Length { name: "contexts", expected, found, per: "demonstration" });
+    if let Some(contexts) = given {
+        check_length("contexts", contexts.len(), demos.len(), "demonstration")?;
     }
     let contexts: Option<Vec<&[ContextValue]>> = match given {
         Some(contexts) => Some(contexts.iter().map(Vec::as_slice).collect()),
@@ -283,8 +286,8 @@ fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> 
 /// Returns names and units of the DoFs; defaults where no demonstration carries any.
 fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
     let n_dofs = demos.first().map_or(0, Demonstration::n_dofs);
-    let names = common_labels(demos, Demonstration::names, "names differ from those of the other demonstrations")?;
-    let units = common_labels(demos, Demonstration::units, "units differ from those of the other demonstrations")?;
+    let names = common_labels(demos, Demonstration::names, "names")?;
+    let units = common_labels(demos, Demonstration::units, "units")?;
     Ok((
         names.unwrap_or_else(|| (0..n_dofs).map(|d| format!("y{d}")).collect()),
         units.unwrap_or_else(|| vec![String::new(); n_dofs]),
@@ -295,11 +298,11 @@ fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
 fn common_labels(
     demos: &[Demonstration],
     labels: impl Fn(&Demonstration) -> Option<&[String]>,
-    conflict: &'static str,
+    name: &'static str,
 ) -> Result<Option<Vec<String>>> {
     let Some(first) = demos.iter().find_map(&labels) else { return Ok(None) };
     match demos.iter().position(|demo| labels(demo).is_some_and(|other| other != first)) {
-        Some(m) => Err(Error::Arguments(conflict).in_demo(m)),
+        Some(m) => Err(Error::Argument { name, problem: "differ from those of the other demonstrations" }.in_demo(m)),
         None => Ok(Some(first.to_vec())),
     }
 }

@@ -24,4 +24,4 @@ pub use alignment::TimeScaling;
 pub use factorization::{Factors, Truncation};
 pub use fit::{fit, fit_with};
 pub use options::{CanonicalOptions, DofScaling, FitOptions, NStyles, Stage, TransportSelection};
-pub use style_inference::style_of;
+pub use style_inference::{StyleOptions, style_of};

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use ndarray::{Array2, Array3, Axis};
+use ndarray::{Array2, Array3, ArrayViewMut1, ArrayViewMut2, Axis, aview1};
 
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::output_system::{Attractor, Inverse};
@@ -17,11 +17,14 @@ use crate::learning::transport_profile::{profile_samples, transport_profile};
 use crate::numerics::simd::{F64x4, gather, groups, pack, scatter, unpack};
 use crate::numerics::spline::Knots;
 use crate::numerics::threads::Threads;
-use crate::validate::zeros;
+use crate::validate::{row_major_mut, zeros};
 
 /// Largest braking rate κ, in units of α_z; that of a movement that ends nearly at rest. With 4 instead, movements leave
 /// their goals by 1.2 to 2 times as much on the recordings of `docs/transport.md`; 16 improves on few of them.
 const MAX_BRAKING: f64 = 8.0;
+
+/// Number of vectors (D,) of each demonstration: start, goal, anchor, range, largest acceleration and speed at the end.
+const N_VECTORS: usize = 6;
 
 /// Targets and other quantities that a fit takes from the demonstrations, one row per demonstration.
 #[derive(Debug)]
@@ -44,18 +47,6 @@ pub(crate) struct Targets {
     displacements: Array3<f64>,
 }
 
-/// Rows of one demonstration.
-struct Rows<'a> {
-    forcing: &'a mut [f64],
-    start: &'a mut [f64],
-    goal: &'a mut [f64],
-    anchor: &'a mut [f64],
-    range: &'a mut [f64],
-    acceleration: &'a mut [f64],
-    end_speed: &'a mut [f64],
-    displacement: &'a mut [f64],
-}
-
 impl Targets {
     /// Computes the targets of all demonstrations about their goals or anchors.
     ///
@@ -75,25 +66,23 @@ impl Targets {
             Kind::Discrete => profile_samples(aligned.n_samples).len(),
             Kind::Rhythmic => 0,
         };
-        let mut targets = Self {
-            forcing: zeros("targets", (n_demos, aligned.n_samples * n_dofs))?,
-            starts: Array2::zeros((n_demos, n_dofs)),
-            goals: Array2::zeros((n_demos, n_dofs)),
-            anchors: Array2::zeros((n_demos, n_dofs)),
-            ranges: Array2::zeros((n_demos, n_dofs)),
-            accelerations: Array2::zeros((n_demos, n_dofs)),
-            end_speeds: Array2::zeros((n_demos, n_dofs)),
-            displacements: Array3::zeros((n_demos, n_profile, n_dofs)),
-        };
+        let mut forcing = zeros("targets", (n_demos, aligned.n_samples * n_dofs))?;
+        let mut vectors = Array3::zeros((n_demos, N_VECTORS, n_dofs));
+        let mut displacements = Array3::zeros((n_demos, n_profile, n_dofs));
         let inversion = TargetComputation::new(attractor, canonical, aligned.n_samples);
         let columns = || [0, 1].map(|_| vec![F64x4::ZERO; aligned.n_samples]);
-        let compute = |columns: &mut [Vec<F64x4>; 2], (m, rows): (usize, Rows)| {
-            aligned.sample(m, rows.forcing);
-            inversion.compute(rows, aligned.demo(m).goal(), columns);
-            Ok(())
-        };
-        threads.try_for_each_with_progress(targets.rows().enumerate().collect(), columns, compute, progress)?;
-        Ok(targets)
+        let rows = forcing.rows_mut().into_iter().zip(vectors.outer_iter_mut()).zip(displacements.outer_iter_mut());
+        let compute =
+            |columns: &mut _, (m, ((mut forcing, vectors), displacement)): (usize, ((ArrayViewMut1<f64>, _), _))| {
+                let forcing = row_major_mut(&mut forcing);
+                aligned.sample(m, forcing);
+                inversion.compute(forcing, vectors, displacement, aligned.demo(m).goal(), columns);
+                Ok(())
+            };
+        threads.try_for_each_with_progress(rows.enumerate().collect(), columns, compute, progress)?;
+        let [starts, goals, anchors, ranges, accelerations, end_speeds] =
+            std::array::from_fn::<_, N_VECTORS, _>(|k| vectors.index_axis(Axis(1), k).to_owned());
+        Ok(Self { forcing, starts, goals, anchors, ranges, accelerations, end_speeds, displacements })
     }
 
     /// Returns the largest peak-to-peak range of each DoF within one demonstration (D,).
@@ -144,7 +133,7 @@ impl Targets {
         let rows = self.forcing.rows_mut().into_iter().zip(self.goals.rows()).zip(self.starts.rows());
         for ((mut row, goal), start) in rows {
             let reach = &goal - &start;
-            let samples = crate::validate::row_major_mut(&mut row).chunks_exact_mut(n_dofs);
+            let samples = row_major_mut(&mut row).chunks_exact_mut(n_dofs);
             for (forcing, lag) in samples.zip(&lag) {
                 forcing.iter_mut().zip(&reach).for_each(|(f, reach)| *f -= reach * lag);
             }
@@ -156,35 +145,6 @@ impl Targets {
         if dof_scale.iter().any(|&scale| scale != 1.0) {
             self.forcing.iter_mut().zip(dof_scale.iter().cycle()).for_each(|(f, scale)| *f /= scale);
         }
-    }
-
-    fn rows(&mut self) -> impl Iterator<Item = Rows<'_>> {
-        let n_dofs = self.starts.ncols();
-        let n_values = self.forcing.ncols();
-        fn chunks(matrix: &mut Array2<f64>, n: usize) -> std::slice::ChunksExactMut<'_, f64> {
-            crate::validate::row_major_mut(matrix).chunks_exact_mut(n)
-        }
-        let [starts, goals, anchors, ranges] = [&mut self.starts, &mut self.goals, &mut self.anchors, &mut self.ranges]
-            .map(|matrix| chunks(matrix, n_dofs));
-        let [accelerations, end_speeds] =
-            [&mut self.accelerations, &mut self.end_speeds].map(|matrix| chunks(matrix, n_dofs));
-        let vectors = starts.zip(goals).zip(anchors.zip(ranges)).zip(accelerations.zip(end_speeds));
-        let displacements = self
-            .displacements
-            .outer_iter_mut()
-            .map(|rows| rows.into_slice().expect("blocks of a row-major array are contiguous"));
-        chunks(&mut self.forcing, n_values).zip(vectors).zip(displacements).map(
-            |((forcing, (((start, goal), (anchor, range)), (acceleration, end_speed))), displacement)| Rows {
-                forcing,
-                start,
-                goal,
-                anchor,
-                range,
-                acceleration,
-                end_speed,
-                displacement,
-            },
-        )
     }
 }
 
@@ -208,26 +168,33 @@ impl TargetComputation {
         Self { kind, clock, inverse, knots }
     }
 
-    /// Computes the rows of a demonstration in place; `rows.forcing` holds its positions on entry and its target on return.
+    /// Computes the target, vectors (6, D) and displacements (S, D) of a demonstration.
     ///
-    /// The output system is invariant to translation, except for rounding. Demonstrations are therefore translated to
-    /// start at 0: a DoF at rest has a target of exactly zero, and its exact position as its mean.
-    fn compute(&self, rows: Rows, given: Option<&[f64]>, [column, slopes]: &mut [Vec<F64x4>; 2]) {
-        let Rows { forcing: position, start, goal, anchor, range, acceleration, end_speed, displacement } = rows;
-        let n_dofs = start.len();
-        start.copy_from_slice(&position[..n_dofs]);
-        for (x, c) in displacement.chunks_exact_mut(n_dofs).zip(profile_samples(column.len())) {
-            let sample = &position[c * n_dofs..];
-            x.iter_mut().zip(sample).zip(&*start).for_each(|((x, y), start)| *x = y - start);
+    /// `samples` are its positions on entry and its target on return. The output system is invariant to translation, except
+    /// for rounding. Demonstrations are therefore translated to start at 0: a DoF at rest has a target of exactly zero, and
+    /// its exact position as its mean.
+    fn compute(
+        &self,
+        samples: &mut [f64],
+        mut vectors: ArrayViewMut2<f64>,
+        mut displacements: ArrayViewMut2<f64>,
+        given: Option<&[f64]>,
+        [column, slopes]: &mut [Vec<F64x4>; 2],
+    ) {
+        let n_dofs = vectors.ncols();
+        let start = samples[..n_dofs].to_vec();
+        for (mut x, c) in displacements.rows_mut().into_iter().zip(profile_samples(column.len())) {
+            x.assign(&aview1(&samples[c * n_dofs..][..n_dofs]));
+            x -= &aview1(&start);
         }
-        goal.copy_from_slice(given.unwrap_or(&position[position.len() - n_dofs..]));
+        let goal = given.unwrap_or(&samples[samples.len() - n_dofs..]).to_vec();
         let n_samples = F64x4::splat(column.len() as f64);
-        let goals = pack(goal);
+        let goals = pack(&goal);
         let [mut means, mut ranges, mut accelerations, mut end_speeds] =
             [(); 4].map(|()| vec![F64x4::ZERO; goals.len()]);
         let per_step = 1.0 / self.clock[1];
         for group in 0..groups(n_dofs) {
-            gather(position, n_dofs, group, column);
+            gather(samples, n_dofs, group, column);
             let start = column[0];
             let [mut low, mut high, mut sum] = [F64x4::ZERO; 3];
             for y in column.iter_mut() {
@@ -242,11 +209,11 @@ impl TargetComputation {
                 slopes.windows(2).fold(F64x4::ZERO, |largest, pair| largest.fast_max(difference(pair)));
             end_speeds[group] = slopes[slopes.len() - 1].abs();
             self.inverse.target(column, slopes, centre - start, self.kind == Kind::Rhythmic);
-            scatter(column, n_dofs, group, position);
+            scatter(column, n_dofs, group, samples);
         }
-        anchor.copy_from_slice(unpack(&means, n_dofs));
-        range.copy_from_slice(unpack(&ranges, n_dofs));
-        acceleration.copy_from_slice(unpack(&accelerations, n_dofs));
-        end_speed.copy_from_slice(unpack(&end_speeds, n_dofs));
+        let computed = [&means, &ranges, &accelerations, &end_speeds].map(|packed| unpack(packed, n_dofs));
+        for (mut row, vector) in vectors.rows_mut().into_iter().zip([&*start, &*goal].into_iter().chain(computed)) {
+            row.assign(&aview1(vector));
+        }
     }
 }

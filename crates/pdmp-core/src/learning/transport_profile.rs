@@ -128,8 +128,10 @@ fn spline(profile: &[f64]) -> Result<Vec<f64>> {
     }
     let roughness = (SMOOTHING * cells as f64).powi(6) / cells as f64;
     (0..cells).for_each(|cell| add(cell, [-1.0, 3.0, -3.0, 1.0], 0.0, roughness));
-    let solution =
-        normal.cholesky().ok_or(Error::Arguments("no transport profile fits the demonstrations"))?.solve(&right);
+    let solution = normal
+        .cholesky()
+        .ok_or_else(|| Error::Fit("no transport profile fits the demonstrations".into()))?
+        .solve(&right);
     for (c, value) in coefficients[DEGREE..].iter_mut().zip(isotonic(solution.iter().map(|c| c.clamp(0.0, 1.0)))) {
         *c = value;
     }

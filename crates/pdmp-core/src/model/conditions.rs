@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::primitive::Primitive;
 use crate::numerics::state::clone_in_place;
-use crate::validate::{check_positive, check_vector};
+use crate::validate::{check_length, check_positive, check_range, check_vector};
 
 /// Conditions under which a movement starts. A condition that is `None` is that of the nominal demonstration.
 ///
@@ -83,9 +83,7 @@ impl Conditions {
     /// # Errors
     /// A condition that one of the two lacks, lengths that differ, or a share that is not finite.
     pub fn blend(&self, other: &Self, share: f64) -> Result<Self> {
-        if !share.is_finite() {
-            return Err(Error::Range { name: "share", value: share, allowed: "must be finite" });
-        }
+        check_range("share", share, share.is_finite(), "must be finite")?;
         let mix = |a: f64, b: f64| (1.0 - share) * a + share * b;
         let number = |name, a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => Ok(Some(mix(a, b))),
@@ -93,10 +91,8 @@ impl Conditions {
             _ => Err(Error::Single { name }),
         };
         let vector = |name, a: &Option<Vec<f64>>, b: &Option<Vec<f64>>| match (a, b) {
-            (Some(a), Some(b)) if a.len() != b.len() => {
-                Err(Error::Length { name, expected: a.len(), found: b.len(), per: "element of the other conditions" })
-            }
-            (Some(a), Some(b)) => Ok(Some(a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect())),
+            (Some(a), Some(b)) => check_length(name, b.len(), a.len(), "element of the other conditions")
+                .map(|()| Some(a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect())),
             (None, None) => Ok(None),
             _ => Err(Error::Single { name }),
         };
@@ -186,9 +182,10 @@ impl Conditions {
     pub fn time_constant(&self, primitive: &Primitive) -> Result<f64> {
         let tau = match (self.tau, &self.segment_durations) {
             (Some(_), Some(_)) => {
-                return Err(Error::Arguments(
-                    "pass tau or segment_durations, not both: segment durations add up to the duration",
-                ));
+                return Err(Error::Conflict {
+                    names: ["tau", "segment_durations"],
+                    reason: "segment durations add up to the duration",
+                });
             }
             (None, Some(segment_durations)) => {
                 primitive.check_segment_durations(segment_durations)?;
@@ -245,9 +242,10 @@ pub(crate) fn reject_goal_velocity(primitive: &Primitive, given: bool) -> Result
     let kind = primitive.kind();
     reject_for_kind(kind, "goal_velocity", kind == Kind::Rhythmic && given)?;
     if given && primitive.transport.is_immediate() {
-        return Err(Error::Arguments(
-            "goal_velocity needs learnt transport: immediate transport ends with the velocity of the demonstrations",
-        ));
+        return Err(Error::Argument {
+            name: "goal_velocity",
+            problem: "needs learnt transport: immediate transport ends with the velocity of the demonstrations",
+        });
     }
     Ok(())
 }
@@ -267,29 +265,17 @@ pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
 /// Checks a time constant against the model's own, in seconds.
 pub(crate) fn check_tau(tau: f64, own: f64) -> Result<()> {
     check_positive("tau", tau)?;
-    if (1e-6..=1e6).contains(&(tau / own)) {
-        Ok(())
-    } else {
-        let allowed = "must lie within a millionfold of the model's tau";
-        Err(Error::Range { name: "tau", value: tau, allowed })
-    }
+    check_range("tau", tau, (1e-6..=1e6).contains(&(tau / own)), "must lie within a millionfold of the model's tau")
 }
 
 /// Checks a phase, in rad, of a rhythmic primitive.
 pub(crate) fn check_phase(kind: Kind, phase: f64) -> Result<()> {
     reject_for_kind(kind, "phase", kind == Kind::Discrete)?;
-    if phase.is_finite() {
-        Ok(())
-    } else {
-        Err(Error::Range { name: "phase", value: phase, allowed: "must be a finite angle in rad" })
-    }
+    check_range("phase", phase, phase.is_finite(), "must be a finite angle in rad")
 }
 
 /// Checks an amplitude: zero is rest.
 pub(crate) fn check_amplitude(value: f64) -> Result<()> {
-    if (0.0..=crate::validate::MAX_MAGNITUDE).contains(&value) {
-        Ok(())
-    } else {
-        Err(Error::Range { name: "amplitude", value, allowed: "must lie between 0, which is rest, and 1e150" })
-    }
+    let valid = (0.0..=crate::validate::MAX_MAGNITUDE).contains(&value);
+    check_range("amplitude", value, valid, "must lie between 0, which is rest, and 1e150")
 }

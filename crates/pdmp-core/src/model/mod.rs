@@ -159,7 +159,7 @@ impl Model {
             return Err(Error::Range { name: "demonstration", value: m as f64, allowed });
         }
         if demonstrations.is_empty() {
-            return Err(Error::Arguments("demonstrations is empty: pass at least one index"));
+            return Err(Error::Argument { name: "demonstrations", problem: "is empty: pass at least one index" });
         }
         let mean = |matrix: &Array2<f64>| {
             let rows = matrix.select(Axis(0), demonstrations);
@@ -198,9 +198,7 @@ impl Model {
     /// # Errors
     /// A model without a context map, a context of another length, an unknown label, or a number that is not finite.
     pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<Prediction> {
-        let map = self.map.as_ref().ok_or(Error::Arguments(
-            "the model has no context map: fit it with contexts=, or with demonstrations that have a context",
-        ))?;
+        let map = self.map.as_ref().ok_or(Error::Argument { name: "context", problem: "does not apply: the model has no context map; fit it with contexts, or with demonstrations that have one" })?;
         let demonstrated = self.demonstrated.durations.iter();
         let [shortest, longest] =
             [f64::min, f64::max].map(|extreme| demonstrated.clone().copied().reduce(extreme).unwrap_or(1.0));

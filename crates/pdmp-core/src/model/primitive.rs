@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::responses::Cache;
 use crate::numerics::simd::{F64x4, groups};
-use crate::validate::check_vector;
+use crate::validate::{check_range, check_vector};
 
 /// Maximum of the rates α_z, β_z, α_x and μ, and inverse of their minimum: products of several stay finite.
 pub(crate) const MAX_RATE: f64 = 1e6;
@@ -210,10 +210,8 @@ impl Primitive {
         let clock = self.canonical().clock_at(phase);
         // Long after the end x underflows to zero, and the clock is infinite.
         let past_cycle = self.kind() == Kind::Rhythmic && phase >= TAU;
-        if !(phase.is_finite() && clock >= 0.0) || past_cycle {
-            let allowed = "must lie in [0, 1] for a discrete and in [0, 2π) for a rhythmic primitive";
-            return Err(Error::Range { name: "phase", value: phase, allowed });
-        }
+        let allowed = "must lie in [0, 1] for a discrete and in [0, 2π) for a rhythmic primitive";
+        check_range("phase", phase, phase.is_finite() && clock >= 0.0 && !past_cycle, allowed)?;
         Ok(self.warping_function(segment_durations)?.slope(clock / extent) / extent)
     }
 
@@ -233,14 +231,10 @@ impl Primitive {
     pub(crate) fn check_segment_durations(&self, segment_durations: &[f64]) -> Result<()> {
         let nominal = &self.nominal.segment_durations;
         check_vector("segment_durations", segment_durations, nominal.len(), "segment between breaks")?;
-        let invalid = |(duration, nominal): &(&f64, &f64)| !(1e-6..=1e6).contains(&(*duration / *nominal));
-        match segment_durations.iter().zip(nominal).find(invalid) {
-            Some((&value, _)) => {
-                let allowed = "seconds must be positive, within a factor of 1e6 of the nominal demonstration's";
-                Err(Error::Range { name: "segment_durations", value, allowed })
-            }
-            None => Ok(()),
-        }
+        let allowed = "seconds must be positive, within a factor of 1e6 of the nominal demonstration's";
+        segment_durations.iter().zip(nominal).try_for_each(|(&value, nominal)| {
+            check_range("segment_durations", value, (1e-6..=1e6).contains(&(value / nominal)), allowed)
+        })
     }
 
     /// Returns the transport profile m(u) of a discrete movement at clock `u`, the position of its frame as a fraction of the
@@ -265,9 +259,7 @@ impl Primitive {
             let instead = ": it moves about an anchor and has no transport profile";
             return Err(Error::Kind { name: "transport", kind: self.kind(), instead });
         }
-        if !(u.is_finite() && u >= 0.0) {
-            return Err(Error::Range { name: "u", value: u, allowed: "must be finite and not negative" });
-        }
+        check_range("u", u, u.is_finite() && u >= 0.0, "must be finite and not negative")?;
         Ok(1.0 + self.transport.lag(u).value)
     }
 
@@ -312,9 +304,8 @@ impl Primitive {
     /// A clock that is not finite, or negative for a discrete movement.
     pub fn landscape(&self, u: f64) -> Result<Vec<f64>> {
         let discrete = self.kind() == Kind::Discrete;
-        if !u.is_finite() || (discrete && u < 0.0) {
-            return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative if discrete" });
-        }
+        let valid = u.is_finite() && (u >= 0.0 || !discrete);
+        check_range("u", u, valid, "must be finite, and not negative if discrete")?;
         // Past the end gate and forcing decay together, so that b is constant.
         let u = if discrete { u.min(self.canonical().extent()) } else { u };
         let (mut value, mut slope) =

@@ -1,12 +1,12 @@
 //! Input and output of a control tick, in memory of the caller.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kind::Kind;
 use crate::model::conditions::{
     check_amplitude, check_phase, check_style, check_tau, reject_for_kind, reject_goal_velocity,
 };
 use crate::model::primitive::Primitive;
-use crate::validate::check_vector;
+use crate::validate::{check_length, check_range, check_vector};
 
 /// Command of one tick. A field that is `None` leaves its quantity unchanged.
 ///
@@ -93,8 +93,8 @@ impl Command<'_> {
             Some(vector) => check_vector(name, vector, n_dofs, "DoF"),
             None => Ok(()),
         };
-        if let Some(dt) = self.dt.filter(|dt| !(0.0..f64::INFINITY).contains(dt)) {
-            return Err(Error::Range { name: "dt", value: dt, allowed: "must be finite and not negative" });
+        if let Some(dt) = self.dt {
+            check_range("dt", dt, (0.0..f64::INFINITY).contains(&dt), "must be finite and not negative")?;
         }
         if let Some(style) = self.style {
             check_style(style, model.n_styles())?;
@@ -124,14 +124,8 @@ impl Command<'_> {
 impl Motion<'_> {
     /// Checks that each vector has one element per DoF.
     pub(crate) fn check(&self, n_dofs: usize) -> Result<()> {
-        let lengths = [
-            ("position", self.position.len()),
-            ("velocity", self.velocity.len()),
-            ("acceleration", self.acceleration.len()),
-        ];
-        match lengths.into_iter().find(|(_, found)| *found != n_dofs) {
-            Some((name, found)) => Err(Error::Length { name, expected: n_dofs, found, per: "DoF" }),
-            None => Ok(()),
-        }
+        check_length("position", self.position.len(), n_dofs, "DoF")?;
+        check_length("velocity", self.velocity.len(), n_dofs, "DoF")?;
+        check_length("acceleration", self.acceleration.len(), n_dofs, "DoF")
     }
 }

@@ -81,9 +81,7 @@ pub fn rollout_with(
     let steps = grid.steps(primitive, conditions.time_constant(primitive)?)?;
     let mut clock = Clock::of(primitive, conditions)?;
     if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
-        return Err(Error::Arguments(
-            "pass phase or segment_durations of several segments, not both: warped time starts at phase 0",
-        ));
+        return Err(Error::Conflict { names: ["phase", "segment_durations"], reason: "warped time starts at phase 0" });
     }
     let conditions = clock.conditions(conditions);
     let mut controller = Controller::new(primitive, grid.dt, &conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);

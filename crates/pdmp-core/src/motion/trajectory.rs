@@ -1,10 +1,10 @@
-//! Trajectories: sampled movements.
+//! Trajectories: sampled movements, singly and in batches.
 
-use ndarray::{Array2, Ix2};
+use ndarray::{Array2, Array3, Ix2};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::motion::command::Motion;
-use crate::validate::{check_positive, row_major_mut, zeros};
+use crate::validate::{check_positive, check_range, row_major_mut, zeros};
 
 /// Number of samples between two calls of `progress`.
 const PROGRESS_INTERVAL: usize = 4096;
@@ -59,12 +59,26 @@ impl Trajectory {
 /// last sample of a duration that is a multiple of dt up to rounding.
 pub(crate) fn step_count(name: &'static str, duration: f64, dt: f64) -> Result<usize> {
     check_positive("dt", dt)?;
-    if !(0.0..f64::INFINITY).contains(&duration) {
-        return Err(Error::Range { name, value: duration, allowed: "must be finite and not negative" });
-    }
+    check_range(name, duration, (0.0..f64::INFINITY).contains(&duration), "must be finite and not negative")?;
     let steps = (duration / dt * (1.0 + 1e-12) + 1e-9).floor();
-    if steps > MAX_STEPS {
-        return Err(Error::Range { name: "dt", value: dt, allowed: "gives more than 1e7 samples: enlarge it" });
-    }
+    check_range("dt", dt, steps <= MAX_STEPS, "gives more than 1e7 samples: enlarge it")?;
     Ok(steps as usize)
+}
+
+/// Generated movements of a batch, sampled at T common times: entry b of each array is movement b.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectories {
+    /// Positions (B, T, D), in the unit of each DoF.
+    pub position: Array3<f64>,
+    /// Velocities (B, T, D), per second, if requested.
+    pub velocity: Option<Array3<f64>>,
+    /// Accelerations (B, T, D), per second squared, if requested.
+    pub acceleration: Option<Array3<f64>>,
+}
+
+impl Trajectories {
+    /// Returns the positions and the derivatives that are present, in order of differentiation.
+    pub fn iter(&self) -> impl Iterator<Item = &Array3<f64>> {
+        [Some(&self.position), self.velocity.as_ref(), self.acceleration.as_ref()].into_iter().flatten()
+    }
 }

@@ -10,7 +10,7 @@ use std::fmt;
 
 use ndarray::{Array2, Axis};
 
-use super::periodicity::STANDS_STILL;
+use super::periodicity::NO_CYCLES;
 use crate::error::Error;
 
 /// Maximum modified z-score.
@@ -60,7 +60,7 @@ impl RejectionReason {
     pub(super) fn of(error: &Error) -> Option<Self> {
         match *error {
             Error::Aperiodic { lag, share, least } => Some(Self::Aperiodic { lag, share, least }),
-            Error::Arguments(STANDS_STILL) => Some(Self::Still),
+            Error::Still { .. } => Some(Self::Still),
             _ => None,
         }
     }
@@ -77,7 +77,7 @@ impl fmt::Display for RejectionReason {
                 write!(f, "the recording has no complete cycle that begins in the phase of the first recording")
             }
             RejectionReason::Aperiodic { lag, share, least } => Error::Aperiodic { lag, share, least }.fmt(f),
-            RejectionReason::Still => write!(f, "{STANDS_STILL}"),
+            RejectionReason::Still => Error::Still { consequence: NO_CYCLES }.fmt(f),
         }
     }
 }

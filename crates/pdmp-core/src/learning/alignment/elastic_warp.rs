@@ -22,6 +22,7 @@ use ndarray::{Array2, Axis};
 use super::{Aligned, WarpingFunction};
 use crate::error::Result;
 use crate::model::template::{STEPS, TimeWarp, WarpTemplate};
+use crate::numerics::statistics::range;
 use crate::numerics::threads::Threads;
 use crate::validate::{row_major, row_major_mut, zeros};
 
@@ -136,17 +137,11 @@ impl Aligned<'_> {
 
 /// Returns the largest peak-to-peak range of each DoF within one demonstration (D,); 1 for a DoF at rest.
 fn ranges(aligned: &Aligned) -> Vec<f64> {
-    let range = |d: usize| {
-        let widths = aligned.demos.iter().map(|demo| {
-            let position = demo.position();
-            let ends =
-                position.column(d).iter().fold([f64::MAX, f64::MIN], |[low, high], &y| [low.min(y), high.max(y)]);
-            ends[1] - ends[0]
-        });
-        let widest = widths.fold(0.0, f64::max);
+    let widest = |d: usize| {
+        let widest = aligned.demos.iter().map(|demo| range(demo.position().column(d))).fold(0.0, f64::max);
         if widest > 0.0 { widest } else { 1.0 }
     };
-    (0..aligned.demo(0).n_dofs()).map(range).collect()
+    (0..aligned.demo(0).n_dofs()).map(widest).collect()
 }
 
 /// Returns the Euclidean norm.

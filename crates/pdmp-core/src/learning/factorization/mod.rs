@@ -112,7 +112,10 @@ impl Factors {
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
         if targets.is_empty() {
-            return Err(Error::Arguments("targets is empty: pass one row per demonstration, one column per value"));
+            return Err(Error::Argument {
+                name: "targets",
+                problem: "is empty: pass one row per demonstration, one column per value",
+            });
         }
         styles.check(targets.nrows(), "demonstrations")?;
         styles.check(targets.ncols(), "target values")?;

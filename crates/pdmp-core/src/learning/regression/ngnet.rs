@@ -9,6 +9,7 @@ use ndarray::{ArrayView2, Axis};
 use super::{Domain, Regression, magnitude};
 use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
+use crate::validate::check_range;
 
 /// Margin of the centres beyond either end of an interval, in centre spacings.
 ///
@@ -119,14 +120,9 @@ impl NGnet {
     }
 
     fn check(&self) -> Result<()> {
-        if !(2..=1000).contains(&self.n_basis) {
-            let value = self.n_basis as f64;
-            return Err(Error::Range { name: "n_basis", value, allowed: "must lie between 2 and 1000" });
-        }
-        if !(0.3..=3.0).contains(&self.overlap) {
-            return Err(Error::Range { name: "overlap", value: self.overlap, allowed: "must lie between 0.3 and 3" });
-        }
-        Ok(())
+        let Self { n_basis, overlap } = *self;
+        check_range("n_basis", n_basis as f64, (2..=1000).contains(&n_basis), "must lie between 2 and 1000")?;
+        check_range("overlap", overlap, (0.3..=3.0).contains(&overlap), "must lie between 0.3 and 3")
     }
 }
 

@@ -14,6 +14,7 @@ mod header;
 mod read;
 mod write;
 
+use std::fmt::Display;
 use std::fs;
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -72,6 +73,9 @@ struct Constants {
 #[serde(deny_unknown_fields)]
 struct Map {
     columns: Vec<ContextColumn>,
+    /// Names of the columns; absent where unknown.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    names: Vec<String>,
     kind: ContextMapKind,
     kernel: Option<Kernel>,
     errors: Vec<(ContextMapKind, Option<f64>)>,
@@ -146,7 +150,7 @@ impl Model {
     pub fn load(path: &Path) -> Result<Self> {
         let failed = |source| Error::Io { path: path.to_path_buf(), source };
         let with_path = |error| match error {
-            Error::File(reason) => Error::File(format!("{}: {reason}", path.display())),
+            Error::File(reason) => unreadable(format!("{}: {reason}", path.display())),
             other => other,
         };
         let mut file = fs::File::open(path).map_err(failed)?;
@@ -159,15 +163,24 @@ impl Model {
     }
 }
 
+/// Returns the error of a file that is damaged, not a model, or of another version.
+fn unreadable(reason: impl Display) -> Error {
+    Error::File(reason.to_string())
+}
+
+/// Checks a property of the contents of a file.
+fn ensure(valid: bool, reason: &str) -> Result<()> {
+    if valid { Ok(()) } else { Err(unreadable(reason)) }
+}
+
 /// Checks the size of the file, and the size of its header as announced in the first eight bytes.
 fn check_size(bytes: &[u8]) -> Result<()> {
-    let bad = |reason: &str| Error::File(reason.to_string());
     match bytes.first_chunk().map(|head| u64::from_le_bytes(*head)) {
-        _ if bytes.len() as u64 > MAX_FILE_SIZE => Err(bad("larger than any model")),
-        None => Err(bad("shorter than a header")),
-        Some(0) => Err(bad("not a safetensors file")),
+        _ if bytes.len() as u64 > MAX_FILE_SIZE => Err(unreadable("larger than any model")),
+        None => Err(unreadable("shorter than a header")),
+        Some(0) => Err(unreadable("not a safetensors file")),
         Some(length) if length > MAX_HEADER_SIZE => {
-            Err(bad("not a safetensors file, or damaged: it announces a header larger than any model has"))
+            Err(unreadable("not a safetensors file, or damaged: it announces a header larger than any model has"))
         }
         Some(_) => Ok(()),
     }
@@ -176,7 +189,7 @@ fn check_size(bytes: &[u8]) -> Result<()> {
 /// Returns the CRC-32 of the constants and of the names and bytes of all arrays, in the order of `Model::arrays`.
 fn checksum<'a>(constants: &Constants, arrays: impl Iterator<Item = (&'a str, &'a [u8])>) -> Result<u32> {
     let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&serde_json::to_vec(constants).map_err(|error| Error::File(error.to_string()))?);
+    hasher.update(&serde_json::to_vec(constants).map_err(unreadable)?);
     for (name, bytes) in arrays {
         hasher.update(name.as_bytes());
         hasher.update(bytes);

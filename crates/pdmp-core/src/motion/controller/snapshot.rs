@@ -71,9 +71,7 @@ impl Controller {
             return Err(Error::Range { name: "snapshot version", value: head[0], allowed: "must be 1" });
         }
         if head[..HEADER - 2] != header(primitive) {
-            return Err(Error::Arguments(
-                "the snapshot belongs to another model: restore it with the model of its controller",
-            ));
+            return Err(unsuitable("belongs to another model: restore it with the model of its controller"));
         }
         let mut controller = Self::new(primitive, head[HEADER - 2], &Conditions::default(), Some(head[HEADER - 1]))?;
         let mut expected = HEADER;
@@ -212,10 +210,10 @@ impl Controller {
         check_tau(self.max_tau, self.primitive.tau())?;
         reject_goal_velocity(&self.primitive, self.conditions.has_goal_velocity)?;
         if self.goal_transition.is_active() && !self.has_frame() {
-            return Err(Error::Arguments("snapshot: a transition of the goal needs learnt transport"));
+            return Err(unsuitable("describes no state: a transition of the goal needs learnt transport"));
         }
         if self.status == Status::Finished && self.primitive.kind() == Kind::Rhythmic {
-            return Err(Error::Arguments("snapshot: a rhythmic movement never finishes"));
+            return Err(unsuitable("describes no state: a rhythmic movement never finishes"));
         }
         // The next tick may have any phase rate.
         let gate = Gate { phase_rate: MAX_PHASE_RATE, ..self.gate() };
@@ -223,14 +221,14 @@ impl Controller {
         if at_once
             && [&self.style, &self.rate, &self.amplitude].iter().any(|command| command.value() != command.target())
         {
-            return Err(Error::Arguments("snapshot: a command that takes effect at once is in transition"));
+            return Err(unsuitable("describes no state: a command that takes effect at once is in transition"));
         }
         let forcing = self.groups.iter().map(|group| gate.forcing::<F64x4>(&group.forcing));
         let bounded = |lanes: F64x4| lanes.to_array().iter().all(|x| (QUANTITY[0]..=QUANTITY[1]).contains(x));
         if forcing.flat_map(|w| [w.value, w.slope]).all(bounded) {
             return Ok(());
         }
-        Err(Error::Arguments("snapshot: its style and amplitude make the forcing overflow"))
+        Err(unsuitable("describes no state: its style and amplitude make the forcing overflow"))
     }
 }
 
@@ -247,6 +245,11 @@ fn header(primitive: &Primitive) -> [f64; HEADER - 2] {
         attractor.alpha_z,
         attractor.beta_z,
     ]
+}
+
+/// Returns the error of a snapshot with the given problem.
+fn unsuitable(problem: &'static str) -> Error {
+    Error::Argument { name: "snapshot", problem }
 }
 
 /// Visits a vector that may be absent, as a flag and `n` numbers.

@@ -16,12 +16,12 @@ use ndarray::{Array2, ArrayView2};
 
 pub use self::kernel::Kernel;
 use self::likelihood::{Gradient, Likelihood, Profile};
-pub use self::posterior::GpPosterior;
+pub use self::posterior::{GpPosterior, GpPrediction};
 use self::state_space::StateSpace;
 use super::hyperparameter_search::{Axis, maximise};
 use super::{Domain, magnitude};
 use crate::error::{Error, Result};
-use crate::validate::check_positive;
+use crate::validate::{check_positive, check_range};
 
 /// Smallest ratio of noise to signal variance: below it, rounding makes the covariance matrix indefinite.
 const MIN_NOISE: f64 = 1e-10;
@@ -212,11 +212,9 @@ impl Gp {
     }
 
     fn check(&self, domain: Domain) -> Result<()> {
-        if let Some(value) = self.length
-            && !(1e-6..=1e6).contains(&(value / domain.extent()))
-        {
+        if let Some(length) = self.length {
             let allowed = "must lie between 1e-6 and 1e6 times the extent of the clock";
-            return Err(Error::Range { name: "length", value, allowed });
+            check_range("length", length, (1e-6..=1e6).contains(&(length / domain.extent())), allowed)?;
         }
         check_noise(self.noise)
     }
@@ -258,12 +256,9 @@ impl Gp {
 }
 
 fn check_noise(noise: Option<f64>) -> Result<()> {
-    match noise {
-        Some(value) if !(MIN_NOISE..=1e6).contains(&value) => {
-            Err(Error::Range { name: "noise", value, allowed: "must lie between 1e-10 and 1e6" })
-        }
-        _ => Ok(()),
-    }
+    noise.map_or(Ok(()), |noise| {
+        check_range("noise", noise, (MIN_NOISE..=1e6).contains(&noise), "must lie between 1e-10 and 1e6")
+    })
 }
 
 /// Length scale ℓ and noise ratio ν.
