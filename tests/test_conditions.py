@@ -112,7 +112,7 @@ def test_final_velocity_is_a_condition() -> None:
     assert strike != plain and strike.replace(goal_velocity=None) == plain
     half = pdmp.blend(strike, strike.replace(goal_velocity=[0.0, 0.0]), 0.5)
     np.testing.assert_array_equal(half.goal_velocity, [1.0, -0.2])
-    with pytest.raises(ValueError, match="goal_velocity: given for one of the two only"):
+    with pytest.raises(ValueError, match="goal_velocity: given for some of the conditions only"):
         pdmp.blend(strike, plain, 0.5)
     made = model.rollout(strike)
     np.testing.assert_array_equal(
