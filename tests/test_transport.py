@@ -162,6 +162,83 @@ def two_dofs() -> pdmp.Model:
     return pdmp.fit(reaches(), n_styles=2)
 
 
+@pytest.mark.parametrize("name", ["goal_velocity", "tau"])
+@pytest.mark.parametrize("at", [0.7, 0.8, 0.89])
+def test_late_final_velocity_is_met(name: str, at: float) -> None:
+    """A final velocity or tau that changes before the last tenth of the movement is met."""
+    model = two_dofs()
+    controller = model.controller(0.001, goal_velocity=[2.0, -0.5], transition=0.0)
+    ticks = round(model.durations[model.nominal] / 0.001)
+    for tick in range(round(at * ticks)):
+        assert controller.step(), tick
+    setattr(controller, name, {"goal_velocity": [1.0, 0.3], "tau": 0.8 * model.tau}[name])
+    while (left := ticks * 0.001 / model.tau + np.log(controller.phase) / model.alpha_x) > 1e-9:
+        controller.step(min(0.001, left * controller.tau))
+    np.testing.assert_allclose(controller.velocity, controller.goal_velocity, atol=2e-6)
+    np.testing.assert_allclose(controller.position, controller.goal, atol=1e-6)
+
+
+@pytest.mark.parametrize("options", [{"alpha_z": 4.0}, {"alpha_z": 5.0}, {}], ids=str)
+@pytest.mark.parametrize("transition", [0.0, 0.3, 1.0])
+def test_final_velocity_is_met_for_any_gain_and_transition(
+    options: dict[str, Any], transition: float
+) -> None:
+    """A final velocity that is known from the start is met, as in a rollout."""
+    model = pdmp.fit(reaches(), n_styles=2, **options)
+    controller = model.controller(0.001, goal_velocity=[2.0, -0.5], transition=transition)
+    for _ in range(round(model.durations[model.nominal] / 0.001)):
+        controller.step()
+    np.testing.assert_allclose(controller.velocity, [2.0, -0.5], atol=1e-6)
+    made = model.rollout(goal_velocity=[2.0, -0.5], dt=0.001)
+    np.testing.assert_allclose(controller.position, made.position[-1], atol=1e-9)
+
+
+@pytest.mark.parametrize("at", [0.5, 0.8, 0.95, 1.2])
+def test_goal_after_a_late_final_velocity_is_reached(at: float) -> None:
+    """A goal that is commanded with a final velocity is reached at last, however late both are."""
+    model = two_dofs()
+    controller = model.controller(0.001)
+    for _ in range(round(1000 * at * model.durations[model.nominal])):
+        controller.step()
+    controller.goal_velocity = [1.0, 0.0]
+    controller.goal = model.goals[1] + [0.5, 0.5]
+    while controller.step():
+        assert controller.time < 5
+    np.testing.assert_allclose(controller.position, controller.goal, atol=0.01)
+
+
+@pytest.mark.parametrize(("moved", "repeated"), [(0.5, 0.75), (0.5, 0.8), (0.8, 1.05), (1.2, 1.4)])
+def test_goal_repeated_with_a_small_change_is_not_overshot(moved: float, repeated: float) -> None:
+    """A change of 1e-9 of the goal during a transition does not prolong this past the goal."""
+    controller, farthest = straight().controller(0.001), 0.0
+    for tick in range(3000):
+        if tick in (round(1000 * moved), round(1000 * repeated)):
+            controller.goal = [2.0 + 1e-9 * (tick > 1000 * moved)]
+        controller.step()
+        farthest = max(farthest, controller.position[0])
+    assert farthest < 2.0001
+
+
+@pytest.mark.parametrize("transport", ["learnt", "immediate"])
+def test_movement_finishes_under_a_goal_that_trembles(transport: str) -> None:
+    """A goal measured at every tick, with noise far below the tolerance, is reached in time."""
+    controller = straight(transport).controller(0.001)
+    for tick in range(5000):
+        controller.goal = [1.2 + 1e-6 * (tick % 2)]
+        if not controller.step():
+            break
+    assert controller.time < 1.5
+    np.testing.assert_allclose(controller.position, [1.2], atol=0.01)
+
+
+def test_constant_demonstrations_finish_far_from_zero() -> None:
+    """Rounding of a large position does not keep a movement from finishing."""
+    still = [np.column_stack([a * RISE, np.full(101, 1e6)]) for a in (0.9, 1.0, 1.1)]
+    controller = pdmp.fit(still, dt=0.01).controller(0.0001, goal_velocity=[1.0, 0.0])
+    while controller.step():
+        assert controller.time < 5
+
+
 @pytest.mark.parametrize("at", [0.01, 0.1, 0.2, 0.4])
 def test_goal_moved_early_is_reached_in_time(at: float) -> None:
     """A goal that moves early is reached in time."""

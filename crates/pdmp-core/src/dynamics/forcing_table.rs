@@ -109,7 +109,8 @@ impl ForcingBound {
 #[repr(align(64))]
 struct Cubic([F64x4; 4]);
 
-/// Position in the table: the index of the first cubic at a knot, and the clock since that knot.
+/// Position in the table: the index of the first cubic at a knot, and the argument of the cubics: the clock since that knot,
+/// or p past the end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TableIndex {
     first: usize,

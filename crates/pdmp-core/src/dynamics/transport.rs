@@ -110,9 +110,9 @@ impl Transport {
     }
 
     /// Returns the interval that contains clock `u`.
-    pub(crate) fn stretch(&self, u: f64) -> TransportSegment {
+    pub(crate) fn segment_at(&self, u: f64) -> TransportSegment {
         // The cast saturates: a negative clock is evaluated in the first cell.
-        self.segment((u * self.cells_per_clock) as usize)
+        self.segment_of_cell((u * self.cells_per_clock) as usize)
     }
 
     /// Returns the index of the cell of an interval, the number of cells for that past the end.
@@ -121,7 +121,7 @@ impl Transport {
     }
 
     /// Returns the interval of a cell.
-    pub(crate) fn segment(&self, cell: usize) -> TransportSegment {
+    pub(crate) fn segment_of_cell(&self, cell: usize) -> TransportSegment {
         let at = |knot: usize| self.width * knot as f64;
         match self.cubics.get(cell) {
             Some(&cubic) => TransportSegment { from: at(cell), to: at(cell + 1), cubic },
@@ -131,7 +131,7 @@ impl Transport {
 
     /// Returns the lag ℓ at clock `u`.
     pub(crate) fn lag(&self, u: f64) -> TransportSample {
-        self.stretch(u).lag(u)
+        self.segment_at(u).lag(u)
     }
 }
 

@@ -115,11 +115,11 @@ impl Batch {
     /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
     /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
     /// let goals = PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1], [0.8, 0.3]]);
-    /// let styles = model.demonstrated().styles.clone();
-    /// let conditions = BatchConditions { styles, goals: Some(goals), ..BatchConditions::default() };
+    /// let styles = PerMovement::Each(model.demonstrated().styles.clone());
+    /// let conditions = BatchConditions { style: Some(styles), goal: Some(goals), ..BatchConditions::default() };
     /// let batch = batch(model.primitive(), conditions, TimeGrid { dt: 0.01, duration: None }, &mut |_| Ok(()))?;
-    /// let outputs = batch.rollouts(0..3, Derivative::Position, Threads::available(), &mut |_| Ok(()))?;
-    /// assert_eq!(outputs[0].dim(), (3, 101, 2));
+    /// let movements = batch.rollouts(0..3, Derivative::Position, Threads::available(), &mut |_| Ok(()))?;
+    /// assert_eq!(movements.position.dim(), (3, 101, 2));
     /// # Ok(())
     /// # }
     /// ```

@@ -96,7 +96,8 @@ pub fn jacobian(
         WithRespectTo::Goal | WithRespectTo::Anchor => by_dof(&curves.start, |_| one),
         WithRespectTo::Start => by_dof(&curves.start, |response| response),
         WithRespectTo::GoalVelocity => {
-            by_dof(curves.goal_velocity.as_ref().unwrap_or(&curves.velocity), |response| response)
+            let curve = curves.goal_velocity.as_ref().expect("responses with a final velocity were computed above");
+            by_dof(curve, |response| response)
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Transition of the moving frame to a commanded goal and final velocity.
 //!
-//! The frame c(u) = g + (g − y₀)ℓ(u) + q(u) has a displacement q (`goal_transition`) that begins when a goal is commanded
-//! and ends, with rest, at the new goal. A final velocity is reached at u_end: q there compensates for the position and
+//! The frame c(u) = g₁ + (g₀ − y₀)ℓ(u) + q(u) has a displacement q (`goal_transition`) that begins when a goal is commanded
+//! and ends, with rest, at the new goal; g₀ is the goal at the start, g₁ that before the transition. A final velocity is reached at u_end: q there compensates for the position and
 //! velocity at which the output system would arrive,
 //!
 //! ```text

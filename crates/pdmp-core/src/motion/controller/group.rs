@@ -81,7 +81,7 @@ pub(super) struct Gate {
     pub(super) r: f64,
     /// r′.
     pub(super) r_slope: f64,
-    /// κ. It scales the derivative of b alone: style and amplitude are filtered on the clock of the output system.
+    /// κ, past the end κp′. It scales the derivative of b alone: style and amplitude are filtered on the clock of the output system.
     pub(super) phase_rate: f64,
     /// ρ and ρ̇.
     pub(super) rate: [f64; 2],

@@ -46,7 +46,7 @@ use group::Group;
 /// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
 /// Default tolerance of a settled movement, relative to the range of each DoF. On the recordings of `docs/transport.md`,
-/// movements that end in motion settle to it at 1.0 to 1.35 durations (median of a set), to 1e-3 at up to 1.5.
+/// movements settle to it within 1.0 to 1.3 durations (median of a set), to 1e-3 within up to 1.5.
 const DEFAULT_TOLERANCE: f64 = 5e-3;
 /// Flush level, relative to the largest range: values 1e-16 of it become zero. It lies far below the last digit of every
 /// movement, and its square is a normal number.
@@ -236,7 +236,7 @@ impl Controller {
             groups,
             forcing_phase_rate: 1.0,
             frame_lag: 0.0,
-            transport_segment: primitive.transport.stretch(0.0),
+            transport_segment: primitive.transport.segment_at(0.0),
             position: zeros.clone(),
             velocity: zeros.clone(),
             acceleration: zeros,

@@ -192,7 +192,7 @@ impl Controller {
         visit_number(visit, frame_lag, [-2.0, 2.0])?;
         let mut cell = primitive.transport.cell(transport_segment) as f64;
         visit_number(visit, &mut cell, [0.0, 1e6])?;
-        *transport_segment = primitive.transport.segment(cell as usize);
+        *transport_segment = primitive.transport.segment_of_cell(cell as usize);
 
         groups.iter_mut().try_for_each(|group| group.walk(visit, QUANTITY, distance))?;
         visit_number(visit, max_tau, [f64::MIN_POSITIVE, f64::MAX])?;

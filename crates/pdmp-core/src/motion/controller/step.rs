@@ -174,7 +174,7 @@ impl Controller {
             };
         }
         if !self.transport_segment.reaches(self.clock.value()) {
-            self.transport_segment = self.primitive.transport.stretch(self.clock.value());
+            self.transport_segment = self.primitive.transport.segment_at(self.clock.value());
         }
         let TransportSample { value, slope, bend } = self.transport_segment.lag(self.clock.value());
         let lags = [std::mem::replace(&mut self.frame_lag, value), value];
@@ -300,7 +300,7 @@ impl Controller {
 
     /// Evaluates the frame after the clock was set.
     pub(super) fn read_frame(&mut self) {
-        self.transport_segment = self.primitive.transport.stretch(self.clock.value());
+        self.transport_segment = self.primitive.transport.segment_at(self.clock.value());
         self.frame_lag = self.transport_segment.lag(self.clock.value()).value;
     }
 
