@@ -1124,7 +1124,7 @@ class Model:
         Raises
         ------
         OSError
-            The file cannot be written.
+            The file cannot be written, or its folder does not exist.
 
         Examples
         --------
@@ -1526,7 +1526,7 @@ class Trajectory:
         Raises
         ------
         OSError
-            The file cannot be written.
+            The file cannot be written, or its folder does not exist.
         ValueError
             A name could not be read back by `io.read_csv`.
         """

@@ -356,7 +356,7 @@ impl Trajectory {
     /// Raises
     /// ------
     /// OSError
-    ///     The file cannot be written.
+    ///     The file cannot be written, or its folder does not exist.
     /// ValueError
     ///     A name could not be read back by `io.read_csv`.
     fn to_csv(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {

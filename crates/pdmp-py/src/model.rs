@@ -328,7 +328,7 @@ impl Model {
     /// Raises
     /// ------
     /// OSError
-    ///     The file cannot be written.
+    ///     The file cannot be written, or its folder does not exist.
     ///
     /// Examples
     /// --------

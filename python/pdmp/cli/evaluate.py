@@ -29,7 +29,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "paths", nargs="+", type=file_path, metavar="PATH", help="folder with an index.csv"
     )
-    add_output(parser, "FOLDER", "folder for figures and tables")
+    add_output(parser, "FOLDER", "folder for figures and tables, created if missing")
     add_reader_options(parser)
     add_fit_options(parser)
     parser.add_argument("--unit", default="", help="unit of the positions in the figures")

@@ -31,7 +31,7 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="PATH",
         help="its demonstrations, as for pdmp fit",
     )
-    add_output(parser, "FOLDER", "folder for the figures", required=True)
+    add_output(parser, "FOLDER", "folder for the figures, created if missing", required=True)
     add_reader_options(parser)
 
 

@@ -210,7 +210,7 @@ def write_csv(
     ValueError
         A number of names or units other than D, or names that would be read differently.
     OSError
-        A file that cannot be written.
+        A file that cannot be written, or whose folder does not exist.
     """
     path = Path(path)
     check_type("trajectory", trajectory, Trajectory, "pdmp.Trajectory")
