@@ -13,12 +13,13 @@ use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::options::TransportSelection;
 use crate::learning::style_selection::cross_validation::StyleSelection;
 use crate::learning::targets::Targets;
-use crate::model::primitive::{Parts, Primitive};
+use crate::model::primitive::{Parts, Primitive, end_velocities};
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{inspect, unwound};
 use crate::validate::{check_length, check_names};
 
+use super::braking_rate::braking_rate;
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
 use super::noise_findings;
@@ -100,7 +101,7 @@ pub fn fit_with(
         }
         _ => Transport::immediate(),
     };
-    let braking = (!transport.is_immediate()).then(|| targets.braking(constants.attractor));
+    let accelerations = targets.largest_accelerations();
     targets.carry(&transport, constants.attractor, constants.canonical);
     targets.scale(&dof_scale);
 
@@ -142,6 +143,10 @@ pub fn fit_with(
     let Constants { attractor, canonical, tau } = constants;
     let breaks = aligned.breaks.clone();
     let nominal = demonstrated.nominal_conditions(canonical.kind());
+    let braking = (!transport.is_immediate()).then(|| {
+        let end_velocities = end_velocities(attractor, &forcing_table, names.len());
+        braking_rate(attractor, &accelerations, demonstrated.styles.view(), &end_velocities)
+    });
     let parts = Parts { attractor, forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal };
     let primitive = Arc::new(Primitive::new(parts));
     findings.extend(stiffness(&primitive, &aligned)?);

@@ -3,6 +3,7 @@
 //! [`fit`] composes the four steps of Section 3.2: alignment, targets, factorisation, regression.
 
 pub(crate) mod alignment;
+mod braking_rate;
 mod constants;
 mod context_folds;
 mod cycle_phase;

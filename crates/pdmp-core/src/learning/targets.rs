@@ -19,12 +19,8 @@ use crate::numerics::spline::Knots;
 use crate::numerics::threads::Threads;
 use crate::validate::{row_major_mut, zeros};
 
-/// Largest braking rate κ, in units of α_z; that of a movement that ends nearly at rest. With 4 instead, movements leave
-/// their goals by 1.2 to 2 times as much on the recordings of `docs/transport.md`; 16 improves on few of them.
-const MAX_BRAKING: f64 = 8.0;
-
-/// Number of vectors (D,) of each demonstration: start, goal, anchor, range, largest acceleration and speed at the end.
-const N_VECTORS: usize = 6;
+/// Number of vectors (D,) of each demonstration: start, goal, anchor, range and largest acceleration.
+const N_VECTORS: usize = 5;
 
 /// Targets and other quantities that a fit takes from the demonstrations, one row per demonstration.
 #[derive(Debug)]
@@ -41,8 +37,6 @@ pub(crate) struct Targets {
     ranges: Array2<f64>,
     /// Largest |y″| (M, D) with respect to the clock.
     accelerations: Array2<f64>,
-    /// |y′| at the end (M, D) with respect to the clock.
-    end_speeds: Array2<f64>,
     /// Displacements from the start (M, S, D), from which the transport profile is learnt; empty for rhythmic movements.
     displacements: Array3<f64>,
 }
@@ -80,14 +74,14 @@ impl Targets {
                 Ok(())
             };
         threads.try_for_each_with_progress(rows.enumerate().collect(), columns, compute, progress)?;
-        let [starts, goals, anchors, ranges, accelerations, end_speeds] =
+        let [starts, goals, anchors, ranges, accelerations] =
             std::array::from_fn::<_, N_VECTORS, _>(|k| vectors.index_axis(Axis(1), k).to_owned());
-        Ok(Self { forcing, starts, goals, anchors, ranges, accelerations, end_speeds, displacements })
+        Ok(Self { forcing, starts, goals, anchors, ranges, accelerations, displacements })
     }
 
     /// Returns the largest peak-to-peak range of each DoF within one demonstration (D,).
     pub(crate) fn ranges(&self) -> Vec<f64> {
-        self.ranges.fold_axis(Axis(0), 0.0f64, |most, range| most.max(*range)).to_vec()
+        largest(&self.ranges)
     }
 
     /// Learns the transport profile of discrete movements, with DoFs scaled by the given units (D,).
@@ -102,19 +96,9 @@ impl Targets {
         transport_profile(displacements, reaches, canonical)
     }
 
-    /// Returns the rate κ at which movements brake past their ends: y″ is about −κy′ at most.
-    ///
-    /// From its fastest demonstrated end, each DoF decelerates by no more than its largest demonstrated acceleration. κ is
-    /// at least α_z, since the attractor itself decelerates so, and at most 8α_z, that of movements that end at rest.
-    pub(crate) fn braking(&self, attractor: Attractor) -> f64 {
-        let largest = |matrix: &Array2<f64>| matrix.fold_axis(Axis(0), 0.0f64, |most, x| most.max(*x));
-        let ratio = |(acceleration, speed): (f64, f64)| if speed > 0.0 { acceleration / speed } else { f64::INFINITY };
-        let slowest = largest(&self.accelerations)
-            .into_iter()
-            .zip(largest(&self.end_speeds))
-            .map(ratio)
-            .fold(f64::INFINITY, f64::min);
-        slowest.clamp(attractor.alpha_z, MAX_BRAKING * attractor.alpha_z)
+    /// Returns the largest |y″| of each DoF with respect to the clock (D,).
+    pub(crate) fn largest_accelerations(&self) -> Vec<f64> {
+        largest(&self.accelerations)
     }
 
     /// Converts the targets to those about the moving frame c, f = y′ − c′ − z with z driven by y − c.
@@ -190,8 +174,7 @@ impl TargetComputation {
         let goal = given.unwrap_or(&samples[samples.len() - n_dofs..]).to_vec();
         let n_samples = F64x4::splat(column.len() as f64);
         let goals = pack(&goal);
-        let [mut means, mut ranges, mut accelerations, mut end_speeds] =
-            [(); 4].map(|()| vec![F64x4::ZERO; goals.len()]);
+        let [mut means, mut ranges, mut accelerations] = [(); 3].map(|()| vec![F64x4::ZERO; goals.len()]);
         let per_step = 1.0 / self.clock[1];
         for group in 0..groups(n_dofs) {
             gather(samples, n_dofs, group, column);
@@ -207,13 +190,17 @@ impl TargetComputation {
             let difference = |pair: &[F64x4]| (pair[1] - pair[0]).abs() * per_step;
             accelerations[group] =
                 slopes.windows(2).fold(F64x4::ZERO, |largest, pair| largest.fast_max(difference(pair)));
-            end_speeds[group] = slopes[slopes.len() - 1].abs();
             self.inverse.target(column, slopes, centre - start, self.kind == Kind::Rhythmic);
             scatter(column, n_dofs, group, samples);
         }
-        let computed = [&means, &ranges, &accelerations, &end_speeds].map(|packed| unpack(packed, n_dofs));
+        let computed = [&means, &ranges, &accelerations].map(|packed| unpack(packed, n_dofs));
         for (mut row, vector) in vectors.rows_mut().into_iter().zip([&*start, &*goal].into_iter().chain(computed)) {
             row.assign(&aview1(vector));
         }
     }
+}
+
+/// Returns the largest element of each column.
+fn largest(matrix: &Array2<f64>) -> Vec<f64> {
+    matrix.fold_axis(Axis(0), 0.0f64, |largest, x| largest.max(*x)).to_vec()
 }

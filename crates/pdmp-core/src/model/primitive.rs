@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use ndarray::Array2;
+
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::forcing_table::{ForcingTable, TableIndex};
 use crate::dynamics::output_system::{Attractor, Propagator, State};
@@ -10,7 +12,7 @@ use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::responses::Cache;
-use crate::numerics::simd::{F64x4, groups};
+use crate::numerics::simd::{F64x4, WIDTH, groups};
 use crate::validate::{check_range, check_vector};
 
 /// Maximum of the rates α_z, β_z, α_x and μ, and inverse of their minimum: products of several stay finite.
@@ -317,6 +319,19 @@ impl Primitive {
         }
         Ok(value)
     }
+}
+
+/// Returns the velocities y′ at the end for unit styles (J, D), starting from zero.
+pub(crate) fn end_velocities(attractor: Attractor, forcing_table: &ForcingTable, n_dofs: usize) -> Array2<f64> {
+    let n_styles = forcing_table.n_outputs() / n_dofs;
+    let states = from_rest(attractor, forcing_table);
+    let end = &states[states.len() - forcing_table.knot(0).len()..];
+    let flows: Vec<[f64; WIDTH]> = end
+        .iter()
+        .zip(forcing_table.knot(forcing_table.cells()))
+        .map(|(state, w)| (state.z + w.value).to_array())
+        .collect();
+    Array2::from_shape_fn((n_styles, n_dofs), |(j, d)| flows[d / WIDTH * n_styles + j][d % WIDTH])
 }
 
 /// Returns the states at the knots of the forcing table for unit styles, starting from zero, by knots, groups of DoFs and
