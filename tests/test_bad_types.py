@@ -27,6 +27,12 @@ OBJECTS: list[tuple[Callable[[pdmp.Model], Any], str]] = [
     (lambda m: pdmp.blend(1, m.conditions(0), 0.5), "a = 1: expected pdmp.Conditions"),  # type: ignore[arg-type]
     (lambda m: pdmp.blend(m.conditions(0), 2, 0.5), "b = 2: expected pdmp.Conditions"),  # type: ignore[arg-type]
     (lambda m: m.rollout(3), "conditions = 3: expected pdmp.Conditions"),  # type: ignore[arg-type]
+    (lambda m: m.controller().step(coupling=3), "coupling = 3: expected two vectors"),  # type: ignore[arg-type]
+    (
+        lambda m: m.controller().step(coupling=([0, 0],)),  # type: ignore[arg-type]
+        r"coupling = \(\[0, 0\],\): expected two vectors",
+    ),
+    (lambda m: setattr(m.controller(), "compliance", 3), "compliance = 3: expected two gains"),
     (lambda m: pdmp.fit(reaches(), progress=3), "progress = 3: expected a function"),  # type: ignore[arg-type]
     (lambda m: pdmp.evaluate(3), "demos = 3: expected a list of demonstrations"),  # type: ignore[arg-type]
     (lambda m: pdmp.evaluate(reaches(), predictors=3), "predictors = 3: expected a mapping"),  # type: ignore[arg-type]

@@ -10,8 +10,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::conditions::conditions_of;
-use crate::convert::{Vector, items, quoted, read_only, refill};
+use crate::convert::{Vector, read_only, refill};
 use crate::error::raise;
+use crate::instance::pair;
 use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
 use crate::status::Status;
@@ -141,7 +142,7 @@ impl Controller {
         py: Python<'_>,
         dt: Option<Scalar<'_>>,
         measured: Option<&Bound<'_, PyAny>>,
-        coupling: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+        coupling: Option<&Bound<'_, PyAny>>,
         phase: Option<Scalar<'_>>,
     ) -> PyResult<Py<PyAny>> {
         let Self { inner, arguments, .. } = self;
@@ -149,9 +150,10 @@ impl Controller {
         if let Some(measured) = measured {
             refill("measured", measured, &mut arguments.measured)?;
         }
-        if let Some((velocity, acceleration)) = &coupling {
-            refill("coupling velocity", velocity, &mut arguments.velocity)?;
-            refill("coupling acceleration", acceleration, &mut arguments.acceleration)?;
+        if let Some(coupling) = coupling {
+            let [velocity, acceleration] = pair("coupling", coupling, "vectors (c_v, c_a)")?;
+            refill("coupling velocity", &velocity, &mut arguments.velocity)?;
+            refill("coupling acceleration", &acceleration, &mut arguments.acceleration)?;
         }
         let terms = Coupling { velocity: &arguments.velocity, acceleration: &arguments.acceleration };
         let command = Command {
@@ -352,11 +354,8 @@ impl Controller {
 
     #[setter]
     fn set_compliance(&mut self, compliance: &Bound<'_, PyAny>) -> PyResult<()> {
-        let gains = items("compliance", compliance, number)?;
-        let [stopping, tracking] = gains[..] else {
-            let text = format!("compliance = {}: expected two gains (k_s, k_t)", quoted(compliance));
-            return Err(PyValueError::new_err(text));
-        };
+        let [stopping, tracking] = pair("compliance", compliance, "gains (stopping, tracking)")?;
+        let (stopping, tracking) = (number("stopping", &stopping)?, number("tracking", &tracking)?);
         self.inner.set_compliance(Compliance { stopping, tracking }).map_err(raise)
     }
 

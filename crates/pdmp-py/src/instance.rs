@@ -28,6 +28,13 @@ where
     value.cast::<T>().map(Bound::get).map_err(wrong)
 }
 
+/// Returns the two items of an iterable.
+pub(crate) fn pair<'py>(name: &str, value: &Bound<'py, PyAny>, expected: &str) -> PyResult<[Bound<'py, PyAny>; 2]> {
+    let wrong = || PyTypeError::new_err(format!("{name} = {}: expected two {expected}", quoted(value)));
+    let items: Vec<_> = value.try_iter().map_err(|_| wrong())?.take(3).collect::<PyResult<_>>()?;
+    items.try_into().map_err(|_| wrong())
+}
+
 /// Returns a function that is called with the progress of a long call.
 pub(crate) fn callback<'a, 'py>(
     name: &str,

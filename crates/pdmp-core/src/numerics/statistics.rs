@@ -12,6 +12,14 @@ pub(crate) fn range<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> f64 {
     high - low
 }
 
+/// Returns the median, or 0 without numbers.
+pub(crate) fn median(numbers: &[f64]) -> f64 {
+    let mut sorted = numbers.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    if n == 0 { 0.0 } else { (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0 }
+}
+
 /// Returns the median, or the upper one of two.
 pub(crate) fn upper_median(numbers: impl Iterator<Item = f64>) -> f64 {
     let mut numbers: Vec<f64> = numbers.collect();

@@ -4,11 +4,12 @@ use ndarray::{Array1, Array2, Axis, s};
 
 use super::cycle_growth::{Growth, exceeds_movement, median_gain, turns};
 use super::cycle_onsets::CycleSearch;
-use super::outliers::{RejectionReason, median, rejections};
+use super::outliers::{RejectionReason, rejections};
 use super::periodicity::{period_of, traits};
 use super::resampling::check_times;
 use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
+use crate::numerics::statistics::median;
 use crate::preprocessing::Curve;
 use crate::validate::check_length;
 

@@ -35,8 +35,8 @@ use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, concatenate};
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::numerics::spline::{Knots, Splines};
+use crate::numerics::statistics::median;
 use crate::preprocessing::Curve;
-use crate::preprocessing::outliers::median;
 use crate::preprocessing::significance::SignificanceThreshold;
 
 /// Consequence of a recording without motion.
