@@ -112,7 +112,7 @@ def test_invalid_perturbations_are_rejected_and_change_nothing(
     ):
         with pytest.raises(ValueError, match=name):
             controller.step(**arguments)
-    with pytest.raises(ValueError, match="tuple of length 2"):
+    with pytest.raises(TypeError, match="expected two vectors"):
         controller.step(coupling=([0, 0],))
     np.testing.assert_array_equal(controller.position, before)
     assert controller.time == 0.001
