@@ -19,13 +19,13 @@ WALKS := $(if $(PDMP_DATA),$(wildcard $(PDMP_DATA)/walk_styles_bandai/demos))
 # Seconds of `make fuzz` for each target.
 TIME ?= 60
 HOST = $(shell rustc -vV | sed -n 's/^host: //p')
-# Coverage for libFuzzer, as cargo-fuzz asks for it, and AddressSanitizer, which the stable compiler hides.
+# Coverage for libFuzzer, with the flags of cargo-fuzz, and AddressSanitizer, which the stable compiler hides.
 COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases report rtsan fuzz asan licences capi header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport report rtsan fuzz asan licences capi header stubs \
 	clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -39,7 +39,7 @@ test: .venv/with-test  ## Runs every test, Rust and Python
 	cargo test --release --package pdmp-core --no-default-features --test runtime
 	$(BIN)/pytest
 
-check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, stubs against the module, and licences
+check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, stubs against the module, prose, and licences
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
 	cargo clippy --release --package pdmp-core --no-default-features -- -D warnings
@@ -49,6 +49,7 @@ check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, 
 	$(BIN)/mypy
 	$(BIN)/stubtest pdmp._native
 	$(BIN)/python .ci/stubs.py
+	$(PYTHON) .ci/prose.py
 	$(PYTHON) .ci/licences.py
 	$(PYTHON) .ci/runtime.py
 
@@ -64,14 +65,17 @@ bench-scaling: .venv/with-peers  ## Draws how the time to learn grows with the d
 bench-bases: .venv/with-demo  ## How well each basis reproduces and predicts the recordings in PDMP_DATA
 	OMP_NUM_THREADS=1 $(BIN)/python benches/bases.py
 
-report: .venv/with-test  ## How well movements are foreseen from their context, on the recordings in PDMP_DATA; figures into out/report/
+bench-transport: .venv/with-demo  ## Transport to other goals and the end of movements, on the recordings in PDMP_DATA
+	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m transport
+
+report: .venv/with-test  ## Errors of predictions from contexts, on the recordings in PDMP_DATA; figures into out/report/
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report
 
 # The sanitizer may not touch build scripts, which a named target spares. A compiler without it says why.
 rtsan: | needs  ## Runs the control loop under the real-time sanitizer of a nightly compiler, where there is one
 	@mkdir -p target/rtsan
 	@if ! reason=$$(echo 'fn main() {}' | rustup run nightly rustc -Zsanitizer=realtime -o target/rtsan/probe - 2>&1); \
-	then echo "skipped, for want of a nightly compiler with the real-time sanitizer: $$reason"; \
+	then echo "skipped, as there is no nightly compiler with the real-time sanitizer: $$reason"; \
 	else RUSTFLAGS='-Zsanitizer=realtime --cfg rtsan' rustup run nightly cargo test --release --package pdmp-core \
 		--test realtime --target "$$(rustc -vV | sed -n 's/^host: //p')" --target-dir target/rtsan; \
 	fi
@@ -102,7 +106,7 @@ capi: | needs  ## Builds the libraries for C and C++ and puts them and their hea
 	cp LICENSE* dist/capi
 	$(if $(filter so,$(SHARED)),ln -sf libpdmp.so dist/capi/lib/libpdmp.so.$(ABI))
 
-header: | needs  ## Makes pdmp.h anew from the sources of the C ABI
+header: | needs  ## Writes pdmp.h from the sources of the C ABI
 	PDMP_WRITE_HEADER=1 cargo test --release --package pdmp-capi --test header
 
 stubs: .venv/with-dev  ## Copies the docstrings of the compiled module into its stub

@@ -14,6 +14,7 @@ from time import perf_counter
 import numpy as np
 
 import pdmp
+from pdmp._markdown import markdown_table
 from peers.timing import machine
 from recordings import Group, groups, sources
 
@@ -173,12 +174,6 @@ def over_sets(scores: dict[Group, Score]) -> list[str]:
     return [*shares, f"{density:.2f}", f"{1e3 * seconds:.3g}"]
 
 
-def table(names: list[str], rows: list[list[str]]) -> list[str]:
-    """Returns the lines of a table in Markdown: names aligned left, numbers right."""
-    align = ["---"] * len(names) + ["---:"] * len(FIGURES)
-    return [f"| {' | '.join(row)} |" for row in [[*names, *FIGURES], align, *rows]] + [""]
-
-
 def report(scores: dict[str, dict[Group, Score]]) -> str:
     """Returns the report in Markdown."""
     seen = list(next(iter(scores.values())))
@@ -198,14 +193,15 @@ def report(scores: dict[str, dict[Group, Score]]) -> str:
             if of_kind:
                 mark = "**" if name in DEFAULTS else ""
                 rows.append([f"{mark}{name}{mark}", *over_sets(of_kind)])
-        lines += [f"## {kind.capitalize()} movements", "", *table(["basis"], rows)]
+        table = markdown_table(["basis", *FIGURES], rows)
+        lines += [f"## {kind.capitalize()} movements", "", table, ""]
     lines += ["## The defaults, set by set", ""]
     rows = []
     for source in dict.fromkeys(group.source for group in seen):
         for name in DEFAULTS:
             of_set = {group: s for group, s in scores[name].items() if group.source == source}
             rows.append([source, name, *over_sets(of_set)])
-    lines += table(["set", "basis"], rows)
+    lines += [markdown_table(["set", "basis", *FIGURES], rows, n_names=2), ""]
     lines += [sources(dict.fromkeys(group.source for group in seen)), ""]
     return "\n".join(lines)
 

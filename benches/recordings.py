@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from pdmp import Demonstration
+from pdmp._markdown import markdown_table
 from pdmp.datasets import REGISTRY, folder, handwriting
 from pdmp.io import read_csv, read_folder
 
@@ -82,15 +83,13 @@ def groups() -> Iterator[Group]:
         for name, demos in members.items():
             yield Group(source, name, "discrete", few(demos))
     if is_available("gait_boys"):
-        boys = read_folder(folder("gait_boys")).values()
-        yield Group("gait_boys", "", "rhythmic", few([cycle(demo.position, 1.0) for demo in boys]))
+        boys = [cycle(demo.position, 1.0) for demo in recorded("gait_boys")]
+        yield Group("gait_boys", "", "rhythmic", few(boys))
     if is_available("running_strides"):
-        strides = read_folder(folder("running_strides")).values()
-        # The last of 101 samples is the first of the next stride.
-        closed = [cycle(demo.position[:-1], 1.0) for demo in strides]
-        yield Group("running_strides", "", "rhythmic", few(closed))
+        yield Group("running_strides", "", "rhythmic", few(running_strides()))
     if is_available("walk_styles_bandai"):
-        yield Group("walk_styles_bandai", "", "rhythmic", few(list(styled_walks())))
+        walks = [demo for _, demo in walking_strides(ARM, stride="0")]
+        yield Group("walk_styles_bandai", "", "rhythmic", few(walks))
 
 
 def is_available(source: str) -> bool:
@@ -118,8 +117,7 @@ def sources(names: Iterable[str]) -> str:
         ]
         for recordings in map(REGISTRY.__getitem__, names)
     ]
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join([SOURCES, *(f"| {' | '.join(map(str, line))} |" for line in lines)])
+    return f"{SOURCES}\n{markdown_table(header, rows, n_names=len(header))}"
 
 
 def few(demos: list[Demonstration]) -> list[Demonstration]:
@@ -138,12 +136,31 @@ def cycle(position: np.ndarray, period: float, names: list[str] | None = None) -
     return Demonstration(position, dt=period / len(position), names=names)
 
 
-def styled_walks() -> Iterator[Demonstration]:
-    """Yields the first stride of each walk, foot strike to foot strike."""
-    walks = folder("walk_styles_bandai")
-    with open(walks / "strides.csv", newline="") as file:
-        for stride in csv.DictReader(file):
-            if stride["stride"] == "0" and stride["id"].startswith("walk"):
-                recording = read_csv(walks / "demos" / f"{stride['id']}.csv", columns=ARM)
-                start, end = int(stride["start_frame"]), int(stride["end_frame"])
-                yield cycle(recording.position[start:end], float(stride["duration_s"]))
+def rows(source: str, name: str = "index.csv") -> list[dict[str, str]]:
+    """Reads a table of a set."""
+    with open(folder(source) / name, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def recorded(source: str, columns: list[str] | None = None) -> list[Demonstration]:
+    """Reads the demonstrations of a set, in the order of its index."""
+    return list(read_folder(folder(source), columns=columns).values())
+
+
+def running_strides() -> list[Demonstration]:
+    """Reads the strides of runners; the last of 101 samples is the first of the next stride."""
+    strides = recorded("running_strides")
+    return [cycle(demo.position[:-1], 1.0, demo.names) for demo in strides]
+
+
+def walking_strides(
+    columns: list[str], **selected: str
+) -> Iterator[tuple[dict[str, str], Demonstration]]:
+    """Yields the selected strides of each walk, foot strike to foot strike, with their rows."""
+    source = "walk_styles_bandai"
+    for stride in rows(source, "strides.csv"):
+        if stride["id"].startswith("walk") and selected.items() <= stride.items():
+            path = folder(source) / "demos" / f"{stride['id']}.csv"
+            demo = read_csv(path, columns=columns)
+            position = demo.position[int(stride["start_frame"]) : int(stride["end_frame"])]
+            yield stride, cycle(position, float(stride["duration_s"]), demo.names)

@@ -13,7 +13,7 @@ use pdmp_core::learning::regression::{Basis, NGnet};
 use pdmp_core::learning::{Stage, TimeScaling, Truncation};
 use pdmp_core::model::TimeWarp;
 use pdmp_core::numerics::Smoothing;
-use pdmp_core::{Demonstration, FitOptions, Kind};
+use pdmp_core::{Demonstration, FitOptions};
 
 const STAGES: [Stage; 5] = [Stage::Align, Stage::Targets, Stage::Factorise, Stage::Regress, Stage::Compile];
 
@@ -65,17 +65,15 @@ fn main() {
     if !env::args().any(|argument| argument == "--bench") {
         return;
     }
-    let network = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(3)).basis(Basis::NGnet(NGnet::default()));
-    let mut smoothed = network.clone();
-    smoothed.smoothing = Smoothing::Auto;
-    let mut warped = network.clone();
-    warped.time_scaling = TimeScaling::Warp(TimeWarp::default());
-    let process = FitOptions::new(Kind::Discrete).n_styles(Truncation::Rank(3));
+    let network = FitOptions::discrete().n_styles(Truncation::Rank(3)).basis(Basis::NGnet(NGnet::default()));
+    let interpolated = network.clone().smoothing(Smoothing::Interpolate);
+    let warped = network.clone().time_scaling(TimeScaling::Warp(TimeWarp::default()));
+    let process = FitOptions::discrete().n_styles(Truncation::Rank(3));
 
     let demos = movements(20, 1001);
     print_heading("Milliseconds of a fit, M = 20, C = 1001, D = 7, J = 3");
-    print_row("NGnet", 101, &demos, &network);
-    print_row("NGnet, auto smoothing", 21, &demos, &smoothed);
+    print_row("NGnet", 21, &demos, &network);
+    print_row("NGnet, no smoothing", 101, &demos, &interpolated);
     print_row("NGnet, time warp", 21, &demos, &warped);
     print_row("GP", 11, &demos, &process);
 
@@ -83,7 +81,7 @@ fn main() {
     let before = peak_memory();
     print_heading("Milliseconds of a fit, M = 5000, C = 200, D = 7");
     print_row("NGnet, J = 5", 3, &demos, &network.clone().n_styles(Truncation::Rank(5)));
-    print_row("NGnet, J from spectrum", 3, &demos, &network.n_styles(Truncation::Share(0.9)));
+    print_row("NGnet, J from singular values", 3, &demos, &network.n_styles(Truncation::Share(0.9)));
     if let (Some(before), Some(after)) = (before, peak_memory()) {
         println!("\nPeak memory: {after}; {before} before these fits.");
     }

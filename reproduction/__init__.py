@@ -4,7 +4,7 @@ The paper is Matsubara, Hyon, Morimoto, Neural Networks 24 (2011). `python -m re
 its figures, `python -m reproduction.demo` learns human handwriting. Modules import only from
 modules above them::
 
-    command, metrics, section              exit codes, reproduction error, section of the report
+    command, metrics, section              command line, reproduction error, section of the report
     human, swing                           models of human reaching and arm swing
     baxter, robot, film                    kinematics, dynamics and pictures of the robot
     reaching, loop, paths                  demonstrations on the robot, control loop, drawings

@@ -4,7 +4,7 @@ example: python -m reproduction fig3 -o out/reproduction
 """
 
 import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from argparse import ArgumentParser
 from collections.abc import Sequence
 
 from pdmp.cli.options import file_path
@@ -28,23 +28,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> ArgumentParser:
-    parser = ArgumentParser(
-        "python -m reproduction",
-        description=__doc__,
-        formatter_class=RawDescriptionHelpFormatter,
-    )
+    parser = command.parser("reproduction", __doc__, output="out/reproduction")
     parser.add_argument(
         "figure",
         choices=(*FIGURES, "all"),
         help="figure of Matsubara, Hyon and Morimoto (2011), or comparison with other methods",
-    )
-    parser.add_argument(
-        "-o",
-        "--output",
-        default="out/reproduction",
-        type=file_path,
-        metavar="FOLDER",
-        help="folder for figures and tables; default: %(default)s",
     )
     parser.add_argument(
         "--seed",

@@ -1,10 +1,24 @@
-"""Exit codes and error messages of the commands."""
+"""Arguments, exit codes and error messages of the commands."""
 
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable
 
 from pdmp import PdmpError
 from pdmp.cli.console import console, report, say
+from pdmp.cli.options import add_output
+
+
+def parser(module: str, description: str | None, output: str) -> ArgumentParser:
+    """Returns the parser of a command, with an option for the folder to write to."""
+    parser = ArgumentParser(
+        f"python -m {module}",
+        description=description,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    text = "folder for figures and tables; default: %(default)s"
+    add_output(parser, "FOLDER", text, default=output)
+    return parser
 
 
 def run(make_report: Callable[[], str]) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.markdown import markdown_table
+from pdmp._markdown import markdown_table
 from pdmp.plot.canvas import BLUE, GREY, ORANGE, PALETTE, ensure_figure, label_axes, legend
 from pdmp.preprocessing import resample
 from reproduction import paths

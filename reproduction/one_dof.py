@@ -11,7 +11,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.markdown import markdown_table
+from pdmp._markdown import markdown_table
 from pdmp.plot.canvas import BLUE, GREY, ORANGE, colormap, ensure_figure, label_axes, legend
 from reproduction.metrics import reproduction_error
 from reproduction.section import SEED, Section

@@ -22,7 +22,7 @@ START = np.array([0.30, -0.55, 0.0])  # m, start of the hand relative to its goa
 HEIGHTS = (0.0, 0.15, 0.30, 0.45, 0.60)  # m: none to four boxes
 TRAINING_HEIGHTS = (0.0, 0.30, 0.45)  # m
 TRIALS = 3
-MOST_TRIALS = 100
+MAX_TRIALS = 100
 CONSTANTS: dict[str, Any] = {
     **{"alpha_z": 1.5, "beta_z": 1.5, "alpha_x": 0.5, "tau": 0.3},
     "smoothing": None,
@@ -90,13 +90,13 @@ def _trial(
     arm: Arm, task: Task, height: float, usual: float, start: Array, noise: np.random.Generator
 ) -> tuple[Array, float]:
     """Returns the joint angles of one reach [rad], and their sampling interval [s]."""
-    for _ in range(MOST_TRIALS):
+    for _ in range(MAX_TRIALS):
         trial = reach(task, height, noise)
         with suppress(UnreachableError):
             elbow = np.full(len(trial.hand), usual + trial.elbow)
             return arm.reach(trial.hand, elbow, start), trial.dt
     raise UnreachableError(
-        f"height = {height} m: none of {MOST_TRIALS} trials is within the arm's reach"
+        f"height = {height} m: none of {MAX_TRIALS} trials is within the arm's reach"
     )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.markdown import markdown_table
+from pdmp._markdown import markdown_table
 from pdmp.plot.canvas import BLUE, GREY, ORANGE, ensure_figure, label_axes, legend
 from reproduction.heights import (
     N_SAMPLES,
@@ -90,33 +90,19 @@ def library(reaching: Reaching) -> Callable[[float], Movement]:
 class Recording:
     """A trajectory that is replayed in time; commands, such as `goal`, have no effect."""
 
-    trajectory: tuple[Array, Array, Array]
+    trajectory: Array  # (3, T, 4): joint angles [rad], their velocities and accelerations
     goal: Array
     tick: int = 0
 
+    def __post_init__(self) -> None:  # noqa: D105
+        self.position, self.velocity, self.acceleration = self.trajectory[:, 0]
+
     def step(self, *, measured: Array | None = None) -> pdmp.Status:
         """Advances to the next sample, or stays at the last."""
-        self.tick = min(self.tick + 1, len(self.trajectory[0]) - 1)
-        ended = self.tick == len(self.trajectory[0]) - 1
-        return pdmp.Status.FINISHED if ended else pdmp.Status.WORKING
-
-    @property
-    def position(self) -> Array:
-        """Joint angles (4,) [rad]."""
-        return self._row(0)
-
-    @property
-    def velocity(self) -> Array:
-        """Joint velocities (4,) [rad/s]."""
-        return self._row(1)
-
-    @property
-    def acceleration(self) -> Array:
-        """Joint accelerations (4,) [rad/s²]."""
-        return self._row(2)
-
-    def _row(self, derivative: int) -> Array:
-        return np.asarray(self.trajectory[derivative][self.tick])
+        last = self.trajectory.shape[1] - 1
+        self.tick = min(self.tick + 1, last)
+        self.position, self.velocity, self.acceleration = self.trajectory[:, self.tick]
+        return pdmp.Status.FINISHED if self.tick == last else pdmp.Status.WORKING
 
 
 def components(reaching: Reaching) -> Callable[[float], Movement]:
@@ -132,13 +118,13 @@ def components(reaching: Reaching) -> Callable[[float], Movement]:
 
     def play(height: float) -> Movement:
         weights = chosen.predict([[height]])[0][0]
-        path = (mean + weights @ factors.basis).reshape(N_SAMPLES, -1)
+        path = (mean + weights @ factors.basis_targets).reshape(N_SAMPLES, -1)
         spline = CubicSpline(np.linspace(0, duration, N_SAMPLES), path, bc_type="clamped")
         # A recording does not wait for the robot; it stays at its last sample.
         times = np.minimum(np.arange(0, duration + 1.0, DT), duration)
         moving = (times < duration)[:, None]
-        rows = (spline(times), moving * spline(times, 1), moving * spline(times, 2))
-        return Recording(rows, reaching.goal)
+        rows = [spline(times), moving * spline(times, 1), moving * spline(times, 2)]
+        return Recording(np.array(rows), reaching.goal)
 
     return play
 

@@ -7,8 +7,6 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
-from pdmp import plot
-from pdmp.files import atomic_write
 from pdmp.plot.canvas import ensure_figure
 from reproduction.section import SEED, Section
 
@@ -68,13 +66,7 @@ def reproduce(
     for name in FIGURES if figure == "all" else [figure]:
         if progress is not None:
             progress(name)
-        section = _make(name, seed, recordings)
-        reports.append("\n\n".join([f"# {section.title}", *section.text]))
-        for file, picture in section.figures.items():
-            plot.save(picture, folder / f"{file}.png")
-        images = "\n\n".join(f"![{file}]({file}.png)" for file in section.figures)
-        with atomic_write(folder / f"{name}.md") as draft:
-            draft.write_text(f"{reports[-1]}\n\n{images}\n", encoding="utf-8")
+        reports.append(_make(name, seed, recordings).write(folder, name))
     return "\n\n".join(reports)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
-from pdmp.markdown import markdown_table
+from pdmp._markdown import markdown_table
 from pdmp.plot.canvas import GREY, PALETTE, ensure_figure
 from reproduction import film, paths
 from reproduction.loop import reach_over

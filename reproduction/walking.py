@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pdmp
+from pdmp._markdown import markdown_table
 from pdmp.io import read_csv
-from pdmp.markdown import markdown_table
 from pdmp.plot.canvas import BLUE, ORANGE, ensure_figure, label_axes
 from pdmp.preprocessing import cycles
 from reproduction import film
@@ -138,8 +138,8 @@ def figure_5(recordings: str | PathLike[str] | None = None, seed: int = SEED) ->
     robot = Robot(model.rollout(**commands[0].command).position[0])
     result = swing(model, commands, robot)
     text = [
-        f"{len(names)} styles of both arms, {model.n_dofs} joints. {_spectrum(model)} The largest "
-        f"tracking error on the robot is {1e3 * robot.log.tracking_error():.1f} mrad.",
+        f"{len(names)} styles of both arms, {model.n_dofs} joints. {_singular_values(model)} "
+        f"The largest tracking error on the robot is {1e3 * robot.log.tracking_error():.1f} mrad.",
         _settling(commands, result),
     ]
     section = Section(
@@ -222,13 +222,13 @@ def recorded(folder: Path) -> tuple[list[str], Figure]:
     result = swing(model, commands)
     without = f", without {', '.join(aperiodic)}, which are not periodic" if aperiodic else ""
     paragraphs = [
-        f"Recordings of {len(demos)} walks{without}. {_spectrum(model)}",
+        f"Recordings of {len(demos)} walks{without}. {_singular_values(model)}",
         _settling(commands, result),
     ]
     return paragraphs, draw(model, commands, result, RECORDED[:4])
 
 
-def _spectrum(model: pdmp.Model) -> str:
+def _singular_values(model: pdmp.Model) -> str:
     """Returns a sentence on the number of styles and the share of four, the number in the paper."""
     share = model.singular_values[:4].sum() / model.singular_values.sum()
     return (

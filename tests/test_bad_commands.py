@@ -50,6 +50,10 @@ DISCRETE: list[tuple[dict[str, Any], str]] = [
     ({"goal": [1]}, "goal has length 1, expected 2: one value per DoF"),
     ({"goal": [NAN, 0]}, r"goal\[0\] = NaN"),
     ({"goal": [0, 1e200]}, r"goal\[.*1\] = 1e200: magnitudes above 1e150 overflow"),
+    ({"goal_velocity": [1]}, "goal_velocity has length 1, expected 2: one value per DoF"),
+    ({"goal_velocity": [[1, 2]]}, r"goal_velocity has shape \[1, 2\], expected one axis"),
+    ({"goal_velocity": [0, NAN]}, r"goal_velocity\[1\] = NaN: every number must be finite"),
+    ({"goal_velocity": [1e200, 0]}, r"goal_velocity\[.*0\] = 1e200: magnitudes above .* overflow"),
     ({"anchor": [0, 0]}, "anchor does not apply to a discrete primitive: .*; set goal"),
     ({"amplitude": 1.1}, "amplitude does not apply to a discrete primitive"),
     ({"context": [1, 2]}, "context has length 2, expected 1: one value per context value"),
@@ -62,9 +66,13 @@ RHYTHMIC: list[tuple[dict[str, Any], str]] = [
     ({"anchor": [1]}, "anchor has length 1, expected 2: one value per DoF"),
     ({"anchor": [NAN, 0]}, r"anchor\[0\] = NaN"),
     ({"goal": [0, 0]}, "goal does not apply to a rhythmic primitive: .*; set anchor"),
+    ({"goal_velocity": [0, 0]}, "goal_velocity does not apply to a rhythmic primitive"),
     ({"amplitude": -1.0}, "amplitude = -1: must lie between 0, which is rest, and 1e150"),
     ({"amplitude": NAN}, "amplitude = NaN"),
-    ({"context": [1]}, "the model has no context map: fit it with contexts="),
+    (
+        {"context": [1]},
+        "context does not apply: the model has no context map; fit it with contexts",
+    ),
 ]
 
 
@@ -86,6 +94,18 @@ def test_invalid_conditions_of_a_rhythmic_one_are_rejected(
     """Rhythmic primitives report the argument and the number that they reject."""
     with pytest.raises(ValueError, match=message):
         call(rhythmic, **given)
+
+
+def test_final_velocity_needs_learnt_transport() -> None:
+    """With the paper's transport no frame could pass the goal, as the error states."""
+    model = pdmp.fit(reaches(), transport="immediate")
+    for call in (model.rollout, model.controller, model.controller().reset):
+        with pytest.raises(ValueError, match="goal_velocity needs learnt transport"):
+            call(goal_velocity=[0.0, 0.0])
+    controller = model.controller()
+    with pytest.raises(ValueError, match="goal_velocity needs learnt transport"):
+        controller.goal_velocity = [0.0, 0.0]
+    assert controller.goal_velocity is None
 
 
 @pytest.mark.parametrize("duration", [-1.0, NAN, INF])
@@ -114,7 +134,7 @@ def test_impossible_transitions_are_rejected(discrete: pdmp.Model, transition: f
 
 def outputs(model: pdmp.Model) -> tuple[np.ndarray, np.ndarray]:
     """Returns output arrays for the rollouts of a model's styles at 0.1 s."""
-    shape = model.rollouts(model.styles, dt=0.1)[0].shape
+    shape = model.rollouts(style=model.styles, dt=0.1)[0].shape
     return np.zeros(shape), np.zeros(shape)
 
 
@@ -124,7 +144,7 @@ def test_outputs_of_another_shape_are_rejected_before_anything_is_written(
     """The error states both shapes, and neither array is changed."""
     positions, velocities = outputs(discrete)
     with pytest.raises(ValueError, match=r"out: shape \[5, 12, 2\]; expected .* \[5, 13, 2\]"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
+        discrete.rollouts(style=discrete.styles, dt=0.1, out=(positions, velocities[:, :-1]))
     assert not positions.any()
 
 
@@ -132,7 +152,9 @@ def test_outputs_of_another_type_are_rejected(discrete: pdmp.Model) -> None:
     """Only float64 can be written in place, as the error states."""
     positions, velocities = outputs(discrete)
     with pytest.raises(ValueError, match="out.*float64"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions.astype(np.float32), velocities))
+        discrete.rollouts(
+            style=discrete.styles, dt=0.1, out=(positions.astype(np.float32), velocities)
+        )
 
 
 def test_read_only_outputs_are_rejected(discrete: pdmp.Model) -> None:
@@ -140,7 +162,7 @@ def test_read_only_outputs_are_rejected(discrete: pdmp.Model) -> None:
     positions, velocities = outputs(discrete)
     velocities.setflags(write=False)
     with pytest.raises(ValueError, match="out.* not writeable"):
-        discrete.rollouts(discrete.styles, dt=0.1, out=(positions, velocities))
+        discrete.rollouts(style=discrete.styles, dt=0.1, out=(positions, velocities))
     assert not velocities.any()
 
 
@@ -152,12 +174,27 @@ def test_invalid_clocks_are_rejected(discrete: pdmp.Model, u: list[float]) -> No
 
 
 COMMANDS: list[tuple[str, str, Any]] = [
-    *[("discrete", name, bad) for name in ("goal", "style") for bad in ([NAN, 0], [0], [[0, 0]])],
-    *[("rhythmic", name, bad) for name in ("anchor", "style") for bad in ([NAN, 0], [0], [[0, 0]])],
+    *[
+        (kind, name, bad)
+        for kind, name in (
+            ("discrete", "goal"),
+            ("discrete", "goal_velocity"),
+            ("discrete", "style"),
+            ("rhythmic", "anchor"),
+            ("rhythmic", "style"),
+        )
+        for bad in ([NAN, 0], [0], [[0, 0]])
+    ],
     *[(kind, "tau", bad) for kind in ("discrete", "rhythmic") for bad in (NAN, 0.0, -1.0, INF)],
     *[("rhythmic", "amplitude", bad) for bad in (NAN, -1.0, INF)],
-    ("discrete", "goal", [1e200, 0]),
-    ("discrete", "goal", ["a", "b"]),
+    *[("rhythmic", "phase", bad) for bad in (NAN, INF, "a", [1.0])],
+    *[("discrete", "phase", bad) for bad in (0.5, NAN)],
+    *[("rhythmic", "phase_gain", bad) for bad in (NAN, -1.0, 1001.0, None)],
+    *[(kind, "tolerance", bad) for kind in ("discrete", "rhythmic") for bad in (NAN, 0, -1, 1.1)],
+    *[("discrete", name, [1e200, 0]) for name in ("goal", "goal_velocity")],
+    *[("discrete", name, ["a", "b"]) for name in ("goal", "goal_velocity")],
+    *[("discrete", "tolerance", bad) for bad in (None, "x", [0.1])],
+    ("rhythmic", "goal_velocity", [0, 0]),
 ]
 
 

@@ -41,16 +41,16 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"nominal": 5}, "nominal = 5: must be the index of a demonstration, from 0"),
     ({"n_samples": 3}, "n_samples = 3: must lie between 4 and 1e6"),
     ({"n_samples": -1}, "n_samples = -1: must not be negative"),
-    ({"smoothing": 25.1}, "smoothing = 25.1: must lie below half the sampling rate"),
+    ({"smoothing": 25.1}, "smoothing = 25.1 Hz: must lie below half the sampling rate of 50 Hz"),
     ({"smoothing": True}, 'smoothing = True: must be None, "auto" or a cut-off in Hz'),
     ({"mu": 3.0}, "mu does not apply to a discrete"),
     ({"smoothing": "strong"}, "smoothing = 'strong': must be None, \"auto\" or a cut-off in Hz"),
-    ({"kind": "circular"}, 'kind = "circular": must be "discrete" or "rhythmic"'),
+    ({"kind": "circular"}, 'kind = .circular.: must be "discrete" or "rhythmic"'),
     ({"basis": "rbf"}, 'basis = \'rbf\': must be "gp", "ngnet"'),
     ({"dof_scale": [1, 0]}, "dof_scale = 0: must lie between"),
     ({"dof_scale": [-1, 1]}, "dof_scale = -1: must lie between"),
     ({"dof_scale": [1]}, "dof_scale has length 1, expected 2: one value per DoF"),
-    ({"dof_scale": "metre"}, 'dof_scale = "metre": must be None, "unit", "range" or one number'),
+    ({"dof_scale": "metre"}, 'dof_scale = .metre.: must be None, "unit", "range" or one number'),
     (
         {"n_styles": 2, "singular_value_share": 0.9},
         "n_styles and singular_value_share: pass one of them",
@@ -74,7 +74,7 @@ RHYTHMIC: list[tuple[dict[str, Any], str]] = [
     *numbers("period", "positive and finite", 0, -1, NAN, INF),
     ({"period": 1.98}, "period = 1.98: must exceed the last time stamp"),
     ({"period": [2, 2]}, "period has length 2, expected 3: one value per demonstration"),
-    ({"period": None}, "time-stamped cycle .*: pass period in seconds"),
+    ({"period": None}, "period is missing: pass it in seconds"),
     ({"tau": 1.0}, "tau does not apply to a rhythmic primitive"),
     ({"alpha_x": 1.0}, "alpha_x does not apply to a rhythmic primitive"),
 ]
@@ -92,7 +92,7 @@ def test_invalid_options_of_a_rhythmic_fit_are_rejected(
 
 def test_missing_interval_is_reported() -> None:
     """Bare arrays need a sampling interval."""
-    with pytest.raises(ValueError, match=r"no sampling interval: pass dt in seconds"):
+    with pytest.raises(ValueError, match=r"dt is missing: pass the sampling interval in seconds"):
         pdmp.fit([POSITION])
 
 
@@ -113,7 +113,7 @@ def test_networks_of_impossible_width_are_rejected(overlap: float) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"kernel": "cubic"}, 'kernel = "cubic": must be "matern32" or "matern52"'),
+        ({"kernel": "cubic"}, 'kernel = .cubic.: must be "matern52" or "matern32"'),
         ({"length": 0.0}, "length = 0: must be positive"),
         ({"length": NAN}, "length = NaN: must be positive"),
         ({"noise": 0.0}, "noise = 0: must lie between 1e-10 and 1e6"),
@@ -169,22 +169,59 @@ def test_goals_of_cycles_are_rejected() -> None:
 
 def test_duplicate_names_are_rejected() -> None:
     """Names of degrees of freedom must be unique."""
-    with pytest.raises(ValueError, match="names must differ"):
+    with pytest.raises(ValueError, match=r'names\[1\] = "a": repeats a name: the names'):
         Demonstration(POSITION, dt=0.02, names=["a", "a"])
 
 
 DEMO = Demonstration(POSITION, dt=0.02)
+TEXTS: dict[str, tuple[Callable[..., Any], str]] = {
+    "kind": (lambda _, **text: pdmp.fit(reaches(), **text), '"discrete" or "rhythmic"'),
+    "map": (
+        lambda _, **text: pdmp.fit(reaches(), **text),
+        '"auto", "stacked", "gp", "polynomial" or "linear"',
+    ),
+    "transport": (lambda _, **text: pdmp.fit(reaches(), **text), '"learnt" or "immediate"'),
+    "alignment": (
+        lambda _, **text: pdmp.fit(reaches(), **text),
+        '"linear", "warp" or pdmp.TimeWarp(...)',
+    ),
+    "basis": (
+        lambda _, **text: pdmp.fit(reaches(), **text),
+        '"gp", "ngnet", pdmp.GP(...) or pdmp.NGnet(...)',
+    ),
+    "kernel": (lambda _, **text: pdmp.GP(**text), '"matern52" or "matern32"'),
+    "wrt": (
+        lambda model, **text: model.jacobian(**text),
+        '"style", "goal", "anchor", "start" or "goal_velocity"',
+    ),
+    "periodic": (
+        lambda _, **text: pdmp.GP().regress([0.0, 1.0], [[0.0], [1.0]], **text),
+        "True or False",
+    ),
+}
+
+
+@pytest.mark.parametrize("value", [1, 3.5, b"discrete", [], object, "un\nknown"], ids=str)
+@pytest.mark.parametrize("name", TEXTS)
+def test_invalid_choices_are_rejected_by_name(model: pdmp.Model, name: str, value: Any) -> None:
+    """One line gives the name, the value of any type and the choices."""
+    call, choices = TEXTS[name]
+    with pytest.raises(ValueError) as raised:
+        call(model, **{name: value})
+    assert str(raised.value) == f"{name} = {value!r}: must be {choices}"
+
+
 SCALARS: dict[str, tuple[Callable[..., Any], list[str]]] = {
     "rollout": (
         lambda model, **scalar: model.rollout(**scalar),
         ["dt", "duration", "tau", "amplitude", "phase"],
     ),
     "rollouts": (
-        lambda model, **scalar: model.rollouts(model.styles, **scalar),
+        lambda model, **scalar: model.rollouts(style=model.styles, **scalar),
         ["dt", "duration", "tau", "amplitude", "derivatives", "threads"],
     ),
     "rollout_chunks": (
-        lambda model, **scalar: model.rollout_chunks(model.styles, **scalar),
+        lambda model, **scalar: model.rollout_chunks(style=model.styles, **scalar),
         ["dt", "duration", "tau", "amplitude", "derivatives", "threads", "size"],
     ),
     "controller": (

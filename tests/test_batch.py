@@ -19,15 +19,12 @@ FIELDS = ("position", "velocity", "acceleration")
 STYLES = np.random.default_rng(0).normal(size=(23, 2))
 
 
-def centres(model: pdmp.Model) -> str:
+def centre_of(model: pdmp.Model) -> str:
     """Returns the name of the argument that moves a batch as a whole."""
-    return "goals" if model.kind == "discrete" else "anchors"
+    return "goal" if model.kind == "discrete" else "anchor"
 
 
-SINGULAR = {"goals": "goal", "anchors": "anchor", "starts": "start", "velocities": "velocity"}
-
-
-@pytest.mark.parametrize("names", [(), ("starts",), ("velocities",), ("starts", "velocities")])
+@pytest.mark.parametrize("names", [(), ("start",), ("velocity",), ("start", "velocity")])
 @pytest.mark.parametrize("one_each", [False, True])
 @pytest.mark.parametrize("dt", [0.001, 0.01])
 def test_each_movement_has_its_own_conditions(
@@ -36,21 +33,82 @@ def test_each_movement_has_its_own_conditions(
     """Movement b is the rollout of row b of batched arguments and of the shared ones."""
     rng = np.random.default_rng(1)
     shape = (len(STYLES), 2) if one_each else (2,)
-    given = {name: rng.normal(size=shape) for name in (centres(model), *names)}
-    made = model.rollouts(STYLES, dt=dt, tau=0.8 * model.tau, derivatives=2, **given)
+    given = {name: rng.normal(size=shape) for name in (centre_of(model), *names)}
+    made = model.rollouts(style=STYLES, dt=dt, tau=0.8 * model.tau, derivatives=2, **given)
     for b in (0, 7, 22):
-        own = {SINGULAR[n]: rows[b] if one_each else rows for n, rows in given.items()}
+        own = {n: rows[b] if one_each else rows for n, rows in given.items()}
         single = model.rollout(style=STYLES[b], dt=dt, tau=0.8 * model.tau, **own)
         for values, name in zip(made, FIELDS, strict=True):
             expected = getattr(single, name)
             np.testing.assert_allclose(values[b], expected, atol=1e-12 * abs(expected).max())
 
 
+def test_each_discrete_movement_has_its_own_final_velocity(reach: pdmp.Model) -> None:
+    """Final velocities are conditions of a batch as of a rollout, singly and for all."""
+    rng = np.random.default_rng(3)
+    for velocities in (rng.normal(size=(23, 2)), rng.normal(size=2)):
+        (positions,) = reach.rollouts(style=STYLES, goal_velocity=velocities, derivatives=0)
+        for b, velocity in enumerate(np.broadcast_to(velocities, (23, 2))):
+            single = reach.rollout(style=STYLES[b], goal_velocity=velocity)
+            np.testing.assert_allclose(positions[b], single.position, atol=1e-12)
+
+
+def test_batch_takes_conditions_of_each_movement(model: pdmp.Model) -> None:
+    """Movement b is the rollout of the b-th conditions, with the same changes."""
+    listed = [model.conditions(m).replace(tau=0.7) for m in range(model.n_demos)]
+    start = [0.3, -0.2]
+    made = model.rollouts(listed, start=start, duration=1.0, derivatives=2)
+    for b, conditions in enumerate(listed):
+        single = model.rollout(conditions, start=start, duration=1.0)
+        for values, name in zip(made, FIELDS, strict=True):
+            expected = getattr(single, name)
+            np.testing.assert_allclose(values[b], expected, atol=1e-12 * abs(expected).max())
+    (one,) = model.rollouts(listed[0], start=[start, start], duration=1.0, derivatives=0)
+    np.testing.assert_array_equal(one, np.stack([made[0][0]] * 2))
+    assert model.rollouts(dt=0.1, duration=1.0)[0].shape == (1, 11, 2)
+    assert model.rollouts([], dt=0.1, duration=1.0)[0].shape == (0, 11, 2)
+
+
+def test_batch_takes_contexts_of_each_movement() -> None:
+    """Movement b is the rollout for the b-th context; other conditions replace the prediction."""
+    heights = np.linspace(0.1, 0.5, 6)
+    s = np.linspace(0, 1, 81)
+    ramp = s**3 * (10 - 15 * s + 6 * s**2)
+    demos = [np.column_stack([ramp, h * np.sin(np.pi * s) ** 2]) for h in heights]
+    model = pdmp.fit(demos, dt=0.01, contexts=heights[:, None], n_styles=1)
+    contexts = [[0.15], [0.2], [0.43]]
+    goals = np.array([[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]])
+    shared = {"dt": 0.02, "tau": 0.6}
+    (made,) = model.rollouts(context=contexts, goal=goals, derivatives=0, **shared)
+    (alone,) = model.rollouts(context=contexts[1], goal=goals, derivatives=0, **shared)
+    listed = [pdmp.Conditions(goal=goal) for goal in goals]
+    (also,) = model.rollouts(listed, context=np.array(contexts), derivatives=0, **shared)
+    np.testing.assert_array_equal(also, made)
+    for b, (context, goal) in enumerate(zip(contexts, goals, strict=True)):
+        expected = model.rollout(context=context, goal=goal, **shared).position
+        np.testing.assert_allclose(made[b], expected, atol=1e-12)
+        expected = model.rollout(context=contexts[1], goal=goal, **shared).position
+        np.testing.assert_allclose(alone[b], expected, atol=1e-12)
+    for given, message in (
+        ({"style": [[0.0]]}, "pass style or context, not both"),
+        ({"goal": goals[:2]}, "goal has 2 rows, but there are 3 movements"),
+        ({"conditions": listed[:2]}, "context has 3 rows, but there are 2 movements"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            model.rollouts(context=contexts, **given, **shared)
+    slow = [np.column_stack([ramp, h * ramp]) for h in heights]
+    timed = [pdmp.Demonstration(y, dt=0.01 + 0.02 * h) for y, h in zip(slow, heights, strict=True)]
+    model = pdmp.fit(timed, contexts=heights[:, None], n_styles=1)
+    with pytest.raises(ValueError, match="tau differs between the movements: a batch has one; pa"):
+        model.rollouts(context=contexts)
+    assert model.rollouts(context=contexts, tau=1.0)[0].shape[0] == 3
+
+
 @pytest.mark.parametrize("amplitude", [0.0, 0.4, 2.5])
 def test_amplitude_is_that_of_all(cycle: pdmp.Model, amplitude: float) -> None:
     """The amplitude applies to all movements of a batch as to a rollout, zero included."""
     model = cycle
-    positions, _ = model.rollouts(STYLES, amplitude=amplitude)
+    positions, _ = model.rollouts(style=STYLES, amplitude=amplitude)
     expected = model.rollout(style=STYLES[3], amplitude=amplitude).position
     np.testing.assert_allclose(positions[3], expected, atol=1e-12)
     assert (np.ptp(positions, axis=1) == 0).all() == (amplitude == 0)
@@ -59,8 +117,8 @@ def test_amplitude_is_that_of_all(cycle: pdmp.Model, amplitude: float) -> None:
 @pytest.mark.parametrize("derivatives", [0, 1, 2])
 def test_number_of_arrays_follows_derivatives(model: pdmp.Model, derivatives: int) -> None:
     """The tuple has derivatives + 1 arrays, which do not depend on the number of derivatives."""
-    made = model.rollouts(STYLES, derivatives=derivatives)
-    expected = model.rollouts(STYLES, derivatives=2)
+    made = model.rollouts(style=STYLES, derivatives=derivatives)
+    expected = model.rollouts(style=STYLES, derivatives=2)
     assert len(made) == 1 + derivatives
     for values, full in zip(made, expected, strict=False):
         np.testing.assert_array_equal(values, full, strict=True)
@@ -70,10 +128,10 @@ def test_number_of_arrays_follows_derivatives(model: pdmp.Model, derivatives: in
 def test_chunks_and_threads_are_bitwise_equal(model: pdmp.Model, threads: int) -> None:
     """The chunks together equal the batch bit for bit, for any number of threads."""
     styles, velocities = np.tile(STYLES, (20, 1)), np.tile(STYLES, (20, 1)) / 3
-    expected = model.rollouts(styles, dt=0.005, velocities=velocities, threads=1)
-    whole = model.rollouts(styles, dt=0.005, velocities=velocities, threads=threads)
+    expected = model.rollouts(style=styles, dt=0.005, velocity=velocities, threads=1)
+    whole = model.rollouts(style=styles, dt=0.005, velocity=velocities, threads=threads)
     pieces = list(
-        model.rollout_chunks(styles, size=77, dt=0.005, velocities=velocities, threads=threads)
+        model.rollout_chunks(style=styles, size=77, dt=0.005, velocity=velocities, threads=threads)
     )
     assert [len(positions) for positions, _ in pieces] == [77] * 5 + [75]
     for values, full, parts in zip(whole, expected, zip(*pieces, strict=True), strict=True):
@@ -86,7 +144,7 @@ def test_many_movements_take_little_memory(reach: pdmp.Model) -> None:
     model, total = reach, 0
     styles = np.zeros((10**6, 2))
     tracemalloc.start()
-    for (positions,) in model.rollout_chunks(styles, dt=0.02, derivatives=0, duration=1.8):
+    for (positions,) in model.rollout_chunks(style=styles, dt=0.02, derivatives=0, duration=1.8):
         total += len(positions)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -97,7 +155,7 @@ def test_many_movements_take_little_memory(reach: pdmp.Model) -> None:
 def test_chunks_can_be_shared_among_threads(model: pdmp.Model) -> None:
     """Threads that share an iterator receive every chunk once."""
     styles = np.arange(600.0).reshape(300, 2)
-    chunks = model.rollout_chunks(styles, size=7, dt=0.05, derivatives=0)
+    chunks = model.rollout_chunks(style=styles, size=7, dt=0.05, derivatives=0)
     assert iter(chunks) is chunks
 
     def take(_: int) -> list[float]:
@@ -105,27 +163,27 @@ def test_chunks_can_be_shared_among_threads(model: pdmp.Model) -> None:
 
     with ThreadPoolExecutor(4) as pool:
         taken = sorted(x for part in pool.map(take, range(4)) for x in part)
-    (expected,) = model.rollouts(styles, dt=0.05, derivatives=0)
+    (expected,) = model.rollouts(style=styles, dt=0.05, derivatives=0)
     np.testing.assert_array_equal(taken, sorted(expected[:, 0, 0]))
 
 
 def test_no_styles_give_no_movements(model: pdmp.Model) -> None:
     """An empty batch is valid and has no chunks."""
     none = np.zeros((0, 2))
-    positions, velocities = model.rollouts(none, dt=0.1, duration=1.0)
+    positions, velocities = model.rollouts(style=none, dt=0.1, duration=1.0)
     assert positions.shape == velocities.shape == (0, 11, 2)
-    assert list(model.rollout_chunks(none)) == []
+    assert list(model.rollout_chunks(style=none)) == []
 
 
 def test_cached_responses_are_bitwise_equal(model: pdmp.Model) -> None:
     """Cached responses do not change results, from several threads too."""
     times = [{"dt": dt, "tau": tau} for dt in (0.01, 0.02, 0.03, 0.05) for tau in (0.5, 0.8, 1, 2)]
     fresh: pdmp.Model = pickle.loads(pickle.dumps(model))
-    expected = [pickle.loads(pickle.dumps(model)).rollouts(STYLES, **t)[1] for t in times]
+    expected = [pickle.loads(pickle.dumps(model)).rollouts(style=STYLES, **t)[1] for t in times]
 
     def ask(n: int) -> None:
         for k in np.random.default_rng(n).integers(len(times), size=60):
-            np.testing.assert_array_equal(fresh.rollouts(STYLES, **times[k])[1], expected[k])
+            np.testing.assert_array_equal(fresh.rollouts(style=STYLES, **times[k])[1], expected[k])
 
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(ask, range(4)))
@@ -147,7 +205,7 @@ def test_movement_is_its_jacobians_times_the_changes(
     """Changes of a rollout equal the Jacobians times the changes of its conditions."""
     rng, name = np.random.default_rng(2), FIELDS[derivative]
     style, step, shift, push = rng.normal(size=(4, 2))
-    centre = SINGULAR[centres(model)]
+    centre = centre_of(model)
     shared = {"tau": 0.7, "dt": 0.02, "duration": 1.5}
     start = {"start": given["start"]} if "start" in given else {}
 
@@ -181,16 +239,16 @@ def test_jacobian_follows_the_amplitude(cycle: pdmp.Model) -> None:
 
 
 REJECTED: list[tuple[dict[str, Any], str]] = [
-    ({"goals": np.zeros((3, 2))}, "goals has 3 rows, but there are 23 styles: pass one row for ea"),
-    ({"starts": np.zeros((23, 3))}, "starts has length 3, expected 2: one value per DoF"),
-    ({"velocities": [0.0]}, "velocities has length 1, expected 2: one value per DoF"),
-    ({"starts": np.where(np.arange(46) == 35, NAN, 0).reshape(23, 2)}, r"starts\[17, 1\] = NaN"),
-    ({"starts": 0.3}, r"starts has shape \[\], expected \(D,\) or \(B, D\)"),
-    ({"goals": np.zeros((1, 23, 2))}, r"goals has shape \[1, 23, 2\], expected \(D,\) or \(B, D\)"),
-    ({"anchors": [0, 0]}, "anchors does not apply to a discrete primitive: .*; set goals"),
-    ({"styles": np.zeros((4, 3))}, "styles has length 3, expected 2: one value per style"),
-    ({"styles": [0.0, 0.0]}, r"styles has shape \[2\], expected two axes \(B, J\)"),
-    ({"styles": [[0.0, 0.0], [0.0, NAN]]}, r"styles\[1, 1\] = NaN"),
+    ({"goal": np.zeros((3, 2))}, "goal has 3 rows, but there are 23 movements: pass one row for"),
+    ({"start": np.zeros((23, 3))}, "start has length 3, expected 2: one value per DoF"),
+    ({"velocity": [0.0]}, "velocity has length 1, expected 2: one value per DoF"),
+    ({"start": np.where(np.arange(46) == 35, NAN, 0).reshape(23, 2)}, r"start\[17, 1\] = NaN"),
+    ({"start": 0.3}, r"start has shape \[\], expected \(D,\) or \(B, D\)"),
+    ({"goal": np.zeros((1, 23, 2))}, r"goal has shape \[1, 23, 2\], expected \(D,\) or \(B, D\)"),
+    ({"anchor": [0, 0]}, "anchor does not apply to a discrete primitive: .*; set goal"),
+    ({"style": np.zeros((4, 3))}, "style has length 3, expected 2: one value per style"),
+    ({"style": np.zeros((1, 4, 2))}, r"style has shape \[1, 4, 2\], expected \(J,\) or \(B, J\)"),
+    ({"style": [[0.0, 0.0], [0.0, NAN]]}, r"style\[1, 1\] = NaN"),
     ({"derivatives": 3}, r"derivatives = 3: must be 0 \(position\), 1"),
     ({"derivatives": -1}, "derivatives = -1: must not be negative"),
     ({"threads": 0}, "threads = 0: must lie between 1 and 1024"),
@@ -208,14 +266,33 @@ def test_invalid_batches_are_rejected(
     """Batches and chunks name the argument and the numbers before any computation."""
     for call in (reach.rollouts, reach.rollout_chunks):
         with pytest.raises(ValueError, match=message):
-            call(**{"styles": STYLES, "dt": 0.1, **given})
+            call(**{"style": STYLES, "dt": 0.1, **given})
+
+
+WRONG_TYPES: list[tuple[dict[str, Any], str]] = [
+    (
+        {"conditions": STYLES},
+        r"conditions\[0\] = array.*: expected pdmp.Conditions; pass single ones",
+    ),
+    ({"conditions": 3}, "conditions = 3: expected pdmp.Conditions"),
+    ({"goals": STYLES}, "unexpected keyword argument 'goals'; conditions are style, goal"),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), WRONG_TYPES, ids=str)
+def test_batches_of_a_wrong_type_are_rejected(
+    reach: pdmp.Model, given: dict[str, Any], message: str
+) -> None:
+    """Conditions of another type and unknown keywords are rejected by name."""
+    with pytest.raises(TypeError, match=message):
+        reach.rollouts(**given)
 
 
 @pytest.mark.parametrize("size", [0, -1])
 def test_chunks_have_a_size(reach: pdmp.Model, size: int) -> None:
     """A chunk size of zero is rejected."""
     with pytest.raises(ValueError, match=f"size = {size}: must"):
-        reach.rollout_chunks(STYLES, size=size)
+        reach.rollout_chunks(style=STYLES, size=size)
 
 
 def test_jacobians_of_the_other_kind_are_rejected(reach: pdmp.Model, cycle: pdmp.Model) -> None:
@@ -229,7 +306,7 @@ def test_jacobians_of_the_other_kind_are_rejected(reach: pdmp.Model, cycle: pdmp
             reach.jacobian(wrt, derivative=3)
     with pytest.raises(
         ValueError,
-        match="wrt = 'tau': must be 'style', 'goal', 'anchor', 'start' or 'goal_velocity'",
+        match='wrt = .tau.: must be "style", "goal", "anchor", "start" or "goal_velocity"',
     ):
         reach.jacobian("tau")
 
@@ -241,7 +318,7 @@ def arrays(n: int = 2) -> list[np.ndarray]:
 
 def test_outputs_are_one_for_each_derivative(reach: pdmp.Model) -> None:
     """A wrong number of output arrays is rejected with the number."""
-    model, batch = reach, {"styles": STYLES, "dt": 0.1, "duration": 1.0}
+    model, batch = reach, {"style": STYLES, "dt": 0.1, "duration": 1.0}
     for n, derivatives in ((1, 1), (2, 0), (2, 2)):
         message = f"out: {n} arrays; expected {derivatives + 1} float64 arrays"
         with pytest.raises(ValueError, match=message):
@@ -253,7 +330,7 @@ def test_outputs_that_overlap_are_rejected(reach: pdmp.Model) -> None:
     model, (one, _) = reach, arrays()
     for out in ((one, one), (one, one[::-1])):
         with pytest.raises(ValueError, match="out: .*share memory"):
-            model.rollouts(STYLES, dt=0.1, duration=1.0, out=out)
+            model.rollouts(style=STYLES, dt=0.1, duration=1.0, out=out)
     assert not one.any()
 
 
@@ -261,16 +338,16 @@ def test_misaligned_outputs_are_rejected(reach: pdmp.Model) -> None:
     """Misaligned output arrays, such as fields of packed records, are rejected."""
     records = np.zeros((23, 11, 2), [("value", "f8"), ("other", "f4")])
     with pytest.raises(ValueError, match="out: not aligned in memory"):
-        reach.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=0, out=(records["value"],))
+        reach.rollouts(style=STYLES, dt=0.1, duration=1.0, derivatives=0, out=(records["value"],))
     assert not records["other"].any()
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_outputs_can_have_any_strides(model: pdmp.Model, order: Any) -> None:
     """Output arrays of any strides are returned, with the numbers of a batch without them."""
-    expected = model.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=2)
+    expected = model.rollouts(style=STYLES, dt=0.1, duration=1.0, derivatives=2)
     out = [np.full((23, 11, 2), NAN, order=order)[::-1] for _ in range(3)]
-    made = model.rollouts(STYLES, dt=0.1, duration=1.0, derivatives=2, out=out)
+    made = model.rollouts(style=STYLES, dt=0.1, duration=1.0, derivatives=2, out=out)
     for mine, theirs, result in zip(out, made, expected, strict=True):
         assert theirs is mine
         np.testing.assert_array_equal(mine, result)
@@ -285,10 +362,10 @@ import resource, numpy as np, pdmp
 model, styles = pdmp.load({str(tmp_path / "model")!r}), np.zeros((10**6, 2))
 resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
 try:
-    model.rollouts(styles, dt=1e-3, duration=1.0, threads=1)
+    model.rollouts(style=styles, dt=1e-3, duration=1.0, threads=1)
 except MemoryError as error:
     print(error)
-print(next(model.rollout_chunks(styles, dt=1e-3, duration=1.0, threads=1))[0].shape)
+print(next(model.rollout_chunks(style=styles, dt=1e-3, duration=1.0, threads=1))[0].shape)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     reported, shape = done.stdout.splitlines()
@@ -308,12 +385,14 @@ def test_signal_ends_a_long_batch(reach: pdmp.Model) -> None:
 
     model, styles = reach, np.zeros((20000, 2))
     out = np.empty((20000, 1001, 2))
-    model.rollouts(styles[:1], dt=1e-3, duration=1.0)
+    model.rollouts(style=styles[:1], dt=1e-3, duration=1.0)
     before = signal.signal(signal.SIGALRM, ring)
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.002)
         with pytest.raises(Late):
-            model.rollouts(styles, dt=1e-3, duration=1.0, derivatives=0, out=(out,), threads=1)
+            model.rollouts(
+                style=styles, dt=1e-3, duration=1.0, derivatives=0, out=(out,), threads=1
+            )
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)

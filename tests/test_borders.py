@@ -31,7 +31,7 @@ def test_a_wrong_length_is_rejected_by_name(model: Model, length: int) -> None:
     calls: list[tuple[str, Callable[[], object]]] = [
         ("names", lambda: pdmp.Demonstration(REACHES[0], dt=0.02, names=lie)),
         ("units", lambda: pdmp.Demonstration(REACHES[0], dt=0.02, units=lie)),
-        ("out", lambda: model.rollouts(model.styles, out=lie)),
+        ("out", lambda: model.rollouts(style=model.styles, out=lie)),
     ]
     for name, call in calls:
         with pytest.raises((ValueError, TypeError), match=name):
@@ -84,12 +84,12 @@ def test_tiny_transitions_and_ticks_stay_finite(model: Model, transition: float)
 
 def test_outputs_that_overlap_themselves_are_rejected(model: Model) -> None:
     """An output array with overlapping elements is rejected."""
-    shape = model.rollouts(model.styles, dt=0.1, derivatives=0)[0].shape
+    shape = model.rollouts(style=model.styles, dt=0.1, derivatives=0)[0].shape
     out = np.lib.stride_tricks.as_strided(np.zeros(1), shape, (0, 0, 0))
     with pytest.raises(ValueError, match="share memory"):
-        model.rollouts(model.styles, dt=0.1, derivatives=0, out=[out])
+        model.rollouts(style=model.styles, dt=0.1, derivatives=0, out=[out])
     slices = np.zeros((2 * shape[0], shape[1], 2 * shape[2]))[::2, :, ::-2]
-    model.rollouts(model.styles, dt=0.1, derivatives=0, out=[slices])
+    model.rollouts(style=model.styles, dt=0.1, derivatives=0, out=[slices])
 
 
 def test_endless_recursion_is_an_exception() -> None:

@@ -116,6 +116,18 @@ def test_rollout_writes_the_movement(model_file: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(made.position, expected.position)
 
 
+def test_rollout_passes_its_goal_with_the_given_velocity(model_file: Path, tmp_path: Path) -> None:
+    """--velocity is the start velocity, --goal-velocity that at the end."""
+    path = tmp_path / "out.csv"
+    ends = "--velocity", 0.2, 0, "--goal-velocity", -1, 0.5
+    assert run("rollout", model_file, *ends, "-o", path) == 0
+    model = pdmp.load(model_file)
+    expected = model.rollout(velocity=[0.2, 0.0], goal_velocity=[-1.0, 0.5])
+    made = pdmp.io.read_csv(path, columns=model.names)
+    np.testing.assert_array_equal(made.position, expected.position)
+    assert not np.allclose(made.position, model.rollout(velocity=[0.2, 0.0]).position, atol=1e-3)
+
+
 def test_rollout_reproduces_a_demonstration(model_file: Path, tmp_path: Path) -> None:
     """With --demo, style, goal, start and duration are those of the demonstration."""
     path = tmp_path / "out.csv"
@@ -137,7 +149,7 @@ def test_rollout_of_a_context_is_its_prediction(model_file: Path, tmp_path: Path
 def test_warped_models_are_described_and_reproduce_demonstrations(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With --alignment and --styles auto the fit is the library's; --tau overrides a timing."""
+    """--alignment and --styles auto select the library's fit; --tau replaces segment durations."""
     path, out = tmp_path / "model.safetensors", tmp_path / "out.csv"
     options = ("--context", "bend", "--alignment", "warp", "--styles", "auto")
     assert run("fit", folder, *options, "-o", path) == 0
@@ -150,7 +162,7 @@ def test_warped_models_are_described_and_reproduce_demonstrations(
     model = pdmp.load(path)
     np.testing.assert_array_equal(model.styles, expected.styles)
     assert run("info", path) == 0
-    assert re.search(r"timing +8 segments", capsys.readouterr().out)
+    assert re.search(r"segments +8", capsys.readouterr().out)
     assert run("rollout", path, "--demo", 2, "-o", out) == 0
     made = model.rollout(model.conditions(2))
     np.testing.assert_array_equal(pdmp.io.read_csv(out, columns=["x", "y"]).position, made.position)
@@ -202,7 +214,7 @@ def test_plot_writes_every_figure(model_file: Path, folder: Path, tmp_path: Path
     figures = tmp_path / "figures"
     assert run("plot", model_file, folder, "-o", figures) == 0
     written = {path.name for path in figures.iterdir()}
-    assert written == {"demonstrations.png", "fan.png", "spectrum.png", "styles.png"}
+    assert written == {"demonstrations.png", "fan.png", "singular_values.png", "styles.png"}
 
 
 def test_plot_draws_the_phase_portrait_of_a_rhythmic_model(tmp_path: Path) -> None:
@@ -245,9 +257,14 @@ def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
         (["fit", "none.csv", "-o", "m"], "none.csv: No such file"),
         (["rollout", "{model}", "--style", "1", "-o", "o"], "--style has length 1, expected 2"),
         (["rollout", "{model}", "--goal", "1", "-o", "o"], "--goal has length 1, expected 2"),
+        (["rollout", "{model}", "--goal-velocity", "1", "-o", "o"], "--goal-velocity has length 1"),
+        (["rollout", "{model}", "--velocity", "1", "-o", "o"], "--velocity has length 1, expec"),
         (["rollout", "{model}", "--tau", "-1", "-o", "o"], "--tau = -1: must be positive"),
-        (["rollout", "{model}", "--demo", "9", "-o", "o"], "--demo.* 9 must lie between 0 and 4"),
-        (["rollout", "{model}", "--demo", "-1", "-o", "o"], "--demo.* -1 must lie between 0 and 4"),
+        (["rollout", "{model}", "--demo", "9", "-o", "o"], "--demo = 9: must lie between 0 and 4"),
+        (
+            ["rollout", "{model}", "--demo", "-1", "-o", "o"],
+            "--demo = -1: must lie between",
+        ),
         (["fit", "{folder}", "--styles", "9", "-o", "m"], "--styles = 9: must lie between 1 and 5"),
         (
             ["fit", "{folder}", "--styles", "1", "--singular-value-share", "0.5", "-o", "m"],
@@ -306,14 +323,59 @@ def test_negative_exponents_are_numbers(model_file: Path, tmp_path: Path) -> Non
     np.testing.assert_allclose(end, [-1e-3, 2], atol=0.2)
 
 
-def test_missing_folder_is_reported_before_learning(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("command", ["fit", "rollout", "plot", "evaluate"])
+def test_missing_folder_is_reported_before_the_work(
+    folder: Path,
+    model_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
 ) -> None:
-    """A missing output folder is reported before the fit."""
-    assert run("fit", folder, "-o", tmp_path / "nowhere" / "model.safetensors") == 1
+    """An output in a folder that does not exist is rejected; no folder is created."""
+    source = folder if command in ("fit", "evaluate") else model_file
+    assert run(command, source, "-o", tmp_path / "nowhere" / "output") == 1
     reported = capsys.readouterr().err
-    assert "no such folder" in reported
-    assert "learning" not in reported
+    assert reported == f"pdmp: error: {tmp_path / 'nowhere'}: no such folder; create it first\n"
+    assert not (tmp_path / "nowhere").exists()
+
+
+def test_numbers_of_recordings_are_reported(
+    folder: Path, model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Figures need all demonstrations of a fit."""
+    assert run("plot", model_file, folder / "demos" / "0.csv", "-o", tmp_path / "figures") == 1
+    assert "1 recording given, expected 5: one per demonstration" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--kind", "rhythmic", "--transport", "learnt"], "--transport does not apply to"),
+        (["--kind", "rhythmic"], "demo 0: --period is missing: pass it in seconds"),
+        (["--styles", "auto"], "--styles needs contexts for cross-validation: pass --context, or"),
+        (["--styles", "9"], "--styles = 9: must lie between 1 and 5"),
+    ],
+)
+def test_messages_name_the_options_of_the_command(
+    folder: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    message: str,
+) -> None:
+    """Arguments that an error reports or recommends have the form of options."""
+    assert run("fit", folder, "-o", tmp_path / "m", *arguments) == 1
+    assert message in capsys.readouterr().err
+
+
+def test_recommended_conditions_are_options(
+    model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An anchor of a discrete model is rejected with the option of its goal."""
+    assert run("rollout", model_file, "--anchor", 1, 2, "-o", tmp_path / "out.csv") == 1
+    reported = capsys.readouterr().err
+    assert "--anchor does not apply to a discrete primitive" in reported
+    assert "set --goal" in reported
 
 
 def test_extrapolated_contexts_are_reported(

@@ -1,5 +1,6 @@
 """Conditions of movements: of demonstrations, their means and blends."""
 
+import copy
 import pickle
 from typing import Any
 
@@ -62,14 +63,14 @@ def test_blend_rejects_unequal_lengths_and_shares_that_are_not_finite() -> None:
 
 def test_blend_rejects_a_condition_that_one_lacks() -> None:
     """A condition that only one of the two has is named."""
-    with pytest.raises(ValueError, match="goal: given for one of the two only"):
+    with pytest.raises(ValueError, match="goal: given for some of the conditions only"):
         pdmp.blend(pdmp.Conditions(style=[1.0]), pdmp.Conditions(style=[1.0], goal=[0.0]), 0.5)
 
 
 @pytest.mark.parametrize("demos", [-1, 5, [0, 7], []])
 def test_unknown_demonstration_is_rejected(demos: int | list[int]) -> None:
     """An index outside the demonstrations is rejected with the range."""
-    with pytest.raises(ValueError, match=r"between 0 and 4|empty"):
+    with pytest.raises(ValueError, match=r"between 0 and 4|at least one"):
         pdmp.fit(reaches()).conditions(demos)
 
 
@@ -102,6 +103,36 @@ def test_invalid_conditions_are_rejected_by_name(how: str) -> None:
             call([0.1, 0.2])
 
 
+def test_final_velocity_is_a_condition() -> None:
+    """It is blended, replaced and reset as the other conditions; demonstrations have none."""
+    model = pdmp.fit(reaches())
+    plain = model.conditions(1)
+    assert plain.goal_velocity is None
+    strike = plain.replace(goal_velocity=[2.0, -0.4])
+    assert strike != plain and strike.replace(goal_velocity=None) == plain
+    half = pdmp.blend(strike, strike.replace(goal_velocity=[0.0, 0.0]), 0.5)
+    np.testing.assert_array_equal(half.goal_velocity, [1.0, -0.2])
+    with pytest.raises(ValueError, match="goal_velocity: given for some of the conditions only"):
+        pdmp.blend(strike, plain, 0.5)
+    made = model.rollout(strike)
+    np.testing.assert_array_equal(
+        made.position, model.rollout(plain, goal_velocity=[2.0, -0.4]).position
+    )
+    controller = model.controller(0.001)
+    for conditions in (strike, plain):
+        controller.reset(conditions)
+        np.testing.assert_array_equal(controller.goal_velocity, conditions.goal_velocity)
+
+
+def test_tolerance_is_kept_by_reset_and_copies() -> None:
+    """The tolerance, 0.005 by default, belongs to the controller and not to a movement."""
+    controller = pdmp.fit(reaches()).controller(0.001)
+    assert controller.tolerance == 0.005
+    controller.tolerance = 1e-4
+    controller.reset()
+    assert (controller.tolerance, copy.copy(controller).tolerance) == (1e-4, 1e-4)
+
+
 def test_conditions_are_values() -> None:
     """Conditions compare by value, survive pickling, and print their values."""
     conditions = pdmp.Conditions(goal=np.array([0.5, 1.0]), amplitude=np.float64(0.5))
@@ -112,9 +143,13 @@ def test_conditions_are_values() -> None:
 
 
 def test_conditions_of_the_other_kind_are_rejected_everywhere() -> None:
-    """An amplitude of a discrete movement is rejected by rollout, controller and reset alike."""
+    """Rollout, controller and reset reject an amplitude or final velocity of the other kind."""
     model = pdmp.fit(reaches())
     controller = model.controller(0.01)
     for call in (model.rollout, model.controller, controller.reset):
         with pytest.raises(ValueError, match="amplitude"):
             call(amplitude=1.0)
+    model = pdmp.fit(loops(), kind="rhythmic")
+    for call in (model.rollout, model.controller, model.controller(0.01).reset):
+        with pytest.raises(ValueError, match="goal_velocity"):
+            call(goal_velocity=[0.0, 0.0])

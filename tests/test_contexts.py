@@ -1,6 +1,9 @@
 """Maps from contexts to movements: their selection, covariance and extrapolation."""
 
 import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +50,99 @@ def test_auto_reports_its_selection() -> None:
     heights = np.linspace(0, 1, 9)[:, None]
     line = pdmp.ContextMap(heights, heights * [1.0, -2.0])
     assert "interpolation weights 0.00 and 1.00" in repr(line)
+
+
+MASSES, SIDES = np.linspace(0.1, 0.6, 6), ["left", "right"] * 3
+
+
+def named(contexts: Any) -> pdmp.Model:
+    """Returns a model of contexts with a mass and a side."""
+    demos = [bent(m, 0.3 * (side == "left")) for m, side in zip(MASSES, SIDES, strict=True)]
+    return pdmp.fit(demos, dt=0.02, contexts=contexts)
+
+
+def pandas_contexts() -> Any:
+    """Returns the contexts as a data frame."""
+    return pytest.importorskip("pandas").DataFrame({"mass": MASSES, "side": SIDES})
+
+
+NAMED: dict[str, Callable[[], Any]] = {
+    "columns": lambda: {"mass": MASSES, "side": SIDES},
+    "rows": lambda: [{"mass": m, "side": s} for m, s in zip(MASSES, SIDES, strict=True)],
+    "mixed rows": lambda: [
+        {"mass": m, "side": s} if s == "left" else {"side": s, "mass": m}
+        for m, s in zip(MASSES, SIDES, strict=True)
+    ],
+    "records": lambda: np.array(
+        list(zip(MASSES, SIDES, strict=True)), [("mass", float), ("side", "U5")]
+    ),
+    "frame": pandas_contexts,
+}
+
+
+@pytest.mark.parametrize("form", NAMED)
+def test_names_of_contexts_are_kept_and_order_predictions(form: str, tmp_path: Path) -> None:
+    """Each form of named contexts gives the model of unnamed ones, with names that files keep."""
+    plain = named([[m, s] for m, s in zip(MASSES, SIDES, strict=True)])
+    assert plain.context_names is None
+    fitted = named(NAMED[form]())
+    fitted.save(tmp_path / "model")
+    expected = plain.predict([0.3, "right"]).conditions
+    for model in (fitted, pdmp.load(tmp_path / "model"), pickle.loads(pickle.dumps(fitted))):
+        assert model.context_names == ["mass", "side"]
+        assert "mass from 0.1 to 0.6, side 'left' or 'right'" in repr(model)
+        for context in ([0.3, "right"], {"mass": 0.3, "side": "right"}):
+            assert model.predict(context).conditions == expected
+        assert model.predict({"side": "right", "mass": 0.3}).conditions == expected
+        turned = model.rollout(context={"side": "right", "mass": 0.3}).position
+        np.testing.assert_array_equal(turned, plain.rollout(expected).position)
+        batch = {"side": ["right", "left"], "mass": [0.3, 0.5]}
+        (made,) = model.rollouts(context=batch, derivatives=0)
+        (same,) = plain.rollouts(context=[[0.3, "right"], [0.5, "left"]], derivatives=0)
+        np.testing.assert_array_equal(made, same)
+
+
+def test_a_row_of_a_frame_is_a_context() -> None:
+    """Rows of a data frame are contexts by name, frames with other columns first too."""
+    frame = pandas_contexts()
+    model = named(frame)
+    expected = model.rollouts(context=frame, derivatives=0)[0]
+    swapped = frame[["side", "mass"]]
+    np.testing.assert_array_equal(model.rollouts(context=swapped, derivatives=0)[0], expected)
+    assert (
+        model.predict(swapped.iloc[2]).conditions == model.predict([MASSES[2], "left"]).conditions
+    )
+
+
+def test_errors_of_named_contexts_have_the_names() -> None:
+    """Values and names that do not suit the columns are rejected with the names."""
+    model, plain = named(NAMED["columns"]()), curved(np.linspace(0, 1, 5))
+    for context, message in (
+        ({"mass": 0.3}, "context has the names mass; expected one value for each of mass, side"),
+        ({"mass": 0.3, "side": "left", "x": 1.0}, "context has the names mass, side, x; expected"),
+        ({"mass": 0.3, "side": "up"}, r'context\["side"\] = "up": not demonstrated'),
+        ({"mass": "heavy", "side": "left"}, r'context\["mass"\] = "heavy": a number is expected'),
+        ([0.3, "up"], r'context\["side"\] = "up": not demonstrated'),
+    ):
+        with pytest.raises(ValueError, match=message):
+            model.predict(context)
+    with pytest.raises(
+        ValueError, match="context has names, but the contexts of the demonstration"
+    ):
+        plain.predict({"height": 0.2})
+    for contexts, message in (
+        ({"mass": MASSES, "side": SIDES[:3]}, "contexts: columns of different lengths"),
+        (
+            [{"mass": 0.1}] * 5 + [{"side": 0.1}],
+            r"contexts\[5\]: expected one value for each of mass",
+        ),
+        ({"mass": MASSES[:5]}, "contexts has length 5, expected 6"),
+        ({"m" * 1001: MASSES}, r'context_names\[0\] = "m+": must have at most 1000'),
+    ):
+        with pytest.raises(ValueError, match=message):
+            named(contexts)
+    with pytest.raises(TypeError, match="context is a mapping: pass its values in a list"):
+        Demonstration(bent(0.1), dt=0.02, context={"mass": 0.1})
 
 
 def test_labels_alone_give_the_mean_of_their_demonstrations() -> None:
@@ -151,7 +247,7 @@ def test_unknown_labels_are_rejected(context: list[object], message: str) -> Non
 
 def test_labels_and_numbers_do_not_mix_in_a_column() -> None:
     """A context value is a label in all demonstrations or in none."""
-    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 1 labels and 2 numbers"):
+    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 1 label and 2 numbers"):
         pdmp.fit([BASE] * 3, dt=0.02, contexts=[[0.1], ["high"], [0.2]])
 
 
@@ -303,9 +399,12 @@ def test_styles_are_those_of_cross_validation(kind: str) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"n_styles": "auto"}, "needs contexts: pass contexts"),
-        ({"n_styles": "auto", "contexts": [[0.0], [0.0], [1.0]]}, "three different contexts"),
-        ({"n_styles": "most"}, 'n_styles = "most": must be a number, "auto" or None'),
+        ({"n_styles": "auto"}, "n_styles needs contexts"),
+        (
+            {"n_styles": "auto", "contexts": [[0.0], [0.0], [1.0]]},
+            "n_styles needs at least three different contexts",
+        ),
+        ({"n_styles": "most"}, 'n_styles = .most.: must be a number, "auto" or None'),
     ],
 )
 def test_selection_without_varying_contexts_is_rejected(

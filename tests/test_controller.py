@@ -352,6 +352,30 @@ def test_speed_zero_pauses_on_the_path(model: pdmp.Model) -> None:
             paused.speed = bad
 
 
+@pytest.mark.parametrize("speed", [0.5, 2.0])
+def test_speed_scales_the_rate_smoothly(model: pdmp.Model, speed: float) -> None:
+    """A new speed scales the rate of the clock, and the velocity does not jump."""
+
+    def clock() -> float:
+        """Returns u or the polar phase."""
+        phase = controller.phase
+        return phase if model.alpha_x is None else float(-np.log(phase) / model.alpha_x)
+
+    controller = model.controller()
+    for _ in range(300):
+        controller.step()
+    peak = np.abs(model.rollout().velocity).max()
+    controller.speed = speed
+    for _ in range(1000):
+        before = controller.velocity.copy()
+        controller.step()
+        assert np.abs(controller.velocity - before).max() <= 0.02 * max(speed, 1) * peak
+    start = clock()
+    controller.step()
+    advance = (clock() - start) % (2 * np.pi)
+    assert advance == pytest.approx(speed * controller.dt / model.tau, rel=1e-4)
+
+
 def test_a_rhythmic_movement_starts_on_its_cycle_at_any_phase(reach: pdmp.Model) -> None:
     """A start at a phase has no transient."""
     s = np.arange(100) / 100 * 2 * np.pi

@@ -72,7 +72,7 @@ def test_model_is_a_table(reach: pdmp.Model) -> None:
     assert rows["styles J"].startswith("2, ")
     assert rows["contexts"] == "[0] from -0.2 to 0.2"
     assert rows["context map"].startswith('"stacked" (')
-    assert {"demonstrations", "measurement noise", "landscape"} <= set(rows)
+    assert {"demonstrations", "measurement noise", "regression"} <= set(rows)
 
 
 def test_period_of_a_rhythmic_model_is_in_seconds(cycle: pdmp.Model) -> None:
@@ -87,7 +87,7 @@ def test_context_map_and_landscape_are_not_mistaken(reach: pdmp.Model) -> None:
     """Each regression is named, and the error of the map is its own, not the least of all."""
     errors = dict(reach.map.errors)  # type: ignore[union-attr]
     text = repr(reach)
-    assert "; landscape NGnet, 50 functions" in text
+    assert "; regression NGnet, 50 functions" in text
     assert 'context map "stacked" (Gaussian process and line), mean squared' in text
     stated = float(text.split("leave-one-out error ")[1].split()[0])
     assert stated == pytest.approx(errors["stacked"], rel=0.05)

@@ -260,9 +260,9 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"contexts": [[1.0]] * 6}, "contexts: one condition in 6 demonstrations: at least 2"),
     ({"max_folds": 1}, "max_folds = 1: must be at least 2"),
     ({"n_samples": 3}, "n_samples = 3: must be at least 4"),
-    ({"kind": "circular"}, 'kind = "circular": must be "discrete" or "rhythmic"'),
+    ({"kind": "circular"}, 'kind = .circular.: must be "discrete" or "rhythmic"'),
     ({"period": 1.0}, "period does not apply to discrete"),
-    ({"dt": None}, "no sampling interval: pass dt= in seconds"),
+    ({"dt": None}, "dt is missing: pass the sampling interval in seconds"),
     ({"splits": []}, "splits is empty"),
     ({"splits": [([0], [1])]}, r"splits\[0\]: must be \(train, test,"),
     ({"splits": [([0], [], "interpolation")]}, r"splits\[0\]: test must be one or more indices"),
@@ -379,5 +379,5 @@ def test_labels_without_training_demonstrations_are_rejected() -> None:
     with pytest.raises(ValueError, match="has no training demonstration"):
         pdmp.evaluate(movements, contexts=manners, dt=0.01)
     mixed = [[0.1], *manners[1:]]
-    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 numbers"):
+    with pytest.raises(ValueError, match=r"contexts\[:, 0\] holds 11 labels and 1 number:"):
         pdmp.evaluate(movements, contexts=mixed, dt=0.01)

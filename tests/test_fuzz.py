@@ -180,6 +180,7 @@ def moves(kind: str) -> dict[str, tuple[Strategy | None, Strategy]]:
         "start": (PLACES, ODD),
         "velocity": (PLACES, ODD),
         "goal": (PLACES if discrete else None, ODD),
+        "goal_velocity": (PLACES if discrete else None, ODD),
         "anchor": (None if discrete else PLACES, ODD),
         "amplitude": (None if discrete else SIZES, SCALARS),
     }
@@ -215,22 +216,20 @@ def test_batch_with_unusual_arguments_is_finite_or_rejected(
     model = request.getfixturevalue(FIXTURES[kind])
     tally = Tally()
     three = arrays.arrays(np.float64, (3, 2), elements=st.floats(-2, 2))
-    plural = {"goal": "goals", "anchor": "anchors", "start": "starts", "velocity": "velocities"}
-    several = {plural.get(name, name): pair for name, pair in moves(kind).items()}
 
     @QUICK
     @given(
         mostly(
-            styles=(three, ODD),
+            style=(three, ODD),
             duration=(SHORT, SPANS),
             derivatives=(st.integers(0, 2), COUNTS),
             threads=(st.integers(1, 3), COUNTS),
             out=(None, ODD),
-            **several,
+            **moves(kind),
         )
     )
     def rolls_out(arguments: dict[str, Any]) -> None:
-        batch = {"styles": np.ones((3, 2))} | arguments
+        batch = {"style": np.ones((3, 2))} | arguments
         for values in tally.attempt(model.rollouts, **batch) or ():
             assert np.isfinite(values).all()
 
@@ -245,9 +244,14 @@ def test_loop_with_unusual_commands_is_finite(kind: str, request: pytest.Fixture
     model = request.getfixturevalue(FIXTURES[kind])
     tally = Tally()
     centre = "goal" if kind == "discrete" else "anchor"
-    good = st.tuples(st.sampled_from(["style", centre]), PLACES) | st.tuples(st.just("tau"), SIZES)
-    odd = st.tuples(st.sampled_from(["goal", "style", "anchor"]), ODD) | st.tuples(
-        st.sampled_from(["tau", "amplitude"]), SCALARS
+    vectors = ["style", centre, *(["goal_velocity"] if kind == "discrete" else [])]
+    good = (
+        st.tuples(st.sampled_from(vectors), PLACES)
+        | st.tuples(st.just("tau"), SIZES)
+        | st.tuples(st.just("tolerance"), st.floats(1e-9, 1))
+    )
+    odd = st.tuples(st.sampled_from(["goal", "goal_velocity", "style", "anchor"]), ODD) | st.tuples(
+        st.sampled_from(["tau", "amplitude", "tolerance"]), SCALARS
     )
 
     @QUICK

@@ -320,7 +320,7 @@ def test_small_degrees_of_freedom_that_are_left_out_are_reported() -> None:
         np.column_stack([400 * far * wave, 0.2 * turn * bump])
         for far, turn in random.uniform(-1, 1, (12, 2))
     ]
-    with pytest.warns(UserWarning, match=r'1 styles leave out \d+ % of "y1"'):
+    with pytest.warns(UserWarning, match=r'n_styles = 1 leaves out \d+ % of "y1"'):
         pdmp.fit(demos, dt=0.01, n_styles=1)
     made = pdmp.fit(demos, dt=0.01)
     assert made.n_styles == 2

@@ -69,12 +69,27 @@ def test_trajectories_are_the_users_own(model: pdmp.Model) -> None:
     np.testing.assert_array_equal(model.rollout().position, expected)
 
 
-@pytest.mark.parametrize("name", ["styles", "goals", "starts", "anchors", "durations"])
-def test_models_cannot_be_changed_through_their_arrays(model: pdmp.Model, name: str) -> None:
-    """Arrays of a model are copies."""
-    expected = getattr(model, name).copy()
-    getattr(model, name)[:] = np.nan
-    np.testing.assert_array_equal(getattr(model, name), expected)
+def test_objects_that_cannot_change_hand_out_read_only_arrays(model: pdmp.Model) -> None:
+    """Assignment to an element would be lost, and is an error; a view made writable is a copy."""
+    demo = pdmp.Demonstration(np.zeros((5, 2)), dt=0.1, goal=[1.0, 2.0], context=[3.0])
+    conditions = model.conditions(0).replace(velocity=[0.1, 0.2])
+    found = 0
+    for holder in (model, demo, conditions, model.controller(0.01)):
+        for name in dir(holder):
+            if name.startswith("_") or name in ("goal", "anchor") and holder is not demo:
+                continue
+            array = getattr(holder, name)
+            if isinstance(array, np.ndarray):
+                found += 1
+                expected = array.copy()
+                with pytest.raises(ValueError, match="read-only"):
+                    array[...] = np.nan
+                np.testing.assert_array_equal(getattr(holder, name), expected)
+    assert found > 20
+    styles = model.styles
+    styles.setflags(write=True)
+    styles[:] = np.nan
+    assert np.isfinite(model.styles).all()
 
 
 def test_status_is_one_of_two_objects(reach: pdmp.Model) -> None:
@@ -192,10 +207,10 @@ def test_missing_files_are_missing_files(tmp_path: Path) -> None:
 
 def test_batch_is_written_in_place(model: pdmp.Model) -> None:
     """With `out`, positions and velocities are written into given arrays, strided ones too."""
-    expected = model.rollouts(model.styles, dt=0.05)
+    expected = model.rollouts(style=model.styles, dt=0.05)
     shape = expected[0].shape
     out = np.full(shape, np.nan), np.full((*shape[:2], 4), np.nan)[:, :, ::2]
-    returned = model.rollouts(model.styles, dt=0.05, out=out)
+    returned = model.rollouts(style=model.styles, dt=0.05, out=out)
     for mine, theirs, result in zip(out, returned, expected, strict=True):
         assert theirs is mine
         np.testing.assert_array_equal(mine, result)
@@ -203,7 +218,7 @@ def test_batch_is_written_in_place(model: pdmp.Model) -> None:
 
 def test_batch_is_the_rollouts_one_by_one(model: pdmp.Model) -> None:
     """Row b of a batch is the rollout of style b."""
-    positions, velocities = model.rollouts(model.styles, dt=0.05, tau=1.5 * model.tau)
+    positions, velocities = model.rollouts(style=model.styles, dt=0.05, tau=1.5 * model.tau)
     for style, position, velocity in zip(model.styles, positions, velocities, strict=True):
         single = model.rollout(style=style, dt=0.05, tau=1.5 * model.tau)
         np.testing.assert_allclose(position, single.position, atol=1e-12)

@@ -161,8 +161,8 @@ def test_frames_are_demonstrations_and_contexts(frame: Callable[..., Any]) -> No
         found = pdmp.evaluate(given, dt=DT, contexts=contexts, predictors={})
         np.testing.assert_array_equal(found.recordings.contexts, scales)
         assert found.recordings.names == ["x", "y"]
-    batch = model.rollouts(frame(model.styles, [f"s{j}" for j in range(model.n_styles)]))
-    np.testing.assert_array_equal(batch[0], model.rollouts(model.styles)[0])
+    batch = model.rollouts(style=frame(model.styles, [f"s{j}" for j in range(model.n_styles)]))
+    np.testing.assert_array_equal(batch[0], model.rollouts(style=model.styles)[0])
 
 
 def test_frames_of_numbers_and_labels_are_contexts() -> None:
@@ -209,7 +209,7 @@ def test_text_is_never_read_as_numbers(text: Any) -> None:
         (lambda: Demonstration(POSITION, dt=DT, goal=text), "goal"),
         (lambda: model.rollout(goal=text), "goal"),
         (lambda: model.rollout(style=text), "style"),
-        (lambda: model.rollouts([text]), "styles"),
+        (lambda: model.rollouts(style=[text]), "style"),
         (lambda: setattr(controller, "goal", text), "goal"),
         (lambda: pdmp.fit(reaches(), dof_scale=text), "dof_scale"),
     ):
@@ -324,7 +324,7 @@ def test_mappings_of_readers_are_accepted(tmp_path: Path) -> None:
             expected = function(demo, *arguments).position
             np.testing.assert_array_equal(one.position, expected)
             np.testing.assert_array_equal(other.position, expected)
-    parts = pdmp.preprocessing.cut(named, [0.1, 0.5, 0.9])
+    parts = pdmp.preprocessing.split_at(named, [0.1, 0.5, 0.9])
     assert [len(part) for part in parts.values()] == [2] * len(named)
     with pytest.raises(ValueError, match="^d0: cut_off = -1"):
         pdmp.preprocessing.lowpass(named, -1.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import pdmp
+from synthetic import reaches
 
 
 def test_zero_perturbation_changes_nothing(model: pdmp.Model) -> None:
@@ -41,6 +42,50 @@ def test_blocked_robot_waits_and_then_arrives(reach: pdmp.Model) -> None:
     np.testing.assert_allclose(controller.position, controller.goal, atol=controller.tolerance)
 
 
+@pytest.mark.parametrize("transport", ["learnt", "immediate"])
+def test_velocity_is_continuous_when_a_robot_is_held_and_released(transport: str) -> None:
+    """A changed phase rate does not change the velocity; a release keeps that of the held robot."""
+    controller = pdmp.fit(reaches(), n_styles=2, transport=transport).controller(0.001)
+    controller.compliance = (1000.0, 0.0)
+    for _ in range(500):
+        controller.step()
+    # An error of a tenth of the range slows the phase elevenfold at once.
+    for error in (0.1, 0.0, 0.1):
+        before = controller.velocity.copy()
+        controller.step(measured=controller.position + [error, 0.0])
+        np.testing.assert_allclose(controller.velocity, before, atol=0.1)
+    controller.compliance = (1000.0, 10.0)
+    place = controller.position.copy()
+    for _ in range(500):
+        controller.step(measured=place)
+    held = controller.velocity.copy()
+    controller.release()
+    np.testing.assert_allclose(controller.velocity, held, atol=1e-12)
+    controller.step()
+    np.testing.assert_allclose(controller.velocity, held, atol=0.1)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.001, 0.1])
+def test_coupling_at_low_speed_does_not_launch_the_movement(speed: float) -> None:
+    """An acceleration coupled during a pause leaves no velocity for the full speed."""
+    model = pdmp.fit(reaches(), n_styles=2)
+    controller, free = model.controller(0.001), model.controller(0.001)
+    for _ in range(300):
+        controller.step()
+        free.step()
+    controller.speed = speed
+    for _ in range(600):
+        controller.step(coupling=([0.0, 0.0], [1.0, 0.0]))
+    controller.speed = 1.0
+    fastest = 0.0
+    for _ in range(3000):
+        controller.step()
+        free.step()
+        fastest = max(fastest, np.abs(controller.velocity).max())
+    assert fastest < 3.0
+    np.testing.assert_allclose(controller.position, free.position, atol=1e-3)
+
+
 def test_constant_tracking_error_is_kept_at_the_goal(reach: pdmp.Model) -> None:
     """A constant error prevents neither the goal nor the end of the movement."""
     controller = reach.controller()
@@ -67,7 +112,7 @@ def test_invalid_perturbations_are_rejected_and_change_nothing(
     ):
         with pytest.raises(ValueError, match=name):
             controller.step(**arguments)
-    with pytest.raises(ValueError, match="tuple of length 2"):
+    with pytest.raises(TypeError, match="expected two vectors"):
         controller.step(coupling=([0, 0],))
     np.testing.assert_array_equal(controller.position, before)
     assert controller.time == 0.001

@@ -1,6 +1,7 @@
 """Contents of figures, on axes with quantity and unit."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def test_only_a_plane_has_a_path_panel(n_dofs: int) -> None:
 
 def test_demonstrations_must_be_those_of_the_fit(model: pdmp.Model) -> None:
     """A wrong number of demonstrations is rejected."""
-    with pytest.raises(ValueError, match="demos has length 4, expected 5"):
+    with pytest.raises(ValueError, match="4 recordings given, expected 5"):
         plot.demonstrations(model, reaches()[:4])
 
 
@@ -83,9 +84,9 @@ def test_demonstrations_have_the_dofs_of_the_model(
         plot.demonstrations(model, [other] * model.n_demos)
 
 
-def test_spectrum_states_the_number_of_styles(model: pdmp.Model) -> None:
+def test_singular_values_state_the_number_of_styles(model: pdmp.Model) -> None:
     """The title has J and the number of singular values."""
-    (axes,) = plot.spectrum(model).axes
+    (axes,) = plot.singular_values(model).axes
     assert axes.get_title().startswith("J = 2 of 5: ")
 
 
@@ -165,32 +166,48 @@ def test_held_out_movements_have_a_column_per_reach(evaluation: Evaluation) -> N
 def test_given_figure_is_drawn_on(model: pdmp.Model) -> None:
     """A given figure is drawn on and returned."""
     figure = Figure()
-    assert plot.spectrum(model, figure=figure) is figure
+    assert plot.singular_values(model, figure=figure) is figure
     assert figure.axes
 
 
 def test_saved_figure_is_a_png(model: pdmp.Model, tmp_path: Path) -> None:
-    """Saving creates the folder and writes a PNG only."""
-    plot.save(plot.spectrum(model), tmp_path / "new" / "spectrum.png")
-    (file,) = (tmp_path / "new").iterdir()
+    """Saving writes a PNG only."""
+    plot.save(plot.singular_values(model), tmp_path / "singular_values.png")
+    (file,) = tmp_path.iterdir()
     assert file.read_bytes().startswith(b"\x89PNG")
+
+
+def test_missing_folders_are_not_created(model: pdmp.Model, tmp_path: Path) -> None:
+    """Figures, trajectories and models are written into existing folders only."""
+    path = tmp_path / "new" / "file"
+    writers: list[Callable[[], object]] = [
+        lambda: plot.save(plot.singular_values(model), path),
+        lambda: pdmp.io.write_csv(path, model.rollout()),
+        lambda: model.rollout().to_csv(path),
+        lambda: model.save(path),
+    ]
+    for write in writers:
+        with pytest.raises(FileNotFoundError, match="no such folder; create it first") as error:
+            write()
+        assert error.value.filename == str(tmp_path / "new")
+    assert not list(tmp_path.iterdir())
 
 
 def test_suffix_selects_the_format(model: pdmp.Model, tmp_path: Path) -> None:
     """The suffix selects the format; unsupported ones are rejected."""
-    figure = plot.spectrum(model)
-    plot.save(figure, tmp_path / "spectrum.pdf")
-    assert (tmp_path / "spectrum.pdf").read_bytes().startswith(b"%PDF")
+    figure = plot.singular_values(model)
+    plot.save(figure, tmp_path / "singular_values.pdf")
+    assert (tmp_path / "singular_values.pdf").read_bytes().startswith(b"%PDF")
     with pytest.raises(ValueError, match="docx"):
-        plot.save(figure, tmp_path / "spectrum.docx")
-    assert [path.name for path in tmp_path.iterdir()] == ["spectrum.pdf"]
+        plot.save(figure, tmp_path / "singular_values.docx")
+    assert [path.name for path in tmp_path.iterdir()] == ["singular_values.pdf"]
 
 
 def test_missing_matplotlib_is_named(model: pdmp.Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without matplotlib, the error names the extra."""
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(ImportError, match=r"pip install 'pdmp\[plot\]'"):
-        plot.spectrum(model)
+        plot.singular_values(model)
 
 
 def test_cut_off_is_where_the_residual_equals_the_noise() -> None:

@@ -236,5 +236,5 @@ def test_a_recording_needs_a_clock() -> None:
     """Functions that need times reject recordings without them."""
     bare = pdmp.Demonstration(walk())
     for call in (pdmp.preprocessing.period, pdmp.preprocessing.trim, pdmp.preprocessing.cycles):
-        with pytest.raises(ValueError, match=r"no sampling times: .* dt= or time="):
+        with pytest.raises(ValueError, match=r"time is unknown: .*dt= or time="):
             call(bare)

@@ -13,7 +13,7 @@ from reproduction import film, heights, one_dof, rivals, styles, walking
 from reproduction import swing as arms
 from reproduction.__main__ import main
 from reproduction.baxter import mjcf
-from reproduction.demo.__main__ import main as demo_main
+from reproduction.demo import main as demo_main
 from reproduction.human import BOX, HAND_HEIGHT, minimum_jerk
 from reproduction.loop import NewGoal, from_rest, reach_over
 from reproduction.reaching import GOAL, Reaching, demonstrate, height_of

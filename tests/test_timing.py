@@ -73,7 +73,9 @@ def test_landmarks_are_aligned() -> None:
     np.testing.assert_allclose(
         model.style_of(training[2], landmarks=landmarks[2]), model.styles[2], atol=0.01
     )
-    with pytest.raises(ValueError, match="pass the landmarks of this demonstration"):
+    with pytest.raises(
+        ValueError, match="landmarks is missing: the model was fitted with landmarks"
+    ):
         model.style_of(training[2])
 
 

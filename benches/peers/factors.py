@@ -51,7 +51,6 @@ def scikit_learn_factors() -> Begin:
 TASKS = [
     Task(
         "singular value decomposition of {} × {}".format(*SMALL),
-        calls=1,
         rounds=20,
         libraries={
             "pdmp": partial(pdmp_factors, SMALL, SMALL[0]),
@@ -60,7 +59,6 @@ TASKS = [
     ),
     Task(
         "{} leading factors of {} × {}".format(N_LEADING, *LARGE),
-        calls=1,
         rounds=5,
         libraries={
             "pdmp": partial(pdmp_factors, LARGE, N_LEADING),

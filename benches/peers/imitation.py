@@ -53,7 +53,6 @@ def movement_primitives_promp() -> Begin:
 TASKS = [
     Task(
         "imitation of one demonstration of 1001 samples, D=7",
-        calls=1,
         rounds=10,
         libraries={
             "pdmp, network": partial(pdmp_imitate, "ngnet"),
@@ -64,7 +63,6 @@ TASKS = [
     ),
     Task(
         f"fit of {N_DEMOS} demonstrations of 1001 samples, D={N_DOFS}",
-        calls=1,
         rounds=10,
         libraries={
             "pdmp, network": partial(pdmp_fit, "ngnet"),

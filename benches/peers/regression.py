@@ -76,7 +76,6 @@ def scikit_learn_found() -> Begin:
 TASKS = [
     Task(
         f"Gaussian process of {MANY} samples, 3 outputs, Matérn-5/2, hyperparameters given",
-        calls=1,
         rounds=20,
         libraries={
             "pdmp": partial(pdmp_conditioned, "matern52"),
@@ -85,7 +84,6 @@ TASKS = [
     ),
     Task(
         f"Gaussian process of {MANY} samples, 3 outputs, Matérn-3/2, hyperparameters given",
-        calls=1,
         rounds=20,
         libraries={
             "pdmp": partial(pdmp_conditioned, "matern32"),
@@ -95,7 +93,6 @@ TASKS = [
     ),
     Task(
         f"Gaussian process of {SOME} samples, 3 outputs, Matérn-5/2, with hyperparameters",
-        calls=1,
         rounds=5,
         libraries={
             "pdmp": partial(pdmp_found, "matern52", SOME),
@@ -105,7 +102,6 @@ TASKS = [
     # scikit-learn would take some minutes.
     Task(
         f"Gaussian process of {MANY} samples, 3 outputs, Matérn-5/2, with hyperparameters",
-        calls=1,
         rounds=20,
         libraries={"pdmp": partial(pdmp_found, "matern52", MANY)},
     ),

@@ -31,7 +31,7 @@ def pydmps_rollout() -> Begin:
 def pdmp_rollouts() -> Begin:
     """Computes rollouts of many styles, with velocities."""
     styles = np.random.default_rng(0).normal(size=(N_ROLLOUTS, N_STYLES))
-    return lambda: partial(primitive().rollouts, styles, dt=DT, threads=1)
+    return lambda: partial(primitive().rollouts, style=styles, dt=DT, threads=1)
 
 
 def mp_pytorch_rollouts(kind: str) -> Begin:
@@ -68,7 +68,6 @@ def mp_pytorch_rollouts(kind: str) -> Begin:
 TASKS = [
     Task(
         "rollout of one second at 1 kHz, D=7",
-        calls=1,
         rounds=40,
         libraries={
             "pdmp, J=3": pdmp_rollout,
@@ -79,7 +78,6 @@ TASKS = [
     ),
     Task(
         f"{N_ROLLOUTS} rollouts of 1001 samples, D={N_DOFS}, with velocities",
-        calls=1,
         rounds=10,
         libraries={
             "pdmp, J=3": pdmp_rollouts,

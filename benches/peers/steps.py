@@ -11,16 +11,21 @@ from peers.timing import Begin, Call, Task
 TICKS = 800  # within the duration of one second, so that no movement ends earlier
 
 
+def after(*calls: Call, tick: Call) -> Begin:
+    """Returns a preparation of rounds of ticks by some calls."""
+
+    def begin() -> Call:
+        for call in calls:
+            call()
+        return tick
+
+    return begin
+
+
 def pdmp_settled() -> Begin:
     """Steps with constant style, goal and tau."""
     controller = primitive().controller(dt=DT)
-
-    def begin() -> Call:
-        controller.reset()
-        controller.step()
-        return controller.step
-
-    return begin
+    return after(controller.reset, controller.step, tick=controller.step)
 
 
 def pdmp_live() -> Begin:
@@ -28,15 +33,12 @@ def pdmp_live() -> Begin:
     model = primitive()
     controller = model.controller(dt=DT, transition=DT * TICKS)
 
-    def begin() -> Call:
-        controller.reset()
-        controller.step()
+    def change() -> None:
         controller.style = model.styles[1]
         controller.goal = model.goals[1] + 0.1
         controller.tau = 1.2 * model.tau
-        return controller.step
 
-    return begin
+    return after(controller.reset, controller.step, change, tick=controller.step)
 
 
 def pdmp_new_goal() -> Begin:
@@ -48,12 +50,7 @@ def pdmp_new_goal() -> Begin:
         controller.goal = next(targets)
         controller.step()
 
-    def begin() -> Call:
-        controller.reset()
-        controller.step()
-        return tick
-
-    return begin
+    return after(controller.reset, controller.step, tick=tick)
 
 
 def ruckig_start() -> tuple[Any, Any, Any]:
@@ -87,12 +84,7 @@ def ruckig_sample() -> Begin:
         generator.update(parameters, output)
         output.pass_to_input(parameters)
 
-    def begin() -> Call:
-        ruckig_rest(parameters)
-        tick()
-        return tick
-
-    return begin
+    return after(partial(ruckig_rest, parameters), tick, tick=tick)
 
 
 def ruckig_new_goal() -> Begin:
@@ -105,12 +97,7 @@ def ruckig_new_goal() -> Begin:
         generator.update(parameters, output)
         output.pass_to_input(parameters)
 
-    def begin() -> Call:
-        ruckig_rest(parameters)
-        tick()
-        return tick
-
-    return begin
+    return after(partial(ruckig_rest, parameters), tick, tick=tick)
 
 
 def movement_primitives_step(method: str, new_goal: bool) -> Begin:
@@ -122,17 +109,15 @@ def movement_primitives_step(method: str, new_goal: bool) -> Begin:
     def tick() -> None:
         state[:] = dmp.step(*state, step_function=method)
 
+    def reset() -> None:
+        dmp.reset()
+        state[:] = dmp.start_y, dmp.start_yd
+
     def tick_to_new_goal() -> None:
         dmp.configure(goal_y=next(targets))
         tick()
 
-    def begin() -> Call:
-        dmp.reset()
-        state[:] = dmp.start_y, dmp.start_yd
-        tick()
-        return tick_to_new_goal if new_goal else tick
-
-    return begin
+    return after(reset, tick, tick=tick_to_new_goal if new_goal else tick)
 
 
 def pydmps_step(new_goal: bool) -> Begin:
@@ -144,12 +129,7 @@ def pydmps_step(new_goal: bool) -> Begin:
         dmp.goal = next(targets)
         dmp.step()
 
-    def begin() -> Call:
-        dmp.reset_state()
-        dmp.step()
-        return tick_to_new_goal if new_goal else dmp.step
-
-    return begin
+    return after(dmp.reset_state, dmp.step, tick=tick_to_new_goal if new_goal else dmp.step)
 
 
 TASKS = [

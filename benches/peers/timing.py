@@ -25,9 +25,9 @@ class Task:
     """Task to time: number of calls per round, number of rounds, and libraries."""
 
     title: str
-    calls: int
     rounds: int
     libraries: dict[str, Prepare]  # the first is the reference of the ratios
+    calls: int = 1
 
 
 def prepared(libraries: dict[str, Prepare]) -> dict[str, Begin]:

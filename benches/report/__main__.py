@@ -34,6 +34,7 @@ def main() -> None:
     available = list(questions())
     if not available:
         raise SystemExit("no recordings: set PDMP_DATA to a folder with sets of them")
+    FIGURES.mkdir(parents=True, exist_ok=True)
     answers: list[tuple[Question, Evaluation]] = []
     with ProcessPoolExecutor() as pool:
         for question, evaluation in zip(available, pool.map(answer, available), strict=True):

@@ -1,6 +1,5 @@
 """Sets of recordings with numeric contexts, each as one or several questions."""
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,9 +7,7 @@ from typing import Any
 import numpy as np
 
 from pdmp import Demonstration
-from pdmp.datasets import folder
-from pdmp.io import read_csv, read_folder
-from recordings import ARM, HAND, cycle, is_available
+from recordings import ARM, HAND, is_available, recorded, rows, running_strides, walking_strides
 
 LEGS = [f"{side}_{angle}" for side in "rl" for angle in ("hip_flex", "knee_flex", "ank_dorsi")]
 MAX_DEMOS = 120  # of a question; with more, a Gaussian process takes over a second
@@ -44,7 +41,7 @@ def questions() -> Iterator[Question]:
 def raised_hands() -> Iterator[Question]:
     """Yields raised hands: up, hold and back, or the rise alone."""
     index = rows("raise_hand_bandai")
-    demos = list(read_folder(folder("raise_hand_bandai"), columns=ARM).values())
+    demos = recorded("raise_hand_bandai", ARM)
     heights = numbers(index, "hold_height_m")
     yield Question("raise_hand_bandai, whole", "height held", "rad", demos, heights)
     rises = cut(demos, numbers(index, "rise_start_s", "rise_end_s"))
@@ -54,7 +51,7 @@ def raised_hands() -> Iterator[Question]:
 def high_and_low() -> Iterator[Question]:
     """Yields high grabs and deposits on the floor by three actors of different size."""
     index = rows("arms_hdm05")
-    demos = list(read_folder(folder("arms_hdm05"), columns=ARM).values())
+    demos = recorded("arms_hdm05", ARM)
     columns = {"grabHighR": "peak_height_m", "depositFloorR": "low_height_m"}
     heights, chosen = np.full((len(index), 1), np.nan), {}
     for motion, column in columns.items():
@@ -69,7 +66,7 @@ def high_and_low() -> Iterator[Question]:
 def walking_forces() -> Iterator[Question]:
     """Yields ground forces of five people at many walking speeds."""
     index = rows("walking_force_speed")
-    demos = list(read_folder(folder("walking_force_speed")).values())
+    demos = recorded("walking_force_speed")
     speeds = numbers(index, "speed_m_s")
     subjects = np.array([row["subject"] for row in index])
     for subject in np.unique(subjects):
@@ -85,7 +82,7 @@ def walking_forces() -> Iterator[Question]:
 def doors() -> Iterator[Question]:
     """Yields reaches for the handle of a door at many places, and the opening of the door."""
     index = rows("door_adroit")
-    demos = list(read_folder(folder("door_adroit"), columns=HAND).values())
+    demos = recorded("door_adroit", HAND)
     contexts = numbers(index, "door_x", "door_y", "door_z")
     ends = numbers(index, "latch_turns_at_s")
     reaches = cut(demos, np.hstack([0 * ends, ends]))
@@ -96,31 +93,23 @@ def doors() -> Iterator[Question]:
 def styled_walks() -> Iterator[Question]:
     """Yields walks in ten styles, right foot to right foot; a recording has one speed."""
     speeds = {row["id"]: float(row["speed_m_s"]) for row in rows("walk_styles_bandai")}
-    demos, contexts = [], []
-    for stride in rows("walk_styles_bandai", "strides.csv"):
-        if stride["id"].startswith("walk") and stride["foot"] == "r":
-            recording = walk(stride["id"])
-            start, end = int(stride["start_frame"]), int(stride["end_frame"])
-            demos.append(
-                cycle(recording.position[start:end], float(stride["duration_s"]), recording.names)
-            )
-            contexts.append([speeds[stride["id"]]])
+    strides, demos = zip(*walking_strides([*ARM, *LEGS], foot="r"), strict=True)
+    contexts = np.array([[speeds[stride["id"]]] for stride in strides])
     options = {"kind": "rhythmic"}
-    yield Question("walk_styles_bandai", "speed", "rad", demos, np.array(contexts), options)
+    yield Question("walk_styles_bandai", "speed", "rad", list(demos), contexts, options)
 
 
 def runners() -> Iterator[Question]:
     """Yields strides of runners of different age, height and mass."""
     index = rows("running_strides")
-    strides = list(read_folder(folder("running_strides")).values())
+    strides = running_strides()
     seen: dict[str, int] = {}
     members = []
     for k, row in enumerate(index):
         seen[row["runner"]] = seen.get(row["runner"], 0) + 1
         if seen[row["runner"]] <= STRIDES:
             members.append(k)
-    # The last of 101 samples is the first of the next stride.
-    demos = [cycle(strides[k].position[:-1], 1.0, strides[k].names) for k in members]
+    demos = [strides[k] for k in members]
     contexts = numbers(index, "age", "height_cm", "mass_kg")[members]
     options = {"kind": "rhythmic"}
     yield Question("running_strides", "age, height, mass", "rad", demos, contexts, options)
@@ -129,7 +118,7 @@ def runners() -> Iterator[Question]:
 def pushes() -> Iterator[Question]:
     """Yields pushes of an object to a target with a planar arm."""
     index = rows("arm3_pushing")
-    demos = list(read_folder(folder("arm3_pushing")).values())
+    demos = recorded("arm3_pushing")
     contexts = numbers(index, "object_x", "object_y", "target_x", "target_y")
     yield Question("arm3_pushing", "object and target", "rad", demos, contexts)
 
@@ -145,12 +134,6 @@ ASKED = {
 }
 
 
-def rows(source: str, name: str = "index.csv") -> list[dict[str, str]]:
-    """Reads a table of a set."""
-    with open(folder(source) / name, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
 def numbers(index: list[dict[str, str]], *columns: str) -> np.ndarray:
     """Returns columns of a table (M, Q)."""
     return np.array([[float(row[column]) for column in columns] for row in index])
@@ -163,9 +146,3 @@ def cut(demos: list[Demonstration], bounds: np.ndarray) -> list[Demonstration]:
         inside = (demo.time >= begin - 1e-3) & (demo.time <= end + 1e-3)
         parts.append(Demonstration(demo.position[inside], time=demo.time[inside], names=demo.names))
     return parts
-
-
-def walk(name: str) -> Demonstration:
-    """Reads one recording of a walk: the right arm and the flexion of the legs."""
-    path = folder("walk_styles_bandai") / "demos" / f"{name}.csv"
-    return read_csv(path, columns=[*ARM, *LEGS])

@@ -5,6 +5,7 @@ from typing import Any
 
 import pdmp
 from pdmp import TimeWarp
+from pdmp._markdown import markdown_table
 from pdmp.evaluation import Evaluation, baselines
 from pdmp.evaluation.result import REFERENCE
 from recordings import sources
@@ -77,21 +78,16 @@ def text(answers: Sequence[tuple[Question, Evaluation]]) -> str:
                 time.append([*cells, *shares, f"{gained} {question.unit}²"])
     primitives = ["J", "J selected", "map", "E", "inside", "duration", "best other", "difference"]
     spectrum = ["first three, linear", "first three, warped", "difference"]
-    return "\n".join(
-        [
-            INTRODUCTION,
-            *table(["recordings", "reach", "context", "folds, demos", *names], errors),
-            "",
-            PRIMITIVE_ITSELF,
-            *table(["recordings", "reach", *primitives], itself),
-            "",
-            TIME,
-            *table(["recordings", "reach", *spectrum], time),
-            "",
-            sources(dict.fromkeys(question.source for question, _ in answers)),
-            "",
-        ]
-    )
+    tables = [
+        (INTRODUCTION, ["context", "folds, demos", *names], errors),
+        (PRIMITIVE_ITSELF, primitives, itself),
+        (TIME, spectrum, time),
+    ]
+    lines = []
+    for introduction, header, rows in tables:
+        header = ["recordings", "reach", *header]
+        lines += [introduction, markdown_table(header, rows, n_names=len(header)), ""]
+    return "\n".join([*lines, sources(dict.fromkeys(asked.source for asked, _ in answers)), ""])
 
 
 def relative(evaluation: Evaluation, name: str, reach: str) -> str:
@@ -140,8 +136,3 @@ def learnt(question: Question, **settings: Any) -> pdmp.Model:
     """Fits a primitive to all demonstrations."""
     kind = question.options.get("kind", "discrete")
     return pdmp.fit(question.demos, kind=kind, contexts=question.contexts, **settings)
-
-
-def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Returns the lines of a table in Markdown."""
-    return [f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *rows)]

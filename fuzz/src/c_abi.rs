@@ -170,12 +170,19 @@ impl Caller<'_> {
                 8 => return self.reset(slot, input),
                 9 => return self.update(slot, input),
                 10 => return self.call_model(input),
-                11 => {
-                    if input.byte().is_multiple_of(2) {
-                        self.slots[slot] = None;
+                11 => match input.byte() % 4 {
+                    0 => {
+                        let source = usize::from(input.byte()) % N_SLOTS;
+                        let source = self.slots[source].as_ref().map_or(ptr::null_mut(), |x| x.controller);
+                        pdmp_controller_copy(source, controller.map_or(ptr::null_mut(), ptr::from_mut))
                     }
-                    return;
-                }
+                    1 => pdmp_controller_set_phase(controller, input.number()),
+                    3 => pdmp_controller_set_phase_gain(controller, input.number()),
+                    _ => {
+                        self.slots[slot] = None;
+                        return;
+                    }
+                },
                 12 => pdmp_controller_set_goal_velocity(controller, Numbers::new(n_dofs, input).vector()),
                 _ => {
                     let mut status = PDMP_OK;
@@ -251,6 +258,7 @@ impl Caller<'_> {
             dt: pointer(&dt),
             measured: measured.vector(),
             coupling: pdmp_coupling { velocity: velocity.vector(), acceleration: acceleration.vector() },
+            phase: pointer(&amplitude),
         };
         let mut outputs: [Numbers; 3] = std::array::from_fn(|_| Numbers::new(n_dofs, input));
         let [position, velocity, acceleration] = outputs.each_mut().map(Numbers::buffer);

@@ -7,10 +7,9 @@ use std::sync::{Arc, LazyLock};
 
 use ndarray::Array2;
 use pdmp_core::model::Derivative;
-use pdmp_core::motion::jacobian;
-use pdmp_core::motion::rollouts;
-use pdmp_core::motion::{BatchConditions, TimeGrid, WithRespectTo};
+use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, WithRespectTo};
 use pdmp_core::motion::{PredictionBand, prediction_band};
+use pdmp_core::motion::{batch, jacobian};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, Controller, Model};
@@ -139,7 +138,7 @@ impl EditableFile {
             }
             6..9 => self.constant(input),
             9 => {
-                // Another number of demonstrations, up to 1024 times as many.
+                // Another number of demonstrations, up to 1024-fold.
                 let n = self.arrays[0].shape[0];
                 let resized = match input.byte() {
                     0 => n.saturating_sub(1),
@@ -282,11 +281,12 @@ fn exercise(model: &Arc<Model>) {
         assert_finite("Jacobian", &jacobian);
     }
     let styles = Array2::zeros((2, model.n_styles()));
-    let batch = BatchConditions { styles, ..Default::default() };
-    if let Ok(outputs) =
-        rollouts(model.primitive(), batch, grid, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(()))
+    let conditions = BatchConditions { style: Some(PerMovement::Each(styles)), ..Default::default() };
+    let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(()));
+    if let Ok(trajectories) =
+        batch.and_then(|batch| batch.rollouts(0..2, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(())))
     {
-        outputs.iter().for_each(|output| assert_finite("batch", output));
+        trajectories.iter().for_each(|output| assert_finite("batch", output));
     }
     control(model);
     let demonstrated = model.demonstrated();

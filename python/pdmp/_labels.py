@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pdmp._messages import value_error
+from pdmp._messages import quoted, value_error
 
 if TYPE_CHECKING:
     from pdmp._native import Trajectory
@@ -24,11 +24,19 @@ def split_label(field: str) -> tuple[str, str]:
     return (match[1], match[2].strip()) if match else (field.strip(), "")
 
 
+def join_label(name: str, unit: str) -> str:
+    """Returns a name with its unit, which `split_label` splits again."""
+    return f"{name} [{unit}]" if unit else name
+
+
 def name_list(argument: str, names: Sequence[str]) -> list[str]:
     """Returns names as a list; rejects a single text, which would become a list of letters."""
     if isinstance(names, str):
         raise value_error(f"{argument} = '{names}': pass a list of names, ['{names}']")
-    return list(names)
+    listed = list(names) if isinstance(names, Iterable) else [None]
+    if not all(isinstance(name, str) for name in listed):
+        raise TypeError(f"{argument} = {quoted(names)}: expected a list of names")
+    return listed
 
 
 def names_and_units(value: Any) -> tuple[list[str] | None, list[str] | None]:

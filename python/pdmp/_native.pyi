@@ -14,8 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Map: TypeAlias = Literal["auto", "stacked", "gp", "linear", "polynomial"]
-_Context: TypeAlias = ArrayLike | Sequence[float | str]
-_Contexts: TypeAlias = ArrayLike | Sequence[Sequence[float | str]]
+_Context: TypeAlias = ArrayLike | Sequence[float | str] | Mapping[str, float | str]
+_Contexts: TypeAlias = (
+    ArrayLike
+    | Sequence[Sequence[float | str]]
+    | Sequence[Mapping[str, float | str]]
+    | Mapping[str, Sequence[float | str] | ArrayLike]
+)
 _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
 _Kernel: TypeAlias = Literal["matern32", "matern52"]
@@ -41,10 +46,10 @@ __all__ = [
     "Trajectory",
     "__version__",
     "blend",
-    "cut",
+    "split_at",
     "cycles",
     "factorise",
-    "fill",
+    "fill_gaps",
     "fit",
     "inspected",
     "load",
@@ -106,7 +111,7 @@ class Demonstration:
         dt: float | None = None,
         time: ArrayLike | None = None,  # (T,)
         goal: ArrayLike | None = None,  # (D,)
-        context: _Context | None = None,  # (Q,)
+        context: ArrayLike | Sequence[float | str] | None = None,  # (Q,)
         names: Sequence[str] | None = None,  # D of them
         units: Sequence[str] | None = None,  # D of them
     ) -> Demonstration: ...
@@ -165,7 +170,7 @@ def fit(
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,  # stage, share in [0, 1]
 ) -> Model:
-    """Fit a movement primitive to demonstrations.
+    """Fits a movement primitive to demonstrations.
 
     The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets f = τẏ − z exactly,
     factorise them, F ≈ S·F_basis (Eq. 7), and regress the attractor landscape on the phase.
@@ -181,8 +186,10 @@ def fit(
         Sampling interval in s of demonstrations without one.
     period : float or array_like, (M,), optional
         Periods in s of time-stamped cycles.
-    contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
-        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
+    contexts : array_like, (M, Q), or M lists of Q numbers and labels, or mapping, optional
+        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
+        keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
+        (M,).
     map : {"auto", "stacked", "gp", "linear", "polynomial"}
         Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
         regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
@@ -282,7 +289,7 @@ def fit(
 def inspected(
     demos: Sequence[Demonstration], *, dt: float | None = None
 ) -> tuple[list[Demonstration], list[str]]:
-    """Inspect demonstrations as `fit` does.
+    """Inspects demonstrations as `fit` does.
 
     Parameters
     ----------
@@ -310,7 +317,7 @@ def factorise(
     n_styles: int | None = None,
     singular_value_share: float = 0.9,
 ) -> Factors:
-    """Factorise stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
+    """Factorises stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
 
     F = UΣVᵀ; S is the first J columns of U and F_basis the first J rows of ΣVᵀ, the best approximation of F of rank J.
     `fit` factorises its targets so. A few factors of many demonstrations are computed by Krylov iteration, others from
@@ -341,7 +348,7 @@ def factorise(
     """
 
 def load(path: str | PathLike[str]) -> Model:
-    """Read a model file.
+    """Reads a model file.
 
     Parameters
     ----------
@@ -372,7 +379,7 @@ def load(path: str | PathLike[str]) -> Model:
     """
 
 def resample(demo: Demonstration, dt: float) -> Demonstration:
-    """Resample a recording at even intervals.
+    """Resamples a recording at even intervals.
 
     The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no
     denser than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the
@@ -398,7 +405,7 @@ def resample(demo: Demonstration, dt: float) -> Demonstration:
     """
 
 def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration:
-    """Trim the rests before and after the movement of a recording.
+    """Trims the rests before and after the movement of a recording.
 
     The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed,
     where v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise
@@ -423,8 +430,8 @@ def trim(demo: Demonstration, threshold: float = 0.05) -> Demonstration:
         `threshold` is out of range, or the recording has no movement, fewer than four samples of it, or no times.
     """
 
-def cut(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fewer than times
-    """Cut a recording at given times.
+def split_at(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fewer than times
+    """Cuts a recording at given times.
 
     Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the
     recording. As with `resample`, noise stays white.
@@ -449,7 +456,7 @@ def cut(demo: Demonstration, times: ArrayLike) -> list[Demonstration]:  # one fe
     """
 
 def lowpass(demo: Demonstration, cut_off: float) -> Demonstration:
-    """Filter a recording with a low-pass of zero phase.
+    """Filters a recording with a low-pass of zero phase.
 
     The filter is the cubic smoothing spline, with gain 1/(1 + (f/f_c)⁴) at frequency f: one half at the cut-off f_c.
     `pdmp.plot.cut_off` plots residuals over the cut-off.
@@ -477,7 +484,7 @@ def lowpass(demo: Demonstration, cut_off: float) -> Demonstration:
     """
 
 def residuals(demo: Demonstration, cut_offs: ArrayLike) -> _Array:  # (K, D)
-    """Compute the residuals of `lowpass` over its cut-off.
+    """Computes the residuals of `lowpass` over its cut-off.
 
     Parameters
     ----------
@@ -498,7 +505,7 @@ def residuals(demo: Demonstration, cut_offs: ArrayLike) -> _Array:  # (K, D)
     """
 
 def period(demo: Demonstration) -> float:
-    """Estimate the period of a cyclic recording by autocorrelation.
+    """Estimates the period of a cyclic recording by autocorrelation.
 
     A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal
     of linear trends. The period is the first peak of A that equals the highest peak within the variation between
@@ -526,14 +533,14 @@ def period(demo: Demonstration) -> float:
     P. McLeod, G. Wyvill, A smarter way to find pitch, International Computer Music Conference 2005
     """
 
-def fill(
+def fill_gaps(
     position: ArrayLike,  # (T, D)
     time: ArrayLike,  # (T,)
     names: Sequence[str],  # D of them
     turns: Sequence[float],  # D of them; 0 where no angle
     max_gap: float,
 ) -> _Array:  # (T, D)
-    """Interpolate missing samples.
+    """Interpolates missing samples.
 
     Parameters
     ----------
@@ -571,7 +578,7 @@ def cycles(
     list[tuple[int, float, float, str, bool]],
     list[tuple[int, int, float, int]],
 ]:
-    """Cut recordings into cycles, for `pdmp.preprocessing.cycles`.
+    """Cuts recordings into cycles, for `pdmp.preprocessing.cycles`.
 
     Parameters
     ----------
@@ -598,7 +605,7 @@ def cycles(
 class Model:
     """Parametric dynamic movement primitive, returned by `fit` and `load`.
 
-    Models are immutable and can be pickled.
+    Models are immutable, their arrays are read-only copies, and they can be pickled.
     """
     @property
     def kind(self) -> _Kind:
@@ -691,6 +698,9 @@ class Model:
     def contexts(self) -> _Array | list[list[float | str]] | None:  # (M, Q)
         """Contexts (M, Q) of the demonstrations, an array of numbers or lists with labels; None without contexts."""
     @property
+    def context_names(self) -> list[str] | None:
+        """Names (Q,) of the context columns; None where the contexts had none."""
+    @property
     def map(self) -> ContextMap | None:
         """Map from contexts to style, goal, start or anchor, and duration; None without contexts."""
     @property
@@ -708,7 +718,7 @@ class Model:
         context: _Context | None = None,  # (Q,)
         **changes: Unpack[_Changes],
     ) -> Trajectory:
-        """Compute the movement under constant conditions.
+        """Computes the movement under constant conditions.
 
         Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb
         (discrete) or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
@@ -748,7 +758,7 @@ class Model:
         True
         """
     def conditions(self, demos: int | Sequence[int]) -> Conditions:
-        """Return the conditions of one demonstration, or the mean of several.
+        """Returns the conditions of one demonstration, or the mean of several.
 
         Parameters
         ----------
@@ -773,42 +783,31 @@ class Model:
         """
     def rollouts(
         self,
-        styles: ArrayLike,  # (B, J)
+        conditions: Conditions | Sequence[Conditions] | None = None,
         *,
-        goals: ArrayLike | None = None,  # (D,) or (B, D), as are starts, velocities and anchors
-        starts: ArrayLike | None = None,
-        velocities: ArrayLike | None = None,
-        anchors: ArrayLike | None = None,
-        amplitude: float | None = None,
-        tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
+        context: _Context | _Contexts | None = None,
         derivatives: int = 1,  # at most 2
         out: Sequence[_Array] | None = None,
         threads: int | None = None,
-    ) -> tuple[_Array, ...]:  # positions and as many derivatives (B, T, D)
-        """Compute the movements of many styles.
+        **changes: Unpack[_Changes],  # vectors (n,) or (B, n)
+    ) -> tuple[_Array, ...]:  # position and its `derivatives`, each (B, T, D)
+        """Computes the movements of many conditions.
 
         A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
         response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
         to rounding.
 
+        All movements share time constant and amplitude; they follow linear time and start at phase 0.
+
         Parameters
         ----------
-        styles : array_like, (B, J)
-            Style parameters s.
-        goals : array_like, (D,) or (B, D), optional
-            Goals g of all or of each movement, in the unit of each degree of freedom; discrete.
-        starts : array_like, (D,) or (B, D), optional
-            Start positions y₀ of all or of each movement. Rhythmic movements start on their limit cycles by default.
-        velocities : array_like, (D,) or (B, D), optional
-            Start velocities per s of all or of each movement; by default those of the demonstrations.
-        anchors : array_like, (D,) or (B, D), optional
-            Anchors y_a of all or of each movement; rhythmic.
-        amplitude : float, optional
-            Amplitude r₀ of all movements; rhythmic.
-        tau : float, optional
-            Time constant τ of all movements in s.
+        conditions : Conditions, or B Conditions, optional
+            Conditions of all movements, or of each.
+        context : array_like or list, (Q,) or (B, Q), optional
+            Context of all movements, or of each, whose prediction supplies absent conditions. Pass `tau` where the
+            predicted durations differ.
         dt : float
             Interval between samples in s.
         duration : float, optional
@@ -819,6 +818,9 @@ class Model:
             Writable float64 arrays for the results, one per order of derivative.
         threads : int, optional
             Largest number of threads; by default all that the system offers. Results do not depend on it.
+        **changes
+            Single conditions by name, which replace those of `conditions`; see `Conditions`. Style, goal, start,
+            velocity, goal_velocity and anchor may have a leading axis, with one row for each of B movements.
 
         Returns
         -------
@@ -828,48 +830,48 @@ class Model:
         Raises
         ------
         ValueError
-            An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit.
-            Nothing is written then.
+            An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit;
+            leading axes, time constants or amplitudes differ. Nothing is written then.
+        TypeError
+            A keyword is unknown, or `conditions` has another type.
         MemoryError
             The results do not fit into memory; use `rollout_chunks`.
 
         Examples
         --------
-        >>> positions, velocities = model.rollouts(model.styles, dt=0.1)
+        >>> positions, velocities = model.rollouts(style=model.styles, goal=model.goals, dt=0.1)
         >>> positions.shape
         (5, 13, 2)
         """
     def rollout_chunks(
         self,
-        styles: ArrayLike,  # (B, J)
+        conditions: Conditions | Sequence[Conditions] | None = None,
         *,
         size: int = 1000,
-        goals: ArrayLike | None = None,  # (D,) or (B, D), as are starts, velocities and anchors
-        starts: ArrayLike | None = None,
-        velocities: ArrayLike | None = None,
-        anchors: ArrayLike | None = None,
-        amplitude: float | None = None,
-        tau: float | None = None,
         dt: float = 0.01,
         duration: float | None = None,
+        context: _Context | _Contexts | None = None,
         derivatives: int = 1,
         threads: int | None = None,
+        **changes: Unpack[_Changes],
     ) -> RolloutChunks:
-        """Compute the movements of many styles in chunks.
+        """Computes the movements of many conditions in chunks.
 
         Memory holds one chunk at a time. Results equal those of `rollouts` bit for bit. This call checks all arguments.
 
         Parameters
         ----------
-        styles : array_like, (B, J)
-            Style parameters s.
+        conditions : Conditions, or B Conditions, optional
+            As in `rollouts`.
         size : int
             Number of movements in a chunk; the last may have fewer.
-        goals, starts, velocities, anchors : array_like, (D,) or (B, D), optional
+        context : array_like or list, (Q,) or (B, Q), optional
             As in `rollouts`.
-        amplitude, tau, dt, duration : float, optional
+        dt, duration : float, optional
             As in `rollouts`.
         derivatives, threads : int, optional
+            As in `rollouts`.
+        **changes
             As in `rollouts`.
 
         Returns
@@ -881,18 +883,20 @@ class Model:
         ------
         ValueError
             An argument that `rollouts` rejects, or a `size` below 1.
+        TypeError
+            As in `rollouts`.
 
         Examples
         --------
         >>> cost = []
-        >>> for positions, velocities in model.rollout_chunks(model.styles, size=2):
+        >>> for positions, velocities in model.rollout_chunks(style=model.styles, size=2):
         ...     cost.extend((velocities**2).sum(axis=(1, 2)))
         >>> len(cost) == model.n_demos
         True
         """
     def jacobian(
         self,
-        wrt: Literal["style", "goal", "anchor", "start"],
+        wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
         conditions: Conditions | None = None,
         *,
         derivative: int = 0,  # at most 2
@@ -901,7 +905,7 @@ class Model:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> _Array:  # (T, D, J) or (T, D, D)
-        """Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
+        """Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
 
         A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
         Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,
@@ -950,7 +954,7 @@ class Model:
         period: float | None = None,
         landmarks: ArrayLike | None = None,  # (E,)
     ) -> _Array:  # (J,)
-        """Estimate the style of a new demonstration.
+        """Estimates the style of a new demonstration.
 
         The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of
         the styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A
@@ -988,7 +992,7 @@ class Model:
         True
         """
     def landscape(self, u: ArrayLike) -> _Array:  # (len(u), J, D)
-        """Compute the attractor landscape b(u) of each style dimension and degree of freedom.
+        """Computes the attractor landscape b(u) of each style dimension and degree of freedom.
 
         Parameters
         ----------
@@ -1006,7 +1010,7 @@ class Model:
             A clock value is not finite, or negative for a discrete movement.
         """
     def transport(self, u: ArrayLike) -> _Array:  # (n,)
-        """Compute the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
+        """Computes the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
 
         The frame of the output system is c(u) = y₀ + (g − y₀)·m(u). m increases from 0 at the start to 1 at the end and
         stays 1; with `transport="immediate"`, m = 1 everywhere.
@@ -1027,7 +1031,7 @@ class Model:
             The primitive is rhythmic, or a clock value is negative or not finite.
         """
     def tau_at(self, phase: float, segment_durations: ArrayLike) -> float:  # (K,)
-        """Compute the time constant τ at a phase for given segment durations.
+        """Computes the time constant τ at a phase for given segment durations.
 
         A control loop follows segment durations, as `rollout` does, if it sets
         `controller.tau = model.tau_at(controller.phase, segment_durations)` before each tick, with `transition=0`.
@@ -1050,12 +1054,12 @@ class Model:
             `segment_durations` has a wrong length or is not positive, or `phase` is out of range.
         """
     def predict(self, context: _Context) -> Prediction:
-        """Predict the movement for a context (Section 4.1.2).
+        """Predicts the movement for a context (Section 4.1.2).
 
         Parameters
         ----------
-        context : array_like or list, (Q,)
-            Numbers and labels, in the units of the demonstrations' contexts.
+        context : array_like, list or mapping, (Q,)
+            Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
 
         Returns
         -------
@@ -1081,7 +1085,7 @@ class Model:
         level: float = 0.9,
         dt: float = 0.01,
     ) -> tuple[_Array, _Array]:  # lower, upper (T, D)
-        """Compute the prediction band of a new movement for a context.
+        """Computes the prediction band of a new movement for a context.
 
         y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
         conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
@@ -1089,8 +1093,8 @@ class Model:
 
         Parameters
         ----------
-        context : array_like or list, (Q,)
-            Numbers and labels, in the units of the demonstrations' contexts.
+        context : array_like, list or mapping, (Q,)
+            Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
         level : float
             Probability in (0, 1) that a position of the new movement lies within its bounds.
         dt : float
@@ -1107,7 +1111,7 @@ class Model:
             `level` is not in (0, 1), `predict` rejects `context`, or the demonstrations are too few for a covariance.
         """
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a model file.
+        """Writes a model file.
 
         The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary
         file `.pdmp-*.draft` beside it.
@@ -1120,7 +1124,7 @@ class Model:
         Raises
         ------
         OSError
-            The file cannot be written.
+            The file cannot be written, or its folder does not exist.
 
         Examples
         --------
@@ -1139,7 +1143,7 @@ class Model:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> Controller:
-        """Start a movement that is computed tick by tick in a control loop.
+        """Starts a movement that is computed tick by tick in a control loop.
 
         Parameters
         ----------
@@ -1180,10 +1184,10 @@ class Model:
         True
         """
     def to_bytes(self) -> bytes:
-        """Return the contents of a model file as bytes."""
+        """Returns the contents of a model file as bytes."""
     @staticmethod
     def from_bytes(data: bytes) -> Model:
-        """Read a model from the contents of a model file.
+        """Reads a model from the contents of a model file.
 
         Parameters
         ----------
@@ -1214,7 +1218,7 @@ class Factors:
     def styles(self) -> _Array:  # (M, J)
         """Styles S (M, J) with orthonormal columns. The entry of largest magnitude in each column is positive."""
     @property
-    def basis(self) -> _Array:  # (J, C*D)
+    def basis_targets(self) -> _Array:  # (J, C*D)
         """Basis targets F_basis = SᵀF (J, C·D). Their rows are orthogonal with the singular values as norms."""
     @property
     def singular_values(self) -> _Array:  # decreasing: all, or of a large library the first J
@@ -1225,9 +1229,10 @@ class Factors:
 
 class _Changes(TypedDict, total=False):
     style: ArrayLike | None  # (J,)
-    goal: ArrayLike | None  # (D,), as are start, velocity and anchor
+    goal: ArrayLike | None  # (D,), as are start, both velocities and anchor
     start: ArrayLike | None
     velocity: ArrayLike | None
+    goal_velocity: ArrayLike | None
     anchor: ArrayLike | None
     amplitude: float | None
     tau: float | None
@@ -1286,7 +1291,7 @@ class Conditions:
     """
     def __new__(cls, **conditions: Unpack[_Changes]) -> Conditions: ...
     def replace(self, **changes: Unpack[_Changes]) -> Conditions:
-        """Return a copy with some conditions replaced.
+        """Returns a copy with some conditions replaced.
 
         Parameters
         ----------
@@ -1316,6 +1321,9 @@ class Conditions:
     def velocity(self) -> _Array | None:
         """Start velocity (D,) per s, or None."""
     @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s of a discrete movement, or None."""
+    @property
     def anchor(self) -> _Array | None:
         """Anchor y_a (D,) of a rhythmic movement, or None."""
     @property
@@ -1335,7 +1343,7 @@ class Conditions:
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
 
 def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
-    """Compute the conditions (1 − share)·a + share·b.
+    """Computes the conditions (1 − share)·a + share·b.
 
     Parameters
     ----------
@@ -1351,7 +1359,7 @@ def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
     Raises
     ------
     ValueError
-        A condition is given for one of the two only, lengths differ, or `share` is not finite.
+        A condition is given for only one of the two, lengths differ, or `share` is not finite.
 
     Examples
     --------
@@ -1437,7 +1445,7 @@ class ContextMap:
     def degrees_of_freedom(self) -> int:
         """Degrees of freedom of the covariance estimate."""
     def predict(self, contexts: _Contexts) -> tuple[_Array, _Array | None]:
-        """Compute the predictive mean and covariance of new outputs.
+        """Computes the predictive mean and covariance of new outputs.
 
         Parameters
         ----------
@@ -1482,7 +1490,7 @@ class Trajectory:
     def units(self) -> list[str]:  # "" where unknown
         """Units of the degrees of freedom (D,); "" if unknown."""
     def to_dict(self) -> dict[str, Any]:
-        """Return the arrays, names and units in a dictionary.
+        """Returns the arrays, names and units in a dictionary.
 
         `io.read_npz` reads the file that `numpy.savez(path, **trajectory.to_dict())` writes.
 
@@ -1492,7 +1500,7 @@ class Trajectory:
             Keys are the names of the attributes.
         """
     def to_dataframe(self) -> Any:  # pandas.DataFrame
-        """Return a data frame of positions, velocities and accelerations.
+        """Returns a data frame of positions, velocities and accelerations.
 
         `Demonstration(frame[names], time=frame.index)` makes a demonstration of it.
 
@@ -1508,7 +1516,7 @@ class Trajectory:
             pandas is not installed.
         """
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write a CSV file as `io.write_csv` does.
+        """Writes a CSV file as `io.write_csv` does.
 
         Parameters
         ----------
@@ -1518,7 +1526,7 @@ class Trajectory:
         Raises
         ------
         OSError
-            The file cannot be written.
+            The file cannot be written, or its folder does not exist.
         ValueError
             A name could not be read back by `io.read_csv`.
         """
@@ -1540,25 +1548,28 @@ class Controller:
     """Running movement, returned by `Model.controller`.
 
     `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed`, `tolerance` and `compliance` can be set at any
-    tick; a value that is rejected leaves the present one in force.
+    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `compliance` and
+    `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
+    copied (`copy`, `deepcopy`) and pickled, and continues from its state to the bit.
     """
     def __copy__(self) -> Controller: ...
     def __deepcopy__(self, _memo: Any, /) -> Controller: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
     def step(
         self,
         dt: float | None = None,
         *,
         measured: ArrayLike | None = None,  # (D,)
         coupling: tuple[ArrayLike, ArrayLike] | None = None,  # velocity and acceleration (D,)
+        phase: float | None = None,
     ) -> Status:
-        """Advance the movement by one tick.
+        """Advances the movement by one tick.
 
         A measured position and coupling terms perturb the equations::
 
             tau y' = z + w(u) + k_t d + tau c_v
             tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
-            tau u' = k = 1 / (1 + k_s |d / range|**2)
+            tau u' = max(0, k + k_phi sin(phase - phi))     k = 1 / (1 + k_s |d / range|**2)
             tau o' = 5 k (e - o) / extent
 
         with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
@@ -1566,7 +1577,8 @@ class Controller:
         terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
         m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
         there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
-        finishes.
+        finishes. A measured phase pulls the phase of a rhythmic movement with the gain k_phi of `phase_gain`, without
+        overshoot for a tick of any length.
 
         Parameters
         ----------
@@ -1578,6 +1590,9 @@ class Controller:
             `release`, so that a sensor may be slower than the loop.
         coupling : tuple of two array_like, (D,), optional
             Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
+        phase : float, optional
+            Measured phase in rad of a rhythmic movement, for this tick only. A sensor slower than the loop passes its
+            last phase plus the time since then over tau.
 
         Returns
         -------
@@ -1587,8 +1602,8 @@ class Controller:
         Raises
         ------
         ValueError
-            The tick is negative or longer than 1000 tau, a length is wrong, or a number is not finite. The state then
-            stays as it was.
+            The tick is negative or longer than 1000 tau, a length is wrong, a number is not finite, or a phase is passed
+            to a discrete movement. The state then stays as it was.
 
         Examples
         --------
@@ -1603,11 +1618,50 @@ class Controller:
         Ijspeert, Nakanishi, Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739 (phase stopping, term in y').
         Schaal, Mohajerian, Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9.
         Pastor, Hoffmann, Asfour, Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385 (terms in z').
+        Acebrón, Bonilla, Pérez Vicente, Ritort, Spigler, Reviews of Modern Physics 77, 137, 2005 (pull of the phase).
         """
     def release(self) -> None:
-        """Discard the measured position.
+        """Discards the measured position.
 
         The movement is unperturbed until the next measurement.
+        """
+    def forecast(self, horizon: float, dt: float | None = None) -> Trajectory:
+        """Computes the motion over the next seconds under the present commands, without a change of the controller.
+
+        Commands in transition continue. A measured position remains in force as in `step`; coupling terms and a measured
+        phase, which apply to one tick, do not. Ticks are exact for any length, so that a coarse `dt` is as accurate as a
+        fine one, except for a measured position, whose terms are constant over a tick. The call allocates and belongs
+        outside the real-time loop, which another thread may step meanwhile.
+
+        Parameters
+        ----------
+        horizon : float
+            Length in s.
+        dt : float, optional
+            Interval between samples in s; by default that of the controller, for which the samples are those of the loop
+            to the bit.
+
+        Returns
+        -------
+        Trajectory
+            n + 1 samples, where n is horizon / dt rounded down. Times are from now, and the first sample is the present
+            motion.
+
+        Raises
+        ------
+        ValueError
+            `horizon` is negative or not finite, `dt` is not positive or longer than 1000 tau, or there are more than 1e7
+            samples.
+
+        Examples
+        --------
+        >>> controller = model.controller(dt=0.01)
+        >>> controller.goal = [1.1, 0.0]
+        >>> ahead = controller.forecast(0.5)
+        >>> for _ in range(50):
+        ...     _ = controller.step()
+        >>> np.array_equal(ahead.position[-1], controller.position)
+        True
         """
     def reset(
         self,
@@ -1616,7 +1670,7 @@ class Controller:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> None:
-        """Restart the movement.
+        """Restarts the movement.
 
         Parameters
         ----------
@@ -1649,7 +1703,45 @@ class Controller:
         """Result of the last `step`, or `WORKING` after a later command."""
     @property
     def phase(self) -> float:  # x in (0, 1], or phi in [0, 2 pi)
-        """Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one."""
+        """Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one.
+
+        Assigning the phase of a rhythmic movement resets it, for example at the heel strike of a gait. Position and
+        velocity are continuous, the acceleration jumps, and the deviation from the cycle at the new phase decays. Before
+        the first tick the movement starts at this phase. A discrete movement rejects it.
+
+        Examples
+        --------
+        Reset the phase at each heel strike, and adapt the frequency by the measured stride:
+
+        >>> walk = np.sin(2 * np.pi * np.arange(100) / 100)[:, None]
+        >>> gait = pdmp.fit([pdmp.Demonstration(walk, dt=0.01)], kind="rhythmic")
+        >>> controller = gait.controller(dt=0.01)
+        >>> stride, heel, gain = 1.25, 0.0, 0.5
+        >>> for _ in range(12):
+        ...     for _ in range(125):
+        ...         _ = controller.step()
+        ...     controller.phase = heel
+        ...     omega = 1 / controller.tau
+        ...     controller.tau = 1 / (omega + gain * (2 * np.pi / stride - omega))
+        >>> round(2 * np.pi * controller.tau, 2)
+        1.25
+
+        References
+        ----------
+        Nakanishi, Morimoto, Endo, Cheng, Schaal, Kawato, Robotics and Autonomous Systems 47 (2004) 79-91 (the rule).
+        The same authors, IROS 2004, doi:10.1109/IROS.2004.1389470 (phase resetting).
+        """
+    @phase.setter
+    def phase(self, phase: float, /) -> None: ...
+    @property
+    def phase_gain(self) -> float:
+        """Gain k_phi of a measured phase in `step`, per unit of u, from 0 to 1000; 1 by default, 0 disables the pull.
+
+        An error of the phase decays with exp(-k_phi t / tau). A movement whose frequency differs from the measured one
+        by the share e lags by asin(e / k_phi), and is synchronised for e < k_phi. The gain stays in force after `reset`.
+        """
+    @phase_gain.setter
+    def phase_gain(self, gain: float, /) -> None: ...
     @property
     def time(self) -> float:
         """Time since the start in s."""
@@ -1663,6 +1755,13 @@ class Controller:
         """Style s (J,); a read-only copy. Assign all values at once."""
     @style.setter
     def style(self, style: ArrayLike, /) -> None: ...
+    @property
+    def goal_velocity(self) -> _Array | None:
+        """Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
+        demonstrations; a read-only copy. Assign all values at once.
+        """
+    @goal_velocity.setter
+    def goal_velocity(self, velocity: ArrayLike | None, /) -> None: ...
     @property
     def anchor(self) -> _Array:
         """Anchor y_a (D,) of a rhythmic movement; a read-only copy. Assign all values at once."""
@@ -1686,6 +1785,15 @@ class Controller:
         """
     @speed.setter
     def speed(self, speed: float, /) -> None: ...
+    @property
+    def tolerance(self) -> float:
+        """Tolerance within which the movement has settled on its goal, 0.005 by default, at most 1.
+
+        It is relative to the larger of two lengths of each degree of freedom: its largest demonstrated range, and its
+        distance from the goal when this was last set. It stays in force after `reset`.
+        """
+    @tolerance.setter
+    def tolerance(self, tolerance: float, /) -> None: ...
     @property
     def compliance(self) -> tuple[float, float]:  # stopping k_s, tracking k_t
         """Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each."""
@@ -1738,7 +1846,7 @@ class GP:
         *,
         periodic: bool = False,
     ) -> GPRegression:
-        """Condition the process on targets over the clock.
+        """Conditions the process on targets over the clock.
 
         Parameters
         ----------
@@ -1787,7 +1895,7 @@ class GPRegression:
         Densities are in the unit of the outputs. It is 0 if all outputs are zero.
         """
     def predict(self, u: ArrayLike) -> tuple[_Array, _Array]:  # mean, variance (len(u), P)
-        """Compute the posterior mean and variance of the outputs without noise.
+        """Computes the posterior mean and variance of the outputs without noise.
 
         Parameters
         ----------
@@ -1881,7 +1989,7 @@ class NGnet:
         *,
         periodic: bool = False,
     ) -> NGnetRegression:
-        """Fit the network to targets over the clock by least squares.
+        """Fits the network to targets over the clock by least squares.
 
         Parameters
         ----------
@@ -1906,7 +2014,7 @@ class NGnet:
 class NGnetRegression:
     """Normalised Gaussian network fitted to data, returned by `NGnet.regress`."""
     def predict(self, u: ArrayLike) -> tuple[_Array, None]:  # mean (len(u), P), no variance
-        """Compute the outputs.
+        """Computes the outputs.
 
         Parameters
         ----------

@@ -12,7 +12,10 @@ from typing import Literal, TypeAlias, TypeVar
 
 from numpy.typing import ArrayLike
 
+from pdmp._messages import check_type
 from pdmp._native import Controller, Status
+
+__all__ = ["PacedLoop", "Tick"]
 
 T = TypeVar("T")
 _Measured: TypeAlias = Callable[[], ArrayLike | None] | None
@@ -87,8 +90,12 @@ class PacedLoop:
 
     Examples
     --------
-    >>> for tick in pdmp.PacedLoop(model.controller(dt=0.001)):
-    ...     robot.move(controller.position, controller.velocity)
+    >>> controller = model.controller(dt=0.001, goal=[1.2, 0.1])
+    >>> commands = []
+    >>> for tick in pdmp.PacedLoop(controller, duration=0.01):
+    ...     commands.append(controller.position.copy())
+    >>> len(commands)
+    10
     """
 
     def __init__(
@@ -101,6 +108,7 @@ class PacedLoop:
         coupling: _Coupling = None,
         late: Literal["wait", "catch up"] = "wait",
     ) -> None:
+        check_type("controller", controller, Controller, "pdmp.Controller, of model.controller(dt)")
         self._controller = controller
         self._rate = _checked_number("rate_hz", 1 / controller.dt if rate_hz is None else rate_hz)
         self._last = None if duration is None else _n_periods(duration, self._rate)

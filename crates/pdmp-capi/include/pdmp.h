@@ -15,7 +15,7 @@
 // - Lengths: n_dofs, n_styles, n_contexts and n_conditions are members of pdmp_info. Numbers are counted in elements,
 //   text and memory in bytes. All numbers are double precision, all strings UTF-8.
 // - Threads: any number of threads may use a model; one thread at a time may use a controller.
-// - Real time: pdmp_controller_step, _update, _set_..., _release, _read, _progress and _error neither allocate nor
+// - Real time: pdmp_controller_step, _update, _set_..., _release, _copy, _read, _progress and _error neither allocate nor
 //   lock.
 // - ABI: structs may grow between minor versions before 1.0; recompile for each.
 //
@@ -172,8 +172,8 @@ typedef struct {
 
 /// Command of one tick. A member that is `{NULL, 0}` or NULL leaves the present value unchanged.
 ///
-/// Style, goal, final velocity, anchor, tau and amplitude stay in force until the next command, and a measurement until the next one or
-/// until pdmp_controller_release. dt and the coupling terms hold for this tick only.
+/// Style, goal, final velocity, anchor, tau and amplitude stay in force until the next command, and a measurement until
+/// the next one or until pdmp_controller_release. dt, the coupling terms and the phase hold for this tick only.
 typedef struct {
     /// Style parameter s (n_styles).
     pdmp_vector style;
@@ -194,6 +194,8 @@ typedef struct {
     pdmp_vector measured;
     /// Coupling terms.
     pdmp_coupling coupling;
+    /// Measured phase, in rad, which pulls the phase, see pdmp_controller_set_phase_gain; rhythmic models only.
+    const double *phase;
 } pdmp_command;
 
 /// Outputs of a motion. A member that is `{NULL, 0}` is not written. The buffers may overlap with the arrays of the
@@ -295,18 +297,6 @@ pdmp_status pdmp_controller_new(const pdmp_model *model,
                                 pdmp_controller **controller,
                                 pdmp_text error);
 
-/// Copies a controller with its state, for example to simulate the movement ahead. Under the same commands, copy and
-/// original move identically to the bit.
-///
-/// `memory` is memory for the copy as in pdmp_settings.memory, or `{NULL, 0}`. `*copy` is set to the new controller,
-/// which the caller frees with pdmp_controller_free, or to NULL on error.
-///
-/// Errors: PDMP_NULL, PDMP_MEMORY.
-pdmp_status pdmp_controller_clone(const pdmp_controller *controller,
-                                  pdmp_memory memory,
-                                  pdmp_controller **copy,
-                                  pdmp_text error);
-
 /// Frees a controller; NULL is ignored. Memory that the caller provided may then be reused.
 void pdmp_controller_free(pdmp_controller *controller);
 
@@ -340,6 +330,17 @@ pdmp_status pdmp_controller_set_tau(pdmp_controller *controller, double tau);
 /// PDMP_RANGE, PDMP_ABSENT.
 pdmp_status pdmp_controller_set_amplitude(pdmp_controller *controller, double amplitude);
 
+/// Sets the phase phi of a rhythmic movement, in rad, for example at the heel strike of a gait. Position and velocity are
+/// continuous, and the deviation from the cycle at the new phase decays. Before the first tick the movement starts at this
+/// phase. Errors: PDMP_NULL, PDMP_RANGE, PDMP_ABSENT.
+pdmp_status pdmp_controller_set_phase(pdmp_controller *controller,
+                                      double phase);
+
+/// Sets the gain k_phi in [0, 1000] of a measured phase, pdmp_command.phase, per unit of the clock u: an error of the phase
+/// decays with exp(-k_phi t/tau). 1 by default, 0 disables the pull. Errors: PDMP_NULL, PDMP_RANGE.
+pdmp_status pdmp_controller_set_phase_gain(pdmp_controller *controller,
+                                           double gain);
+
 /// Sets the speed in [0, 1e6], a factor of the rate 1/tau: 0 pauses the movement on its path, 1 is the default. The
 /// change is filtered like tau, and persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
 pdmp_status pdmp_controller_set_speed(pdmp_controller *controller, double speed);
@@ -371,15 +372,18 @@ pdmp_status pdmp_controller_step(pdmp_controller *controller);
 ///
 ///     tau y' = z + w(u) + k_t d + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
-///     tau u' = k = 1 / (1 + k_s |d / range|^2)
+///     tau u' = max(0, k + k_phi sin(phi* - phi))      k = 1 / (1 + k_s |d / range|^2)
 ///     tau o' = 5 k (e - o) / extent
 ///
 /// with the coupling terms c_v and c_a, the tracking error e = m - y at the measured position m, the expected error o,
 /// and d, the part of e beyond o: d = e - min(max(o, min(e, 0)), max(e, 0)) for each DoF. The last e stays in force
-/// until the next measurement or pdmp_controller_release.
+/// until the next measurement or pdmp_controller_release. A measured phase phi* pulls the phase of a rhythmic movement; the
+/// pull is the mean over the tick of the exact solution, so that it does not overshoot phi*.
 ///
 /// Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE; PDMP_ABSENT if a command does not apply to the kind of model.
-pdmp_status pdmp_controller_update(pdmp_controller *controller, const pdmp_command *command, const pdmp_motion *motion);
+pdmp_status pdmp_controller_update(pdmp_controller *controller,
+                                   const pdmp_command *command,
+                                   const pdmp_motion *motion);
 
 /// Writes the present motion. Returns PDMP_WORKING, PDMP_FINISHED or an error: PDMP_NULL, PDMP_LENGTH.
 pdmp_status pdmp_controller_read(pdmp_controller *controller, const pdmp_motion *motion);
@@ -392,6 +396,28 @@ pdmp_status pdmp_controller_progress(const pdmp_controller *controller, double *
 /// the terminating zero, also if `text` is too short for it. The message is empty before the first error. The message
 /// of a NULL controller is empty.
 size_t pdmp_controller_error(const pdmp_controller *controller, pdmp_text text);
+
+/// Copies a controller with its state, for example to simulate the movement ahead. Under the same commands, copy and
+/// original move identically to the bit.
+///
+/// `memory` is memory for the copy as in pdmp_settings.memory, or `{NULL, 0}`. `*copy` is set to the new controller,
+/// which the caller frees with pdmp_controller_free, or to NULL on error.
+///
+/// Errors: PDMP_NULL, PDMP_MEMORY.
+pdmp_status pdmp_controller_clone(const pdmp_controller *controller,
+                                  pdmp_memory memory,
+                                  pdmp_controller **copy,
+                                  pdmp_text error);
+
+/// Copies the state of a controller into an earlier copy of it, without allocation, so that a control loop can look ahead:
+/// the copy is then advanced by pdmp_controller_step, or by pdmp_controller_update with ticks of any length.
+///
+/// `copy` becomes as by pdmp_controller_clone in its own memory; its error message remains. It allocates only if `copy` is
+/// of another model, or if `controller` was reset with a start or a velocity since `copy` was made without one.
+///
+/// Errors: PDMP_NULL.
+pdmp_status pdmp_controller_copy(const pdmp_controller *controller,
+                                 pdmp_controller *copy);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -179,6 +179,16 @@ public:
         controller_.reset(controller);
     }
 
+    /// Copies the controller with its state, see pdmp_controller_clone.
+    Controller clone() const {
+        pdmp_controller *copy = nullptr;
+        detail::check([&](pdmp_text error) { return pdmp_controller_clone(get(), {}, &copy, error); });
+        return Controller(copy);
+    }
+
+    /// Copies the state of another controller without allocation, see pdmp_controller_copy.
+    pdmp_status copy_from(const Controller &other) noexcept { return pdmp_controller_copy(other.get(), get()); }
+
     /// Starts a new movement, see pdmp_controller_reset.
     void reset(const Conditions &conditions = {}) {
         const pdmp_conditions c = detail::to_c(conditions);
@@ -199,6 +209,8 @@ public:
         return pdmp_controller_set_compliance(get(), stopping, tracking);
     }
 
+    pdmp_status set_phase(double phase) noexcept { return pdmp_controller_set_phase(get(), phase); }
+    pdmp_status set_phase_gain(double gain) noexcept { return pdmp_controller_set_phase_gain(get(), gain); }
     pdmp_status set_speed(double speed) noexcept { return pdmp_controller_set_speed(get(), speed); }
     pdmp_status set_tolerance(double tolerance) noexcept { return pdmp_controller_set_tolerance(get(), tolerance); }
     pdmp_status release() noexcept { return pdmp_controller_release(get()); }
@@ -234,6 +246,8 @@ public:
     pdmp_controller *get() const noexcept { return controller_.get(); }
 
 private:
+    explicit Controller(pdmp_controller *controller) noexcept : controller_(controller) {}
+
     struct Free {
         void operator()(pdmp_controller *controller) const noexcept { pdmp_controller_free(controller); }
     };

@@ -45,8 +45,8 @@ pub struct pdmp_coupling {
 
 /// Command of one tick. A member that is `{NULL, 0}` or NULL leaves the present value unchanged.
 ///
-/// Style, goal, final velocity, anchor, tau and amplitude stay in force until the next command, and a measurement until the next one or
-/// until pdmp_controller_release. dt and the coupling terms hold for this tick only.
+/// Style, goal, final velocity, anchor, tau and amplitude stay in force until the next command, and a measurement until
+/// the next one or until pdmp_controller_release. dt, the coupling terms and the phase hold for this tick only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_command {
@@ -69,6 +69,8 @@ pub struct pdmp_command {
     pub measured: pdmp_vector,
     /// Coupling terms.
     pub coupling: pdmp_coupling,
+    /// Measured phase, in rad, which pulls the phase, see pdmp_controller_set_phase_gain; rhythmic models only.
+    pub phase: *const f64,
 }
 
 /// Outputs of a motion. A member that is `{NULL, 0}` is not written. The buffers may overlap with the arrays of the
@@ -160,8 +162,8 @@ impl pdmp_command {
             (Some(_), None) => return Err(Fault::Null("coupling acceleration")),
         };
         // SAFETY: the caller guarantees that the pointer is NULL or valid.
-        let [dt, tau, amplitude] =
-            [self.dt, self.tau, self.amplitude].map(|number| unsafe { number.as_ref() }.copied());
+        let [dt, tau, amplitude, phase] =
+            [self.dt, self.tau, self.amplitude, self.phase].map(|number| unsafe { number.as_ref() }.copied());
         Ok(Command {
             dt,
             style: vector("style", self.style, primitive.n_styles(), "style dimension")?,
@@ -172,6 +174,7 @@ impl pdmp_command {
             amplitude,
             measured: per_dof("measured", self.measured)?,
             coupling,
+            phase,
         })
     }
 }

@@ -17,7 +17,7 @@ use pdmp_status::PDMP_OK;
 
 /// Controller of one movement: a primitive, its commands and its state. One thread at a time may use it.
 pub struct pdmp_controller {
-    inner: Controller,
+    pub(crate) inner: Controller,
     /// Error of the last call that failed.
     fault: Option<Fault>,
     /// True if the library allocated the memory.
@@ -86,7 +86,7 @@ pub unsafe extern "C" fn pdmp_controller_new(
 }
 
 /// Checks size and alignment of the caller's memory, and returns it, or `None` if it is not given.
-fn aligned(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> {
+pub(crate) fn aligned(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> {
     let (needed, alignment) = (size_of::<pdmp_controller>(), align_of::<pdmp_controller>());
     let (address, size) = (memory.data.addr(), memory.size);
     match (address, size) {
@@ -101,7 +101,7 @@ fn aligned(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller>, Fault> {
 ///
 /// # Safety
 /// The memory comes from [`aligned`], and nothing else uses it.
-unsafe fn emplace(inner: Controller, memory: Option<*mut pdmp_controller>) -> *mut pdmp_controller {
+pub(crate) unsafe fn emplace(inner: Controller, memory: Option<*mut pdmp_controller>) -> *mut pdmp_controller {
     let controller = pdmp_controller { inner, fault: None, owned: memory.is_none() };
     match memory {
         // SAFETY: `aligned` has checked size and alignment, and the contract of this function excludes other users.
@@ -111,32 +111,6 @@ unsafe fn emplace(inner: Controller, memory: Option<*mut pdmp_controller>) -> *m
         },
         None => Box::into_raw(Box::new(controller)),
     }
-}
-
-/// Copies a controller with its state, for example to simulate the movement ahead. Under the same commands, copy and
-/// original move identically to the bit.
-///
-/// `memory` is memory for the copy as in pdmp_settings.memory, or `{NULL, 0}`. `*copy` is set to the new controller,
-/// which the caller frees with pdmp_controller_free, or to NULL on error.
-///
-/// Errors: PDMP_NULL, PDMP_MEMORY.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn pdmp_controller_clone(
-    controller: Option<&pdmp_controller>,
-    memory: pdmp_memory,
-    copy: Option<&mut MaybeUninit<*mut pdmp_controller>>,
-    error: pdmp_text,
-) -> pdmp_status {
-    let call = || {
-        let handle = copy.ok_or(Fault::Null("copy"))?.write(ptr::null_mut());
-        let inner = controller.ok_or(Fault::Null("controller"))?.inner.clone();
-        let memory = aligned(memory)?;
-        // SAFETY: `aligned` has checked the memory, and the contract of the C ABI guarantees that nothing else uses it.
-        *handle = unsafe { emplace(inner, memory) };
-        Ok(PDMP_OK)
-    };
-    // SAFETY: the contract of the C ABI covers `error`.
-    unsafe { guard_with_text(error, call) }
 }
 
 /// Frees a controller; NULL is ignored. Memory that the caller provided may then be reused.
@@ -153,7 +127,7 @@ pub unsafe extern "C" fn pdmp_controller_free(controller: *mut pdmp_controller) 
 }
 
 /// Executes a call on a controller, and stores its error, if any, in the controller.
-fn call_on(
+pub(crate) fn call_on(
     controller: Option<&mut pdmp_controller>,
     call: impl FnOnce(&mut pdmp_controller) -> Result<pdmp_status, Fault>,
 ) -> pdmp_status {
@@ -260,6 +234,21 @@ pub extern "C" fn pdmp_controller_set_amplitude(
     call_on(controller, |controller| Ok(controller.inner.set_amplitude(amplitude).map(|()| PDMP_OK)?))
 }
 
+/// Sets the phase phi of a rhythmic movement, in rad, for example at the heel strike of a gait. Position and velocity are
+/// continuous, and the deviation from the cycle at the new phase decays. Before the first tick the movement starts at this
+/// phase. Errors: PDMP_NULL, PDMP_RANGE, PDMP_ABSENT.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_set_phase(controller: Option<&mut pdmp_controller>, phase: f64) -> pdmp_status {
+    call_on(controller, |controller| Ok(controller.inner.set_phase(phase).map(|()| PDMP_OK)?))
+}
+
+/// Sets the gain k_phi in [0, 1000] of a measured phase, pdmp_command.phase, per unit of the clock u: an error of the phase
+/// decays with exp(-k_phi t/tau). 1 by default, 0 disables the pull. Errors: PDMP_NULL, PDMP_RANGE.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_controller_set_phase_gain(controller: Option<&mut pdmp_controller>, gain: f64) -> pdmp_status {
+    call_on(controller, |controller| Ok(controller.inner.set_phase_gain(gain).map(|()| PDMP_OK)?))
+}
+
 /// Sets the speed in [0, 1e6], a factor of the rate 1/tau: 0 pauses the movement on its path, 1 is the default. The
 /// change is filtered like tau, and persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
 #[unsafe(no_mangle)]
@@ -318,12 +307,13 @@ pub extern "C" fn pdmp_controller_step(controller: Option<&mut pdmp_controller>)
 ///
 ///     tau y' = z + w(u) + k_t d + tau c_v
 ///     tau z' = alpha_z (beta_z (g - y) - z) + tau^2 c_a
-///     tau u' = k = 1 / (1 + k_s |d / range|^2)
+///     tau u' = max(0, k + k_phi sin(phi* - phi))      k = 1 / (1 + k_s |d / range|^2)
 ///     tau o' = 5 k (e - o) / extent
 ///
 /// with the coupling terms c_v and c_a, the tracking error e = m - y at the measured position m, the expected error o,
 /// and d, the part of e beyond o: d = e - min(max(o, min(e, 0)), max(e, 0)) for each DoF. The last e stays in force
-/// until the next measurement or pdmp_controller_release.
+/// until the next measurement or pdmp_controller_release. A measured phase phi* pulls the phase of a rhythmic movement; the
+/// pull is the mean over the tick of the exact solution, so that it does not overshoot phi*.
 ///
 /// Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE; PDMP_ABSENT if a command does not apply to the kind of model.
 #[unsafe(no_mangle)]

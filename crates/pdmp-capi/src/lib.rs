@@ -21,6 +21,7 @@
 mod buffers;
 mod command;
 mod controller;
+mod controller_copies;
 mod fault;
 mod guard;
 mod model;
@@ -29,5 +30,6 @@ mod status;
 pub use buffers::*;
 pub use command::*;
 pub use controller::*;
+pub use controller_copies::*;
 pub use model::*;
 pub use status::{pdmp_status, pdmp_version};

@@ -39,6 +39,7 @@ fn to_c(command: &Command) -> pdmp_command {
             velocity: vector(command.coupling.map(|terms| terms.velocity)),
             acceleration: vector(command.coupling.map(|terms| terms.acceleration)),
         },
+        phase: pointer(&command.phase),
     }
 }
 
@@ -63,6 +64,12 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
             let model = Box::from_raw(loaded.assume_init());
             pdmp_controller_new(Some(&model), Some(&settings), None, Some(&mut made), none);
             made.assume_init()
+        };
+        let mut cloned = MaybeUninit::uninit();
+        // SAFETY: the controller is alive.
+        let copy = unsafe {
+            assert_eq!(pdmp_controller_clone(c.as_ref(), memory, Some(&mut cloned), none), pdmp_status::PDMP_OK);
+            cloned.assume_init()
         };
 
         let mut random = Random(1);
@@ -91,6 +98,7 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                 amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(values[0].abs()),
                 measured: random.rarely().then_some(per_dof),
                 coupling: random.rarely().then_some(Coupling { velocity: per_dof, acceleration: per_dof }),
+                phase: (random.rarely() && kind == Kind::Rhythmic).then_some(10.0 * values[0]),
             };
             let mut motion =
                 Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
@@ -117,7 +125,9 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                         rust.set_compliance(Compliance { stopping: tau, tracking: tau }),
                         pdmp_controller_set_compliance(c.as_mut(), tau, tau),
                     ),
-                    7 => (rust.set_tolerance(tau - own), pdmp_controller_set_tolerance(c.as_mut(), tau - own)),
+                    7 => (rust.set_phase(tau), pdmp_controller_set_phase(c.as_mut(), tau)),
+                    8 => (rust.set_phase_gain(tau), pdmp_controller_set_phase_gain(c.as_mut(), tau)),
+                    9 => (rust.set_tolerance(tau - own), pdmp_controller_set_tolerance(c.as_mut(), tau - own)),
                     _ => (Ok(()), pdmp_status::PDMP_OK),
                 }
             };
@@ -130,11 +140,28 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
             }
             let pairs = [(&position, &written[0]), (&velocity, &written[1]), (&acceleration, &written[2])];
             assert!(pairs.into_iter().all(|(rust, c)| bits(rust).eq(bits(c))));
+            if random.rarely() {
+                // SAFETY: both controllers are alive.
+                unsafe {
+                    assert_eq!(pdmp_controller_copy(c, copy), pdmp_status::PDMP_OK);
+                    assert_eq!(pdmp_controller_step(copy.as_mut()), pdmp_controller_step(c.as_mut()));
+                    pdmp_controller_read(copy.as_mut(), Some(&out));
+                    assert!(rust.step().is_ok() && bits(rust.position()).eq(bits(&written[0])));
+                    pdmp_controller_read(c.as_mut(), Some(&out));
+                    assert!(bits(rust.position()).eq(bits(&written[0])));
+                }
+                position.copy_from_slice(rust.position());
+                velocity.copy_from_slice(rust.velocity());
+                acceleration.copy_from_slice(rust.acceleration());
+            }
         }
         assert_eq!(allocations() - before, 0);
         println!("{kind}: {accepted} of 200000 commands accepted");
         assert!(accepted >= 100_000, "{kind}: {accepted} of 200000 commands accepted");
-        // SAFETY: the controller is alive and not used again.
-        unsafe { pdmp_controller_free(c) };
+        // SAFETY: the controllers are alive and not used again.
+        unsafe {
+            pdmp_controller_free(c);
+            pdmp_controller_free(copy);
+        };
     }
 }

@@ -29,6 +29,7 @@ const NO_COMMAND: pdmp_command = pdmp_command {
     dt: ptr::null(),
     measured: NO_VECTOR,
     coupling: pdmp_coupling { velocity: NO_VECTOR, acceleration: NO_VECTOR },
+    phase: ptr::null(),
 };
 const NO_CONDITIONS: pdmp_conditions = pdmp_conditions {
     style: NO_VECTOR,
@@ -188,10 +189,15 @@ fn null_for_a_required_argument_is_an_error() {
             pdmp_controller_set_amplitude(None, 1.0),
             pdmp_controller_set_compliance(None, 1.0, 1.0),
             pdmp_controller_set_speed(None, 1.0),
+            pdmp_controller_set_phase(None, 1.0),
+            pdmp_controller_set_phase_gain(None, 1.0),
             pdmp_controller_set_tolerance(None, 0.1),
             pdmp_controller_release(None),
             pdmp_controller_clone(None, SETTINGS.memory, Some(&mut out), NO_TEXT),
             pdmp_controller_clone(running.handle().as_deref(), SETTINGS.memory, None, NO_TEXT),
+            pdmp_controller_copy(ptr::null(), ptr::null_mut()),
+            pdmp_controller_copy(ptr::null(), running.0),
+            pdmp_controller_copy(running.0, ptr::null_mut()),
             pdmp_controller_set_style(running.handle(), NO_VECTOR),
             pdmp_controller_set_goal(running.handle(), NO_VECTOR),
             pdmp_controller_set_goal(running.handle(), pdmp_vector { data: ptr::null(), length: 3 }),
@@ -255,6 +261,11 @@ fn an_invalid_command_changes_nothing_and_leaves_a_message() {
             PDMP_ABSENT,
             "anchor does not apply to a discrete primitive: it moves to a goal; set goal",
         ),
+        (
+            pdmp_command { phase: &1.0, ..none },
+            PDMP_ABSENT,
+            "phase does not apply to a discrete primitive: its state depends on its past; it starts at the start of its path",
+        ),
         (pdmp_command { coupling: half, ..none }, PDMP_NULL, "coupling acceleration is NULL"),
         // The valid part of an invalid command takes no effect either.
         (
@@ -279,6 +290,8 @@ fn an_invalid_command_changes_nothing_and_leaves_a_message() {
     }
     assert_eq!(pdmp_controller_set_amplitude(running.handle(), 1.0), PDMP_ABSENT);
     assert_eq!(pdmp_controller_set_tau(running.handle(), -1.0), PDMP_RANGE);
+    assert_eq!(pdmp_controller_set_phase(running.handle(), 1.0), PDMP_ABSENT);
+    assert_eq!(pdmp_controller_set_phase_gain(running.handle(), -1.0), PDMP_RANGE);
     assert_eq!(pdmp_controller_set_compliance(running.handle(), -1.0, 0.0), PDMP_RANGE);
     assert_eq!(pdmp_controller_set_tolerance(running.handle(), 0.0), PDMP_RANGE);
     assert_eq!(running.state(3), before);
@@ -539,7 +552,9 @@ fn every_kind_of_core_error_has_its_status() {
         (Error::Length { name: "goal", expected: 3, found: 2, per: "DoF" }, PDMP_LENGTH),
         (Error::Range { name: "tau", value: -1.0, allowed: "must be positive" }, PDMP_RANGE),
         (Error::NotFinite { name: "goal", index: 0, value: f64::NAN }, PDMP_RANGE),
-        (Error::Arguments("pass one or the other"), PDMP_RANGE),
+        (Error::Argument { name: "dt", problem: "is missing" }, PDMP_RANGE),
+        (Error::Conflict { names: ["tau", "segment_durations"], reason: "they exclude each other" }, PDMP_RANGE),
+        (Error::Still { consequence: "it has no cycles" }, PDMP_RANGE),
         (Error::Kind { name: "anchor", kind: Kind::Discrete, instead: "" }, PDMP_ABSENT),
         (Error::Memory { name: "outputs", numbers: 1e18 }, PDMP_MEMORY),
         (Error::Io { path: "absent".into(), source: io() }, PDMP_IO),

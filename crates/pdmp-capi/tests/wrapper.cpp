@@ -74,11 +74,27 @@ int main(int, char **argv) try {
     }
     REQUIRE(controller.set_speed(1.0) == PDMP_OK && controller.release() == PDMP_OK);
     REQUIRE(controller.set_anchor(pdmp::view(goal)) == PDMP_ABSENT);
+    REQUIRE(controller.set_phase(0.5) == PDMP_ABSENT && controller.set_phase_gain(2.0) == PDMP_OK);
     REQUIRE(controller.set_amplitude(0.5) == PDMP_ABSENT);
     REQUIRE(controller.error() == "amplitude does not apply to a discrete primitive");
     double time = 0.0, phase = 0.0;
     REQUIRE(controller.progress(&time, &phase) == PDMP_WORKING);
     REQUIRE(time > 0.999 && time < 1.001 && phase > 0.0 && phase < 1.0);
+
+    auto copy = controller.clone();
+    pdmp::Motion ahead(3);
+    for (int tick = 0; tick < 100; ++tick) REQUIRE(copy.step() > 0);
+    REQUIRE(controller.read(motion) > 0 && copy.read(ahead) > 0 && motion.position != ahead.position);
+    for (int tick = 0; tick < 100; ++tick) REQUIRE(controller.step() > 0);
+    REQUIRE(controller.read(motion) > 0 && motion.position == ahead.position);
+    REQUIRE(motion.velocity == ahead.velocity && motion.acceleration == ahead.acceleration);
+    for (int tick = 0; tick < 50; ++tick) REQUIRE(controller.step() > 0);
+    REQUIRE(copy.copy_from(controller) == PDMP_OK && copy.copy_from(copy) == PDMP_OK);
+    REQUIRE(controller.step() > 0 && copy.step() > 0 && controller.read(motion) > 0 && copy.read(ahead) > 0);
+    REQUIRE(motion.position == ahead.position && motion.acceleration == ahead.acceleration);
+    REQUIRE(copy.copy_from(first) == PDMP_NULL && first.copy_from(copy) == PDMP_NULL);
+    REQUIRE(copy.error() == "controller is NULL");
+    REQUIRE(status_thrown_by([&] { first.clone(); }) == PDMP_NULL);
     return 0;
 } catch (const std::exception &error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -4,13 +4,12 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
 pub use crate::validate::MAX_MAGNITUDE;
-use crate::validate::{check_matrix, check_number, check_positive, check_time, check_vector};
+use crate::validate::{
+    MAX_NAME_LENGTH, check_length, check_matrix, check_names, check_number, check_positive, check_time, check_vector,
+};
 
 /// Minimum number of samples of a demonstration: a cubic spline with not-a-knot ends needs four.
 pub const MIN_SAMPLES_PER_DEMONSTRATION: usize = 4;
-
-/// Maximum length of the name or unit of a DoF, in bytes: it bounds the header of a model file.
-const MAX_NAME_LENGTH: usize = 1000;
 
 /// Sampling times of a demonstration.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,7 +98,10 @@ impl Demonstration {
         check_matrix("position", position.view())?;
         let (found, n_dofs) = position.dim();
         if n_dofs == 0 {
-            return Err(Error::Arguments("position has no DoFs: pass an array of shape (T, D) with D of at least 1"));
+            return Err(Error::Argument {
+                name: "position",
+                problem: "has no DoFs: pass an array of shape (T, D) with D of at least 1",
+            });
         }
         if found < MIN_SAMPLES_PER_DEMONSTRATION {
             return Err(Error::Samples { found, least: MIN_SAMPLES_PER_DEMONSTRATION });
@@ -113,6 +115,18 @@ impl Demonstration {
     }
 
     /// Sets the goal of this movement (D,). The default is the last sample.
+    ///
+    /// ```
+    /// # use ndarray::Array2;
+    /// # use pdmp_core::{Demonstration, Sampling};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let position = Array2::from_shape_fn((50, 1), |(c, _)| c as f64 / 50.0);
+    /// // The recording stops short of the target.
+    /// let demo = Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?.with_goal(vec![1.0])?;
+    /// assert_eq!(demo.goal(), Some(&[1.0][..]));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A length other than D, or a number that is not finite or exceeds [`MAX_MAGNITUDE`].
@@ -138,13 +152,7 @@ impl Demonstration {
     /// # Errors
     /// A number of names other than D, a repeated name, or one longer than 1000 bytes.
     pub fn with_names(mut self, names: Vec<String>) -> Result<Self> {
-        if names.len() != self.n_dofs() {
-            let (expected, found) = (self.n_dofs(), names.len());
-            return Err(Error::Length { name: "names", expected, found, per: "DoF" });
-        }
-        if names.iter().enumerate().any(|(d, name)| names[..d].contains(name) || name.len() > MAX_NAME_LENGTH) {
-            return Err(Error::Arguments("names must differ from each other and have at most 1000 bytes each"));
-        }
+        check_names("names", &names, self.n_dofs(), "DoF")?;
         self.names = Some(names);
         Ok(self)
     }
@@ -154,12 +162,9 @@ impl Demonstration {
     /// # Errors
     /// A number of units other than D, or one longer than 1000 bytes.
     pub fn with_units(mut self, units: Vec<String>) -> Result<Self> {
-        if units.len() != self.n_dofs() {
-            let (expected, found) = (self.n_dofs(), units.len());
-            return Err(Error::Length { name: "units", expected, found, per: "DoF" });
-        }
+        check_length("units", units.len(), self.n_dofs(), "DoF")?;
         if units.iter().any(|unit| unit.len() > MAX_NAME_LENGTH) {
-            return Err(Error::Arguments("units must have at most 1000 bytes each"));
+            return Err(Error::Argument { name: "units", problem: "must have at most 1000 bytes each" });
         }
         self.units = Some(units);
         Ok(self)
@@ -231,7 +236,7 @@ impl Demonstration {
 /// Checks that a context has a value and that its numbers are finite.
 pub(crate) fn check_context(context: &[ContextValue]) -> Result<()> {
     if context.is_empty() {
-        return Err(Error::Arguments("context is empty: pass at least one value, or omit it"));
+        return Err(Error::Argument { name: "context", problem: "is empty: pass at least one value, or omit it" });
     }
     context.iter().enumerate().try_for_each(|(index, value)| match value {
         ContextValue::Number(number) => check_number("context", index, *number),

@@ -7,11 +7,19 @@ use crate::error::{Error, Result};
 /// Largest magnitude of a position: its square, summed over a recording, stays finite.
 pub const MAX_MAGNITUDE: f64 = 1e150;
 
+/// Checks that an argument has `expected` elements, one per `per`.
+pub(crate) fn check_length(name: &'static str, found: usize, expected: usize, per: &'static str) -> Result<()> {
+    if found == expected { Ok(()) } else { Err(Error::Length { name, expected, found, per }) }
+}
+
+/// Checks that a value meets a condition, which `allowed` states as the end of a sentence.
+pub(crate) fn check_range(name: &'static str, value: f64, valid: bool, allowed: &'static str) -> Result<()> {
+    if valid { Ok(()) } else { Err(Error::Range { name, value, allowed }) }
+}
+
 /// Checks that `value` has `expected` elements, one per `per`, and passes [`check_finite`].
 pub(crate) fn check_vector(name: &'static str, value: &[f64], expected: usize, per: &'static str) -> Result<()> {
-    if value.len() != expected {
-        return Err(Error::Length { name, expected, found: value.len(), per });
-    }
+    check_length(name, value.len(), expected, per)?;
     check_finite(name, value)
 }
 
@@ -31,11 +39,7 @@ pub(crate) fn check_number(name: &'static str, index: usize, value: f64) -> Resu
 
 /// Checks that `value` is positive and finite.
 pub(crate) fn check_positive(name: &'static str, value: f64) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(Error::Range { name, value, allowed: "must be positive and finite" })
-    }
+    check_range(name, value, value.is_finite() && value > 0.0, "must be positive and finite")
 }
 
 /// Returns an array of zeros, or [`Error::Memory`] if the allocation fails.
@@ -106,9 +110,27 @@ pub(crate) fn check_time(time: &[f64], n_samples: usize) -> Result<()> {
 
 /// Checks that a duration in seconds lies within 1e-9 to 1e9, where the squares of rates stay finite.
 pub(crate) fn check_duration(value: f64) -> Result<()> {
-    if (1e-9..=1e9).contains(&value) {
-        return Ok(());
-    }
     let allowed = "seconds from start to end must lie between 1e-9 and 1e9; check dt or time";
-    Err(Error::Range { name: "duration", value, allowed })
+    check_range("duration", value, (1e-9..=1e9).contains(&value), allowed)
+}
+
+/// Maximum length of the name of a DoF or context column, or of a unit, in bytes: it bounds the header of a model file.
+pub(crate) const MAX_NAME_LENGTH: usize = 1000;
+/// Largest number of characters of a name in an error text.
+const MAX_QUOTED_LENGTH: usize = 60;
+
+/// Checks the number of names, that they differ, and their lengths.
+pub(crate) fn check_names(name: &'static str, names: &[String], expected: usize, per: &'static str) -> Result<()> {
+    if names.len() != expected {
+        return Err(Error::Length { name, expected, found: names.len(), per });
+    }
+    for (index, value) in names.iter().enumerate() {
+        let allowed = match value {
+            value if names[..index].contains(value) => "repeats a name: the names must differ from each other",
+            value if value.len() > MAX_NAME_LENGTH => "must have at most 1000 bytes",
+            _ => continue,
+        };
+        return Err(Error::Name { name, index, value: value.chars().take(MAX_QUOTED_LENGTH).collect(), allowed });
+    }
+    Ok(())
 }

@@ -10,16 +10,19 @@ use common::*;
 use ndarray::{Array2, Array3, Axis, array, s};
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::batch;
-use pdmp_core::motion::rollouts;
-use pdmp_core::motion::{self, BatchConditions, PerMovement, TimeGrid, Trajectory, WithRespectTo};
+use pdmp_core::motion::{self, BatchConditions, PerMovement, TimeGrid, Trajectories, Trajectory, WithRespectTo};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, Controller, Error, Kind, Model};
 use proptest::prelude::*;
 
-fn all(conditions: &BatchConditions, model: &Arc<Model>, grid: TimeGrid) -> Vec<Array3<f64>> {
-    let (highest, threads) = (Derivative::Acceleration, Threads::ONE);
-    rollouts(model.primitive(), conditions.clone(), grid, highest, threads, &mut |_| Ok(())).unwrap()
+fn all(conditions: &BatchConditions, model: &Arc<Model>, grid: TimeGrid) -> Trajectories {
+    let batch = batch(model.primitive(), conditions.clone(), grid, &mut |_| Ok(())).unwrap();
+    batch.rollouts(0..batch.shape().0, Derivative::Acceleration, Threads::ONE, &mut |_| Ok(())).unwrap()
+}
+
+fn one_each(rows: Array2<f64>) -> Option<PerMovement> {
+    Some(PerMovement::Each(rows))
 }
 
 fn jacobian(variable: WithRespectTo, order: Derivative, model: &Arc<Model>, conditions: &Conditions) -> Array3<f64> {
@@ -83,12 +86,12 @@ proptest! {
             let goal_velocities = cut(&rows.3).filter(|_| discrete);
             let tau = Some(factor * model.tau());
             let conditions = BatchConditions {
-                styles: styles.clone(),
-                goals: centres.clone().filter(|_| discrete),
-                anchors: centres.clone().filter(|_| !discrete),
-                starts: starts.clone(),
-                velocities: velocities.clone(),
-                goal_velocities: goal_velocities.clone(),
+                style: one_each(styles.clone()),
+                goal: centres.clone().filter(|_| discrete),
+                anchor: centres.clone().filter(|_| !discrete),
+                start: starts.clone(),
+                velocity: velocities.clone(),
+                goal_velocity: goal_velocities.clone(),
                 amplitude: Some(amplitude).filter(|_| !discrete),
                 tau,
             };
@@ -108,7 +111,7 @@ proptest! {
                     phase: None,
                 };
                 let mut controller = Controller::new(model.primitive(), dt, &one, Some(0.0)).unwrap();
-                let mut stepped = [(); 3].map(|()| Array2::zeros((made[0].len_of(Axis(1)), n)));
+                let mut stepped = [(); 3].map(|()| Array2::zeros((made.position.len_of(Axis(1)), n)));
                 for k in 0..stepped[0].nrows() {
                     if k > 0 {
                         controller.step().unwrap();
@@ -130,8 +133,8 @@ proptest! {
     #[test]
     fn results_do_not_depend_on_the_division_of_the_work(size in 1usize..50, n_threads in 1usize..5, samples in 1usize..900) {
         let styles = Array2::from_shape_fn((41, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
-        let velocities = Some(PerMovement::Each(Array2::from_shape_fn((41, 3), |(b, d)| (b * d) as f64 * 0.01)));
-        let conditions = BatchConditions { styles, velocities, ..BatchConditions::default() };
+        let velocity = one_each(Array2::from_shape_fn((41, 3), |(b, d)| (b * d) as f64 * 0.01));
+        let conditions = BatchConditions { style: one_each(styles), velocity, ..BatchConditions::default() };
         let grid = grid(1e-3, (samples - 1) as f64 * 1e-3);
         let expected = all(&conditions, &REACH, grid);
         let batch = batch(REACH.primitive(), conditions, grid, &mut |_| Ok(())).unwrap();
@@ -141,8 +144,8 @@ proptest! {
             ends.push(chunk.end);
             let threads = Threads::new(n_threads).unwrap();
             let made = batch.rollouts(chunk.clone(), Derivative::Velocity, threads, &mut |_| Ok(())).unwrap();
-            prop_assert_eq!(made.len(), 2);
-            for (made, expected) in made.iter().zip(&expected) {
+            prop_assert!(made.velocity.is_some() && made.acceleration.is_none());
+            for (made, expected) in made.iter().zip(expected.iter()) {
                 prop_assert_eq!(made.view(), expected.slice(s![chunk.clone(), .., ..]));
             }
         }
@@ -155,9 +158,13 @@ proptest! {
 #[test]
 fn large_batches_are_the_same_on_several_threads() {
     let styles = Array2::from_shape_fn((2000, 2), |(b, j)| (b as f64 + 0.3 * j as f64).sin());
-    let batch =
-        batch(REACH.primitive(), BatchConditions { styles, ..Default::default() }, grid(1e-3, 0.4), &mut |_| Ok(()))
-            .unwrap();
+    let batch = batch(
+        REACH.primitive(),
+        BatchConditions { style: one_each(styles), ..Default::default() },
+        grid(1e-3, 0.4),
+        &mut |_| Ok(()),
+    )
+    .unwrap();
     let expected = batch.rollouts(0..2000, Derivative::Position, Threads::ONE, &mut |_| Ok(())).unwrap();
     let mut shares = Vec::new();
     let threads = Threads::new(3).unwrap();
@@ -168,7 +175,7 @@ fn large_batches_are_the_same_on_several_threads() {
         Ok(())
     };
     batch.write(0..2000, vec![output], threads, &mut progress).unwrap();
-    assert_eq!(strided.slice(s![.., .., ..;2]).permuted_axes([1, 0, 2]), expected[0]);
+    assert_eq!(strided.slice(s![.., .., ..;2]).permuted_axes([1, 0, 2]), expected.position);
     assert!(strided.slice(s![.., .., 1..;2]).iter().all(|x| *x == 0.0));
     assert!(shares[0] == 0.0 && shares.is_sorted() && shares.iter().all(|share| (0.0..1.0).contains(share)));
 }
@@ -179,7 +186,7 @@ fn batches_can_be_interrupted() {
     let styles = Array2::zeros((3000, 2));
     let batch = motion::batch(
         REACH.primitive(),
-        BatchConditions { styles, ..Default::default() },
+        BatchConditions { style: one_each(styles), ..Default::default() },
         grid(1e-3, 1.0),
         &mut |_| Ok(()),
     )
@@ -190,7 +197,7 @@ fn batches_can_be_interrupted() {
     let new = Model::from_bytes(&REACH.to_bytes().unwrap()).unwrap();
     let stopped = motion::batch(
         new.primitive(),
-        BatchConditions { styles: array![[0.0, 0.0]], ..Default::default() },
+        BatchConditions { style: one_each(array![[0.0, 0.0]]), ..Default::default() },
         grid(1e-3, 1.0),
         &mut |_| Err(Error::Interrupted),
     );
@@ -202,7 +209,7 @@ fn batches_can_be_interrupted() {
 fn cached_responses_are_bitwise_equal_to_new_ones() {
     let styles = array![[0.4, -1.0], [0.0, 2.0]];
     for (model, other) in [(&*REACH, 0.7), (&*CYCLE, 1.3)] {
-        let conditions = BatchConditions { styles: styles.clone(), ..Default::default() };
+        let conditions = BatchConditions { style: one_each(styles.clone()), ..Default::default() };
         let slower = BatchConditions { tau: Some(other), ..conditions.clone() };
         let fresh = || Arc::new(Model::clone(model));
         let (expected, expected_slower) = [&conditions, &slower].map(|c| all(c, &fresh(), grid(0.01, 1.0))).into();
@@ -296,34 +303,84 @@ fn variables_of_the_other_kind_are_rejected() {
     assert!(matches!(Derivative::of_order("derivative", 3), Err(Error::Range { name: "derivative", .. })));
 }
 
+/// A batch of conditions has the movements of their rollouts, with nominal values where a condition is absent.
+#[test]
+fn a_batch_of_conditions_has_their_rollouts() {
+    for model in [&*REACH, &*CYCLE] {
+        let (n, discrete) = (model.n_dofs(), model.kind() == Kind::Discrete);
+        let centre = Some(vec![0.4; n]);
+        let demonstrated = model.conditions(&[1]).unwrap();
+        let conditions = [
+            Conditions::default(),
+            Conditions { style: Some(vec![0.3, -0.2]), ..Conditions::default() },
+            Conditions {
+                goal: centre.clone().filter(|_| discrete),
+                anchor: centre.filter(|_| !discrete),
+                ..Conditions::default()
+            },
+            Conditions { segment_durations: None, ..demonstrated },
+        ];
+        let batch = BatchConditions::each(model.primitive(), &conditions).unwrap();
+        let made = all(&batch, model, grid(0.01, 1.0));
+        assert_eq!(made.position.len_of(Axis(0)), 4);
+        for (b, one) in conditions.iter().enumerate() {
+            let expected = rollout(model.primitive(), one, grid(0.01, 1.0)).unwrap();
+            let shared = BatchConditions::shared(model.primitive(), one.clone()).unwrap();
+            let alone = all(&shared, model, grid(0.01, 1.0));
+            for (made, b) in [(&made, b), (&alone, 0)] {
+                let (error, size) = difference(&made.position.index_axis(Axis(0), b).to_owned(), &expected.position);
+                assert!(error < 1e-11 * size.max(1.0), "{b}: {error:e} of {size:e}");
+            }
+        }
+    }
+}
+
+/// Conditions that one product cannot serve are refused by name: different time constants, phases and warped time, and a
+/// start velocity for some movements only.
+#[test]
+fn conditions_that_a_batch_cannot_share_are_refused() {
+    let none = Conditions::default;
+    let refused = |model: &Arc<Model>, conditions: &[Conditions]| {
+        let error = BatchConditions::each(model.primitive(), conditions).unwrap_err();
+        error.argument().map(str::to_string)
+    };
+    let tau = |tau: f64| Conditions { tau: Some(tau), ..none() };
+    assert_eq!(refused(&REACH, &[tau(0.5), tau(0.6)]).as_deref(), Some("tau"));
+    assert_eq!(refused(&REACH, &[none(), tau(2.0 * REACH.tau())]).as_deref(), Some("tau"));
+    let equal = BatchConditions::each(REACH.primitive(), &[none(), tau(REACH.tau() * (1.0 + 1e-12))]);
+    assert_eq!(equal.unwrap().tau, Some(REACH.tau()));
+    let phase = Conditions { phase: Some(1.0), ..none() };
+    assert_eq!(refused(&CYCLE, &[phase]).as_deref(), Some("phase"));
+    let velocity = Conditions { velocity: Some(vec![0.0; 3]), ..none() };
+    assert_eq!(refused(&REACH, &[velocity, none()]).as_deref(), Some("velocity"));
+    let warped = Conditions { segment_durations: Some(vec![0.5, 0.5]), ..none() };
+    assert_eq!(refused(&REACH, &[warped]).as_deref(), Some("segment_durations"));
+    let amplitude = |amplitude| Conditions { amplitude: Some(amplitude), ..none() };
+    assert_eq!(refused(&CYCLE, &[amplitude(0.5), none()]).as_deref(), Some("amplitude"));
+}
+
 /// Invalid conditions are rejected with the name of the argument and its numbers.
 #[test]
 fn invalid_batches_are_rejected() {
-    let valid = || BatchConditions { styles: Array2::zeros((4, 2)), ..Default::default() };
+    let valid = || BatchConditions { style: one_each(Array2::zeros((4, 2))), ..Default::default() };
     let error_of = |model: &Arc<Model>, conditions| {
         batch(model.primitive(), conditions, grid(0.1, 1.0), &mut |_| Ok(())).unwrap_err().to_string()
     };
     let mut nan = Array2::zeros((4, 3));
     nan[[2, 1]] = f64::NAN;
     for (conditions, message) in [
-        (BatchConditions { styles: Array2::zeros((4, 3)), ..valid() }, "styles has length 3, expected 2"),
-        (BatchConditions { styles: array![[0.0, 1e101]], ..valid() }, "styles[0, 1] = 1e101"),
+        (BatchConditions { style: one_each(Array2::zeros((4, 3))), ..valid() }, "style has length 3, expected 2"),
+        (BatchConditions { style: one_each(array![[0.0, 1e101]]), ..valid() }, "style[0, 1] = 1e101"),
+        (BatchConditions { goal: one_each(Array2::zeros((3, 3))), ..valid() }, "goal has 3 rows, but there are 4"),
+        (BatchConditions { start: one_each(Array2::zeros((4, 2))), ..valid() }, "start has length 2, expected 3"),
+        (BatchConditions { velocity: one_each(nan), ..valid() }, "velocity[2, 1] = NaN"),
         (
-            BatchConditions { goals: Some(PerMovement::Each(Array2::zeros((3, 3)))), ..valid() },
-            "goals has 3 rows, but there are 4",
+            BatchConditions { velocity: Some(PerMovement::All(vec![0.0; 4])), ..valid() },
+            "velocity has length 4, expected 3",
         ),
         (
-            BatchConditions { starts: Some(PerMovement::Each(Array2::zeros((4, 2)))), ..valid() },
-            "starts has length 2, expected 3",
-        ),
-        (BatchConditions { velocities: Some(PerMovement::Each(nan)), ..valid() }, "velocities[2, 1] = NaN"),
-        (
-            BatchConditions { velocities: Some(PerMovement::All(vec![0.0; 4])), ..valid() },
-            "velocities has length 4, expected 3",
-        ),
-        (
-            BatchConditions { anchors: Some(PerMovement::All(vec![0.0; 3])), ..valid() },
-            "anchors does not apply to a discrete",
+            BatchConditions { anchor: Some(PerMovement::All(vec![0.0; 3])), ..valid() },
+            "anchor does not apply to a discrete",
         ),
         (BatchConditions { amplitude: Some(2.0), ..valid() }, "amplitude does not apply"),
         (BatchConditions { tau: Some(-1.0), ..valid() }, "tau = -1"),
@@ -331,13 +388,14 @@ fn invalid_batches_are_rejected() {
         let found = error_of(&REACH, conditions);
         assert!(found.starts_with(message), "{found}");
     }
-    let goals = Some(PerMovement::All(vec![0.0; 2]));
-    assert!(error_of(&CYCLE, BatchConditions { goals, ..valid() }).ends_with("they move about anchors; set anchors"));
+    let goal = Some(PerMovement::All(vec![0.0; 2]));
+    assert!(error_of(&CYCLE, BatchConditions { goal, ..valid() }).ends_with("it moves about an anchor; set anchor"));
     let batch = batch(REACH.primitive(), valid(), grid(0.1, 1.0), &mut |_| Ok(())).unwrap();
     assert!(matches!(batch.chunks(0), Err(Error::Range { name: "size", .. })));
     let (mut narrow, mut valid) = (Array3::zeros((4, 11, 2)), Array3::zeros((4, 11, 3)));
-    for (movements, output) in [(0..4, narrow.view_mut()), (1..5, valid.view_mut())] {
-        assert!(batch.write(movements, vec![output], Threads::ONE, &mut |_| Ok(())).is_err());
+    for (movements, output, argument) in [(0..4, narrow.view_mut(), "outputs"), (1..5, valid.view_mut(), "movements")] {
+        let error = batch.write(movements, vec![output], Threads::ONE, &mut |_| Ok(())).unwrap_err();
+        assert_eq!(error.argument(), Some(argument));
     }
 }
 
@@ -347,14 +405,14 @@ fn extreme_batches_are_finite() {
     for model in [&*REACH, &*CYCLE] {
         let huge = Some(PerMovement::All(vec![1e150; model.n_dofs()]));
         let conditions = BatchConditions {
-            styles: array![[1e100, -1e100], [0.0, 0.0]],
-            starts: huge.clone(),
-            velocities: huge,
+            style: one_each(array![[1e100, -1e100], [0.0, 0.0]]),
+            start: huge.clone(),
+            velocity: huge,
             amplitude: (model.kind() == Kind::Rhythmic).then_some(1e150),
             ..Default::default()
         };
         assert!(all(&conditions, model, grid(0.01, 2.0)).iter().flatten().all(|x| x.is_finite()));
     }
-    let none = BatchConditions { styles: Array2::zeros((0, 2)), ..Default::default() };
-    assert_eq!(all(&none, &REACH, grid(0.1, 1.0))[0].dim(), (0, 11, 3));
+    let none = BatchConditions { style: one_each(Array2::zeros((0, 2))), ..Default::default() };
+    assert_eq!(all(&none, &REACH, grid(0.1, 1.0)).position.dim(), (0, 11, 3));
 }

@@ -96,11 +96,26 @@ fn another_version_is_rejected_with_its_number() {
     assert!(message.contains("version 8") && message.contains("reads version 6"), "{message}");
 }
 
+/// A file keeps the names of context columns; a file of a model without them does not mention any.
+#[test]
+fn names_of_context_columns_are_kept() {
+    let named = options(Kind::Discrete).context_names(vec!["height".to_string()]);
+    let model = learn(&reaches(), &named);
+    let loaded = Model::from_bytes(&model.to_bytes().unwrap()).unwrap();
+    assert_eq!(loaded.map().unwrap(), model.map().unwrap());
+    assert_eq!(loaded.map().unwrap().names(), ["height"]);
+    let plain = Model::from_bytes(&BYTES).unwrap();
+    assert!(plain.map().unwrap().names().is_empty());
+    assert_eq!(loaded.predict(&[0.2]).unwrap(), plain.predict(&[0.2]).unwrap());
+    let named = options(Kind::Discrete).context_names(vec!["a".to_string(), "b".to_string()]);
+    assert_eq!(pdmp_core::fit(&reaches(), &named).unwrap_err().argument(), Some("context_names"));
+}
+
 /// Errors of writing and reading name the path.
 #[test]
 fn unusable_paths_are_named() {
     let model = learn(&reaches(), &options(Kind::Discrete));
     let message = model.save(std::path::Path::new("/nowhere/model.safetensors")).unwrap_err().to_string();
-    assert!(message.contains("/nowhere/model.safetensors"), "{message}");
+    assert_eq!(message, "/nowhere: no such folder; create it first");
     assert!(matches!(Model::load(std::path::Path::new("/nowhere/model.safetensors")), Err(Error::Io { .. })));
 }

@@ -8,7 +8,7 @@ use common::*;
 use ndarray::Array2;
 use pdmp_core::dynamics::Canonical;
 use pdmp_core::learning::fit_with;
-use pdmp_core::learning::{DofScaling, Truncation, style_of};
+use pdmp_core::learning::{DofScaling, StyleOptions, Truncation, style_of};
 use pdmp_core::motion::TimeGrid;
 use pdmp_core::rollout;
 use pdmp_core::{Error, Kind, Sampling, fit};
@@ -105,7 +105,7 @@ fn style_of_recovers_the_styles_of_demonstrations() {
     let demos = reaches();
     let model = learn(&demos, &options(Kind::Discrete).n_styles(Truncation::Rank(3)));
     for (m, demo) in demos.iter().enumerate() {
-        let style = style_of(&model, demo, None, None, None).unwrap();
+        let style = style_of(&model, demo, &StyleOptions::default()).unwrap();
         for (j, s) in style.iter().enumerate() {
             assert!((s - model.demonstrated().styles[[m, j]]).abs() < 2e-3, "{m} {j} {s}");
         }
@@ -118,12 +118,12 @@ fn style_of_recovers_the_style_of_a_cycle_in_any_phase() {
     let demos = cycles();
     let model = learn(&demos, &options(Kind::Rhythmic).n_styles(Truncation::Rank(2)));
     for (m, demo) in demos.iter().enumerate() {
-        let expected = style_of(&model, demo, None, None, None).unwrap();
+        let expected = style_of(&model, demo, &StyleOptions::default()).unwrap();
         let n = demo.n_samples();
         for lead in [n / 7, n / 2, n - 3] {
             let turned = Array2::from_shape_fn(demo.position().dim(), |(c, d)| demo.position()[[(c + lead) % n, d]]);
             let turned = pdmp_core::Demonstration::new(turned, demo.sampling().clone()).unwrap();
-            let style = style_of(&model, &turned, None, None, None).unwrap();
+            let style = style_of(&model, &turned, &StyleOptions::default()).unwrap();
             for (found, expected) in style.iter().zip(&expected) {
                 assert!((found - expected).abs() < 5e-3, "{m}, {lead}: {found} is not {expected}");
             }
@@ -141,7 +141,7 @@ fn style_of_rejects_demonstrations_that_no_style_describes() {
         let position =
             Array2::from_shape_fn(demos[1].position().dim(), |(c, d)| change(c, demos[1].position()[[c, d]]));
         let demo = pdmp_core::Demonstration::new(position, demos[1].sampling().clone()).unwrap();
-        style_of(&model, &demo, None, None, None)
+        style_of(&model, &demo, &StyleOptions::default())
     };
     assert!(changed(&|_, y| y).is_ok());
     assert!(matches!(changed(&|_, y| 57.3 * y), Err(Error::StyleSize { ratio }) if ratio > 10.0));
@@ -150,9 +150,9 @@ fn style_of_rejects_demonstrations_that_no_style_describes() {
 
     let equal = vec![demos[1].clone(); 4];
     let model = learn(&equal, &options(Kind::Discrete).n_styles(Truncation::Rank(3)));
-    let style = style_of(&model, &equal[0], None, None, None).unwrap();
+    let style = style_of(&model, &equal[0], &StyleOptions::default()).unwrap();
     assert!(style.iter().all(|s| s.abs() <= 1.0), "{style:?}");
-    let style = style_of(&model, &demos[2], None, None, None);
+    let style = style_of(&model, &demos[2], &StyleOptions::default());
     assert!(style.is_err() || style.unwrap().iter().all(|s| s.abs() < 10.0));
 }
 
@@ -263,7 +263,7 @@ fn invalid_demonstrations_are_rejected_by_name() {
     let options = options(Kind::Discrete);
     assert_eq!(message(&demos, &options), "demo 1: position has 2 DoFs, but demo 0 has 3: all must have the same");
     assert!(message(&[], &options).contains("at least one demonstration"));
-    assert!(message(&demos[1..], &options).contains("pass dt in seconds"));
+    assert!(message(&demos[1..], &options).starts_with("demo 0: dt is missing"));
     let options = options.n_styles(Truncation::Rank(2));
     assert!(message(&demos[..1], &options).contains("n_styles = 2: must lie between 1 and 1"));
 }

@@ -6,14 +6,17 @@
 mod accepted;
 mod common;
 
-use std::sync::Arc;
+use std::f64::consts::TAU;
+use std::sync::{Arc, LazyLock};
 
 use accepted::mostly_accepted;
 use common::*;
+use ndarray::Array2;
+use pdmp_core::learning::Truncation;
 use pdmp_core::motion::TimeGrid;
 use pdmp_core::motion::rollout_with;
 use pdmp_core::rollout;
-use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
+use pdmp_core::{Command, Conditions, Controller, Demonstration, Error, Kind, Model, Sampling, Status};
 use proptest::prelude::*;
 
 fn controller(model: &Arc<Model>, dt: f64) -> Controller {
@@ -285,6 +288,72 @@ fn movement_finishes_when_settled_and_restarts() {
     assert_eq!(controller.step().unwrap(), Status::Working);
 }
 
+/// Movements that end in motion, with braking at the rate α_z and above.
+static ENDS_IN_MOTION: LazyLock<[Arc<Model>; 2]> = LazyLock::new(|| {
+    [0.4, 3.3].map(|turns| {
+        let demo = |size: f64| {
+            let position = Array2::from_shape_fn((101, 2), |(c, d)| {
+                let s = c as f64 / 100.0;
+                size * if d == 0 { s * s } else { (turns * TAU * s).sin() * s + size * s.powi(3) }
+            });
+            Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
+        };
+        let options = options(Kind::Discrete).n_styles(Truncation::Rank(2));
+        learn(&[demo(0.7), demo(1.0), demo(1.2)], &options)
+    })
+});
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Finished movements stay within the tolerance of their goal, after any late command; without one they finish as
+    /// soon as |y − g| + 2τ|ẏ|/α_z stays within it.
+    #[test]
+    fn finished_movements_stay_within_their_tolerance(
+        style in prop::collection::vec(-2.0..2.0f64, 2),
+        tolerance in prop_oneof![Just(0.005), 1e-4..0.05f64],
+        transition in prop_oneof![Just(0.0), 0.01..0.3f64],
+        late in prop::option::of((prop::bool::ANY, prop::collection::vec(-1.0..1.0f64, 2), 0.5..1.2f64)),
+    ) {
+        for model in &*ENDS_IN_MOTION {
+            let conditions = Conditions { style: Some(style.clone()), ..Conditions::default() };
+            let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, Some(transition)).unwrap();
+            controller.set_tolerance(tolerance).unwrap();
+            let distances = |controller: &Controller| -> Vec<f64> {
+                controller.position().iter().zip(controller.centre()).map(|(y, g)| (y - g).abs()).collect()
+            };
+            let mut lengths: Vec<f64> =
+                distances(&controller).iter().zip(model.ranges()).map(|(d, range)| d.max(*range)).collect();
+            let (mut finished, mut settled) = (None, 0);
+            for k in 1..6000 {
+                if let Some((is_goal, value, _)) = late.as_ref().filter(|(_, _, at)| k == (1e3 * at) as usize) {
+                    finished = None;
+                    if *is_goal { controller.set_goal(value) } else { controller.set_style(value) }.unwrap();
+                    lengths = distances(&controller).iter().zip(model.ranges()).map(|(d, range)| d.max(*range)).collect();
+                }
+                let status = controller.step().unwrap();
+                finished = finished.or((status == Status::Finished).then_some(k));
+                let overshoot = controller.velocity().iter().map(|v| 2.0 * model.tau() * v.abs() / 25.0);
+                let distances = distances(&controller);
+                let relative = |values: &[f64]| {
+                    values.iter().zip(&lengths).map(|(value, length)| value / length).fold(0.0, f64::max)
+                };
+                if finished.is_some() {
+                    prop_assert!(relative(&distances) <= 1.001 * tolerance);
+                }
+                let bounds: Vec<f64> = distances.iter().zip(overshoot).map(|(d, v)| d + v).collect();
+                if relative(&bounds) > tolerance {
+                    settled = k + 1;
+                }
+            }
+            prop_assert!(finished.is_some());
+            if late.is_none() {
+                prop_assert!(finished.unwrap() <= settled.max(1000) + 2, "{finished:?} {settled}");
+            }
+        }
+    }
+}
+
 /// A movement finishes at the goal in force after any earlier goals, and not while the goal is in transition.
 #[test]
 fn movement_finishes_at_the_goal_in_force() {
@@ -414,7 +483,7 @@ fn context_predicts_its_demonstration() {
     assert!((prediction.duration - REACH.demonstrated().durations[2]).abs() < 0.01);
     let conditions = prediction.conditions;
     assert!((conditions.time_constant(&REACH).unwrap() - prediction.duration).abs() < 1e-12);
-    assert!(matches!(CYCLE.predict(&[0.3]), Err(Error::Arguments(_))));
+    assert!(matches!(CYCLE.predict(&[0.3]), Err(Error::Argument { name: "context", .. })));
     assert!(REACH.predict(&[0.3, 0.1]).is_err() && REACH.predict(&[f64::NAN]).is_err());
 }
 
@@ -434,9 +503,10 @@ fn rollouts_can_be_cancelled() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
-    /// The path does not depend on the rate: movements at any sequence of speeds, with pauses, pass the same positions.
+    /// The path does not depend on the rate: movements at any sequence of speeds and τ, with pauses, pass the same
+    /// positions, also past the end and after commands.
     #[test]
-    fn path_does_not_depend_on_the_rate(speeds in prop::collection::vec((0..4u8, 0.2..1.5f64), 6)) {
+    fn path_does_not_depend_on_the_rate(rates in prop::collection::vec((0..4u8, 0.2..1.5f64), 6)) {
         for model in [&*REACH, &*CYCLE] {
             let dt = 2e-4;
             let make = || Controller::new(model.primitive(), dt, &Conditions::default(), None).unwrap();
@@ -445,11 +515,18 @@ proptest! {
                 pdmp_core::dynamics::Canonical::Rhythmic { .. } => controller.phase(),
             };
             // Advances to a clock, with a last tick of the remaining length. Returns whether the clock is reached.
-            let advance_to = |controller: &mut Controller, to: f64, speeds: &[(u8, f64)]| {
+            let advance_to = |controller: &mut Controller, to: f64, rates: &[(u8, f64)]| {
                 for k in 0..100_000 {
-                    if k % 400 == 0 && !speeds.is_empty() {
-                        let (pause, speed) = speeds[k / 400 % speeds.len()];
-                        controller.set_speed(if pause == 0 { 0.0 } else { speed }).unwrap();
+                    if k % 400 == 0 && !rates.is_empty() {
+                        let (command, factor) = rates[k / 400 % rates.len()];
+                        match command {
+                            0 => controller.set_speed(0.0).unwrap(),
+                            1 => {
+                                controller.set_speed(1.0).unwrap();
+                                controller.set_tau(factor * model.tau()).unwrap();
+                            }
+                            _ => controller.set_speed(factor).unwrap(),
+                        }
                     }
                     let mut ahead = controller.clone();
                     ahead.step().unwrap();
@@ -471,9 +548,11 @@ proptest! {
             };
             let extent = model.canonical().extent();
             let (mut constant, mut varied) = (make(), make());
-            for (k, share) in [0.2, 0.3, 0.45, 0.7, 0.9].into_iter().enumerate() {
+            // The phase of a rhythmic movement wraps at its extent.
+            let n_stops = if model.kind() == Kind::Discrete { 6 } else { 5 };
+            for (k, share) in [0.2, 0.3, 0.45, 0.7, 0.9, 1.3].into_iter().take(n_stops).enumerate() {
                 let mut reached = advance_to(&mut constant, share * extent, &[]);
-                reached &= advance_to(&mut varied, share * extent, &speeds);
+                reached &= advance_to(&mut varied, share * extent, &rates);
                 prop_assume!(reached);
                 for ((a, b), range) in constant.position().iter().zip(varied.position()).zip(model.ranges()) {
                     prop_assert!((a - b).abs() < 1e-9 * range, "{share}: {a} {b}");
@@ -482,7 +561,7 @@ proptest! {
                 for controller in [&mut constant, &mut varied] {
                     match (k, model.kind()) {
                         (0, _) => controller.set_style(&[0.6, -0.2]).unwrap(),
-                        (1, Kind::Discrete) => controller.set_goal(&centre).unwrap(),
+                        (1 | 4, Kind::Discrete) => controller.set_goal(&centre).unwrap(),
                         (1, Kind::Rhythmic) => controller.set_anchor(&centre).unwrap(),
                         (2, Kind::Rhythmic) => controller.set_amplitude(0.4).unwrap(),
                         _ => {}

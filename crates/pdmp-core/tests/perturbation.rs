@@ -125,8 +125,14 @@ fn perturbed_movement_solves_the_stated_equations() {
             // The expected error is the same share of the constant error for every DoF.
             let excess: Vec<f64> = behind[..n].iter().map(|e| e * (1.0 - expected)).collect();
             if tracking_error && k > 0 {
+                let before = phase_rate;
                 let squares: f64 = excess.iter().zip(model.ranges()).map(|(d, range)| (d / range).powi(2)).sum();
                 phase_rate = 1.0 / (1.0 + stopping * squares);
+                // z takes up the change of the frame's velocity κc′.
+                for d in 0..n {
+                    let [a, b] = [-1e-6, 1e-6].map(|step| frame_offset(model, d, reference.2 + step));
+                    reference.1[d] += (before - phase_rate) * (b - a) / 2e-6;
+                }
                 expected += (1.0 - expected)
                     * (1.0 - (-5.0 / model.canonical().extent() * phase_rate * dt / model.tau()).exp());
             }
@@ -147,8 +153,7 @@ fn perturbed_movement_solves_the_stated_equations() {
     }
 }
 
-/// Velocity and acceleration are the derivatives of the position under perturbations and while τ is in transition. The
-/// acceleration of a discrete movement lacks the derivative of the phase rate, which a measured position changes.
+/// Velocity and acceleration are the derivatives of the position under perturbations and while τ is in transition.
 #[test]
 fn velocity_and_acceleration_stay_derivatives() {
     for (model, is_measured) in [(&*REACH, true), (&*REACH, false), (&*CYCLE, true), (&*CYCLE, false)] {
@@ -170,11 +175,13 @@ fn velocity_and_acceleration_stay_derivatives() {
         }
         for ticks in samples.windows(3) {
             let [before, now, after] = [&ticks[0], &ticks[1], &ticks[2]];
-            let exact = !is_measured || model.kind() == Kind::Rhythmic;
-            for (order, bound) in [(0, 1e-5), (1, if exact { 5e-3 } else { 2.0 })] {
+            for (order, bound) in [(0, 1e-5), (1, 5e-3)] {
                 for d in 0..n {
                     let slope = (after[order][d] - before[order][d]) / (2.0 * dt);
-                    assert!((slope - now[order + 1][d]).abs() < bound);
+                    assert!(
+                        (slope - now[order + 1][d]).abs() < bound,
+                        "{order} {slope} {now:?} {is_measured}, {before:?} {after:?}"
+                    );
                 }
             }
         }
@@ -248,7 +255,10 @@ fn blocked_movement_continues_after_its_release() {
         match model.kind() {
             Kind::Discrete => {
                 let goal = model.demonstrated().goals.row(model.demonstrated().nominal).to_vec();
-                assert!(relative_distance(model, blocked.position(), &goal) < 2e-3 && ticks < 1600, "{ticks}");
+                assert!(
+                    relative_distance(model, blocked.position(), &goal) < blocked.tolerance() && ticks < 1600,
+                    "{ticks}"
+                );
             }
             Kind::Rhythmic => {
                 // It has returned to the limit cycle: the unperturbed movement has this position at the same phase.

@@ -57,7 +57,7 @@ impl Loop {
         }
         let (vector, style, size) = (&values[..n_dofs], &values[..n_styles], values[0].abs());
         let tau = nominal_tau * (0.5 + random.next());
-        let _ = black_box(match (random.next() * 10.0) as u8 {
+        let _ = black_box(match (random.next() * 12.0) as u8 {
             0 => controller.set_style(style),
             1 => controller.set_goal(vector),
             2 => controller.set_anchor(vector),
@@ -65,7 +65,9 @@ impl Loop {
             4 => controller.set_amplitude(size),
             5 => controller.set_compliance(Compliance { stopping: 1e3 * size, tracking: 10.0 * size }),
             6 => controller.step().map(drop),
-            7 => controller.set_goal_velocity((size < 0.5).then_some(vector)),
+            7 => controller.set_phase(10.0 * size),
+            8 => controller.set_phase_gain(10.0 * size),
+            9 => controller.set_goal_velocity((size < 0.5).then_some(vector)),
             _ => Ok(()),
         });
         let command = Command {
@@ -78,10 +80,12 @@ impl Loop {
             amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(size),
             measured: random.rarely().then_some(vector),
             coupling: random.rarely().then_some(Coupling { velocity: vector, acceleration: vector }),
+            phase: (random.rarely() && kind == Kind::Rhythmic).then_some(10.0 * values[0]),
         };
         let vectors = [command.style, command.goal, command.goal_velocity, command.anchor, command.measured];
-        let uses_values =
-            vectors.iter().any(Option::is_some) || command.amplitude.is_some() || command.coupling.is_some();
+        let uses_values = vectors.iter().any(Option::is_some)
+            || command.amplitude.or(command.phase).is_some()
+            || command.coupling.is_some();
         let mut motion = Motion { position, velocity, acceleration };
         assert_eq!(black_box(controller.update(&command, &mut motion)).is_err(), uses_values && invalid);
     }
@@ -108,7 +112,7 @@ fn extreme_numbers_are_rejected_or_bounded() {
         [f64::NAN, f64::INFINITY, -f64::INFINITY, f64::MAX, -1e200, 1e150, 1e-150, 1e-300, 5e-324, -5e-324, 0.0, -0.0];
     for kind in [Kind::Discrete, Kind::Rhythmic] {
         let Loop { controller: fresh, .. } = Loop::new(kind);
-        for (field, &value) in (0..8).flat_map(|field| EXTREMES.iter().map(move |value| (field, value))) {
+        for (field, &value) in (0..11).flat_map(|field| EXTREMES.iter().map(move |value| (field, value))) {
             let mut controller = fresh.clone();
             let values = [value; 8];
             let (vector, style) = (&values[..fresh.primitive().n_dofs()], &values[..fresh.primitive().n_styles()]);
@@ -121,9 +125,17 @@ fn extreme_numbers_are_rejected_or_bounded() {
                 4 => Command { goal: Some(vector), ..none },
                 5 => Command { anchor: Some(vector), ..none },
                 6 => Command { measured: Some(vector), ..none },
-                _ => Command { coupling: Some(Coupling { velocity: vector, acceleration: vector }), ..none },
+                7 => Command { coupling: Some(Coupling { velocity: vector, acceleration: vector }), ..none },
+                8 => Command { phase: Some(value), ..none },
+                _ => none,
             };
             controller.step().unwrap();
+            let set = match field {
+                9 => controller.set_phase(value),
+                10 => controller.set_phase_gain(value),
+                _ => Ok(()),
+            };
+            assert!(field < 9 || set.is_err() || value.is_finite());
             let before = controller.clone();
             for _ in 0..100 {
                 match tick(&mut controller, &command) {
@@ -133,7 +145,7 @@ fn extreme_numbers_are_rejected_or_bounded() {
             }
             let motion = [controller.position(), controller.velocity(), controller.acceleration()];
             assert!(motion.into_iter().flatten().all(|x| x.is_finite()), "{kind} {field} {value:e}: {motion:?}");
-            assert!(value.is_finite() || controller.time() == before.time());
+            assert!(field > 8 || value.is_finite() || controller.time() == before.time());
         }
     }
 }

@@ -501,7 +501,7 @@ fn the_low_pass_halves_a_sine_at_the_cut_off_without_lag() {
     assert_relative_eq!(residuals[[1, 0]], 0.5 * 0.5f64.sqrt(), max_relative = 2e-2);
     assert!(residuals[[2, 0]] < 1e-3);
     let message = preprocessing::lowpass(&recorded(position), 80.0).unwrap_err().to_string();
-    assert_eq!(message, "cut_off = 80: must lie below half the sampling rate");
+    assert_eq!(message, "cut_off = 80 Hz: must lie below half the sampling rate of 100 Hz");
 }
 
 /// Gaps up to `max_gap` are interpolated, and other samples are unchanged.

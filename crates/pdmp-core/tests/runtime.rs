@@ -1,6 +1,6 @@
 //! A build without learning loads a model file, predicts from a context and moves as the build that learnt it.
 //!
-//! `PDMP_WRITE_MODEL=1 cargo test --package pdmp-core --test runtime` writes the model file and the expected numbers anew,
+//! `PDMP_WRITE_MODEL=1 cargo test --package pdmp-core --test runtime` writes the model file and the expected numbers,
 //! after a change of the file's format.
 
 use ndarray::Array2;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use common::*;
 use ndarray::{Array2, array};
-use pdmp_core::learning::{TimeScaling, Truncation, style_of};
+use pdmp_core::learning::{StyleOptions, TimeScaling, Truncation, style_of};
 use pdmp_core::model::TimeWarp;
 use pdmp_core::motion::TimeGrid;
 use pdmp_core::motion::jacobian;
@@ -302,6 +302,10 @@ fn segment_durations_are_predicted_from_contexts() {
 /// A new demonstration is aligned as in the fit, by the template or by its own landmarks.
 #[test]
 fn style_of_recovers_the_styles_of_warped_demonstrations() {
+    let options = |by_landmarks, landmarks: &[f64]| match by_landmarks {
+        true => StyleOptions::default().landmarks(landmarks),
+        false => StyleOptions::default(),
+    };
     for kind in KINDS {
         let demos = [warped(kind, 1.0, &EVEN, 1.0), warped(kind, 0.7, &UNEVEN, 1.3), warped(kind, 1.4, &SLOWER, 0.8)];
         let landmarks = array![[0.4], [0.5], [0.3]];
@@ -310,12 +314,12 @@ fn style_of_recovers_the_styles_of_warped_demonstrations() {
             let model = learn(&demos, &with(kind, time_scaling).n_styles(Truncation::Rank(3)));
             for (m, demo) in demos.iter().enumerate() {
                 let own = landmarks.row(m).to_vec();
-                let style = style_of(&model, demo, None, None, by_landmarks.then_some(&own)).unwrap();
+                let style = style_of(&model, demo, &options(by_landmarks, &own)).unwrap();
                 for (j, s) in style.iter().enumerate() {
                     assert!((s - model.demonstrated().styles[[m, j]]).abs() < 5e-3, "{kind} {m} {j} {s}");
                 }
             }
-            let wrong = style_of(&model, &demos[1], None, None, (!by_landmarks).then_some(&[0.5])).unwrap_err();
+            let wrong = style_of(&model, &demos[1], &options(!by_landmarks, &[0.5])).unwrap_err();
             assert!(wrong.to_string().contains("landmarks"), "{wrong}");
         }
     }
@@ -342,7 +346,7 @@ fn a_warped_model_is_saved_and_independent_of_threads() {
         assert_eq!(model.to_bytes().unwrap(), one);
         assert_eq!(model.breaks().len(), 9);
         assert!(model.learnt().template.is_some());
-        assert!(style_of(&model, &demos[3], None, None, None).is_ok());
+        assert!(style_of(&model, &demos[3], &StyleOptions::default()).is_ok());
     }
 }
 
@@ -395,7 +399,7 @@ fn the_jacobian_of_a_warped_movement_is_rejected() {
         grid,
         &mut |_| Ok(()),
     );
-    assert!(matches!(found, Err(Error::Arguments(_))));
+    assert!(matches!(found, Err(Error::Argument { name: "segment_durations", .. })));
 }
 
 /// Invalid warps, landmarks and segment durations are rejected with their numbers and the remedy.

@@ -3,45 +3,38 @@
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use ndarray::{Ix1, Ix2};
 use numpy::PyArrayMethods;
 use pdmp_core::Error;
 use pdmp_core::model::Derivative;
-use pdmp_core::motion::{Batch, BatchChunks, BatchConditions, PerMovement, TimeGrid, batch};
+use pdmp_core::motion::{Batch, BatchChunks, BatchConditions, TimeGrid, batch};
 use pdmp_core::numerics::Threads;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 
-use crate::convert::{Cube, array, items, matrix, threads, writable};
+use crate::batch_conditions::batch_conditions_of;
+use crate::convert::{Cube, items, threads, writable};
 use crate::error::{interruptible, raise};
 use crate::model::Model;
 use crate::scalar::{Scalar, optional_number};
 
 #[pymethods]
 impl Model {
-    /// Compute the movements of many styles.
+    /// Computes the movements of many conditions.
     ///
     /// A movement under constant conditions is linear in them, so that a batch is one product of coefficients with
     /// response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
     /// to rounding.
     ///
+    /// All movements share time constant and amplitude; they follow linear time and start at phase 0.
+    ///
     /// Parameters
     /// ----------
-    /// styles : array_like, (B, J)
-    ///     Style parameters s.
-    /// goals : array_like, (D,) or (B, D), optional
-    ///     Goals g of all or of each movement, in the unit of each degree of freedom; discrete.
-    /// starts : array_like, (D,) or (B, D), optional
-    ///     Start positions y₀ of all or of each movement. Rhythmic movements start on their limit cycles by default.
-    /// velocities : array_like, (D,) or (B, D), optional
-    ///     Start velocities per s of all or of each movement; by default those of the demonstrations.
-    /// anchors : array_like, (D,) or (B, D), optional
-    ///     Anchors y_a of all or of each movement; rhythmic.
-    /// amplitude : float, optional
-    ///     Amplitude r₀ of all movements; rhythmic.
-    /// tau : float, optional
-    ///     Time constant τ of all movements in s.
+    /// conditions : Conditions, or B Conditions, optional
+    ///     Conditions of all movements, or of each.
+    /// context : array_like or list, (Q,) or (B, Q), optional
+    ///     Context of all movements, or of each, whose prediction supplies absent conditions. Pass `tau` where the
+    ///     predicted durations differ.
     /// dt : float
     ///     Interval between samples in s.
     /// duration : float, optional
@@ -52,6 +45,9 @@ impl Model {
     ///     Writable float64 arrays for the results, one per order of derivative.
     /// threads : int, optional
     ///     Largest number of threads; by default all that the system offers. Results do not depend on it.
+    /// **changes
+    ///     Single conditions by name, which replace those of `conditions`; see `Conditions`. Style, goal, start,
+    ///     velocity, goal_velocity and anchor may have a leading axis, with one row for each of B movements.
     ///
     /// Returns
     /// -------
@@ -61,42 +57,40 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit.
-    ///     Nothing is written then.
+    ///     An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit;
+    ///     leading axes, time constants or amplitudes differ. Nothing is written then.
+    /// TypeError
+    ///     A keyword is unknown, or `conditions` has another type.
     /// MemoryError
     ///     The results do not fit into memory; use `rollout_chunks`.
     ///
     /// Examples
     /// --------
-    /// >>> positions, velocities = model.rollouts(model.styles, dt=0.1)
+    /// >>> positions, velocities = model.rollouts(style=model.styles, goal=model.goals, dt=0.1)
     /// >>> positions.shape
     /// (5, 13, 2)
     #[pyo3(
         signature = (
-            styles, *, goals=None, starts=None, velocities=None, anchors=None, amplitude=None, tau=None,
-            dt=Scalar::Number(0.01), duration=None, derivatives=Scalar::Count(1), out=None, threads=None
+            conditions=None, *, dt=Scalar::Number(0.01), duration=None, context=None, derivatives=Scalar::Count(1),
+            out=None, threads=None, **changes
         ),
-        text_signature = "($self, styles, *, goals=None, starts=None, velocities=None, anchors=None, amplitude=None, \
-                          tau=None, dt=0.01, duration=None, derivatives=1, out=None, threads=None)"
+        text_signature = "($self, conditions=None, *, dt=0.01, duration=None, context=None, derivatives=1, out=None, \
+                          threads=None, **changes)"
     )]
     #[allow(clippy::too_many_arguments)]
     fn rollouts<'py>(
         &self,
         py: Python<'py>,
-        styles: &Bound<'py, PyAny>,
-        goals: Option<&Bound<'py, PyAny>>,
-        starts: Option<&Bound<'py, PyAny>>,
-        velocities: Option<&Bound<'py, PyAny>>,
-        anchors: Option<&Bound<'py, PyAny>>,
-        amplitude: Option<Scalar<'py>>,
-        tau: Option<Scalar<'py>>,
+        conditions: Option<&Bound<'py, PyAny>>,
         dt: Scalar<'py>,
         duration: Option<Scalar<'py>>,
+        context: Option<&Bound<'py, PyAny>>,
         derivatives: Scalar<'py>,
         out: Option<&Bound<'py, PyAny>>,
         threads: Option<Scalar<'py>>,
+        changes: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let conditions = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
+        let conditions = batch_conditions_of(py, &self.0, conditions, context, changes)?;
         let options = Options { dt, duration, derivatives, threads };
         let work = PreparedBatch::new(py, self, conditions, options)?;
         let movements = 0..work.batch.shape().0;
@@ -107,21 +101,23 @@ impl Model {
         work.write(py, movements, out)
     }
 
-    /// Compute the movements of many styles in chunks.
+    /// Computes the movements of many conditions in chunks.
     ///
     /// Memory holds one chunk at a time. Results equal those of `rollouts` bit for bit. This call checks all arguments.
     ///
     /// Parameters
     /// ----------
-    /// styles : array_like, (B, J)
-    ///     Style parameters s.
+    /// conditions : Conditions, or B Conditions, optional
+    ///     As in `rollouts`.
     /// size : int
     ///     Number of movements in a chunk; the last may have fewer.
-    /// goals, starts, velocities, anchors : array_like, (D,) or (B, D), optional
+    /// context : array_like or list, (Q,) or (B, Q), optional
     ///     As in `rollouts`.
-    /// amplitude, tau, dt, duration : float, optional
+    /// dt, duration : float, optional
     ///     As in `rollouts`.
     /// derivatives, threads : int, optional
+    ///     As in `rollouts`.
+    /// **changes
     ///     As in `rollouts`.
     ///
     /// Returns
@@ -133,41 +129,39 @@ impl Model {
     /// ------
     /// ValueError
     ///     An argument that `rollouts` rejects, or a `size` below 1.
+    /// TypeError
+    ///     As in `rollouts`.
     ///
     /// Examples
     /// --------
     /// >>> cost = []
-    /// >>> for positions, velocities in model.rollout_chunks(model.styles, size=2):
+    /// >>> for positions, velocities in model.rollout_chunks(style=model.styles, size=2):
     /// ...     cost.extend((velocities**2).sum(axis=(1, 2)))
     /// >>> len(cost) == model.n_demos
     /// True
     #[pyo3(
         signature = (
-            styles, *, size=Scalar::Count(1000), goals=None, starts=None, velocities=None, anchors=None, amplitude=None,
-            tau=None, dt=Scalar::Number(0.01), duration=None, derivatives=Scalar::Count(1), threads=None
+            conditions=None, *, size=Scalar::Count(1000), dt=Scalar::Number(0.01), duration=None, context=None,
+            derivatives=Scalar::Count(1), threads=None, **changes
         ),
-        text_signature = "($self, styles, *, size=1000, goals=None, starts=None, velocities=None, anchors=None, \
-                          amplitude=None, tau=None, dt=0.01, duration=None, derivatives=1, threads=None)"
+        text_signature = "($self, conditions=None, *, size=1000, dt=0.01, duration=None, context=None, derivatives=1, \
+                          threads=None, **changes)"
     )]
     #[allow(clippy::too_many_arguments)]
     fn rollout_chunks<'py>(
         &self,
         py: Python<'py>,
-        styles: &Bound<'py, PyAny>,
+        conditions: Option<&Bound<'py, PyAny>>,
         size: Scalar<'py>,
-        goals: Option<&Bound<'py, PyAny>>,
-        starts: Option<&Bound<'py, PyAny>>,
-        velocities: Option<&Bound<'py, PyAny>>,
-        anchors: Option<&Bound<'py, PyAny>>,
-        amplitude: Option<Scalar<'py>>,
-        tau: Option<Scalar<'py>>,
         dt: Scalar<'py>,
         duration: Option<Scalar<'py>>,
+        context: Option<&Bound<'py, PyAny>>,
         derivatives: Scalar<'py>,
         threads: Option<Scalar<'py>>,
+        changes: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<RolloutChunks> {
         let size = size.count("size")?;
-        let conditions = Arguments { styles, goals, starts, velocities, anchors, amplitude, tau };
+        let conditions = batch_conditions_of(py, &self.0, conditions, context, changes)?;
         let options = Options { dt, duration, derivatives, threads };
         let work = PreparedBatch::new(py, self, conditions, options)?;
         let chunks = work.batch.chunks(size).map_err(raise)?;
@@ -205,9 +199,9 @@ struct PreparedBatch {
 }
 
 impl PreparedBatch {
-    fn new(py: Python<'_>, model: &Model, arguments: Arguments<'_, '_>, options: Options<'_>) -> PyResult<Self> {
+    fn new(py: Python<'_>, model: &Model, conditions: BatchConditions, options: Options<'_>) -> PyResult<Self> {
         let highest = Derivative::of_order("derivatives", options.derivatives.count("derivatives")?).map_err(raise)?;
-        let (threads, conditions) = (threads(options.threads)?, arguments.conditions()?);
+        let threads = threads(options.threads)?;
         let duration = optional_number("duration", options.duration)?;
         let grid = TimeGrid { dt: options.dt.number("dt")?, duration };
         let batch = interruptible(py, |progress| batch(model.0.primitive(), conditions, grid, progress))?;
@@ -262,48 +256,10 @@ impl PreparedBatch {
 
 const OVERLAP: &str = "out: arrays that share memory, with each other or with one in use; pass separate ones";
 
-/// Arguments for the conditions of a batch.
-struct Arguments<'a, 'py> {
-    styles: &'a Bound<'py, PyAny>,
-    goals: Option<&'a Bound<'py, PyAny>>,
-    starts: Option<&'a Bound<'py, PyAny>>,
-    velocities: Option<&'a Bound<'py, PyAny>>,
-    anchors: Option<&'a Bound<'py, PyAny>>,
-    amplitude: Option<Scalar<'py>>,
-    tau: Option<Scalar<'py>>,
-}
-
 /// Arguments for the samples of a batch.
 struct Options<'py> {
     dt: Scalar<'py>,
     duration: Option<Scalar<'py>>,
     derivatives: Scalar<'py>,
     threads: Option<Scalar<'py>>,
-}
-
-impl Arguments<'_, '_> {
-    fn conditions(self) -> PyResult<BatchConditions> {
-        Ok(BatchConditions {
-            styles: matrix("styles", "(B, J)", self.styles)?,
-            goals: rows("goals", self.goals)?,
-            anchors: rows("anchors", self.anchors)?,
-            starts: rows("starts", self.starts)?,
-            velocities: rows("velocities", self.velocities)?,
-            amplitude: optional_number("amplitude", self.amplitude)?,
-            tau: optional_number("tau", self.tau)?,
-            ..BatchConditions::default()
-        })
-    }
-}
-
-/// Converts to a vector (D,) for all movements or a matrix (B, D) with one row for each.
-fn rows(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<PerMovement>> {
-    let Some(value) = value else { return Ok(None) };
-    let array = array(name, value)?;
-    let shape = array.shape().to_vec();
-    let rows = match shape.len() {
-        1 => array.into_dimensionality::<Ix1>().map(|row| PerMovement::All(row.to_vec())),
-        _ => array.into_dimensionality::<Ix2>().map(PerMovement::Each),
-    };
-    rows.map(Some).map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected (D,) or (B, D)")))
 }

@@ -1,13 +1,15 @@
 //! Conditions of a movement, and the conversion of keywords to conditions.
 
 use numpy::PyArray1;
+use pdmp_core::Error;
 use pdmp_core::model::Conditions as Inner;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::{quoted, to_numpy, vector};
+use crate::convert::{read_only, vector};
 use crate::error::{ascii, raise};
+use crate::instance;
 use crate::scalar::{Scalar, number};
 
 /// Names of all conditions, which are their keywords.
@@ -77,7 +79,7 @@ impl Conditions {
         changed(Inner::default(), conditions).map(Self)
     }
 
-    /// Return a copy with some conditions replaced.
+    /// Returns a copy with some conditions replaced.
     ///
     /// Parameters
     /// ----------
@@ -172,7 +174,7 @@ impl Conditions {
     }
 }
 
-/// Compute the conditions (1 − share)·a + share·b.
+/// Computes the conditions (1 − share)·a + share·b.
 ///
 /// Parameters
 /// ----------
@@ -188,7 +190,7 @@ impl Conditions {
 /// Raises
 /// ------
 /// ValueError
-///     A condition is given for one of the two only, lengths differ, or `share` is not finite.
+///     A condition is given for only one of the two, lengths differ, or `share` is not finite.
 ///
 /// Examples
 /// --------
@@ -196,8 +198,9 @@ impl Conditions {
 /// >>> np.allclose(between.goal, 0.75 * model.goals[0] + 0.25 * model.goals[1])
 /// True
 #[pyfunction]
-pub(crate) fn blend(a: &Conditions, b: &Conditions, share: Scalar<'_>) -> PyResult<Conditions> {
-    a.0.blend(&b.0, share.number("share")?).map(Conditions).map_err(raise)
+pub(crate) fn blend(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>, share: Scalar<'_>) -> PyResult<Conditions> {
+    let (a, b) = (instance::conditions("a", a)?, instance::conditions("b", b)?);
+    a.blend(b, share.number("share")?).map(Conditions).map_err(raise)
 }
 
 /// Returns the conditions of a call: `conditions`, single ones replaced by `changes`, those absent from both predicted
@@ -210,28 +213,23 @@ pub(crate) fn conditions_of(
 ) -> PyResult<Inner> {
     let base = match conditions {
         None => Inner::default(),
-        Some(object) => match object.cast::<Conditions>() {
-            Ok(conditions) => conditions.get().0.clone(),
-            Err(_) => {
-                let text = format!(
-                    "conditions = {}: expected pdmp.Conditions; pass single ones by name, such as style=",
-                    quoted(object)
-                );
-                return Err(PyTypeError::new_err(text));
-            }
-        },
+        Some(object) => instance::conditions("conditions", object)?.clone(),
     };
     let own = changed(base, changes)?;
     let Some(context) = context else { return Ok(own) };
-    if own.style.is_some() {
-        return Err(PyValueError::new_err("pass style or context, not both: the context predicts the style"));
-    }
-    let prediction = model.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+    reject_style(own.style.is_some())?;
+    let prediction = model.predict(&crate::named_contexts::context_for(model, context)?).map_err(raise)?;
     Ok(own.or(prediction.conditions))
 }
 
+/// Rejects a style beside a context.
+pub(crate) fn reject_style(is_present: bool) -> PyResult<()> {
+    let reason = "the context predicts the style";
+    if is_present { Err(raise(Error::Conflict { names: ["style", "context"], reason })) } else { Ok(()) }
+}
+
 /// Returns conditions with the changes of a keyword dictionary.
-fn changed(mut conditions: Inner, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Inner> {
+pub(crate) fn changed(mut conditions: Inner, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Inner> {
     let Some(changes) = changes else { return Ok(conditions) };
     for (name, value) in changes {
         let name: String = name.extract()?;
@@ -281,5 +279,5 @@ fn present<'py>(conditions: &Bound<'py, Conditions>) -> PyResult<Bound<'py, PyDi
 }
 
 fn array<'py>(py: Python<'py>, values: &Option<Vec<f64>>) -> Option<Bound<'py, PyArray1<f64>>> {
-    values.as_ref().map(|values| to_numpy(py, values))
+    values.as_ref().map(|values| read_only(py, values))
 }

@@ -5,6 +5,7 @@ use numpy::IntoPyArray;
 use pdmp_core::context::MapSelection;
 use pyo3::prelude::*;
 
+use crate::choice::Choice;
 use crate::convert::{Cube, Matrix, matrix};
 use crate::error::{ascii, raise};
 use crate::fit::map_of;
@@ -47,9 +48,12 @@ pub(crate) struct ContextMap(pub(crate) pdmp_core::context::ContextMap);
 #[pymethods]
 impl ContextMap {
     #[new]
-    #[pyo3(signature = (contexts, outputs, map="auto"))]
-    fn new(contexts: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>, map: &str) -> PyResult<Self> {
-        let (rows, outputs) = (crate::convert::contexts(contexts)?, matrix("outputs", "(M, P)", outputs)?);
+    #[pyo3(
+        signature = (contexts, outputs, map=Choice::FIRST),
+        text_signature = "(contexts, outputs, map='auto')"
+    )]
+    fn new(contexts: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>, map: Choice<'_>) -> PyResult<Self> {
+        let (rows, outputs) = (crate::convert::contexts("contexts", contexts)?, matrix("outputs", "(M, P)", outputs)?);
         let selection: MapSelection = map_of(map)?;
         pdmp_core::context::ContextMap::fit(&rows, outputs.view(), selection).map(Self).map_err(raise)
     }
@@ -74,7 +78,7 @@ impl ContextMap {
         self.0.degrees_of_freedom()
     }
 
-    /// Compute the predictive mean and covariance of new outputs.
+    /// Computes the predictive mean and covariance of new outputs.
     ///
     /// Parameters
     /// ----------
@@ -93,7 +97,7 @@ impl ContextMap {
     /// ValueError
     ///     A context has a wrong length, an unknown label, or a number that is not finite.
     fn predict<'py>(&self, py: Python<'py>, contexts: &Bound<'_, PyAny>) -> PyResult<(Matrix<'py>, Option<Cube<'py>>)> {
-        let predictions = crate::convert::contexts(contexts)?
+        let predictions = crate::convert::contexts("contexts", contexts)?
             .iter()
             .map(|context| self.0.predict(context))
             .collect::<pdmp_core::Result<Vec<_>>>()
@@ -112,6 +116,10 @@ impl ContextMap {
     }
 
     fn __repr__(&self) -> String {
-        ascii(&format!("<pdmp.ContextMap: {}>", self.0))
+        format!("<pdmp.ContextMap: {}>", self.__str__())
+    }
+
+    fn __str__(&self) -> String {
+        ascii(&self.0.to_string())
     }
 }

@@ -10,36 +10,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::conditions::conditions_of;
-use crate::convert::{Reduced, Vector, items, quoted, read_only, refill};
+use crate::convert::{Vector, read_only, refill};
 use crate::error::raise;
+use crate::instance::pair;
 use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
-
-/// State of a movement: in progress (`WORKING`, 1, true) or settled on its goal (`FINISHED`, 2, false).
-#[pyclass(frozen, eq, hash, module = "pdmp")]
-#[derive(PartialEq, Eq, Hash)]
-pub(crate) enum Status {
-    #[pyo3(name = "WORKING")]
-    Working = 1,
-    #[pyo3(name = "FINISHED")]
-    Finished = 2,
-}
-
-#[pymethods]
-impl Status {
-    /// Return whether the movement is in progress, so that a loop is `while controller.step()`.
-    fn __bool__(&self) -> bool {
-        *self == Self::Working
-    }
-
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        let name = match self {
-            Self::Working => "WORKING",
-            Self::Finished => "FINISHED",
-        };
-        Ok((py.import("builtins")?.getattr("getattr")?, (py.get_type::<Self>(), name).into_pyobject(py)?))
-    }
-}
+use crate::status::Status;
 
 /// Buffers for vector arguments, which may be lists, strided arrays or the controller's own outputs.
 #[derive(Default)]
@@ -55,13 +31,14 @@ struct Arguments {
 /// Running movement, returned by `Model.controller`.
 ///
 /// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-/// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `speed`, `tolerance` and `compliance` can be set at any
-/// tick; a value that is rejected leaves the present one in force.
+/// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `compliance` and
+/// `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
+/// copied (`copy`, `deepcopy`) and pickled, and continues from its state to the bit.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
-    inner: pdmp_core::Controller,
+    pub(crate) inner: pdmp_core::Controller,
     /// Source of predictions for contexts in `reset`.
-    model: Arc<pdmp_core::Model>,
+    pub(crate) model: Arc<pdmp_core::Model>,
     arguments: Arguments,
     position: Output,
     velocity: Output,
@@ -95,7 +72,7 @@ impl Controller {
     }
 
     /// Publishes the outputs after a command: one before the first tick may change them.
-    fn command(&mut self, result: pdmp_core::Result<()>) -> PyResult<()> {
+    pub(crate) fn command(&mut self, result: pdmp_core::Result<()>) -> PyResult<()> {
         self.publish();
         result.map_err(raise)
     }
@@ -103,13 +80,13 @@ impl Controller {
 
 #[pymethods]
 impl Controller {
-    /// Advance the movement by one tick.
+    /// Advances the movement by one tick.
     ///
     /// A measured position and coupling terms perturb the equations::
     ///
     ///     tau y' = z + w(u) + k_t d + tau c_v
     ///     tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
-    ///     tau u' = k = 1 / (1 + k_s |d / range|**2)
+    ///     tau u' = max(0, k + k_phi sin(phase - phi))     k = 1 / (1 + k_s |d / range|**2)
     ///     tau o' = 5 k (e - o) / extent
     ///
     /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
@@ -117,7 +94,8 @@ impl Controller {
     /// terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
     /// m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
     /// there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
-    /// finishes.
+    /// finishes. A measured phase pulls the phase of a rhythmic movement with the gain k_phi of `phase_gain`, without
+    /// overshoot for a tick of any length.
     ///
     /// Parameters
     /// ----------
@@ -129,6 +107,9 @@ impl Controller {
     ///     `release`, so that a sensor may be slower than the loop.
     /// coupling : tuple of two array_like, (D,), optional
     ///     Terms (c_v, c_a), per s and per s². c_v adds to the velocity, including its jumps; c_a to the acceleration.
+    /// phase : float, optional
+    ///     Measured phase in rad of a rhythmic movement, for this tick only. A sensor slower than the loop passes its
+    ///     last phase plus the time since then over tau.
     ///
     /// Returns
     /// -------
@@ -138,8 +119,8 @@ impl Controller {
     /// Raises
     /// ------
     /// ValueError
-    ///     The tick is negative or longer than 1000 tau, a length is wrong, or a number is not finite. The state then
-    ///     stays as it was.
+    ///     The tick is negative or longer than 1000 tau, a length is wrong, a number is not finite, or a phase is passed
+    ///     to a discrete movement. The state then stays as it was.
     ///
     /// Examples
     /// --------
@@ -154,28 +135,32 @@ impl Controller {
     /// Ijspeert, Nakanishi, Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739 (phase stopping, term in y').
     /// Schaal, Mohajerian, Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9.
     /// Pastor, Hoffmann, Asfour, Schaal, ICRA 2009, doi:10.1109/ROBOT.2009.5152385 (terms in z').
-    #[pyo3(signature = (dt=None, *, measured=None, coupling=None))]
+    /// Acebrón, Bonilla, Pérez Vicente, Ritort, Spigler, Reviews of Modern Physics 77, 137, 2005 (pull of the phase).
+    #[pyo3(signature = (dt=None, *, measured=None, coupling=None, phase=None))]
     fn step(
         &mut self,
         py: Python<'_>,
         dt: Option<Scalar<'_>>,
         measured: Option<&Bound<'_, PyAny>>,
-        coupling: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+        coupling: Option<&Bound<'_, PyAny>>,
+        phase: Option<Scalar<'_>>,
     ) -> PyResult<Py<PyAny>> {
         let Self { inner, arguments, .. } = self;
-        let dt = optional_number("dt", dt)?;
+        let (dt, phase) = (optional_number("dt", dt)?, optional_number("phase", phase)?);
         if let Some(measured) = measured {
             refill("measured", measured, &mut arguments.measured)?;
         }
-        if let Some((velocity, acceleration)) = &coupling {
-            refill("coupling velocity", velocity, &mut arguments.velocity)?;
-            refill("coupling acceleration", acceleration, &mut arguments.acceleration)?;
+        if let Some(coupling) = coupling {
+            let [velocity, acceleration] = pair("coupling", coupling, "vectors (c_v, c_a)")?;
+            refill("coupling velocity", &velocity, &mut arguments.velocity)?;
+            refill("coupling acceleration", &acceleration, &mut arguments.acceleration)?;
         }
         let terms = Coupling { velocity: &arguments.velocity, acceleration: &arguments.acceleration };
         let command = Command {
             dt,
             measured: measured.map(|_| arguments.measured.as_slice()),
             coupling: coupling.map(|_| terms),
+            phase,
             ..Command::default()
         };
         inner.step_with(&command).map_err(raise)?;
@@ -183,7 +168,7 @@ impl Controller {
         Ok(self.status(py))
     }
 
-    /// Restart the movement.
+    /// Restarts the movement.
     ///
     /// Parameters
     /// ----------
@@ -231,12 +216,6 @@ impl Controller {
         self.acceleration.view(py)
     }
 
-    /// Phase: x in (0, 1] of a discrete movement, φ in [0, 2π) rad of a rhythmic one.
-    #[getter]
-    fn phase(&self) -> f64 {
-        self.inner.phase()
-    }
-
     /// Result of the last `step`, or `WORKING` after a later command.
     #[getter]
     fn status(&self, py: Python<'_>) -> Py<PyAny> {
@@ -273,7 +252,7 @@ impl Controller {
 
     /// Style s (J,); a read-only copy. Assign all values at once.
     #[getter]
-    fn style<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
+    fn style<'py>(&self, py: Python<'py>) -> Vector<'py> {
         read_only(py, self.inner.style())
     }
 
@@ -287,8 +266,8 @@ impl Controller {
     /// Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
     /// demonstrations; a read-only copy. Assign all values at once.
     #[getter]
-    fn goal_velocity<'py>(&self, py: Python<'py>) -> PyResult<Option<Vector<'py>>> {
-        self.inner.goal_velocity().map(|velocity| read_only(py, velocity)).transpose()
+    fn goal_velocity<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
+        self.inner.goal_velocity().map(|velocity| read_only(py, velocity))
     }
 
     #[setter]
@@ -375,24 +354,12 @@ impl Controller {
 
     #[setter]
     fn set_compliance(&mut self, compliance: &Bound<'_, PyAny>) -> PyResult<()> {
-        let gains = items("compliance", compliance, number)?;
-        let [stopping, tracking] = gains[..] else {
-            let text = format!("compliance = {}: expected two gains (k_s, k_t)", quoted(compliance));
-            return Err(PyValueError::new_err(text));
-        };
+        let [stopping, tracking] = pair("compliance", compliance, "gains (stopping, tracking)")?;
+        let (stopping, tracking) = (number("stopping", &stopping)?, number("tracking", &tracking)?);
         self.inner.set_compliance(Compliance { stopping, tracking }).map_err(raise)
     }
 
-    /// Return an independent controller in the same state, with the same model.
-    fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
-        Self::new(py, Arc::clone(&self.model), self.inner.clone())
-    }
-
-    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> PyResult<Self> {
-        self.__copy__(py)
-    }
-
-    /// Discard the measured position.
+    /// Discards the measured position.
     ///
     /// The movement is unperturbed until the next measurement.
     fn release(&mut self) {
@@ -411,6 +378,6 @@ impl Controller {
         if self.model.kind() != kind {
             return Err(PyValueError::new_err(other));
         }
-        read_only(py, self.inner.centre())
+        Ok(read_only(py, self.inner.centre()))
     }
 }

@@ -1,17 +1,16 @@
 //! Conversion of Python arguments and results: anything that numpy converts to float64 in, float64 out.
 
-use ndarray::{Array1, Array2, ArrayD, Ix1, Ix2};
+use ndarray::{Array1, Array2, ArrayD, Dimension, Ix1};
 use numpy::{
-    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayLikeDyn,
-    PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
+    AllowTypeChange, IntoPyArray, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn,
+    PyArrayLikeDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pdmp_core::demonstration::ContextValue;
 use pdmp_core::numerics::Threads;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
-use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
+use pyo3::types::{PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple};
 
 use crate::error::{nested, printable, raise};
 use crate::scalar::{Scalar, optional_count};
@@ -36,7 +35,7 @@ pub(crate) fn items<'py, T>(
     value: &Bound<'py, PyAny>,
     convert: impl Fn(&str, &Bound<'py, PyAny>) -> PyResult<T>,
 ) -> PyResult<Vec<T>> {
-    let expected = || PyTypeError::new_err(format!("{name} must be a list"));
+    let expected = || PyTypeError::new_err(format!("{name} = {}: expected a list", quoted(value)));
     if value.is_instance_of::<PyString>() {
         return Err(expected());
     }
@@ -177,11 +176,11 @@ pub(crate) fn array(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ArrayD<f64
 }
 
 /// Returns positions (T, D).
-pub(crate) fn two_axes(name: &str, array: ArrayD<f64>) -> PyResult<Array2<f64>> {
+pub(crate) fn two_axes(name: &str, axes: &str, array: ArrayD<f64>) -> PyResult<Array2<f64>> {
     let shape = array.shape().to_vec();
     array
         .into_dimensionality()
-        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes (T, D)")))
+        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
 }
 
 /// Converts to a vector (n,).
@@ -226,6 +225,9 @@ pub(crate) fn context(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Cont
     if value.is_instance_of::<PyString>() || value.is_instance_of::<PyBytes>() {
         return Err(PyTypeError::new_err(format!("{name} is a single text: put it into a list, one value per column")));
     }
+    if value.is_instance_of::<PyMapping>() {
+        return Err(PyTypeError::new_err(format!("{name} is a mapping: pass its values in a list")));
+    }
     let value = &rows_of(name, value)?;
     if value.try_iter().is_err() {
         return Ok(vec![context_value(name, value)?]);
@@ -244,7 +246,7 @@ fn rows_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, Py
     Ok(plain(name, value)?.into_any())
 }
 
-fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue> {
+pub(crate) fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue> {
     if let Ok(label) = value.extract::<String>() {
         return Ok(ContextValue::Label(label));
     }
@@ -256,20 +258,20 @@ fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<ContextValue>
 }
 
 /// Converts contexts (M, Q) of numbers and labels.
-pub(crate) fn contexts(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
-    let value = &rows_of("contexts", value)?;
+pub(crate) fn contexts(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
+    let value = &rows_of(argument, value)?;
     if let Ok(shape) = value.getattr("shape")
         && let Ok(shape) = shape.cast::<PyTuple>()
         && shape.len() != 2
     {
         let shape: Vec<String> = shape.iter().map(|length| length.to_string()).collect();
         let shape = format!("[{}]", shape.join(", "));
-        return Err(PyValueError::new_err(format!("contexts has shape {shape}, expected two axes (M, Q)")));
+        return Err(PyValueError::new_err(format!("{argument} has shape {shape}, expected two axes (M, Q)")));
     }
     if value.try_iter().is_err() {
-        return Err(PyTypeError::new_err("contexts must be an array of shape (M, Q), or a list of M lists"));
+        return Err(PyTypeError::new_err(format!("{argument} must be an array of shape (M, Q), or a list of M lists")));
     }
-    items("contexts", value, |name, row| {
+    items(argument, value, |name, row| {
         if row.is_instance_of::<PyString>() || row.try_iter().is_err() {
             return Err(PyValueError::new_err(format!(
                 "{name} = {}: expected two axes (M, Q): put the values of each demonstration into a list",
@@ -287,7 +289,7 @@ pub(crate) fn context_to_python<'py>(py: Python<'py>, context: &[ContextValue]) 
         .map(|value| if let ContextValue::Number(number) = value { Some(*number) } else { None })
         .collect();
     if let Some(numbers) = numbers {
-        return Ok(to_numpy(py, &numbers).into_any());
+        return Ok(read_only(py, &numbers).into_any());
     }
     let values = context.iter().map(|value| match value {
         ContextValue::Number(number) => number.into_bound_py_any(py),
@@ -310,11 +312,7 @@ pub(crate) fn numbers(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<
 /// Converts to a matrix with the named axes.
 pub(crate) fn matrix(name: &str, axes: &str, value: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
     // Copied: other threads may write to the caller's memory during a long call.
-    let array = array(name, value)?;
-    let shape = array.shape().to_vec();
-    array
-        .into_dimensionality::<Ix2>()
-        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected two axes {axes}")))
+    two_axes(name, axes, array(name, value)?)
 }
 
 /// Checks that an output is a writable float64 array of the given shape.
@@ -355,11 +353,18 @@ fn overlaps(shape: &[usize], strides: &[isize]) -> bool {
     })
 }
 
-/// Returns a new read-only numpy vector: assignment to an element would not reach the controller.
-pub(crate) fn read_only<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Vector<'py>> {
-    let vector = to_numpy(py, values);
-    vector.call_method(intern!(py, "setflags"), (false,), None)?;
-    Ok(vector)
+/// Returns a new read-only numpy vector: assignment to an element would not reach the object.
+pub(crate) fn read_only<'py>(py: Python<'py>, values: &[f64]) -> Vector<'py> {
+    locked(to_numpy(py, values))
+}
+
+/// Makes a new array read-only: assignment to an element of a copy would not reach the object.
+pub(crate) fn locked<D: Dimension>(array: Bound<'_, PyArray<f64, D>>) -> Bound<'_, PyArray<f64, D>> {
+    if let Ok(array) = array.try_readwrite() {
+        // The borrow ends, the flag remains.
+        drop(array.make_nonwriteable());
+    }
+    array
 }
 
 /// Returns a new numpy vector.

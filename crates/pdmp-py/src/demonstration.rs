@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::convert::{
-    Matrix, Reduced, Vector, array, context_to_python, optional, plain, quoted, texts, to_numpy, two_axes, vector,
+    Matrix, Reduced, Vector, array, context_to_python, locked, optional, plain, quoted, read_only, texts, to_numpy,
+    two_axes, vector,
 };
 use crate::error::raise;
 use crate::scalar::{Scalar, optional_number};
@@ -72,7 +73,7 @@ impl Demonstration {
             (None, None) => Sampling::Unknown,
         };
         let mut demo =
-            pdmp_core::Demonstration::new(two_axes("position", source.position)?, sampling).map_err(raise)?;
+            pdmp_core::Demonstration::new(two_axes("position", "(T, D)", source.position)?, sampling).map_err(raise)?;
         if let Some(goal) = optional("goal", goal)? {
             demo = demo.with_goal(goal).map_err(raise)?;
         }
@@ -80,19 +81,14 @@ impl Demonstration {
             demo = demo.with_context(crate::convert::context("context", values)?).map_err(raise)?;
         }
         let labels = |name, value: Option<&Bound<'_, PyAny>>| value.map(|value| texts(name, value)).transpose();
-        if let Some(names) = labels("names", names)?.or(source.names) {
-            demo = demo.with_names(names).map_err(raise)?;
-        }
-        if let Some(units) = labels("units", units)?.or(source.units) {
-            demo = demo.with_units(units).map_err(raise)?;
-        }
-        Ok(Self(demo))
+        let (names, units) = (labels("names", names)?.or(source.names), labels("units", units)?.or(source.units));
+        labelled(demo, names, units).map(Self).map_err(raise)
     }
 
     /// Positions (T, D) in the unit of each degree of freedom.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        self.0.position().to_pyarray(py)
+        locked(self.0.position().to_pyarray(py))
     }
 
     /// Times of the samples (T,) in s; None if unknown.
@@ -102,9 +98,9 @@ impl Demonstration {
             Sampling::Unknown => None,
             Sampling::Uniform { dt } => {
                 let time: Vec<f64> = (0..self.0.n_samples()).map(|c| c as f64 * dt).collect();
-                Some(to_numpy(py, &time))
+                Some(read_only(py, &time))
             }
-            Sampling::Stamped { time } => Some(to_numpy(py, time)),
+            Sampling::Stamped { time } => Some(read_only(py, time)),
         }
     }
 
@@ -120,7 +116,7 @@ impl Demonstration {
     /// Goal g (D,); None if not given.
     #[getter]
     fn goal<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
-        self.0.goal().map(|goal| to_numpy(py, goal))
+        self.0.goal().map(|goal| read_only(py, goal))
     }
 
     /// Context (Q,), an array of numbers or a list with labels; None if not given.
@@ -153,18 +149,14 @@ impl Demonstration {
         self.0.n_dofs()
     }
 
-    /// Return the arguments that rebuild the demonstration.
-    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((Matrix<'py>,), Bound<'py, PyDict>)> {
-        let options = PyDict::new(py);
-        match self.0.sampling() {
-            Sampling::Stamped { .. } => options.set_item("time", self.time(py))?,
-            _ => options.set_item("dt", self.dt())?,
+    /// Returns the arguments that rebuild the demonstration.
+    fn __getnewargs_ex__<'py>(slf: &Bound<'py, Self>) -> PyResult<((Bound<'py, PyAny>,), Bound<'py, PyDict>)> {
+        let stamped = matches!(slf.get().0.sampling(), Sampling::Stamped { .. });
+        let options = PyDict::new(slf.py());
+        for name in [if stamped { "time" } else { "dt" }, "goal", "context", "names", "units"] {
+            options.set_item(name, slf.getattr(name)?)?;
         }
-        options.set_item("goal", self.goal(py))?;
-        options.set_item("context", self.context(py)?)?;
-        options.set_item("names", self.names())?;
-        options.set_item("units", self.units())?;
-        Ok(((self.position(py),), options))
+        Ok(((slf.getattr("position")?,), options))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -240,15 +232,24 @@ impl Source {
     /// Returns demonstration `m` of a fit.
     pub(crate) fn demonstration(self, m: usize) -> PyResult<pdmp_core::Demonstration> {
         let sampling = self.time.map_or(Sampling::Unknown, |time| Sampling::Stamped { time });
-        let position = two_axes(&format!("demo {m}: position"), self.position)?;
-        let mut demo = pdmp_core::Demonstration::new(position, sampling);
-        if let Some(names) = self.names {
-            demo = demo.and_then(|demo| demo.with_names(names));
-        }
-        if let Some(units) = self.units {
-            demo = demo.and_then(|demo| demo.with_units(units));
-        }
-        demo.map_err(|error| raise(error.in_demo(m)))
+        let position = two_axes(&format!("demo {m}: position"), "(T, D)", self.position)?;
+        let demo = pdmp_core::Demonstration::new(position, sampling);
+        demo.and_then(|demo| labelled(demo, self.names, self.units)).map_err(|error| raise(error.in_demo(m)))
+    }
+}
+
+/// Sets the names and units that are given.
+fn labelled(
+    mut demo: pdmp_core::Demonstration,
+    names: Option<Vec<String>>,
+    units: Option<Vec<String>>,
+) -> pdmp_core::Result<pdmp_core::Demonstration> {
+    if let Some(names) = names {
+        demo = demo.with_names(names)?;
+    }
+    match units {
+        Some(units) => demo.with_units(units),
+        None => Ok(demo),
     }
 }
 
@@ -292,7 +293,7 @@ impl Trajectory {
 
 #[pymethods]
 impl Trajectory {
-    /// Rebuild a pickled trajectory.
+    /// Rebuilds a pickled trajectory.
     #[staticmethod]
     fn _of(
         time: Py<PyArray1<f64>>,
@@ -311,7 +312,7 @@ impl Trajectory {
         Ok((py.get_type::<Self>().getattr("_of")?, arguments))
     }
 
-    /// Return the arrays, names and units in a dictionary.
+    /// Returns the arrays, names and units in a dictionary.
     ///
     /// `io.read_npz` reads the file that `numpy.savez(path, **trajectory.to_dict())` writes.
     ///
@@ -319,18 +320,15 @@ impl Trajectory {
     /// -------
     /// dict
     ///     Keys are the names of the attributes.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let values = PyDict::new(py);
-        values.set_item("time", &self.time)?;
-        values.set_item("position", &self.position)?;
-        values.set_item("velocity", &self.velocity)?;
-        values.set_item("acceleration", &self.acceleration)?;
-        values.set_item("names", self.names.clone())?;
-        values.set_item("units", self.units.clone())?;
+    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let values = PyDict::new(slf.py());
+        for name in ["time", "position", "velocity", "acceleration", "names", "units"] {
+            values.set_item(name, slf.getattr(name)?)?;
+        }
         Ok(values)
     }
 
-    /// Return a data frame of positions, velocities and accelerations.
+    /// Returns a data frame of positions, velocities and accelerations.
     ///
     /// `Demonstration(frame[names], time=frame.index)` makes a demonstration of it.
     ///
@@ -348,7 +346,7 @@ impl Trajectory {
         slf.py().import("pdmp._labels")?.call_method1("to_dataframe", (slf,))
     }
 
-    /// Write a CSV file as `io.write_csv` does.
+    /// Writes a CSV file as `io.write_csv` does.
     ///
     /// Parameters
     /// ----------
@@ -358,7 +356,7 @@ impl Trajectory {
     /// Raises
     /// ------
     /// OSError
-    ///     The file cannot be written.
+    ///     The file cannot be written, or its folder does not exist.
     /// ValueError
     ///     A name could not be read back by `io.read_csv`.
     fn to_csv(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {

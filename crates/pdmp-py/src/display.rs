@@ -21,18 +21,20 @@ impl Model {
     fn __repr__(&self) -> String {
         let model = &self.0;
         let (n_demos, n_styles) = (model.n_demos(), model.n_styles());
-        let mut text = format!("<pdmp.Model: {}, {n_demos} demonstrations", model.kind());
-        let _ = write!(text, ", {} DoFs ({}), {n_styles} styles, {}", model.n_dofs(), dofs(model), timing(model));
+        let counts = [count(n_demos, "demonstration"), count(model.n_dofs(), "DoF"), count(n_styles, "style")];
+        let [n_demos, n_dofs, n_styles] = counts;
+        let mut text = format!("<pdmp.Model: {}, {n_demos}, {n_dofs} ({}), {n_styles}", model.kind(), dofs(model));
+        let _ = write!(text, ", {}", timing(model));
         if let Some((noise, share)) = largest_noise(model) {
             let _ = write!(text, "; measurement noise {noise}, {share}");
         }
         if let Some(map) = model.map() {
             let _ = write!(text, "; contexts {}; context map {}", contexts(model, map), map_summary(map));
         }
-        ascii(&format!("{text}; landscape {}>", model.learnt().regression))
+        ascii(&format!("{text}; regression {}>", model.learnt().regression))
     }
 
-    /// Return a table for notebooks.
+    /// Returns a table for notebooks.
     fn _repr_html_(&self) -> String {
         let model = &self.0;
         let mut rows = vec![
@@ -49,7 +51,7 @@ impl Model {
         if let Some(map) = model.map() {
             rows.extend([("contexts", contexts(model, map)), ("context map", map_summary(map))]);
         }
-        rows.push(("landscape", model.learnt().regression.clone()));
+        rows.push(("regression", model.learnt().regression.clone()));
         let rows = rows.iter().fold(String::new(), |mut html, (name, text)| {
             let _ = write!(html, "<tr><th>{}</th><td>{}</td></tr>", escaped(name), escaped(text));
             html
@@ -64,7 +66,7 @@ impl Trajectory {
         ascii(&format!("<pdmp.Trajectory: {}>", self.summary(py)))
     }
 
-    /// Return a table of the first and last samples for notebooks.
+    /// Returns a table of the first and last samples for notebooks.
     fn _repr_html_(&self, py: Python<'_>) -> String {
         let (time, position) = (self.time.bind(py).readonly(), self.position.bind(py).readonly());
         let (time, position) = (time.as_array(), position.as_array());
@@ -97,7 +99,7 @@ impl Trajectory {
     fn summary(&self, py: Python<'_>) -> String {
         let time = self.time.bind(py).readonly();
         let (n_samples, last) = (time.as_array().len(), time.as_array().last().copied().unwrap_or(0.0));
-        format!("{n_samples} samples x {} DoFs, {last:.4} s", self.names.len())
+        format!("{n_samples} samples x {}, {last:.4} s", count(self.names.len(), "DoF"))
     }
 }
 
@@ -161,10 +163,11 @@ fn largest_noise(model: &pdmp_core::Model) -> Option<(String, String)> {
 /// Returns the labels of each context column, or the range of its numbers.
 fn contexts(model: &pdmp_core::Model, map: &ContextMap) -> String {
     let columns = map.columns();
+    let column_name = |q: usize| map.names().get(q).map_or_else(|| format!("[{q}]"), String::clone);
     listed(
         columns.iter().enumerate().map(|(q, column)| match column {
             ContextColumn::Label(labels) => {
-                format!("[{q}] {}", listed(labels.iter().map(|label| format!("'{label}'")), " or "))
+                format!("{} {}", column_name(q), listed(labels.iter().map(|label| format!("'{label}'")), " or "))
             }
             ContextColumn::Number => {
                 let values = model.demonstrated().contexts.as_ref().map(|contexts| contexts.column(q).to_vec());
@@ -172,7 +175,7 @@ fn contexts(model: &pdmp_core::Model, map: &ContextMap) -> String {
                     .iter()
                     .flatten()
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| (low.min(value), high.max(value)));
-                format!("[{q}] from {} to {}", range.0, range.1)
+                format!("{} from {} to {}", column_name(q), range.0, range.1)
             }
         }),
         ", ",
@@ -193,4 +196,9 @@ fn map_summary(map: &ContextMap) -> String {
         let _ = write!(summary, " (for comparison: {})", others.join(", "));
     }
     summary
+}
+
+/// Returns a number of things, with their name in the singular or plural.
+pub(crate) fn count(n: usize, name: &str) -> String {
+    format!("{n} {name}{}", if n == 1 { "" } else { "s" })
 }

@@ -37,6 +37,7 @@ fn hint(error: &Error) -> &'static str {
     match error {
         Error::Demo { source, .. } => hint(source),
         Error::Aperiodic { .. } => " (onsets=)",
+        Error::Argument { name: "time", .. } => " (dt= or time=)",
         _ => "",
     }
 }
@@ -46,7 +47,7 @@ fn system_error(path: &Path, source: &std::io::Error) -> PyErr {
     match (source.raw_os_error(), source.kind()) {
         // Python chooses the subclass by the errno.
         (Some(errno), _) => PyOSError::new_err((errno, reason, path)),
-        (None, std::io::ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, "No such file or directory", path)),
+        (None, std::io::ErrorKind::NotFound) => PyFileNotFoundError::new_err((2, reason, path)),
         (None, std::io::ErrorKind::PermissionDenied) => PyPermissionError::new_err((13, "Permission denied", path)),
         // EINVAL: the path is invalid before any system call.
         (None, _) => PyOSError::new_err((22, reason, path)),

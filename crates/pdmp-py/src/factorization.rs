@@ -14,7 +14,7 @@ pub(crate) struct Factors {
     /// Styles S (M, J) with orthonormal columns. The entry of largest magnitude in each column is positive.
     styles: Py<PyArray2<f64>>,
     /// Basis targets F_basis = SᵀF (J, C·D). Their rows are orthogonal with the singular values as norms.
-    basis: Py<PyArray2<f64>>,
+    basis_targets: Py<PyArray2<f64>>,
     /// Singular values in decreasing order: all min(M, C·D), or the first J if the others were not computed.
     singular_values: Py<PyArray1<f64>>,
     /// Truncation error ‖F − S·F_basis‖/‖F‖ in the Frobenius norm.
@@ -24,8 +24,8 @@ pub(crate) struct Factors {
 #[pymethods]
 impl Factors {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let (styles, basis) = (self.styles.bind(py), self.basis.bind(py));
-        let (rows, n_styles, columns) = (styles.shape()[0], styles.shape()[1], basis.shape()[1]);
+        let (styles, targets) = (self.styles.bind(py), self.basis_targets.bind(py));
+        let (rows, n_styles, columns) = (styles.shape()[0], styles.shape()[1], targets.shape()[1]);
         Ok(format!(
             "<pdmp.Factors: J = {n_styles} of targets ({rows}, {columns}), truncation error {:.1e}>",
             self.truncation_error
@@ -33,7 +33,7 @@ impl Factors {
     }
 }
 
-/// Factorise stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
+/// Factorises stacked targets by a truncated singular value decomposition (step 3 of Section 3.2).
 ///
 /// F = UΣVᵀ; S is the first J columns of U and F_basis the first J rows of ΣVᵀ, the best approximation of F of rank J.
 /// `fit` factorises its targets so. A few factors of many demonstrations are computed by Krylov iteration, others from
@@ -79,7 +79,7 @@ pub(crate) fn factorise(
     let truncation_error = factors.truncation_error();
     Ok(Factors {
         styles: factors.styles.into_pyarray(py).unbind(),
-        basis: factors.basis.into_pyarray(py).unbind(),
+        basis_targets: factors.basis_targets.into_pyarray(py).unbind(),
         singular_values: to_numpy(py, &factors.singular_values).unbind(),
         truncation_error,
     })

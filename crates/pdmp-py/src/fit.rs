@@ -15,15 +15,17 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyList, PyMapping};
 
+use crate::choice::Choice;
 use crate::convert::{items, matrix, numbers, quoted};
 use crate::demonstration::{Demonstration, Source, Trajectory};
 use crate::error::{detached, raise};
+use crate::instance;
 use crate::model::Model;
 use crate::regression::{Gp, NGnet};
 use crate::scalar::{Scalar, optional_count, optional_number};
 use crate::warp::TimeWarp;
 
-/// Fit a movement primitive to demonstrations.
+/// Fits a movement primitive to demonstrations.
 ///
 /// The four steps of Section 3.2: align the demonstrations to a nominal one, compute the targets f = τẏ − z exactly,
 /// factorise them, F ≈ S·F_basis (Eq. 7), and regress the attractor landscape on the phase.
@@ -39,8 +41,10 @@ use crate::warp::TimeWarp;
 ///     Sampling interval in s of demonstrations without one.
 /// period : float or array_like, (M,), optional
 ///     Periods in s of time-stamped cycles.
-/// contexts : array_like, (M, Q), or M lists of Q numbers and labels, optional
-///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry.
+/// contexts : array_like, (M, Q), or M lists of Q numbers and labels, or mapping, optional
+///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
+///     keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
+///     (M,).
 /// map : {"auto", "stacked", "gp", "linear", "polynomial"}
 ///     Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
 ///     regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
@@ -138,7 +142,7 @@ use crate::warp::TimeWarp;
 #[pyfunction]
 #[pyo3(
     signature = (
-        demos, *, kind="discrete", dt=None, period=None, contexts=None, map="auto", n_styles=None,
+        demos, *, kind=Choice::FIRST, dt=None, period=None, contexts=None, map=Choice::FIRST, n_styles=None,
         singular_value_share=None, basis=None, smoothing=SmoothingArgument(Smoothing::Auto), nominal=None,
         n_samples=None, transport=None, dof_scale=None, alignment=None, landmarks=None, tau=None,
         alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None, mu=None, threads=None, progress=None
@@ -152,18 +156,18 @@ use crate::warp::TimeWarp;
 pub(crate) fn fit(
     py: Python<'_>,
     demos: &Bound<'_, PyAny>,
-    kind: &str,
+    kind: Choice<'_>,
     dt: Option<Scalar<'_>>,
     period: Option<&Bound<'_, PyAny>>,
     contexts: Option<&Bound<'_, PyAny>>,
-    map: &str,
+    map: Choice<'_>,
     n_styles: Option<&Bound<'_, PyAny>>,
     singular_value_share: Option<Scalar<'_>>,
     basis: Option<&Bound<'_, PyAny>>,
     smoothing: SmoothingArgument,
     nominal: Option<Scalar<'_>>,
     n_samples: Option<Scalar<'_>>,
-    transport: Option<&str>,
+    transport: Option<Choice<'_>>,
     dof_scale: Option<&Bound<'_, PyAny>>,
     alignment: Option<&Bound<'_, PyAny>>,
     landmarks: Option<&Bound<'_, PyAny>>,
@@ -173,18 +177,21 @@ pub(crate) fn fit(
     alpha_x: Option<Scalar<'_>>,
     mu: Option<Scalar<'_>>,
     threads: Option<Scalar<'_>>,
-    progress: Option<Py<PyAny>>,
+    progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Model> {
     let demos = demonstrations("demos", demos)?;
     let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
     let rhythmic = (optional_number("mu", mu)?, period);
-    let mut options = FitOptions::new(canonical_of(kind_of(kind)?, discrete, rhythmic)?);
+    let mut options = FitOptions::new(canonical_of(kind.of("kind", &KINDS)?, discrete, rhythmic)?);
     options.dt = optional_number("dt", dt)?;
     options.smoothing = smoothing.0;
     options.nominal = optional_count("nominal", nominal)?;
     options.n_samples = optional_count("n_samples", n_samples)?;
     options.time_scaling = time_scaling_of(alignment, landmarks)?;
-    options.contexts = contexts.map(crate::convert::contexts).transpose()?;
+    if let Some(contexts) = contexts {
+        let (names, rows) = crate::named_contexts::named_contexts("contexts", contexts)?;
+        (options.contexts, options.context_names) = (Some(rows), names.unwrap_or_default());
+    }
     options.map = map_of(map)?;
     options.n_styles = n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?;
     options.basis = basis_of(basis)?;
@@ -192,6 +199,7 @@ pub(crate) fn fit(
     options.alpha_z = alpha_z.number("alpha_z")?;
     options.beta_z = optional_number("beta_z", beta_z)?;
     options.threads = crate::convert::threads(threads)?;
+    let progress = instance::callback("progress", progress)?.map(|progress| progress.clone().unbind());
     let report = |py: Python<'_>, stage: Stage, fraction| match &progress {
         Some(progress) => progress.call1(py, (stage.name(), fraction)).map(drop),
         None => Ok(()),
@@ -204,7 +212,7 @@ pub(crate) fn fit(
 /// Returns the options of the canonical system. Rejects arguments of the other kind.
 fn canonical_of(
     kind: Kind,
-    (tau, alpha_x, transport): (Option<f64>, Option<f64>, Option<&str>),
+    (tau, alpha_x, transport): (Option<f64>, Option<f64>, Option<Choice<'_>>),
     (mu, period): (Option<f64>, Option<&Bound<'_, PyAny>>),
 ) -> PyResult<CanonicalOptions> {
     let reject = |name, is_present: bool| match is_present {
@@ -215,7 +223,8 @@ fn canonical_of(
         Kind::Discrete => {
             reject("mu", mu.is_some())?;
             reject("period", period.is_some())?;
-            Ok(CanonicalOptions::Discrete { tau, alpha_x, transport: transport_of(transport.unwrap_or("learnt"))? })
+            let transport = transport.unwrap_or(Choice::FIRST).of("transport", &TRANSPORTS)?;
+            Ok(CanonicalOptions::Discrete { tau, alpha_x, transport })
         }
         Kind::Rhythmic => {
             reject("tau", tau.is_some())?;
@@ -235,7 +244,10 @@ fn n_styles_of(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option
     }
     match n_styles.extract::<String>().as_deref() {
         Ok("auto") => Ok(NStyles::CrossValidated),
-        Ok(name) => Err(PyValueError::new_err(format!("n_styles = {name:?}: must be a number, \"auto\" or None"))),
+        Ok(_) => {
+            let allowed = "must be a number, \"auto\" or None";
+            Err(PyValueError::new_err(format!("n_styles = {}: {allowed}", quoted(n_styles))))
+        }
         Err(_) => Ok(Truncation::Rank(Scalar::Object(n_styles.clone()).count("n_styles")?).into()),
     }
 }
@@ -273,21 +285,14 @@ pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResu
     })
 }
 
-pub(crate) fn map_of(map: &str) -> PyResult<MapSelection> {
-    if map == "auto" {
-        return Ok(MapSelection::Auto);
-    }
-    let kind = ContextMapKind::ALL.into_iter().find(|kind| kind.name() == map);
-    let allowed = "must be \"auto\", \"stacked\", \"gp\", \"linear\" or \"polynomial\"";
-    kind.map(MapSelection::Given).ok_or_else(|| PyValueError::new_err(format!("map = {map:?}: {allowed}")))
-}
+const KINDS: [(&str, Kind); 2] = [("discrete", Kind::Discrete), ("rhythmic", Kind::Rhythmic)];
+const TRANSPORTS: [(&str, TransportSelection); 2] =
+    [("learnt", TransportSelection::Learnt), ("immediate", TransportSelection::Immediate)];
 
-pub(crate) fn kind_of(kind: &str) -> PyResult<Kind> {
-    match kind {
-        "discrete" => Ok(Kind::Discrete),
-        "rhythmic" => Ok(Kind::Rhythmic),
-        _ => Err(PyValueError::new_err(format!("kind = {kind:?}: must be \"discrete\" or \"rhythmic\""))),
-    }
+/// Returns the selection of the context map for argument `map`.
+pub(crate) fn map_of(map: Choice<'_>) -> PyResult<MapSelection> {
+    let given = ContextMapKind::ALL.into_iter().map(|kind| (kind.name(), MapSelection::Given(kind)));
+    map.of("map", &[("auto", MapSelection::Auto)].into_iter().chain(given).collect::<Vec<_>>())
 }
 
 fn basis_of(basis: Option<&Bound<'_, PyAny>>) -> PyResult<Basis> {
@@ -362,22 +367,15 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
     }
 }
 
-fn transport_of(transport: &str) -> PyResult<TransportSelection> {
-    match transport {
-        "learnt" => Ok(TransportSelection::Learnt),
-        "immediate" => Ok(TransportSelection::Immediate),
-        _ => Err(PyValueError::new_err(format!("transport = {transport:?}: must be \"learnt\" or \"immediate\""))),
-    }
-}
-
 fn dof_scale_of(scale: Option<&Bound<'_, PyAny>>) -> PyResult<DofScaling> {
     let Some(scale) = scale else { return Ok(DofScaling::Auto) };
     match scale.extract::<String>().as_deref() {
         Ok("range") => Ok(DofScaling::Range),
         Ok("unit") => Ok(DofScaling::Unit),
-        Ok(other) => Err(PyValueError::new_err(format!(
-            "dof_scale = {other:?}: must be None, \"unit\", \"range\" or one number per DoF"
-        ))),
+        Ok(_) => {
+            let allowed = "must be None, \"unit\", \"range\" or one number per DoF";
+            Err(PyValueError::new_err(format!("dof_scale = {}: {allowed}", quoted(scale))))
+        }
         Err(_) => crate::convert::vector("dof_scale", scale).map(DofScaling::Given),
     }
 }

@@ -18,7 +18,7 @@ pub(crate) fn warn(py: Python<'_>, findings: &[Finding]) -> PyResult<()> {
     Ok(())
 }
 
-/// Inspect demonstrations as `fit` does.
+/// Inspects demonstrations as `fit` does.
 ///
 /// Parameters
 /// ----------

@@ -2,9 +2,12 @@
 //! calls the core and converts the result.
 
 mod batch;
+mod batch_conditions;
+mod choice;
 mod conditions;
 mod context;
 mod controller;
+mod controller_state;
 mod convert;
 mod demonstration;
 mod display;
@@ -12,14 +15,17 @@ mod error;
 mod factorization;
 mod fit;
 mod inspection;
+mod instance;
 mod model;
 mod model_getters;
 mod motion;
+mod named_contexts;
 mod output;
 mod prediction;
 mod preprocessing;
 mod regression;
 mod scalar;
+mod status;
 mod warp;
 
 use pyo3::prelude::*;
@@ -45,7 +51,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<context::ContextMap>()?;
     module.add_class::<conditions::Conditions>()?;
     module.add_class::<prediction::Prediction>()?;
-    module.add_class::<controller::Status>()?;
+    module.add_class::<status::Status>()?;
     module.add_class::<controller::Controller>()?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
     module.add_function(wrap_pyfunction!(conditions::blend, module)?)?;
@@ -54,11 +60,11 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(model::load, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::resample, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::trim, module)?)?;
-    module.add_function(wrap_pyfunction!(preprocessing::cut, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::split_at, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::lowpass, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::residuals, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::period, module)?)?;
-    module.add_function(wrap_pyfunction!(preprocessing::fill, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::fill_gaps, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::cycles, module)?)?;
     Ok(())
 }

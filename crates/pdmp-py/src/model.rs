@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ndarray::Array3;
 use numpy::IntoPyArray;
-use pdmp_core::learning::style_of;
+use pdmp_core::learning::{StyleOptions, style_of};
 use pdmp_core::motion::{PredictionBand, TimeGrid, prediction_band};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -13,18 +13,18 @@ use pyo3::types::{PyBytes, PyString};
 
 use crate::conditions::Conditions;
 use crate::convert::{Cube, Matrix, Reduced, Vector, optional, quoted, to_numpy, vector};
-use crate::demonstration::Demonstration;
 use crate::error::raise;
+use crate::instance;
 use crate::prediction::Prediction;
 use crate::scalar::{Scalar, optional_number};
 
 /// Parametric dynamic movement primitive, returned by `fit` and `load`.
 ///
-/// Models are immutable and can be pickled.
+/// Models are immutable, their arrays are read-only copies, and they can be pickled.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
 
-/// Read a model file.
+/// Reads a model file.
 ///
 /// Parameters
 /// ----------
@@ -59,7 +59,7 @@ pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
 
 #[pymethods]
 impl Model {
-    /// Return the conditions of one demonstration, or the mean of several.
+    /// Returns the conditions of one demonstration, or the mean of several.
     ///
     /// Parameters
     /// ----------
@@ -96,16 +96,19 @@ impl Model {
             let text = format!("demos = {}: pass the index of a demonstration, or a list of them", quoted(demos));
             return Err(PyValueError::new_err(text));
         };
+        if indices.is_empty() {
+            return Err(PyValueError::new_err("demos = []: pass the index of at least one demonstration"));
+        }
         let last = self.0.n_demos() - 1;
         let index = |index: isize| {
-            let text = || format!("demos: {index} must lie between 0 and {last}");
+            let text = || format!("demos = {index}: must lie between 0 and {last}");
             usize::try_from(index).ok().filter(|index| *index <= last).ok_or_else(|| PyValueError::new_err(text()))
         };
         let indices = indices.into_iter().map(index).collect::<PyResult<Vec<usize>>>()?;
         self.0.conditions(&indices).map(Conditions).map_err(raise)
     }
 
-    /// Estimate the style of a new demonstration.
+    /// Estimates the style of a new demonstration.
     ///
     /// The maximum a posteriori estimate minimises ‖f − As‖²/σ² + Σ s_j²/v_j, with the target f, the forcing terms A of
     /// the styles, the least-squares residual variance σ² and the largest square v_j of the demonstrations' styles. A
@@ -145,23 +148,25 @@ impl Model {
     fn style_of<'py>(
         &self,
         py: Python<'py>,
-        demonstration: &Demonstration,
+        demonstration: &Bound<'py, PyAny>,
         dt: Option<Scalar<'py>>,
         period: Option<Scalar<'py>>,
         landmarks: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vector<'py>> {
-        let (dt, period) = (optional_number("dt", dt)?, optional_number("period", period)?);
-        let landmarks = optional("landmarks", landmarks)?;
+        let demonstration = instance::demonstration("demonstration", demonstration)?;
+        let mut options = StyleOptions::default();
+        options.dt = optional_number("dt", dt)?;
+        options.period = optional_number("period", period)?;
+        options.landmarks = optional("landmarks", landmarks)?;
         crate::inspection::warn(
             py,
-            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(&demonstration.0), dt),
+            &pdmp_core::preprocessing::inspection::inspect(std::slice::from_ref(demonstration), options.dt),
         )?;
-        let style =
-            py.detach(|| style_of(&self.0, &demonstration.0, dt, period, landmarks.as_deref())).map_err(raise)?;
+        let style = py.detach(|| style_of(&self.0, demonstration, &options)).map_err(raise)?;
         Ok(to_numpy(py, &style))
     }
 
-    /// Compute the attractor landscape b(u) of each style dimension and degree of freedom.
+    /// Computes the attractor landscape b(u) of each style dimension and degree of freedom.
     ///
     /// Parameters
     /// ----------
@@ -189,7 +194,7 @@ impl Model {
         Ok(landscape.into_pyarray(py))
     }
 
-    /// Compute the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
+    /// Computes the transport m(u), the share of the distance from start to goal that a discrete movement has covered.
     ///
     /// The frame of the output system is c(u) = y₀ + (g − y₀)·m(u). m increases from 0 at the start to 1 at the end and
     /// stays 1; with `transport="immediate"`, m = 1 everywhere.
@@ -213,7 +218,7 @@ impl Model {
         Ok(shares?.into_pyarray(py))
     }
 
-    /// Compute the time constant τ at a phase for given segment durations.
+    /// Computes the time constant τ at a phase for given segment durations.
     ///
     /// A control loop follows segment durations, as `rollout` does, if it sets
     /// `controller.tau = model.tau_at(controller.phase, segment_durations)` before each tick, with `transition=0`.
@@ -239,12 +244,12 @@ impl Model {
         self.0.tau_at(phase, &vector("segment_durations", segment_durations)?).map_err(raise)
     }
 
-    /// Predict the movement for a context (Section 4.1.2).
+    /// Predicts the movement for a context (Section 4.1.2).
     ///
     /// Parameters
     /// ----------
-    /// context : array_like or list, (Q,)
-    ///     Numbers and labels, in the units of the demonstrations' contexts.
+    /// context : array_like, list or mapping, (Q,)
+    ///     Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
     ///
     /// Returns
     /// -------
@@ -263,11 +268,11 @@ impl Model {
     /// >>> np.allclose(trajectory.position, model.rollout(context=[0.05]).position)
     /// True
     fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
-        let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+        let prediction = self.0.predict(&crate::named_contexts::context_for(&self.0, context)?).map_err(raise)?;
         Prediction::new(py, prediction)
     }
 
-    /// Compute the prediction band of a new movement for a context.
+    /// Computes the prediction band of a new movement for a context.
     ///
     /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
     /// conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
@@ -275,8 +280,8 @@ impl Model {
     ///
     /// Parameters
     /// ----------
-    /// context : array_like or list, (Q,)
-    ///     Numbers and labels, in the units of the demonstrations' contexts.
+    /// context : array_like, list or mapping, (Q,)
+    ///     Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
     /// level : float
     ///     Probability in (0, 1) that a position of the new movement lies within its bounds.
     /// dt : float
@@ -303,14 +308,14 @@ impl Model {
         dt: Scalar<'py>,
     ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let (level, dt) = (level.number("level")?, dt.number("dt")?);
-        let prediction = self.0.predict(&crate::convert::context("context", context)?).map_err(raise)?;
+        let prediction = self.0.predict(&crate::named_contexts::context_for(&self.0, context)?).map_err(raise)?;
         let grid = TimeGrid { dt, duration: None };
         let PredictionBand { lower, upper } =
             py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
 
-    /// Write a model file.
+    /// Writes a model file.
     ///
     /// The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary
     /// file `.pdmp-*.draft` beside it.
@@ -323,7 +328,7 @@ impl Model {
     /// Raises
     /// ------
     /// OSError
-    ///     The file cannot be written.
+    ///     The file cannot be written, or its folder does not exist.
     ///
     /// Examples
     /// --------
@@ -336,12 +341,12 @@ impl Model {
         py.detach(|| self.0.save(&path)).map_err(raise)
     }
 
-    /// Return the contents of a model file as bytes.
+    /// Returns the contents of a model file as bytes.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &py.detach(|| self.0.to_bytes()).map_err(raise)?))
     }
 
-    /// Read a model from the contents of a model file.
+    /// Reads a model from the contents of a model file.
     ///
     /// Parameters
     /// ----------

@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 
 use crate::context::ContextMap;
-use crate::convert::{Matrix, Vector, context_to_python, to_numpy};
-use crate::error::raise;
+use crate::convert::{Matrix, Vector, context_to_python, locked, read_only};
+use crate::error::{ascii, raise};
 use crate::model::Model;
 
 #[pymethods]
@@ -102,7 +102,7 @@ impl Model {
     /// Styles S (M, J) of the demonstrations, without unit.
     #[getter]
     fn styles<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        self.0.demonstrated().styles.to_pyarray(py)
+        locked(self.0.demonstrated().styles.to_pyarray(py))
     }
 
     /// Singular values of the targets in decreasing order.
@@ -110,7 +110,7 @@ impl Model {
     /// All min(M, C·D), or the first J if a small `n_styles` was given and the others were not computed.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        to_numpy(py, &self.0.learnt().singular_values)
+        read_only(py, &self.0.learnt().singular_values)
     }
 
     /// Truncation error ‖F − S·F_basis‖/‖F‖ of the targets F in the Frobenius norm.
@@ -125,7 +125,7 @@ impl Model {
     /// 0 if no noise was found, or with `smoothing=None`.
     #[getter]
     fn noise<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        to_numpy(py, self.0.learnt().noise.levels())
+        read_only(py, self.0.learnt().noise.levels())
     }
 
     /// Cut-off frequencies (D,) of the smoothing in Hz, at a gain of one half; inf without smoothing.
@@ -133,49 +133,49 @@ impl Model {
     fn cut_offs<'py>(&self, py: Python<'py>) -> Vector<'py> {
         let cut_offs: Vec<f64> =
             self.0.learnt().noise.cut_offs().iter().map(|hz| hz.unwrap_or(f64::INFINITY)).collect();
-        to_numpy(py, &cut_offs)
+        read_only(py, &cut_offs)
     }
 
     /// Scale (D,) of each degree of freedom in the factorisation, in its unit.
     #[getter]
     fn dof_scale<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        to_numpy(py, &self.0.learnt().dof_scale)
+        read_only(py, &self.0.learnt().dof_scale)
     }
 
     /// Goals (M, D) of the demonstrations in the unit of each degree of freedom.
     #[getter]
     fn goals<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        self.0.demonstrated().goals.to_pyarray(py)
+        locked(self.0.demonstrated().goals.to_pyarray(py))
     }
 
     /// First positions (M, D) of the demonstrations in the unit of each degree of freedom.
     #[getter]
     fn starts<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        self.0.demonstrated().starts.to_pyarray(py)
+        locked(self.0.demonstrated().starts.to_pyarray(py))
     }
 
     /// Mean positions (M, D) of the demonstrations, the anchors of cycles, in the unit of each degree of freedom.
     #[getter]
     fn anchors<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        self.0.demonstrated().anchors.to_pyarray(py)
+        locked(self.0.demonstrated().anchors.to_pyarray(py))
     }
 
     /// Bounds (K+1,) of the segments as shares of the movement, from 0 to 1; K = 1 with linear scaling of time.
     #[getter]
     fn breaks<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        to_numpy(py, self.0.breaks())
+        read_only(py, self.0.breaks())
     }
 
     /// Time (M, K) in s of each demonstration in each segment between `breaks`.
     #[getter]
     fn segment_durations<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        self.0.demonstrated().segment_durations.to_pyarray(py)
+        locked(self.0.demonstrated().segment_durations.to_pyarray(py))
     }
 
     /// Durations or periods (M,) of the demonstrations in s, the sums of their segment durations.
     #[getter]
     fn durations<'py>(&self, py: Python<'py>) -> Vector<'py> {
-        to_numpy(py, &self.0.demonstrated().durations)
+        read_only(py, &self.0.demonstrated().durations)
     }
 
     /// Contexts (M, Q) of the demonstrations, an array of numbers or lists with labels; None without contexts.
@@ -183,13 +183,19 @@ impl Model {
     fn contexts<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let (Some(contexts), Some(map)) = (&self.0.demonstrated().contexts, self.0.map()) else { return Ok(None) };
         if map.columns().iter().all(|column| *column == ContextColumn::Number) {
-            return Ok(Some(contexts.to_pyarray(py).into_any()));
+            return Ok(Some(locked(contexts.to_pyarray(py)).into_any()));
         }
         let rows = contexts.rows().into_iter().map(|row| {
             let context = map.context(&row.to_vec()).map_err(raise)?;
             context_to_python(py, &context)
         });
         Ok(Some(PyList::new(py, rows.collect::<PyResult<Vec<_>>>()?)?.into_any()))
+    }
+
+    /// Names (Q,) of the context columns; None where the contexts had none.
+    #[getter]
+    fn context_names(&self) -> Option<Vec<String>> {
+        self.0.map().map(|map| map.names().to_vec()).filter(|names| !names.is_empty())
     }
 
     /// Map from contexts to style, goal, start or anchor, and duration; None without contexts.
@@ -200,8 +206,8 @@ impl Model {
 
     /// Description of the regression of the landscape.
     #[getter]
-    fn regression(&self) -> &str {
-        &self.0.learnt().regression
+    fn regression(&self) -> String {
+        ascii(&self.0.learnt().regression)
     }
 
     /// Estimated interpolation error of the tabulated landscape, relative to its largest value.

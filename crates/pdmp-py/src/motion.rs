@@ -5,10 +5,10 @@ use std::sync::Arc;
 use numpy::IntoPyArray;
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::{TimeGrid, WithRespectTo, jacobian, rollout_with};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::choice::Choice;
 use crate::conditions::conditions_of;
 use crate::controller::Controller;
 use crate::convert::Cube;
@@ -19,7 +19,7 @@ use crate::scalar::{Scalar, optional_number};
 
 #[pymethods]
 impl Model {
-    /// Compute the movement under constant conditions.
+    /// Computes the movement under constant conditions.
     ///
     /// Integrates τż = α_z(β_z(c − y) − z), τẏ = z + w about the frame c exactly, with the forcing term w = x·sᵀb
     /// (discrete) or w = r·sᵀb (rhythmic). Conditions that are absent are those of the nominal demonstration.
@@ -76,7 +76,7 @@ impl Model {
         Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
     }
 
-    /// Start a movement that is computed tick by tick in a control loop.
+    /// Starts a movement that is computed tick by tick in a control loop.
     ///
     /// Parameters
     /// ----------
@@ -134,7 +134,7 @@ impl Model {
         Controller::new(py, Arc::clone(&self.0), controller)
     }
 
-    /// Compute the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
+    /// Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
     ///
     /// A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
     /// Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,
@@ -186,7 +186,7 @@ impl Model {
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        wrt: &str,
+        wrt: Choice<'py>,
         conditions: Option<&Bound<'py, PyAny>>,
         derivative: Scalar<'py>,
         dt: Scalar<'py>,
@@ -194,17 +194,14 @@ impl Model {
         context: Option<&Bound<'py, PyAny>>,
         changes: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Cube<'py>> {
-        let wrt = match wrt {
-            "style" => WithRespectTo::Style,
-            "goal" => WithRespectTo::Goal,
-            "anchor" => WithRespectTo::Anchor,
-            "start" => WithRespectTo::Start,
-            "goal_velocity" => WithRespectTo::GoalVelocity,
-            _ => {
-                let text = format!("wrt = '{wrt}': must be 'style', 'goal', 'anchor', 'start' or 'goal_velocity'");
-                return Err(PyValueError::new_err(text));
-            }
-        };
+        let variables = [
+            ("style", WithRespectTo::Style),
+            ("goal", WithRespectTo::Goal),
+            ("anchor", WithRespectTo::Anchor),
+            ("start", WithRespectTo::Start),
+            ("goal_velocity", WithRespectTo::GoalVelocity),
+        ];
+        let wrt = wrt.of("wrt", &variables)?;
         let derivative = Derivative::of_order("derivative", derivative.count("derivative")?).map_err(raise)?;
         let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
         let conditions = conditions_of(&self.0, conditions, context, changes)?;

@@ -37,7 +37,7 @@ impl Prediction {
 
 #[pymethods]
 impl Prediction {
-    /// Rebuild a pickled prediction.
+    /// Rebuilds a pickled prediction.
     #[staticmethod]
     fn _of(
         conditions: Py<Conditions>,
@@ -62,7 +62,7 @@ impl Prediction {
             most if most.is_finite() => format!("; extrapolated by {most:.2} of the demonstrated range of contexts"),
             _ => "; extrapolated along a context value that never varied".to_string(),
         };
-        let style = self.conditions.bind(py).getattr("style")?;
-        Ok(format!("<pdmp.Prediction: style {}, duration {:.4} s{note}>", style.repr()?, self.duration))
+        let style = self.conditions.bind(py).getattr("style")?.call_method0("tolist")?;
+        Ok(format!("<pdmp.Prediction: style {style}, duration {:.4} s{note}>", self.duration))
     }
 }

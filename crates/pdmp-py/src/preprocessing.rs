@@ -5,13 +5,15 @@ use pdmp_core::preprocessing;
 use pdmp_core::preprocessing::{CycleOutput, RejectionReason};
 use pyo3::prelude::*;
 
+use crate::choice::Choice;
 use crate::convert::{Matrix, Vector, items, matrix, texts, to_numpy, vector};
 use crate::demonstration::Demonstration;
 use crate::error::raise;
 use crate::fit::demonstrations;
+use crate::instance;
 use crate::scalar::Scalar;
 
-/// Resample a recording at even intervals.
+/// Resamples a recording at even intervals.
 ///
 /// The samples are at t₀, t₀ + dt, … up to the end of the recording; the returned clock starts at 0. On a grid no
 /// denser than the recording, samples are those of the cubic smoothing spline of generalised cross-validation plus the
@@ -35,12 +37,13 @@ use crate::scalar::Scalar;
 /// ValueError
 ///     `dt` is not positive or leaves fewer than four samples, or the recording has no times.
 #[pyfunction]
-pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: Scalar<'_>) -> PyResult<Demonstration> {
+pub(crate) fn resample(py: Python<'_>, demo: &Bound<'_, PyAny>, dt: Scalar<'_>) -> PyResult<Demonstration> {
+    let demo = instance::demonstration("demo", demo)?;
     let dt = dt.number("dt")?;
-    py.detach(|| preprocessing::resample(&demo.0, dt)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::resample(demo, dt)).map(Demonstration).map_err(raise)
 }
 
-/// Trim the rests before and after the movement of a recording.
+/// Trims the rests before and after the movement of a recording.
 ///
 /// The movement extends from the first to the last sample with a speed of at least `threshold` times the peak speed,
 /// where v² = Σ_d (ẏ_d / (max y_d − min y_d))² of the smoothed recording (generalised cross-validation). If noise
@@ -65,12 +68,13 @@ pub(crate) fn resample(py: Python<'_>, demo: &Demonstration, dt: Scalar<'_>) -> 
 ///     `threshold` is out of range, or the recording has no movement, fewer than four samples of it, or no times.
 #[pyfunction]
 #[pyo3(signature = (demo, threshold=Scalar::Number(0.05)), text_signature = "(demo, threshold=0.05)")]
-pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) -> PyResult<Demonstration> {
+pub(crate) fn trim(py: Python<'_>, demo: &Bound<'_, PyAny>, threshold: Scalar<'_>) -> PyResult<Demonstration> {
+    let demo = instance::demonstration("demo", demo)?;
     let threshold = threshold.number("threshold")?;
-    py.detach(|| preprocessing::trim(&demo.0, threshold)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::trim(demo, threshold)).map(Demonstration).map_err(raise)
 }
 
-/// Cut a recording at given times.
+/// Cuts a recording at given times.
 ///
 /// Each part extends from one time to the next, both included. It is sampled evenly, at most as densely as the
 /// recording. As with `resample`, noise stays white.
@@ -93,13 +97,18 @@ pub(crate) fn trim(py: Python<'_>, demo: &Demonstration, threshold: Scalar<'_>) 
 ///     `times` do not increase or lie outside the recording, a part is shorter than three sampling intervals, or the
 ///     recording has no times.
 #[pyfunction]
-pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>) -> PyResult<Vec<Demonstration>> {
+pub(crate) fn split_at(
+    py: Python<'_>,
+    demo: &Bound<'_, PyAny>,
+    times: &Bound<'_, PyAny>,
+) -> PyResult<Vec<Demonstration>> {
+    let demo = instance::demonstration("demo", demo)?;
     let times = vector("times", times)?;
-    let parts = py.detach(|| preprocessing::split_at(&demo.0, &times)).map_err(raise)?;
+    let parts = py.detach(|| preprocessing::split_at(demo, &times)).map_err(raise)?;
     Ok(parts.into_iter().map(Demonstration).collect())
 }
 
-/// Filter a recording with a low-pass of zero phase.
+/// Filters a recording with a low-pass of zero phase.
 ///
 /// The filter is the cubic smoothing spline, with gain 1/(1 + (f/f_c)⁴) at frequency f: one half at the cut-off f_c.
 /// `pdmp.plot.cut_off` plots residuals over the cut-off.
@@ -125,12 +134,13 @@ pub(crate) fn cut(py: Python<'_>, demo: &Demonstration, times: &Bound<'_, PyAny>
 /// ----------
 /// C. H. Reinsch, Smoothing by spline functions, Numerische Mathematik 10 (1967), https://doi.org/10.1007/BF02162161
 #[pyfunction]
-pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: Scalar<'_>) -> PyResult<Demonstration> {
+pub(crate) fn lowpass(py: Python<'_>, demo: &Bound<'_, PyAny>, cut_off: Scalar<'_>) -> PyResult<Demonstration> {
+    let demo = instance::demonstration("demo", demo)?;
     let cut_off = cut_off.number("cut_off")?;
-    py.detach(|| preprocessing::lowpass(&demo.0, cut_off)).map(Demonstration).map_err(raise)
+    py.detach(|| preprocessing::lowpass(demo, cut_off)).map(Demonstration).map_err(raise)
 }
 
-/// Compute the residuals of `lowpass` over its cut-off.
+/// Computes the residuals of `lowpass` over its cut-off.
 ///
 /// Parameters
 /// ----------
@@ -151,15 +161,16 @@ pub(crate) fn lowpass(py: Python<'_>, demo: &Demonstration, cut_off: Scalar<'_>)
 #[pyfunction]
 pub(crate) fn residuals<'py>(
     py: Python<'py>,
-    demo: &Demonstration,
+    demo: &Bound<'_, PyAny>,
     cut_offs: &Bound<'py, PyAny>,
 ) -> PyResult<Matrix<'py>> {
+    let demo = instance::demonstration("demo", demo)?;
     let cut_offs = vector("cut_offs", cut_offs)?;
-    let residuals = py.detach(|| preprocessing::residuals(&demo.0, &cut_offs)).map_err(raise)?;
+    let residuals = py.detach(|| preprocessing::residuals(demo, &cut_offs)).map_err(raise)?;
     Ok(residuals.into_pyarray(py))
 }
 
-/// Estimate the period of a cyclic recording by autocorrelation.
+/// Estimates the period of a cyclic recording by autocorrelation.
 ///
 /// A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal
 /// of linear trends. The period is the first peak of A that equals the highest peak within the variation between
@@ -186,11 +197,12 @@ pub(crate) fn residuals<'py>(
 /// ----------
 /// P. McLeod, G. Wyvill, A smarter way to find pitch, International Computer Music Conference 2005
 #[pyfunction]
-pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
-    py.detach(|| preprocessing::period(&demo.0)).map_err(raise)
+pub(crate) fn period(py: Python<'_>, demo: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let demo = instance::demonstration("demo", demo)?;
+    py.detach(|| preprocessing::period(demo)).map_err(raise)
 }
 
-/// Interpolate missing samples.
+/// Interpolates missing samples.
 ///
 /// Parameters
 /// ----------
@@ -215,7 +227,7 @@ pub(crate) fn period(py: Python<'_>, demo: &Demonstration) -> PyResult<f64> {
 /// ValueError
 ///     A gap is longer than `max_gap`, or lies at an end.
 #[pyfunction]
-pub(crate) fn fill<'py>(
+pub(crate) fn fill_gaps<'py>(
     py: Python<'py>,
     position: &Bound<'py, PyAny>,
     time: &Bound<'py, PyAny>,
@@ -239,7 +251,7 @@ type Growth = (usize, usize, f64, i32);
 /// Cycles, their periods (K,) in s, their gains (K, D), the indices of their recordings, rejections and growths.
 type CutCycles<'py> = (Vec<Demonstration>, Vector<'py>, Vec<Vec<f64>>, Vec<usize>, Vec<Rejected>, Vec<Growth>);
 
-/// Cut recordings into cycles, for `pdmp.preprocessing.cycles`.
+/// Cuts recordings into cycles, for `pdmp.preprocessing.cycles`.
 ///
 /// Parameters
 /// ----------
@@ -265,11 +277,11 @@ pub(crate) fn cycles<'py>(
     py: Python<'py>,
     recordings: &Bound<'py, PyAny>,
     onsets: Option<&Bound<'py, PyAny>>,
-    average: bool,
+    average: Choice<'py>,
 ) -> PyResult<CutCycles<'py>> {
     let recordings = demonstrations("recordings", recordings)?;
     let onsets = onsets.map(|onsets| items("onsets", onsets, vector)).transpose()?;
-    let output = if average { CycleOutput::Mean } else { CycleOutput::Each };
+    let output = if average.flag("average")? { CycleOutput::Mean } else { CycleOutput::Each };
     let cycles = py.detach(|| preprocessing::cycles(&recordings, onsets.as_deref(), output)).map_err(raise)?;
     let periods: Vec<f64> = cycles.kept.iter().map(|cycle| cycle.period).collect();
     let indices = cycles.kept.iter().map(|cycle| cycle.recording).collect();

@@ -1,10 +1,11 @@
 //! Regressors of the attractor landscape: options of a fit, and stand-alone regression on the clock.
 
 use numpy::IntoPyArray;
-use pdmp_core::learning::regression::{self, Domain, GpPosterior, Kernel, Regression};
+use pdmp_core::learning::regression::{self, Domain, GpPosterior, GpPrediction, Kernel, Regression};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::choice::Choice;
 use crate::convert::{Matrix, matrix, vector};
 use crate::error::{ascii, raise};
 use crate::scalar::{Scalar, optional_number};
@@ -37,12 +38,14 @@ pub(crate) struct Gp(pub(crate) regression::Gp);
 #[pymethods]
 impl Gp {
     #[new]
-    #[pyo3(signature = (kernel="matern52", length=None, noise=None))]
-    fn new(kernel: &str, length: Option<Scalar<'_>>, noise: Option<Scalar<'_>>) -> PyResult<Self> {
+    #[pyo3(
+        signature = (kernel=Choice::FIRST, length=None, noise=None),
+        text_signature = "(kernel='matern52', length=None, noise=None)"
+    )]
+    fn new(kernel: Choice<'_>, length: Option<Scalar<'_>>, noise: Option<Scalar<'_>>) -> PyResult<Self> {
         let (length, noise) = (optional_number("length", length)?, optional_number("noise", noise)?);
-        let kernel = Kernel::from_name(kernel).ok_or_else(|| {
-            PyValueError::new_err(format!("kernel = {kernel:?}: must be \"matern32\" or \"matern52\""))
-        })?;
+        let kernel =
+            kernel.of("kernel", &[Kernel::Matern52, Kernel::Matern32].map(|kernel| (kernel.name(), kernel)))?;
         regression::Gp::new(kernel, length, noise).map(Self).map_err(raise)
     }
 
@@ -64,7 +67,7 @@ impl Gp {
         self.0.noise
     }
 
-    /// Condition the process on targets over the clock.
+    /// Conditions the process on targets over the clock.
     ///
     /// Parameters
     /// ----------
@@ -83,14 +86,18 @@ impl Gp {
     /// ------
     /// ValueError
     ///     `u` does not increase from 0, lengths differ, or a number is not finite.
-    #[pyo3(signature = (u, targets, *, periodic=false))]
+    #[pyo3(
+        signature = (u, targets, *, periodic=Choice::FIRST),
+        text_signature = "($self, u, targets, *, periodic=False)"
+    )]
     fn regress(
         &self,
         py: Python<'_>,
         u: &Bound<'_, PyAny>,
         targets: &Bound<'_, PyAny>,
-        periodic: bool,
+        periodic: Choice<'_>,
     ) -> PyResult<GpRegression> {
+        let periodic = periodic.flag("periodic")?;
         let (u, targets) = (vector("u", u)?, matrix("targets", "(C, P)", targets)?);
         let gp = &self.0;
         let posterior = py.detach(|| gp.regress(domain(&u, periodic), &u, targets.view(), &mut |_| Ok(())));
@@ -149,7 +156,7 @@ impl GpRegression {
         self.0.log_likelihood()
     }
 
-    /// Compute the posterior mean and variance of the outputs without noise.
+    /// Computes the posterior mean and variance of the outputs without noise.
     ///
     /// Parameters
     /// ----------
@@ -169,7 +176,7 @@ impl GpRegression {
     ///     A clock value is not finite.
     fn predict<'py>(&self, py: Python<'py>, u: &Bound<'py, PyAny>) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
         let u = clock(u)?;
-        let (mean, variance) = self.0.predict(&u);
+        let GpPrediction { mean, variance } = self.0.predict(&u);
         Ok((mean.into_pyarray(py), variance.into_pyarray(py)))
     }
 
@@ -229,7 +236,7 @@ impl NGnet {
         self.0.overlap
     }
 
-    /// Fit the network to targets over the clock by least squares.
+    /// Fits the network to targets over the clock by least squares.
     ///
     /// Parameters
     /// ----------
@@ -248,8 +255,17 @@ impl NGnet {
     /// ------
     /// ValueError
     ///     `u` does not increase from 0, lengths differ, or a number is not finite.
-    #[pyo3(signature = (u, targets, *, periodic=false))]
-    fn regress(&self, u: &Bound<'_, PyAny>, targets: &Bound<'_, PyAny>, periodic: bool) -> PyResult<NGnetRegression> {
+    #[pyo3(
+        signature = (u, targets, *, periodic=Choice::FIRST),
+        text_signature = "($self, u, targets, *, periodic=False)"
+    )]
+    fn regress(
+        &self,
+        u: &Bound<'_, PyAny>,
+        targets: &Bound<'_, PyAny>,
+        periodic: Choice<'_>,
+    ) -> PyResult<NGnetRegression> {
+        let periodic = periodic.flag("periodic")?;
         let (u, targets) = (vector("u", u)?, matrix("targets", "(C, P)", targets)?);
         let n_outputs = targets.ncols();
         let regression = self.0.regress(domain(&u, periodic), &u, targets.view()).map_err(raise)?;
@@ -274,7 +290,7 @@ pub(crate) struct NGnetRegression {
 
 #[pymethods]
 impl NGnetRegression {
-    /// Compute the outputs.
+    /// Computes the outputs.
     ///
     /// Parameters
     /// ----------

@@ -3,21 +3,27 @@
 import re
 import sys
 import warnings
-from collections.abc import Iterator
+from argparse import ArgumentParser
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TextIO
 
 from pdmp._messages import printable
 
-# Arguments of Python that a message asks for, and those that it reports, at its beginning or behind
-# a file or demonstration.
-_ARGUMENT = re.compile(
-    r"\b(contexts|dt|max_gap|period|time)="
-    r"|(?:^|(?<=: ))(dt|max_gap|period|smoothing)(?= = | does not )"
-    r"|(?:^|(?<=^n_styles and ))(amplitude|anchor|context|demos|duration|goal|n_styles"
-    r"|singular_value_share|start|style|tau)(?= = | and |\[| has |: | does not )"
-)
+# Python arguments whose command-line options have another name.
 _RENAMED = {"contexts": "context", "demos": "demo", "n_styles": "styles"}
+
+
+def option_names(parser: ArgumentParser) -> dict[str, str]:
+    """Returns the options of a command by the names of the Python arguments that they set."""
+    options = {
+        action.dest: option
+        for action in parser._actions
+        for option in action.option_strings
+        if option.startswith("--") and action.dest not in ("help", "output")
+    }
+    renamed = {name: options[dest] for name, dest in _RENAMED.items() if dest in options}
+    return options | renamed
 
 
 def say(text: object, *, file: TextIO | None = None) -> None:
@@ -30,36 +36,49 @@ def report(text: str) -> None:
     print(printable(text, keep="\n"))
 
 
-def one_line(message: object) -> str:
-    """Returns a message in one line, with command-line options for arguments of Python."""
-    return _ARGUMENT.sub(_option, printable(" ".join(str(message).split())))
+def one_line(message: object, options: Mapping[str, str]) -> str:
+    """Returns a message in one line, with command-line options for arguments of Python.
 
-
-def _option(match: re.Match[str]) -> str:
-    name = "".join(filter(None, match.groups()))
-    return "--" + _RENAMED.get(name, name).replace("_", "-")
+    A message names an argument at its beginning or behind a file or demonstration, as in "demo 0:
+    dt = 0: must be positive", or recommends one, as in "pass dt=" or "set goal".
+    """
+    text = printable(" ".join(str(message).split()))
+    if not options:
+        return text
+    name = "|".join(sorted(options, key=len, reverse=True))
+    argument = re.compile(
+        rf"\b({name})=(?!=)"
+        rf"|(?<=: pass )({name})\b|(?<=; set )({name})\b"
+        rf"|(?:^|(?<=: )|(?<=^n_styles and ))({name})"
+        r"(?= = | and | has |: | does not | is missing| needs )"
+        rf"|^({name})(?=\[\d)"
+    )
+    return argument.sub(lambda match: options["".join(filter(None, match.groups()))], text)
 
 
 @contextmanager
 def console() -> Iterator[None]:
-    """Writes warnings in one line, and ? for characters that the console cannot encode."""
+    """Writes ? for characters that the console cannot encode."""
+    changed = []
+    for stream in (sys.stdout, sys.stderr):
+        errors, reconfigure = getattr(stream, "errors", None), getattr(stream, "reconfigure", None)
+        if errors in ("strict", "surrogateescape") and reconfigure is not None:
+            reconfigure(errors="replace")
+            changed.append((reconfigure, errors))
+    try:
+        yield
+    finally:
+        for reconfigure, errors in changed:
+            reconfigure(errors=errors)
+
+
+@contextmanager
+def short_warnings(options: Mapping[str, str]) -> Iterator[None]:
+    """Writes each warning in one line."""
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        print(f"pdmp: warning: {one_line(message, options)}", file=sys.stderr)
+
     with warnings.catch_warnings():
-        warnings.showwarning = _warning
-        changed = []
-        for stream in (sys.stdout, sys.stderr):
-            errors, reconfigure = (
-                getattr(stream, "errors", None),
-                getattr(stream, "reconfigure", None),
-            )
-            if errors in ("strict", "surrogateescape") and reconfigure is not None:
-                reconfigure(errors="replace")
-                changed.append((reconfigure, errors))
-        try:
-            yield
-        finally:
-            for reconfigure, errors in changed:
-                reconfigure(errors=errors)
-
-
-def _warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"pdmp: warning: {one_line(message)}", file=sys.stderr)
+        warnings.showwarning = show
+        yield

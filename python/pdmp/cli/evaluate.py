@@ -6,18 +6,19 @@ example: pdmp evaluate recordings/ --columns q1 q2 q3 --context height_m -o eval
 """
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
+from pdmp._files import atomic_write
 from pdmp.cli.console import report, say
 from pdmp.cli.options import (
     add_fit_options,
+    add_output,
     add_reader_options,
     file_path,
     fit_arguments,
+    made_folder,
     reader_arguments,
 )
 from pdmp.cli.progress import progress
-from pdmp.files import atomic_write
 from pdmp.io import read
 
 MAX_STYLES = 8  # in the figure of E over J
@@ -28,13 +29,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "paths", nargs="+", type=file_path, metavar="PATH", help="folder with an index.csv"
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=file_path,
-        metavar="FOLDER",
-        help="folder for figures and tables",
-    )
+    add_output(parser, "FOLDER", "folder for figures and tables, created if missing")
     add_reader_options(parser)
     add_fit_options(parser)
     parser.add_argument("--unit", default="", help="unit of the positions in the figures")
@@ -44,9 +39,7 @@ def run(options: Namespace) -> None:
     """Reads recordings, evaluates predictors, prints and draws the results."""
     from pdmp.evaluation import PDMP, baselines, evaluate, over_styles
 
-    folder = options.output and Path(options.output)
-    if folder:
-        folder.mkdir(parents=True, exist_ok=True)
+    folder = made_folder(options.output) if options.output else None
     recordings = read(options.paths, context=options.context, **reader_arguments(options))
     settings = fit_arguments(options)
     data = {"kind": options.kind, "period": options.period}

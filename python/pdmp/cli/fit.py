@@ -4,13 +4,14 @@ example: pdmp fit recordings/ --columns q1 q2 q3 --context height_m -o reach.saf
 """
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
 import pdmp
 from pdmp.cli.console import say
 from pdmp.cli.options import (
     add_fit_options,
+    add_output,
     add_reader_options,
+    check_file,
     file_path,
     fit_arguments,
     reader_arguments,
@@ -28,20 +29,14 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="PATH",
         help="CSV or BVH file (one demonstration), NPZ file (several) or folder with an index.csv",
     )
-    parser.add_argument(
-        "-o", "--output", type=file_path, required=True, metavar="FILE", help="model to write"
-    )
+    add_output(parser, "FILE", "model to write", required=True)
     add_reader_options(parser)
     add_fit_options(parser)
 
 
 def run(options: Namespace) -> None:
     """Reads demonstrations, fits a model and saves it."""
-    output = Path(options.output).absolute()
-    if not output.parent.is_dir():
-        raise FileNotFoundError(f"{output.parent}: no such folder; create it first")
-    if output.is_dir():
-        raise IsADirectoryError(f"{output}: is a folder; name a file in it")
+    check_file(options.output)
     recordings = read(options.paths, context=options.context, **reader_arguments(options))
     with progress() as show:
         model = pdmp.fit(

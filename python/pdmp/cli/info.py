@@ -9,16 +9,17 @@ from collections.abc import Sequence
 import numpy as np
 
 import pdmp
+from pdmp._labels import join_label
 from pdmp._messages import printable
 from pdmp.cli.console import say
-from pdmp.cli.options import file_path
+from pdmp.cli.options import add_model
 
 MAX_VALUES = 40  # singular values to print
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
+    add_model(parser)
 
 
 def run(options: Namespace) -> None:
@@ -33,16 +34,18 @@ def run(options: Namespace) -> None:
         "kind": model.kind,
         "demonstrations": f"{model.n_demos}, nominal {model.nominal}",
         "durations": f"{model.durations.min():g} to {model.durations.max():g} s",
-        "DoFs": f"{model.n_dofs}: {', '.join(_labels(model))}",
+        "DoFs": f"{model.n_dofs}: {', '.join(map(join_label, model.names, model.units))}",
         "styles": f"{model.n_styles}; truncation error {model.truncation_error:.1%} of the targets",
         "singular values": _several(model.singular_values),
         "noise": _noise(model),
-        "basis": f"{model.regression}; table error {model.table_error:.1e}",
-        "tau": f"{model.tau:g} s",
+        "regression": f"{model.regression}; table error {model.table_error:.1e}",
+        "time": f"tau {model.tau:g} s",
         "constants": constants,
     }
+    if model.kind == "rhythmic":
+        lines["time"] = f"period {2 * np.pi * model.tau:g} s (tau {model.tau:g} s)"
     if len(model.breaks) > 2:
-        lines["timing"] = f"{len(model.breaks) - 1} segments"
+        lines["segments"] = f"{len(model.breaks) - 1}"
     if model.contexts is not None:
         columns = zip(*model.contexts, strict=True)
         lines["contexts"] = ", ".join(_extent(column) for column in columns)
@@ -51,17 +54,9 @@ def run(options: Namespace) -> None:
         say(f"{name:<16}{printable(text)}")
 
 
-def _labels(model: pdmp.Model) -> list[str]:
-    """Returns the names of the degrees of freedom with their units."""
-    return [
-        f"{name} [{unit}]" if unit else name
-        for name, unit in zip(model.names, model.units, strict=True)
-    ]
-
-
 def _noise(model: pdmp.Model) -> str:
     """Returns the standard deviation of the measurement noise and the cut-off, per DoF, as text."""
-    labels = _labels(model)
+    labels = map(join_label, model.names, model.units)
     noisy = zip(labels, model.noise, model.cut_offs, strict=True)
     levels = [
         f"{label}: {level:.2g}, smoothed at {hz:.3g} Hz" for label, level, hz in noisy if level

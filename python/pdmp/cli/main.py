@@ -4,12 +4,12 @@ import os
 import re
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from pdmp._messages import printable
 from pdmp._native import PdmpError, __version__
 from pdmp.cli import evaluate, fit, info, plot, rollout
-from pdmp.cli.console import console, one_line
+from pdmp.cli.console import console, one_line, option_names, short_warnings
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 COMMANDS = {
@@ -47,7 +47,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(options: Namespace) -> int:
     """Runs a command and returns the exit code."""
     try:
-        options.run(options)
+        with short_warnings(options.options):
+            options.run(options)
         sys.stdout.flush()
     except KeyboardInterrupt:
         print("pdmp: interrupted", file=sys.stderr)
@@ -57,7 +58,7 @@ def _run(options: Namespace) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (PdmpError, ValueError, OSError, ImportError, MemoryError) as error:
-        print(f"pdmp: error: {_error_text(error)}", file=sys.stderr)
+        print(f"pdmp: error: {_error_text(error, options.options)}", file=sys.stderr)
         return 1
     return 0
 
@@ -77,12 +78,12 @@ def _parser() -> ArgumentParser:
         # Before Python 3.14 argparse parses -1e-3 as an option.
         command_parser._negative_number_matcher = _NEGATIVE_NUMBER
         command.arguments(command_parser)
-        command_parser.set_defaults(run=command.run)
+        command_parser.set_defaults(run=command.run, options=option_names(command_parser))
     return parser
 
 
-def _error_text(error: Exception) -> str:
+def _error_text(error: Exception, options: Mapping[str, str]) -> str:
     """Returns an error in one line, with command-line options for arguments of Python."""
     if isinstance(error, OSError) and error.filename is not None:
         return printable(f"{error.filename}: {error.strerror}")
-    return one_line(error)
+    return one_line(error, options)

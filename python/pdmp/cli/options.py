@@ -2,7 +2,10 @@
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
+
+from pdmp._files import check_folder
 
 
 def file_path(text: str) -> str:
@@ -10,6 +13,31 @@ def file_path(text: str) -> str:
     if text == "-":
         raise ArgumentTypeError("- is not a file: name one, or write ./- for a file called -")
     return text
+
+
+def add_output(parser: ArgumentParser, metavar: str, text: str, **settings: Any) -> None:
+    """Adds the option for the file or folder to write, with further settings of the argument."""
+    parser.add_argument("-o", "--output", type=file_path, metavar=metavar, help=text, **settings)
+
+
+def add_model(parser: ArgumentParser) -> None:
+    """Adds the argument for the model file to read."""
+    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
+
+
+def check_file(path: str) -> None:
+    """Raises an error before a long call if its result could not be written to this file."""
+    if Path(path).is_dir():
+        raise IsADirectoryError(f"{path}: is a folder; name a file in it")
+    check_folder(Path(path))
+
+
+def made_folder(path: str) -> Path:
+    """Returns a folder, which is created if it does not exist, in a folder that exists."""
+    folder = Path(path)
+    check_folder(folder)
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 def add_reader_options(parser: ArgumentParser) -> None:

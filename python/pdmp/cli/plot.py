@@ -6,18 +6,24 @@ example: pdmp plot reach.safetensors recordings/ --columns q1 q2 q3 -o figures
 """
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
 import pdmp
 from pdmp import plot
 from pdmp.cli.console import say
-from pdmp.cli.options import add_reader_options, file_path, reader_arguments
+from pdmp.cli.options import (
+    add_model,
+    add_output,
+    add_reader_options,
+    file_path,
+    made_folder,
+    reader_arguments,
+)
 from pdmp.io import read
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
+    add_model(parser)
     parser.add_argument(
         "paths",
         nargs="*",
@@ -25,24 +31,18 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="PATH",
         help="its demonstrations, as for pdmp fit",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=file_path,
-        required=True,
-        metavar="FOLDER",
-        help="folder for the figures",
-    )
+    add_output(parser, "FOLDER", "folder for the figures, created if missing", required=True)
     add_reader_options(parser)
 
 
 def run(options: Namespace) -> None:
     """Loads a model and writes its figures."""
+    folder = made_folder(options.output)
     model = pdmp.load(options.model)
     first = model.styles[:, 0]
     ends = [int(first.argmin()), int(first.argmax())]
     figures = {
-        "spectrum": plot.spectrum(model),
+        "singular_values": plot.singular_values(model),
         "styles": plot.styles(model),
         "fan": plot.fan(
             model,
@@ -56,6 +56,6 @@ def run(options: Namespace) -> None:
         recordings = read(options.paths, **reader_arguments(options))
         figures["demonstrations"] = plot.demonstrations(model, recordings)
     for name, figure in figures.items():
-        path = Path(options.output, f"{name}.png")
+        path = folder / f"{name}.png"
         plot.save(figure, path)
         say(path)

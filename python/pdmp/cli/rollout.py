@@ -10,15 +10,13 @@ from argparse import ArgumentParser, Namespace
 
 import pdmp
 from pdmp.cli.console import say
-from pdmp.cli.options import file_path
+from pdmp.cli.options import add_model, add_output, check_file
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
-    parser.add_argument(
-        "-o", "--output", type=file_path, required=True, metavar="FILE", help="CSV to write"
-    )
+    add_model(parser)
+    add_output(parser, "FILE", "CSV to write", required=True)
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--style", nargs="+", type=float, metavar="S", help="style parameters")
     source.add_argument(
@@ -27,12 +25,14 @@ def arguments(parser: ArgumentParser) -> None:
     source.add_argument(
         "--demo", type=int, metavar="M", help="demonstration to reproduce, counted from 0"
     )
-    for name, text in (
-        ("goal", "goal of a discrete movement"),
-        ("start", "start position"),
-        ("anchor", "centre of a rhythmic movement"),
+    for name, metavar, text in (
+        ("goal", "Y", "goal of a discrete movement"),
+        ("goal-velocity", "V", "velocity [1/s] at the goal of a discrete movement"),
+        ("start", "Y", "start position"),
+        ("velocity", "V", "start velocity [1/s]"),
+        ("anchor", "Y", "centre of a rhythmic movement"),
     ):
-        parser.add_argument(f"--{name}", nargs="+", type=float, metavar="Y", help=text)
+        parser.add_argument(f"--{name}", nargs="+", type=float, metavar=metavar, help=text)
     for name, metavar, text in (
         ("amplitude", "R", "amplitude of a rhythmic movement, relative to the demonstrations"),
         ("tau", "S", "time constant [s]"),
@@ -44,9 +44,11 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Loads a model, computes a rollout and writes it."""
+    check_file(options.output)
     model = pdmp.load(options.model)
     conditions = None if options.demo is None else model.conditions(options.demo)
-    names = ("style", "context", "goal", "start", "anchor", "amplitude", "tau", "dt", "duration")
+    positions = ("goal", "goal_velocity", "start", "velocity", "anchor")
+    names = ("style", "context", *positions, "amplitude", "tau", "dt", "duration")
     arguments = {name: value for name in names if (value := getattr(options, name)) is not None}
     trajectory = model.rollout(conditions, **arguments)
     if options.context is not None and model.predict(options.context).extrapolation.any():

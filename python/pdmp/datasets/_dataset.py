@@ -29,7 +29,7 @@ class Dataset:
     licence : str
         Licence under which they are published.
     credit : str
-        Reference to cite, or acknowledgement that the licence asks for; "" if there is none.
+        Reference to cite, or acknowledgement that the licence requires; "" if there is none.
     """
 
     name: str

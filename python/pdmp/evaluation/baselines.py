@@ -92,7 +92,7 @@ class Components:
         joint = recordings.sampled.reshape(recordings.n_demos, -1)
         mean = joint.mean(axis=0)
         factors = factorise(joint - mean, singular_value_share=self.share)
-        return factors.styles, mean, factors.basis
+        return factors.styles, mean, factors.basis_targets
 
 
 class RadialWeights:

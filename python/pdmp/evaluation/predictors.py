@@ -43,8 +43,10 @@ class Predictor(Protocol):
     >>> class First:
     ...     def fit(self, recordings):
     ...         position, duration = recordings.sampled[0], recordings.durations[0]
-    ...         return lambda context: Forecast(position, duration)
-    >>> pdmp.evaluate(demos, contexts=heights, predictors={"first": First()})
+    ...         return lambda context: pdmp.evaluation.Forecast(position, duration)
+    >>> evaluation = pdmp.evaluate(demos, contexts=heights, predictors={"first": First()})
+    >>> list(evaluation.scores)
+    ['mean demonstration', 'first']
     """
 
     def fit(self, recordings: Recordings) -> Predict:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp._messages import value_error, warn
+from pdmp._messages import check_number, check_type, counted, value_error, warn
 from pdmp._native import Demonstration, Trajectory, inspected
 
 Array: TypeAlias = NDArray[Any]  # of float64
@@ -105,11 +105,13 @@ def recordings(
 ) -> Recordings:
     """Checks demonstrations and contexts, and resamples each over normalised time."""
     if kind not in ("discrete", "rhythmic"):
-        raise value_error(f'kind = "{kind}": must be "discrete" or "rhythmic"')
+        raise value_error(f'kind = {kind!r}: must be "discrete" or "rhythmic"')
+    check_number("n_samples", n_samples)
     if n_samples < 4:
         raise value_error(f"n_samples = {n_samples}: must be at least 4")
     if isinstance(demos, (Demonstration, Trajectory)):
         raise ValueError("demos is a single demonstration: put it into a list")
+    check_type("demos", demos, Iterable, "a list of demonstrations, or a mapping of names to them")
     values = demos.values() if isinstance(demos, Mapping) else demos
     valid = tuple(_with_interval(demo, dt) for demo in values)  # type: ignore[union-attr]
     if not valid:
@@ -155,7 +157,7 @@ def _resample(
 ) -> tuple[float, Array]:
     """Returns the duration [s] and the linearly interpolated positions (C, D)."""
     if demo.time is None:
-        raise value_error(f"demo {m}: no sampling interval: pass dt= in seconds")
+        raise value_error(f"demo {m}: dt is missing: pass the sampling interval in seconds")
     time = demo.time - demo.time[0]
     duration, cycle = float(time[-1]), None
     if kind == "rhythmic":
@@ -209,7 +211,8 @@ def _labels(q: int, values: Array) -> list[str] | None:
         return None
     if numbers := sum(not isinstance(value, str) for value in values):
         raise value_error(
-            f"contexts[:, {q}] holds {len(values) - numbers} labels and {numbers} numbers: "
+            f"contexts[:, {q}] holds {counted(len(values) - numbers, 'label')} and "
+            f"{counted(numbers, 'number')}: "
             "write all of them as labels, or all as numbers"
         )
     return labels

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pdmp._markdown import markdown_table
 from pdmp._messages import printable, value_error
 from pdmp.evaluation.predictors import BAND, HALF_WIDTH, Forecast, Predictor
 from pdmp.evaluation.recordings import Array, Recordings
 from pdmp.evaluation.splits import Reach, Split
-from pdmp.markdown import markdown_table
 
 REFERENCE = "mean demonstration"
 HEADER = ("predictor", "E", "± sd", "E / mean's", "± se", f"in {BAND:.0%} band", "duration off")

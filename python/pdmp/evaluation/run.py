@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pdmp._messages import value_error
+from pdmp._messages import check_function, check_number, check_type, quoted, value_error
 from pdmp.evaluation.baselines import (
     Components,
     LinearWeights,
@@ -124,9 +124,19 @@ def evaluate(
     Examples
     --------
     >>> evaluation = pdmp.evaluate(demos, contexts=heights)
-    >>> print(evaluation)
-    >>> evaluation.compare("PDMP", "PCA, linear map")
+    >>> comparison = evaluation.compare("PDMP", "PCA, linear map")
     """
+    if predictors is not None:
+        check_type("predictors", predictors, Mapping, "a mapping of names to predictors")
+        for name, predictor in predictors.items():
+            if not callable(getattr(predictor, "fit", None)):
+                found = f"predictors['{name}'] = {quoted(predictor)}"
+                raise TypeError(f"{found}: expected an object with a method fit")
+    if splits is not None:
+        check_type("splits", splits, Iterable, "a list of (train, test, reach)")
+    if progress is not None:
+        check_function("progress", progress)
+    check_number("max_folds", max_folds)
     data = recordings(demos, contexts, kind=kind, dt=dt, period=period, n_samples=n_samples)
     if splits is None:
         folds = held_out(data.numbers(data.contexts), max_folds)

@@ -108,7 +108,11 @@ def checked(splits: Iterable[Sequence[object]], n_demos: int) -> list[Split]:
     """Returns the checked splits of a user, each (train, test, reach)."""
     valid = []
     for k, split in enumerate(splits):
-        if len(split) != 3 or split[2] not in ("interpolation", "extrapolation"):
+        if (
+            not isinstance(split, Sequence)
+            or len(split) != 3
+            or split[2] not in ("interpolation", "extrapolation")
+        ):
             raise value_error(
                 f'splits[{k}]: must be (train, test, "interpolation" or "extrapolation")'
             )

@@ -8,8 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._labels import FULL_TURN
-from pdmp._messages import value_error
-from pdmp._native import Demonstration, fill
+from pdmp._messages import check_number, check_type, value_error
+from pdmp._native import Demonstration, fill_gaps
+
+
+def check_options(dt: float | None, max_gap: float, time: str = "t") -> None:
+    """Raises an error for options of a reader that are of the wrong type."""
+    check_type("time", time, str, "the name of a column")
+    check_number("max_gap", max_gap)
+    if dt is not None:
+        check_number("dt", dt)
 
 
 def make_demonstration(
@@ -29,7 +37,7 @@ def make_demonstration(
     turns = [FULL_TURN.get(unit, 0.0) if unit else np.nan for unit in units or [""] * n_dofs]
     clock = np.arange(n_samples) * (dt or 1.0) if time is None else time
     try:
-        filled = fill(position, clock, columns, turns, max_gap)
+        filled = fill_gaps(position, clock, columns, turns, max_gap)
         return Demonstration(filled, dt=dt, time=time, context=context, names=names, units=units)
     except ValueError as error:
         raise value_error(f"{source}: {error}") from None

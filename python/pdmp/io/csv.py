@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._labels import DERIVATIVES, name_list, split_label
-from pdmp._messages import value_error
+from pdmp._files import atomic_write
+from pdmp._labels import DERIVATIVES, join_label, name_list, split_label
+from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration, Trajectory
-from pdmp.files import atomic_write
 from pdmp.io import _fields, _time_units
 from pdmp.io._csv_layout import CsvTable, parse_layout
-from pdmp.io._demonstration import make_demonstration
+from pdmp.io._demonstration import check_options, make_demonstration
 
 THOUSANDS = re.compile(r"[^,]*|[-+]?[1-9]\d{0,2}(,\d{3})+")
 CLOCKS = ("t", "time", "Time", "TIME")
@@ -71,6 +71,7 @@ def read_csv(
         A file that cannot be read.
     """
     path = Path(path)
+    check_options(dt, max_gap, time)
     times = CLOCKS if time == CLOCKS[0] else (time, split_label(time)[0])
     table = parse_layout(path, times if dt is None else ())
     header, units = _labels(table)
@@ -209,9 +210,10 @@ def write_csv(
     ValueError
         A number of names or units other than D, or names that would be read differently.
     OSError
-        A file that cannot be written.
+        A file that cannot be written, or whose folder does not exist.
     """
     path = Path(path)
+    check_type("trajectory", trajectory, Trajectory, "pdmp.Trajectory")
     names = trajectory.names if names is None else name_list("names", names)
     units = trajectory.units if units is None else name_list("units", units)
     n_dofs = trajectory.position.shape[1]
@@ -223,9 +225,7 @@ def write_csv(
     header = [f"{name}{suffix}" for suffix, _ in DERIVATIVES for name in names]
     _fields.check_names(path, 1, ["t", *header])
     units = [unit and f"{unit}{per}" for _, per in DERIVATIVES for unit in units]
-    fields = [
-        f"{name} [{unit}]" if unit else name for name, unit in zip(header, units, strict=True)
-    ]
+    fields = list(map(join_label, header, units))
     for name, unit, field in zip(header, units, fields, strict=True):
         if split_label(field) != (name, unit):
             raise value_error(f"{path}: '{field}' would not be read as '{name}' in '{unit}'")

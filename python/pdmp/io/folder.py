@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pdmp._labels import name_list, split_label
-from pdmp._messages import value_error
+from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields
 from pdmp.io._csv_layout import parse_layout
@@ -58,6 +58,7 @@ def read(
         A file that cannot be read.
     """
     demos: list[Demonstration] = []
+    check_type("paths", paths, (str, PathLike, Iterable), "a path, or a list of them")
     paths = [paths] if isinstance(paths, (str, PathLike)) else paths
     options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
     for path in map(Path, paths):

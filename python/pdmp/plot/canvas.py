@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from pdmp._files import atomic_write
+from pdmp._labels import join_label
 from pdmp._native import Model
-from pdmp.files import atomic_write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,8 +58,7 @@ def label_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
 
 def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
     """Returns the names of the degrees of freedom with their units; long ones take two lines."""
-    labels = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
-    return [fill(label, MAX_LABEL) for label in labels]
+    return [fill(label, MAX_LABEL) for label in map(join_label, names, units)]
 
 
 def movement_panels(
@@ -137,7 +137,7 @@ def save(figure: Figure, path: str | PathLike[str]) -> None:
     ValueError
         A suffix that matplotlib does not support.
     OSError
-        A file that cannot be written.
+        A file that cannot be written, or whose folder does not exist.
     """
     with atomic_write(path) as draft:
         figure.savefig(draft, format=Path(path).suffix[1:] or "png")

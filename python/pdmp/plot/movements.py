@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pdmp._messages import counted
 from pdmp._native import Conditions, Demonstration, Model, blend
 from pdmp.plot.canvas import BLUE, GREY, colormap, draw_movement, legend, movement_panels
 
@@ -48,11 +49,11 @@ def demonstrations(
     """
     demos = list(demos.values()) if isinstance(demos, Mapping) else demos
     labels = [""] * len(demos) if labels is None else labels
-    for name, length in (("demos", len(demos)), ("labels", len(labels))):
+    for name, length in (("recording", len(demos)), ("label", len(labels))):
         if length != model.n_demos:
             raise ValueError(
-                f"{name} has length {length}, expected {model.n_demos}: "
-                "one per demonstration of the fit"
+                f"{counted(length, name)} given, expected {model.n_demos}: "
+                "one per demonstration of the fit, in its order"
             )
     for m, demo in enumerate(demos):
         _check(model, m, demo)

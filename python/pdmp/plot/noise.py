@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pdmp._labels import join_label
 from pdmp._native import Demonstration, residuals
 from pdmp.plot.canvas import BLUE, GREY, ORANGE, grid_panels, legend
 
@@ -55,7 +56,7 @@ def cut_off(demo: Demonstration, *, figure: Figure | None = None) -> Figure:
     frequencies = np.geomspace(lowest, MAX_FREQUENCY * half_rate, N_FREQUENCIES)
     rms = residuals(demo, frequencies)
     names = demo.names or [f"y{d}" for d in range(demo.n_dofs)]
-    labels = [f"RMS [{unit}]" if unit else "RMS" for unit in demo.units or [""] * demo.n_dofs]
+    labels = [join_label("RMS", unit) for unit in demo.units or [""] * demo.n_dofs]
     figure, panels = grid_panels(labels, "cut-off [Hz]", figure)
     noise_only = (frequencies > NOISE_RANGE[0] * half_rate) & (
         frequencies < NOISE_RANGE[1] * half_rate

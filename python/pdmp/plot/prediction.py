@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pdmp._labels import join_label
 from pdmp.plot.canvas import BLUE, GREY, PALETTE, dof_labels, ensure_figure, label_axes, legend
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def prediction_error(
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         label_axes(axes, "number of style parameters J", "", reach)
     panels[0].set_ylim(bottom=0)
-    panels[0].set_ylabel(f"E [{unit}²]" if unit else "E")
+    panels[0].set_ylabel(join_label("E", unit and f"{unit}²"))
     legend(figure, panels[0])
     return figure
 

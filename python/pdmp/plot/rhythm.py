@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import ceil, pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pdmp._native import Model
 from pdmp.plot.canvas import BLUE, GREY, dof_labels, ensure_figure, label_axes, legend
@@ -47,25 +47,14 @@ def phase_portrait(model: Model, *, figure: Figure | None = None) -> Figure:
     converging = model.rollout(
         start=centre, velocity=0 * centre, duration=N_PERIODS * period, dt=period / N_SAMPLES
     )
+    orbit: dict[str, Any] = {"color": GREY, "linewidth": 1, "label": "limit cycles"}
+    start: dict[str, Any] = {"color": BLUE, "linewidth": 1.4, "marker": "o", "markevery": [0]}
+    start["label"] = "from rest at the anchor"
+    paths = [*((cycle, orbit) for cycle in cycles), (converging, start)]
     labels = dof_labels(model.names, model.units)
     for dof, (axes, label, unit) in enumerate(zip(panels, labels, model.units, strict=False)):
-        for cycle in cycles:
-            axes.plot(
-                cycle.position[:, dof],
-                cycle.velocity[:, dof],
-                color=GREY,
-                linewidth=1,
-                label="limit cycles",
-            )
-        axes.plot(
-            converging.position[:, dof],
-            converging.velocity[:, dof],
-            color=BLUE,
-            linewidth=1.4,
-            marker="o",
-            markevery=[0],
-            label="from rest at the anchor",
-        )
+        for path, style in paths:
+            axes.plot(path.position[:, dof], path.velocity[:, dof], **style)
         label_axes(axes, label, f"velocity [{unit}/s]" if unit else "velocity [per s]")
     for axes in panels[model.n_dofs :]:
         axes.set_axis_off()

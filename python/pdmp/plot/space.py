@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def spectrum(model: Model, *, figure: Figure | None = None) -> Figure:
+def singular_values(model: Model, *, figure: Figure | None = None) -> Figure:
     """Draws the share of each singular value in their sum, and the number J of styles.
 
     Parameters

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
-from pdmp._messages import value_error
+from pdmp._messages import printable
 from pdmp._native import Demonstration
 
 P = ParamSpec("P")
@@ -41,7 +41,8 @@ def vectorized(function: Callable[Concatenate[Demonstration, P], R]) -> Vectoriz
     def _apply(name: object, demo: Demonstration, args: Any, kwargs: Any) -> Any:
         try:
             return function(demo, *args, **kwargs)
-        except ValueError as error:
-            raise value_error(f"{name}: {error}") from None
+        except (ValueError, TypeError) as error:
+            kind = TypeError if isinstance(error, TypeError) else ValueError
+            raise kind(printable(f"{name}: {error}")) from None
 
     return for_each

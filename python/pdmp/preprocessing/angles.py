@@ -3,6 +3,7 @@
 import numpy as np
 
 from pdmp._labels import FULL_TURN
+from pdmp._messages import check_type
 from pdmp._native import Demonstration
 
 
@@ -23,6 +24,7 @@ def unwrap(demo: Demonstration) -> Demonstration:
     Demonstration
         Unwrapped recording at the same times, with its names, units and context.
     """
+    check_type("demo", demo, Demonstration, "pdmp.Demonstration")
     (position,), rest = demo.__getnewargs_ex__()
     units = demo.units or ["rad"] * demo.n_dofs
     unwrapped = position.copy()

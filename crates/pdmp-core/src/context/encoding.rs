@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use crate::demonstration::ContextValue;
 use crate::demonstration::check_context;
 use crate::error::{Error, Result};
-use crate::validate::check_finite;
+use crate::numerics::statistics::extremes;
+use crate::validate::{check_finite, check_length, check_range};
 
 /// Type of one context value, common to all contexts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -47,7 +48,9 @@ impl ContextColumn {
             (Self::Label(labels), ContextValue::Number(number)) => {
                 Err(unknown_label(column, number.to_string(), labels))
             }
-            (Self::Number, ContextValue::Label(label)) => Err(Error::NoNumber { column, label: label.clone() }),
+            (Self::Number, ContextValue::Label(label)) => {
+                Err(Error::NoNumber { column, name: None, label: label.clone() })
+            }
         }
     }
 
@@ -73,18 +76,18 @@ impl ContextColumn {
 }
 
 fn unknown_label(column: usize, value: String, labels: &[String]) -> Error {
-    Error::Label { column, value, known: labels.join(", ") }
+    Error::Label { column, name: None, value, known: labels.join(", ") }
 }
 
 /// Returns the column types (Q,) of contexts and the contexts as numbers (M, Q), with labels as their indices.
 pub(crate) fn tabulate(contexts: &[&[ContextValue]]) -> Result<(Vec<ContextColumn>, Array2<f64>)> {
     if contexts.is_empty() {
-        return Err(Error::Arguments("contexts is empty: pass one row per movement"));
+        return Err(Error::Argument { name: "contexts", problem: "is empty: pass one row per movement" });
     }
     let width = contexts.iter().map(|context| context.len()).find(|&width| width > 0).unwrap_or(0);
-    if let Some(m) = contexts.iter().position(|context| context.len() != width) {
-        let (found, per) = (contexts[m].len(), "context value, as in the other demonstrations");
-        return Err(Error::Length { name: "context", expected: width, found, per }.in_demo(m));
+    let per = "context value, as in the other demonstrations";
+    for (m, context) in contexts.iter().enumerate() {
+        check_length("context", context.len(), width, per).map_err(|error| error.in_demo(m))?;
     }
     for (m, context) in contexts.iter().enumerate() {
         check_context(context).map_err(|error| error.in_demo(m))?;
@@ -103,10 +106,7 @@ pub(crate) fn tabulate(contexts: &[&[ContextValue]]) -> Result<(Vec<ContextColum
 
 /// Returns one context as numbers (Q,), with labels as their indices.
 pub(super) fn to_numbers(columns: &[ContextColumn], context: &[ContextValue]) -> Result<Vec<f64>> {
-    if context.len() != columns.len() {
-        let (expected, found) = (columns.len(), context.len());
-        return Err(Error::Length { name: "context", expected, found, per: "context value" });
-    }
+    check_length("context", context.len(), columns.len(), "context value")?;
     let numbers: Vec<f64> = columns
         .iter()
         .zip(context)
@@ -148,14 +148,12 @@ impl Encoder {
                 ContextColumn::Number => {
                     let mean = values.mean().unwrap_or(0.0);
                     let largest = values.fold(0.0f64, |max, value| max.max((value - mean).abs()));
-                    if largest > 0.0 && !(1e-100..=1e100).contains(&largest) {
-                        let allowed = "each must vary by 1e-100 to 1e100; give them in another unit";
-                        return Err(Error::Range { name: "contexts", value: largest, allowed });
-                    }
+                    let valid = largest == 0.0 || (1e-100..=1e100).contains(&largest);
+                    let allowed = "each must vary by 1e-100 to 1e100; give them in another unit";
+                    check_range("contexts", largest, valid, allowed)?;
                     let variance = values.map(|value| ((value - mean) / largest.max(1e-100)).powi(2)).mean();
                     let deviation = if largest > 0.0 { largest * variance.unwrap_or(1.0).sqrt() } else { 1.0 };
-                    let range = [f64::INFINITY, f64::NEG_INFINITY];
-                    let range = values.iter().fold(range, |[low, high], &value| [low.min(value), high.max(value)]);
+                    let range = extremes(values.iter().copied());
                     Ok(ColumnEncoder::Standardised { first, mean, deviation, range })
                 }
             }
@@ -230,6 +228,6 @@ mod tests {
         assert!(message(&["old".into(), "young".into()]).contains("context[1] = \"young\": a number is expected"));
         assert!(message(&["old".into()]).contains("length 1, expected 2"));
         let mixed = tabulate(&[&context("old", 1.0), &[1.0.into(), 1.0.into()]]).unwrap_err().to_string();
-        assert!(mixed.contains("1 labels and 1 numbers"), "{mixed}");
+        assert!(mixed.contains("1 label and 1 number"), "{mixed}");
     }
 }

@@ -9,6 +9,7 @@ mod encoding;
 mod kernel;
 mod kriging;
 mod model_selection;
+mod names;
 mod outputs;
 mod principal_axes;
 mod stacking;
@@ -22,7 +23,7 @@ pub use encoding::ContextColumn;
 pub(crate) use encoding::tabulate;
 pub(crate) use kernel::Kernel;
 pub use model_selection::{ContextMapKind, MapSelection};
-pub(crate) use outputs::{log_duration_jacobian, outputs};
+pub(crate) use outputs::{log_duration_jacobian, log_durations, outputs};
 pub(crate) use stacking::StackingWeights;
 pub(crate) use training_data::group_equal_contexts;
 
@@ -35,7 +36,7 @@ use training_data::GroupedData;
 
 use crate::demonstration::ContextValue;
 use crate::error::{Error, Result};
-use crate::validate::check_matrix;
+use crate::validate::{check_length, check_matrix};
 
 /// Degrees of freedom that the estimated signal-to-noise ratio leaves at least; with fewer, it costs none.
 ///
@@ -66,19 +67,16 @@ const MIN_DEGREES_OF_FREEDOM: usize = 2;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContextMap {
     columns: Vec<ContextColumn>,
+    /// Names of the columns (Q,); empty where unknown.
+    names: Vec<String>,
     encoder: Encoder,
-    kind: ContextMapKind,
-    kernel: Option<Kernel>,
     axes: PrincipalAxes,
-    /// Signal-to-noise ratio of each component (P,). All following fields refer to components too.
-    ratios: Vec<f64>,
-    /// Signal-to-noise ratios of the line (P,); empty unless the map is stacked.
-    line_ratios: Vec<f64>,
-    errors: Vec<(ContextMapKind, f64)>,
+    /// Parameters of the components, to which all following fields refer too.
+    parameters: MapParameters,
     /// Least squares, ridge regression or Gaussian process.
     predictor: Predictor,
-    /// Line of a stacked map, with the weights of the stack.
-    line: Option<(Predictor, StackingWeights)>,
+    /// Line of a stacked map.
+    line: Option<Predictor>,
     /// Mean over the contexts (P,).
     mean: Array1<f64>,
     /// Covariance (P, P) of the noise of the contexts' means; `None` without degrees of freedom.
@@ -111,14 +109,12 @@ impl Predictor {
     }
 }
 
-/// Parameters of a map, which determine it together with the training data.
-#[derive(Clone, Debug)]
+/// Parameters of a map, which determine it together with the training data and the axes of the outputs.
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MapParameters {
     pub(crate) kind: ContextMapKind,
     pub(crate) kernel: Option<Kernel>,
-    /// Outputs per unit of each component, as rows (P, P).
-    pub(crate) directions: Array2<f64>,
-    /// Signal-to-noise ratios (P,).
+    /// Signal-to-noise ratio of each component (P,).
     pub(crate) ratios: Vec<f64>,
     /// Signal-to-noise ratios (P,) of the line of a stacked map, and the weights of the stack.
     pub(crate) line: Option<(Vec<f64>, StackingWeights)>,
@@ -149,10 +145,7 @@ impl ContextMap {
     /// more than 1024 distinct contexts for a kind other than [`ContextMapKind::Linear`].
     pub fn fit(contexts: &[Vec<ContextValue>], outputs: ArrayView2<f64>, selection: MapSelection) -> Result<Self> {
         check_matrix("outputs", outputs)?;
-        if contexts.len() != outputs.nrows() {
-            let (expected, found) = (outputs.nrows(), contexts.len());
-            return Err(Error::Length { name: "contexts", expected, found, per: "row of the outputs" });
-        }
+        check_length("contexts", contexts.len(), outputs.nrows(), "row of the outputs")?;
         let contexts: Vec<&[ContextValue]> = contexts.iter().map(Vec::as_slice).collect();
         let (columns, table) = tabulate(&contexts)?;
         Self::learn(columns, &table, outputs, Array2::eye(outputs.ncols()).view(), selection)
@@ -178,14 +171,15 @@ impl ContextMap {
         Ok(Self::new(data, axes, selected))
     }
 
-    /// Restores a map from its parameters and training data.
+    /// Restores a map from its training data, the outputs per unit of each component, as rows (P, P), and its parameters.
     pub(crate) fn restore(
         columns: Vec<ContextColumn>,
         contexts: &Array2<f64>,
         outputs: ArrayView2<f64>,
+        directions: Array2<f64>,
         parameters: MapParameters,
     ) -> Result<Self> {
-        let MapParameters { kind, kernel, directions, ratios, line, errors } = parameters;
+        let MapParameters { kind, kernel, ratios, line, errors } = parameters;
         let axes = PrincipalAxes::from_directions(directions)?;
         let data = GroupedData::new(columns, contexts, outputs)?;
         if kernel.is_some() || kind != ContextMapKind::Linear {
@@ -202,7 +196,7 @@ impl ContextMap {
         let SelectedMap { kind, model, line, errors } = selected;
         let (noise, degrees_of_freedom) = match (model.kriging.degrees_of_freedom(), &data.within) {
             (0, None) => (None, 0),
-            // With as many coefficients as contexts, repetitions alone have noise.
+            // With one coefficient per context, repetitions alone have noise.
             (0, Some((within, n))) => (Some(within * data.averaged_share), *n),
             (n, _) => {
                 let n = n - usize::from(model.kernel.is_some() && n > MIN_DEGREES_OF_FREEDOM);
@@ -214,30 +208,31 @@ impl ContextMap {
             mean: data.means.mean_axis(Axis(0)).unwrap_or_default(),
             within: data.within.map(|(within, _)| within * (1.0 - data.averaged_share)),
             columns: data.columns,
+            names: Vec::new(),
             encoder: data.encoder,
-            kind,
-            kernel: model.kernel,
             axes,
-            ratios: model.ratios.clone(),
-            line_ratios: line.as_ref().map(|line| line.model.ratios.clone()).unwrap_or_default(),
-            errors,
+            parameters: MapParameters {
+                kind,
+                kernel: model.kernel,
+                ratios: model.ratios.clone(),
+                line: line.as_ref().map(|line| (line.model.ratios.clone(), line.weights)),
+                errors,
+            },
             predictor: Predictor::new(model),
-            line: line.map(|line| (Predictor::new(line.model), line.weights)),
+            line: line.map(|line| Predictor::new(line.model)),
             noise,
             degrees_of_freedom,
         }
     }
 
-    /// Returns the parameters from which [`ContextMap::restore`] reproduces the map.
-    pub(crate) fn parameters(&self) -> MapParameters {
-        MapParameters {
-            kind: self.kind,
-            kernel: self.kernel,
-            directions: self.axes.directions.clone(),
-            ratios: self.ratios.clone(),
-            line: self.line.as_ref().map(|(_, weights)| (self.line_ratios.clone(), *weights)),
-            errors: self.errors.clone(),
-        }
+    /// Returns the parameters from which [`ContextMap::restore`] reproduces the map, with its directions.
+    pub(crate) fn parameters(&self) -> &MapParameters {
+        &self.parameters
+    }
+
+    /// Returns the outputs per unit of each component, as rows (P, P).
+    pub(crate) fn directions(&self) -> &Array2<f64> {
+        &self.axes.directions
     }
 
     /// Returns the type of each context value (Q,).
@@ -247,6 +242,18 @@ impl ContextMap {
 
     /// Returns the context that numbers (Q,) encode, where a label is its index in [`ContextMap::columns`].
     ///
+    /// ```
+    /// # use ndarray::array;
+    /// # use pdmp_core::context::{ContextMap, MapSelection};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// let contexts = [vec!["left".into()], vec!["right".into()], vec!["left".into()]];
+    /// let outputs = array![[1.0], [2.0], [1.2]];
+    /// let map = ContextMap::fit(&contexts, outputs.view(), MapSelection::Auto)?;
+    /// assert_eq!(map.context(&[1.0])?, contexts[1]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A number that is not the index of a label.
     pub fn context(&self, numbers: &[f64]) -> Result<Vec<ContextValue>> {
@@ -254,14 +261,9 @@ impl ContextMap {
         columns.zip(numbers).map(|((q, column), &number)| column.value(q, number)).collect()
     }
 
-    /// Returns the number of context values Q.
-    pub fn n_inputs(&self) -> usize {
-        self.columns.len()
-    }
-
     /// Returns the kind of the map.
     pub fn kind(&self) -> ContextMapKind {
-        self.kind
+        self.parameters.kind
     }
 
     /// Returns the mean squared leave-one-out error of the map and of its members, in closed form.
@@ -269,7 +271,7 @@ impl ContextMap {
     /// Hyperparameters are those of all contexts. An error is infinite where the other contexts do not determine the
     /// prediction.
     pub fn errors(&self) -> &[(ContextMapKind, f64)] {
-        &self.errors
+        &self.parameters.errors
     }
 
     /// Returns the degrees of freedom of the covariance.
@@ -286,7 +288,7 @@ impl ContextMap {
     /// A context of another length, an unknown label, a number that is not finite, or a prediction that overflows.
     pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<ContextPrediction> {
         let context: Vec<ContextValue> = context.iter().cloned().map(Into::into).collect();
-        let context = to_numbers(&self.columns, &context)?;
+        let context = to_numbers(&self.columns, &context).map_err(|error| self.with_column_name(error))?;
         let features = self.encoder.features(&context);
         let extrapolation = self.encoder.extrapolation(&context);
         let (components, deviations) = self.components(&features, &extrapolation);
@@ -295,7 +297,7 @@ impl ContextMap {
             let kriging = &self.predictor.kriging;
             let location = kriging.location(&features);
             let growth: Vec<f64> =
-                self.ratios.iter().map(|&ratio| (1.0 + kriging.variance(&location, ratio)).sqrt()).collect();
+                self.parameters.ratios.iter().map(|&ratio| (1.0 + kriging.variance(&location, ratio)).sqrt()).collect();
             let mut covariance = Array2::from_shape_fn(noise.dim(), |(i, j)| noise[[i, j]] * growth[i] * growth[j]);
             for (weight, deviation) in deviations {
                 let column = deviation.view().insert_axis(Axis(1));
@@ -322,7 +324,9 @@ impl ContextMap {
     /// their weights in the variance of the mixture.
     fn components(&self, features: &[f64], extrapolation: &[f64]) -> (Array1<f64>, Vec<(f64, Array1<f64>)>) {
         let process = self.predictor.mean(features);
-        let Some((line, weights)) = &self.line else { return (process, Vec::new()) };
+        let (Some(line), Some((_, weights))) = (&self.line, &self.parameters.line) else {
+            return (process, Vec::new());
+        };
         let weights = weights.at(extrapolation.iter().fold(0.0, |max, distance| distance.max(max)));
         let members = [process, line.mean(features), self.mean.clone()];
         let mut combined = Array1::zeros(self.mean.len());
@@ -348,16 +352,17 @@ fn overflow(context: &[f64], extrapolation: &[f64]) -> Error {
 
 impl std::fmt::Display for ContextMap {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}", self.kind)?;
-        if let Some(Kernel::Matern { length }) = self.kernel {
+        let MapParameters { kind, kernel, line, errors, .. } = &self.parameters;
+        write!(f, "{kind}")?;
+        if let Some(Kernel::Matern { length }) = kernel {
             write!(f, ", length scale {length:.2} of the contexts' standard deviation")?;
         }
-        if let Some((_, StackingWeights { interpolation, extrapolation: [g, l] })) = &self.line {
+        if let Some((_, StackingWeights { interpolation, extrapolation: [g, l] })) = line {
             let mean = (1.0 - g - l).max(0.0);
             write!(f, "; interpolation weights {:.2} and {:.2}", interpolation[0], interpolation[1])?;
             write!(f, ", extrapolation weights {g:.2}, {l:.2} and {mean:.2} for the mean")?;
         }
-        for (k, (kind, error)) in self.errors.iter().filter(|(_, error)| error.is_finite()).enumerate() {
+        for (k, (kind, error)) in errors.iter().filter(|(_, error)| error.is_finite()).enumerate() {
             let before = if k == 0 { "; leave-one-out error" } else { "," };
             write!(f, "{before} {error:.3e} ({})", kind.name())?;
         }

@@ -8,7 +8,8 @@ use super::ContextColumn;
 use super::encoding::Encoder;
 use super::model_selection::{MAX_CONTEXTS, TrainingSet};
 use super::principal_axes::PrincipalAxes;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::validate::check_range;
 
 /// Most multiplications n·F² of least squares for n contexts with F features, which take one or two seconds.
 const MAX_WORK: f64 = 4e9;
@@ -35,10 +36,9 @@ impl GroupedData {
     pub(super) fn new(columns: Vec<ContextColumn>, contexts: &Array2<f64>, outputs: ArrayView2<f64>) -> Result<Self> {
         let groups = group_equal_contexts(contexts);
         let n_features: usize = columns.iter().map(ContextColumn::n_features).sum();
-        if groups.len() as f64 * (n_features as f64).powi(2) > MAX_WORK {
-            let allowed = "labels and numbers per context are too many for this number of contexts; merge labels";
-            return Err(Error::Range { name: "contexts", value: n_features as f64, allowed });
-        }
+        let allowed = "labels and numbers per context are too many for this number of contexts; merge labels";
+        let work = groups.len() as f64 * (n_features as f64).powi(2);
+        check_range("contexts", n_features as f64, work <= MAX_WORK, allowed)?;
         let first_of_each: Vec<usize> = groups.iter().map(|group| group[0]).collect();
         let distinct = contexts.select(Axis(0), &first_of_each);
         let encoder = Encoder::fit(&columns, &distinct)?;
@@ -66,11 +66,8 @@ impl GroupedData {
     /// More than [`MAX_CONTEXTS`].
     pub(super) fn check_kernel_size(&self) -> Result<()> {
         let n = self.features.nrows();
-        if n > MAX_CONTEXTS {
-            let allowed = "different contexts: at most 1024 for this map; round them, or select the linear map";
-            return Err(Error::Range { name: "contexts", value: n as f64, allowed });
-        }
-        Ok(())
+        let allowed = "different contexts: at most 1024 for this map; round them, or select the linear map";
+        check_range("contexts", n as f64, n <= MAX_CONTEXTS, allowed)
     }
 
     /// Returns the data with components along axes for outputs.

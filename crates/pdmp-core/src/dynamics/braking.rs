@@ -10,7 +10,7 @@
 //! decelerates equally but leaves a displacement that decays at the rate α_z/2 for every κ. From
 //! z = −α_zβ_z·h(v), h(v) = ∫₀ᵛ exp(−α_z(v − s))·s·exp(−λs) ds, and e′ = z + p, the forcing is p = (1 − λv)·exp(−λv) + α_zβ_z·h.
 
-use crate::dynamics::output_system::{Attractor, INVERSE_FACTORIAL};
+use crate::dynamics::output_system::{Attractor, INVERSE_FACTORIAL, State};
 
 /// Maximum |x| of the series of ψ; the closed form loses a digit here, and more below.
 const MAX_SERIES: f64 = 0.5;
@@ -47,6 +47,17 @@ impl Braking {
         let growth = (d * v).exp();
         let p = (1.0 - lambda * v) * growth + stiffness * v * v * psi(d * v, growth);
         [p, growth * (d * (1.0 - lambda * v) - lambda + stiffness * v)]
+    }
+
+    /// Returns e = v·exp(−λv) and z = −α_zβ_z·h(v).
+    pub(crate) fn state(&self, v: f64) -> State<f64> {
+        State { e: v * (-self.lambda * v).exp(), z: -self.stiffness * self.h(v) }
+    }
+
+    /// Returns the maximum of e from v on.
+    pub(crate) fn max_displacement(&self, v: f64) -> f64 {
+        let v = v.max(1.0 / self.lambda);
+        v * (-self.lambda * v).exp()
     }
 
     /// Returns an upper bound of |p| from v on, which decreases.

@@ -9,7 +9,9 @@
 
 use std::f64::consts::TAU;
 
+use crate::error::Result;
 use crate::kind::Kind;
+use crate::numerics::state::{Visitor, visit_number};
 use serde::{Deserialize, Serialize};
 
 /// Canonical system of a movement.
@@ -109,6 +111,13 @@ impl CompensatedSum {
         let sum = self.value + step;
         self.compensation = step - (sum - self.value);
         self.value = sum;
+    }
+
+    /// Visits the sum, within the given bounds, and its compensation.
+    pub(crate) fn walk(&mut self, visit: &mut Visitor, bounds: [f64; 2]) -> Result<()> {
+        visit_number(visit, &mut self.value, bounds)?;
+        let rounding = 1e-9 * self.value.abs().max(1.0);
+        visit_number(visit, &mut self.compensation, [-rounding, rounding])
     }
 
     /// Wraps an angle to [0, 2π).

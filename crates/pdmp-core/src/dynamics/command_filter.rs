@@ -9,7 +9,9 @@
 //! positive, so that a filtered positive command stays positive for any sequence of changes.
 
 use crate::dynamics::output_system::INVERSE_FACTORIAL;
+use crate::error::Result;
 use crate::numerics::simd::{F64x4, Register, pack, repack};
+use crate::numerics::state::{Visitor, clone_in_place, visit_number};
 
 /// ωt at which 99 % of a step are done: the root of (1 + s)exp(−s) = 0.01.
 const SETTLING_TIME: f64 = 6.638_352_067_993_813;
@@ -17,12 +19,14 @@ const SETTLING_TIME: f64 = 6.638_352_067_993_813;
 const DECAY_TIME: f64 = 45.0;
 /// Maximum ωt of a substep: a cubic then deviates from the filter by about 1e-9 of the step.
 const MAX_SUBSTEP: f64 = 0.07;
-/// Maximum number of substeps that a filter asks for.
+/// Maximum number of substeps that a filter requires.
 const MAX_SUBSTEPS: f64 = 32.0;
 /// Number of terms of the series of an exponential that is exact to the last digit up to [`MAX_SUBSTEP`].
 const N_TERMS: usize = 10;
 /// Minimum transition, in seconds, that is filtered. A shorter one is immediate, since its ω² may overflow.
 const MIN_TRANSITION: f64 = 1e-15;
+/// Maximum rate of a restored command; its products with gains stay finite.
+const MAX_COMMAND_RATE: f64 = 1e220;
 /// Maximum ωt in exponents: exp(−ωt) is zero, and ωt·exp(−ωt) must not become ∞·0.
 const MAX_EXPONENT: f64 = 1e4;
 
@@ -153,7 +157,7 @@ impl FilterStep {
 }
 
 /// Filtered commands with a common transition, in groups of four, padded with zeros.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct CommandFilter {
     value: Vec<F64x4>,
     rate: Vec<F64x4>,
@@ -161,6 +165,8 @@ pub(crate) struct CommandFilter {
     /// Time until the values are set to their targets.
     remaining: f64,
 }
+
+clone_in_place!(CommandFilter { value, rate, target, remaining });
 
 impl CommandFilter {
     /// Returns commands at rest on their targets.
@@ -203,9 +209,9 @@ impl CommandFilter {
         repack(&mut self.target, target);
     }
 
-    /// Sets the values without a transition and leaves the targets.
-    pub(crate) fn set_value(&mut self, value: &[F64x4]) {
-        self.value.copy_from_slice(value);
+    /// Sets the value of a group without a transition and leaves its target.
+    pub(crate) fn set_value(&mut self, group: usize, value: F64x4) {
+        self.value[group] = value;
     }
 
     /// Sets targets and values.
@@ -214,6 +220,17 @@ impl CommandFilter {
         self.value.copy_from_slice(&self.target);
         self.rate.fill(F64x4::ZERO);
         self.remaining = 0.0;
+    }
+
+    /// Visits values, targets and rates, for commands from `least` to `limit`.
+    pub(crate) fn walk(&mut self, visit: &mut Visitor, gains: &FilterGains, [least, limit]: [f64; 2]) -> Result<()> {
+        // Value and rate of a chain of steps between ±limit are bounded by 2·limit and 2ω·limit.
+        let rate = if gains.is_immediate() { 0.0 } else { (2.0 * limit * gains.omega).min(MAX_COMMAND_RATE) };
+        let Self { value, rate: slope, target, remaining: _ } = self;
+        for (lanes, bounds) in [(value, [2.0 * least, 2.0 * limit]), (target, [least, limit]), (slope, [-rate, rate])] {
+            visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), bounds)?;
+        }
+        visit_number(visit, &mut self.remaining, [-1e300, gains.decay_time])
     }
 
     /// Advances all groups by a tick.

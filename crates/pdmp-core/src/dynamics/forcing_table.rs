@@ -6,7 +6,7 @@
 use crate::dynamics::braking::Braking;
 use crate::dynamics::canonical::{Canonical, faded, turn};
 use crate::dynamics::hermite_table::KnotTable;
-use crate::dynamics::output_system::{Attractor, CubicSample};
+use crate::dynamics::output_system::{Attractor, CubicSample, State};
 use crate::numerics::simd::{F64x4, Real, Register, WIDTH, groups};
 
 /// Forcing w of unit styles over the clock: x·b(x; W) for a discrete movement, b(φ; W) for a rhythmic one.
@@ -65,6 +65,31 @@ pub(crate) struct Fade {
     pub(crate) p_slope: f64,
 }
 
+/// Motion past the end due to the forcing w = r·(a + b·p) of a movement that brakes: e = b·e₁ and z = b·z₁ − a·r solve
+/// e′ = z + w about the goal.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BrakedMotion {
+    r: f64,
+    p: f64,
+    /// e₁ and z₁.
+    unit: State<f64>,
+    /// Maximum of e₁ from the clock on.
+    max_displacement: f64,
+}
+
+impl BrakedMotion {
+    /// Returns the state for a + b·p as value and b as slope.
+    pub(crate) fn state(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> State<F64x4> {
+        let a = value - slope * self.p;
+        State { e: slope * self.unit.e, z: slope * self.unit.z - a * self.r }
+    }
+
+    /// Returns the maximum of |e| from the clock on.
+    pub(crate) fn max_displacement(&self, slope: F64x4) -> F64x4 {
+        slope.abs() * self.max_displacement
+    }
+}
+
 /// Upper bound of |w|, without the part that decays as z does, from a clock past the end on: of a + b·p and of b.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ForcingBound {
@@ -84,7 +109,8 @@ impl ForcingBound {
 #[repr(align(64))]
 struct Cubic([F64x4; 4]);
 
-/// Position in the table: the index of the first cubic at a knot, and the clock since that knot.
+/// Position in the table: the index of the first cubic at a knot, and the argument of the cubics: the clock since that knot,
+/// or p past the end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TableIndex {
     first: usize,
@@ -255,6 +281,15 @@ impl ForcingTable {
             }
             _ => None,
         }
+    }
+
+    /// Returns the motion due to the forcing at clock `u` past the end of a movement that brakes.
+    pub(crate) fn braked_motion(&self, u: f64) -> Option<BrakedMotion> {
+        let (Some(Fade { r, p, .. }), Ending::Braked { braking, .. }) = (self.fade(u), self.ending) else {
+            return None;
+        };
+        let v = u - self.canonical.extent();
+        Some(BrakedMotion { r, p, unit: braking.state(v), max_displacement: braking.max_displacement(v) })
     }
 
     /// Returns the bound of the forcing from clock `u` past the end on.

@@ -67,6 +67,36 @@ pub(crate) struct Propagator {
 }
 
 impl Attractor {
+    /// Returns ω = √(α_zβ_z) and exp(−ζa) with the damping ratio ζ = α_z/2ω and a = arccos(ζ)/√(1 − ζ²).
+    ///
+    /// After a step of the goal by 1 the peak velocity is ω·exp(−ζa); after a step of z by 1 the peak displacement is
+    /// exp(−ζa)/ω.
+    fn peak(&self) -> (f64, f64) {
+        let omega = (self.alpha_z * self.beta_z).sqrt();
+        let damping = 0.5 * self.alpha_z / omega;
+        let root = (damping * damping - 1.0).abs().sqrt();
+        let angle = if root < 1e-6 {
+            1.0
+        } else if damping < 1.0 {
+            damping.acos() / root
+        } else {
+            damping.acosh() / root
+        };
+        (omega, (-damping * angle).exp())
+    }
+
+    /// Returns the peak velocity on the clock after a step of the goal by 1.
+    pub(crate) fn step_peak(&self) -> f64 {
+        let (omega, decay) = self.peak();
+        omega * decay
+    }
+
+    /// Returns the peak displacement after a step of z by 1.
+    pub(crate) fn impulse_peak(&self) -> f64 {
+        let (omega, decay) = self.peak();
+        decay / omega
+    }
+
     /// Returns the propagator over a clock interval `h`.
     pub(crate) fn propagator(&self, h: f64) -> Propagator {
         let stiffness = self.alpha_z * self.beta_z;

@@ -12,6 +12,7 @@
 
 use crate::dynamics::output_system::{Attractor, Propagator};
 use crate::numerics::simd::{F64x4, Register};
+use crate::numerics::state::clone_in_place;
 
 /// Truncation error of the series, relative to its value.
 const TOLERANCE: f64 = 1e-17;
@@ -23,7 +24,7 @@ const MAX_SPECTRAL_BOUND: f64 = 1e9;
 const GROUPS: usize = 5;
 
 /// Power series of the weights of a propagator.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Series {
     attractor: Attractor,
     /// Pairs of an even and an odd coefficient for each group.
@@ -31,6 +32,8 @@ pub(crate) struct Series {
     /// Maximum step of the series.
     max_step: f64,
 }
+
+clone_in_place!(Series { attractor, coefficients, max_step });
 
 impl Series {
     /// Returns the series for steps up to `max_step`, or up to its radius of accuracy if that is smaller.

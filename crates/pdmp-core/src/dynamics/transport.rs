@@ -44,7 +44,7 @@ pub(crate) struct TransportSegment {
     cubic: [f64; 4],
 }
 
-/// TransportSample ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
+/// Lag ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TransportSample {
     pub(crate) value: f64,
@@ -69,7 +69,10 @@ impl Transport {
             return Ok(Self::immediate());
         }
         let Canonical::Discrete { u_end, .. } = canonical else {
-            return Err(Error::Arguments("only a discrete movement has a transport profile"));
+            return Err(Error::Argument {
+                name: "transport",
+                problem: "must be empty: a rhythmic movement has no transport profile",
+            });
         };
         let constant = |end: &[f64], value: f64| end.iter().all(|c| *c == value);
         if !(MIN_CELLS + DEGREE..=MAX_CELLS + DEGREE).contains(&n)
@@ -77,7 +80,10 @@ impl Transport {
             || !constant(&coefficients[n - DEGREE..], 1.0)
             || !coefficients.windows(2).all(|pair| pair[0] <= pair[1])
         {
-            return Err(Error::Arguments("a transport profile must increase from 0 to 1 and be constant at both ends"));
+            return Err(Error::Argument {
+                name: "transport",
+                problem: "must increase from 0 to 1 and be constant at both ends",
+            });
         }
         let cells = n - DEGREE;
         let width = u_end / cells as f64;
@@ -104,9 +110,18 @@ impl Transport {
     }
 
     /// Returns the interval that contains clock `u`.
-    pub(crate) fn stretch(&self, u: f64) -> TransportSegment {
+    pub(crate) fn segment_at(&self, u: f64) -> TransportSegment {
         // The cast saturates: a negative clock is evaluated in the first cell.
-        let cell = (u * self.cells_per_clock) as usize;
+        self.segment_of_cell((u * self.cells_per_clock) as usize)
+    }
+
+    /// Returns the index of the cell of an interval, the number of cells for that past the end.
+    pub(crate) fn cell(&self, segment: &TransportSegment) -> usize {
+        (segment.from * self.cells_per_clock).round() as usize
+    }
+
+    /// Returns the interval of a cell.
+    pub(crate) fn segment_of_cell(&self, cell: usize) -> TransportSegment {
         let at = |knot: usize| self.width * knot as f64;
         match self.cubics.get(cell) {
             Some(&cubic) => TransportSegment { from: at(cell), to: at(cell + 1), cubic },
@@ -116,7 +131,7 @@ impl Transport {
 
     /// Returns the lag ℓ at clock `u`.
     pub(crate) fn lag(&self, u: f64) -> TransportSample {
-        self.stretch(u).lag(u)
+        self.segment_at(u).lag(u)
     }
 }
 

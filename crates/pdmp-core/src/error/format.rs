@@ -40,3 +40,33 @@ impl fmt::Display for Number {
         if self.0.fract() == 0.0 && self.0.abs() < 1e9 { write!(f, "{}", self.0) } else { write!(f, "{:?}", self.0) }
     }
 }
+
+/// A measured number, to six significant digits.
+pub(super) struct Rounded(pub(super) f64);
+
+impl fmt::Display for Rounded {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        Number(format!("{:.5e}", self.0).parse().unwrap_or(self.0)).fmt(f)
+    }
+}
+
+/// A number of things, with their name in the singular or plural.
+pub(super) struct Count(pub(super) usize, pub(super) &'static str);
+
+impl fmt::Display for Count {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} {}{}", self.0, self.1, if self.0 == 1 { "" } else { "s" })
+    }
+}
+
+/// Index of a context column, or its name.
+pub(super) struct Column<'a>(pub(super) usize, pub(super) &'a Option<String>);
+
+impl fmt::Display for Column<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.1 {
+            Some(name) => write!(f, "{name:?}"),
+            None => write!(f, "{}", self.0),
+        }
+    }
+}

@@ -4,31 +4,14 @@
 //! Texts belong to no programming language: a binding appends its own hints. Errors of the control loop hold nothing that
 //! allocates.
 
+mod classification;
 mod format;
 
 use std::path::PathBuf;
 
 use crate::kind::Kind;
-use format::{Gap, Number, Times};
-
-/// The caller's next step after an [`Error`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ErrorKind {
-    /// Pass another argument.
-    Argument,
-    /// Mend the recording, or choose another one.
-    Data,
-    /// Change the problem: it is well-formed, but has no numerical solution.
-    Numerical,
-    /// Ask for less, or provide more memory.
-    Memory,
-    /// Use another model file.
-    ModelFile,
-    /// Check the path, permissions and disk.
-    Io,
-    /// Nothing: the caller cancelled the call.
-    Interrupted,
-}
+pub use classification::ErrorKind;
+use format::{Column, Count, Gap, Number, Rounded, Times};
 
 /// Any error of this crate.
 ///
@@ -87,18 +70,32 @@ pub enum Error {
         /// Owner of one element.
         per: &'static str,
     },
+    /// A name that is repeated or too long.
+    #[error("{name}[{index}] = {value:?}: {allowed}")]
+    Name {
+        /// The argument.
+        name: &'static str,
+        /// Index of the name.
+        index: usize,
+        /// The name, shortened.
+        value: String,
+        /// The allowed values, as the end of the sentence.
+        allowed: &'static str,
+    },
     /// A number of vectors that differs from the number of movements.
-    #[error("{name} has {found} rows, but there are {expected} styles: pass one row for each, or one vector for all")]
+    #[error(
+        "{name} has {found} rows, but there are {expected} movements: pass one row for each, or one vector for all"
+    )]
     Rows {
         /// The argument.
         name: &'static str,
-        /// The number of styles.
+        /// The number of movements.
         expected: usize,
         /// The number of rows.
         found: usize,
     },
-    /// A condition of only one of two conditions that are blended.
-    #[error("{name}: given for one of the two only; give it for both")]
+    /// A condition that only some of several conditions have.
+    #[error("{name}: given for some of the conditions only; give it for all")]
     Single {
         /// The condition.
         name: &'static str,
@@ -112,6 +109,18 @@ pub enum Error {
         value: f64,
         /// The allowed range, as the end of the sentence.
         allowed: &'static str,
+    },
+    /// A cut-off frequency outside its range.
+    #[error("{name} = {} Hz: {allowed} of {} Hz", Number(*hz), Rounded(*rate))]
+    CutOff {
+        /// The argument.
+        name: &'static str,
+        /// Its value, in Hz.
+        hz: f64,
+        /// The allowed range, as the end of a sentence about the sampling rate.
+        allowed: &'static str,
+        /// The sampling rate, in Hz.
+        rate: f64,
     },
     /// A number so large that its square overflows.
     #[error(
@@ -143,7 +152,7 @@ pub enum Error {
         limit: f64,
     },
     /// Arrays that do not fit into memory.
-    #[error("{name} would take {} numbers: not enough memory; ask for fewer samples", Number(*numbers))]
+    #[error("{name} would take {} numbers: not enough memory; reduce the number of samples", Number(*numbers))]
     Memory {
         /// The requested arrays.
         name: &'static str,
@@ -259,25 +268,37 @@ pub enum Error {
         of: &'static str,
     },
     /// A context value that is none of the demonstrated labels.
-    #[error("context[{column}] = {value}: not demonstrated; the labels are {known}")]
+    #[error("context[{}] = {value}: not demonstrated; the labels are {known}", Column(*column, name))]
     Label {
         /// Index of the context value.
         column: usize,
+        /// Name of its column, if known.
+        name: Option<String>,
         /// The value.
         value: String,
         /// The demonstrated labels.
         known: String,
     },
     /// A label in place of a number.
-    #[error("context[{column}] = {label:?}: a number is expected, as in the demonstrations")]
+    #[error("context[{}] = {label:?}: a number is expected, as in the demonstrations", Column(*column, name))]
     NoNumber {
         /// Index of the context value.
         column: usize,
+        /// Name of its column, if known.
+        name: Option<String>,
         /// The label.
         label: String,
     },
+    /// A context with other names than the columns of the demonstrations' contexts.
+    #[error("context has the names {found}; expected one value for each of {expected}")]
+    ContextNames {
+        /// Names of the columns.
+        expected: String,
+        /// Names of the values.
+        found: String,
+    },
     /// A context value that is a label in one demonstration and a number in another.
-    #[error("contexts[:, {column}] holds {labels} labels and {numbers} numbers: give one or the other")]
+    #[error("contexts[:, {column}] holds {} and {}: give one or the other", Count(*labels, "label"), Count(*numbers, "number"))]
     Mixed {
         /// Index of the context value.
         column: usize,
@@ -319,9 +340,6 @@ pub enum Error {
         /// Its size over the largest of the demonstrations'.
         ratio: f64,
     },
-    /// Arguments that are missing or exclude each other.
-    #[error("{0}")]
-    Arguments(&'static str),
     /// A lower limit of the position that is not below the upper one.
     #[error("limits of DoF {dof}: the lower limit {lower} must be below the upper limit {upper}")]
     LimitOrder {
@@ -350,6 +368,28 @@ pub enum Error {
         /// Fraction of the clock.
         phase: f64,
     },
+    /// An argument that is missing, empty or unsuitable.
+    #[error("{name} {problem}")]
+    Argument {
+        /// The argument.
+        name: &'static str,
+        /// The problem and its remedy, as the end of the sentence.
+        problem: &'static str,
+    },
+    /// Two arguments that exclude each other.
+    #[error("pass {} or {}, not both: {reason}", names[0], names[1])]
+    Conflict {
+        /// The arguments.
+        names: [&'static str; 2],
+        /// The reason, as the end of the sentence.
+        reason: &'static str,
+    },
+    /// A recording without motion.
+    #[error("the recording stands still: {consequence}")]
+    Still {
+        /// The consequence, as the end of the sentence.
+        consequence: &'static str,
+    },
     /// A well-formed problem without a numerical solution.
     #[error("{0}")]
     Fit(String),
@@ -371,49 +411,3 @@ pub enum Error {
 
 /// Result of a fallible call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
-
-impl Error {
-    /// Returns the caller's next step; that of the inner error for one of several demonstrations.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Self::Demo { source, .. } => source.kind(),
-            Self::Memory { .. } => ErrorKind::Memory,
-            Self::Fit(_) => ErrorKind::Numerical,
-            Self::File(_) => ErrorKind::ModelFile,
-            Self::Io { .. } => ErrorKind::Io,
-            Self::Interrupted => ErrorKind::Interrupted,
-            Self::NotFiniteAt { .. }
-            | Self::Magnitude { .. }
-            | Self::Time { .. }
-            | Self::Gap { .. }
-            | Self::WrapInGap { .. }
-            | Self::Aperiodic { .. }
-            | Self::Samples { .. }
-            | Self::Dofs { .. }
-            | Self::Mixed { .. }
-            | Self::Undescribed { .. }
-            | Self::StyleSize { .. } => ErrorKind::Data,
-            Self::NotFinite { .. }
-            | Self::Length { .. }
-            | Self::Rows { .. }
-            | Self::Single { .. }
-            | Self::Range { .. }
-            | Self::TooLarge { .. }
-            | Self::Landmark { .. }
-            | Self::Segments { .. }
-            | Self::NoDemonstrations
-            | Self::Styles { .. }
-            | Self::Label { .. }
-            | Self::NoNumber { .. }
-            | Self::Kind { .. }
-            | Self::LimitOrder { .. }
-            | Self::LeavesLimits { .. }
-            | Self::Arguments(_) => ErrorKind::Argument,
-        }
-    }
-
-    /// Names the demonstration in which this error arose.
-    pub fn in_demo(self, demo: usize) -> Self {
-        Error::Demo { demo, source: Box::new(self) }
-    }
-}

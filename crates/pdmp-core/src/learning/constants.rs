@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use super::{CanonicalOptions, FitOptions};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::output_system::Attractor;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::learning::alignment::Aligned;
 use crate::learning::regression::Domain;
 use crate::model::primitive::{MAX_RATE, MAX_TAU};
-use crate::validate::check_positive;
+use crate::validate::{check_positive, check_range};
 
 /// Constants of a primitive.
 pub(crate) struct Constants {
@@ -33,16 +33,12 @@ impl Constants {
                 let tau = tau.unwrap_or(duration);
                 check_positive("tau", tau)?;
                 let u_end = duration / tau;
-                if !(1e-3..=1e3).contains(&u_end) {
-                    let allowed = "must lie within a thousandfold of the nominal duration";
-                    return Err(Error::Range { name: "tau", value: tau, allowed });
-                }
+                let allowed = "must lie within a thousandfold of the nominal duration";
+                check_range("tau", tau, (1e-3..=1e3).contains(&u_end), allowed)?;
                 let alpha_x = alpha_x.unwrap_or(100f64.ln() / u_end);
                 check_rate("alpha_x", alpha_x)?;
-                if alpha_x * u_end > 300.0 {
-                    let allowed = "must not exceed 300 tau / T, or the phase vanishes before the end";
-                    return Err(Error::Range { name: "alpha_x", value: alpha_x, allowed });
-                }
+                let allowed = "must not exceed 300 tau / T, or the phase vanishes before the end";
+                check_range("alpha_x", alpha_x, alpha_x * u_end <= 300.0, allowed)?;
                 (Canonical::Discrete { alpha_x, u_end }, tau)
             }
             CanonicalOptions::Rhythmic { mu, .. } => {
@@ -50,10 +46,8 @@ impl Constants {
                 (Canonical::Rhythmic { mu }, duration / TAU)
             }
         };
-        if !(1.0 / MAX_TAU..=MAX_TAU).contains(&tau) {
-            let allowed = "seconds: must lie between 1e-12 and 1e12; check the unit of time";
-            return Err(Error::Range { name: "tau", value: tau, allowed });
-        }
+        let allowed = "seconds: must lie between 1e-12 and 1e12; check the unit of time";
+        check_range("tau", tau, (1.0 / MAX_TAU..=MAX_TAU).contains(&tau), allowed)?;
         Ok(Self { attractor, canonical, tau })
     }
 
@@ -68,9 +62,5 @@ impl Constants {
 
 /// Checks a rate; the bounds keep products of rates far from overflow and underflow.
 fn check_rate(name: &'static str, value: f64) -> Result<()> {
-    if (1.0 / MAX_RATE..=MAX_RATE).contains(&value) {
-        Ok(())
-    } else {
-        Err(Error::Range { name, value, allowed: "must lie between 1e-6 and 1e6" })
-    }
+    check_range(name, value, (1.0 / MAX_RATE..=MAX_RATE).contains(&value), "must lie between 1e-6 and 1e6")
 }

@@ -13,17 +13,19 @@ use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::options::TransportSelection;
 use crate::learning::style_selection::cross_validation::StyleSelection;
 use crate::learning::targets::Targets;
-use crate::model::primitive::{Parts, Primitive};
+use crate::model::primitive::{Parts, Primitive, end_velocities};
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{inspect, unwound};
+use crate::validate::{check_length, check_names};
 
+use super::braking_rate::braking_rate;
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
 use super::noise_findings;
 use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
 use super::stiffness::stiffness;
-use super::style_selection::spectrum;
+use super::style_selection::singular_values;
 use super::tabulation::compile;
 use super::warp_selection::WarpSelection;
 
@@ -81,6 +83,10 @@ pub fn fit_with(
     let demos = &*whole;
     let mut aligned = options.alignment().align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
+    if !options.context_names.is_empty() {
+        let n_columns = contexts.as_ref().map_or(0, |(columns, _)| columns.len());
+        check_names("context_names", &options.context_names, n_columns, "context column")?;
+    }
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
     let mut aligning = |share| progress(Stage::Align, share);
@@ -95,7 +101,7 @@ pub fn fit_with(
         }
         _ => Transport::immediate(),
     };
-    let braking = (!transport.is_immediate()).then(|| targets.braking(constants.attractor));
+    let accelerations = targets.largest_accelerations();
     targets.carry(&transport, constants.attractor, constants.canonical);
     targets.scale(&dof_scale);
 
@@ -110,38 +116,44 @@ pub fn fit_with(
 
     progress(Stage::Regress, 0.0)?;
     let clock = constants.canonical.clock(aligned.n_samples);
-    let basis_targets = by_clock(&factors.basis, &dof_scale);
+    let basis_targets = by_clock(&factors.basis_targets, &dof_scale);
     let mut regressing = |share| progress(Stage::Regress, share);
     let regression = options.basis.regress(constants.domain(), &clock, basis_targets.view(), &mut regressing)?;
 
     let mut compiling = |share| progress(Stage::Compile, share);
-    let shape = (factors.basis.nrows(), demos[0].n_dofs());
+    let shape = (factors.basis_targets.nrows(), demos[0].n_dofs());
     let n_samples = clock.len();
     let forcing_table = compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
 
-    let (segment_durations, nominal) = (aligned.segment_durations.clone(), aligned.nominal);
+    let segment_durations = aligned.segment_durations.clone();
     let (columns, contexts) = contexts.unzip();
     let truncation_error = factors.truncation_error();
     let Factors { styles, singular_values, .. } = factors;
     let durations = aligned.durations();
-    let demonstrated =
-        DemonstrationParameters { styles, goals, starts, anchors, segment_durations, durations, contexts, nominal };
+    let demonstrated = DemonstrationParameters {
+        styles,
+        goals,
+        starts,
+        anchors,
+        segment_durations,
+        durations,
+        contexts,
+        nominal: aligned.nominal,
+    };
     let Constants { attractor, canonical, tau } = constants;
     let breaks = aligned.breaks.clone();
-    let nominal = demonstrated.nominal(canonical.kind());
+    let nominal = demonstrated.nominal_conditions(canonical.kind());
+    let braking = (!transport.is_immediate()).then(|| {
+        let end_velocities = end_velocities(attractor, &forcing_table, names.len());
+        braking_rate(attractor, &accelerations, demonstrated.styles.view(), &end_velocities)
+    });
     let parts = Parts { attractor, forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal };
     let primitive = Arc::new(Primitive::new(parts));
     findings.extend(stiffness(&primitive, &aligned)?);
     let noise = aligned.noise.clone();
-    let (map, residual_variance) = match (columns, &demonstrated.contexts) {
-        (Some(columns), Some(contexts)) => {
-            let outputs = demonstrated.outputs(canonical.kind());
-            let metric = metric(&primitive, outputs.view(), demonstrated.segment_durations.view())?;
-            let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
-            (Some(map), Some(residual_variance(&primitive, outputs.view(), aligned)?))
-        }
-        _ => (None, None),
-    };
+    let contexts = columns.zip(demonstrated.contexts.as_ref());
+    let learn = |contexts| learn_map(contexts, &primitive, &demonstrated, aligned, options);
+    let (map, residual_variance) = contexts.map(learn).transpose()?.unzip();
     let regression = regression.describe();
     let learnt = FitSummary {
         n_samples,
@@ -155,6 +167,20 @@ pub fn fit_with(
         findings,
     };
     Ok(Model { primitive, demonstrated, learnt, map })
+}
+
+/// Learns the map from contexts (M, Q) to movements, and the residual variance (S, D) of the movements.
+fn learn_map(
+    (columns, contexts): (Vec<ContextColumn>, &Array2<f64>),
+    primitive: &Arc<Primitive>,
+    demonstrated: &DemonstrationParameters,
+    aligned: Aligned,
+    options: &FitOptions,
+) -> Result<(ContextMap, Array2<f64>)> {
+    let outputs = demonstrated.outputs(primitive.kind());
+    let metric = metric(primitive, outputs.view(), demonstrated.segment_durations.view())?;
+    let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
+    Ok((map.with_names(options.context_names.clone())?, residual_variance(primitive, outputs.view(), aligned)?))
 }
 
 /// Types of the context columns (Q,), and the contexts (M, Q) as numbers.
@@ -216,14 +242,15 @@ impl Training<'_> {
         let forcing = targets.forcing.view();
         match options.n_styles {
             NStyles::AboveNoise => {
-                let noise = spectrum::noise_limit(aligned, constants, transport, dof_scale, options.threads)?;
-                spectrum::systematic(forcing, noise, contexts, progress)
+                let noise = singular_values::noise_limit(aligned, constants, transport, dof_scale, options.threads)?;
+                singular_values::systematic(forcing, noise, contexts, progress)
             }
             NStyles::Truncated(count) => Factors::of(forcing, count, progress),
             NStyles::CrossValidated => {
-                let (columns, numbers) = contexts.ok_or(Error::Arguments(
-                    "cross-validation of the number of styles needs contexts: pass contexts, or a number of styles",
-                ))?;
+                let (columns, numbers) = contexts.ok_or(Error::Argument {
+                    name: "n_styles",
+                    problem: "needs contexts for cross-validation: pass contexts, or a number of styles",
+                })?;
                 let all = Factors::of(forcing, Truncation::Share(1.0), &mut |share| progress(0.5 * share))?;
                 let selection =
                     StyleSelection::new(aligned, targets, &all, transport, constants.attractor, constants.canonical);
@@ -250,11 +277,8 @@ fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
 
 /// Returns the given contexts, or those of the demonstrations; `None` if there are none.
 fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> Result<Option<Contexts>> {
-    if let Some(contexts) = given
-        && contexts.len() != demos.len()
-    {
-        let (expected, found) = (demos.len(), contexts.len());
-        return Err(Error::Length { name: "contexts", expected, found, per: "demonstration" });
+    if let Some(contexts) = given {
+        check_length("contexts", contexts.len(), demos.len(), "demonstration")?;
     }
     let contexts: Option<Vec<&[ContextValue]>> = match given {
         Some(contexts) => Some(contexts.iter().map(Vec::as_slice).collect()),
@@ -267,8 +291,8 @@ fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> 
 /// Returns names and units of the DoFs; defaults where no demonstration carries any.
 fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
     let n_dofs = demos.first().map_or(0, Demonstration::n_dofs);
-    let names = common_labels(demos, Demonstration::names, "names differ from those of the other demonstrations")?;
-    let units = common_labels(demos, Demonstration::units, "units differ from those of the other demonstrations")?;
+    let names = common_labels(demos, Demonstration::names, "names")?;
+    let units = common_labels(demos, Demonstration::units, "units")?;
     Ok((
         names.unwrap_or_else(|| (0..n_dofs).map(|d| format!("y{d}")).collect()),
         units.unwrap_or_else(|| vec![String::new(); n_dofs]),
@@ -279,11 +303,11 @@ fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
 fn common_labels(
     demos: &[Demonstration],
     labels: impl Fn(&Demonstration) -> Option<&[String]>,
-    conflict: &'static str,
+    name: &'static str,
 ) -> Result<Option<Vec<String>>> {
     let Some(first) = demos.iter().find_map(&labels) else { return Ok(None) };
     match demos.iter().position(|demo| labels(demo).is_some_and(|other| other != first)) {
-        Some(m) => Err(Error::Arguments(conflict).in_demo(m)),
+        Some(m) => Err(Error::Argument { name, problem: "differ from those of the other demonstrations" }.in_demo(m)),
         None => Ok(Some(first.to_vec())),
     }
 }

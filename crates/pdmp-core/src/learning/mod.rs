@@ -3,6 +3,7 @@
 //! [`fit`] composes the four steps of Section 3.2: alignment, targets, factorisation, regression.
 
 pub(crate) mod alignment;
+mod braking_rate;
 mod constants;
 mod context_folds;
 mod cycle_phase;
@@ -24,4 +25,4 @@ pub use alignment::TimeScaling;
 pub use factorization::{Factors, Truncation};
 pub use fit::{fit, fit_with};
 pub use options::{CanonicalOptions, DofScaling, FitOptions, NStyles, Stage, TransportSelection};
-pub use style_inference::style_of;
+pub use style_inference::{StyleOptions, style_of};

@@ -47,7 +47,7 @@ pub(super) fn truncation_error(
         |d: &usize| ranges[*d] * MIN_RANGE_RATIO < largest && ranges[*d] > MIN_SIGNAL_TO_NOISE * noise.levels()[*d];
     let share = |d: usize| {
         let all = squares(&targets.forcing, d);
-        let share = (1.0 - squares(&factors.basis, d) / all.max(f64::MIN_POSITIVE)).max(0.0).sqrt();
+        let share = (1.0 - squares(&factors.basis_targets, d) / all.max(f64::MIN_POSITIVE)).max(0.0).sqrt();
         if all > 0.0 { share } else { 0.0 }
     };
     let worst = (0..n_dofs).filter(small).map(|d| (d, share(d))).max_by(|a, b| a.1.total_cmp(&b.1));

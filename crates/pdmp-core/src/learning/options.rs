@@ -2,14 +2,14 @@
 
 use crate::context::MapSelection;
 use crate::demonstration::ContextValue;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kind::Kind;
 use crate::learning::alignment::{Alignment, TimeScaling};
 use crate::learning::factorization::Truncation;
 use crate::learning::regression::{Basis, Gp};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
-use crate::validate::check_vector;
+use crate::validate::{check_range, check_vector};
 
 /// Scale of each degree of freedom in the factorisation.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,12 +34,10 @@ impl DofScaling {
     pub(super) fn given(&self, n_dofs: usize) -> Result<Option<&[f64]>> {
         let Self::Given(scale) = self else { return Ok(None) };
         check_vector("dof_scale", scale, n_dofs, "DoF")?;
-        match scale.iter().find(|value| !(1e-100..=1e100).contains(*value)) {
-            Some(&value) => {
-                Err(Error::Range { name: "dof_scale", value, allowed: "must lie between 1e-100 and 1e100" })
-            }
-            None => Ok(Some(scale)),
-        }
+        let check = |&value: &f64| {
+            check_range("dof_scale", value, (1e-100..=1e100).contains(&value), "must lie between 1e-100 and 1e100")
+        };
+        scale.iter().try_for_each(check).map(|()| Some(scale.as_slice()))
     }
 
     /// Returns the scales (D,) of DoFs with the given ranges and units.
@@ -131,6 +129,8 @@ pub struct FitOptions {
     pub time_scaling: TimeScaling,
     /// Contexts of the demonstrations (M rows of Q); otherwise those that they carry.
     pub contexts: Option<Vec<Vec<ContextValue>>>,
+    /// Names of the context columns (Q,); empty where unknown.
+    pub context_names: Vec<String>,
     /// Map from contexts to movements.
     pub map: MapSelection,
     /// Style dimension J.
@@ -159,6 +159,7 @@ impl FitOptions {
             n_samples: None,
             time_scaling: TimeScaling::Linear,
             contexts: None,
+            context_names: Vec::new(),
             map: MapSelection::Auto,
             n_styles: NStyles::AboveNoise,
             basis: Basis::Gp(Gp::default()),
@@ -197,6 +198,11 @@ impl FitOptions {
     /// Sets the contexts of the demonstrations (M rows of Q).
     pub fn contexts(self, contexts: Vec<Vec<ContextValue>>) -> Self {
         Self { contexts: Some(contexts), ..self }
+    }
+
+    /// Sets the names of the context columns (Q,).
+    pub fn context_names(self, context_names: Vec<String>) -> Self {
+        Self { context_names, ..self }
     }
 
     /// Sets the map from contexts to movements.

@@ -15,6 +15,7 @@ use crate::model::conditions::Conditions;
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
+use crate::validate::check_length;
 
 /// Smallest standard deviation σ of the residuals relative to the target.
 const ROUNDING: f64 = 1e-9;
@@ -26,21 +27,56 @@ const MAX_DEVIATION: f64 = 0.5;
 /// Largest truncation error of the forcing relative to that of the demonstrations, by root mean square.
 const MAX_TRUNCATION_RATIO: f64 = 3.0;
 
+/// Options of [`style_of`].
+///
+/// ```
+/// use pdmp_core::learning::StyleOptions;
+///
+/// let options = StyleOptions::default().dt(0.01).landmarks([0.4, 0.9]);
+/// assert_eq!(options.period, None);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct StyleOptions {
+    /// Sampling interval in seconds of a demonstration that carries none.
+    pub dt: Option<f64>,
+    /// Period in seconds of a cycle with time stamps.
+    pub period: Option<f64>,
+    /// Times (E,) in seconds of the landmarks of the demonstration, where the model was fitted with landmarks.
+    pub landmarks: Option<Vec<f64>>,
+}
+
+impl StyleOptions {
+    /// Sets the sampling interval, in seconds, of a demonstration that carries none.
+    pub fn dt(self, dt: f64) -> Self {
+        Self { dt: Some(dt), ..self }
+    }
+
+    /// Sets the period, in seconds, of a cycle with time stamps.
+    pub fn period(self, period: f64) -> Self {
+        Self { period: Some(period), ..self }
+    }
+
+    /// Sets the times (E,) of the landmarks, in seconds.
+    pub fn landmarks(self, landmarks: impl Into<Vec<f64>>) -> Self {
+        Self { landmarks: Some(landmarks.into()), ..self }
+    }
+}
+
 /// Estimates the style (J,) of a demonstration outside the training set.
 ///
 /// The estimate is the maximum a posteriori style given the target, with Gaussian residuals and a zero-mean Gaussian prior
 /// whose standard deviations are the largest magnitudes of the demonstrations' styles. A rhythmic demonstration that
 /// begins in another phase than those of the model is first shifted to their phase.
 ///
-/// `dt` is the sampling interval and `period` the period in seconds, as in a fit. Time is scaled as in the fit: by the
-/// same warp, or by landmarks, whose times `landmarks` (E,) are in seconds.
+/// Time is scaled as in the fit: linearly, by the same warp, or by the landmarks in the options.
 ///
 /// # Errors
 /// A demonstration that does not match the model, one that no style describes, or landmarks where the model has none.
 ///
 /// ```
 /// # use ndarray::Array2;
-/// use pdmp_core::learning::{Truncation, style_of};
+/// use pdmp_core::learning::{StyleOptions, Truncation, style_of};
 /// use pdmp_core::{Demonstration, FitOptions, Sampling, fit};
 ///
 /// # let arch = |h: f64| {
@@ -49,35 +85,23 @@ const MAX_TRUNCATION_RATIO: f64 = 3.0;
 /// # };
 /// let demonstrations = [arch(1.0)?, arch(2.0)?];
 /// let model = fit(&demonstrations, &FitOptions::discrete().n_styles(Truncation::Rank(1)))?;
-/// let style = style_of(&model, &arch(1.5)?, None, None, None)?;
+/// let style = style_of(&model, &arch(1.5)?, &StyleOptions::default())?;
 /// let styles = &model.demonstrated().styles;
 /// assert!(styles[[0, 0]] < style[0] && style[0] < styles[[1, 0]]);
 /// # Ok::<(), pdmp_core::Error>(())
 /// ```
-pub fn style_of(
-    model: &Model,
-    demo: &Demonstration,
-    dt: Option<f64>,
-    period: Option<f64>,
-    landmarks: Option<&[f64]>,
-) -> Result<Vec<f64>> {
+pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> Result<Vec<f64>> {
     let n_dofs = model.n_dofs();
-    if demo.n_dofs() != n_dofs {
-        let (expected, found) = (n_dofs, demo.n_dofs());
-        return Err(Error::Length { name: "demonstration", expected, found, per: "DoF" });
-    }
-    for (labels, own, conflict) in [
-        (demo.names(), model.names(), "names differ from those of the model"),
-        (demo.units(), model.units(), "units differ from those of the model"),
-    ] {
+    check_length("demonstration", demo.n_dofs(), n_dofs, "DoF")?;
+    for (name, labels, own) in [("names", demo.names(), model.names()), ("units", demo.units(), model.units())] {
         if labels.is_some_and(|labels| labels != own) {
-            return Err(Error::Arguments(conflict));
+            return Err(Error::Argument { name, problem: "differ from those of the model" });
         }
     }
     let alignment = Alignment {
         kind: model.kind(),
-        dt,
-        period: period.into_iter().collect(),
+        dt: options.dt,
+        period: options.period.into_iter().collect(),
         smoothing: Smoothing::Interpolate,
         nominal: None,
         n_samples: Some(model.learnt.n_samples),
@@ -85,15 +109,19 @@ pub fn style_of(
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
     let by_landmarks = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
-    match (&model.learnt.template, landmarks) {
+    match (&model.learnt.template, options.landmarks.as_deref()) {
         (None, Some(landmarks)) if by_landmarks => aligned.register_to(model.breaks(), landmarks)?,
         (None, None) if by_landmarks => {
-            return Err(Error::Arguments(
-                "the model was fitted with landmarks: pass the landmarks of this demonstration too",
-            ));
+            return Err(Error::Argument {
+                name: "landmarks",
+                problem: "is missing: the model was fitted with landmarks; pass those of this demonstration too",
+            });
         }
         (_, Some(_)) => {
-            return Err(Error::Arguments("the model was fitted without landmarks: leave out the landmarks"));
+            return Err(Error::Argument {
+                name: "landmarks",
+                problem: "does not apply: the model was fitted without landmarks",
+            });
         }
         (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use ndarray::{Array2, Array3, Axis};
+use ndarray::{Array2, Array3, ArrayViewMut1, ArrayViewMut2, Axis, aview1};
 
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::output_system::{Attractor, Inverse};
@@ -17,11 +17,10 @@ use crate::learning::transport_profile::{profile_samples, transport_profile};
 use crate::numerics::simd::{F64x4, gather, groups, pack, scatter, unpack};
 use crate::numerics::spline::Knots;
 use crate::numerics::threads::Threads;
-use crate::validate::zeros;
+use crate::validate::{row_major_mut, zeros};
 
-/// Largest braking rate κ, in units of α_z; that of a movement that ends nearly at rest. With 4 instead, movements leave
-/// their goals by 1.2 to 2 times as much on the recordings of `docs/transport.md`; 16 improves on few of them.
-const MAX_BRAKING: f64 = 8.0;
+/// Number of vectors (D,) of each demonstration: start, goal, anchor, range and largest acceleration.
+const N_VECTORS: usize = 5;
 
 /// Targets and other quantities that a fit takes from the demonstrations, one row per demonstration.
 #[derive(Debug)]
@@ -38,22 +37,8 @@ pub(crate) struct Targets {
     ranges: Array2<f64>,
     /// Largest |y″| (M, D) with respect to the clock.
     accelerations: Array2<f64>,
-    /// |y′| at the end (M, D) with respect to the clock.
-    end_speeds: Array2<f64>,
     /// Displacements from the start (M, S, D), from which the transport profile is learnt; empty for rhythmic movements.
     displacements: Array3<f64>,
-}
-
-/// Rows of one demonstration.
-struct Rows<'a> {
-    forcing: &'a mut [f64],
-    start: &'a mut [f64],
-    goal: &'a mut [f64],
-    anchor: &'a mut [f64],
-    range: &'a mut [f64],
-    acceleration: &'a mut [f64],
-    end_speed: &'a mut [f64],
-    displacement: &'a mut [f64],
 }
 
 impl Targets {
@@ -75,30 +60,28 @@ impl Targets {
             Kind::Discrete => profile_samples(aligned.n_samples).len(),
             Kind::Rhythmic => 0,
         };
-        let mut targets = Self {
-            forcing: zeros("targets", (n_demos, aligned.n_samples * n_dofs))?,
-            starts: Array2::zeros((n_demos, n_dofs)),
-            goals: Array2::zeros((n_demos, n_dofs)),
-            anchors: Array2::zeros((n_demos, n_dofs)),
-            ranges: Array2::zeros((n_demos, n_dofs)),
-            accelerations: Array2::zeros((n_demos, n_dofs)),
-            end_speeds: Array2::zeros((n_demos, n_dofs)),
-            displacements: Array3::zeros((n_demos, n_profile, n_dofs)),
-        };
+        let mut forcing = zeros("targets", (n_demos, aligned.n_samples * n_dofs))?;
+        let mut vectors = Array3::zeros((n_demos, N_VECTORS, n_dofs));
+        let mut displacements = Array3::zeros((n_demos, n_profile, n_dofs));
         let inversion = TargetComputation::new(attractor, canonical, aligned.n_samples);
         let columns = || [0, 1].map(|_| vec![F64x4::ZERO; aligned.n_samples]);
-        let compute = |columns: &mut [Vec<F64x4>; 2], (m, rows): (usize, Rows)| {
-            aligned.sample(m, rows.forcing);
-            inversion.compute(rows, aligned.demo(m).goal(), columns);
-            Ok(())
-        };
-        threads.try_for_each_with_progress(targets.rows().enumerate().collect(), columns, compute, progress)?;
-        Ok(targets)
+        let rows = forcing.rows_mut().into_iter().zip(vectors.outer_iter_mut()).zip(displacements.outer_iter_mut());
+        let compute =
+            |columns: &mut _, (m, ((mut forcing, vectors), displacement)): (usize, ((ArrayViewMut1<f64>, _), _))| {
+                let forcing = row_major_mut(&mut forcing);
+                aligned.sample(m, forcing);
+                inversion.compute(forcing, vectors, displacement, aligned.demo(m).goal(), columns);
+                Ok(())
+            };
+        threads.try_for_each_with_progress(rows.enumerate().collect(), columns, compute, progress)?;
+        let [starts, goals, anchors, ranges, accelerations] =
+            std::array::from_fn::<_, N_VECTORS, _>(|k| vectors.index_axis(Axis(1), k).to_owned());
+        Ok(Self { forcing, starts, goals, anchors, ranges, accelerations, displacements })
     }
 
     /// Returns the largest peak-to-peak range of each DoF within one demonstration (D,).
     pub(crate) fn ranges(&self) -> Vec<f64> {
-        self.ranges.fold_axis(Axis(0), 0.0f64, |most, range| most.max(*range)).to_vec()
+        largest(&self.ranges)
     }
 
     /// Learns the transport profile of discrete movements, with DoFs scaled by the given units (D,).
@@ -113,19 +96,9 @@ impl Targets {
         transport_profile(displacements, reaches, canonical)
     }
 
-    /// Returns the rate κ at which movements brake past their ends, y″ = −κy′ at the end.
-    ///
-    /// κ limits the deceleration of each DoF to its largest demonstrated acceleration, within [α_z, 8α_z]; it is 8α_z for
-    /// movements that end at rest.
-    pub(crate) fn braking(&self, attractor: Attractor) -> f64 {
-        let largest = |matrix: &Array2<f64>| matrix.fold_axis(Axis(0), 0.0f64, |most, x| most.max(*x));
-        let ratio = |(acceleration, speed): (f64, f64)| if speed > 0.0 { acceleration / speed } else { f64::INFINITY };
-        let slowest = largest(&self.accelerations)
-            .into_iter()
-            .zip(largest(&self.end_speeds))
-            .map(ratio)
-            .fold(f64::INFINITY, f64::min);
-        slowest.clamp(attractor.alpha_z, MAX_BRAKING * attractor.alpha_z)
+    /// Returns the largest |y″| of each DoF with respect to the clock (D,).
+    pub(crate) fn largest_accelerations(&self) -> Vec<f64> {
+        largest(&self.accelerations)
     }
 
     /// Converts the targets to those about the moving frame c, f = y′ − c′ − z with z driven by y − c.
@@ -144,7 +117,7 @@ impl Targets {
         let rows = self.forcing.rows_mut().into_iter().zip(self.goals.rows()).zip(self.starts.rows());
         for ((mut row, goal), start) in rows {
             let reach = &goal - &start;
-            let samples = crate::validate::row_major_mut(&mut row).chunks_exact_mut(n_dofs);
+            let samples = row_major_mut(&mut row).chunks_exact_mut(n_dofs);
             for (forcing, lag) in samples.zip(&lag) {
                 forcing.iter_mut().zip(&reach).for_each(|(f, reach)| *f -= reach * lag);
             }
@@ -156,35 +129,6 @@ impl Targets {
         if dof_scale.iter().any(|&scale| scale != 1.0) {
             self.forcing.iter_mut().zip(dof_scale.iter().cycle()).for_each(|(f, scale)| *f /= scale);
         }
-    }
-
-    fn rows(&mut self) -> impl Iterator<Item = Rows<'_>> {
-        let n_dofs = self.starts.ncols();
-        let n_values = self.forcing.ncols();
-        fn chunks(matrix: &mut Array2<f64>, n: usize) -> std::slice::ChunksExactMut<'_, f64> {
-            crate::validate::row_major_mut(matrix).chunks_exact_mut(n)
-        }
-        let [starts, goals, anchors, ranges] = [&mut self.starts, &mut self.goals, &mut self.anchors, &mut self.ranges]
-            .map(|matrix| chunks(matrix, n_dofs));
-        let [accelerations, end_speeds] =
-            [&mut self.accelerations, &mut self.end_speeds].map(|matrix| chunks(matrix, n_dofs));
-        let vectors = starts.zip(goals).zip(anchors.zip(ranges)).zip(accelerations.zip(end_speeds));
-        let displacements = self
-            .displacements
-            .outer_iter_mut()
-            .map(|rows| rows.into_slice().expect("blocks of a row-major array are contiguous"));
-        chunks(&mut self.forcing, n_values).zip(vectors).zip(displacements).map(
-            |((forcing, (((start, goal), (anchor, range)), (acceleration, end_speed))), displacement)| Rows {
-                forcing,
-                start,
-                goal,
-                anchor,
-                range,
-                acceleration,
-                end_speed,
-                displacement,
-            },
-        )
     }
 }
 
@@ -208,26 +152,32 @@ impl TargetComputation {
         Self { kind, clock, inverse, knots }
     }
 
-    /// Computes the rows of a demonstration in place; `rows.forcing` holds its positions on entry and its target on return.
+    /// Computes the target, vectors (6, D) and displacements (S, D) of a demonstration.
     ///
-    /// The output system is invariant to translation, except for rounding. Demonstrations are therefore translated to
-    /// start at 0: a DoF at rest has a target of exactly zero, and its exact position as its mean.
-    fn compute(&self, rows: Rows, given: Option<&[f64]>, [column, slopes]: &mut [Vec<F64x4>; 2]) {
-        let Rows { forcing: position, start, goal, anchor, range, acceleration, end_speed, displacement } = rows;
-        let n_dofs = start.len();
-        start.copy_from_slice(&position[..n_dofs]);
-        for (x, c) in displacement.chunks_exact_mut(n_dofs).zip(profile_samples(column.len())) {
-            let sample = &position[c * n_dofs..];
-            x.iter_mut().zip(sample).zip(&*start).for_each(|((x, y), start)| *x = y - start);
+    /// `samples` are its positions on entry and its target on return. The output system is invariant to translation, except
+    /// for rounding. Demonstrations are therefore translated to start at 0: a DoF at rest has a target of exactly zero, and
+    /// its exact position as its mean.
+    fn compute(
+        &self,
+        samples: &mut [f64],
+        mut vectors: ArrayViewMut2<f64>,
+        mut displacements: ArrayViewMut2<f64>,
+        given: Option<&[f64]>,
+        [column, slopes]: &mut [Vec<F64x4>; 2],
+    ) {
+        let n_dofs = vectors.ncols();
+        let start = samples[..n_dofs].to_vec();
+        for (mut x, c) in displacements.rows_mut().into_iter().zip(profile_samples(column.len())) {
+            x.assign(&aview1(&samples[c * n_dofs..][..n_dofs]));
+            x -= &aview1(&start);
         }
-        goal.copy_from_slice(given.unwrap_or(&position[position.len() - n_dofs..]));
+        let goal = given.unwrap_or(&samples[samples.len() - n_dofs..]).to_vec();
         let n_samples = F64x4::splat(column.len() as f64);
-        let goals = pack(goal);
-        let [mut means, mut ranges, mut accelerations, mut end_speeds] =
-            [(); 4].map(|()| vec![F64x4::ZERO; goals.len()]);
+        let goals = pack(&goal);
+        let [mut means, mut ranges, mut accelerations] = [(); 3].map(|()| vec![F64x4::ZERO; goals.len()]);
         let per_step = 1.0 / self.clock[1];
         for group in 0..groups(n_dofs) {
-            gather(position, n_dofs, group, column);
+            gather(samples, n_dofs, group, column);
             let start = column[0];
             let [mut low, mut high, mut sum] = [F64x4::ZERO; 3];
             for y in column.iter_mut() {
@@ -240,13 +190,17 @@ impl TargetComputation {
             let difference = |pair: &[F64x4]| (pair[1] - pair[0]).abs() * per_step;
             accelerations[group] =
                 slopes.windows(2).fold(F64x4::ZERO, |largest, pair| largest.fast_max(difference(pair)));
-            end_speeds[group] = slopes[slopes.len() - 1].abs();
             self.inverse.target(column, slopes, centre - start, self.kind == Kind::Rhythmic);
-            scatter(column, n_dofs, group, position);
+            scatter(column, n_dofs, group, samples);
         }
-        anchor.copy_from_slice(unpack(&means, n_dofs));
-        range.copy_from_slice(unpack(&ranges, n_dofs));
-        acceleration.copy_from_slice(unpack(&accelerations, n_dofs));
-        end_speed.copy_from_slice(unpack(&end_speeds, n_dofs));
+        let computed = [&means, &ranges, &accelerations].map(|packed| unpack(packed, n_dofs));
+        for (mut row, vector) in vectors.rows_mut().into_iter().zip([&*start, &*goal].into_iter().chain(computed)) {
+            row.assign(&aview1(vector));
+        }
     }
+}
+
+/// Returns the largest element of each column.
+fn largest(matrix: &Array2<f64>) -> Vec<f64> {
+    matrix.fold_axis(Axis(0), 0.0f64, |largest, x| largest.max(*x)).to_vec()
 }

@@ -1,13 +1,15 @@
 //! Selection between a time warp and linear time scaling by cross-validation over the contexts.
 //!
 //! The mean squared prediction error over linear time is lowest for movements averaged over linear time. A warp lowers it
-//! where contexts predict the timing, or where fewer styles remain, and raises it otherwise. Both are validated on
+//! where contexts predict the segment durations, or where fewer styles remain, and raises it otherwise. Both are validated on
 //! held-out contexts, with principal components of the positions in place of styles and landscape, equal in number to
 //! the styles of the fit.
 
-use ndarray::{Array2, ArrayView1, Axis, s};
+use std::iter::repeat_n;
 
-use crate::context::{ContextColumn, ContextMap, MapSelection};
+use ndarray::{Array1, Array2, ArrayView1, Axis, concatenate};
+
+use crate::context::{ContextColumn, ContextMap, MapSelection, log_durations};
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::Result;
 use crate::kind::Kind;
@@ -15,6 +17,7 @@ use crate::learning::alignment::Aligned;
 use crate::learning::context_folds::{Fold, folds};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::model::sensitivity::STEPS;
+use crate::motion::prediction_band::interpolate;
 
 /// Cross-validation of a time warp.
 pub(super) struct WarpSelection<'a> {
@@ -97,47 +100,27 @@ fn positions(aligned: &Aligned, kind: Kind) -> Array2<f64> {
 }
 
 /// Returns the outputs of the map, which are the component scores and the logarithms of the segment durations, and the
-/// metric of their errors. An error of 1 in the timing weighs as much as the movement about its mean.
+/// metric of their errors. An error of 1 in the relative segment durations weighs as much as the movement about its mean.
 fn outputs(factors: &Factors, segment_durations: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
-    let (n, last) = (factors.styles.ncols(), segment_durations.ncols() - 1);
-    let sizes: Vec<f64> = factors.basis.rows().into_iter().map(|row| row.dot(&row)).collect();
-    let movement =
-        factors.basis.var_axis(Axis(1), 0.0).sum() * factors.basis.ncols() as f64 / segment_durations.nrows() as f64;
-    let outputs = Array2::from_shape_fn((segment_durations.nrows(), n + last + 1), |(m, p)| match p.checked_sub(n) {
-        None => factors.styles[[m, p]],
-        Some(k) if k < last => (segment_durations[[m, k]] / segment_durations[[m, last]]).ln(),
-        Some(_) => segment_durations.row(m).sum().ln(),
-    });
-    let weight = |p: usize| if p < n { sizes[p] } else { movement };
-    let weights: ndarray::Array1<f64> = (0..n + last + 1).map(weight).collect();
-    let metric = Array2::from_diag(&weights);
-    (outputs, metric)
+    let logarithms = log_durations(segment_durations.view());
+    let movement = factors.basis_targets.var_axis(Axis(1), 0.0).sum() * factors.basis_targets.ncols() as f64
+        / segment_durations.nrows() as f64;
+    let sizes = factors.basis_targets.rows().into_iter().map(|row| row.dot(&row));
+    let weights: Array1<f64> = sizes.chain(repeat_n(movement, logarithms.ncols())).collect();
+    (concatenate![Axis(1), factors.styles, logarithms], Array2::from_diag(&weights))
 }
 
 /// Returns the predicted movement (S·D) over linear time.
-fn predicted(expected: &[f64], factors: &Factors, aligned: &Aligned, kind: Kind) -> ndarray::Array1<f64> {
-    let (styles, segment_durations) = expected.split_at(factors.styles.ncols());
-    let curve = ArrayView1::from(styles).dot(&factors.basis);
-    let last = segment_durations.len() - 1;
-    if last == 0 {
+fn predicted(expected: &[f64], factors: &Factors, aligned: &Aligned, kind: Kind) -> Array1<f64> {
+    let (styles, logarithms) = expected.split_at(factors.styles.ncols());
+    let curve = ArrayView1::from(styles).dot(&factors.basis_targets);
+    if logarithms.len() == 1 {
         return curve;
     }
-    let segment_durations: Vec<f64> =
-        segment_durations[..last].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
+    let segment_durations: Vec<f64> = logarithms[1..].iter().chain(&[0.0]).map(|logarithm| logarithm.exp()).collect();
     let time = WarpingFunction::new(kind, &aligned.breaks, &segment_durations);
     let n_dofs = aligned.demo(0).n_dofs();
-    let n_samples = curve.len() / n_dofs;
-    let mut warped = curve.clone();
-    for c in 0..n_samples {
-        let position = (time.phase(time.duration() * c as f64 / STEPS as f64)[0] * STEPS as f64).max(0.0);
-        let (near, share) = (position.floor() as usize, position.fract());
-        let row = |c: usize| {
-            let c = if kind == Kind::Rhythmic { c % n_samples } else { c.min(n_samples - 1) };
-            curve.slice(s![c * n_dofs..(c + 1) * n_dofs])
-        };
-        warped
-            .slice_mut(s![c * n_dofs..(c + 1) * n_dofs])
-            .assign(&(&row(near) * (1.0 - share) + &row(near + 1) * share));
-    }
-    warped
+    let curve = Array2::from_shape_fn((curve.len() / n_dofs, n_dofs), |(c, d)| curve[c * n_dofs + d]);
+    let sample = |c: usize| (time.phase(time.duration() * c as f64 / STEPS as f64)[0] * STEPS as f64).max(0.0);
+    (0..curve.nrows()).flat_map(|c| interpolate(&curve, sample(c), kind)).collect()
 }

@@ -4,7 +4,8 @@ use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::primitive::Primitive;
-use crate::validate::{check_positive, check_vector};
+use crate::numerics::state::clone_in_place;
+use crate::validate::{check_length, check_positive, check_range, check_vector};
 
 /// Conditions under which a movement starts. A condition that is `None` is that of the nominal demonstration.
 ///
@@ -65,12 +66,24 @@ impl Conditions {
 
     /// Returns the conditions (1 − share)·self + share·other; a share outside [0, 1] extrapolates.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit, rollout};
+    /// # use pdmp_core::motion::TimeGrid;
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let (low, high) = (model.conditions(&[0])?, model.conditions(&[2])?);
+    /// let between = low.blend(&high, 0.5)?;
+    /// let trajectory = rollout(model.primitive(), &between, TimeGrid { dt: 0.01, duration: None })?;
+    /// assert_eq!(trajectory.position.nrows(), 101);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A condition that one of the two lacks, lengths that differ, or a share that is not finite.
     pub fn blend(&self, other: &Self, share: f64) -> Result<Self> {
-        if !share.is_finite() {
-            return Err(Error::Range { name: "share", value: share, allowed: "must be finite" });
-        }
+        check_range("share", share, share.is_finite(), "must be finite")?;
         let mix = |a: f64, b: f64| (1.0 - share) * a + share * b;
         let number = |name, a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => Ok(Some(mix(a, b))),
@@ -78,10 +91,8 @@ impl Conditions {
             _ => Err(Error::Single { name }),
         };
         let vector = |name, a: &Option<Vec<f64>>, b: &Option<Vec<f64>>| match (a, b) {
-            (Some(a), Some(b)) if a.len() != b.len() => {
-                Err(Error::Length { name, expected: a.len(), found: b.len(), per: "element of the other conditions" })
-            }
-            (Some(a), Some(b)) => Ok(Some(a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect())),
+            (Some(a), Some(b)) => check_length(name, b.len(), a.len(), "element of the other conditions")
+                .map(|()| Some(a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect())),
             (None, None) => Ok(None),
             _ => Err(Error::Single { name }),
         };
@@ -139,11 +150,7 @@ impl Conditions {
             Some(style) => check_style(style, primitive.n_styles()).map(|()| style.clone())?,
             None => nominal.style.clone(),
         };
-        reject_for_kind(kind, "phase", kind == Kind::Discrete && self.phase.is_some())?;
-        let phase = self.phase.unwrap_or(0.0);
-        if !phase.is_finite() {
-            return Err(Error::Range { name: "phase", value: phase, allowed: "must be a finite angle in rad" });
-        }
+        self.phase.map_or(Ok(()), |phase| check_phase(kind, phase))?;
         Ok(ResolvedConditions {
             style,
             centre,
@@ -153,20 +160,32 @@ impl Conditions {
             has_goal_velocity: self.goal_velocity.is_some(),
             amplitude,
             tau,
-            phase: turn(phase),
+            phase: turn(self.phase.unwrap_or(0.0)),
         })
     }
 
-    /// τ in seconds: as given, that of a movement as long as the timing, or the nominal demonstration's.
+    /// Returns τ in seconds: the given one, that of a movement as long as the sum of the segment durations, or the nominal demonstration's.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let slow = Conditions { segment_durations: Some(vec![2.0]), ..Conditions::default() };
+    /// assert!((slow.time_constant(model.primitive())? - 2.0 * model.tau()).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
-    /// Both of them, a τ that is not positive, or a timing that does not fit the primitive.
+    /// Both of them, a τ that is not positive, or segment durations that do not fit the primitive.
     pub fn time_constant(&self, primitive: &Primitive) -> Result<f64> {
         let tau = match (self.tau, &self.segment_durations) {
             (Some(_), Some(_)) => {
-                return Err(Error::Arguments(
-                    "pass tau or segment_durations, not both: segment durations add up to the duration",
-                ));
+                return Err(Error::Conflict {
+                    names: ["tau", "segment_durations"],
+                    reason: "segment durations add up to the duration",
+                });
             }
             (None, Some(segment_durations)) => {
                 primitive.check_segment_durations(segment_durations)?;
@@ -179,7 +198,7 @@ impl Conditions {
 }
 
 /// Conditions with nothing left open but a start on the cycle and a demonstrated start velocity.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct ResolvedConditions {
     pub(crate) style: Vec<f64>,
     /// Goal or anchor.
@@ -195,11 +214,23 @@ pub(crate) struct ResolvedConditions {
     pub(crate) phase: f64,
 }
 
+clone_in_place!(ResolvedConditions {
+    style,
+    centre,
+    start,
+    velocity,
+    goal_velocity,
+    has_goal_velocity,
+    amplitude,
+    tau,
+    phase,
+});
+
 /// Refuses an argument that this kind of primitive does not have.
 pub(crate) fn reject_for_kind(kind: Kind, name: &'static str, given: bool) -> Result<()> {
     let instead = match (kind, name) {
         (Kind::Discrete, "anchor") => ": it moves to a goal; set goal",
-        (Kind::Discrete, "phase") => ": what it does later depends on where it started; it starts at its start",
+        (Kind::Discrete, "phase") => ": its state depends on its past; it starts at the start of its path",
         (Kind::Rhythmic, "goal") => ": it moves about an anchor; set anchor",
         _ => "",
     };
@@ -211,9 +242,10 @@ pub(crate) fn reject_goal_velocity(primitive: &Primitive, given: bool) -> Result
     let kind = primitive.kind();
     reject_for_kind(kind, "goal_velocity", kind == Kind::Rhythmic && given)?;
     if given && primitive.transport.is_immediate() {
-        return Err(Error::Arguments(
-            "goal_velocity needs learnt transport: immediate transport ends with the velocity of the demonstrations",
-        ));
+        return Err(Error::Argument {
+            name: "goal_velocity",
+            problem: "needs learnt transport: immediate transport ends with the velocity of the demonstrations",
+        });
     }
     Ok(())
 }
@@ -233,19 +265,17 @@ pub(crate) fn check_style(style: &[f64], n_styles: usize) -> Result<()> {
 /// Checks a time constant against the model's own, in seconds.
 pub(crate) fn check_tau(tau: f64, own: f64) -> Result<()> {
     check_positive("tau", tau)?;
-    if (1e-6..=1e6).contains(&(tau / own)) {
-        Ok(())
-    } else {
-        let allowed = "must lie within a millionfold of the model's tau";
-        Err(Error::Range { name: "tau", value: tau, allowed })
-    }
+    check_range("tau", tau, (1e-6..=1e6).contains(&(tau / own)), "must lie within a millionfold of the model's tau")
+}
+
+/// Checks a phase, in rad, of a rhythmic primitive.
+pub(crate) fn check_phase(kind: Kind, phase: f64) -> Result<()> {
+    reject_for_kind(kind, "phase", kind == Kind::Discrete)?;
+    check_range("phase", phase, phase.is_finite(), "must be a finite angle in rad")
 }
 
 /// Checks an amplitude: zero is rest.
 pub(crate) fn check_amplitude(value: f64) -> Result<()> {
-    if (0.0..=crate::validate::MAX_MAGNITUDE).contains(&value) {
-        Ok(())
-    } else {
-        Err(Error::Range { name: "amplitude", value, allowed: "must lie between 0, which is rest, and 1e150" })
-    }
+    let valid = (0.0..=crate::validate::MAX_MAGNITUDE).contains(&value);
+    check_range("amplitude", value, valid, "must lie between 0, which is rest, and 1e150")
 }

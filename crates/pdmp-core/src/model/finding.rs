@@ -223,7 +223,7 @@ impl fmt::Display for Finding {
             ),
             Self::TruncatedDof { dof, range, largest, share, n_styles } => write!(
                 f,
-                "{n_styles} styles leave out {} % of {dof:?}, whose range of {} is small relative to {}: if its unit differs, \
+                "n_styles = {n_styles} leaves out {} % of {dof:?}, whose range of {} is small relative to {}: if its unit differs, \
                  give units or dof_scale = \"range\"; otherwise raise n_styles",
                 short((100.0 * share).round()),
                 short(*range),

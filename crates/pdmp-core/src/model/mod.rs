@@ -138,6 +138,19 @@ impl Model {
     /// Returns the conditions of one demonstration, or the mean of several: style, goal and start or anchor, and segment
     /// durations.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let second = model.conditions(&[1])?;
+    /// assert_eq!(second.style, Some(model.demonstrated().styles.row(1).to_vec()));
+    /// let mean = model.conditions(&[0, 1, 2])?;
+    /// assert!(mean.goal.is_some() && mean.anchor.is_none());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// No demonstration, or an index that is not below their number.
     pub fn conditions(&self, demonstrations: &[usize]) -> Result<Conditions> {
@@ -146,7 +159,7 @@ impl Model {
             return Err(Error::Range { name: "demonstration", value: m as f64, allowed });
         }
         if demonstrations.is_empty() {
-            return Err(Error::Arguments("demonstrations is empty: pass at least one index"));
+            return Err(Error::Argument { name: "demonstrations", problem: "is empty: pass at least one index" });
         }
         let mean = |matrix: &Array2<f64>| {
             let rows = matrix.select(Axis(0), demonstrations);
@@ -170,12 +183,22 @@ impl Model {
     /// Predicts the movement for a context (Q,), as in Section 4.1.2. Its duration lies between a third of the shortest and
     /// three times the longest demonstrated duration.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let prediction = model.predict(&[0.25])?;
+    /// assert_eq!(prediction.conditions.style.as_ref().map(Vec::len), Some(model.n_styles()));
+    /// assert_eq!(prediction.extrapolation, [0.0]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A model without a context map, a context of another length, an unknown label, or a number that is not finite.
     pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<Prediction> {
-        let map = self.map.as_ref().ok_or(Error::Arguments(
-            "the model has no context map: fit it with contexts=, or with demonstrations that have a context",
-        ))?;
+        let map = self.map.as_ref().ok_or(Error::Argument { name: "context", problem: "does not apply: the model has no context map; fit it with contexts, or with demonstrations that have one" })?;
         let demonstrated = self.demonstrated.durations.iter();
         let [shortest, longest] =
             [f64::min, f64::max].map(|extreme| demonstrated.clone().copied().reduce(extreme).unwrap_or(1.0));
@@ -200,7 +223,7 @@ impl DemonstrationParameters {
     }
 
     /// Returns the conditions of the nominal demonstration.
-    pub(crate) fn nominal(&self, kind: Kind) -> Nominal {
+    pub(crate) fn nominal_conditions(&self, kind: Kind) -> Nominal {
         let row = |matrix: &Array2<f64>| matrix.row(self.nominal).to_vec();
         let centre = match kind {
             Kind::Discrete => &self.goals,

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use ndarray::Array2;
+
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::forcing_table::{ForcingTable, TableIndex};
 use crate::dynamics::output_system::{Attractor, Propagator, State};
@@ -10,8 +12,8 @@ use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::responses::Cache;
-use crate::numerics::simd::{F64x4, groups};
-use crate::validate::check_vector;
+use crate::numerics::simd::{F64x4, WIDTH, groups};
+use crate::validate::{check_range, check_vector};
 
 /// Maximum of the rates α_z, β_z, α_x and μ, and inverse of their minimum: products of several stay finite.
 pub(crate) const MAX_RATE: f64 = 1e6;
@@ -210,10 +212,8 @@ impl Primitive {
         let clock = self.canonical().clock_at(phase);
         // Long after the end x underflows to zero, and the clock is infinite.
         let past_cycle = self.kind() == Kind::Rhythmic && phase >= TAU;
-        if !(phase.is_finite() && clock >= 0.0) || past_cycle {
-            let allowed = "must lie in [0, 1] for a discrete and in [0, 2π) for a rhythmic primitive";
-            return Err(Error::Range { name: "phase", value: phase, allowed });
-        }
+        let allowed = "must lie in [0, 1] for a discrete and in [0, 2π) for a rhythmic primitive";
+        check_range("phase", phase, phase.is_finite() && clock >= 0.0 && !past_cycle, allowed)?;
         Ok(self.warping_function(segment_durations)?.slope(clock / extent) / extent)
     }
 
@@ -233,18 +233,26 @@ impl Primitive {
     pub(crate) fn check_segment_durations(&self, segment_durations: &[f64]) -> Result<()> {
         let nominal = &self.nominal.segment_durations;
         check_vector("segment_durations", segment_durations, nominal.len(), "segment between breaks")?;
-        let invalid = |(duration, nominal): &(&f64, &f64)| !(1e-6..=1e6).contains(&(*duration / *nominal));
-        match segment_durations.iter().zip(nominal).find(invalid) {
-            Some((&value, _)) => {
-                let allowed = "seconds must be positive, within a factor of 1e6 of the nominal demonstration's";
-                Err(Error::Range { name: "segment_durations", value, allowed })
-            }
-            None => Ok(()),
-        }
+        let allowed = "seconds must be positive, within a factor of 1e6 of the nominal demonstration's";
+        segment_durations.iter().zip(nominal).try_for_each(|(&value, nominal)| {
+            check_range("segment_durations", value, (1e-6..=1e6).contains(&(value / nominal)), allowed)
+        })
     }
 
     /// Returns the transport profile m(u) of a discrete movement at clock `u`, the position of its frame as a fraction of the
     /// displacement from start to goal. Immediate transport is m ≡ 1.
+    ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let primitive = model.primitive();
+    /// assert_eq!(primitive.transport(0.0)?, 0.0);
+    /// assert!((primitive.transport(1.0)? - 1.0).abs() < 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A rhythmic primitive, or a clock that is negative or not finite.
@@ -253,9 +261,7 @@ impl Primitive {
             let instead = ": it moves about an anchor and has no transport profile";
             return Err(Error::Kind { name: "transport", kind: self.kind(), instead });
         }
-        if !(u.is_finite() && u >= 0.0) {
-            return Err(Error::Range { name: "u", value: u, allowed: "must be finite and not negative" });
-        }
+        check_range("u", u, u.is_finite() && u >= 0.0, "must be finite and not negative")?;
         Ok(1.0 + self.transport.lag(u).value)
     }
 
@@ -285,13 +291,23 @@ impl Primitive {
 
     /// Returns the attractor landscape b (J, D) by rows at clock `u`, without its gate.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let landscape = model.primitive().landscape(0.5)?;
+    /// assert_eq!(landscape.len(), model.n_styles() * model.n_dofs());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A clock that is not finite, or negative for a discrete movement.
     pub fn landscape(&self, u: f64) -> Result<Vec<f64>> {
         let discrete = self.kind() == Kind::Discrete;
-        if !u.is_finite() || (discrete && u < 0.0) {
-            return Err(Error::Range { name: "u", value: u, allowed: "must be finite, and not negative if discrete" });
-        }
+        let valid = u.is_finite() && (u >= 0.0 || !discrete);
+        check_range("u", u, valid, "must be finite, and not negative if discrete")?;
         // Past the end gate and forcing decay together, so that b is constant.
         let u = if discrete { u.min(self.canonical().extent()) } else { u };
         let (mut value, mut slope) =
@@ -303,6 +319,19 @@ impl Primitive {
         }
         Ok(value)
     }
+}
+
+/// Returns the velocities y′ at the end for unit styles (J, D), starting from zero.
+pub(crate) fn end_velocities(attractor: Attractor, forcing_table: &ForcingTable, n_dofs: usize) -> Array2<f64> {
+    let n_styles = forcing_table.n_outputs() / n_dofs;
+    let states = from_rest(attractor, forcing_table);
+    let end = &states[states.len() - forcing_table.knot(0).len()..];
+    let flows: Vec<[f64; WIDTH]> = end
+        .iter()
+        .zip(forcing_table.knot(forcing_table.cells()))
+        .map(|(state, w)| (state.z + w.value).to_array())
+        .collect();
+    Array2::from_shape_fn((n_styles, n_dofs), |(j, d)| flows[d / WIDTH * n_styles + j][d % WIDTH])
 }
 
 /// Returns the states at the knots of the forcing table for unit styles, starting from zero, by knots, groups of DoFs and

@@ -3,6 +3,7 @@
 use ndarray::Array2;
 
 use crate::error::{Error, Result};
+use crate::validate::check_range;
 
 /// Number of time steps of the search grid per segment of linear time, and of comparison points per segment.
 pub(crate) const STEPS: usize = 10;
@@ -63,19 +64,12 @@ impl TimeWarp {
 
     /// Checks the settings, given the maximum number of segments that the samples resolve.
     pub(crate) fn check(&self, max_segments: usize) -> Result<()> {
-        match *self {
-            Self { n_segments: 0, .. } => {
-                Err(Error::Range { name: "n_segments", value: 0.0, allowed: "must be at least 1, which is linear" })
-            }
-            Self { n_segments, .. } if n_segments > max_segments => {
-                Err(Error::Segments { n_segments, most: max_segments })
-            }
-            Self { max_slope, .. } if !(1.0..=MAX_SLOPE).contains(&max_slope) => Err(Error::Range {
-                name: "max_slope",
-                value: max_slope,
-                allowed: "must lie between 1, which is linear, and 10",
-            }),
-            _ => Ok(()),
+        let Self { n_segments, max_slope } = *self;
+        check_range("n_segments", n_segments as f64, n_segments > 0, "must be at least 1, which is linear")?;
+        if n_segments > max_segments {
+            return Err(Error::Segments { n_segments, most: max_segments });
         }
+        let valid = (1.0..=MAX_SLOPE).contains(&max_slope);
+        check_range("max_slope", max_slope, valid, "must lie between 1, which is linear, and 10")
     }
 }

@@ -3,18 +3,19 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use ndarray::{Array2, Array3, ArrayView1, ArrayViewMut3, Axis, aview1};
+use ndarray::{ArrayViewMut3, Axis};
 
 use crate::error::{Error, Result};
-use crate::kind::Kind;
-use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, reject_goal_velocity};
+use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
+use crate::motion::batch_conditions::{BatchConditions, PerMovement};
 use crate::motion::rollout::TimeGrid;
 use crate::motion::superposition::{self, Combination};
+use crate::motion::trajectory::Trajectories;
 use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
-use crate::validate::{check_matrix, check_vector, zeros};
+use crate::validate::{check_range, zeros};
 
 /// Number of elements of each output that one thread writes per block.
 const BLOCK: usize = 1 << 17;
@@ -23,54 +24,24 @@ const MIN_MOVEMENTS_PER_BLOCK: usize = 8;
 /// Number of blocks per thread between two calls of `progress`.
 const PROGRESS_INTERVAL: usize = 16;
 
-/// One vector (D,) for all movements of a batch, or one for each.
-#[derive(Clone, Debug, PartialEq)]
-pub enum PerMovement {
-    /// One vector (D,) for all movements.
-    All(Vec<f64>),
-    /// One vector for each of B movements (B, D).
-    Each(Array2<f64>),
-}
-
-/// Conditions of the movements of a batch. The default of an optional field is the value of the nominal demonstration.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BatchConditions {
-    /// Styles s (B, J).
-    pub styles: Array2<f64>,
-    /// Goals g of discrete movements.
-    pub goals: Option<PerMovement>,
-    /// Anchors y_a of rhythmic movements.
-    pub anchors: Option<PerMovement>,
-    /// Start positions. The default of rhythmic movements is their limit cycle at φ = 0.
-    pub starts: Option<PerMovement>,
-    /// Start velocities, per second. The default is the velocity of the demonstrated movement.
-    pub velocities: Option<PerMovement>,
-    /// Final velocities of discrete movements, per second. The default is the velocity of the demonstrated movement.
-    pub goal_velocities: Option<PerMovement>,
-    /// Common amplitude r₀ of rhythmic movements. The default is 1.
-    pub amplitude: Option<f64>,
-    /// Common time constant τ, in seconds.
-    pub tau: Option<f64>,
-}
-
 /// Checked movements of a batch, ready to be computed as a whole or in parts, with bitwise equal results.
 ///
 /// ```
 /// # use ndarray::Array2;
 /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
 /// # use pdmp_core::model::Derivative;
-/// # use pdmp_core::motion::{BatchConditions, TimeGrid, batch};
+/// # use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, batch};
 /// # use pdmp_core::numerics::Threads;
 /// # fn main() -> pdmp_core::Result<()> {
 /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
 /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
 /// let styles = Array2::from_shape_fn((1000, model.n_styles()), |(b, _)| b as f64 / 1000.0);
-/// let conditions = BatchConditions { styles, ..BatchConditions::default() };
+/// let conditions = BatchConditions { style: Some(PerMovement::Each(styles)), ..BatchConditions::default() };
 /// let batch = batch(model.primitive(), conditions, TimeGrid { dt: 0.01, duration: None }, &mut |_| Ok(()))?;
 /// for movements in batch.chunks(300)? {
 ///     let n = movements.len();
-///     let outputs = batch.rollouts(movements, Derivative::Velocity, Threads::ONE, &mut |_| Ok(()))?;
-///     assert_eq!(outputs[1].dim(), (n, 101, 2));
+///     let trajectories = batch.rollouts(movements, Derivative::Velocity, Threads::ONE, &mut |_| Ok(()))?;
+///     assert_eq!(trajectories.position.dim(), (n, 101, 2));
 /// }
 /// # Ok(())
 /// # }
@@ -78,7 +49,8 @@ pub struct BatchConditions {
 #[derive(Clone, Debug)]
 pub struct Batch {
     responses: Arc<Responses>,
-    styles: Array2<f64>,
+    n_movements: usize,
+    styles: PerMovement,
     /// Goals of discrete, anchors of rhythmic movements.
     centres: PerMovement,
     starts: Option<PerMovement>,
@@ -92,88 +64,33 @@ pub struct Batch {
 /// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
 ///
 /// # Errors
-/// Conditions or times that do not fit the primitive, a number of rows other than that of the styles, or the error of
-/// `progress`.
+/// Conditions or times that do not fit the primitive, numbers of rows that differ, or the error of `progress`.
 pub fn batch(
     primitive: &Arc<Primitive>,
     conditions: BatchConditions,
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Batch> {
-    let BatchConditions { styles, goals, anchors, starts, velocities, goal_velocities, amplitude, tau } = conditions;
-    reject_goal_velocity(primitive, goal_velocities.is_some())?;
-    check_styles(&styles, primitive.n_styles())?;
-    let kind = primitive.kind();
-    let (centres, (name, other, instead)) = match kind {
-        Kind::Discrete => (goals, ("anchors", anchors, ": they move to goals; set goals")),
-        Kind::Rhythmic => (anchors, ("goals", goals, ": they move about anchors; set anchors")),
-    };
-    if other.is_some() {
-        return Err(Error::Kind { name, kind, instead });
-    }
-    let centre = if kind == Kind::Discrete { "goals" } else { "anchors" };
-    let vectors =
-        [(centre, &centres), ("starts", &starts), ("velocities", &velocities), ("goal_velocities", &goal_velocities)];
-    for (name, rows) in vectors {
-        if let Some(rows) = rows {
-            rows.check(name, styles.nrows(), primitive.n_dofs())?;
-        }
-    }
+    let n_movements = conditions.check(primitive)?;
+    let BatchConditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau } = conditions;
     let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(primitive)?;
     Ok(Batch {
-        responses: responses(primitive, nominal.tau, goal_velocities.is_some(), grid, progress)?,
-        styles,
-        centres: centres.unwrap_or(PerMovement::All(nominal.centre)),
-        starts: starts.or(nominal.start.map(PerMovement::All)),
-        velocities,
-        goal_velocities,
+        responses: responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?,
+        n_movements,
+        styles: style.unwrap_or(PerMovement::All(nominal.style)),
+        centres: goal.or(anchor).unwrap_or(PerMovement::All(nominal.centre)),
+        starts: start.or(nominal.start.map(PerMovement::All)),
+        velocities: velocity,
+        goal_velocities: goal_velocity,
         amplitude: nominal.amplitude,
     })
-}
-
-/// Computes the movements of a batch: positions and their derivatives up to `highest`, each (B, T, D).
-///
-/// `progress` is called as by [`batch()`] and [`Batch::write`].
-///
-/// ```
-/// # use ndarray::array;
-/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
-/// # use pdmp_core::model::Derivative;
-/// # use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, rollouts};
-/// # use pdmp_core::numerics::Threads;
-/// # fn main() -> pdmp_core::Result<()> {
-/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
-/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
-/// let goals = PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1], [0.8, 0.3]]);
-/// let styles = model.demonstrated().styles.clone();
-/// let conditions = BatchConditions { styles, goals: Some(goals), ..BatchConditions::default() };
-/// let grid = TimeGrid { dt: 0.01, duration: None };
-/// let threads = Threads::available();
-/// let outputs = rollouts(model.primitive(), conditions, grid, Derivative::Position, threads, &mut |_| Ok(()))?;
-/// assert_eq!(outputs[0].dim(), (3, 101, 2));
-/// # Ok(())
-/// # }
-/// ```
-///
-/// # Errors
-/// As for [`batch()`], or outputs that do not fit into memory.
-pub fn rollouts(
-    primitive: &Arc<Primitive>,
-    conditions: BatchConditions,
-    grid: TimeGrid,
-    highest: Derivative,
-    threads: Threads,
-    progress: &mut dyn FnMut(f64) -> Result<()>,
-) -> Result<Vec<Array3<f64>>> {
-    let batch = batch(primitive, conditions, grid, progress)?;
-    batch.rollouts(0..batch.shape().0, highest, threads, progress)
 }
 
 impl Batch {
     /// Returns the numbers of movements B, samples T and degrees of freedom D.
     pub fn shape(&self) -> (usize, usize, usize) {
         let (n_samples, n_dofs) = self.responses.of(Derivative::Position).start.dim();
-        (self.styles.nrows(), n_samples, n_dofs)
+        (self.n_movements, n_samples, n_dofs)
     }
 
     /// Returns consecutive ranges of `size` movements, the last one possibly shorter, to compute the batch in parts by
@@ -182,13 +99,30 @@ impl Batch {
     /// # Errors
     /// A size of zero.
     pub fn chunks(&self, size: usize) -> Result<BatchChunks> {
-        match size {
-            0 => Err(Error::Range { name: "size", value: 0.0, allowed: "must be at least 1" }),
-            _ => Ok(BatchChunks { remaining: 0..self.styles.nrows(), size }),
-        }
+        check_range("size", size as f64, size > 0, "must be at least 1")?;
+        Ok(BatchChunks { remaining: 0..self.n_movements, size })
     }
 
     /// Computes a range of the movements: positions and their derivatives up to `highest`, each (n, T, D).
+    ///
+    /// ```
+    /// # use ndarray::array;
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # use pdmp_core::model::Derivative;
+    /// # use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, batch};
+    /// # use pdmp_core::numerics::Threads;
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let goals = PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1], [0.8, 0.3]]);
+    /// let styles = PerMovement::Each(model.demonstrated().styles.clone());
+    /// let conditions = BatchConditions { style: Some(styles), goal: Some(goals), ..BatchConditions::default() };
+    /// let batch = batch(model.primitive(), conditions, TimeGrid { dt: 0.01, duration: None }, &mut |_| Ok(()))?;
+    /// let movements = batch.rollouts(0..3, Derivative::Position, Threads::available(), &mut |_| Ok(()))?;
+    /// assert_eq!(movements.position.dim(), (3, 101, 2));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// As for [`Batch::write`], or outputs that do not fit into memory.
@@ -198,18 +132,33 @@ impl Batch {
         highest: Derivative,
         threads: Threads,
         progress: &mut dyn FnMut(f64) -> Result<()>,
-    ) -> Result<Vec<Array3<f64>>> {
+    ) -> Result<Trajectories> {
         let (_, n_samples, n_dofs) = self.shape();
-        let mut outputs = (0..=highest as usize)
-            .map(|_| zeros("rollouts", (movements.len(), n_samples, n_dofs)))
-            .collect::<Result<Vec<Array3<f64>>>>()?;
-        self.write(movements, outputs.iter_mut().map(|output| output.view_mut()).collect(), threads, progress)?;
-        Ok(outputs)
+        let new = || zeros("rollouts", (movements.len(), n_samples, n_dofs));
+        let derivative = |order: Derivative| (order as usize <= highest as usize).then(new).transpose();
+        let mut position = new()?;
+        let (mut velocity, mut acceleration) =
+            (derivative(Derivative::Velocity)?, derivative(Derivative::Acceleration)?);
+        let outputs = [Some(&mut position), velocity.as_mut(), acceleration.as_mut()];
+        let outputs = outputs.into_iter().flatten().map(|output| output.view_mut()).collect();
+        self.write(movements, outputs, threads, progress)?;
+        Ok(Trajectories { position, velocity, acceleration })
     }
 
     /// Writes a range of n movements to up to three `outputs` (n, T, D): positions, velocities and accelerations.
     ///
     /// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
+    ///
+    /// ```
+    /// # use ndarray::Array3;
+    /// # use pdmp_core::motion::Batch;
+    /// # use pdmp_core::numerics::Threads;
+    /// fn positions(batch: &Batch) -> pdmp_core::Result<Array3<f64>> {
+    ///     let mut positions = Array3::zeros(batch.shape());
+    ///     batch.write(0..batch.shape().0, vec![positions.view_mut()], Threads::available(), &mut |_| Ok(()))?;
+    ///     Ok(positions)
+    /// }
+    /// ```
     ///
     /// # Errors
     /// A range beyond the batch, outputs of another shape or number, or the error of `progress`.
@@ -222,10 +171,15 @@ impl Batch {
     ) -> Result<()> {
         let (n_movements, n_samples, n_dofs) = self.shape();
         let shape = (movements.len(), n_samples, n_dofs);
-        if movements.end > n_movements || outputs.len() > 3 || outputs.iter().any(|output| output.dim() != shape) {
-            return Err(Error::Arguments(
-                "outputs must be at most three, each (movements, samples, DoFs) of the batch",
-            ));
+        if movements.end > n_movements {
+            let value = movements.end as f64;
+            return Err(Error::Range { name: "movements", value, allowed: "exceeds the number of movements" });
+        }
+        if outputs.len() > 3 || outputs.iter().any(|output| output.dim() != shape) {
+            return Err(Error::Argument {
+                name: "outputs",
+                problem: "must be at most three, each (movements, samples, DoFs) of the batch",
+            });
         }
         let in_block = (BLOCK / (n_samples * n_dofs)).max(MIN_MOVEMENTS_PER_BLOCK);
         let mut chunks: Vec<_> =
@@ -274,7 +228,7 @@ impl Batch {
         let start = difference(&self.starts, Derivative::Position, &centre);
         let velocity = difference(&self.velocities, Derivative::Velocity, &vec![0.0; centre.len()]);
         let goal_velocity = self.goal_velocities.as_ref().map(|rows| rows.row(b).to_vec());
-        Combination::new(style, &centre, &start, &velocity).with_goal_velocity(goal_velocity.as_deref())
+        Combination::new(style, [&centre, &start, &velocity], goal_velocity.as_deref())
     }
 }
 
@@ -292,43 +246,5 @@ impl Iterator for BatchChunks {
         let first = self.remaining.start;
         self.remaining.start += self.size.min(self.remaining.len());
         Some(first..self.remaining.start).filter(|chunk| !chunk.is_empty())
-    }
-}
-
-impl PerMovement {
-    /// Returns the vector (D,) of movement `b`.
-    fn row(&self, b: usize) -> ArrayView1<'_, f64> {
-        match self {
-            Self::All(row) => aview1(row),
-            Self::Each(rows) => rows.row(b),
-        }
-    }
-
-    /// Checks the numbers of rows, if any, and of columns.
-    fn check(&self, name: &'static str, n: usize, n_dofs: usize) -> Result<()> {
-        match self {
-            Self::All(row) => check_vector(name, row, n_dofs, "DoF"),
-            Self::Each(rows) if rows.nrows() != n => Err(Error::Rows { name, expected: n, found: rows.nrows() }),
-            Self::Each(rows) => check_rows(name, rows, n_dofs, "DoF"),
-        }
-    }
-}
-
-/// Checks that rows have `expected` finite elements, one per `per`.
-fn check_rows(name: &'static str, rows: &Array2<f64>, expected: usize, per: &'static str) -> Result<()> {
-    if rows.ncols() != expected {
-        return Err(Error::Length { name, expected, found: rows.ncols(), per });
-    }
-    check_matrix(name, rows.view())
-}
-
-/// Checks styles (B, J); the row-wise counterpart of [`crate::model::conditions::check_style`].
-fn check_styles(styles: &Array2<f64>, n_styles: usize) -> Result<()> {
-    check_rows("styles", styles, n_styles, "style dimension")?;
-    match styles.indexed_iter().find(|(_, s)| s.abs() > MAX_STYLE_MAGNITUDE) {
-        Some(((row, column), &value)) => {
-            Err(Error::Magnitude { name: "styles", row, column, value, limit: MAX_STYLE_MAGNITUDE })
-        }
-        None => Ok(()),
     }
 }

@@ -1,16 +1,18 @@
 //! Input and output of a control tick, in memory of the caller.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kind::Kind;
-use crate::model::conditions::{check_amplitude, check_style, check_tau, reject_for_kind, reject_goal_velocity};
+use crate::model::conditions::{
+    check_amplitude, check_phase, check_style, check_tau, reject_for_kind, reject_goal_velocity,
+};
 use crate::model::primitive::Primitive;
-use crate::validate::check_vector;
+use crate::validate::{check_length, check_range, check_vector};
 
 /// Command of one tick. A field that is `None` leaves its quantity unchanged.
 ///
-/// Style, goal, final velocity, anchor, τ and amplitude remain in force until the next command, and a repeated command has no further
-/// effect. `measured` remains in force until the next measurement or [`crate::Controller::release`]. `dt` and `coupling`
-/// apply to this tick only.
+/// Style, goal, final velocity, anchor, τ and amplitude remain in force until the next command, and a repeated command has
+/// no further effect. `measured` remains in force until the next measurement or [`crate::Controller::release`]. `dt`,
+/// `coupling` and `phase` apply to this tick only.
 ///
 /// ```
 /// use pdmp_core::Command;
@@ -40,6 +42,10 @@ pub struct Command<'a> {
     pub measured: Option<&'a [f64]>,
     /// Coupling terms.
     pub coupling: Option<Coupling<'a>>,
+    /// Measured phase φ* of a rhythmic movement, in rad, which pulls the phase over this tick; see
+    /// [`crate::Controller::set_phase_gain`]. A sensor slower than the loop passes its last phase plus the time since then
+    /// over τ.
+    pub phase: Option<f64>,
 }
 
 /// Coupling terms of the user, constant over the tick. A jump of c_v makes the velocity jump.
@@ -87,8 +93,8 @@ impl Command<'_> {
             Some(vector) => check_vector(name, vector, n_dofs, "DoF"),
             None => Ok(()),
         };
-        if let Some(dt) = self.dt.filter(|dt| !(0.0..f64::INFINITY).contains(dt)) {
-            return Err(Error::Range { name: "dt", value: dt, allowed: "must be finite and not negative" });
+        if let Some(dt) = self.dt {
+            check_range("dt", dt, (0.0..f64::INFINITY).contains(&dt), "must be finite and not negative")?;
         }
         if let Some(style) = self.style {
             check_style(style, model.n_styles())?;
@@ -111,21 +117,15 @@ impl Command<'_> {
             vector("coupling velocity", Some(velocity))?;
             vector("coupling acceleration", Some(acceleration))?;
         }
-        Ok(())
+        self.phase.map_or(Ok(()), |phase| check_phase(kind, phase))
     }
 }
 
 impl Motion<'_> {
     /// Checks that each vector has one element per DoF.
     pub(crate) fn check(&self, n_dofs: usize) -> Result<()> {
-        let lengths = [
-            ("position", self.position.len()),
-            ("velocity", self.velocity.len()),
-            ("acceleration", self.acceleration.len()),
-        ];
-        match lengths.into_iter().find(|(_, found)| *found != n_dofs) {
-            Some((name, found)) => Err(Error::Length { name, expected: n_dofs, found, per: "DoF" }),
-            None => Ok(()),
-        }
+        check_length("position", self.position.len(), n_dofs, "DoF")?;
+        check_length("velocity", self.velocity.len(), n_dofs, "DoF")?;
+        check_length("acceleration", self.acceleration.len(), n_dofs, "DoF")
     }
 }

@@ -75,9 +75,10 @@ pub fn jacobian(
     reject_for_kind(kind, "goal", variable == WithRespectTo::Goal && kind == Kind::Rhythmic)?;
     reject_for_kind(kind, "anchor", variable == WithRespectTo::Anchor && kind == Kind::Discrete)?;
     if conditions.segment_durations.as_ref().is_some_and(|segment_durations| segment_durations.len() > 1) {
-        return Err(Error::Arguments(
-            "Jacobians are available in linear time only: pass tau instead of segment_durations",
-        ));
+        return Err(Error::Argument {
+            name: "segment_durations",
+            problem: "does not apply: Jacobians are available in linear time only; pass tau instead",
+        });
     }
     let conditions = conditions.complete(primitive)?;
     let by_goal_velocity = variable == WithRespectTo::GoalVelocity;
@@ -95,7 +96,8 @@ pub fn jacobian(
         WithRespectTo::Goal | WithRespectTo::Anchor => by_dof(&curves.start, |_| one),
         WithRespectTo::Start => by_dof(&curves.start, |response| response),
         WithRespectTo::GoalVelocity => {
-            by_dof(curves.goal_velocity.as_ref().unwrap_or(&curves.velocity), |response| response)
+            let curve = curves.goal_velocity.as_ref().expect("responses with a final velocity were computed above");
+            by_dof(curve, |response| response)
         }
     }
 }

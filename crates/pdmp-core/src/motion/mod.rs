@@ -1,6 +1,7 @@
 //! Motion generation: the control loop, rollouts, batches of rollouts and their derivatives.
 
 pub(crate) mod batch;
+pub(crate) mod batch_conditions;
 pub(crate) mod command;
 pub(crate) mod controller;
 pub(crate) mod jacobian;
@@ -14,7 +15,8 @@ pub(crate) mod trajectory;
 pub(crate) mod unit_responses;
 pub(crate) mod viability;
 
-pub use batch::{Batch, BatchChunks, BatchConditions, PerMovement, batch, rollouts};
+pub use batch::{Batch, BatchChunks, batch};
+pub use batch_conditions::{BatchConditions, PerMovement};
 pub use command::{Command, Coupling, Motion};
 pub use controller::{Controller, Status};
 pub use jacobian::{WithRespectTo, jacobian};
@@ -23,4 +25,4 @@ pub use perturbation::Compliance;
 pub use prediction_band::{PredictionBand, prediction_band};
 pub use rollout::{TimeGrid, rollout, rollout_with};
 pub use time_law::{fastest, fastest_tau};
-pub use trajectory::Trajectory;
+pub use trajectory::{Trajectories, Trajectory};

@@ -30,6 +30,7 @@
 use crate::error::{Error, Result};
 use crate::motion::command::{Command, Coupling};
 use crate::numerics::simd::{F64x4, groups, pack, repack};
+use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Default k_s: an error of a tenth of the range slows the phase elevenfold.
 const STOPPING_GAIN: f64 = 1000.0;
@@ -39,6 +40,8 @@ const TRACKING_GAIN: f64 = 10.0;
 /// λ times the demonstrated clock interval. A larger rate takes a blocked robot for one that sags; a smaller one adapts
 /// later to an error that is present from the start.
 const ADAPTATION_RATE: f64 = 5.0;
+/// Bound of κ, above the sum of 1 and the largest gain of a measured phase.
+pub(crate) const MAX_PHASE_RATE: f64 = 1e4;
 /// Maximum gain. It keeps products finite.
 const MAX_GAIN: f64 = 1e100;
 /// Range, relative to the largest one, up to which a DoF is stationary.
@@ -56,14 +59,16 @@ pub struct Compliance {
 }
 
 /// Velocity and acceleration that are added over a tick, by groups of DoFs.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct PerturbationTerms {
     pub(crate) velocity: Vec<F64x4>,
     pub(crate) acceleration: Vec<F64x4>,
 }
 
+clone_in_place!(PerturbationTerms { velocity, acceleration });
+
 /// Perturbation of the current tick, and the gains of the movement's response.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Perturbation {
     terms: PerturbationTerms,
     /// True if the terms apply to the tick.
@@ -80,6 +85,8 @@ pub(crate) struct Perturbation {
     error: Vec<F64x4>,
     /// Expected error o, by groups of DoFs.
     expected_error: Vec<F64x4>,
+    /// Velocity of the tracking term in the last tick, by groups of DoFs.
+    pull: Vec<F64x4>,
     /// λ, per unit of the clock.
     adaptation_rate: f64,
     /// Share of the last measured error that the ticks since then have not yet corrected.
@@ -91,6 +98,23 @@ pub(crate) struct Perturbation {
     /// Inverse of the range; zero for a stationary DoF, whose error does not stop the phase.
     inverse_range: Vec<F64x4>,
 }
+
+clone_in_place!(Perturbation {
+    terms,
+    active,
+    phase_rate,
+    limited_rate,
+    compliance,
+    measured,
+    error,
+    expected_error,
+    pull,
+    adaptation_rate,
+    remaining_pull,
+    turn,
+    inverse_turn,
+    inverse_range,
+});
 
 /// Returns the largest range of a DoF.
 pub(crate) fn largest_range(ranges: &[f64]) -> f64 {
@@ -114,7 +138,8 @@ impl Perturbation {
             compliance: Compliance { stopping: STOPPING_GAIN, tracking: TRACKING_GAIN / extent },
             measured: false,
             error: zeros.clone(),
-            expected_error: zeros,
+            expected_error: zeros.clone(),
+            pull: zeros,
             adaptation_rate: ADAPTATION_RATE / extent,
             remaining_pull: 1.0,
             turn: pack(&turn),
@@ -134,6 +159,12 @@ impl Perturbation {
         self.clear_terms();
         self.measured = false;
         self.expected_error.fill(F64x4::ZERO);
+        self.pull.fill(F64x4::ZERO);
+    }
+
+    /// Returns the velocity of the tracking term in the last tick, by groups of DoFs.
+    pub(crate) fn pull(&self) -> &[F64x4] {
+        &self.pull
     }
 
     /// Returns whether a measurement is in force.
@@ -141,7 +172,8 @@ impl Perturbation {
         self.measured
     }
 
-    /// Sets the perturbation of a tick of `dt` seconds and `h` on the clock that starts at `position`. The command is valid.
+    /// Sets the perturbation of a tick that starts at `position`, of `h` on the clock and a pull over `dt` seconds. The command
+    /// is valid.
     ///
     /// The error of a measurement before the first tick is expected: nothing has moved, so that the robot is not blocked.
     pub(crate) fn set(&mut self, command: &Command, position: &[F64x4], dt: f64, h: f64, started: bool) {
@@ -179,13 +211,14 @@ impl Perturbation {
         // The share of the error that k_t alone would correct over the tick, so that the pull does not overshoot ỹ. It is
         // stable for every tick and gain up to β_z = 4α_z at least, far above the critical damping of α_z/4.
         let share = -(-tracking * h).exp_m1();
-        let pull = self.remaining_pull * share / dt;
+        let pull = if dt > 0.0 { self.remaining_pull * share / dt } else { 0.0 };
         self.remaining_pull *= 1.0 - share;
         let mut squares = F64x4::ZERO;
         for (group, velocity) in self.terms.velocity.iter_mut().enumerate() {
             let error = self.error[group];
             let unexpected = error - self.expected_error[group].max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
-            *velocity += unexpected * pull;
+            self.pull[group] = unexpected * pull;
+            *velocity += self.pull[group];
             let scaled = unexpected * self.inverse_range[group];
             squares += scaled * scaled;
         }
@@ -211,6 +244,41 @@ impl Perturbation {
     /// Returns κ, the rate of the phase's clock relative to that of the output system.
     pub(crate) fn phase_rate(&self) -> f64 {
         self.phase_rate
+    }
+
+    /// Adds the pull of a measured phase to the phase rate, which stays at least 0.
+    pub(crate) fn add_phase_pull(&mut self, pull: f64) {
+        self.phase_rate = (self.phase_rate + pull).max(0.0);
+    }
+
+    /// Visits the state, with the bounds of a quantity in units of a DoF.
+    pub(crate) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2]) -> Result<()> {
+        let Self {
+            terms: PerturbationTerms { velocity, acceleration },
+            active,
+            phase_rate,
+            limited_rate,
+            compliance: Compliance { stopping, tracking },
+            measured,
+            error,
+            expected_error,
+            pull,
+            remaining_pull,
+            adaptation_rate: _,
+            turn: _,
+            inverse_turn: _,
+            inverse_range: _,
+        } = self;
+        for lanes in [velocity, acceleration, error, expected_error, pull] {
+            visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), quantity)?;
+        }
+        visit_flag(visit, active)?;
+        visit_flag(visit, measured)?;
+        visit_number(visit, phase_rate, [0.0, MAX_PHASE_RATE])?;
+        visit_number(visit, limited_rate, [0.0, 1.0])?;
+        visit_number(visit, stopping, [0.0, MAX_GAIN])?;
+        visit_number(visit, tracking, [0.0, MAX_GAIN])?;
+        visit_number(visit, remaining_pull, [0.0, 1.0])
     }
 
     /// Returns k_s and k_t.

@@ -19,6 +19,7 @@ use crate::model::responses::Derivative;
 use crate::model::sensitivity::{STEPS, Sensitivity};
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::motion::unit_responses::phases;
+use crate::validate::check_range;
 
 /// Computes the sensitivities ∂y/∂T_k (S, D) of the positions to each segment duration, in DoF units per second, at equal
 /// fractions s of the duration: y′ ∂p/∂T_k with the phase p and ∂p/∂T_k = −(∂s/∂T_k)/(∂s/∂p). Empty for linear time.
@@ -86,17 +87,16 @@ pub struct PredictionBand {
 /// # Errors
 /// A prediction without covariance, a `level` outside (0, 1), a band that overflows, or an error of the rollout.
 pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid: TimeGrid) -> Result<PredictionBand> {
-    if !(level > 0.0 && level < 1.0) {
-        return Err(Error::Range { name: "level", value: level, allowed: "must lie between 0 and 1" });
-    }
-    let covariance = prediction.covariance.as_ref().ok_or(Error::Arguments(
-        "the prediction has no covariance: a band needs more demonstrations, or more different contexts",
-    ))?;
+    check_range("level", level, level > 0.0 && level < 1.0, "must lie between 0 and 1")?;
+    let covariance = prediction.covariance.as_ref().ok_or(Error::Argument {
+        name: "prediction",
+        problem: "has no covariance: a band needs more demonstrations, or more different contexts",
+    })?;
     let residual_variance = model
         .learnt
         .residual_variance
         .as_ref()
-        .ok_or(Error::Arguments("the model has no context map: fit demonstrations with contexts"))?;
+        .ok_or(Error::Argument { name: "model", problem: "has no context map: fit demonstrations with contexts" })?;
     let primitive = model.primitive();
     let conditions = &prediction.conditions;
     let segment_durations = conditions.segment_durations.as_deref().unwrap_or(&primitive.nominal.segment_durations);
@@ -113,20 +113,24 @@ pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid:
         let [phase, ..] = time.phase(k as f64 * grid.dt);
         variance.assign(&interpolate(&variances, phase * STEPS as f64, kind));
     }
-    let student = StudentsT::new(0.0, 1.0, prediction.degrees_of_freedom.max(1) as f64)
-        .map_err(|_| Error::Arguments("a band needs at least one degree of freedom"))?;
+    let student = StudentsT::new(0.0, 1.0, prediction.degrees_of_freedom.max(1) as f64).map_err(|_| {
+        Error::Argument { name: "prediction", problem: "has no degree of freedom: a band needs at least one" }
+    })?;
     let quantile = student.inverse_cdf(0.5 * (1.0 + level));
     let width = variance.mapv(|variance| quantile * variance.sqrt());
     let band = PredictionBand { lower: &centre - &width, upper: &centre + &width };
     if band.lower.iter().chain(&band.upper).any(|bound| !bound.is_finite()) {
-        return Err(Error::Arguments("the prediction band overflows: pass a context closer to the demonstrations"));
+        return Err(Error::Argument {
+            name: "prediction",
+            problem: "gives a band that overflows: pass a context closer to the demonstrations",
+        });
     }
     Ok(band)
 }
 
 /// Interpolates curves (S, D) linearly at a fractional sample: constant past the end of a discrete movement, periodic for a
 /// rhythmic one.
-fn interpolate(curves: &Array2<f64>, sample: f64, kind: Kind) -> Array1<f64> {
+pub(crate) fn interpolate(curves: &Array2<f64>, sample: f64, kind: Kind) -> Array1<f64> {
     let n = curves.nrows();
     let (low, fraction) = (sample.floor(), sample.fract());
     let row = |k: f64| match kind {

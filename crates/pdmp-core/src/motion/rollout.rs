@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use ndarray::Ix2;
-
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
 use crate::model::conditions::{Conditions, check_tau};
@@ -11,15 +9,11 @@ use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::controller::Controller;
 use crate::motion::time_law::TimeLaw;
-use crate::motion::trajectory::Trajectory;
-use crate::validate::{check_positive, row_major_mut, zeros};
+use crate::motion::trajectory::{Trajectory, step_count};
+use crate::validate::check_positive;
 
-/// Number of samples between two calls of `progress`.
-const PROGRESS_INTERVAL: usize = 4096;
 /// Number of ticks by which the forcing table is prefetched: about the latency of main memory.
 const PREFETCH_TICKS: f64 = 16.0;
-/// Maximum number of steps of a rollout.
-const MAX_STEPS: f64 = 1e7;
 
 /// Sampling times 0, dt, 2dt, … of a rollout.
 #[derive(Clone, Copy, Debug)]
@@ -32,27 +26,10 @@ pub struct TimeGrid {
 }
 
 impl TimeGrid {
-    /// Returns the number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋; the margins keep the last sample of a duration that
-    /// is a multiple of dt up to rounding.
+    /// Returns the number of steps.
     pub(crate) fn steps(&self, primitive: &Primitive, tau: f64) -> Result<usize> {
-        check_positive("dt", self.dt)?;
         check_tau(tau, primitive.tau)?;
-        let duration = match self.duration {
-            Some(duration) if duration.is_finite() && duration >= 0.0 => duration,
-            Some(value) => {
-                return Err(Error::Range { name: "duration", value, allowed: "must be finite and not negative" });
-            }
-            None => primitive.duration() * tau / primitive.tau,
-        };
-        let steps = (duration / self.dt * (1.0 + 1e-12) + 1e-9).floor();
-        if steps > MAX_STEPS {
-            return Err(Error::Range {
-                name: "dt",
-                value: self.dt,
-                allowed: "gives more than 1e7 samples: enlarge it",
-            });
-        }
-        Ok(steps as usize)
+        step_count("duration", self.duration.unwrap_or(primitive.duration() * tau / primitive.tau), self.dt)
     }
 }
 
@@ -106,9 +83,7 @@ pub fn rollout_with(
     let steps = grid.steps(primitive, conditions.time_constant(primitive)?)?;
     let clock = Clock::of(primitive, conditions)?;
     if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
-        return Err(Error::Arguments(
-            "pass phase or segment_durations of several segments, not both: warped time starts at phase 0",
-        ));
+        return Err(Error::Conflict { names: ["phase", "segment_durations"], reason: "warped time starts at phase 0" });
     }
     let conditions = clock.conditions(conditions);
     sample(primitive, &conditions, clock, grid.dt, steps, progress)
@@ -116,10 +91,10 @@ pub fn rollout_with(
 
 /// Computes the movement that follows a time law: samples at t = 0, dt, … up to the first one at its end or past it.
 pub(crate) fn follow(primitive: &Arc<Primitive>, conditions: &Conditions, law: TimeLaw, dt: f64) -> Result<Trajectory> {
-    let duration = Some((law.duration() / dt).ceil() * dt);
-    let steps = TimeGrid { dt, duration }.steps(primitive, primitive.tau())?;
-    let rate = law.at(0.0);
-    let clock = Clock::Warped { function: ClockFunction::Law(law), extent: primitive.tau(), phase: rate };
+    check_positive("dt", dt)?;
+    let steps = step_count("duration", (law.duration() / dt).ceil() * dt, dt)?;
+    let phase = law.at(0.0);
+    let clock = Clock::Warped { function: ClockFunction::Law(law), extent: primitive.tau(), phase };
     sample(primitive, conditions, clock, dt, steps, &mut |_| Ok(()))
 }
 
@@ -133,28 +108,14 @@ fn sample(
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Trajectory> {
     let mut controller = Controller::new(primitive, dt, conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
-    let shape = (steps + 1, primitive.n_dofs());
-    let mut trajectory = Trajectory {
-        time: (0..=steps).map(|k| k as f64 * dt).collect(),
-        position: zeros("rollout", shape)?,
-        velocity: zeros("rollout", shape)?,
-        acceleration: zeros("rollout", shape)?,
-    };
-    let Trajectory { time, position, velocity, acceleration } = &mut trajectory;
-    let rows = |array| row_major_mut::<_, Ix2>(array).chunks_exact_mut(primitive.n_dofs());
-    let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
-    for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
-        if k % PROGRESS_INTERVAL == 0 {
-            progress(k as f64 / (steps + 1) as f64)?;
-        }
+    Trajectory::record("rollout", primitive.n_dofs(), steps, dt, progress, |k, time, motion| {
         if k > 0 {
-            clock.step(&mut controller, *time)?;
+            clock.step(&mut controller, time)?;
         }
-        let mut motion = Motion { position, velocity, acceleration };
-        controller.read(&mut motion);
-        clock.rescale(&mut motion);
-    }
-    Ok(trajectory)
+        controller.read(motion);
+        clock.rescale(motion);
+        Ok(())
+    })
 }
 
 /// Clock of a rollout.

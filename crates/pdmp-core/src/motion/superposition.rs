@@ -26,14 +26,10 @@ pub(crate) struct Combination {
 }
 
 impl Combination {
-    /// Returns the combination of the styles (J,) with centre, start and velocity coefficients (D,).
-    pub(crate) fn new(style: Vec<f64>, centre: &[f64], start: &[f64], velocity: &[f64]) -> Self {
-        Self { style, centre: pattern(centre), start: pattern(start), velocity: pattern(velocity), goal_velocity: None }
-    }
-
-    /// Adds a final velocity (D,).
-    pub(crate) fn with_goal_velocity(self, velocity: Option<&[f64]>) -> Self {
-        Self { goal_velocity: velocity.map(pattern), ..self }
+    /// Returns the combination of the styles (J,) with centre, start and velocity coefficients and final velocity (D,).
+    pub(crate) fn new(style: Vec<f64>, coefficients: [&[f64]; 3], goal_velocity: Option<&[f64]>) -> Self {
+        let [centre, start, velocity] = coefficients.map(pattern);
+        Self { style, centre, start, velocity, goal_velocity: goal_velocity.map(pattern) }
     }
 }
 

@@ -198,8 +198,8 @@ fn rates(limits: &Limits, n_dofs: usize) -> Result<[Vec<f64>; 2]> {
     limits.check(n_dofs)?;
     let rates = limits.rates(n_dofs);
     if rates.iter().flatten().all(|limit| limit.is_infinite()) {
-        let text = "limits: give a limit of velocity or acceleration; without one the movement takes no time";
-        return Err(Error::Arguments(text));
+        let problem = "bound neither velocity nor acceleration: give one of them, or the movement takes no time";
+        return Err(Error::Argument { name: "limits", problem });
     }
     Ok(rates)
 }

@@ -1,9 +1,12 @@
 //! Numerical methods that are independent of movements.
 
 pub(crate) mod linear_algebra;
+pub(crate) mod orthonormal_span;
 pub(crate) mod simd;
 pub(crate) mod smoothing_spline;
 pub(crate) mod spline;
+pub(crate) mod state;
+pub(crate) mod statistics;
 pub(crate) mod threads;
 
 pub use smoothing_spline::{Noise, Smoothing};

@@ -34,11 +34,9 @@ impl Threads {
     /// # Errors
     /// A number outside 1 to 1024.
     pub fn new(n: usize) -> Result<Self> {
-        NonZeroUsize::new(n).filter(|n| n.get() <= MAX_THREADS).map(Self).ok_or(Error::Range {
-            name: "threads",
-            value: n as f64,
-            allowed: "must lie between 1 and 1024",
-        })
+        let allowed = "must lie between 1 and 1024";
+        let threads = NonZeroUsize::new(n).filter(|n| n.get() <= MAX_THREADS).map(Self);
+        threads.ok_or(Error::Range { name: "threads", value: n as f64, allowed })
     }
 
     /// Returns the number of threads that the system runs in parallel for this process.

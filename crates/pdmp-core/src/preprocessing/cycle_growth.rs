@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 
 use ndarray::{Array1, Array2};
 
-/// Full turn in each unit of angle.
-const TURNS: [(&str, f64); 3] = [("rad", TAU), ("deg", 360.0), ("°", 360.0)];
+use crate::numerics::statistics::extremes;
+use crate::preprocessing::inspection::turn_of;
+
 /// Maximum deviation of the gain of an angle from whole turns, in turns: cycle onsets are accurate to about a percent.
 const ANGLE_TOLERANCE: f64 = 0.05;
 /// Maximum deviation of the gain of a number without a unit from one turn, in turns, for it to count as an angle.
@@ -31,10 +32,9 @@ pub struct Growth {
 
 /// Returns the full turns in a gain per cycle, and the size of a turn in the unit; (0, 0) if there are none.
 pub(super) fn turns(gain: f64, unit: &str) -> (i32, f64) {
-    let known = TURNS.iter().filter(|(angle, _)| *angle == unit);
-    let known = known.map(|(_, turn)| (*turn, ANGLE_TOLERANCE, f64::from(i32::MAX)));
-    let guessed = TURNS[..2].iter().filter(|_| unit.is_empty()).map(|(_, turn)| (*turn, UNKNOWN_TOLERANCE, 1.0));
-    for (turn, tolerance, max_turns) in known.chain(guessed) {
+    let known = turn_of(unit).map(|turn| (turn, ANGLE_TOLERANCE, f64::from(i32::MAX)));
+    let guessed = [TAU, 360.0].into_iter().filter(|_| unit.is_empty()).map(|turn| (turn, UNKNOWN_TOLERANCE, 1.0));
+    for (turn, tolerance, max_turns) in known.into_iter().chain(guessed) {
         let whole = (gain / turn).round();
         if whole != 0.0 && whole.abs() <= max_turns && (gain / turn - whole).abs() <= tolerance {
             return (whole as i32, turn);
@@ -53,8 +53,7 @@ pub(super) fn median_gain(gains: &[Array1<f64>], dof: usize) -> f64 {
 /// Returns whether a gain exceeds the movement of a degree of freedom within every closed cycle (C, D), and rounding.
 pub(super) fn exceeds_movement(gain: f64, cycles: &[Array2<f64>], dof: usize) -> bool {
     let threshold = |cycle: &Array2<f64>| {
-        let column = cycle.column(dof);
-        let (low, high) = column.iter().fold((f64::MAX, f64::MIN), |(low, high), y| (y.min(low), y.max(high)));
+        let [low, high] = extremes(cycle.column(dof).iter().copied());
         f64::max(MIN_REPORTED * (high - low), ROUNDING * high.abs().max(low.abs()))
     };
     gain.abs() > cycles.iter().map(threshold).fold(0.0, f64::max)

@@ -4,12 +4,14 @@ use ndarray::{Array1, Array2, Axis, s};
 
 use super::cycle_growth::{Growth, exceeds_movement, median_gain, turns};
 use super::cycle_onsets::CycleSearch;
-use super::outliers::{RejectionReason, median, rejections};
+use super::outliers::{RejectionReason, rejections};
 use super::periodicity::{period_of, traits};
 use super::resampling::check_times;
 use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
+use crate::numerics::statistics::median;
 use crate::preprocessing::Curve;
+use crate::validate::check_length;
 
 /// Demonstrations that are made from the cycles of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,8 +100,8 @@ pub struct Rejected {
 /// recording.
 pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: CycleOutput) -> Result<Cycles> {
     let n_dofs = recordings.first().ok_or(Error::NoDemonstrations)?.n_dofs();
-    if let Some(found) = onsets.map(<[_]>::len).filter(|&found| found != recordings.len()) {
-        return Err(Error::Length { name: "onsets", expected: recordings.len(), found, per: "recording" });
+    if let Some(onsets) = onsets {
+        check_length("onsets", onsets.len(), recordings.len(), "recording")?;
     }
     let mut cycles = Cycles { kept: Vec::new(), rejected: Vec::new(), growths: Vec::new() };
     let (mut nominal, mut errors) = (None, Vec::new());

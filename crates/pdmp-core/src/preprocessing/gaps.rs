@@ -7,7 +7,8 @@ use ndarray::Array2;
 use crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION;
 use crate::error::{Error, Result};
 use crate::numerics::spline::Knots;
-use crate::validate::check_time;
+use crate::numerics::statistics::range;
+use crate::validate::{check_length, check_range, check_time};
 
 /// Fills the gaps of `position` (T, D), samples that are NaN, by the cubic spline through the other samples of the column.
 ///
@@ -37,15 +38,10 @@ pub fn fill_gaps(
     turns: &[f64],
     max_gap: f64,
 ) -> Result<Array2<f64>> {
-    if max_gap.is_nan() || max_gap < 0.0 {
-        return Err(Error::Range { name: "max_gap", value: max_gap, allowed: "must not be negative; 0 fills none" });
-    }
+    check_range("max_gap", max_gap, max_gap >= 0.0, "must not be negative; 0 fills none")?;
     let (n_samples, n_dofs) = position.dim();
-    for (name, found) in [("names", names.len()), ("turns", turns.len())] {
-        if found != n_dofs {
-            return Err(Error::Length { name, expected: n_dofs, found, per: "DoF" });
-        }
-    }
+    check_length("names", names.len(), n_dofs, "DoF")?;
+    check_length("turns", turns.len(), n_dofs, "DoF")?;
     if !position.iter().any(|y| y.is_nan()) {
         return Ok(position);
     }
@@ -108,8 +104,7 @@ const MIN_RATIO: f64 = 3.0;
 
 /// Returns the present sample before the first gap through which the values change like those of a wrapped angle.
 fn find_wrap(values: &[f64], present: &[usize]) -> Option<usize> {
-    let [low, high] = values.iter().fold([f64::MAX, f64::MIN], |[low, high], &y| [low.min(y), high.max(y)]);
-    let may_wrap = |turn: f64| (WRAPPED_RANGE[0] * turn..=WRAPPED_RANGE[1] * turn).contains(&(high - low));
+    let may_wrap = |turn: f64| (WRAPPED_RANGE[0] * turn..=WRAPPED_RANGE[1] * turn).contains(&range(values));
     let turn = [TAU, 360.0].into_iter().find(|turn| may_wrap(*turn))?;
     let change = |k: usize| (values[k + 1] - values[k]).abs();
     let steps = |k: usize| present[k + 1] - present[k];

@@ -49,9 +49,10 @@ pub use trim::trim;
 fn clock(demo: &Demonstration) -> Result<Vec<f64>> {
     let time: Vec<f64> = match demo.sampling() {
         Sampling::Unknown => {
-            return Err(Error::Arguments(
-                "the recording has no sampling times: create the demonstration with dt= or time=",
-            ));
+            return Err(Error::Argument {
+                name: "time",
+                problem: "is unknown: create the demonstration with a sampling interval or time stamps",
+            });
         }
         Sampling::Uniform { dt } => (0..demo.n_samples()).map(|c| c as f64 * dt).collect(),
         Sampling::Stamped { time } => time.clone(),

@@ -10,8 +10,9 @@ use std::fmt;
 
 use ndarray::{Array2, Axis};
 
-use super::periodicity::STANDS_STILL;
+use super::periodicity::NO_CYCLES;
 use crate::error::Error;
+use crate::numerics::statistics::median;
 
 /// Maximum modified z-score.
 const MAX_SCORE: f64 = 3.5;
@@ -60,7 +61,7 @@ impl RejectionReason {
     pub(super) fn of(error: &Error) -> Option<Self> {
         match *error {
             Error::Aperiodic { lag, share, least } => Some(Self::Aperiodic { lag, share, least }),
-            Error::Arguments(STANDS_STILL) => Some(Self::Still),
+            Error::Still { .. } => Some(Self::Still),
             _ => None,
         }
     }
@@ -77,7 +78,7 @@ impl fmt::Display for RejectionReason {
                 write!(f, "the recording has no complete cycle that begins in the phase of the first recording")
             }
             RejectionReason::Aperiodic { lag, share, least } => Error::Aperiodic { lag, share, least }.fmt(f),
-            RejectionReason::Still => write!(f, "{STANDS_STILL}"),
+            RejectionReason::Still => Error::Still { consequence: NO_CYCLES }.fmt(f),
         }
     }
 }
@@ -122,12 +123,4 @@ fn distances(cycles: &[Array2<f64>]) -> Vec<f64> {
 /// Returns the standard deviation of a normal distribution with the median absolute deviation of the numbers.
 fn deviation(numbers: &[f64], middle: f64) -> f64 {
     median(&numbers.iter().map(|x| (x - middle).abs()).collect::<Vec<_>>()) / NORMAL_DEVIATION
-}
-
-/// Returns the median, or 0 without numbers.
-pub(super) fn median(numbers: &[f64]) -> f64 {
-    let mut sorted = numbers.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let n = sorted.len();
-    if n == 0 { 0.0 } else { (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0 }
 }

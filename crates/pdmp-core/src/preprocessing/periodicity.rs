@@ -35,12 +35,12 @@ use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, concatenate};
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::numerics::spline::{Knots, Splines};
+use crate::numerics::statistics::median;
 use crate::preprocessing::Curve;
-use crate::preprocessing::outliers::median;
 use crate::preprocessing::significance::SignificanceThreshold;
 
-/// Text of the error for a recording without motion.
-pub(super) const STANDS_STILL: &str = "the recording stands still: it has no cycles";
+/// Consequence of a recording without motion.
+pub(super) const NO_CYCLES: &str = "it has no cycles";
 /// Longest period relative to the recording, which then contains one and a half cycles.
 const MAX_PERIOD: f64 = 2.0 / 3.0;
 /// Least autocorrelation at the period. Noise with a sharp cut-off rings with less.
@@ -101,7 +101,7 @@ pub(super) fn traits(curve: &Curve) -> Result<Array2<f64>> {
     }
     let traits = concatenate![Axis(1), position, velocity];
     if traits.iter().all(|x| *x == 0.0) {
-        return Err(Error::Arguments(STANDS_STILL));
+        return Err(Error::Still { consequence: NO_CYCLES });
     }
     Ok(traits)
 }

@@ -3,7 +3,7 @@
 use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
 use crate::preprocessing::Curve;
-use crate::validate::{check_finite, check_positive};
+use crate::validate::{check_finite, check_positive, check_range};
 
 /// Relative tolerance within which sampling intervals count as equal, for rounding and drifting clocks.
 const INTERVAL_TOLERANCE: f64 = 1e-3;
@@ -33,13 +33,8 @@ pub fn resample(demo: &Demonstration, dt: f64) -> Result<Demonstration> {
     check_positive("dt", dt)?;
     let curve = Curve::of(demo)?;
     let steps = ((curve.last() - curve.first()) / dt * (1.0 + 1e-12) + 1e-9).floor();
-    if steps < (MIN_SAMPLES_PER_DEMONSTRATION - 1) as f64 {
-        return Err(Error::Range {
-            name: "dt",
-            value: dt,
-            allowed: "leaves fewer than 4 samples; pass a shorter interval",
-        });
-    }
+    let enough = steps >= (MIN_SAMPLES_PER_DEMONSTRATION - 1) as f64;
+    check_range("dt", dt, enough, "leaves fewer than 4 samples; pass a shorter interval")?;
     // The bound avoids overflow; an allocation of that size fails with an error.
     let n = steps.min(1e18) as usize + 1;
     let (from, to) = (curve.first(), curve.first() + steps * dt);
@@ -75,10 +70,8 @@ pub fn split_at(demo: &Demonstration, times: &[f64]) -> Result<Vec<Demonstration
     let part = |pair: &[f64]| {
         let duration = pair[1] - pair[0];
         let steps = (duration / curve.interval() * (1.0 + INTERVAL_TOLERANCE)).floor() as usize;
-        if steps + 1 < MIN_SAMPLES_PER_DEMONSTRATION {
-            let allowed = "a part must last at least three sampling intervals of the recording; leave the time out";
-            return Err(Error::Range { name: "times", value: pair[1], allowed });
-        }
+        let allowed = "a part must last at least three sampling intervals of the recording; leave the time out";
+        check_range("times", pair[1], steps + 1 >= MIN_SAMPLES_PER_DEMONSTRATION, allowed)?;
         let dt = duration / steps as f64;
         demo.part(curve.sample(pair[0], pair[1], steps + 1)?, Sampling::Uniform { dt })
     };

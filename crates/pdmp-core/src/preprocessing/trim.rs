@@ -5,6 +5,8 @@ use ndarray::{ArrayView1, s};
 use super::Curve;
 use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
 use crate::error::{Error, Result};
+use crate::numerics::statistics::range;
+use crate::validate::check_range;
 
 /// Threshold of the squared speed above its mean under noise, in standard deviations: noise in one degree of freedom
 /// exceeds it once in thirty thousand samples.
@@ -45,16 +47,13 @@ const RINGING: usize = 4;
 /// # Errors
 /// A threshold outside (0, 1); a recording that stands still, moves for fewer than four samples, or has no times.
 pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
-    if !(threshold > 0.0 && threshold < 1.0) {
-        let allowed = "must lie between 0 and 1: it is a fraction of the peak speed";
-        return Err(Error::Range { name: "threshold", value: threshold, allowed });
-    }
+    let allowed = "must lie between 0 and 1: it is a fraction of the peak speed";
+    check_range("threshold", threshold, threshold > 0.0 && threshold < 1.0, allowed)?;
     let (position, curve) = (demo.position(), Curve::of(demo)?);
     let slopes = curve.splines.slopes() * curve.interval();
     let (mut speeds, mut steps, mut noise) = (vec![0.0; slopes.nrows()], vec![0.0; slopes.nrows() - 1], Vec::new());
     for (d, column) in position.columns().into_iter().enumerate() {
-        let (low, high) = column.iter().fold((f64::MAX, f64::MIN), |(low, high), y| (y.min(low), y.max(high)));
-        let range = high - low;
+        let range = range(column);
         if range > 0.0 {
             let slopes = &slopes.column(d) / range;
             speeds.iter_mut().zip(&slopes).for_each(|(speed, slope)| *speed += slope * slope);
@@ -77,14 +76,12 @@ pub fn trim(demo: &Demonstration, threshold: f64) -> Result<Demonstration> {
     let surely_moves = |speed: &f64| moves(speed, certain_speed);
     let (Some(first), Some(last)) = (speeds.iter().position(surely_moves), speeds.iter().rposition(surely_moves))
     else {
-        return Err(Error::Arguments("the recording stands still: there is no movement to trim it to"));
+        return Err(Error::Still { consequence: "there is no movement to trim it to" });
     };
     let first = speeds[..first].iter().rposition(|v| !moves(v, min_speed)).map_or(0, |rest| rest + 1);
     let last = speeds[last..].iter().position(|v| !moves(v, min_speed)).map_or(speeds.len(), |rest| last + rest) - 1;
-    if last - first + 1 < MIN_SAMPLES_PER_DEMONSTRATION {
-        let allowed = "leaves fewer than 4 samples; pass a lower one";
-        return Err(Error::Range { name: "threshold", value: threshold, allowed });
-    }
+    let enough = last - first + 1 >= MIN_SAMPLES_PER_DEMONSTRATION;
+    check_range("threshold", threshold, enough, "leaves fewer than 4 samples; pass a lower one")?;
     let sampling = match demo.sampling() {
         Sampling::Stamped { time } => Sampling::Stamped { time: time[first..=last].to_vec() },
         uniform => uniform.clone(),

@@ -22,8 +22,9 @@ use ndarray::{Array2, Axis};
 use super::{Aligned, WarpingFunction};
 use crate::error::Result;
 use crate::model::template::{STEPS, TimeWarp, WarpTemplate};
+use crate::numerics::statistics::range;
 use crate::numerics::threads::Threads;
-use crate::validate::zeros;
+use crate::validate::{row_major, row_major_mut, zeros};
 
 /// Largest number of segments; the search then takes some 160 MB per thread, and grows with the square of the number.
 const MAX_SEGMENTS: usize = 1000;
@@ -56,7 +57,7 @@ impl Aligned<'_> {
             shapes.axis_iter_mut(Axis(0)).enumerate().collect(),
             || (),
             |(), (m, mut shape)| {
-                aligned.shape(m, &unit, crate::validate::row_major_mut(&mut shape));
+                aligned.shape(m, &unit, row_major_mut(&mut shape));
                 Ok(())
             },
             &mut |share| progress(share / 3.0),
@@ -69,8 +70,7 @@ impl Aligned<'_> {
                 rows.filter(|(m, _)| *m != nominal).map(|(_, rows)| rows).collect(),
                 || Scratch::new(&search),
                 |scratch, (shape, mut path)| {
-                    let (shape, path) = (shape.to_slice(), path.as_slice_mut());
-                    search.run(&template, shape.unwrap_or_default(), path.unwrap_or_default(), scratch);
+                    search.run(&template, row_major(&shape), row_major_mut(&mut path), scratch);
                     Ok(())
                 },
                 &mut |share| progress((f64::from(pass) + share) / 3.0),
@@ -87,7 +87,8 @@ impl Aligned<'_> {
             let warped = path.iter().any(|&steps| steps != STEPS);
             self.warps[m] = warped.then(|| WarpingFunction::new(self.kind, &self.breaks, &segment_durations.to_vec()));
         }
-        let shape = Array2::from_shape_vec((search.cells(), n_dofs), template).unwrap_or_default();
+        let shape = Array2::from_shape_vec((search.cells(), n_dofs), template)
+            .expect("a template has one row per cell and one column per DoF");
         Ok(WarpTemplate { slope: warp.max_slope, unit, shape })
     }
 
@@ -103,7 +104,7 @@ impl Aligned<'_> {
         let search = Search::new(cells / STEPS, template.slope, n_dofs);
         let (mut shape, mut path) = (vec![0.0; cells * n_dofs], vec![STEPS; search.segments]);
         self.shape(0, &template.unit, &mut shape);
-        let onto = crate::validate::row_major(&template.shape);
+        let onto = row_major(&template.shape);
         search.run(onto, &shape, &mut path, &mut Scratch::new(&search));
         let segment_durations: Vec<f64> =
             path.iter().map(|&steps| search.seconds(steps, self.clocks[0].duration)).collect();
@@ -136,17 +137,11 @@ impl Aligned<'_> {
 
 /// Returns the largest peak-to-peak range of each DoF within one demonstration (D,); 1 for a DoF at rest.
 fn ranges(aligned: &Aligned) -> Vec<f64> {
-    let range = |d: usize| {
-        let widths = aligned.demos.iter().map(|demo| {
-            let position = demo.position();
-            let ends =
-                position.column(d).iter().fold([f64::MAX, f64::MIN], |[low, high], &y| [low.min(y), high.max(y)]);
-            ends[1] - ends[0]
-        });
-        let widest = widths.fold(0.0, f64::max);
+    let widest = |d: usize| {
+        let widest = aligned.demos.iter().map(|demo| range(demo.position().column(d))).fold(0.0, f64::max);
         if widest > 0.0 { widest } else { 1.0 }
     };
-    (0..aligned.demo(0).n_dofs()).map(range).collect()
+    (0..aligned.demo(0).n_dofs()).map(widest).collect()
 }
 
 /// Returns the Euclidean norm.

@@ -7,7 +7,7 @@ use ndarray::{Array2, ArrayView1, ArrayView2};
 use super::sample_times::Ticks;
 use super::{Aligned, WarpingFunction};
 use crate::error::{Error, Result};
-use crate::validate::check_vector;
+use crate::validate::{check_length, check_vector};
 
 /// Shortest segment as a share of the duration.
 const MIN_SEGMENT: f64 = 1e-6;
@@ -20,16 +20,14 @@ impl Aligned<'_> {
     /// # Errors
     /// Another number of rows than demonstrations, no column, landmarks out of order or outside a demonstration.
     pub(super) fn register(&mut self, landmarks: ArrayView2<f64>) -> Result<()> {
-        let (found, expected) = (landmarks.nrows(), self.n_demos());
-        if found != expected {
-            return Err(Error::Length { name: "landmarks", expected, found, per: "demonstration" });
-        }
+        check_length("landmarks", landmarks.nrows(), self.n_demos(), "demonstration")?;
         if landmarks.ncols() == 0 {
-            return Err(Error::Arguments(
-                "landmarks has no columns: pass their times (M, E) in seconds, with E of at least 1",
-            ));
+            return Err(Error::Argument {
+                name: "landmarks",
+                problem: "has no columns: pass their times (M, E) in seconds, with E of at least 1",
+            });
         }
-        let mut segment_durations = Array2::zeros((expected, landmarks.ncols() + 1));
+        let mut segment_durations = Array2::zeros((landmarks.nrows(), landmarks.ncols() + 1));
         for (m, (row, mut segment_durations)) in
             landmarks.rows().into_iter().zip(segment_durations.rows_mut()).enumerate()
         {

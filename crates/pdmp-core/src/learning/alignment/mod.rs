@@ -19,6 +19,7 @@ use crate::model::template::{TimeWarp, WarpTemplate};
 use crate::numerics::smoothing_spline::{MIN_DECIMATED, Noise, Samples, Smoothing, pooled};
 use crate::numerics::spline::{Knots, Splines};
 use crate::numerics::threads::Threads;
+use crate::validate::{check_length, check_range};
 use sample_times::{Clock, Ticks};
 
 /// Smallest number of steps of the aligned demonstrations, unless their number of samples is given: the steps of the
@@ -90,9 +91,8 @@ impl Alignment {
     /// samples or cut-off out of range.
     pub(crate) fn align<'a>(&self, demos: &'a [Demonstration], threads: Threads) -> Result<Aligned<'a>> {
         let n_dofs = demos.first().ok_or(Error::NoDemonstrations)?.n_dofs();
-        if !(self.period.len() <= 1 || self.period.len() == demos.len()) {
-            let (expected, found) = (demos.len(), self.period.len());
-            return Err(Error::Length { name: "period", expected, found, per: "demonstration" });
+        if self.period.len() > 1 {
+            check_length("period", self.period.len(), demos.len(), "demonstration")?;
         }
         let mut clocks = Vec::with_capacity(demos.len());
         for (m, demo) in demos.iter().enumerate() {
@@ -110,10 +110,8 @@ impl Alignment {
         let nominal = self.nominal_of(&durations)?;
         let steps = self.kind.steps(demos[nominal].n_samples());
         let n_samples = self.n_samples.unwrap_or(self.kind.samples(steps * MIN_STEPS.div_ceil(steps)));
-        if !(MIN_SAMPLES_PER_DEMONSTRATION..=MAX_SAMPLES).contains(&n_samples) {
-            let value = n_samples as f64;
-            return Err(Error::Range { name: "n_samples", value, allowed: "must lie between 4 and 1e6" });
-        }
+        let valid = (MIN_SAMPLES_PER_DEMONSTRATION..=MAX_SAMPLES).contains(&n_samples);
+        check_range("n_samples", n_samples as f64, valid, "must lie between 4 and 1e6")?;
         let (kind, noise) = (self.kind, Noise::none(n_dofs));
         let (warps, breaks) = (vec![None; demos.len()], vec![0.0, 1.0]);
         let segment_durations = ndarray::Array1::from_vec(durations).insert_axis(Axis(1));
@@ -137,10 +135,9 @@ impl Alignment {
     /// Returns the given nominal index, or that of the lower median of the durations, the first of equals.
     fn nominal_of(&self, durations: &[f64]) -> Result<usize> {
         match self.nominal {
-            Some(nominal) if nominal < durations.len() => Ok(nominal),
             Some(nominal) => {
-                let value = nominal as f64;
-                Err(Error::Range { name: "nominal", value, allowed: "must be the index of a demonstration, from 0" })
+                let allowed = "must be the index of a demonstration, from 0";
+                check_range("nominal", nominal as f64, nominal < durations.len(), allowed).map(|()| nominal)
             }
             None => {
                 let mut order: Vec<usize> = (0..durations.len()).collect();

@@ -4,7 +4,7 @@ use super::Alignment;
 use crate::demonstration::{Demonstration, Sampling};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::validate::{check_duration, check_positive};
+use crate::validate::{check_duration, check_positive, check_range};
 
 /// Sample times and duration of a demonstration.
 #[derive(Clone, Copy, Debug)]
@@ -43,12 +43,16 @@ impl<'a> Clock<'a> {
                 even(dt)
             }
             (Sampling::Unknown, None) => {
-                return Err(Error::Arguments(
-                    "no sampling interval: pass dt in seconds, or demonstrations with time stamps",
-                ));
+                return Err(Error::Argument {
+                    name: "dt",
+                    problem: "is missing: pass the sampling interval in seconds, or demonstrations with time stamps",
+                });
             }
             (Sampling::Stamped { .. }, _) if alignment.kind == Kind::Rhythmic && period.is_none() => {
-                return Err(Error::Arguments("a time-stamped cycle has no known period: pass period in seconds"));
+                return Err(Error::Argument {
+                    name: "period",
+                    problem: "is missing: pass it in seconds for a cycle with time stamps",
+                });
             }
             (Sampling::Stamped { time }, _) => {
                 let duration = time[n - 1] - time[0];
@@ -61,9 +65,8 @@ impl<'a> Clock<'a> {
                 return Err(Error::Kind { name, kind, instead: "; its duration follows from dt or time" });
             }
             check_positive("period", period)?;
-            if period <= clock.ticks.at(n - 1) * clock.ticks.unit() {
-                return Err(Error::Range { name: "period", value: period, allowed: "must exceed the last time stamp" });
-            }
+            let last = clock.ticks.at(n - 1) * clock.ticks.unit();
+            check_range("period", period, period > last, "must exceed the last time stamp")?;
             clock = Clock { duration: period, extent: period / clock.ticks.unit(), ..clock };
         }
         check_duration(clock.duration)?;

@@ -7,6 +7,7 @@ use super::householder::orthonormal;
 use super::product;
 use super::small_svd::Svd;
 use crate::error::Result;
+use crate::numerics::statistics::pseudo_random;
 
 /// Residual relative to σ₁ at which a singular vector has converged.
 const TOLERANCE: f64 = 1e-12;
@@ -35,7 +36,8 @@ pub(super) fn leading(
     }
     let (mut left, mut right) = (OrthonormalBasis::new(k), OrthonormalBasis::new(length));
     let mut projected = Mat::<f64>::zeros(0, 0);
-    left.extend(pseudo_random(k, block));
+    let mut state = 0;
+    left.extend(Mat::from_fn(k, block, |_, _| pseudo_random(&mut state) as f64 / 2f64.powi(63)));
     for step in 0..steps {
         progress(step as f64 / steps as f64)?;
         let size = step * block;
@@ -92,16 +94,4 @@ impl OrthonormalBasis {
         matmul(block.as_mut(), Accum::Add, &self.vectors, &within, -1.0, Par::Seq);
         (within, block)
     }
-}
-
-/// Returns reproducible pseudo-random numbers in [-1, 1) (SplitMix64).
-fn pseudo_random(rows: usize, columns: usize) -> Mat<f64> {
-    let mut state = 0u64;
-    Mat::from_fn(rows, columns, |_, _| {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) as i64 as f64 / 2f64.powi(63)
-    })
 }

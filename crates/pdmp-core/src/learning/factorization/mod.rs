@@ -61,7 +61,7 @@ const ACCURACY: f64 = 1e-11;
 ///
 /// let targets = array![[1.0, 2.0, 2.0], [2.0, 4.0, 4.0]];
 /// let factors = Factors::of(targets.view(), Truncation::Rank(1), &mut |_| Ok(()))?;
-/// assert!((factors.styles.dot(&factors.basis) - targets).iter().all(|x| x.abs() < 1e-12));
+/// assert!((factors.styles.dot(&factors.basis_targets) - targets).iter().all(|x| x.abs() < 1e-12));
 /// assert!(factors.truncation_error() < 1e-6);
 /// # Ok::<(), pdmp_core::Error>(())
 /// ```
@@ -70,7 +70,7 @@ pub struct Factors {
     /// Styles S (M, J), the columns of U.
     pub styles: Array2<f64>,
     /// Basis targets F_basis (J, C·D), the rows of ΣVᵀ.
-    pub basis: Array2<f64>,
+    pub basis_targets: Array2<f64>,
     /// Singular values in decreasing order. With a given J much smaller than K = min(M, C·D), the first J; otherwise all
     /// K, with an error of up to √(K·ε)·σ₁, ε = 2.2e-16, after the first J.
     pub singular_values: Vec<f64>,
@@ -95,7 +95,7 @@ impl Factors {
         self.error =
             self.singular_values[n_styles..self.styles.ncols()].iter().fold(self.error, |sum, s| sum.hypot(*s));
         self.styles = self.styles.slice(ndarray::s![.., ..n_styles]).to_owned();
-        self.basis = self.basis.slice(ndarray::s![..n_styles, ..]).to_owned();
+        self.basis_targets = self.basis_targets.slice(ndarray::s![..n_styles, ..]).to_owned();
         self
     }
 
@@ -112,7 +112,10 @@ impl Factors {
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
         if targets.is_empty() {
-            return Err(Error::Arguments("targets is empty: pass one row per demonstration, one column per value"));
+            return Err(Error::Argument {
+                name: "targets",
+                problem: "is empty: pass one row per demonstration, one column per value",
+            });
         }
         styles.check(targets.nrows(), "demonstrations")?;
         styles.check(targets.ncols(), "target values")?;
@@ -125,7 +128,7 @@ impl Factors {
         let singular_values = vec![0.0; rows.min(columns)];
         let n_styles = styles.among(&singular_values, rows);
         let styles = Array2::from_shape_fn((rows, n_styles), |(i, j)| if i == j { 1.0 } else { 0.0 });
-        Self { styles, basis: Array2::zeros((n_styles, columns)), singular_values, error: 0.0 }
+        Self { styles, basis_targets: Array2::zeros((n_styles, columns)), singular_values, error: 0.0 }
     }
 }
 
@@ -140,7 +143,7 @@ struct ScaledTargets<'a> {
 /// S, and the first J rows of SᵀF.
 struct Projection {
     styles: Mat<f64>,
-    basis: Array2<f64>,
+    basis_targets: Array2<f64>,
 }
 
 /// Inner products of the rows of SᵀF, in the lower triangle.
@@ -253,24 +256,24 @@ impl<'a> ScaledTargets<'a> {
             }
         }
         let n_vectors = styles.ncols();
-        let mut basis = zeros("basis", (n_styles, columns))?;
+        let mut basis_targets = zeros("basis_targets", (n_styles, columns))?;
         let mut part = vec![0.0; n_vectors * PANEL.min(columns)];
         for start in (0..columns).step_by(PANEL) {
             let width = PANEL.min(columns - start);
             let part = &mut part[..n_vectors * width];
             // A column of zeros stays exactly zero, so that a DoF at rest is not moved by rounding errors.
             visit(projected(part, styles.as_ref(), targets.subcols(start, width)));
-            let whole = crate::validate::row_major_mut(&mut basis).chunks_exact_mut(columns);
+            let whole = crate::validate::row_major_mut(&mut basis_targets).chunks_exact_mut(columns);
             whole.zip(part.chunks_exact(width)).for_each(|(row, part)| row[start..start + width].copy_from_slice(part));
         }
-        Ok(Projection { styles, basis })
+        Ok(Projection { styles, basis_targets })
     }
 
     /// Undoes the scaling; `squared_error` is ‖F − S·F_basis‖² of the scaled targets.
     fn finish(&self, projection: Projection, n_styles: usize, values: Vec<f64>, squared_error: f64) -> Factors {
-        let Projection { styles, mut basis } = projection;
+        let Projection { styles, mut basis_targets } = projection;
         if self.scale != 1.0 {
-            basis *= self.scale;
+            basis_targets *= self.scale;
         }
         // Rounding may disorder equal values.
         let mut least = f64::INFINITY;
@@ -282,7 +285,7 @@ impl<'a> ScaledTargets<'a> {
             styles: Array2::from_shape_fn((styles.nrows(), n_styles), |(i, j)| styles[(i, j)]),
             singular_values: decreasing.collect(),
             error: squared_error.max(0.0).sqrt() * self.scale,
-            basis,
+            basis_targets,
         }
     }
 }

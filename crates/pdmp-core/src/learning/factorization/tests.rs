@@ -56,7 +56,7 @@ fn decaying(n: usize, ratio: f64) -> Vec<f64> {
 /// Asserts the claims about all factors: S is orthonormal with fixed signs, the rows of F_basis = SᵀF are orthogonal and
 /// as long as the singular values, and the stated error bounds the truncation error closely.
 fn check(targets: &Array2<f64>, factors: &Factors) {
-    let Factors { styles, basis, singular_values, error } = factors;
+    let Factors { styles, basis_targets: basis, singular_values, error } = factors;
     let n_styles = styles.ncols();
     assert_eq!((styles.nrows(), basis.dim()), (targets.nrows(), (n_styles, targets.ncols())));
     assert!(singular_values.windows(2).all(|pair| pair[0] >= pair[1]));
@@ -134,7 +134,14 @@ fn degenerate_targets_are_factorised() {
             check(&targets, &factors);
             let rounding = (factors.singular_values.len() as f64 * f64::EPSILON).sqrt();
             assert!(factors.singular_values.iter().skip(1).all(|&s| s < rounding * factors.singular_values[0]));
-            assert!(factors.basis.axis_iter(Axis(1)).skip(3).step_by(7).all(|column| column.iter().all(|&x| x == 0.0)));
+            assert!(
+                factors
+                    .basis_targets
+                    .axis_iter(Axis(1))
+                    .skip(3)
+                    .step_by(7)
+                    .all(|column| column.iter().all(|&x| x == 0.0))
+            );
         }
         assert_eq!(of(&targets, Truncation::Share(1.0)).styles.ncols(), 1);
         let still = of(&Array2::zeros((rows, 500)), Truncation::Share(0.9));
@@ -161,7 +168,7 @@ fn few_leading_factors_are_those_of_all() {
                 let sine = (1.0 - aligned * aligned).max(0.0).sqrt();
                 assert!(sine < 1e-7 + 1e-10 * sigma[0] / gap, "{j} {sine:e}");
                 // Residuals as claimed, with F itself: F·f_j = σ_j²·s_j.
-                let row = few.basis.row(j);
+                let row = few.basis_targets.row(j);
                 let residual = targets.dot(&row) - &few.styles.column(j) * row.dot(&row);
                 let length = residual.dot(&residual).sqrt();
                 assert!(length <= 1e-11 * sigma[0] * sigma[0], "{length:e}");
@@ -214,7 +221,7 @@ fn slow_and_clustered_spectra_are_factorised() {
     }
 }
 
-/// The share rule keeps as many styles as the exact singular values require, and they are accurate.
+/// The share rule keeps the number of styles that the exact singular values require, and they are accurate.
 #[test]
 fn the_share_rule_follows_the_exact_singular_values() {
     for (rows, columns) in [(100, 700), (400, 90)] {
@@ -309,8 +316,8 @@ fn results_are_reproducible() {
             let first = of(&targets, styles);
             for again in [of(&targets, styles), Factors::of(transposed.t(), styles, &mut go).unwrap()] {
                 assert_eq!(
-                    (&first.styles, &first.basis, &first.singular_values),
-                    (&again.styles, &again.basis, &again.singular_values)
+                    (&first.styles, &first.basis_targets, &first.singular_values),
+                    (&again.styles, &again.basis_targets, &again.singular_values)
                 );
             }
         }
@@ -382,7 +389,7 @@ fn second_gram_pass_is_as_accurate_as_reflections() {
         check(&targets, &factors);
         for (j, sigma) in sigma.iter().enumerate() {
             assert!((factors.singular_values[j] - sigma).abs() < 1e-14);
-            let residual = targets.dot(&factors.basis.row(j)) - &factors.styles.column(j) * (sigma * sigma);
+            let residual = targets.dot(&factors.basis_targets.row(j)) - &factors.styles.column(j) * (sigma * sigma);
             assert!(residual.dot(&residual).sqrt() < 1e-14);
         }
     }

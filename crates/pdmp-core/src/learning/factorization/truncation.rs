@@ -1,6 +1,7 @@
 //! Selection of the number of styles from the singular values.
 
 use crate::error::{Error, Result};
+use crate::validate::check_range;
 
 /// Minimum number of styles above the noise, even where fewer carry the share. They cost little: a mean and three styles
 /// are four factors, of which the largest two or three often carry nine tenths. With fewer than ten demonstrations so
@@ -34,12 +35,10 @@ impl Truncation {
     pub(crate) fn check(self, most: usize, of: &'static str) -> Result<()> {
         match self {
             Truncation::Rank(n_styles) if n_styles < 1 || n_styles > most => Err(Error::Styles { n_styles, most, of }),
-            Truncation::Share(value) | Truncation::AboveNoise { share: value, .. }
-                if !(value > 0.0 && value <= 1.0) =>
-            {
-                Err(Error::Range { name: "singular_value_share", value, allowed: "must lie in (0, 1]" })
+            Truncation::Rank(_) => Ok(()),
+            Truncation::Share(share) | Truncation::AboveNoise { share, .. } => {
+                check_range("singular_value_share", share, share > 0.0 && share <= 1.0, "must lie in (0, 1]")
             }
-            _ => Ok(()),
         }
     }
 

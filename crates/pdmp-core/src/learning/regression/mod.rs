@@ -9,10 +9,10 @@ use std::fmt;
 
 use ndarray::ArrayView2;
 
-pub use self::gp::{Gp, GpPosterior, Kernel, NoiseBound};
+pub use self::gp::{Gp, GpPosterior, GpPrediction, Kernel, NoiseBound};
 pub use self::ngnet::{NGnet, NGnetRegression};
 use crate::error::{Error, Result};
-use crate::validate::check_positive;
+use crate::validate::{check_length, check_positive};
 
 /// Domain of the clock on which the landscape is learnt.
 ///
@@ -110,16 +110,14 @@ impl Basis {
 /// Checks the arguments that all regressors share.
 fn check(domain: Domain, u: &[f64], targets: ArrayView2<f64>) -> Result<()> {
     if u.is_empty() {
-        return Err(Error::Arguments("u is empty: at least one sample is needed"));
+        return Err(Error::Argument { name: "u", problem: "is empty: at least one sample is needed" });
     }
-    if u.len() != targets.nrows() {
-        return Err(Error::Length { name: "u", expected: targets.nrows(), found: u.len(), per: "row of targets" });
-    }
+    check_length("u", u.len(), targets.nrows(), "row of targets")?;
     if let Some((index, &value)) = u.iter().enumerate().find(|(_, u)| !u.is_finite()) {
         return Err(Error::NotFinite { name: "u", index, value });
     }
     if u.windows(2).any(|pair| pair[1] < pair[0]) {
-        return Err(Error::Arguments("u must not decrease"));
+        return Err(Error::Argument { name: "u", problem: "must not decrease" });
     }
     check_positive("end", domain.extent())?;
     // Targets may exceed the bound on positions, of which they hold the derivative.
@@ -153,10 +151,10 @@ mod tests {
             for end in [0.0, -1.0, nan, f64::INFINITY] {
                 assert!(matches!(error(Domain::Interval { end }, &[0.0, 1.0], &two), Error::Range { name: "end", .. }));
             }
-            assert!(matches!(error(interval, &[], &Array2::ones((0, 1))), Error::Arguments(_)));
+            assert!(matches!(error(interval, &[], &Array2::ones((0, 1))), Error::Argument { name: "u", .. }));
             assert!(matches!(error(interval, &[0.0], &two), Error::Length { expected: 2, found: 1, .. }));
             assert!(matches!(error(interval, &[0.0, nan], &two), Error::NotFinite { index: 1, .. }));
-            assert!(matches!(error(interval, &[1.0, 0.9], &two), Error::Arguments(_)));
+            assert!(matches!(error(interval, &[1.0, 0.9], &two), Error::Argument { name: "u", .. }));
             let gap = array![[1.0, 1.0], [nan, 1.0]];
             assert!(matches!(error(interval, &[0.0, 1.0], &gap), Error::NotFiniteAt { row: 1, column: 0, .. }));
         }

@@ -9,6 +9,7 @@ use ndarray::{ArrayView2, Axis};
 use super::{Domain, Regression, magnitude};
 use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
+use crate::validate::check_range;
 
 /// Margin of the centres beyond either end of an interval, in centre spacings.
 ///
@@ -18,8 +19,8 @@ const MARGIN: f64 = 2.0;
 
 /// Ridge penalty on the weights, relative to the scale of the design matrix.
 ///
-/// With about as many samples as functions, weights that alternate in sign hardly change the values at the samples: with
-/// noise of 1e-3 on 50 samples, the error of 50 functions was 0.35 of the range at a penalty of 1e-8, and 5e-4 at 1e-5
+/// With about equal numbers of samples and functions, weights that alternate in sign hardly change the values at the
+/// samples: with noise of 1e-3 on 50 samples, the error of 50 functions was 0.35 of the range at a penalty of 1e-8, and 5e-4 at 1e-5
 /// and at 1e-4. A penalty of up to 1e-4 does not affect a well-posed fit: handwriting 4e-4, minimum jerk 1e-6.
 ///
 /// The penalty also bounds the condition number of the normal equations by 1e8. Their rounding then changes the outputs
@@ -119,14 +120,9 @@ impl NGnet {
     }
 
     fn check(&self) -> Result<()> {
-        if !(2..=1000).contains(&self.n_basis) {
-            let value = self.n_basis as f64;
-            return Err(Error::Range { name: "n_basis", value, allowed: "must lie between 2 and 1000" });
-        }
-        if !(0.3..=3.0).contains(&self.overlap) {
-            return Err(Error::Range { name: "overlap", value: self.overlap, allowed: "must lie between 0.3 and 3" });
-        }
-        Ok(())
+        let Self { n_basis, overlap } = *self;
+        check_range("n_basis", n_basis as f64, (2..=1000).contains(&n_basis), "must lie between 2 and 1000")?;
+        check_range("overlap", overlap, (0.3..=3.0).contains(&overlap), "must lie between 0.3 and 3")
     }
 }
 

@@ -83,9 +83,10 @@ impl<'a> StyleSelection<'a> {
         map: MapSelection,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<usize> {
-        let folds = folds(contexts).ok_or(Error::Arguments(
-            "cross-validation of the number of styles needs at least three different contexts: pass a number of styles",
-        ))?;
+        let folds = folds(contexts).ok_or(Error::Argument {
+            name: "n_styles",
+            problem: "needs at least three different contexts for cross-validation: pass a number of styles",
+        })?;
         let mut errors: Vec<Vec<f64>> = Vec::new();
         for (k, fold) in folds.iter().enumerate() {
             progress(k as f64 / folds.len() as f64)?;

@@ -1,4 +1,4 @@
 //! Selection of the number of styles J.
 
 pub(crate) mod cross_validation;
-pub(crate) mod spectrum;
+pub(crate) mod singular_values;

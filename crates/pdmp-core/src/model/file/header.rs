@@ -5,8 +5,8 @@ use std::fmt;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, Visitor};
 
-use super::check_size;
-use crate::error::{Error, Result};
+use super::{check_size, ensure, unreadable};
+use crate::error::Result;
 
 /// Maximum number of entries of a header: the metadata and the arrays, of which a model has fewer.
 const MAX_ENTRIES: usize = 64;
@@ -56,15 +56,13 @@ impl<'de> Deserialize<'de> for Header {
 /// Returns the constants as JSON, after a check of the size of the header with and without its strings.
 pub(super) fn constants(bytes: &[u8]) -> Result<String> {
     check_size(bytes)?;
-    let bad = |reason: &str| Error::File(reason.to_string());
-    let (head, rest) = bytes.split_first_chunk().ok_or(bad("shorter than a header"))?;
-    let length = usize::try_from(u64::from_le_bytes(*head)).map_err(|_| bad("not a safetensors file"))?;
-    let header = rest.get(..length).ok_or(bad("truncated: it ends within its header"))?;
-    let Header(json) = serde_json::from_slice(header).map_err(|error| Error::File(format!("header: {error}")))?;
-    let json = json.ok_or(bad("no pdmp metadata"))?;
-    if header.len() - json.len().min(header.len()) + structure(&json) > MAX_STRUCTURE {
-        return Err(bad("a header larger than any model has"));
-    }
+    let (head, rest) = bytes.split_first_chunk().ok_or(unreadable("shorter than a header"))?;
+    let length = usize::try_from(u64::from_le_bytes(*head)).map_err(|_| unreadable("not a safetensors file"))?;
+    let header = rest.get(..length).ok_or(unreadable("truncated: it ends within its header"))?;
+    let Header(json) = serde_json::from_slice(header).map_err(|error| unreadable(format!("header: {error}")))?;
+    let json = json.ok_or(unreadable("no pdmp metadata"))?;
+    let structure = header.len() - json.len().min(header.len()) + structure(&json);
+    ensure(structure <= MAX_STRUCTURE, "a header larger than any model has")?;
     Ok(json)
 }
 

@@ -14,8 +14,9 @@ mod header;
 mod read;
 mod write;
 
+use std::fmt::Display;
 use std::fs;
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -72,6 +73,9 @@ struct Constants {
 #[serde(deny_unknown_fields)]
 struct Map {
     columns: Vec<ContextColumn>,
+    /// Names of the columns; absent where unknown.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    names: Vec<String>,
     kind: ContextMapKind,
     kernel: Option<Kernel>,
     errors: Vec<(ContextMapKind, Option<f64>)>,
@@ -99,56 +103,84 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// A path that cannot be written.
+    /// A path that cannot be written, or whose folder does not exist.
     pub fn save(&self, path: &Path) -> Result<()> {
         let bytes = self.to_bytes()?;
-        let io = |source| Error::Io { path: path.to_path_buf(), source };
+        let failed = |source| Error::Io { path: path.to_path_buf(), source };
         let target = fs::canonicalize(path)
             // The target of a link need not exist.
             .or_else(|_| fs::read_link(path).map(|to| path.parent().unwrap_or(Path::new("")).join(to)))
             .unwrap_or_else(|_| path.to_path_buf());
         if fs::metadata(&target).is_ok_and(|existing| !existing.is_file() && !existing.is_dir()) {
-            return fs::write(&target, &bytes).map_err(io);
+            return fs::write(&target, &bytes).map_err(failed);
         }
         let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let (draft, mut file) = Draft::create(folder).map_err(io)?;
-        file.write_all(&bytes).map_err(io)?;
-        file.sync_all().map_err(io)?;
-        if let Ok(existing) = fs::metadata(&target) {
-            file.set_permissions(existing.permissions()).map_err(io)?;
+        if !folder.is_dir() {
+            let source = io::Error::new(io::ErrorKind::NotFound, "no such folder; create it first");
+            return Err(Error::Io { path: folder.to_path_buf(), source });
         }
-        draft.persist(&target).map_err(io)
+        let (draft, mut file) = Draft::create(folder).map_err(failed)?;
+        file.write_all(&bytes).map_err(failed)?;
+        file.sync_all().map_err(failed)?;
+        if let Ok(existing) = fs::metadata(&target) {
+            file.set_permissions(existing.permissions()).map_err(failed)?;
+        }
+        draft.persist(&target).map_err(failed)
     }
 
     /// Reads a model file.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, Model, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let folder = tempfile::tempdir().unwrap();
+    /// # let path = folder.path().join("reach.safetensors");
+    /// # model.save(&path)?;
+    /// let loaded = Model::load(&path)?;
+    /// assert_eq!(loaded.n_dofs(), 2);
+    /// assert!(Model::load(folder.path()).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A path that cannot be read, or a file that is damaged, not a model, or of another version.
     pub fn load(path: &Path) -> Result<Self> {
-        let io = |source| Error::Io { path: path.to_path_buf(), source };
+        let failed = |source| Error::Io { path: path.to_path_buf(), source };
         let with_path = |error| match error {
-            Error::File(reason) => Error::File(format!("{}: {reason}", path.display())),
+            Error::File(reason) => unreadable(format!("{}: {reason}", path.display())),
             other => other,
         };
-        let mut file = fs::File::open(path).map_err(io)?;
+        let mut file = fs::File::open(path).map_err(failed)?;
         let mut bytes = Vec::new();
         // The length of the header comes first: a large file of another format is rejected without reading it.
-        Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(io)?;
+        Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(failed)?;
         check_size(&bytes).map_err(with_path)?;
-        file.take(MAX_FILE_SIZE).read_to_end(&mut bytes).map_err(io)?;
+        file.take(MAX_FILE_SIZE).read_to_end(&mut bytes).map_err(failed)?;
         Self::from_bytes(&bytes).map_err(with_path)
     }
 }
 
+/// Returns the error of a file that is damaged, not a model, or of another version.
+fn unreadable(reason: impl Display) -> Error {
+    Error::File(reason.to_string())
+}
+
+/// Checks a property of the contents of a file.
+fn ensure(valid: bool, reason: &str) -> Result<()> {
+    if valid { Ok(()) } else { Err(unreadable(reason)) }
+}
+
 /// Checks the size of the file, and the size of its header as announced in the first eight bytes.
 fn check_size(bytes: &[u8]) -> Result<()> {
-    let bad = |reason: &str| Error::File(reason.to_string());
     match bytes.first_chunk().map(|head| u64::from_le_bytes(*head)) {
-        _ if bytes.len() as u64 > MAX_FILE_SIZE => Err(bad("larger than any model")),
-        None => Err(bad("shorter than a header")),
-        Some(0) => Err(bad("not a safetensors file")),
+        _ if bytes.len() as u64 > MAX_FILE_SIZE => Err(unreadable("larger than any model")),
+        None => Err(unreadable("shorter than a header")),
+        Some(0) => Err(unreadable("not a safetensors file")),
         Some(length) if length > MAX_HEADER_SIZE => {
-            Err(bad("not a safetensors file, or damaged: it announces a header larger than any model has"))
+            Err(unreadable("not a safetensors file, or damaged: it announces a header larger than any model has"))
         }
         Some(_) => Ok(()),
     }
@@ -157,7 +189,7 @@ fn check_size(bytes: &[u8]) -> Result<()> {
 /// Returns the CRC-32 of the constants and of the names and bytes of all arrays, in the order of `Model::arrays`.
 fn checksum<'a>(constants: &Constants, arrays: impl Iterator<Item = (&'a str, &'a [u8])>) -> Result<u32> {
     let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&serde_json::to_vec(constants).map_err(|error| Error::File(error.to_string()))?);
+    hasher.update(&serde_json::to_vec(constants).map_err(unreadable)?);
     for (name, bytes) in arrays {
         hasher.update(name.as_bytes());
         hasher.update(bytes);

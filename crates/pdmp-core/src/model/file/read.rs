@@ -6,14 +6,15 @@ use ndarray::{Array2, Axis};
 use safetensors::tensor::{Dtype, SafeTensors};
 use serde::Deserialize;
 
-use super::{Constants, Map, SCHEMA, Sealed, checksum, header};
+use super::{Constants, Map, SCHEMA, Sealed, checksum, ensure, header, unreadable};
 use crate::context::{ContextMap, ContextMapKind, Kernel, MapParameters, StackingWeights};
+use crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::forcing_table::ForcingTable;
 use crate::dynamics::hermite_table::{KnotTable, MAX_CELLS};
 use crate::dynamics::output_system::Attractor;
 use crate::dynamics::transport::Transport;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kind::Kind;
 use crate::model::conditions::MAX_STYLE_MAGNITUDE;
 use crate::model::primitive::{MAX_RATE, MAX_TAU, Parts, Primitive};
@@ -29,24 +30,17 @@ impl Model {
     /// # Errors
     /// Bytes that are damaged, not a model, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
-        let bad = |reason: &str| Error::File(reason.to_string());
         let json = header::constants(bytes)?;
         // The version is parsed first: other versions may have other fields.
-        let version: Version = serde_json::from_str(&json).map_err(|error| Error::File(error.to_string()))?;
-        match version.schema {
-            Some(found) if found == u64::from(SCHEMA) => {}
-            Some(found) => {
-                return Err(Error::File(format!("version {found}, while this library reads version {SCHEMA}")));
-            }
-            None => return Err(bad("no schema version")),
-        }
-        let tensors = SafeTensors::deserialize(bytes).map_err(|error| Error::File(error.to_string()))?;
-        let sealed: Sealed = serde_json::from_str(&json).map_err(|error| Error::File(error.to_string()))?;
+        let version: Version = serde_json::from_str(&json).map_err(unreadable)?;
+        let found = version.schema.ok_or(unreadable("no schema version"))?;
+        ensure(found == u64::from(SCHEMA), &format!("version {found}, while this library reads version {SCHEMA}"))?;
+        let tensors = SafeTensors::deserialize(bytes).map_err(unreadable)?;
+        let sealed: Sealed = serde_json::from_str(&json).map_err(unreadable)?;
         // The checksum covers the values of the constants. A flipped bit may give another text of the same values, such
         // as 1.50 for 1.5, which differs from the text that `to_bytes` writes.
-        if serde_json::to_string(&sealed).ok().as_deref() != Some(json.as_str()) {
-            return Err(bad("damaged: the text of its constants is not canonical"));
-        }
+        let canonical = serde_json::to_string(&sealed).map_err(unreadable)?;
+        ensure(canonical == json, "damaged: the text of its constants is not canonical")?;
         Reader { tensors }.model(sealed.model, sealed.crc32)
     }
 }
@@ -65,65 +59,58 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// Returns the elements of an array, after a check of its type, shape and magnitudes.
     fn array(&self, name: &str, shape: &[usize]) -> Result<Vec<f64>> {
-        let tensor = self.tensors.tensor(name).map_err(|_| Error::File(format!("no array {name}")))?;
+        let tensor = self.tensors.tensor(name).map_err(|_| unreadable(format!("no array {name}")))?;
         if tensor.dtype() != Dtype::F64 || tensor.shape() != shape {
             let (dtype, found) = (tensor.dtype(), tensor.shape());
-            return Err(Error::File(format!("{name} is {dtype:?} {found:?}, expected F64 {shape:?}")));
+            return Err(unreadable(format!("{name} is {dtype:?} {found:?}, expected F64 {shape:?}")));
         }
         let (bytes, _) = tensor.data().as_chunks();
         let data: Vec<f64> = bytes.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
         let limit = max_magnitude(name);
         match data.iter().position(|x| x.is_nan() || x.abs() > limit) {
-            Some(index) => Err(Error::File(format!("{name}[{index}] = {:e} is out of range", data[index]))),
+            Some(index) => Err(unreadable(format!("{name}[{index}] = {:e} is out of range", data[index]))),
             None => Ok(data),
         }
     }
 
     fn matrix(&self, name: &str, shape: (usize, usize)) -> Result<Array2<f64>> {
         let data = self.array(name, &[shape.0, shape.1])?;
-        Array2::from_shape_vec(shape, data).map_err(|error| Error::File(format!("{name}: {error}")))
+        Array2::from_shape_vec(shape, data).map_err(|error| unreadable(format!("{name}: {error}")))
     }
 
     fn positive(&self, name: &str, length: usize) -> Result<Vec<f64>> {
         let data = self.array(name, &[length])?;
         match data.iter().position(|x| *x <= 0.0) {
-            Some(index) => Err(Error::File(format!("{name}[{index}] = {} is not positive", data[index]))),
+            Some(index) => Err(unreadable(format!("{name}[{index}] = {} is not positive", data[index]))),
             None => Ok(data),
         }
     }
 
     fn noise(&self, n_dofs: usize) -> Result<Noise> {
         let [levels, cut_offs] = [self.array("noise.levels", &[n_dofs])?, self.array("noise.cut_offs", &[n_dofs])?];
-        if levels.iter().chain(&cut_offs).any(|x| *x < 0.0) {
-            return Err(Error::File("a noise or cut-off is negative".to_string()));
-        }
+        ensure(!levels.iter().chain(&cut_offs).any(|x| *x < 0.0), "a noise or cut-off is negative")?;
         Ok(Noise { levels, cut_offs: cut_offs.into_iter().map(|hz| Some(hz).filter(|hz| *hz > 0.0)).collect() })
     }
 
     /// Returns the shape of an array with N axes.
     fn shape<const N: usize>(&self, name: &str) -> Result<[usize; N]> {
-        let tensor = self.tensors.tensor(name).map_err(|_| Error::File(format!("no array {name}")))?;
-        tensor.shape().try_into().map_err(|_| Error::File(format!("{name} has {} axes", tensor.shape().len())))
+        let tensor = self.tensors.tensor(name).map_err(|_| unreadable(format!("no array {name}")))?;
+        tensor.shape().try_into().map_err(|_| unreadable(format!("{name} has {} axes", tensor.shape().len())))
     }
 
     fn model(&self, constants: Constants, crc32: u32) -> Result<Model> {
-        let bad = |reason: &str| Error::File(reason.to_string());
         let kind = constants.canonical.kind();
         let [n_demos, n_styles] = self.shape("styles")?;
         let [n_knots, _, n_dofs] = self.shape("forcing_table.values")?;
         let [n_values] = self.shape("singular_values")?;
         let [_, n_segments] = self.shape("segment_durations")?;
-        if n_segments == 0 || n_demos == 0 || n_styles == 0 || n_dofs == 0 || n_values < n_styles {
-            return Err(bad("an array is empty"));
-        }
-        if !(2..=MAX_CELLS + 1).contains(&n_knots)
-            || [&constants.names, &constants.units].iter().any(|labels| labels.len() != n_dofs)
-        {
-            return Err(bad("the forcing table does not fit the rest"));
-        }
-        if constants.nominal >= n_demos || constants.n_samples < crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION {
-            return Err(bad("nominal or n_samples is out of range"));
-        }
+        let filled = ![n_segments, n_demos, n_styles, n_dofs].contains(&0);
+        ensure(filled && n_values >= n_styles, "an array is empty")?;
+        let labelled = [&constants.names, &constants.units].iter().all(|labels| labels.len() == n_dofs);
+        let fits = (2..=MAX_CELLS + 1).contains(&n_knots) && labelled;
+        ensure(fits, "the forcing table does not fit the rest")?;
+        let valid = constants.nominal < n_demos && constants.n_samples >= MIN_SAMPLES_PER_DEMONSTRATION;
+        ensure(valid, "nominal or n_samples is out of range")?;
         constants.check()?;
 
         let contexts = match &constants.map {
@@ -136,27 +123,21 @@ impl Reader<'_> {
         let forcing_table = ForcingTable::from_knots(constants.canonical, n_dofs, &knots, constants.table_error);
         let [n_coefficients] = self.shape("transport")?;
         let transport = self.array("transport", &[n_coefficients])?;
-        let transport = Transport::from_coefficients(transport, constants.canonical)
-            .map_err(|error| Error::File(error.to_string()))?;
+        let transport = Transport::from_coefficients(transport, constants.canonical).map_err(unreadable)?;
         let braking = constants.braking;
         // The forcing past the end is exp(−α_z v)(a + b·exp(−(κ − α_z)v)): for κ < α_z the second exponential overflows.
         let valid = braking.is_none_or(|braking| (constants.alpha_z..=1e12).contains(&braking));
-        if braking.is_none() != transport.is_immediate() || !valid {
-            return Err(bad("braking does not fit the rest"));
-        }
+        ensure(valid && braking.is_none() == transport.is_immediate(), "braking does not fit the rest")?;
         let breaks = self.array("breaks", &[n_segments + 1])?;
-        if breaks[0] != 0.0 || breaks[n_segments] != 1.0 || breaks.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(bad("breaks do not increase from 0 to 1"));
-        }
+        let increasing = !breaks.windows(2).any(|pair| pair[0] >= pair[1]);
+        let valid = breaks[0] == 0.0 && breaks[n_segments] == 1.0 && increasing;
+        ensure(valid, "breaks do not increase from 0 to 1")?;
         let segment_durations = self.matrix("segment_durations", (n_demos, n_segments))?;
-        if segment_durations.iter().any(|seconds| *seconds <= 0.0) {
-            return Err(bad("a segment duration is not positive"));
-        }
+        ensure(segment_durations.iter().all(|seconds| *seconds > 0.0), "a segment duration is not positive")?;
         // A fit ensures this; the default duration of a rollout relies on it.
         let ratio = segment_durations.row(constants.nominal).sum() / (constants.tau * constants.canonical.extent());
-        if !((1.0 - 1e-6)..=(1.0 + 1e-6)).contains(&ratio) {
-            return Err(bad("tau does not agree with the nominal duration"));
-        }
+        let agrees = ((1.0 - 1e-6)..=(1.0 + 1e-6)).contains(&ratio);
+        ensure(agrees, "tau does not agree with the nominal duration")?;
         let demonstrated = DemonstrationParameters {
             styles: self.matrix("styles", (n_demos, n_styles))?,
             goals: self.matrix("goals", (n_demos, n_dofs))?,
@@ -170,15 +151,12 @@ impl Reader<'_> {
         let singular_values = self.array("singular_values", &[n_values])?;
         let dof_scale = self.positive("dof_scale", n_dofs)?;
         let ranges = self.array("ranges", &[n_dofs])?;
-        if singular_values.iter().chain(&ranges).any(|x| *x < 0.0) {
-            return Err(bad("a range or singular value is negative"));
-        }
+        let negative = singular_values.iter().chain(&ranges).any(|x| *x < 0.0);
+        ensure(!negative, "a range or singular value is negative")?;
         let (map, residual_variance) = match &constants.map {
             Some(map) => {
                 let residual_variance = self.matrix("residual_variance", (kind.samples(STEPS), n_dofs))?;
-                if residual_variance.iter().any(|x| *x < 0.0) {
-                    return Err(bad("a residual variance is negative"));
-                }
+                ensure(residual_variance.iter().all(|x| *x >= 0.0), "a residual variance is negative")?;
                 (Some(self.map(map, &demonstrated, kind)?), Some(residual_variance))
             }
             None => (None, None),
@@ -204,7 +182,7 @@ impl Reader<'_> {
             units: constants.units.clone(),
             ranges,
             breaks,
-            nominal: demonstrated.nominal(kind),
+            nominal: demonstrated.nominal_conditions(kind),
         });
         let model = Model { primitive: Arc::new(primitive), demonstrated, learnt, map };
         self.verify(&constants, &model, crc32)?;
@@ -219,7 +197,6 @@ impl Reader<'_> {
 
     /// Restores the context map from its constants and the parameters of the demonstrations.
     fn map(&self, map: &Map, demonstrated: &DemonstrationParameters, kind: Kind) -> Result<ContextMap> {
-        let bad = |reason: &str| Error::File(reason.to_string());
         let outputs = demonstrated.outputs(kind);
         let ratios = self.array("map.ratios", &[outputs.ncols()])?;
         let valid = match map.kernel {
@@ -228,24 +205,22 @@ impl Reader<'_> {
             Some(Kernel::Quadratic) => ratios.iter().all(|ratio| *ratio >= 0.0),
             Some(Kernel::Matern { length }) => length > 0.0 && ratios.iter().all(|ratio| *ratio >= 0.0),
         };
-        let contexts = demonstrated.contexts.as_ref().ok_or(bad("no contexts"))?;
+        let contexts = demonstrated.contexts.as_ref().ok_or(unreadable("no contexts"))?;
         for (q, column) in map.columns.iter().enumerate() {
-            if contexts.column(q).iter().any(|&number| column.value(q, number).is_err()) {
-                return Err(bad("a context has an unknown label"));
-            }
+            let known = contexts.column(q).iter().all(|&number| column.value(q, number).is_ok());
+            ensure(known, "a context has an unknown label")?;
         }
-        if !valid {
-            return Err(bad("the map's constants are out of range"));
-        }
+        ensure(valid, "the map's constants are out of range")?;
         let errors = map.errors.iter().map(|&(kind, error)| (kind, error.unwrap_or(f64::INFINITY))).collect();
         let directions = self.matrix("map.directions", (outputs.ncols(), outputs.ncols()))?;
         let line = match map.kind {
             ContextMapKind::Stacked => Some(self.stacked_line(outputs.ncols())?),
             _ => None,
         };
-        let parameters = MapParameters { kind: map.kind, kernel: map.kernel, directions, ratios, line, errors };
-        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), parameters)
-            .map_err(|error| Error::File(error.to_string()))
+        let parameters = MapParameters { kind: map.kind, kernel: map.kernel, ratios, line, errors };
+        ContextMap::restore(map.columns.clone(), contexts, outputs.view(), directions, parameters)
+            .and_then(|restored| restored.with_names(map.names.clone()))
+            .map_err(unreadable)
     }
 
     /// Returns the line of a stacked map: its signal-to-noise ratios (P,) and the stacking weights.
@@ -255,21 +230,18 @@ impl Reader<'_> {
         let weights =
             StackingWeights { interpolation: [weights[0], weights[1]], extrapolation: [weights[2], weights[3]] };
         let valid = |[g, l]: [f64; 2]| g >= 0.0 && l >= 0.0 && g + l <= 1.0 + 1e-9;
-        if ratios.iter().any(|ratio| *ratio < 0.0) || !valid(weights.interpolation) || !valid(weights.extrapolation) {
-            return Err(Error::File("the map's line is out of range".to_string()));
-        }
+        let valid = valid(weights.interpolation) && valid(weights.extrapolation);
+        ensure(valid && ratios.iter().all(|ratio| *ratio >= 0.0), "the map's line is out of range")?;
         Ok((ratios, weights))
     }
 
     /// Checks that the file contains the arrays of the model and no others, and compares the checksum.
     fn verify(&self, constants: &Constants, model: &Model, crc32: u32) -> Result<()> {
         let names: Vec<&str> = model.arrays().iter().map(|(name, ..)| *name).collect();
-        if names.len() != self.tensors.len() {
-            return Err(Error::File("it contains arrays that do not belong to a model".to_string()));
-        }
+        ensure(names.len() == self.tensors.len(), "it contains arrays that do not belong to a model")?;
         let tensors: Vec<_> = names.iter().filter_map(|name| self.tensors.tensor(name).ok()).collect();
         let found = checksum(constants, names.iter().copied().zip(tensors.iter().map(|tensor| tensor.data())))?;
-        if found == crc32 { Ok(()) } else { Err(Error::File("damaged: the checksum does not match".to_string())) }
+        ensure(found == crc32, "damaged: the checksum does not match")
     }
 }
 
@@ -290,7 +262,7 @@ impl Constants {
             Canonical::Rhythmic { mu } => (mu, 1.0),
         };
         let max_slope = self.slope.unwrap_or(1.0);
-        TimeWarp { n_segments: 1, max_slope }.check(1).map_err(|error| Error::File(error.to_string()))?;
+        TimeWarp { n_segments: 1, max_slope }.check(1).map_err(unreadable)?;
         for (name, value, limit) in [
             ("tau", self.tau, MAX_TAU),
             ("alpha_z", self.alpha_z, MAX_RATE),
@@ -298,9 +270,7 @@ impl Constants {
             ("alpha_x or mu", phase_rate, MAX_RATE),
             ("u_end", u_end, 1.01e3),
         ] {
-            if !(1.0 / limit..=limit).contains(&value) {
-                return Err(Error::File(format!("{name} = {value} is out of range")));
-            }
+            ensure((1.0 / limit..=limit).contains(&value), &format!("{name} = {value} is out of range"))?;
         }
         Ok(())
     }

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
-use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header};
+use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header, unreadable};
 use crate::context::{ContextMap, MapParameters, StackingWeights};
 use crate::dynamics::hermite_table::KnotTable;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::Model;
 
 /// Array of a file: its name, shape and elements by rows.
@@ -51,14 +51,14 @@ impl Model {
             .collect();
         let crc32 = checksum(&constants, arrays.iter().map(|(name, _, bytes)| (*name, bytes.as_slice())))?;
         let sealed = Sealed { schema: SCHEMA, crc32, model: constants };
-        let json = serde_json::to_string(&sealed).map_err(|error| Error::File(error.to_string()))?;
+        let json = serde_json::to_string(&sealed).map_err(unreadable)?;
         let views = arrays
             .iter()
             .map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F64, shape.clone(), bytes)?)))
             .collect::<std::result::Result<Vec<_>, safetensors::SafeTensorError>>()
-            .map_err(|error| Error::File(error.to_string()))?;
+            .map_err(unreadable)?;
         let metadata = HashMap::from([(KEY.to_string(), json)]);
-        let bytes = serialize(views, Some(metadata)).map_err(|error| Error::File(error.to_string()))?;
+        let bytes = serialize(views, Some(metadata)).map_err(unreadable)?;
         header::constants(&bytes)?;
         Ok(bytes)
     }
@@ -93,7 +93,7 @@ impl Model {
         if let (Some(contexts), Some(map)) = (&demonstrated.contexts, &self.map) {
             arrays.push(matrix("contexts", contexts));
             let parameters = map.parameters();
-            arrays.push(matrix("map.directions", &parameters.directions));
+            arrays.push(matrix("map.directions", map.directions()));
             arrays.push(vector("map.ratios", &parameters.ratios));
             if let Some((ratios, StackingWeights { interpolation, extrapolation })) = &parameters.line {
                 arrays.push(vector("map.slopes", ratios));
@@ -115,7 +115,7 @@ impl Map {
     fn of(map: &ContextMap) -> Self {
         let MapParameters { kind, kernel, errors, .. } = map.parameters();
         // JSON has no infinity, the error of a map that no other contexts can predict.
-        let errors = errors.into_iter().map(|(kind, error)| (kind, error.is_finite().then_some(error))).collect();
-        Self { columns: map.columns().to_vec(), kind, kernel, errors }
+        let errors = errors.iter().map(|&(kind, error)| (kind, error.is_finite().then_some(error))).collect();
+        Self { columns: map.columns().to_vec(), names: map.names().to_vec(), kind: *kind, kernel: *kernel, errors }
     }
 }

@@ -2,8 +2,10 @@
 
 use crate::dynamics::forcing_table::{ForcingTable, TableIndex};
 use crate::dynamics::output_system::{Attractor, CubicSample, State};
+use crate::error::Result;
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
 use crate::numerics::simd::{F64x4, Real, Register, pack};
+use crate::numerics::state::Visitor;
 
 /// State of a group of DoFs besides position, velocity and acceleration.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,6 +31,16 @@ impl Group {
         let min_range = F64x4::splat(MIN_RANGE_RATIO * largest_range(ranges));
         let group = |range: &F64x4| Self { range: range.max(min_range), ..Self::default() };
         pack(ranges).iter().map(group).collect()
+    }
+
+    /// Visits the state, with the bounds of a quantity in units of a DoF and the largest distance from start to goal.
+    pub(super) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2], distance: f64) -> Result<()> {
+        let Self { forcing, w, z, displacement, length, rounding, range: _ } = self;
+        let ForcingSample { value, slope, style_slope } = forcing;
+        for lanes in [value, slope, style_slope, &mut w.value, &mut w.slope, z, length, rounding] {
+            visit(lanes.as_mut_array(), quantity)?;
+        }
+        visit(displacement.as_mut_array(), [-distance, distance])
     }
 }
 
@@ -69,7 +81,7 @@ pub(super) struct Gate {
     pub(super) r: f64,
     /// r′.
     pub(super) r_slope: f64,
-    /// κ. It scales the derivative of b alone: style and amplitude are filtered on the clock of the output system.
+    /// κ, past the end κp′. It scales the derivative of b alone: style and amplitude are filtered on the clock of the output system.
     pub(super) phase_rate: f64,
     /// ρ and ρ̇.
     pub(super) rate: [f64; 2],

@@ -5,6 +5,7 @@ use crate::motion::limits::{Limit, Limits};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
 use crate::motion::viability::Bounds;
 use crate::numerics::simd::{F64x4, WIDTH, groups, padded, unpad};
+use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Maximum number of substeps in which a tick is limited, each so short that it changes ẏ by half of V at most.
 pub(super) const MAX_SUBSTEPS: f64 = 1000.0;
@@ -14,7 +15,7 @@ const BRAKING_SHARE: f64 = 0.01;
 const FREE_VELOCITY: f64 = 10.0;
 
 /// Limits of all groups of DoFs, and the motion at the start of the tick that they apply to.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Limiter {
     active: bool,
     /// True if no DoF was limited in the last tick.
@@ -33,6 +34,8 @@ pub(super) struct Limiter {
     /// max 2A/V and max √(A/(u − l)), in 1/s: with n substeps of a tick of length h, n ≥ h·max.
     pub(super) substep_rate: f64,
 }
+
+clone_in_place!(Limiter { active, is_free, bounds, before, limited, excess, ranges, centre, substep_rate });
 
 impl Limiter {
     /// Returns no limits for DoFs with the given ranges.
@@ -134,5 +137,46 @@ impl Limiter {
     pub(super) fn clear(&mut self) {
         self.is_free = true;
         self.limited.fill(None);
+    }
+
+    /// Returns the limits; infinite elements are none.
+    pub(super) fn limits(&self) -> Limits {
+        let n_dofs = self.centre.len();
+        let vector = |limit: fn(&Bounds) -> F64x4| {
+            let lanes = self.bounds.iter().flat_map(|bounds| limit(bounds).to_array());
+            Some(lanes.take(n_dofs).collect())
+        };
+        Limits {
+            lower: vector(|bounds| bounds.lower),
+            upper: vector(|bounds| bounds.upper),
+            velocity: vector(|bounds| bounds.velocity),
+            acceleration: vector(|bounds| bounds.acceleration),
+        }
+    }
+
+    /// Visits the state, with the bounds of a quantity in units of a DoF, for movements of a `duration` and ticks of `dt`
+    /// seconds.
+    pub(super) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2], duration: f64, dt: f64) -> Result<()> {
+        let mut active = self.active;
+        visit_flag(visit, &mut active)?;
+        let mut limits = self.limits();
+        let Limits { lower, upper, velocity, acceleration } = &mut limits;
+        for vector in [lower, upper, velocity, acceleration].into_iter().flatten() {
+            visit(vector, [f64::NEG_INFINITY, f64::INFINITY])?;
+        }
+        let limits = if active { limits } else { Limits::default() };
+        self.set(&limits, duration, dt)?;
+        visit_flag(visit, &mut self.is_free)?;
+        for [position, velocity] in &mut self.before {
+            visit(position.as_mut_array(), quantity)?;
+            visit(velocity.as_mut_array(), quantity)?;
+        }
+        let kinds = [None, Some(Limit::Position), Some(Limit::Velocity), Some(Limit::Acceleration)];
+        for limited in &mut self.limited {
+            let mut index = kinds.iter().position(|kind| kind == limited).map_or(0.0, |index| index as f64);
+            visit_number(visit, &mut index, [0.0, 3.0])?;
+            *limited = kinds[index as usize];
+        }
+        Ok(())
     }
 }

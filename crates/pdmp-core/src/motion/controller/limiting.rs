@@ -62,6 +62,11 @@ impl Controller {
         Ok(())
     }
 
+    /// Returns the limits; infinite elements are none.
+    pub fn limits(&self) -> Limits {
+        self.limiter.limits()
+    }
+
     /// Returns for each DoF the limit that determined its acceleration in the last tick, `None` for a free one.
     pub fn limited(&self) -> &[Option<Limit>] {
         self.limiter.limited()

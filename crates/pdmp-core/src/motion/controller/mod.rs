@@ -13,13 +13,17 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx;
+mod forecast;
 mod getters;
 mod goal;
 mod group;
 mod limiter;
 mod limiting;
+mod phase;
 mod setters;
 mod settling;
+mod snapshot;
+mod start;
 mod step;
 
 use std::sync::Arc;
@@ -27,7 +31,7 @@ use std::sync::Arc;
 use crate::dynamics::canonical::CompensatedSum;
 use crate::dynamics::command_filter::{CommandFilter, FilterGains, FilterStep};
 use crate::dynamics::goal_transition::{GoalTransition, MinDurations};
-use crate::dynamics::output_system::{Propagator, State};
+use crate::dynamics::output_system::Propagator;
 use crate::dynamics::propagator_series::Series;
 use crate::dynamics::transport::TransportSegment;
 use crate::error::{Error, Result};
@@ -36,7 +40,8 @@ use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::perturbation::{Perturbation, largest_range};
-use crate::numerics::simd::{F64x4, WIDTH, copy, padded, repack};
+use crate::numerics::simd::{F64x4, copy};
+use crate::numerics::state::clone_in_place;
 use crate::validate::check_positive;
 use group::Group;
 use limiter::Limiter;
@@ -44,7 +49,7 @@ use limiter::Limiter;
 /// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
 /// Default tolerance of a settled movement, relative to the range of each DoF. On the recordings of `docs/transport.md`,
-/// movements that end in motion settle to it at 1.0 to 1.35 durations (median of a set), to 1e-3 at up to 1.5.
+/// movements settle to it within 1.0 to 1.3 durations (median of a set), to 1e-3 within up to 1.5.
 const DEFAULT_TOLERANCE: f64 = 5e-3;
 /// Flush level, relative to the largest range: values 1e-16 of it become zero. It lies far below the last digit of every
 /// movement, and its square is a normal number.
@@ -74,10 +79,12 @@ pub enum Status {
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Controller {
     primitive: Arc<Primitive>,
     dt: f64,
+    /// Transition of commands, in seconds.
+    transition: f64,
     conditions: ResolvedConditions,
     started: bool,
     status: Status,
@@ -98,8 +105,14 @@ pub struct Controller {
     /// Transition of the frame to a commanded goal and final velocity.
     goal_transition: GoalTransition,
     min_durations: MinDurations,
+    /// True while the transition ends with the final velocity.
+    approaching: bool,
+    /// y′ at the end of a transition to the final velocity.
+    arrival_slope: Vec<F64x4>,
     /// r₀.
     amplitude: CommandFilter,
+    /// Largest τ commanded since the start.
+    max_tau: f64,
     /// Factor of the rate 1/τ.
     speed: f64,
     /// Tolerance of a settled movement, relative to the range of each DoF.
@@ -118,6 +131,8 @@ pub struct Controller {
     flush_level: f64,
     perturbation: Perturbation,
     limiter: Limiter,
+    /// k_φ.
+    phase_gain: f64,
     /// Maximum clock step of a substep.
     max_clock_step: f64,
     /// Filter step of the rate over the last substep, reused for the next one of that length.
@@ -129,6 +144,50 @@ pub struct Controller {
     /// Number of ticks by which the forcing table is prefetched.
     prefetch_ticks: f64,
 }
+
+// A copy moves as the original does, to the bit. `clone_from` allocates nothing if the destination is an earlier copy, unless
+// a later reset added a start or a start velocity.
+clone_in_place!(Controller {
+    primitive,
+    dt,
+    transition,
+    conditions,
+    started,
+    status,
+    time,
+    clock,
+    r,
+    command_gains,
+    style,
+    rate_gains,
+    rate,
+    centre,
+    goal_transition,
+    min_durations,
+    approaching,
+    arrival_slope,
+    amplitude,
+    max_tau,
+    speed,
+    tolerance,
+    groups,
+    forcing_phase_rate,
+    frame_lag,
+    transport_segment,
+    position,
+    velocity,
+    acceleration,
+    flush_level,
+    perturbation,
+    limiter,
+    phase_gain,
+    max_clock_step,
+    rate_step,
+    command_step,
+    propagator,
+    series,
+    prefetch_ticks,
+});
 
 impl Controller {
     /// Starts a movement.
@@ -160,6 +219,7 @@ impl Controller {
         let series = Series::new(primitive.attractor(), max_clock_step);
         let mut controller = Self {
             dt,
+            transition,
             started: false,
             status: Status::Working,
             time: CompensatedSum::default(),
@@ -172,19 +232,23 @@ impl Controller {
             centre: CommandFilter::new(&conditions.centre),
             goal_transition: GoalTransition::inactive(groups.len()),
             min_durations: MinDurations::new(primitive.attractor(), transition / primitive.tau()),
+            approaching: false,
+            arrival_slope: zeros.clone(),
             amplitude: CommandFilter::new(&[conditions.amplitude]),
+            max_tau: conditions.tau,
             speed: 1.0,
             tolerance: DEFAULT_TOLERANCE,
             groups,
             forcing_phase_rate: 1.0,
             frame_lag: 0.0,
-            transport_segment: primitive.transport.stretch(0.0),
+            transport_segment: primitive.transport.segment_at(0.0),
             position: zeros.clone(),
             velocity: zeros.clone(),
             acceleration: zeros,
             flush_level: FLUSH_RATIO * largest_range(primitive.ranges()),
             perturbation: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
             limiter: Limiter::none(primitive.ranges()),
+            phase_gain: phase::PHASE_GAIN,
             max_clock_step,
             rate_step: rate_gains.step_with_integral(dt),
             command_step: FilterStep::IDENTITY,
@@ -203,89 +267,6 @@ impl Controller {
         Self { prefetch_ticks, ..self }
     }
 
-    /// Restarts the movement under other conditions.
-    ///
-    /// ```
-    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
-    /// # fn main() -> pdmp_core::Result<()> {
-    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
-    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
-    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
-    /// controller.step()?;
-    /// controller.reset(&Conditions { goal: Some(vec![0.8, 0.0]), ..Conditions::default() })?;
-    /// assert_eq!((controller.time(), controller.centre()), (0.0, [0.8, 0.0].as_slice()));
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// As for [`Controller::new`]. The movement then remains unchanged.
-    pub fn reset(&mut self, conditions: &Conditions) -> Result<()> {
-        self.conditions = conditions.complete(&self.primitive)?;
-        self.begin();
-        Ok(())
-    }
-
-    /// Sets clock, commands and state to the start of the movement.
-    fn begin(&mut self) {
-        self.started = false;
-        self.status = Status::Working;
-        self.perturbation.clear();
-        self.limiter.clear();
-        (self.time, self.clock) = (CompensatedSum::default(), CompensatedSum::default());
-        let conditions = &self.conditions;
-        self.r = conditions.amplitude;
-        self.style.reset(&conditions.style);
-        self.rate.reset(&[self.speed / conditions.tau]);
-        self.amplitude.reset(&[conditions.amplitude]);
-        self.centre.reset(self.limiter.accept(&conditions.centre));
-        if let (Kind::Discrete, Some(start)) = (self.primitive.kind(), &conditions.start) {
-            for ((group, goal), start) in self.groups.iter_mut().zip(self.centre.value()).zip(start.chunks(WIDTH)) {
-                group.displacement = *goal - padded(start);
-            }
-        }
-        self.goal_transition.clear();
-        self.read_frame();
-        self.read_forcing();
-        self.set_initial_state();
-        if self.conditions.has_goal_velocity {
-            self.start_goal_transition();
-        }
-        self.update_lengths();
-        self.read_out();
-        self.limiter.begin(&self.position, &self.velocity);
-    }
-
-    /// Sets position and z at the start: z = 0 for a discrete movement, the limit cycle of the style for a rhythmic one.
-    fn set_initial_state(&mut self) {
-        let Self { primitive, conditions, r, .. } = self;
-        for (index, (position, group)) in self.position.iter_mut().zip(&mut self.groups).enumerate() {
-            let cycle = &primitive.cycle[index * primitive.n_styles()..];
-            let on_cycle = conditions.style.iter().zip(cycle).fold(State::<F64x4>::default(), |sum, (s, cycle)| {
-                State { e: sum.e + cycle.e * (*r * s), z: sum.z + cycle.z * (*r * s) }
-            });
-            *position = self.centre.value()[index] + on_cycle.e;
-            group.z = on_cycle.z;
-        }
-        let phase = conditions.phase;
-        if phase > 0.0 {
-            // The limit cycle is known at phase 0 only, and is followed from there.
-            let substeps = (phase / self.max_clock_step).ceil();
-            (0..substeps as u32).for_each(|_| self.advance(self.dt, phase / substeps));
-            self.clock = CompensatedSum::at(phase);
-            self.read_forcing();
-        }
-        let Self { conditions, r, .. } = self;
-        if let Some(start) = &conditions.start {
-            repack(&mut self.position, start);
-        }
-        if let Some(velocity) = &conditions.velocity {
-            for (group, velocity) in self.groups.iter_mut().zip(velocity.chunks(WIDTH)) {
-                group.z = padded(velocity) * conditions.tau - group.forcing.value * *r;
-            }
-        }
-    }
-
     /// Performs one tick of length [`Controller::dt`] without a new command.
     ///
     /// # Errors
@@ -294,7 +275,7 @@ impl Controller {
         self.check_tick_length(self.dt, None)?;
         let h = self.clock_step(self.dt);
         if self.perturbation.has_measurement() {
-            self.perturbation.set(&Command::default(), &self.position, self.dt, h, self.started);
+            self.perturb(&Command::default(), self.dt, h);
         } else {
             self.perturbation.clear_terms();
         }
@@ -309,7 +290,7 @@ impl Controller {
     /// ```text
     /// τẏ = z + w(u) + k_t d + τc_v
     /// τż = α_z(β_z(g − y) − z) + τ²c_a
-    /// τu̇ = κ = 1/(1 + k_s‖d/range‖²)
+    /// τu̇ = max(0, κ + k_φ sin(φ* − φ)),     κ = 1/(1 + k_s‖d/range‖²)
     /// τȯ = λκ(e − o)
     /// ```
     ///
@@ -321,6 +302,9 @@ impl Controller {
     /// that a sensor may be slower than the loop. Coupling terms add c_v to the velocity and c_a to the acceleration. The
     /// pull over a tick of `dt` seconds and h on the clock is the velocity d(1 − exp(−k_t h))/dt: for any length of the tick
     /// it does not overshoot ỹ.
+    ///
+    /// A measured phase φ* pulls the phase of a rhythmic movement with the gain of [`Controller::set_phase_gain`]; the pull
+    /// is the mean over the tick of the exact solution, so that it does not overshoot φ*.
     ///
     /// Phase stopping and tracking: Ijspeert, Nakanishi and Schaal, ICRA 2002, doi:10.1109/ROBOT.2002.1014739; Schaal,
     /// Mohajerian and Ijspeert, Progress in Brain Research 165, 2007, doi:10.1016/S0079-6123(06)65027-9. Terms in ż:
@@ -373,7 +357,17 @@ impl Controller {
             return Ok(self.status);
         }
         let h = self.clock_step(dt);
-        self.perturbation.set(command, &self.position, dt, h, self.started);
+        self.perturb(command, dt, h);
+        if let Some(phase) = command.phase {
+            self.pull_phase(phase, h);
+        }
         Ok(self.tick(dt, h))
+    }
+
+    /// Sets the perturbation of a tick of `dt` seconds and `h` on the clock.
+    fn perturb(&mut self, command: &Command, dt: f64, h: f64) {
+        // The terms fade where the rate is below 1/max_tau, while the pull of a measurement is one on the clock.
+        let full = dt.min(h * self.max_tau);
+        self.perturbation.set(command, &self.position, full, h, self.started);
     }
 }

@@ -8,6 +8,19 @@ use crate::motion::perturbation::Compliance;
 impl Controller {
     /// Sets the style s (J,).
     ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 0.01, &Conditions::default(), None)?;
+    /// let style = model.demonstrated().styles.row(2).to_vec();
+    /// controller.set_style(&style)?;
+    /// assert_eq!(controller.style(), style);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A wrong length or a number that is not finite. The style then remains unchanged.
     pub fn set_style(&mut self, style: &[f64]) -> Result<()> {
@@ -29,9 +42,10 @@ impl Controller {
     /// Sets the final velocity (D,) with which a discrete movement passes its goal at the end, per second; `None` is that of
     /// the demonstrations.
     ///
-    /// At the commanded τ the movement is at its goal with this velocity when the clock reaches the end, to rounding, for
-    /// any sequence of goals, final velocities, τ and speeds; the speed scales it. Past the end the attractor brings it back
-    /// to its goal. A goal commanded later than the shortest transition before the end is taken up past the end.
+    /// At the commanded τ the movement is at its goal with this velocity when the clock reaches the end, to rounding, after
+    /// any sequence of commands: of the final velocity and τ before the last tenth of the movement, of goals and styles before
+    /// the shortest transition of a goal, by default the last third. Later ones do not change the arrival; a later goal is
+    /// taken up past the end, where the attractor also brings the movement back. The speed scales the velocity.
     ///
     /// ```
     /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
@@ -57,7 +71,7 @@ impl Controller {
             self.conditions.goal_velocity.fill(0.0);
             if !self.started {
                 self.begin();
-            } else if !self.primitive.forcing_table().is_past(self.clock.value()) {
+            } else if self.approaching {
                 self.start_goal_transition();
             }
         }
@@ -65,6 +79,19 @@ impl Controller {
     }
 
     /// Sets the anchor y_a (D,) of a rhythmic movement, in the unit of each DoF.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Sampling, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let position = ndarray::Array2::from_shape_fn((100, 1), |(c, _)| (0.02 * std::f64::consts::PI * c as f64).sin());
+    /// # let demos = [Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?];
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Rhythmic))?;
+    /// # let mut controller = Controller::new(model.primitive(), 0.01, &Conditions::default(), None)?;
+    /// controller.set_anchor(&[0.5])?;
+    /// assert_eq!(controller.centre(), [0.5]);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A discrete primitive, a wrong length, or a number that is not finite. The anchor then remains unchanged.
@@ -95,6 +122,19 @@ impl Controller {
     }
 
     /// Sets the amplitude r₀ of a rhythmic movement. r₀ is filtered, and r converges to it by Eq. (4).
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Sampling, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let position = ndarray::Array2::from_shape_fn((100, 1), |(c, _)| (0.02 * std::f64::consts::PI * c as f64).sin());
+    /// # let demos = [Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?];
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Rhythmic))?;
+    /// # let mut controller = Controller::new(model.primitive(), 0.01, &Conditions::default(), None)?;
+    /// controller.set_amplitude(0.5)?;
+    /// assert_eq!(controller.amplitude(), 0.5);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A discrete primitive, a negative number or one that is not finite. r₀ then remains unchanged.
@@ -195,9 +235,15 @@ impl Controller {
         self.perturbation.set_compliance(compliance)
     }
 
-    /// Discards the measured position and the expected error, so that no perturbation acts until the next measurement.
+    /// Discards the measured position and the expected error, so that no perturbation acts until the next measurement. The
+    /// velocity stays continuous: the movement takes up the pull of the last measurement, and regains its own velocity.
     pub fn release(&mut self) {
+        let [tau, _] = self.coupling_tau();
+        for (group, pull) in self.groups.iter_mut().zip(self.perturbation.pull()) {
+            group.z += *pull * tau;
+        }
         self.perturbation.clear();
+        self.change_phase_rate();
         self.read_out();
     }
 
@@ -219,7 +265,7 @@ impl Controller {
             self.style.set_target(style, &gains);
             changed = true;
         }
-        let mut goal_changed = false;
+        let [mut goal_changed, mut velocity_changed] = [false; 2];
         if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
             self.conditions.centre.copy_from_slice(centre);
             goal_changed = self.has_frame();
@@ -231,10 +277,11 @@ impl Controller {
         {
             self.conditions.goal_velocity.copy_from_slice(velocity);
             self.conditions.has_goal_velocity = true;
-            changed = true;
+            (changed, velocity_changed) = (true, true);
         }
         if let Some(tau) = command.tau.filter(|tau| *tau != self.conditions.tau) {
             self.conditions.tau = tau;
+            self.max_tau = self.max_tau.max(tau);
             self.rate.set_target(&[self.speed / tau], &self.rate_gains);
             changed = true;
         }
@@ -250,12 +297,13 @@ impl Controller {
         if !self.started {
             return self.begin();
         }
-        // A style without transition changes the forcing at once.
+        // Without transition, style and τ change the motion at once.
         if gains.is_immediate() {
             self.read_forcing();
+            self.read_out();
         }
         // The velocity at the end depends on style and τ.
-        if goal_changed || self.approaches_goal_velocity() {
+        if goal_changed || self.approaching || velocity_changed {
             self.start_goal_transition();
         }
     }

@@ -3,44 +3,64 @@
 use super::group::ForcingSample;
 use super::{Controller, Status};
 use crate::dynamics::output_system::{Attractor, CubicSample};
-use crate::numerics::simd::unpack;
+use crate::numerics::simd::{F64x4, unpack};
 
 impl Controller {
     /// Sets the lengths that the tolerance is relative to, for the present distances from the goal.
     pub(super) fn update_lengths(&mut self) {
+        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
+        // Per tick of length h the attractor moves by ωh of the distance, which rounding stops below about ε|y|/(ωh).
+        let relative = 8.0 * f64::EPSILON * (1.0 + self.conditions.tau / ((alpha_z * beta_z).sqrt() * self.dt));
         let distances = self.centre.target().iter().zip(&self.position);
         for (group, (&centre, &position)) in self.groups.iter_mut().zip(distances) {
-            group.rounding = centre.abs().max(position.abs()) * (8.0 * f64::EPSILON);
+            group.rounding = centre.abs().max(position.abs()) * relative;
             group.length = group.range.max((centre - position).abs());
         }
     }
 
-    /// Returns [`Status::Finished`] past the end if the remaining displacement of every DoF is within its tolerance.
+    /// Returns [`Status::Finished`] past the end if every DoF is within its tolerance of the goal and will stay there.
     ///
-    /// The displacement is bounded by about |y − g| + 2|z + w|/α_z + |w|/β_z: distance from the goal, overshoot at critical
-    /// damping, and forcing, the larger of those of the present and the commanded style. The remaining displacement of the
-    /// goal is added.
+    /// The deviation from the goal is bounded by the sum of those of the frame, of the braking along its closed form, of the
+    /// homogeneous rest (e, z) of the output system, |e| + |z|·exp(−ζa)/ω, and of a style in transition, whose forcing Δw
+    /// deviates by about |Δw|/β_z. With immediate transport, and while the phase is slowed, the forcing counts as a whole.
     pub(super) fn settled(&self) -> Status {
         let (forcing_table, clock) = (self.primitive.forcing_table(), self.clock.value());
-        let fade = forcing_table.fade(clock);
-        let Some(fade) = fade.filter(|_| !self.goal_transition.is_active()) else { return Status::Working };
-        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
+        let Some(fade) = forcing_table.fade(clock) else { return Status::Working };
+        let attractor = self.primitive.attractor();
+        let (by_flow, by_forcing) = (attractor.impulse_peak(), 1.0 / attractor.beta_z);
         let target = unpack(self.style.target(), self.primitive.n_styles());
         let (bound, table_index) = (forcing_table.bound(clock), forcing_table.index(clock));
+        let braked = forcing_table.braked_motion(clock).filter(|_| self.perturbation.phase_rate() == 1.0);
         let settled = self.groups.iter().enumerate().all(|(index, group)| {
-            let distance = (self.position[index] - self.centre.target()[index]).abs();
             let ForcingSample { value, slope, .. } = group.forcing;
-            let overshoot = (group.z + value * fade.r).abs() * (2.0 / alpha_z);
-            let mut residual = bound.of(CubicSample { value, slope });
+            let forcing = CubicSample { value, slope };
+            let frame = self.centre.value()[index] + self.goal_transition.value[index];
+            let e = self.position[index] - frame;
+            let mut deviation = match &braked {
+                Some(braked) => {
+                    let own = braked.state(forcing);
+                    (e - own.e).abs() + (group.z - own.z).abs() * by_flow + braked.max_displacement(slope)
+                }
+                None => e.abs() + (group.z + value * fade.r).abs() * by_flow + bound.of(forcing) * by_forcing,
+            };
             if !self.style.is_settled() {
-                residual = residual.max(bound.of(forcing_table.sample(table_index, index, target)));
+                let CubicSample { value, slope } = forcing_table.sample::<F64x4>(table_index, index, target);
+                let change = CubicSample { value: value - forcing.value, slope: slope - forcing.slope };
+                deviation += bound.of(change) * by_forcing;
             }
-            let displacement = distance
-                + overshoot
-                + residual * (1.0 / beta_z)
-                + self.command_gains.max_displacement(&self.centre, index);
-            displacement.simd_le((group.length * self.tolerance).max(group.rounding)).all()
+            deviation += self.frame_deviation(index);
+            deviation.simd_le((group.length * self.tolerance).max(group.rounding)).all()
         });
         if settled { Status::Finished } else { Status::Working }
+    }
+
+    /// Returns an upper bound of the distance between frame and commanded goal from now on.
+    fn frame_deviation(&self, index: usize) -> F64x4 {
+        if !self.has_frame() {
+            return self.command_gains.max_displacement(&self.centre, index);
+        }
+        let transition = &self.goal_transition;
+        let end = if transition.is_active() { transition.goal(index) } else { self.centre.value()[index] };
+        (end - self.centre.target()[index]).abs() + transition.max_deviation(index, self.clock.value())
     }
 }

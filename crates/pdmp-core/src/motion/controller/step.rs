@@ -12,8 +12,6 @@ use crate::numerics::simd::{F64x4, Register, flush, unpack};
 
 /// Maximum number of substeps of a tick. A tick that needs more is still stable, but less accurate.
 const MAX_SUBSTEPS: f64 = 1000.0;
-/// Rate ρ, relative to the nominal one, below which coupling terms fade: τ = 1/ρ would exceed every τ that can be commanded.
-const MIN_RATE: f64 = 1e-6;
 /// Maximum length of a tick, in units of τ.
 const MAX_TICK: f64 = 1000.0;
 /// Relative rounding error of a substep that ends at u_end.
@@ -55,8 +53,8 @@ impl Controller {
             self.enforce_limits(dt);
         }
         // The style's transition and perturbations change the arrival that the final velocity compensates for.
-        if self.approaches_goal_velocity() && !(self.style.is_settled() && self.perturbation.terms().is_none()) {
-            self.start_goal_transition();
+        if self.approaching && !(self.style.is_settled() && self.perturbation.terms().is_none()) {
+            self.correct_arrival();
         }
         // A settled movement remains settled until it is perturbed or commanded.
         if self.status == Status::Working || self.perturbation.terms().is_some() {
@@ -73,7 +71,8 @@ impl Controller {
             return first_element(self.rate.value()) * dt;
         }
         self.update_rate_step(dt);
-        self.rate.integral(&self.rate_step)
+        // The integral is positive but for rounding.
+        self.rate.integral(&self.rate_step).max(0.0)
     }
 
     /// Computes the filter step of the rate for `dt` seconds, unless the last one had that length.
@@ -161,7 +160,7 @@ impl Controller {
         let demonstrated = !self.primitive.forcing_table().is_past(self.clock.value());
         let inputs = self.perturbation.terms().map(|_| self.unit_inputs());
         if self.perturbation.phase_rate() != self.forcing_phase_rate {
-            self.update_forcing();
+            self.change_phase_rate();
         }
         self.style.advance::<T>(&self.command_step);
         self.rate.advance::<T>(&self.rate_step);
@@ -178,7 +177,7 @@ impl Controller {
             };
         }
         if !self.transport_segment.reaches(self.clock.value()) {
-            self.transport_segment = self.primitive.transport.stretch(self.clock.value());
+            self.transport_segment = self.primitive.transport.segment_at(self.clock.value());
         }
         let TransportSample { value, slope, bend } = self.transport_segment.lag(self.clock.value());
         let lags = [std::mem::replace(&mut self.frame_lag, value), value];
@@ -251,16 +250,24 @@ impl Controller {
 
     /// Returns the inputs of the output system for unit coupling terms: the forcing τ for c_v, and the displacement
     /// τ²/(α_zβ_z) of the centre for c_a, which adds τ² to the right-hand side of Eq. (1).
+    ///
+    /// τ = 1/ρ up to the largest commanded one. At a lower speed the terms fade with it, c_v by the speed and c_a by its
+    /// square: z would otherwise keep an acceleration during a pause, and return it at the full rate.
     fn unit_inputs(&self) -> [CubicSample; 2] {
         let Attractor { alpha_z, beta_z } = self.primitive.attractor();
-        // On the transition into a pause τ is bounded, so that the terms fade with the rate.
-        let min_rate = MIN_RATE / self.primitive.tau();
-        let (rate, rate_change) = (first_element(self.rate.value()), first_element(self.rate.rate()));
-        let tau = 1.0 / rate.max(min_rate);
-        // dτ/du = τ·dτ/dt.
-        let slope = if rate < min_rate { 0.0 } else { -rate_change * tau.powi(3) };
+        let [tau, slope] = self.coupling_tau();
         let centre = tau / (alpha_z * beta_z);
         [CubicSample { value: tau, slope }, CubicSample { value: tau * centre, slope: 2.0 * slope * centre }]
+    }
+
+    /// Returns τ of the coupling terms and dτ/du.
+    pub(super) fn coupling_tau(&self) -> [f64; 2] {
+        let (rate, rate_change) = (first_element(self.rate.value()), first_element(self.rate.rate()));
+        if rate * self.max_tau < 1.0 {
+            return [self.max_tau, 0.0];
+        }
+        // dτ/du = τ·dτ/dt.
+        [1.0 / rate, -rate_change / (rate * rate * rate)]
     }
 
     /// Returns the gate at the clock, at u_end with the slope past the end.
@@ -296,7 +303,7 @@ impl Controller {
 
     /// Evaluates the frame after the clock was set.
     pub(super) fn read_frame(&mut self) {
-        self.transport_segment = self.primitive.transport.stretch(self.clock.value());
+        self.transport_segment = self.primitive.transport.segment_at(self.clock.value());
         self.frame_lag = self.transport_segment.lag(self.clock.value()).value;
     }
 
@@ -313,7 +320,23 @@ impl Controller {
         self.update_forcing();
     }
 
-    /// Computes w and w′ at the start of a tick for the present phase rate; otherwise those of the last end serve.
+    /// Computes w and w′ for a phase rate κ that has changed since the last tick.
+    ///
+    /// The frame then moves with another velocity κc′: z takes up the difference, so that the velocity stays continuous and
+    /// the attractor follows the frame.
+    pub(super) fn change_phase_rate(&mut self) {
+        let change = self.forcing_phase_rate - self.perturbation.phase_rate();
+        if self.has_frame() {
+            let TransportSample { slope, .. } = self.primitive.transport.lag(self.clock.value());
+            for (index, group) in self.groups.iter_mut().enumerate() {
+                let frame = self.goal_transition.sample::<F64x4>(index, self.clock.value());
+                group.z += (group.displacement * slope + frame.slope) * change;
+            }
+        }
+        self.update_forcing();
+    }
+
+    /// Computes w and w′ at the clock for the present phase rate.
     fn update_forcing(&mut self) {
         self.forcing_phase_rate = self.perturbation.phase_rate();
         let gate = self.gate();
@@ -334,9 +357,12 @@ impl Controller {
             [self.velocity[index], self.acceleration[index]] = gate.motion(attractor, State { e, z }, w);
         }
         if let Some(PerturbationTerms { velocity, acceleration }) = self.perturbation.terms() {
+            let ([tau, slope], [rate, rate_change]) = (self.coupling_tau(), gate.rate);
+            // c_v adds c_v·ρτ to the velocity, and its derivative to the acceleration.
+            let (fade, change) = (rate * tau, rate_change * tau + rate * rate * slope);
             for group in 0..self.groups.len() {
-                self.velocity[group] += velocity[group];
-                self.acceleration[group] += acceleration[group];
+                self.velocity[group] += velocity[group] * fade;
+                self.acceleration[group] += acceleration[group] * (fade * fade) + velocity[group] * change;
             }
         }
     }

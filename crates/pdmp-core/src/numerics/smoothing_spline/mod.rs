@@ -198,16 +198,18 @@ impl Smoothing {
         let Self::CutOff { hz } = self else { return Ok(()) };
         check_positive("smoothing", hz)?;
         let per_sample = hz * samples.interval();
-        let allowed = if per_sample >= 0.5 {
-            "must lie below half the sampling rate"
-        } else if per_sample < MIN_CUT_OFF {
-            "must be at least a ten-thousandth of the sampling rate"
-        } else if samples.period.is_some_and(|period| hz * period < 1.0 - 1e-9) {
-            "must be at least one cycle per period: a lower cut-off removes the movement"
-        } else {
-            return Ok(());
-        };
-        Err(Error::Range { name: "smoothing", value: hz, allowed })
+        let of_rate = |allowed| Err(Error::CutOff { name: "smoothing", hz, allowed, rate: 1.0 / samples.interval() });
+        if per_sample >= 0.5 {
+            return of_rate("must lie below half the sampling rate");
+        }
+        if per_sample < MIN_CUT_OFF {
+            return of_rate("must be at least a ten-thousandth of the sampling rate");
+        }
+        if samples.period.is_some_and(|period| hz * period < 1.0 - 1e-9) {
+            let allowed = "must be at least one cycle per period: a lower cut-off removes the movement";
+            return Err(Error::Range { name: "smoothing", value: hz, allowed });
+        }
+        Ok(())
     }
 }
 

@@ -12,6 +12,7 @@ use super::cross_validation::{CUT_OFF_RATIO, Decimated, Scores};
 use super::{Samples, Smoothing};
 use crate::error::Result;
 use crate::numerics::simd::{F64x4, WIDTH};
+use crate::numerics::statistics::upper_median;
 use crate::numerics::threads::Threads;
 
 /// Most recordings of a search. For forces with an impact, one in five selections of twelve recordings leads to a false
@@ -115,7 +116,7 @@ impl Noise {
             let decimated: Vec<Decimated> =
                 recordings.iter().map(|samples| Decimated::new(samples, min_samples)).collect();
             let is_last = min_samples > longest / 2;
-            let interval = median(decimated.iter().map(|recording| recording.interval));
+            let interval = upper_median(decimated.iter().map(|recording| recording.interval));
             let interpolation =
                 ((INTERPOLATION_CUT_OFF / interval / lowest).ln() / CUT_OFF_RATIO.ln()).ceil().max(2.0) as usize;
             let n_cut_offs = (interpolation + 1).next_multiple_of(WIDTH);
@@ -176,11 +177,4 @@ fn possibly_noisy(recordings: &[Samples]) -> Vec<usize> {
         (0..dofs.len()).filter(noisy).map(|lane| dofs[lane]).collect::<Vec<_>>()
     };
     dofs.chunks(WIDTH).flat_map(of_group).collect()
-}
-
-/// Returns the median, or the upper one of two.
-fn median(numbers: impl Iterator<Item = f64>) -> f64 {
-    let mut numbers: Vec<f64> = numbers.collect();
-    let middle = numbers.len() / 2;
-    *numbers.select_nth_unstable_by(middle, f64::total_cmp).1
 }

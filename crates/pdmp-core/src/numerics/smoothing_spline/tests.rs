@@ -295,7 +295,7 @@ fn invalid_cut_offs_are_rejected() {
     for hz in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(message(hz, None).contains("must be positive and finite"));
     }
-    assert_eq!(message(51.0, None), "smoothing = 51: must lie below half the sampling rate");
+    assert_eq!(message(51.0, None), "smoothing = 51 Hz: must lie below half the sampling rate of 100 Hz");
     assert!(message(0.009, None).contains("ten-thousandth of the sampling rate"));
     assert!(message(0.9, Some(1.0)).contains("at least one cycle per period"));
 }

@@ -73,15 +73,6 @@ struct Survey<'a> {
     zero: bool,
 }
 
-/// Range and largest step of one degree of freedom.
-#[derive(Clone, Copy, Debug)]
-struct Extent {
-    low: f64,
-    high: f64,
-    /// Largest step from one sample to the next.
-    step: f64,
-}
-
 impl<'a> Survey<'a> {
     fn new(demo: &'a Demonstration, dt: Option<f64>) -> Self {
         let n_dofs = demo.n_dofs();
@@ -104,15 +95,10 @@ impl<'a> Survey<'a> {
         Self { demo, dt, n_dofs, step: steps.into_iter().fold(0.0, f64::max), zero }
     }
 
-    /// Returns range and largest step of a degree of freedom.
-    fn extent(&self, d: usize) -> Extent {
+    /// Returns the largest step between neighbouring samples of a degree of freedom.
+    fn largest_step(&self, d: usize) -> f64 {
         let column = self.column(d);
-        let start = Extent { low: column[0], high: column[0], step: 0.0 };
-        (1..column.len()).fold(start, |Extent { low, high, step }, c| Extent {
-            low: low.min(column[c]),
-            high: high.max(column[c]),
-            step: step.max((column[c] - column[c - 1]).abs()),
-        })
+        (1..column.len()).fold(0.0, |step, c| step.max((column[c] - column[c - 1]).abs()))
     }
 
     fn n_samples(&self) -> usize {

@@ -65,6 +65,6 @@ fn stops_abruptly(survey: &Survey, last: usize) -> bool {
         && (0..survey.n_dofs).any(|d| {
             let column = survey.column(d);
             let step = (column[last] - column[last - 1]).abs();
-            step > 0.0 && step > ABRUPT_STEP * survey.extent(d).step
+            step > 0.0 && step > ABRUPT_STEP * survey.largest_step(d)
         })
 }

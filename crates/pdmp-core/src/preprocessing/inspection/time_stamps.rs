@@ -2,6 +2,7 @@
 
 use super::{Finding, Survey};
 use crate::demonstration::Sampling;
+use crate::numerics::statistics::upper_median;
 
 /// Maximum interval of two close stamps, relative to the median interval.
 const CLOSE_INTERVAL: f64 = 0.1;
@@ -18,8 +19,7 @@ pub(super) fn close(demo: usize, survey: &Survey) -> Option<Finding> {
     if shortest > CLOSE_INTERVAL * mean {
         return None;
     }
-    let mut sorted = intervals.clone();
-    let usual = *sorted.select_nth_unstable_by(intervals.len() / 2, f64::total_cmp).1;
+    let usual = upper_median(intervals.iter().copied());
     let mut worst: Option<Finding> = None;
     let mut max_ratio = MAX_RATIO;
     for d in 0..survey.n_dofs {

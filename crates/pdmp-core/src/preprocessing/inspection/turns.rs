@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use super::{Finding, Survey};
 use crate::demonstration::Demonstration;
+use crate::numerics::statistics::{extremes, range};
 
 /// Maximum deviation of an offset from whole turns, in turns; movements from different starts deviate more.
 const MAX_DEVIATION: f64 = 0.25;
@@ -59,7 +60,7 @@ pub(super) fn wraps(demo: usize, survey: &Survey) -> Vec<Finding> {
     // A wrap is a step of more than half a turn, π in the smallest unit.
     let candidates = if survey.step > 0.5 * TAU { 0..survey.n_dofs } else { 0..0 };
     for d in candidates.filter(|d| !matches!(unit(survey.demo, *d), Unit::Other)) {
-        let (column, extent) = (survey.column(d), survey.extent(d));
+        let (column, largest_step) = (survey.column(d), survey.largest_step(d));
         let first_jump = |turn: f64, min: f64, max: f64| {
             let jump = |c: usize| column[c] - column[c - 1];
             let at = (1..column.len()).find(|&c| (min..=max).contains(&(jump(c).abs() / turn)))?;
@@ -67,10 +68,10 @@ pub(super) fn wraps(demo: usize, survey: &Survey) -> Vec<Finding> {
         };
         let wrap = match unit(survey.demo, d) {
             Unit::Other => None,
-            Unit::Angle(turn) if extent.step <= 0.5 * turn => None,
+            Unit::Angle(turn) if largest_step <= 0.5 * turn => None,
             Unit::Angle(turn) => first_jump(turn, 0.5, f64::INFINITY),
             Unit::Unknown => [TAU, 360.0].into_iter().find_map(|turn| {
-                let may_wrap = extent.step >= WRAPS[0] * turn && extent.high - extent.low <= WRAPS[1] * turn;
+                let may_wrap = largest_step >= WRAPS[0] * turn && range(column) <= WRAPS[1] * turn;
                 // Jumps to or from zero may be lost samples.
                 let smooth = || {
                     (1..column.len()).all(|c| {
@@ -138,9 +139,7 @@ fn offsets(demos: &[&Demonstration], d: usize) -> Vec<(usize, f64, f64, bool)> {
     if demos.iter().any(|demo| d >= demo.n_dofs()) {
         return Vec::new();
     }
-    let [low, high] = demos
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], demo| [low.min(start(demo)), high.max(start(demo))]);
+    let [low, high] = extremes(demos.iter().map(|demo| start(demo)));
     // The unit of one demonstration applies to all.
     let known = demos.iter().map(|demo| unit(demo, d)).find(|unit| !matches!(unit, Unit::Unknown));
     let (candidates, mended, deviation): (&[f64], bool, f64) = match known {

@@ -15,6 +15,7 @@ use std::f64::consts::TAU;
 
 use super::kalman_filter::States;
 use super::matern_sde::{Square, Transition};
+use super::posterior::Posterior;
 use crate::numerics::simd::{F64x4, WIDTH};
 
 /// Posterior of the state given all samples.
@@ -83,9 +84,10 @@ impl<const D: usize> StatePosterior<D> {
             (value + value_ahead, slope + slope_ahead)
         })
     }
+}
 
-    /// Writes the means and their derivatives.
-    pub(super) fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
+impl<const D: usize> Posterior for StatePosterior<D> {
+    fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
         let pairs = value.chunks_mut(WIDTH).zip(slope.chunks_mut(WIDTH));
         for ((value, slope), (v, s)) in pairs.zip(self.groups(&self.neighbours(u))) {
             value.copy_from_slice(&v.to_array()[..value.len()]);
@@ -93,8 +95,7 @@ impl<const D: usize> StatePosterior<D> {
         }
     }
 
-    /// Returns the variance of f in units of the signal variance.
-    pub(super) fn variance(&self, u: f64) -> f64 {
+    fn variance(&self, u: f64) -> f64 {
         let at = self.neighbours(u);
         let a = at.since.matrix;
         let covariance = self.covariances[at.before.min(self.covariances.len() - 1)];

@@ -16,12 +16,12 @@ use ndarray::{Array2, ArrayView2};
 
 pub use self::kernel::Kernel;
 use self::likelihood::{Gradient, Likelihood, Profile};
-pub use self::posterior::GpPosterior;
+pub use self::posterior::{GpPosterior, GpPrediction};
 use self::state_space::StateSpace;
 use super::hyperparameter_search::{Axis, maximise};
 use super::{Domain, magnitude};
 use crate::error::{Error, Result};
-use crate::validate::check_positive;
+use crate::validate::{check_positive, check_range};
 
 /// Smallest ratio of noise to signal variance: below it, rounding makes the covariance matrix indefinite.
 const MIN_NOISE: f64 = 1e-10;
@@ -106,6 +106,15 @@ impl NoiseBound {
 impl Gp {
     /// Returns a process with the given kernel and hyperparameters; those that are `None` are estimated.
     ///
+    /// ```
+    /// # use pdmp_core::learning::regression::{Gp, Kernel};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// let given = Gp::new(Kernel::Matern52, Some(0.5), None)?;
+    /// assert!(Gp::new(Kernel::Matern52, Some(-0.5), None).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// A length that is not positive, or noise outside [1e-10, 1e6].
     pub fn new(kernel: Kernel, length: Option<f64>, noise: Option<f64>) -> Result<Self> {
@@ -135,6 +144,17 @@ impl Gp {
     /// completed fraction; an error it returns cancels the regression.
     ///
     /// If rounding makes K indefinite, ν is raised tenfold, at most to 1; [`GpPosterior::noise`] returns the value used.
+    ///
+    /// ```
+    /// # use ndarray::Array2;
+    /// # use pdmp_core::learning::regression::{Domain, Gp, NoiseBound};
+    /// # let u: Vec<f64> = (0..50).map(|i| f64::from(i) / 49.0).collect();
+    /// # let targets = Array2::from_shape_fn((50, 1), |(i, _)| (3.0 * u[i]).sin() + 0.1 * (i % 2) as f64);
+    /// # let (domain, bound) = (Domain::Interval { end: 1.0 }, NoiseBound::LANDSCAPE);
+    /// let posterior = Gp::default().regress_within(bound, domain, &u, targets.view(), &mut |_| Ok(()))?;
+    /// assert!(posterior.noise() <= 1e-6);
+    /// # Ok::<(), pdmp_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Hyperparameters out of range, arrays that do not match, values that are not finite; a covariance matrix that
@@ -192,11 +212,9 @@ impl Gp {
     }
 
     fn check(&self, domain: Domain) -> Result<()> {
-        if let Some(value) = self.length
-            && !(1e-6..=1e6).contains(&(value / domain.extent()))
-        {
+        if let Some(length) = self.length {
             let allowed = "must lie between 1e-6 and 1e6 times the extent of the clock";
-            return Err(Error::Range { name: "length", value, allowed });
+            check_range("length", length, (1e-6..=1e6).contains(&(length / domain.extent())), allowed)?;
         }
         check_noise(self.noise)
     }
@@ -238,12 +256,9 @@ impl Gp {
 }
 
 fn check_noise(noise: Option<f64>) -> Result<()> {
-    match noise {
-        Some(value) if !(MIN_NOISE..=1e6).contains(&value) => {
-            Err(Error::Range { name: "noise", value, allowed: "must lie between 1e-10 and 1e6" })
-        }
-        _ => Ok(()),
-    }
+    noise.map_or(Ok(()), |noise| {
+        check_range("noise", noise, (MIN_NOISE..=1e6).contains(&noise), "must lie between 1e-10 and 1e6")
+    })
 }
 
 /// Length scale ℓ and noise ratio ν.

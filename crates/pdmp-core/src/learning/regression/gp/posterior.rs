@@ -5,7 +5,6 @@ use std::fmt;
 use ndarray::Array2;
 
 use super::Hyperparameters;
-use super::interpolation::StatePosterior;
 use super::kernel::Kernel;
 use crate::learning::regression::Regression;
 
@@ -13,12 +12,12 @@ use crate::learning::regression::Regression;
 ///
 /// ```
 /// # use ndarray::array;
-/// use pdmp_core::learning::regression::{Domain, Gp};
+/// use pdmp_core::learning::regression::{Domain, Gp, GpPrediction};
 ///
 /// let gp = Gp { length: Some(0.5), noise: Some(1e-6), ..Gp::default() };
 /// let targets = array![[0.0], [1.0], [0.0]];
 /// let posterior = gp.regress(Domain::Interval { end: 1.0 }, &[0.0, 0.5, 1.0], targets.view(), &mut |_| Ok(()))?;
-/// let (mean, variance) = posterior.predict(&[0.5]);
+/// let GpPrediction { mean, variance } = posterior.predict(&[0.5]);
 /// assert!((mean[[0, 0]] - 1.0).abs() < 1e-3 && variance[[0, 0]] < 1e-3);
 /// # Ok::<(), pdmp_core::Error>(())
 /// ```
@@ -35,6 +34,15 @@ pub struct GpPosterior {
     pub(super) log_likelihood: f64,
 }
 
+/// Mean and variance of the noise-free outputs of a Gaussian process.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GpPrediction {
+    /// Means (n, outputs), in the unit of the outputs.
+    pub mean: Array2<f64>,
+    /// Variances (n, outputs), in the squared unit of the outputs.
+    pub variance: Array2<f64>,
+}
+
 /// Posterior of the outputs as functions of the clock.
 pub(super) trait Posterior: fmt::Debug + Send + Sync {
     /// Writes the means and their derivatives with respect to u, each (outputs,).
@@ -42,16 +50,6 @@ pub(super) trait Posterior: fmt::Debug + Send + Sync {
 
     /// Returns the variance, which is the same for every output, in units of the signal variance.
     fn variance(&self, u: f64) -> f64;
-}
-
-impl<const D: usize> Posterior for StatePosterior<D> {
-    fn evaluate(&self, u: f64, value: &mut [f64], slope: &mut [f64]) {
-        self.evaluate(u, value, slope);
-    }
-
-    fn variance(&self, u: f64) -> f64 {
-        self.variance(u)
-    }
 }
 
 impl GpPosterior {
@@ -83,7 +81,7 @@ impl GpPosterior {
     /// Returns mean kᵀK⁻¹f and variance σ̂²(1 − kᵀK⁻¹k) of the noise-free outputs at `u` (n,), each (n, outputs).
     ///
     /// The variance is the same for every output. A point costs O(ln C + P).
-    pub fn predict(&self, u: &[f64]) -> (Array2<f64>, Array2<f64>) {
+    pub fn predict(&self, u: &[f64]) -> GpPrediction {
         let shape = (u.len(), self.n_outputs);
         let (mut mean, mut variance) = (Array2::zeros(shape), Array2::zeros(shape));
         let (mut value, mut slope) = (vec![0.0; self.n_outputs], vec![0.0; self.n_outputs]);
@@ -92,7 +90,7 @@ impl GpPosterior {
             mean.row_mut(row).assign(&ndarray::aview1(&value));
             variance.row_mut(row).fill(self.deviation * self.function.variance(u) * self.deviation);
         }
-        (mean, variance)
+        GpPrediction { mean, variance }
     }
 }
 

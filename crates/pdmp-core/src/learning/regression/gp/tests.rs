@@ -1,3 +1,4 @@
+use super::posterior::Posterior;
 use super::*;
 use crate::learning::regression::Regression;
 use crate::learning::regression::hyperparameter_search::Score;
@@ -157,7 +158,7 @@ proptest! {
         prop_assert!((posterior.signal_variance() / exact.signal - 1.0).abs() < 1e-8);
 
         let query: Vec<f64> = [-0.3, 0.0, 0.31, 0.5, 0.9, 1.2].map(|q| q * domain.extent()).into_iter().chain(u.clone()).collect();
-        let (mean, variance) = posterior.predict(&query);
+        let GpPrediction { mean, variance } = posterior.predict(&query);
         let cross = covariances(kernel, domain, length, &query, &u);
         let (expected, known) = (&cross * &exact.weights, &cross * &exact.inverse * cross.transpose());
         for q in 0..query.len() {
@@ -376,7 +377,7 @@ fn the_mean_of_noisy_data_is_closer_to_the_truth_than_the_data() {
         let u = grid(domain, 200);
         let (truth, error) = (waves(domain, &u), 0.05 * normal(200, 2));
         let gp = Gp { noise: Some(1e-3), ..Gp::default() };
-        let (mean, variance) = fit(&gp, domain, &u, &(&truth + &error)).predict(&u);
+        let GpPrediction { mean, variance } = fit(&gp, domain, &u, &(&truth + &error)).predict(&u);
         let square = |a: &Array2<f64>| a.iter().map(|x| x * x).sum::<f64>();
         let missed = square(&(&mean - &truth));
         assert!(missed < 0.25 * square(&error), "{missed} of {}", square(&error));
@@ -404,7 +405,7 @@ fn zero_targets_are_fitted() {
         let u: Vec<f64> = (0..n_samples).map(|i| i as f64 / 20.0).collect();
         let posterior = fit(&Gp::default(), INTERVAL, &u, &Array2::zeros((n_samples, n_outputs)));
         assert_eq!(at(&posterior, 0.3), (vec![0.0; n_outputs], vec![0.0; n_outputs]));
-        assert!(posterior.predict(&[0.3]).1.iter().all(|&variance| variance == 0.0));
+        assert!(posterior.predict(&[0.3]).variance.iter().all(|&variance| variance == 0.0));
         assert_eq!(posterior.log_likelihood(), 0.0);
     }
 }
@@ -447,7 +448,7 @@ fn extreme_lengths_and_noises_give_finite_results() {
                     let gp = Gp { kernel, length: Some(length), noise: Some(noise) };
                     let posterior = fit(&gp, domain, &u, &targets);
                     assert!(posterior.log_likelihood().is_finite());
-                    let (mean, variance) = posterior.predict(&[-1.0, 0.0, 0.3, 0.5, 1.0, 7.0]);
+                    let GpPrediction { mean, variance } = posterior.predict(&[-1.0, 0.0, 0.3, 0.5, 1.0, 7.0]);
                     assert!(mean.iter().all(|value| value.is_finite()));
                     let inside = mean.slice(ndarray::s![1..5, ..]).fold(0.0_f64, |most, value| most.max(value.abs()));
                     assert!(inside < 3.0, "{kernel} {domain:?} {length} {noise:e}: {inside}");
@@ -485,7 +486,7 @@ fn many_samples_of_minimal_noise_are_interpolated() {
         for kernel in Kernel::ALL {
             for length in [0.01, 0.2, 2.0] {
                 let gp = Gp { kernel, length: Some(length * domain.extent()), noise: Some(1e-10) };
-                let (mean, variance) = fit(&gp, domain, &u, &targets).predict(&u);
+                let GpPrediction { mean, variance } = fit(&gp, domain, &u, &targets).predict(&u);
                 let error = (mean - &targets).iter().fold(0.0_f64, |most, error| most.max(error.abs()));
                 // Near an end a long length deflects the mean as far as the noise admits.
                 assert!(error < 1e-4, "{kernel} {domain:?} {length}: {error:e}");

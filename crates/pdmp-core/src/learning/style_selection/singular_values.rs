@@ -17,7 +17,9 @@ use crate::learning::alignment::{Aligned, Alignment};
 use crate::learning::constants::Constants;
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::targets::Targets;
+use crate::numerics::orthonormal_span::OrthonormalSpan;
 use crate::numerics::smoothing_spline::Smoothing;
+use crate::numerics::statistics::pseudo_random;
 use crate::numerics::threads::Threads;
 
 /// Share of the sum of the singular values that the styles carry, as in the paper.
@@ -56,7 +58,8 @@ pub(crate) fn noise_limit(
     let (n_demos, durations) = (aligned.n_demos(), aligned.durations());
     let kind = constants.canonical.kind();
     let n_rows = n_demos.min(MAX_ROWS);
-    let mut signs = Signs(0);
+    // Sums of many random signs are normally distributed.
+    let mut random = 0;
     let noise = |row: usize| {
         let m = row * n_demos / n_rows;
         let recorded = aligned.demo(m).n_samples();
@@ -65,7 +68,8 @@ pub(crate) fn noise_limit(
         // White noise of the same power density at a lower sampling rate.
         let ratio = (n as f64 / recorded as f64).sqrt();
         let size: Vec<f64> = aligned.noise.levels().iter().map(|level| level * ratio).collect();
-        let position = Array2::from_shape_fn((n, size.len()), |(_, d)| signs.next() * size[d]);
+        let position =
+            Array2::from_shape_fn((n, size.len()), |(_, d)| size[d].copysign(pseudo_random(&mut random) as f64));
         Demonstration::new(position, Sampling::Uniform { dt: durations[m] / kind.steps(n) as f64 })
     };
     let noise = (0..n_rows).map(noise).collect::<Result<Vec<_>>>()?;
@@ -108,7 +112,8 @@ pub(crate) fn systematic(
 fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<f64>) -> usize {
     let (n_demos, n_styles) = styles.dim();
     let numbers = || columns.iter().zip(contexts.columns()).filter(|(column, _)| **column == ContextColumn::Number);
-    let mut span = Span::default();
+    // The first regressor is constant.
+    let mut span = OrthonormalSpan::default();
     span.add(ArrayView1::from(&vec![1.0; n_demos]));
     for (column, values) in columns.iter().zip(contexts.columns()) {
         match column {
@@ -125,10 +130,14 @@ fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<
         }
     }
     let n_regressors = span.0.len() - 1;
+    let constant = OrthonormalSpan(span.0[..1].to_vec());
     let degrees_of_freedom = n_demos.saturating_sub(n_regressors + 1);
     let Ok(distribution) = FisherSnedecor::new(n_regressors as f64, degrees_of_freedom as f64) else { return 1 };
     let is_explained = |j: &usize| {
-        let [total, residual] = span.squares(styles.column(*j));
+        let [total, residual] = [&constant, &span].map(|span| {
+            let rest = span.rest(styles.column(*j));
+            rest.dot(&rest)
+        });
         let ratio = (total - residual).max(0.0) / n_regressors as f64 / (residual / degrees_of_freedom as f64);
         match residual.partial_cmp(&(1e-12 * total)) {
             Some(Ordering::Less | Ordering::Equal) => total > 0.0,
@@ -136,54 +145,4 @@ fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<
         }
     };
     (0..n_styles).rev().find(is_explained).map_or(1, |j| j + 1)
-}
-
-/// Orthonormal basis of regressors, the first of which is constant.
-#[derive(Default)]
-struct Span(Vec<ndarray::Array1<f64>>);
-
-impl Span {
-    /// Adds a regressor, unless it depends linearly on those before.
-    fn add(&mut self, column: ArrayView1<f64>) {
-        let scale = column.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-        if scale == 0.0 {
-            return;
-        }
-        let rest = self.rest((&column / scale).view());
-        let size = rest.dot(&rest).sqrt();
-        if size > 1e-9 {
-            self.0.push(rest / size);
-        }
-    }
-
-    /// Returns the part of a column that is orthogonal to the basis; projected twice, to full accuracy.
-    fn rest(&self, column: ArrayView1<f64>) -> ndarray::Array1<f64> {
-        let mut rest = column.to_owned();
-        for unit in self.0.iter().chain(&self.0) {
-            let share = unit.dot(&rest);
-            rest.scaled_add(-share, unit);
-        }
-        rest
-    }
-
-    /// Returns the total sum of squares of a column about its mean, and the residual sum of squares.
-    fn squares(&self, column: ArrayView1<f64>) -> [f64; 2] {
-        let mean = Span(self.0[..1].to_vec()).rest(column);
-        let rest = self.rest(column);
-        [mean.dot(&mean), rest.dot(&rest)]
-    }
-}
-
-/// Reproducible random signs, sums of many of which are normally distributed (SplitMix64; Steele, Lea, Flood, OOPSLA
-/// 2014, doi:10.1145/2660193.2660195).
-struct Signs(u64);
-
-impl Signs {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        1.0f64.copysign((bits ^ (bits >> 31)) as i64 as f64)
-    }
 }

@@ -9,17 +9,24 @@ from contextlib import contextmanager
 from pathlib import Path
 
 
+def check_folder(path: Path) -> None:
+    """Raises FileNotFoundError if the folder of a file does not exist."""
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "no such folder; create it first", str(path.parent))
+
+
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yields a temporary path, whose file replaces `path` when the block ends without an error.
 
     After an error or an interruption the former file is unchanged and the temporary one is removed.
-    Symbolic links are followed. A pipe or a device is written directly.
+    Symbolic links are followed. A pipe or a device is written directly. The folder must exist: one
+    that was mistyped is not created.
     """
     path = Path(path)
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    path.parent.mkdir(parents=True, exist_ok=True)
+    check_folder(path)
     if path.exists() and not path.is_file():
         yield path
         return

@@ -1,0 +1,63 @@
+//! Time of rollouts, batches and Jacobians; `step.rs` measures one tick, `stages.rs` a fit.
+#![allow(missing_docs)]
+
+mod movements;
+
+use std::sync::Arc;
+
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use movements::movements;
+use ndarray::{Array2, Array3};
+use pdmp_core::learning::Truncation;
+use pdmp_core::learning::regression::{Basis, NGnet};
+use pdmp_core::model::Derivative;
+use pdmp_core::motion::batch;
+use pdmp_core::motion::jacobian;
+use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, WithRespectTo};
+use pdmp_core::numerics::Threads;
+use pdmp_core::rollout;
+use pdmp_core::{Conditions, FitOptions, Model, fit};
+
+fn learn(n_styles: usize) -> Arc<Model> {
+    let options = FitOptions::discrete().n_styles(Truncation::Rank(n_styles)).basis(Basis::NGnet(NGnet::default()));
+    Arc::new(fit(&movements(40, 1001), &options).expect("a fit"))
+}
+
+fn rollouts(criterion: &mut Criterion) {
+    let grid = TimeGrid { dt: 1e-3, duration: None };
+    let model = learn(3);
+    let mut group = criterion.benchmark_group("1 s at 1 kHz, D=7");
+    group.sample_size(20);
+    group.bench_function("rollout", |bench| bench.iter(|| rollout(model.primitive(), &Conditions::default(), grid)));
+    for n_styles in [3, 35] {
+        let model = learn(n_styles);
+        let styles = Array2::from_shape_fn((1000, n_styles), |(b, j)| (b + j) as f64 / 1000.0);
+        let conditions = BatchConditions { style: Some(PerMovement::Each(styles)), ..BatchConditions::default() };
+        let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(())).expect("a batch");
+        let mut outputs = [(); 2].map(|()| Array3::zeros(batch.shape()));
+        for n_threads in [1, 2] {
+            let threads = Threads::new(n_threads).expect("some");
+            group.bench_function(
+                format!("1000 rollouts with velocities, J={n_styles}, threads={n_threads}"),
+                |bench| {
+                    bench.iter(|| {
+                        let outputs = outputs.each_mut().map(|output| output.view_mut());
+                        batch.write(0..1000, outputs.into(), threads, &mut |_| Ok(()))
+                    });
+                },
+            );
+        }
+    }
+    let jacobian = |model: &Arc<Model>| {
+        let (variable, derivative) = (WithRespectTo::Style, Derivative::Position);
+        jacobian(model.primitive(), variable, derivative, &Conditions::default(), grid, &mut |_| Ok(()))
+    };
+    group.bench_function("style Jacobian", |bench| bench.iter(|| jacobian(&model)));
+    group.bench_function("style Jacobian without cached responses", |bench| {
+        bench.iter_batched(|| Arc::new(Model::clone(&model)), |model| jacobian(&model), BatchSize::SmallInput);
+    });
+    group.finish();
+}
+
+criterion_group!(benches, rollouts);
+criterion_main!(benches);

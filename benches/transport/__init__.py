@@ -1,0 +1,1 @@
+"""Transport of discrete movements to other starts and goals, and their ends."""

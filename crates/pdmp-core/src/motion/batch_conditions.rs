@@ -1,0 +1,222 @@
+//! Conditions of the movements of a batch.
+
+use ndarray::{Array2, ArrayView1, aview1};
+
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, check_style, reject_for_kind, reject_goal_velocity};
+use crate::model::primitive::Primitive;
+use crate::validate::{check_matrix, check_vector, zeros};
+
+/// Largest relative difference of time constants that count as equal: the rounding of predicted durations.
+const MAX_DIFFERENCE: f64 = 1e-9;
+
+/// One vector (n,) for all movements of a batch, or one for each.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PerMovement {
+    /// One vector (n,) for all movements.
+    All(Vec<f64>),
+    /// One vector for each of B movements (B, n).
+    Each(Array2<f64>),
+}
+
+/// Conditions of the movements of a batch, with the names of [`Conditions`]. The default of each is the value of the
+/// nominal demonstration.
+///
+/// The number of movements is the number of rows of the conditions given for each of them, or one without such conditions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BatchConditions {
+    /// Styles s (J,).
+    pub style: Option<PerMovement>,
+    /// Goals g (D,) of discrete movements.
+    pub goal: Option<PerMovement>,
+    /// Anchors y_a (D,) of rhythmic movements.
+    pub anchor: Option<PerMovement>,
+    /// Start positions (D,). The default of rhythmic movements is their limit cycle at φ = 0.
+    pub start: Option<PerMovement>,
+    /// Start velocities (D,), per second. The default is the velocity of the demonstrated movement.
+    pub velocity: Option<PerMovement>,
+    /// Final velocities (D,) of discrete movements, per second. The default is the velocity of the demonstrated movement.
+    pub goal_velocity: Option<PerMovement>,
+    /// Common amplitude r₀ of rhythmic movements. The default is 1.
+    pub amplitude: Option<f64>,
+    /// Common time constant τ, in seconds.
+    pub tau: Option<f64>,
+}
+
+impl BatchConditions {
+    /// Returns conditions that all movements share.
+    ///
+    /// ```
+    /// # use ndarray::array;
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # use pdmp_core::motion::{BatchConditions, PerMovement};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let mut conditions = BatchConditions::shared(model.primitive(), model.conditions(&[1])?)?;
+    /// conditions.goal = Some(PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1]]));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A phase other than 0, or durations of several segments.
+    pub fn shared(primitive: &Primitive, conditions: Conditions) -> Result<Self> {
+        let tau = time_constant(primitive, &conditions)?;
+        let Conditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, .. } = conditions;
+        let all = |vector: Option<Vec<f64>>| vector.map(PerMovement::All);
+        Ok(Self {
+            style: all(style),
+            goal: all(goal),
+            anchor: all(anchor),
+            start: all(start),
+            velocity: all(velocity),
+            goal_velocity: all(goal_velocity),
+            amplitude,
+            tau,
+        })
+    }
+
+    /// Returns the conditions of one movement each.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # use pdmp_core::motion::{BatchConditions, PerMovement};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let near = Conditions { goal: Some(vec![1.0, 0.0]), ..Conditions::default() };
+    /// let far = Conditions { goal: Some(vec![1.2, 0.1]), ..Conditions::default() };
+    /// let conditions = BatchConditions::each(model.primitive(), &[near, far])?;
+    /// assert_eq!(conditions.goal, Some(PerMovement::Each(ndarray::array![[1.0, 0.0], [1.2, 0.1]])));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`BatchConditions::shared`]; vectors of a wrong length; velocities, or starts of rhythmic movements, that only
+    /// some of the conditions have; time constants or amplitudes that differ.
+    pub fn each(primitive: &Primitive, conditions: &[Conditions]) -> Result<Self> {
+        let nominal = Conditions::default().complete(primitive)?;
+        let (n_dofs, n_styles) = (primitive.n_dofs(), primitive.n_styles());
+        let rows = |name, (n, per): (usize, _), default: Option<&[f64]>, of: fn(&Conditions) -> &Option<Vec<f64>>| {
+            let mut rows = zeros("conditions", (conditions.len(), n))?;
+            for (mut row, one) in rows.rows_mut().into_iter().zip(conditions) {
+                let vector = of(one).as_deref().or(default).ok_or(Error::Single { name })?;
+                check_vector(name, vector, n, per)?;
+                row.assign(&aview1(vector));
+            }
+            Ok(Some(PerMovement::Each(rows)))
+        };
+        let optional = |name, default: Option<&[f64]>, of: fn(&Conditions) -> &Option<Vec<f64>>| {
+            let given = conditions.iter().any(|one| of(one).is_some());
+            if given { rows(name, (n_dofs, "DoF"), default, of) } else { Ok(None) }
+        };
+        let taus = conditions.iter().map(|one| time_constant(primitive, one)).collect::<Result<Vec<_>>>()?;
+        let amplitudes: Vec<_> = conditions.iter().map(|one| one.amplitude).collect();
+        Ok(Self {
+            style: rows("style", (n_styles, "style dimension"), Some(&nominal.style), |one| &one.style)?,
+            goal: optional("goal", Some(&nominal.centre), |one| &one.goal)?,
+            anchor: optional("anchor", Some(&nominal.centre), |one| &one.anchor)?,
+            start: optional("start", nominal.start.as_deref(), |one| &one.start)?,
+            velocity: optional("velocity", None, |one| &one.velocity)?,
+            goal_velocity: optional("goal_velocity", None, |one| &one.goal_velocity)?,
+            amplitude: common("amplitude", &amplitudes, 1.0)?,
+            tau: common("tau", &taus, primitive.tau)?,
+        })
+    }
+
+    /// Checks vectors and kind, and returns the number of movements.
+    pub(crate) fn check(&self, primitive: &Primitive) -> Result<usize> {
+        let (n_dofs, kind) = (primitive.n_dofs(), primitive.kind());
+        reject_for_kind(kind, "anchor", kind == Kind::Discrete && self.anchor.is_some())?;
+        reject_for_kind(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
+        reject_goal_velocity(primitive, self.goal_velocity.is_some())?;
+        let vectors = [
+            ("style", &self.style),
+            ("goal", &self.goal),
+            ("anchor", &self.anchor),
+            ("start", &self.start),
+            ("velocity", &self.velocity),
+            ("goal_velocity", &self.goal_velocity),
+        ];
+        let mut n_movements = None;
+        for (name, vectors) in vectors {
+            match vectors {
+                None => {}
+                Some(PerMovement::All(style)) if name == "style" => check_style(style, primitive.n_styles())?,
+                Some(PerMovement::All(vector)) => check_vector(name, vector, n_dofs, "DoF")?,
+                Some(PerMovement::Each(rows)) => {
+                    let (found, expected) = (rows.nrows(), *n_movements.get_or_insert(rows.nrows()));
+                    if found != expected {
+                        return Err(Error::Rows { name, expected, found });
+                    }
+                    match name {
+                        "style" => check_styles(rows, primitive.n_styles())?,
+                        _ => check_rows(name, rows, n_dofs, "DoF")?,
+                    }
+                }
+            }
+        }
+        Ok(n_movements.unwrap_or(1))
+    }
+}
+
+impl PerMovement {
+    /// Returns the vector (n,) of movement `b`.
+    pub(crate) fn row(&self, b: usize) -> ArrayView1<'_, f64> {
+        match self {
+            Self::All(row) => aview1(row),
+            Self::Each(rows) => rows.row(b),
+        }
+    }
+}
+
+/// Returns the time constant in seconds, if given. Refuses conditions on which the unit responses of a batch would depend.
+fn time_constant(primitive: &Primitive, conditions: &Conditions) -> Result<Option<f64>> {
+    let kind = primitive.kind();
+    reject_for_kind(kind, "phase", kind == Kind::Discrete && conditions.phase.is_some())?;
+    if conditions.phase.is_some_and(|phase| phase != 0.0) {
+        let problem = "does not apply: the movements of a batch start at phase 0; compute rollouts one by one";
+        return Err(Error::Argument { name: "phase", problem });
+    }
+    if conditions.segment_durations.as_ref().is_some_and(|durations| durations.len() > 1) {
+        let problem = "does not apply: batches are available in linear time only; pass tau instead";
+        return Err(Error::Argument { name: "segment_durations", problem });
+    }
+    let given = conditions.tau.is_some() || conditions.segment_durations.is_some();
+    given.then(|| conditions.time_constant(primitive)).transpose()
+}
+
+/// Returns the common value of a number, if given, with `default` for those that are absent.
+fn common(name: &'static str, values: &[Option<f64>], default: f64) -> Result<Option<f64>> {
+    let value = |given: &Option<f64>| given.unwrap_or(default);
+    let first = values.first().map_or(default, value);
+    if values.iter().any(|each| (value(each) - first).abs() > MAX_DIFFERENCE * first.abs()) {
+        return Err(Error::Argument {
+            name,
+            problem: "differs between the movements: a batch has one; pass it for all",
+        });
+    }
+    Ok(values.iter().any(Option::is_some).then_some(first))
+}
+
+/// Checks that rows have `expected` finite elements, one per `per`.
+fn check_rows(name: &'static str, rows: &Array2<f64>, expected: usize, per: &'static str) -> Result<()> {
+    if rows.ncols() != expected {
+        return Err(Error::Length { name, expected, found: rows.ncols(), per });
+    }
+    check_matrix(name, rows.view())
+}
+
+/// Checks styles (B, J); the row-wise counterpart of [`check_style`].
+fn check_styles(styles: &Array2<f64>, n_styles: usize) -> Result<()> {
+    check_rows("style", styles, n_styles, "style dimension")?;
+    match styles.indexed_iter().find(|(_, s)| s.abs() > MAX_STYLE_MAGNITUDE) {
+        Some(((row, column), &value)) => {
+            Err(Error::Magnitude { name: "style", row, column, value, limit: MAX_STYLE_MAGNITUDE })
+        }
+        None => Ok(()),
+    }
+}

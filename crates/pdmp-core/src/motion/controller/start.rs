@@ -1,0 +1,96 @@
+//! Start of a movement.
+
+use super::{Controller, Status};
+use crate::dynamics::canonical::CompensatedSum;
+use crate::dynamics::output_system::State;
+use crate::error::Result;
+use crate::kind::Kind;
+use crate::model::conditions::Conditions;
+use crate::numerics::simd::{F64x4, WIDTH, padded, repack};
+
+impl Controller {
+    /// Restarts the movement under other conditions.
+    ///
+    /// ```
+    /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None)?;
+    /// controller.step()?;
+    /// controller.reset(&Conditions { goal: Some(vec![0.8, 0.0]), ..Conditions::default() })?;
+    /// assert_eq!((controller.time(), controller.centre()), (0.0, [0.8, 0.0].as_slice()));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Controller::new`]. The movement then remains unchanged.
+    pub fn reset(&mut self, conditions: &Conditions) -> Result<()> {
+        self.conditions = conditions.complete(&self.primitive)?;
+        self.begin();
+        Ok(())
+    }
+
+    /// Sets clock, commands and state to the start of the movement.
+    pub(super) fn begin(&mut self) {
+        self.started = false;
+        self.status = Status::Working;
+        self.perturbation.clear();
+        self.limiter.clear();
+        (self.time, self.clock) = (CompensatedSum::default(), CompensatedSum::default());
+        let conditions = &self.conditions;
+        self.max_tau = conditions.tau;
+        self.r = conditions.amplitude;
+        self.style.reset(&conditions.style);
+        self.rate.reset(&[self.speed / conditions.tau]);
+        self.amplitude.reset(&[conditions.amplitude]);
+        self.centre.reset(self.limiter.accept(&conditions.centre));
+        if let (Kind::Discrete, Some(start)) = (self.primitive.kind(), &conditions.start) {
+            for ((group, goal), start) in self.groups.iter_mut().zip(self.centre.value()).zip(start.chunks(WIDTH)) {
+                group.displacement = *goal - padded(start);
+            }
+        }
+        self.goal_transition.clear();
+        self.approaching = false;
+        self.read_frame();
+        self.read_forcing();
+        self.set_initial_state();
+        if self.conditions.has_goal_velocity {
+            self.start_goal_transition();
+        }
+        self.update_lengths();
+        self.read_out();
+        self.limiter.begin(&self.position, &self.velocity);
+    }
+
+    /// Sets position and z at the start: z = 0 for a discrete movement, the limit cycle of the style for a rhythmic one.
+    fn set_initial_state(&mut self) {
+        let Self { primitive, conditions, r, .. } = self;
+        for (index, (position, group)) in self.position.iter_mut().zip(&mut self.groups).enumerate() {
+            let cycle = &primitive.cycle[index * primitive.n_styles()..];
+            let on_cycle = conditions.style.iter().zip(cycle).fold(State::<F64x4>::default(), |sum, (s, cycle)| {
+                State { e: sum.e + cycle.e * (*r * s), z: sum.z + cycle.z * (*r * s) }
+            });
+            *position = self.centre.value()[index] + on_cycle.e;
+            group.z = on_cycle.z;
+        }
+        let phase = conditions.phase;
+        if phase > 0.0 {
+            // The limit cycle is known at phase 0 only, and is followed from there.
+            let substeps = (phase / self.max_clock_step).ceil();
+            (0..substeps as u32).for_each(|_| self.advance(self.dt, phase / substeps));
+            self.clock = CompensatedSum::at(phase);
+            self.read_forcing();
+        }
+        let Self { conditions, r, .. } = self;
+        if let Some(start) = &conditions.start {
+            repack(&mut self.position, start);
+        }
+        if let Some(velocity) = &conditions.velocity {
+            for (group, velocity) in self.groups.iter_mut().zip(velocity.chunks(WIDTH)) {
+                group.z = padded(velocity) * conditions.tau - group.forcing.value * *r;
+            }
+        }
+    }
+}

@@ -1,1 +1,0 @@
-"""Demonstration on human handwriting: five shapes in one primitive."""
