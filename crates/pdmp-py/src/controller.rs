@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
+use pdmp_core::motion::{Compliance, Limit};
 use pdmp_core::{Command, Kind};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -13,6 +13,7 @@ use crate::conditions::conditions_of;
 use crate::convert::{Vector, read_only, refill};
 use crate::error::raise;
 use crate::instance::pair;
+use crate::limits::Limits;
 use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
 use crate::status::Status;
@@ -343,6 +344,33 @@ impl Controller {
     fn set_tolerance(&mut self, tolerance: Scalar<'_>) -> PyResult<()> {
         let result = self.inner.set_tolerance(tolerance.number("tolerance")?);
         self.command(result)
+    }
+
+    /// Limits in force; None without any.
+    #[getter]
+    fn limits(&self) -> Option<Limits> {
+        Limits::of(self.inner.limits())
+    }
+
+    #[setter]
+    fn set_limits(&mut self, limits: Option<&Limits>) -> PyResult<()> {
+        let result = match limits {
+            Some(Limits(limits)) => self.inner.set_limits(limits),
+            None => self.inner.set_limits(&pdmp_core::motion::Limits::default()),
+        };
+        self.command(result)
+    }
+
+    /// Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
+    /// "acceleration", or None.
+    #[getter]
+    fn limited(&self) -> Vec<Option<&'static str>> {
+        let name = |limit: &Limit| match limit {
+            Limit::Position => "position",
+            Limit::Velocity => "velocity",
+            Limit::Acceleration => "acceleration",
+        };
+        self.inner.limited().iter().map(|limit| limit.as_ref().map(name)).collect()
     }
 
     /// Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each.

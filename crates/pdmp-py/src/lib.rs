@@ -16,6 +16,7 @@ mod factorization;
 mod fit;
 mod inspection;
 mod instance;
+mod limits;
 mod model;
 mod model_getters;
 mod motion;
@@ -50,6 +51,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<batch::RolloutChunks>()?;
     module.add_class::<context::ContextMap>()?;
     module.add_class::<conditions::Conditions>()?;
+    module.add_class::<limits::Limits>()?;
     module.add_class::<prediction::Prediction>()?;
     module.add_class::<status::Status>()?;
     module.add_class::<controller::Controller>()?;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use numpy::IntoPyArray;
 use pdmp_core::model::Derivative;
-use pdmp_core::motion::{TimeGrid, WithRespectTo, jacobian, rollout_with};
+use pdmp_core::motion::{TimeGrid, WithRespectTo, fastest, fastest_tau, jacobian, rollout_with};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -14,6 +14,7 @@ use crate::controller::Controller;
 use crate::convert::Cube;
 use crate::demonstration::Trajectory;
 use crate::error::{interruptible, raise};
+use crate::limits::Limits;
 use crate::model::Model;
 use crate::scalar::{Scalar, optional_number};
 
@@ -116,22 +117,64 @@ impl Model {
     /// >>> np.allclose(controller.position, [1.1, 0.0], atol=0.01)
     /// True
     #[pyo3(
-        signature = (dt=Scalar::Number(0.001), conditions=None, *, transition=None, context=None, **changes),
-        text_signature = "($self, dt=0.001, conditions=None, *, transition=None, context=None, **changes)"
+        signature = (dt=Scalar::Number(0.001), conditions=None, *, limits=None, transition=None, context=None, **changes),
+        text_signature = "($self, dt=0.001, conditions=None, *, limits=None, transition=None, context=None, **changes)"
     )]
     fn controller(
         &self,
         py: Python<'_>,
         dt: Scalar<'_>,
         conditions: Option<&Bound<'_, PyAny>>,
+        limits: Option<&Limits>,
         transition: Option<Scalar<'_>>,
         context: Option<&Bound<'_, PyAny>>,
         changes: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Controller> {
         let (dt, transition) = (dt.number("dt")?, optional_number("transition", transition)?);
         let conditions = conditions_of(&self.0, conditions, context, changes)?;
-        let controller = pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
+        let mut controller =
+            pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
+        if let Some(Limits(limits)) = limits {
+            controller.set_limits(limits).map_err(raise)?;
+        }
         Controller::new(py, Arc::clone(&self.0), controller)
+    }
+
+    /// Computes the smallest constant tau within limits of velocity and acceleration.
+    #[pyo3(
+        signature = (limits, conditions=None, *, context=None, **changes),
+        text_signature = "($self, limits, conditions=None, *, context=None, **changes)"
+    )]
+    fn fastest_tau(
+        &self,
+        py: Python<'_>,
+        limits: &Limits,
+        conditions: Option<&Bound<'_, PyAny>>,
+        context: Option<&Bound<'_, PyAny>>,
+        changes: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<f64> {
+        let conditions = conditions_of(&self.0, conditions, context, changes)?;
+        py.detach(|| fastest_tau(self.0.primitive(), &limits.0, &conditions)).map_err(raise)
+    }
+
+    /// Computes the movement that follows its path as fast as limits allow.
+    #[pyo3(
+        signature = (limits, conditions=None, *, dt=Scalar::Number(0.01), context=None, **changes),
+        text_signature = "($self, limits, conditions=None, *, dt=0.01, context=None, **changes)"
+    )]
+    fn fastest(
+        &self,
+        py: Python<'_>,
+        limits: &Limits,
+        conditions: Option<&Bound<'_, PyAny>>,
+        dt: Scalar<'_>,
+        context: Option<&Bound<'_, PyAny>>,
+        changes: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Trajectory> {
+        let conditions = conditions_of(&self.0, conditions, context, changes)?;
+        let dt = dt.number("dt")?;
+        let trajectory = py.detach(|| fastest(self.0.primitive(), &limits.0, &conditions, dt)).map_err(raise)?;
+        Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
     }
 
     /// Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
