@@ -86,11 +86,11 @@ impl Row {
     }
 }
 
-/// Path of a movement and its limits: y′ and y″ of each DoF at N + 1 knots of the clock.
+/// Path of a movement and its limits: y′ and y″ of each DoF at N + 1 knots of the clock and the middles between them.
 struct Path<'a> {
     /// Clock interval Δ between knots.
     interval: f64,
-    /// y′ and y″ (N + 1, D) by rows.
+    /// y′ and y″ (2N + 1, D) by rows.
     slope: Vec<f64>,
     bend: Vec<f64>,
     velocity: &'a [f64],
@@ -100,7 +100,7 @@ struct Path<'a> {
 impl Path<'_> {
     /// Returns the index of the last knot.
     fn last(&self) -> usize {
-        self.slope.len() / self.velocity.len() - 1
+        self.slope.len() / self.velocity.len() / 2
     }
 
     /// Writes the limits of interval `i` on (x, a); returns the largest x at its start from the limits of x alone.
@@ -109,14 +109,15 @@ impl Path<'_> {
         let mut most = max;
         rows.clear();
         for d in 0..n {
-            let [here, next] = [i * n + d, (i + 1) * n + d];
+            let [here, next] = [2 * i * n + d, 2 * (i + 1) * n + d];
             most = most.min((self.velocity[d] / self.slope[here]).powi(2));
             let limit = self.acceleration[d];
             if limit.is_infinite() {
                 continue;
             }
-            let ahead = self.slope[next] + 2.0 * self.interval * self.bend[next];
-            for [alpha, beta] in [[self.bend[here], self.slope[here]], [self.bend[next], ahead]] {
+            let middle = here + n;
+            for (knot, since) in [(here, 0.0), (middle, self.interval), (next, 2.0 * self.interval)] {
+                let (alpha, beta) = (self.bend[knot], self.slope[knot] + since * self.bend[knot]);
                 if beta != 0.0 {
                     rows.push(Row { alpha, beta, limit });
                 } else if alpha != 0.0 {
@@ -226,11 +227,11 @@ fn on_path(primitive: &Primitive, conditions: &Conditions) -> Result<Conditions>
 /// Returns the path under conditions of [`on_path`], with y′ and y″ in place of ẏ and ÿ, and the interval of its clock.
 fn path(primitive: &Arc<Primitive>, conditions: &Conditions) -> Result<(Trajectory, f64)> {
     let (tau, duration) = (primitive.tau(), primitive.duration());
-    let dt = duration / N_INTERVALS as f64;
+    let dt = duration / (2 * N_INTERVALS) as f64;
     let mut path = rollout(primitive, conditions, TimeGrid { dt, duration: Some(duration) })?;
     path.velocity *= tau;
     path.acceleration *= tau * tau;
-    Ok((path, dt / tau))
+    Ok((path, 2.0 * dt / tau))
 }
 
 /// Returns the smallest constant τ with which the movement keeps its limits of velocity and acceleration, in seconds:
