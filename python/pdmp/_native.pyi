@@ -34,6 +34,7 @@ __all__ = [
     "FitError",
     "GP",
     "GPRegression",
+    "Limits",
     "Model",
     "ModelFileError",
     "NGnet",
@@ -1134,11 +1135,110 @@ class Model:
         >>> path.exists()
         True
         """
+    def fastest_tau(
+        self,
+        limits: Limits,
+        conditions: Conditions | None = None,
+        *,
+        context: _Context | None = None,
+        **changes: Unpack[_Changes],
+    ) -> float:
+        """Computes the smallest constant tau with which a discrete movement keeps limits of velocity and acceleration.
+
+        The path y(u) over the clock u = t / tau does not depend on tau. With ẏ = y′ / tau and ÿ = y″ / tau², the smallest
+        tau is max(max |y′| / V, √(max |y″| / A)) over time and degrees of freedom.
+
+        Parameters
+        ----------
+        limits : Limits
+            Limits V of the velocity and A of the acceleration, at least one of them; those of the position do not count.
+        conditions : Conditions, optional
+            Conditions at the start. Velocities among them are those at their tau, and scale with the result.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name, as in `rollout`.
+
+        Returns
+        -------
+        float
+            tau in s.
+
+        Raises
+        ------
+        ValueError
+            `rollout` rejects the conditions, the model is rhythmic, a limit has a wrong length, or there is neither a
+            limit of the velocity nor of the acceleration.
+        TypeError
+            A keyword is unknown, or `conditions` or `limits` has another type.
+
+        Examples
+        --------
+        >>> tau = model.fastest_tau(pdmp.Limits(velocity=0.5))
+        >>> bool(np.isclose(abs(model.rollout(tau=tau, dt=0.001).velocity).max(), 0.5, rtol=1e-3))
+        True
+        """
+    def fastest(
+        self,
+        limits: Limits,
+        conditions: Conditions | None = None,
+        *,
+        dt: float = 0.01,
+        context: _Context | None = None,
+        **changes: Unpack[_Changes],
+    ) -> Trajectory:
+        """Computes the discrete movement that follows its path as fast as limits allow.
+
+        The path y(u) over the clock u does not depend on the rate ρ = du/dt, so that ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′. The
+        rate is the largest with |ẏ| ≤ V and |ÿ| ≤ A for every degree of freedom, found by a pass from the end to the
+        start and one back. The movement starts and ends at rest; with `velocity` or `goal_velocity` among the
+        conditions, it starts or ends with that.
+
+        Parameters
+        ----------
+        limits : Limits
+            Limits V of the velocity and A of the acceleration, at least one of them, and of the position, which the path
+            has to keep.
+        conditions : Conditions, optional
+            Conditions at the start. Their tau matters for velocities among them only.
+        dt : float
+            Interval between samples in s.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name, as in `rollout`.
+
+        Returns
+        -------
+        Trajectory
+            Samples from the start to the end of the movement.
+
+        Raises
+        ------
+        ValueError
+            `rollout` rejects the conditions, the model is rhythmic, a limit has a wrong length, there is neither a limit
+            of the velocity nor of the acceleration, the path leaves the limits of the position, or the start is too fast
+            for the limits.
+        TypeError
+            A keyword is unknown, or `conditions` or `limits` has another type.
+
+        Examples
+        --------
+        >>> limits = pdmp.Limits(velocity=1.5, acceleration=8.0)
+        >>> fastest = model.fastest(limits, dt=0.001)
+        >>> bool(fastest.time[-1] < model.fastest_tau(limits))
+        True
+
+        References
+        ----------
+        Pham, Pham, IEEE Transactions on Robotics 34(3), 2018, doi:10.1109/TRO.2018.2819195.
+        """
     def controller(
         self,
         dt: float = 0.001,
         conditions: Conditions | None = None,
         *,
+        limits: Limits | None = None,
         transition: float | None = None,
         context: _Context | None = None,
         **changes: Unpack[_Changes],
@@ -1151,6 +1251,8 @@ class Model:
             Length of a tick in s.
         conditions : Conditions, optional
             Conditions at the start. The controller takes the sum of segment durations; see `tau_at` to follow them.
+        limits : Limits, optional
+            Limits that every tick keeps, see `Controller.limits`.
         transition : float, optional
             Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0
             switches immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of
@@ -1168,9 +1270,10 @@ class Model:
         Raises
         ------
         ValueError
-            `dt` or `transition` is out of range, or `rollout` rejects the conditions.
+            `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length or are
+            too tight for a tick of `dt`.
         TypeError
-            A keyword is unknown, or `conditions` has another type.
+            A keyword is unknown, or `conditions` or `limits` has another type.
 
         Examples
         --------
@@ -1341,6 +1444,61 @@ class Conditions:
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
+
+@final
+class Limits:
+    """Limits of position, velocity and acceleration.
+
+    Each limit is one number for all degrees of freedom or an array (D,); None and infinity are no limit.
+    `Model.controller` keeps them at every tick, `Model.fastest` along a path, and `Model.fastest_tau` with a constant
+    tau.
+
+    Parameters
+    ----------
+    position : tuple of two float or array_like, (D,), optional
+        Lower and upper limits in the unit of each degree of freedom; either may be None.
+    velocity : float or array_like, (D,), optional
+        Limit of the velocity's magnitude per s, positive.
+    acceleration : float or array_like, (D,), optional
+        Limit of the acceleration's magnitude per s², positive.
+
+    Raises
+    ------
+    ValueError
+        A limit is not a number or a vector, lengths differ, a lower limit is not below the upper one, or a velocity or
+        acceleration is not positive. Models check lengths when they take limits.
+    TypeError
+        `position` does not have two items.
+
+    Examples
+    --------
+    >>> limits = pdmp.Limits(position=(-2.9, 2.9), velocity=2.0, acceleration=[8.0, 10.0])
+    >>> limits
+    pdmp.Limits(position=([-2.9], [2.9]), velocity=[2.0], acceleration=[8.0, 10.0])
+    >>> controller = model.controller(limits=limits)
+    >>> controller.limits.velocity
+    array([2., 2.])
+    """
+    def __new__(
+        cls,
+        position: tuple[ArrayLike | None, ArrayLike | None] | None = None,  # each one, or (D,)
+        velocity: ArrayLike | None = None,  # one, or (D,)
+        acceleration: ArrayLike | None = None,  # one, or (D,)
+    ) -> Limits: ...
+    @property
+    def position(self) -> tuple[_Array, _Array] | None:
+        """Lower and upper limits of the position, each (1,) or (D,) and infinite where there is none, or None."""
+    @property
+    def velocity(self) -> _Array | None:
+        """Limit of the velocity's magnitude (1,) or (D,) per s, or None."""
+    @property
+    def acceleration(self) -> _Array | None:
+        """Limit of the acceleration's magnitude (1,) or (D,) per s², or None."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __getnewargs__(
+        self,
+    ) -> tuple[list[list[float] | None] | None, list[float] | None, list[float] | None]: ...
 
 def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
     """Computes the conditions (1 − share)·a + share·b.
@@ -1548,8 +1706,8 @@ class Controller:
     """Running movement, returned by `Model.controller`.
 
     `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `compliance` and
-    `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
+    valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `limits`,
+    `compliance` and `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
     copied (`copy`, `deepcopy`) and pickled, and continues from its state to the bit.
     """
     def __copy__(self) -> Controller: ...
@@ -1794,6 +1952,24 @@ class Controller:
         """
     @tolerance.setter
     def tolerance(self, tolerance: float, /) -> None: ...
+    @property
+    def limits(self) -> Limits | None:
+        """Limits of position, velocity and acceleration (D,) in force, or None.
+
+        Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower ≤ y ≤ upper at and
+        between ticks, |ẏ| ≤ V, and the change of ẏ over a tick is at most A·dt. A movement inside them is not changed.
+        A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start
+        outside, brakes with A and returns. They stay in force after `reset`; None removes them.
+        """
+    @limits.setter
+    def limits(self, limits: Limits | None, /) -> None: ...
+    @property
+    def limited(self) -> list[Literal["position", "velocity", "acceleration"] | None]:  # D
+        """Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
+        "acceleration", or None for a free one.
+
+        A limit of the position counts from where the degree of freedom brakes in front of it.
+        """
     @property
     def compliance(self) -> tuple[float, float]:  # stopping k_s, tracking k_t
         """Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each."""

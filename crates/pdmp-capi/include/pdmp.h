@@ -15,8 +15,8 @@
 // - Lengths: n_dofs, n_styles, n_contexts and n_conditions are members of pdmp_info. Numbers are counted in elements,
 //   text and memory in bytes. All numbers are double precision, all strings UTF-8.
 // - Threads: any number of threads may use a model; one thread at a time may use a controller.
-// - Real time: pdmp_controller_step, _update, _set_..., _release, _copy, _read, _progress and _error neither allocate nor
-//   lock.
+// - Real time: pdmp_controller_step, _update, _set_... except _set_limits, _release, _copy, _read, _limited, _progress
+//   and _error neither allocate nor lock.
 // - ABI: structs may grow between minor versions before 1.0; recompile for each.
 //
 // Link with -lpdmp; the static library also needs -lpthread -ldl -lm. pdmp.hpp is a C++17 wrapper.
@@ -63,6 +63,18 @@ typedef enum {
     /// Periodic movement around an anchor.
     PDMP_RHYTHMIC,
 } pdmp_kind;
+
+/// Limit that determines the acceleration of a DoF.
+typedef enum {
+    /// None: the DoF is free.
+    PDMP_LIMIT_NONE = 0,
+    /// The lower or upper limit of the position: the DoF brakes in front of it, or rests on it.
+    PDMP_LIMIT_POSITION = 1,
+    /// The limit of the velocity.
+    PDMP_LIMIT_VELOCITY = 2,
+    /// The limit of the acceleration.
+    PDMP_LIMIT_ACCELERATION = 3,
+} pdmp_limit;
 
 /// Controller of one movement: a primitive, its commands and its state. One thread at a time may use it.
 typedef struct pdmp_controller pdmp_controller;
@@ -208,6 +220,19 @@ typedef struct {
     /// Acceleration (n_dofs), in the unit of each DoF per second squared.
     pdmp_buffer acceleration;
 } pdmp_motion;
+
+/// Limits of position, velocity and acceleration. Each member is one number for all DoFs or n_dofs numbers; `{NULL, 0}` and
+/// infinity are no limit.
+typedef struct {
+    /// Lower limits of the position (1) or (n_dofs), in the unit of each DoF; below the upper ones.
+    pdmp_vector lower;
+    /// Upper limits of the position (1) or (n_dofs), in the unit of each DoF.
+    pdmp_vector upper;
+    /// Limits of |y'| (1) or (n_dofs), in the unit of each DoF per second; positive.
+    pdmp_vector velocity;
+    /// Limits of |y''| (1) or (n_dofs), in the unit of each DoF per second squared; positive.
+    pdmp_vector acceleration;
+} pdmp_limits;
 
 #ifdef __cplusplus
 extern "C" {
@@ -396,6 +421,24 @@ pdmp_status pdmp_controller_progress(const pdmp_controller *controller, double *
 /// the terminating zero, also if `text` is too short for it. The message is empty before the first error. The message
 /// of a NULL controller is empty.
 size_t pdmp_controller_error(const pdmp_controller *controller, pdmp_text text);
+
+/// Sets the limits of the robot; NULL removes them.
+///
+/// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower <= y <= upper
+/// at and between ticks, |y'| <= velocity, and |change of y'| <= dt acceleration. A motion inside the limits is not changed.
+/// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start outside,
+/// brakes with the limit of the acceleration and returns. The limits stay in force after pdmp_controller_reset.
+///
+/// This function allocates. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE also if the limits are too tight for a tick. The
+/// present limits then stay in force.
+pdmp_status pdmp_controller_set_limits(pdmp_controller *controller,
+                                       const pdmp_limits *limits);
+
+/// Writes for each DoF the limit that determined its acceleration in the last tick. `limited` has `length` >= n_dofs
+/// elements; those beyond n_dofs keep their value. Returns PDMP_WORKING, PDMP_FINISHED or an error: PDMP_NULL, PDMP_LENGTH.
+pdmp_status pdmp_controller_limited(pdmp_controller *controller,
+                                    pdmp_limit *limited,
+                                    size_t length);
 
 /// Copies a controller with its state, for example to simulate the movement ahead. Under the same commands, copy and
 /// original move identically to the bit.

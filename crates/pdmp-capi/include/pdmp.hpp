@@ -46,6 +46,12 @@ struct Conditions {
     std::optional<double> amplitude, tau, phase;
 };
 
+/// Limits of position, velocity and acceleration, see pdmp_limits: one number for all degrees of freedom, or n_dofs. An
+/// empty member is no limit.
+struct Limits {
+    std::vector<double> lower, upper, velocity, acceleration;
+};
+
 /// Motion with n_dofs elements in each vector, see pdmp_motion.
 struct Motion {
     /// Allocates the vectors.
@@ -74,6 +80,10 @@ inline pdmp_conditions to_c(const Conditions &c) noexcept {
     return {to_c(c.style),    to_c(c.goal),          to_c(c.anchor),    to_c(c.start),
             to_c(c.velocity), to_c(c.goal_velocity), to_c(c.amplitude), to_c(c.tau),
             to_c(c.phase)};
+}
+
+inline pdmp_limits to_c(const Limits &limits) noexcept {
+    return {to_c(limits.lower), to_c(limits.upper), to_c(limits.velocity), to_c(limits.acceleration)};
 }
 
 inline std::vector<double> copy(pdmp_vector numbers) { return {numbers.data, numbers.data + numbers.length}; }
@@ -214,6 +224,17 @@ public:
     pdmp_status set_speed(double speed) noexcept { return pdmp_controller_set_speed(get(), speed); }
     pdmp_status set_tolerance(double tolerance) noexcept { return pdmp_controller_set_tolerance(get(), tolerance); }
     pdmp_status release() noexcept { return pdmp_controller_release(get()); }
+
+    /// Sets the limits of the robot, see pdmp_controller_set_limits; those of Limits{} are none.
+    pdmp_status set_limits(const Limits &limits) noexcept {
+        const pdmp_limits c = detail::to_c(limits);
+        return pdmp_controller_set_limits(get(), &c);
+    }
+
+    /// Writes for each degree of freedom the limit that determined its acceleration in the last tick.
+    pdmp_status limited(std::vector<pdmp_limit> &limited) noexcept {
+        return pdmp_controller_limited(get(), limited.data(), limited.size());
+    }
 
     /// Advances the movement by one tick without a new command.
     pdmp_status step() noexcept { return pdmp_controller_step(get()); }

@@ -24,6 +24,7 @@ mod controller;
 mod controller_copies;
 mod fault;
 mod guard;
+mod limits;
 mod model;
 mod status;
 
@@ -31,5 +32,6 @@ pub use buffers::*;
 pub use command::*;
 pub use controller::*;
 pub use controller_copies::*;
+pub use limits::*;
 pub use model::*;
 pub use status::{pdmp_status, pdmp_version};

@@ -14,6 +14,7 @@ use common::*;
 use ndarray::Array2;
 use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
+use pdmp_core::motion::Limits;
 use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status};
 use tempfile::TempDir;
 
@@ -203,6 +204,8 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
     conditions.velocity = Some(vec![0.0; 3]);
     let mut controller = Controller::new(model.primitive(), 2e-3, &conditions, Some(0.0)).unwrap();
     let (goal, measured) = ([0.75, 0.5, 0.25], [0.5, 0.25, 0.0]);
+    let each = |limit| Some(vec![limit; 3]);
+    let limits = Limits { lower: None, upper: each(1.0), velocity: each(0.25), acceleration: each(5.0) };
     let expected: Vec<_> = (0..500)
         .map(|tick| {
             match tick {
@@ -210,6 +213,8 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
                 150 => controller.set_goal(&goal).unwrap(),
                 200 => controller.set_tau(1.5).unwrap(),
                 220 => controller.set_tolerance(0.05).unwrap(),
+                230 => controller.set_limits(&limits).unwrap(),
+                450 => controller.set_limits(&Limits::default()).unwrap(),
                 250 => controller.set_compliance(Compliance { stopping: 100.0, tracking: 5.0 }).unwrap(),
                 _ => {}
             }

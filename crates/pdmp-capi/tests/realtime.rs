@@ -14,6 +14,7 @@ use counting::{Random, allocations};
 use pdmp::*;
 use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
+use pdmp_core::motion::Limits;
 use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
 fn vector(numbers: Option<&[f64]>) -> pdmp_vector {
@@ -49,7 +50,12 @@ fn bits(numbers: &[f64]) -> impl Iterator<Item = u64> {
 
 #[test]
 fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
-    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
+    for (kind, demos, is_limited) in [
+        (Kind::Discrete, reaches(), false),
+        (Kind::Rhythmic, cycles(), false),
+        (Kind::Discrete, reaches(), true),
+        (Kind::Rhythmic, cycles(), true),
+    ] {
         let model = learn(&demos, &options(kind));
         let (n_dofs, n_styles, own) = (model.n_dofs(), model.n_styles(), model.tau());
         let mut rust = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
@@ -65,6 +71,17 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
             pdmp_controller_new(Some(&model), Some(&settings), None, Some(&mut made), none);
             made.assume_init()
         };
+        if is_limited {
+            let each = |limit| Some(vec![limit; n_dofs]);
+            let limits = Limits { lower: each(-0.5), upper: each(0.75), velocity: each(1.5), acceleration: each(20.0) };
+            let Limits { lower, upper, velocity, acceleration } = &limits;
+            let [lower, upper, velocity, acceleration] =
+                [lower, upper, velocity, acceleration].map(|limits| vector(limits.as_deref()));
+            rust.set_limits(&limits).unwrap();
+            let limits = pdmp_limits { lower, upper, velocity, acceleration };
+            // SAFETY: the controller is alive, and the vectors are valid.
+            assert_eq!(unsafe { pdmp_controller_set_limits(c.as_mut(), Some(&limits)) }, pdmp_status::PDMP_OK);
+        }
         let mut cloned = MaybeUninit::uninit();
         // SAFETY: the controller is alive.
         let copy = unsafe {
@@ -80,6 +97,8 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
         let buffers = written.each_mut().map(|output| pdmp_buffer { data: output.as_mut_ptr(), length: n_dofs });
         let out = pdmp_motion { position: buffers[0], velocity: buffers[1], acceleration: buffers[2] };
         let mut message = [0; 256];
+        let mut limited = vec![pdmp_limit::PDMP_LIMIT_NONE; n_dofs];
+        let mut ticks_limited = 0;
         let (mut accepted, before) = (0, allocations());
         for _ in 0..200_000 {
             values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
@@ -140,6 +159,11 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
             }
             let pairs = [(&position, &written[0]), (&velocity, &written[1]), (&acceleration, &written[2])];
             assert!(pairs.into_iter().all(|(rust, c)| bits(rust).eq(bits(c))));
+            // SAFETY: the controller is alive, and the array has an element for each DoF.
+            let status = unsafe { pdmp_controller_limited(c.as_mut(), limited.as_mut_ptr(), n_dofs) };
+            assert_eq!(status, rust.status().into());
+            assert!(rust.limited().iter().zip(&limited).all(|(rust, c)| pdmp_limit::from(*rust) == *c));
+            ticks_limited += usize::from(rust.limited().iter().any(Option::is_some));
             if random.rarely() {
                 // SAFETY: both controllers are alive.
                 unsafe {
@@ -156,7 +180,8 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
             }
         }
         assert_eq!(allocations() - before, 0);
-        println!("{kind}: {accepted} of 200000 commands accepted");
+        println!("{kind}: {accepted} of 200000 commands accepted, {ticks_limited} ticks limited");
+        assert_eq!(ticks_limited > 10_000, is_limited, "{kind}: {ticks_limited}");
         assert!(accepted >= 100_000, "{kind}: {accepted} of 200000 commands accepted");
         // SAFETY: the controllers are alive and not used again.
         unsafe {

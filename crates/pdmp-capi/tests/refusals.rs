@@ -45,6 +45,9 @@ const NO_CONDITIONS: pdmp_conditions = pdmp_conditions {
 const SETTINGS: pdmp_settings =
     pdmp_settings { dt: 1e-3, transition: ptr::null(), memory: pdmp_memory { data: ptr::null_mut(), size: 0 } };
 
+const NO_LIMITS: pdmp_limits =
+    pdmp_limits { lower: NO_VECTOR, upper: NO_VECTOR, velocity: NO_VECTOR, acceleration: NO_VECTOR };
+
 fn vector(numbers: &[f64]) -> pdmp_vector {
     pdmp_vector { data: numbers.as_ptr(), length: numbers.len() }
 }
@@ -202,6 +205,9 @@ fn null_for_a_required_argument_is_an_error() {
             pdmp_controller_set_goal(running.handle(), NO_VECTOR),
             pdmp_controller_set_goal(running.handle(), pdmp_vector { data: ptr::null(), length: 3 }),
             pdmp_controller_set_goal_velocity(running.handle(), pdmp_vector { data: ptr::null(), length: 3 }),
+            pdmp_controller_set_limits(None, None),
+            pdmp_controller_limited(None, ptr::null_mut(), 0),
+            pdmp_controller_limited(running.handle(), ptr::null_mut(), 3),
             pdmp_controller_step(None),
             pdmp_controller_update(None, None, None),
             pdmp_controller_read(None, None),
@@ -295,6 +301,92 @@ fn an_invalid_command_changes_nothing_and_leaves_a_message() {
     assert_eq!(pdmp_controller_set_compliance(running.handle(), -1.0, 0.0), PDMP_RANGE);
     assert_eq!(pdmp_controller_set_tolerance(running.handle(), 0.0), PDMP_RANGE);
     assert_eq!(running.state(3), before);
+}
+
+/// Returns the limits that determined the accelerations of the last tick, in a buffer of four elements.
+fn limited(running: &mut Running) -> [pdmp_limit; 4] {
+    // An element beyond the DoFs keeps this value.
+    let mut limited = [pdmp_limit::PDMP_LIMIT_VELOCITY; 4];
+    // SAFETY: the array has four elements.
+    let status = unsafe { pdmp_controller_limited(running.handle(), limited.as_mut_ptr(), limited.len()) };
+    assert_eq!(status, pdmp_controller_progress(running.handle().as_deref(), None, None));
+    limited
+}
+
+#[test]
+fn invalid_limits_leave_the_present_ones_and_a_message() {
+    let model = loaded(Kind::Discrete);
+    let mut running = Running::new(&model);
+    let set = |running: &mut Running, limits: &pdmp_limits| {
+        // SAFETY: the pointers of the tests' limits are NULL or valid.
+        unsafe { pdmp_controller_set_limits(running.handle(), Some(limits)) }
+    };
+    assert_eq!(set(&mut running, &pdmp_limits { velocity: vector(&[0.25; 3]), ..NO_LIMITS }), PDMP_OK);
+    let (three, two) = ([0.5; 3], [0.5; 2]);
+    let null = pdmp_vector { data: ptr::null(), length: 3 };
+    let huge = pdmp_vector { data: three.as_ptr(), length: usize::MAX };
+    for (limits, status, text) in [
+        (pdmp_limits { lower: vector(&two), ..NO_LIMITS }, PDMP_LENGTH, "lower has length 2, expected 3"),
+        (pdmp_limits { upper: huge, ..NO_LIMITS }, PDMP_LENGTH, "upper has length"),
+        (pdmp_limits { velocity: vector(&[]), ..NO_LIMITS }, PDMP_LENGTH, "velocity has length 0, expected 3"),
+        (pdmp_limits { acceleration: null, ..NO_LIMITS }, PDMP_NULL, "acceleration is NULL"),
+        (pdmp_limits { velocity: vector(&[1.0, f64::NAN, 1.0]), ..NO_LIMITS }, PDMP_RANGE, "velocity[1] = NaN"),
+        (pdmp_limits { velocity: vector(&[1.0, 0.0, 1.0]), ..NO_LIMITS }, PDMP_RANGE, "velocity = 0: "),
+        (pdmp_limits { acceleration: vector(&[-1.0]), ..NO_LIMITS }, PDMP_RANGE, "acceleration = -1: "),
+        (
+            pdmp_limits { lower: vector(&[0.0, 1.0, 0.0]), upper: vector(&[1.0; 3]), ..NO_LIMITS },
+            PDMP_RANGE,
+            "limits of DoF 1: the lower limit 1 must be below the upper limit 1",
+        ),
+        (
+            pdmp_limits { velocity: vector(&[1e-3; 3]), acceleration: vector(&[1e6; 3]), ..NO_LIMITS },
+            PDMP_RANGE,
+            "dt = 0.001: ",
+        ),
+    ] {
+        assert_eq!(set(&mut running, &limits), status, "{text}");
+        assert!(running.error().starts_with(text), "{}", running.error());
+    }
+    let mut short = [pdmp_limit::PDMP_LIMIT_NONE; 2];
+    // SAFETY: the array has two elements.
+    assert_eq!(unsafe { pdmp_controller_limited(running.handle(), short.as_mut_ptr(), 2) }, PDMP_LENGTH);
+    assert_eq!(running.error(), "limited has length 2, expected 3: one value per DoF");
+
+    let mut slowed = 0;
+    while pdmp_controller_step(running.handle()) == PDMP_WORKING {
+        assert!(running.state(3)[3..6].iter().all(|velocity| velocity.abs() <= 0.25));
+        slowed += limited(&mut running)[..3].iter().filter(|limit| **limit == pdmp_limit::PDMP_LIMIT_VELOCITY).count();
+    }
+    assert!(slowed > 0);
+}
+
+#[test]
+fn limits_of_one_number_are_those_of_all_dofs_and_null_removes_them() {
+    let model = loaded(Kind::Discrete);
+    let (mut one, mut each, mut free) = (Running::new(&model), Running::new(&model), Running::new(&model));
+    let limits = |velocity, acceleration| pdmp_limits { velocity, acceleration, ..NO_LIMITS };
+    // SAFETY: the vectors are valid over their lengths.
+    unsafe {
+        let (by_dof, by_number) = (vector(&[0.5; 3]), vector(&[0.5]));
+        assert_eq!(pdmp_controller_set_limits(each.handle(), Some(&limits(by_dof, vector(&[4.0; 3])))), PDMP_OK);
+        assert_eq!(pdmp_controller_set_limits(one.handle(), Some(&limits(by_number, vector(&[4.0])))), PDMP_OK);
+    }
+    for _ in 0..300 {
+        assert_eq!(pdmp_controller_step(one.handle()), pdmp_controller_step(each.handle()));
+        assert_eq!(one.state(3), each.state(3));
+        assert_eq!(limited(&mut one), limited(&mut each));
+        assert_eq!(limited(&mut one)[3], pdmp_limit::PDMP_LIMIT_VELOCITY);
+    }
+    // SAFETY: NULL is valid.
+    unsafe {
+        assert_eq!(pdmp_controller_set_limits(one.handle(), None), PDMP_OK);
+        assert_eq!(pdmp_controller_reset(one.handle(), None), PDMP_OK);
+    }
+    for _ in 0..300 {
+        assert_eq!(pdmp_controller_step(one.handle()), pdmp_controller_step(free.handle()));
+        assert_eq!(one.state(3), free.state(3));
+        assert_eq!(limited(&mut one)[..3], [pdmp_limit::PDMP_LIMIT_NONE; 3]);
+    }
 }
 
 #[test]

@@ -54,12 +54,17 @@ int main(int, char **argv) try {
     const std::array<double, 3> goal{0.75, 0.5, 0.25};
     const double measured[] = {0.5, 0.25, 0.0};
     const auto style = model.demonstration(0).style;
+    const pdmp::Limits limits{{}, {1.0, 1.0, 1.0}, {0.25, 0.25, 0.25}, {5.0, 5.0, 5.0}};
+    std::vector<pdmp_limit> limited(3);
+    int n_limited = 0;
     for (int tick = 0; tick < 500; ++tick) {
         pdmp_command command{};
         if (tick == 100) REQUIRE(controller.set_style(pdmp::view(style)) == PDMP_OK);
         if (tick == 150) REQUIRE(controller.set_goal(pdmp::view(goal)) == PDMP_OK);
         if (tick == 200) REQUIRE(controller.set_tau(1.5) == PDMP_OK);
         if (tick == 220) REQUIRE(controller.set_tolerance(0.05) == PDMP_OK);
+        if (tick == 230) REQUIRE(controller.set_limits(limits) == PDMP_OK);
+        if (tick == 450) REQUIRE(controller.set_limits({}) == PDMP_OK);
         if (tick == 250) REQUIRE(controller.set_compliance(100.0, 5.0) == PDMP_OK);
         if (tick >= 300 && tick < 350) command.measured = pdmp::view(measured);
         if (tick >= 400) command.coupling = {pdmp::view(measured), pdmp::view(goal)};
@@ -68,10 +73,16 @@ int main(int, char **argv) try {
         } else {
             REQUIRE(controller.step() == PDMP_WORKING && controller.read(motion) == PDMP_WORKING);
         }
+        REQUIRE(controller.limited(limited) == PDMP_WORKING);
+        for (const auto limit : limited) n_limited += limit != PDMP_LIMIT_NONE;
         for (const auto *numbers : {&motion.position, &motion.velocity, &motion.acceleration})
             for (const double number : *numbers) std::printf("%a ", number);
         std::printf("\n");
     }
+    REQUIRE(n_limited > 0);
+    REQUIRE(controller.set_limits({{}, {}, {0.0}, {}}) == PDMP_RANGE);
+    limited.resize(2);
+    REQUIRE(controller.limited(limited) == PDMP_LENGTH);
     REQUIRE(controller.set_speed(1.0) == PDMP_OK && controller.release() == PDMP_OK);
     REQUIRE(controller.set_anchor(pdmp::view(goal)) == PDMP_ABSENT);
     REQUIRE(controller.set_phase(0.5) == PDMP_ABSENT && controller.set_phase_gain(2.0) == PDMP_OK);

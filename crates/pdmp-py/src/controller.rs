@@ -12,7 +12,7 @@ use pyo3::types::PyDict;
 use crate::conditions::conditions_of;
 use crate::convert::{Vector, read_only, refill};
 use crate::error::raise;
-use crate::instance::pair;
+use crate::instance::{self, pair};
 use crate::limits::Limits;
 use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
@@ -32,8 +32,8 @@ struct Arguments {
 /// Running movement, returned by `Model.controller`.
 ///
 /// `step` advances by one tick and updates `position`, `velocity` and `acceleration`, read-only views that remain
-/// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `compliance` and
-/// `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
+/// valid. `goal`, `goal_velocity`, `style`, `tau`, `amplitude`, `anchor`, `phase`, `speed`, `tolerance`, `limits`,
+/// `compliance` and `phase_gain` can be set at any tick; a value that is rejected leaves the present one in force. A controller can be
 /// copied (`copy`, `deepcopy`) and pickled, and continues from its state to the bit.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Controller {
@@ -346,23 +346,30 @@ impl Controller {
         self.command(result)
     }
 
-    /// Limits in force; None without any.
+    /// Limits of position, velocity and acceleration (D,) in force, or None.
+    ///
+    /// Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower ≤ y ≤ upper at and
+    /// between ticks, |ẏ| ≤ V, and the change of ẏ over a tick is at most A·dt. A movement inside them is not changed.
+    /// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start
+    /// outside, brakes with A and returns. They stay in force after `reset`; None removes them.
     #[getter]
     fn limits(&self) -> Option<Limits> {
         Limits::of(self.inner.limits())
     }
 
     #[setter]
-    fn set_limits(&mut self, limits: Option<&Limits>) -> PyResult<()> {
+    fn set_limits(&mut self, limits: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let result = match limits {
-            Some(Limits(limits)) => self.inner.set_limits(limits),
+            Some(limits) => self.inner.set_limits(instance::limits(limits)?),
             None => self.inner.set_limits(&pdmp_core::motion::Limits::default()),
         };
         self.command(result)
     }
 
     /// Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
-    /// "acceleration", or None.
+    /// "acceleration", or None for a free one.
+    ///
+    /// A limit of the position counts from where the degree of freedom brakes in front of it.
     #[getter]
     fn limited(&self) -> Vec<Option<&'static str>> {
         let name = |limit: &Limit| match limit {

@@ -7,6 +7,7 @@ use pyo3::{PyClass, pyclass::boolean_struct::True};
 use crate::conditions::Conditions;
 use crate::convert::quoted;
 use crate::demonstration::Demonstration;
+use crate::limits::Limits;
 
 /// Returns the recording that an argument holds.
 pub(crate) fn demonstration<'a>(name: &str, value: &'a Bound<'_, PyAny>) -> PyResult<&'a pdmp_core::Demonstration> {
@@ -18,6 +19,11 @@ pub(crate) fn conditions<'a>(name: &str, value: &'a Bound<'_, PyAny>) -> PyResul
     let expected = "pdmp.Conditions; pass single ones by name, such as style=";
     let expected = if name.starts_with("conditions") { expected } else { "pdmp.Conditions" };
     instance(name, value, expected).map(|conditions: &Conditions| &conditions.0)
+}
+
+/// Returns the limits that an argument holds.
+pub(crate) fn limits<'a>(value: &'a Bound<'_, PyAny>) -> PyResult<&'a pdmp_core::motion::Limits> {
+    instance("limits", value, "pdmp.Limits").map(|limits: &Limits| &limits.0)
 }
 
 fn instance<'a, T>(name: &str, value: &'a Bound<'_, PyAny>, expected: &str) -> PyResult<&'a T>

@@ -1,39 +1,44 @@
 //! Limits of a robot.
 
-use numpy::PyArray1;
 use pdmp_core::motion::Limits as Inner;
 use pyo3::prelude::*;
 
-use crate::convert::{numbers, to_numpy};
+use crate::convert::{Vector, numbers, read_only};
+use crate::error::raise;
 use crate::instance::pair;
 
 /// Limits of position, velocity and acceleration.
 ///
 /// Each limit is one number for all degrees of freedom or an array (D,); None and infinity are no limit.
+/// `Model.controller` keeps them at every tick, `Model.fastest` along a path, and `Model.fastest_tau` with a constant
+/// tau.
 ///
 /// Parameters
 /// ----------
 /// position : tuple of two float or array_like, (D,), optional
-///     Lower and upper limit in the unit of each degree of freedom.
+///     Lower and upper limits in the unit of each degree of freedom; either may be None.
 /// velocity : float or array_like, (D,), optional
-///     Limit of the velocity's magnitude per s.
+///     Limit of the velocity's magnitude per s, positive.
 /// acceleration : float or array_like, (D,), optional
-///     Limit of the acceleration's magnitude per s².
+///     Limit of the acceleration's magnitude per s², positive.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A limit is not a number or a vector. Lengths and signs are checked where the limits are used.
+///     A limit is not a number or a vector, lengths differ, a lower limit is not below the upper one, or a velocity or
+///     acceleration is not positive. Models check lengths when they take limits.
 /// TypeError
-///     `position` has other than two items.
+///     `position` does not have two items.
 ///
 /// Examples
 /// --------
 /// >>> limits = pdmp.Limits(position=(-2.9, 2.9), velocity=2.0, acceleration=[8.0, 10.0])
+/// >>> limits
+/// pdmp.Limits(position=([-2.9], [2.9]), velocity=[2.0], acceleration=[8.0, 10.0])
 /// >>> controller = model.controller(limits=limits)
-/// >>> limits.velocity
-/// array([2.])
-#[pyclass(frozen, eq, module = "pdmp", from_py_object)]
+/// >>> controller.limits.velocity
+/// array([2., 2.])
+#[pyclass(frozen, eq, module = "pdmp")]
 #[derive(Clone, PartialEq)]
 pub(crate) struct Limits(pub(crate) Inner);
 
@@ -51,36 +56,60 @@ impl Limits {
         };
         let pair = position.map(|position| pair("position", position, "limits (lower, upper)")).transpose()?;
         let (lower, upper) = pair.map(|[lower, upper]| (lower, upper)).unzip();
-        Ok(Self(Inner {
+        let limits = Inner {
             lower: limit("lower", lower.as_ref())?,
             upper: limit("upper", upper.as_ref())?,
             velocity: limit("velocity", velocity)?,
             acceleration: limit("acceleration", acceleration)?,
-        }))
+        };
+        let vectors = [&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration];
+        let n_dofs = vectors.into_iter().flatten().map(Vec::len).fold(1, usize::max);
+        limits.check(n_dofs).map_err(raise)?;
+        Ok(Self(limits))
     }
 
-    /// Lower and upper limits of the position, each (1,) or (D,), or None.
+    /// Lower and upper limits of the position, each (1,) or (D,) and infinite where there is none, or None.
     #[getter]
-    fn position<'py>(&self, py: Python<'py>) -> Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    fn position<'py>(&self, py: Python<'py>) -> Option<(Vector<'py>, Vector<'py>)> {
         let [lower, upper] = [&self.0.lower, &self.0.upper];
         let n = lower.as_ref().or(upper.as_ref())?.len();
         let or = |limits: &Option<Vec<f64>>, none: f64| match limits {
-            Some(limits) => to_numpy(py, limits),
-            None => to_numpy(py, &vec![none; n]),
+            Some(limits) => read_only(py, limits),
+            None => read_only(py, &vec![none; n]),
         };
         Some((or(lower, f64::NEG_INFINITY), or(upper, f64::INFINITY)))
     }
 
     /// Limit of the velocity's magnitude (1,) or (D,) per s, or None.
     #[getter]
-    fn velocity<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.0.velocity.as_ref().map(|limits| to_numpy(py, limits))
+    fn velocity<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
+        self.0.velocity.as_ref().map(|limits| read_only(py, limits))
     }
 
     /// Limit of the acceleration's magnitude (1,) or (D,) per s², or None.
     #[getter]
-    fn acceleration<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.0.acceleration.as_ref().map(|limits| to_numpy(py, limits))
+    fn acceleration<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
+        self.0.acceleration.as_ref().map(|limits| read_only(py, limits))
+    }
+
+    fn __getnewargs__(&self) -> (Option<[&Option<Vec<f64>>; 2]>, &Option<Vec<f64>>, &Option<Vec<f64>>) {
+        let Inner { lower, upper, velocity, acceleration } = &self.0;
+        ((lower.is_some() || upper.is_some()).then_some([lower, upper]), velocity, acceleration)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let Inner { lower, upper, velocity, acceleration } = &self.0;
+        let text = |limits: &Option<Vec<f64>>| Ok::<_, PyErr>(limits.into_pyobject(py)?.repr()?.to_string());
+        let mut parts = Vec::new();
+        if lower.is_some() || upper.is_some() {
+            parts.push(format!("position=({}, {})", text(lower)?, text(upper)?));
+        }
+        for (name, limits) in [("velocity", velocity), ("acceleration", acceleration)] {
+            if limits.is_some() {
+                parts.push(format!("{name}={}", text(limits)?));
+            }
+        }
+        Ok(format!("pdmp.Limits({})", parts.join(", ")))
     }
 }
 

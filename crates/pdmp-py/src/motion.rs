@@ -14,7 +14,7 @@ use crate::controller::Controller;
 use crate::convert::Cube;
 use crate::demonstration::Trajectory;
 use crate::error::{interruptible, raise};
-use crate::limits::Limits;
+use crate::instance;
 use crate::model::Model;
 use crate::scalar::{Scalar, optional_number};
 
@@ -85,6 +85,8 @@ impl Model {
     ///     Length of a tick in s.
     /// conditions : Conditions, optional
     ///     Conditions at the start. The controller takes the sum of segment durations; see `tau_at` to follow them.
+    /// limits : Limits, optional
+    ///     Limits that every tick keeps, see `Controller.limits`.
     /// transition : float, optional
     ///     Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0
     ///     switches immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of
@@ -102,9 +104,10 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     `dt` or `transition` is out of range, or `rollout` rejects the conditions.
+    ///     `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length or are
+    ///     too tight for a tick of `dt`.
     /// TypeError
-    ///     A keyword is unknown, or `conditions` has another type.
+    ///     A keyword is unknown, or `conditions` or `limits` has another type.
     ///
     /// Examples
     /// --------
@@ -125,7 +128,7 @@ impl Model {
         py: Python<'_>,
         dt: Scalar<'_>,
         conditions: Option<&Bound<'_, PyAny>>,
-        limits: Option<&Limits>,
+        limits: Option<&Bound<'_, PyAny>>,
         transition: Option<Scalar<'_>>,
         context: Option<&Bound<'_, PyAny>>,
         changes: Option<&Bound<'_, PyDict>>,
@@ -134,13 +137,46 @@ impl Model {
         let conditions = conditions_of(&self.0, conditions, context, changes)?;
         let mut controller =
             pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
-        if let Some(Limits(limits)) = limits {
-            controller.set_limits(limits).map_err(raise)?;
+        if let Some(limits) = limits {
+            controller.set_limits(instance::limits(limits)?).map_err(raise)?;
         }
         Controller::new(py, Arc::clone(&self.0), controller)
     }
 
-    /// Computes the smallest constant tau within limits of velocity and acceleration.
+    /// Computes the smallest constant tau with which a discrete movement keeps limits of velocity and acceleration.
+    ///
+    /// The path y(u) over the clock u = t / tau does not depend on tau. With ẏ = y′ / tau and ÿ = y″ / tau², the smallest
+    /// tau is max(max |y′| / V, √(max |y″| / A)) over time and degrees of freedom.
+    ///
+    /// Parameters
+    /// ----------
+    /// limits : Limits
+    ///     Limits V of the velocity and A of the acceleration, at least one of them; those of the position do not count.
+    /// conditions : Conditions, optional
+    ///     Conditions at the start. Velocities among them are those at their tau, and scale with the result.
+    /// context : array_like or list, (Q,), optional
+    ///     Context whose prediction supplies absent conditions.
+    /// **changes
+    ///     Single conditions by name, as in `rollout`.
+    ///
+    /// Returns
+    /// -------
+    /// float
+    ///     tau in s.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     `rollout` rejects the conditions, the model is rhythmic, a limit has a wrong length, or there is neither a
+    ///     limit of the velocity nor of the acceleration.
+    /// TypeError
+    ///     A keyword is unknown, or `conditions` or `limits` has another type.
+    ///
+    /// Examples
+    /// --------
+    /// >>> tau = model.fastest_tau(pdmp.Limits(velocity=0.5))
+    /// >>> bool(np.isclose(abs(model.rollout(tau=tau, dt=0.001).velocity).max(), 0.5, rtol=1e-3))
+    /// True
     #[pyo3(
         signature = (limits, conditions=None, *, context=None, **changes),
         text_signature = "($self, limits, conditions=None, *, context=None, **changes)"
@@ -148,16 +184,60 @@ impl Model {
     fn fastest_tau(
         &self,
         py: Python<'_>,
-        limits: &Limits,
+        limits: &Bound<'_, PyAny>,
         conditions: Option<&Bound<'_, PyAny>>,
         context: Option<&Bound<'_, PyAny>>,
         changes: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<f64> {
-        let conditions = conditions_of(&self.0, conditions, context, changes)?;
-        py.detach(|| fastest_tau(self.0.primitive(), &limits.0, &conditions)).map_err(raise)
+        let (limits, conditions) = (instance::limits(limits)?, conditions_of(&self.0, conditions, context, changes)?);
+        py.detach(|| fastest_tau(self.0.primitive(), limits, &conditions)).map_err(raise)
     }
 
-    /// Computes the movement that follows its path as fast as limits allow.
+    /// Computes the discrete movement that follows its path as fast as limits allow.
+    ///
+    /// The path y(u) over the clock u does not depend on the rate ρ = du/dt, so that ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′. The
+    /// rate is the largest with |ẏ| ≤ V and |ÿ| ≤ A for every degree of freedom, found by a pass from the end to the
+    /// start and one back. The movement starts and ends at rest; with `velocity` or `goal_velocity` among the
+    /// conditions, it starts or ends with that.
+    ///
+    /// Parameters
+    /// ----------
+    /// limits : Limits
+    ///     Limits V of the velocity and A of the acceleration, at least one of them, and of the position, which the path
+    ///     has to keep.
+    /// conditions : Conditions, optional
+    ///     Conditions at the start. Their tau matters for velocities among them only.
+    /// dt : float
+    ///     Interval between samples in s.
+    /// context : array_like or list, (Q,), optional
+    ///     Context whose prediction supplies absent conditions.
+    /// **changes
+    ///     Single conditions by name, as in `rollout`.
+    ///
+    /// Returns
+    /// -------
+    /// Trajectory
+    ///     Samples from the start to the end of the movement.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     `rollout` rejects the conditions, the model is rhythmic, a limit has a wrong length, there is neither a limit
+    ///     of the velocity nor of the acceleration, the path leaves the limits of the position, or the start is too fast
+    ///     for the limits.
+    /// TypeError
+    ///     A keyword is unknown, or `conditions` or `limits` has another type.
+    ///
+    /// Examples
+    /// --------
+    /// >>> limits = pdmp.Limits(velocity=1.5, acceleration=8.0)
+    /// >>> fastest = model.fastest(limits, dt=0.001)
+    /// >>> bool(fastest.time[-1] < model.fastest_tau(limits))
+    /// True
+    ///
+    /// References
+    /// ----------
+    /// Pham, Pham, IEEE Transactions on Robotics 34(3), 2018, doi:10.1109/TRO.2018.2819195.
     #[pyo3(
         signature = (limits, conditions=None, *, dt=Scalar::Number(0.01), context=None, **changes),
         text_signature = "($self, limits, conditions=None, *, dt=0.01, context=None, **changes)"
@@ -165,15 +245,15 @@ impl Model {
     fn fastest(
         &self,
         py: Python<'_>,
-        limits: &Limits,
+        limits: &Bound<'_, PyAny>,
         conditions: Option<&Bound<'_, PyAny>>,
         dt: Scalar<'_>,
         context: Option<&Bound<'_, PyAny>>,
         changes: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Trajectory> {
+        let (limits, dt) = (instance::limits(limits)?, dt.number("dt")?);
         let conditions = conditions_of(&self.0, conditions, context, changes)?;
-        let dt = dt.number("dt")?;
-        let trajectory = py.detach(|| fastest(self.0.primitive(), &limits.0, &conditions, dt)).map_err(raise)?;
+        let trajectory = py.detach(|| fastest(self.0.primitive(), limits, &conditions, dt)).map_err(raise)?;
         Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
     }
 

@@ -1,0 +1,120 @@
+//! Limits of a robot in the control loop.
+
+use pdmp_core::Error;
+use pdmp_core::motion::{Limit, Limits};
+
+use crate::buffers::pdmp_vector;
+use crate::controller::{call_on, pdmp_controller};
+use crate::fault::Fault;
+use crate::status::pdmp_status;
+
+/// Limits of position, velocity and acceleration. Each member is one number for all DoFs or n_dofs numbers; `{NULL, 0}` and
+/// infinity are no limit.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct pdmp_limits {
+    /// Lower limits of the position (1) or (n_dofs), in the unit of each DoF; below the upper ones.
+    pub lower: pdmp_vector,
+    /// Upper limits of the position (1) or (n_dofs), in the unit of each DoF.
+    pub upper: pdmp_vector,
+    /// Limits of |y'| (1) or (n_dofs), in the unit of each DoF per second; positive.
+    pub velocity: pdmp_vector,
+    /// Limits of |y''| (1) or (n_dofs), in the unit of each DoF per second squared; positive.
+    pub acceleration: pdmp_vector,
+}
+
+/// Limit that determines the acceleration of a DoF.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum pdmp_limit {
+    /// None: the DoF is free.
+    PDMP_LIMIT_NONE = 0,
+    /// The lower or upper limit of the position: the DoF brakes in front of it, or rests on it.
+    PDMP_LIMIT_POSITION = 1,
+    /// The limit of the velocity.
+    PDMP_LIMIT_VELOCITY = 2,
+    /// The limit of the acceleration.
+    PDMP_LIMIT_ACCELERATION = 3,
+}
+
+use pdmp_limit::*;
+
+impl From<Option<Limit>> for pdmp_limit {
+    fn from(limit: Option<Limit>) -> Self {
+        match limit {
+            None => PDMP_LIMIT_NONE,
+            Some(Limit::Position) => PDMP_LIMIT_POSITION,
+            Some(Limit::Velocity) => PDMP_LIMIT_VELOCITY,
+            Some(Limit::Acceleration) => PDMP_LIMIT_ACCELERATION,
+        }
+    }
+}
+
+impl pdmp_limits {
+    /// Returns the limits as the core takes them.
+    ///
+    /// # Safety
+    /// Every pointer is NULL or valid for reads over its length.
+    unsafe fn get(&self, n_dofs: usize) -> Result<Limits, Fault> {
+        let owned = |name, vector: pdmp_vector| {
+            let expected = if vector.length == 1 { 1 } else { n_dofs };
+            // SAFETY: this function has the same contract.
+            let numbers = unsafe { vector.get(name, expected, "DoF") }?;
+            Ok::<_, Fault>(numbers.map(<[f64]>::to_vec))
+        };
+        Ok(Limits {
+            lower: owned("lower", self.lower)?,
+            upper: owned("upper", self.upper)?,
+            velocity: owned("velocity", self.velocity)?,
+            acceleration: owned("acceleration", self.acceleration)?,
+        })
+    }
+}
+
+/// Sets the limits of the robot; NULL removes them.
+///
+/// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower <= y <= upper
+/// at and between ticks, |y'| <= velocity, and |change of y'| <= dt acceleration. A motion inside the limits is not changed.
+/// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start outside,
+/// brakes with the limit of the acceleration and returns. The limits stay in force after pdmp_controller_reset.
+///
+/// This function allocates. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE also if the limits are too tight for a tick. The
+/// present limits then stay in force.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pdmp_controller_set_limits(
+    controller: Option<&mut pdmp_controller>,
+    limits: Option<&pdmp_limits>,
+) -> pdmp_status {
+    call_on(controller, |controller| {
+        let n_dofs = controller.inner.primitive().n_dofs();
+        // SAFETY: the contract of the C ABI covers the pointers of this argument.
+        let limits = limits.map(|limits| unsafe { limits.get(n_dofs) }).transpose()?.unwrap_or_default();
+        controller.inner.set_limits(&limits)?;
+        Ok(pdmp_status::PDMP_OK)
+    })
+}
+
+/// Writes for each DoF the limit that determined its acceleration in the last tick. `limited` has `length` >= n_dofs
+/// elements; those beyond n_dofs keep their value. Returns PDMP_WORKING, PDMP_FINISHED or an error: PDMP_NULL, PDMP_LENGTH.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pdmp_controller_limited(
+    controller: Option<&mut pdmp_controller>,
+    limited: *mut pdmp_limit,
+    length: usize,
+) -> pdmp_status {
+    call_on(controller, |controller| {
+        let limits = controller.inner.limited();
+        if limited.is_null() {
+            return Err(Fault::Null("limited"));
+        }
+        if length < limits.len() {
+            let (expected, found) = (limits.len(), length);
+            return Err(Error::Length { name: "limited", expected, found, per: "DoF" }.into());
+        }
+        for (dof, limit) in limits.iter().enumerate() {
+            // SAFETY: the contract of the C ABI guarantees `length` writable elements, and there are no more limits.
+            unsafe { limited.add(dof).write((*limit).into()) };
+        }
+        Ok(controller.inner.status().into())
+    })
+}
