@@ -12,6 +12,7 @@ use std::sync::Arc;
 use ndarray::Array2;
 use pdmp_core::learning::Truncation;
 use pdmp_core::learning::regression::{Basis, NGnet};
+use pdmp_core::motion::Limits;
 use pdmp_core::{Command, Conditions, Controller, Demonstration, FitOptions, Kind, Model, Motion, Sampling, fit};
 
 /// Numbers of degrees of freedom D.
@@ -40,16 +41,19 @@ pub(crate) enum CommandLoad {
     InTransition,
     /// New style, goal and τ at every tick, and an output for the motion.
     Commanded,
+    /// As settled, within limits that do not bind.
+    Limited,
 }
 
 impl CommandLoad {
-    pub(crate) const ALL: [Self; 3] = [Self::Settled, Self::InTransition, Self::Commanded];
+    pub(crate) const ALL: [Self; 4] = [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Settled => "settled",
             Self::InTransition => "in transition",
             Self::Commanded => "commanded",
+            Self::Limited => "within limits",
         }
     }
 }
@@ -75,7 +79,17 @@ pub(crate) struct ControlLoop {
 
 impl ControlLoop {
     pub(crate) fn new(model: &Arc<Model>, load: CommandLoad) -> Self {
-        let controller = Controller::new(model.primitive(), DT, &Conditions::default(), None).expect("a controller");
+        let mut controller =
+            Controller::new(model.primitive(), DT, &Conditions::default(), None).expect("a controller");
+        if load == CommandLoad::Limited {
+            let limits = Limits {
+                lower: Some(vec![-1e3]),
+                upper: Some(vec![1e3]),
+                velocity: Some(vec![1e3]),
+                acceleration: Some(vec![1e6]),
+            };
+            controller.set_limits(&limits).expect("limits");
+        }
         // τ is at least that of the model, so that the measured second ends before the movement does.
         let target = |m: usize, tau: f64| Target {
             style: model.demonstrated().styles.row(m).to_vec(),

@@ -60,11 +60,11 @@ impl Limits {
                 return Err(Error::Range { name, value, allowed: "every limit must be positive; infinity is none" });
             }
         }
-        let [lower, upper] = self.position(n_dofs);
-        match lower.iter().zip(&upper).position(|(lower, upper)| lower >= upper) {
-            Some(dof) => Err(Error::LimitOrder { dof, lower: lower[dof], upper: upper[dof] }),
-            None => Ok(()),
-        }
+        (0..n_dofs).try_for_each(|dof| {
+            let lower = limit_of_dof(&self.lower, dof, f64::NEG_INFINITY);
+            let upper = limit_of_dof(&self.upper, dof, f64::INFINITY);
+            if lower < upper { Ok(()) } else { Err(Error::LimitOrder { dof, lower, upper }) }
+        })
     }
 
     /// Returns the lower and upper limits of the position, infinite where there is none.
@@ -93,11 +93,16 @@ impl Limits {
     }
 }
 
+/// Returns the limit of one DoF, `none` if there is none.
+pub(crate) fn limit_of_dof(limits: &Option<Vec<f64>>, dof: usize, none: f64) -> f64 {
+    match limits.as_deref() {
+        None => none,
+        Some([limit]) => *limit,
+        Some(limits) => limits[dof],
+    }
+}
+
 /// Returns limits by DoFs.
 fn of_dofs(limits: &Option<Vec<f64>>, none: f64, n_dofs: usize) -> Vec<f64> {
-    match limits.as_deref() {
-        None => vec![none; n_dofs],
-        Some([limit]) => vec![*limit; n_dofs],
-        Some(limits) => limits.to_vec(),
-    }
+    (0..n_dofs).map(|dof| limit_of_dof(limits, dof, none)).collect()
 }

@@ -1,7 +1,7 @@
 //! Limits of all groups of DoFs in the control loop.
 
 use crate::error::{Error, Result};
-use crate::motion::limits::{Limit, Limits};
+use crate::motion::limits::{Limit, Limits, limit_of_dof};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
 use crate::motion::viability::Bounds;
 use crate::numerics::simd::{F64x4, WIDTH, groups, padded, unpad};
@@ -65,17 +65,17 @@ impl Limiter {
     pub(super) fn set(&mut self, limits: &Limits, duration: f64, dt: f64) -> Result<()> {
         let n_dofs = self.centre.len();
         limits.check(n_dofs)?;
-        let limit =
-            |limits: &Option<Vec<f64>>, dof: usize, none: f64| limits.as_ref().map_or(none, |limits| limits[dof]);
         let infinity = f64::INFINITY;
-        let distance = |dof: usize| limit(&limits.upper, dof, infinity) - limit(&limits.lower, dof, -infinity);
+        let distance =
+            |dof: usize| limit_of_dof(&limits.upper, dof, infinity) - limit_of_dof(&limits.lower, dof, -infinity);
         let braking = |dof: usize| {
-            let velocity = limit(&limits.velocity, dof, infinity).min(FREE_VELOCITY * self.ranges[dof] / duration);
+            let velocity =
+                limit_of_dof(&limits.velocity, dof, infinity).min(FREE_VELOCITY * self.ranges[dof] / duration);
             let free = velocity * velocity / (2.0 * BRAKING_SHARE * distance(dof).min(self.ranges[dof]));
-            limit(&limits.acceleration, dof, free)
+            limit_of_dof(&limits.acceleration, dof, free)
         };
         let substep_rate = (0..n_dofs).fold(0.0, |rate: f64, dof| {
-            let by_velocity = 2.0 * braking(dof) / limit(&limits.velocity, dof, infinity);
+            let by_velocity = 2.0 * braking(dof) / limit_of_dof(&limits.velocity, dof, infinity);
             rate.max(by_velocity).max((braking(dof) / distance(dof)).sqrt())
         });
         if dt * substep_rate > MAX_SUBSTEPS {
@@ -94,10 +94,10 @@ impl Limiter {
                 }))
             };
             *bounds = Bounds {
-                lower: lanes(&|dof| limit(&limits.lower, dof, -infinity), -infinity),
-                upper: lanes(&|dof| limit(&limits.upper, dof, infinity), infinity),
-                velocity: lanes(&|dof| limit(&limits.velocity, dof, infinity), infinity),
-                acceleration: lanes(&|dof| limit(&limits.acceleration, dof, infinity), infinity),
+                lower: lanes(&|dof| limit_of_dof(&limits.lower, dof, -infinity), -infinity),
+                upper: lanes(&|dof| limit_of_dof(&limits.upper, dof, infinity), infinity),
+                velocity: lanes(&|dof| limit_of_dof(&limits.velocity, dof, infinity), infinity),
+                acceleration: lanes(&|dof| limit_of_dof(&limits.acceleration, dof, infinity), infinity),
                 braking: lanes(&braking, infinity),
             };
         }
