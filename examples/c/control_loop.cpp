@@ -1,4 +1,5 @@
-// Control loop in C++ with commands for the anchor, the time constant and the amplitude of a rhythmic movement.
+// Control loop in C++ with limits, and commands for the anchor, the time constant and the amplitude of a rhythmic
+// movement.
 //
 //     control_loop cycle.safetensors
 //
@@ -21,6 +22,10 @@ int main(int argc, char **argv) try {
     const auto model = pdmp::Model::load(argv[1]);
     const auto conditions = model.demonstration(0);
     pdmp::Controller controller(model, 0.001, conditions);
+
+    // Every tick keeps the limits of the robot: here 3 per second and 60 per second squared in each degree of freedom.
+    const pdmp_status limited = controller.set_limits({{}, {}, {3.0}, {60.0}});
+    if (limited < 0) throw pdmp::Error(limited, controller.error());
 
     auto anchor = conditions.anchor;
     for (double &centre : anchor) centre += 0.25;

@@ -140,6 +140,9 @@ fn the_cpp_example_matches_rust_to_the_bit() {
     let conditions = conditions_of(&model, 0);
     let anchor: Vec<f64> = conditions.anchor.as_ref().unwrap().iter().map(|y_a| y_a + 0.25).collect();
     let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, None).unwrap();
+    let limits = Limits { velocity: Some(vec![3.0]), acceleration: Some(vec![60.0]), ..Limits::default() };
+    controller.set_limits(&limits).unwrap();
+    let mut n_limited = 0;
     let expected: Vec<_> = (0..3000)
         .map(|tick| {
             let late = tick >= 2000;
@@ -150,9 +153,11 @@ fn the_cpp_example_matches_rust_to_the_bit() {
                 ..Command::default()
             };
             common::tick(&mut controller, &command).unwrap();
+            n_limited += controller.limited().iter().flatten().count();
             motion(&controller)
         })
         .collect();
+    assert!(n_limited > 0);
 
     let folder = saved(&model, "cycle.safetensors");
     let source = root().join("examples/c/control_loop.cpp");
