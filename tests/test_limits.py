@@ -11,7 +11,7 @@ import pytest
 
 import pdmp
 from pdmp import Limits
-from synthetic import reaches
+from synthetic import loops, reaches
 from test_forecast import motion, pickled
 
 NAN, INF = float("nan"), float("inf")
@@ -66,9 +66,12 @@ def attack(controller: pdmp.Controller, model: pdmp.Model, seed: int, ticks: int
     random = np.random.default_rng(seed)
     rhythmic = model.kind == "rhythmic"
     for _ in range(ticks):
-        kind, vector = random.integers(60), random.normal(size=2) * 10 ** random.uniform(-1, 2)
+        kind, vector = (
+            random.integers(60),
+            random.normal(size=model.n_dofs) * 10 ** random.uniform(-1, 2),
+        )
         if kind == 0:
-            controller.style = random.normal(size=2)
+            controller.style = random.normal(size=model.n_styles)
         elif kind == 1:
             setattr(controller, "anchor" if rhythmic else "goal", vector)
         elif kind == 2:
@@ -113,6 +116,35 @@ def test_hostile_commands_keep_every_limit_at_and_between_ticks(
         limited += any(controller.limited)
     assert judge.excess <= 1e-12
     assert limited > 400
+
+
+@pytest.mark.parametrize("kind", ["discrete", "rhythmic"])
+@pytest.mark.parametrize("n_dofs", [1, 5, 9])
+def test_random_limits_of_any_number_of_dofs_are_kept(kind: str, n_dofs: int) -> None:
+    """Each DoF keeps its own limits, from far apart to close together."""
+    random = np.random.default_rng(n_dofs)
+    mixing = random.normal(size=(2, n_dofs))
+    movements = loops() if kind == "rhythmic" else reaches()
+    demos = [pdmp.Demonstration(demo.position @ mixing, dt=0.02) for demo in movements]
+    model = pdmp.fit(demos, kind=kind, n_styles=2, basis="ngnet")
+    for _ in range(5):
+        at_rest = {"start": random.normal(size=n_dofs), "velocity": np.zeros(n_dofs)}
+        sides = 10 ** random.uniform(-1.5, 0.5, size=(2, n_dofs))
+        position = (at_rest["start"] - sides[0], at_rest["start"] + sides[1])
+        velocity = 10 ** random.uniform(-1, 1, size=n_dofs)
+        # In a tick of 0.1 s, A changes the velocity by V / 2 and moves by range / 8 at most.
+        most = np.minimum(velocity / 0.2, sides.sum(axis=0) / 0.04)
+        limits = Limits(position, velocity, most * 10 ** random.uniform(-1, 0, size=n_dofs))
+        controller, judge = model.controller(limits=limits, **at_rest), Judge.of(limits)
+        controller.step(1e-6)
+        before, limited = motion(controller), 0
+        for after, dt in attack(controller, model, n_dofs, 500):
+            assert np.isfinite(after).all()
+            judge.tick(before, after, dt)
+            before = after
+            limited += any(controller.limited)
+        assert judge.excess <= 1e-12
+        assert limited > 100
 
 
 @pytest.mark.parametrize("scale", [2.0**-10, 2.0**10])
@@ -517,6 +549,21 @@ def test_limits_of_another_type_are_rejected_by_name(
     with pytest.raises(TypeError, match=f"^{message}") as error:
         call(reach)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("dt", [5e-324, 1e-310, 1e-300, 1e-100, 1e-20])
+def test_ticks_of_any_length_keep_the_motion_finite(
+    request: pytest.FixtureRequest, model: pdmp.Model, dt: float
+) -> None:
+    """The reciprocal of the shortest ticks overflows."""
+    if 1 / dt == INF and model.kind == "rhythmic":
+        reason = "the phase is NaN after a tick whose reciprocal overflows"
+        request.applymarker(pytest.mark.xfail(strict=True, reason=reason))
+    controller = model.controller(0.01, limits=Limits(velocity=0.5, acceleration=5.0))
+    for length in [*[0.01] * 20, dt, dt, 0.001, 0.001]:
+        controller.step(length)
+        assert np.isfinite(motion(controller)).all()
+        assert np.isfinite(controller.phase)
 
 
 def test_forged_states_with_limits_are_rejected_or_keep_finite(reach: pdmp.Model) -> None:

@@ -183,6 +183,7 @@ impl Caller<'_> {
                         return;
                     }
                 },
+                13 => return self.set_limits(slot, input),
                 12 => pdmp_controller_set_goal_velocity(controller, Numbers::new(n_dofs, input).vector()),
                 _ => {
                     let mut status = PDMP_OK;
@@ -239,6 +240,19 @@ impl Caller<'_> {
         let conditions = conditions.as_ref().map(Conditions::get);
         // SAFETY: every pointer is valid over its stated length, or NULL.
         let status = unsafe { pdmp_controller_reset(self.handle(slot), conditions.as_ref()) };
+        self.check(slot, status, input);
+    }
+
+    fn set_limits(&mut self, slot: usize, input: &mut Input) {
+        let vectors: [Numbers; 4] = std::array::from_fn(|_| {
+            let n = if input.byte() < 64 { 1 } else { self.info.n_dofs };
+            Numbers::new(n, input)
+        });
+        let [lower, upper, velocity, acceleration] = vectors.each_ref().map(Numbers::vector);
+        let limits = pdmp_limits { lower, upper, velocity, acceleration };
+        let given = !input.byte().is_multiple_of(8);
+        // SAFETY: every pointer is valid over its stated length, or NULL.
+        let status = unsafe { pdmp_controller_set_limits(self.handle(slot), given.then_some(&limits)) };
         self.check(slot, status, input);
     }
 
@@ -339,6 +353,9 @@ impl Caller<'_> {
             motion.chunks_exact_mut(n_dofs).map(|part| pdmp_buffer { data: part.as_mut_ptr(), length: part.len() });
         let mut part = || parts.next().unwrap_or(pdmp_buffer { data: ptr::null_mut(), length: 0 });
         let outputs = pdmp_motion { position: part(), velocity: part(), acceleration: part() };
+        let mut limited = vec![pdmp_limit::PDMP_LIMIT_NONE; n_dofs];
+        // SAFETY: the array has the stated length.
+        assert_no_panic(unsafe { pdmp_controller_limited(self.handle(slot), limited.as_mut_ptr(), n_dofs) });
         let (mut time, mut phase) = (MaybeUninit::new(0.0), MaybeUninit::new(0.0));
         // SAFETY: every pointer is valid over its stated length.
         assert_no_panic(unsafe { pdmp_controller_read(self.handle(slot), Some(&outputs)) });

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
-use pdmp_core::motion::{Compliance, Limit};
 use pdmp_core::{Command, Kind};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -12,8 +12,7 @@ use pyo3::types::PyDict;
 use crate::conditions::conditions_of;
 use crate::convert::{Vector, read_only, refill};
 use crate::error::raise;
-use crate::instance::{self, pair};
-use crate::limits::Limits;
+use crate::instance::pair;
 use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
 use crate::status::Status;
@@ -344,40 +343,6 @@ impl Controller {
     fn set_tolerance(&mut self, tolerance: Scalar<'_>) -> PyResult<()> {
         let result = self.inner.set_tolerance(tolerance.number("tolerance")?);
         self.command(result)
-    }
-
-    /// Limits of position, velocity and acceleration (D,) in force, or None.
-    ///
-    /// Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower ≤ y ≤ upper at and
-    /// between ticks, |ẏ| ≤ V, and the change of ẏ over a tick is at most A·dt. A movement inside them is not changed.
-    /// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start
-    /// outside, brakes with A and returns. They stay in force after `reset`; None removes them.
-    #[getter]
-    fn limits(&self) -> Option<Limits> {
-        Limits::of(self.inner.limits())
-    }
-
-    #[setter]
-    fn set_limits(&mut self, limits: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let result = match limits {
-            Some(limits) => self.inner.set_limits(instance::limits(limits)?),
-            None => self.inner.set_limits(&pdmp_core::motion::Limits::default()),
-        };
-        self.command(result)
-    }
-
-    /// Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
-    /// "acceleration", or None for a free one.
-    ///
-    /// A limit of the position counts from where the degree of freedom brakes in front of it.
-    #[getter]
-    fn limited(&self) -> Vec<Option<&'static str>> {
-        let name = |limit: &Limit| match limit {
-            Limit::Position => "position",
-            Limit::Velocity => "velocity",
-            Limit::Acceleration => "acceleration",
-        };
-        self.inner.limited().iter().map(|limit| limit.as_ref().map(name)).collect()
     }
 
     /// Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each.

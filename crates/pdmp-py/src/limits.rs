@@ -1,11 +1,12 @@
 //! Limits of a robot.
 
-use pdmp_core::motion::Limits as Inner;
+use pdmp_core::motion::{Limit, Limits as Inner};
 use pyo3::prelude::*;
 
+use crate::controller::Controller;
 use crate::convert::{Vector, numbers, read_only};
 use crate::error::raise;
-use crate::instance::pair;
+use crate::instance::{self, pair};
 
 /// Limits of position, velocity and acceleration.
 ///
@@ -110,6 +111,43 @@ impl Limits {
             }
         }
         Ok(format!("pdmp.Limits({})", parts.join(", ")))
+    }
+}
+
+#[pymethods]
+impl Controller {
+    /// Limits of position, velocity and acceleration (D,) in force, or None.
+    ///
+    /// Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower ≤ y ≤ upper at and
+    /// between ticks, |ẏ| ≤ V, and the change of ẏ over a tick is at most A·dt. A movement inside them is not changed.
+    /// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start
+    /// outside, brakes with A and returns. They stay in force after `reset`; None removes them.
+    #[getter]
+    fn limits(&self) -> Option<Limits> {
+        Limits::of(self.inner.limits())
+    }
+
+    #[setter]
+    fn set_limits(&mut self, limits: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let result = match limits {
+            Some(limits) => self.inner.set_limits(instance::limits(limits)?),
+            None => self.inner.set_limits(&Inner::default()),
+        };
+        self.command(result)
+    }
+
+    /// Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
+    /// "acceleration", or None for a free one.
+    ///
+    /// A limit of the position counts from where the degree of freedom brakes in front of it.
+    #[getter]
+    fn limited(&self) -> Vec<Option<&'static str>> {
+        let name = |limit: &Limit| match limit {
+            Limit::Position => "position",
+            Limit::Velocity => "velocity",
+            Limit::Acceleration => "acceleration",
+        };
+        self.inner.limited().iter().map(|limit| limit.as_ref().map(name)).collect()
     }
 }
 
