@@ -1498,7 +1498,9 @@ class Limits:
     def __ne__(self, other: object, /) -> bool: ...
     def __getnewargs__(
         self,
-    ) -> tuple[list[list[float] | None] | None, list[float] | None, list[float] | None]: ...
+    ) -> tuple[
+        tuple[list[float] | None, list[float] | None] | None, list[float] | None, list[float] | None
+    ]: ...
 
 def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
     """Computes the conditions (1 − share)·a + share·b.

@@ -2,6 +2,7 @@
 
 use pdmp_core::motion::{Limit, Limits as Inner};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 use crate::controller::Controller;
 use crate::convert::{Vector, numbers, read_only};
@@ -93,9 +94,10 @@ impl Limits {
         self.0.acceleration.as_ref().map(|limits| read_only(py, limits))
     }
 
-    fn __getnewargs__(&self) -> (Option<[&Option<Vec<f64>>; 2]>, &Option<Vec<f64>>, &Option<Vec<f64>>) {
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let Inner { lower, upper, velocity, acceleration } = &self.0;
-        ((lower.is_some() || upper.is_some()).then_some([lower, upper]), velocity, acceleration)
+        let position = (lower.is_some() || upper.is_some()).then_some((lower, upper));
+        (position, velocity, acceleration).into_pyobject(py)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

@@ -123,6 +123,7 @@ impl Model {
         signature = (dt=Scalar::Number(0.001), conditions=None, *, limits=None, transition=None, context=None, **changes),
         text_signature = "($self, dt=0.001, conditions=None, *, limits=None, transition=None, context=None, **changes)"
     )]
+    #[allow(clippy::too_many_arguments)]
     fn controller(
         &self,
         py: Python<'_>,
