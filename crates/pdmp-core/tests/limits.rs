@@ -258,7 +258,7 @@ fn fastest_straight_movement_is_that_of_the_textbook() {
         let duration = movement.time[movement.time.len() - 1];
         assert!((duration / expected - 1.0).abs() < 3e-3, "{duration} {expected}");
         assert!(movement.velocity.iter().all(|v| v.abs() <= velocity * 1.001));
-        assert!(movement.acceleration.iter().all(|a| a.abs() <= acceleration * 1.02));
+        assert!(movement.acceleration.iter().all(|a| a.abs() <= acceleration * 1.05));
     }
 }
 
