@@ -43,7 +43,7 @@ from pdmp._native import (
 from pdmp.realtime import PacedLoop, Tick
 
 if _TYPE_CHECKING:
-    from pdmp import datasets, evaluation
+    from pdmp import datasets, evaluation, robots
     from pdmp.evaluation import evaluate
 else:
 
@@ -51,7 +51,7 @@ else:
         """Imports modules that a control loop does not need at their first use."""
         if name == "evaluate":
             return _import_module("pdmp.evaluation").evaluate
-        if name in ("datasets", "evaluation"):
+        if name in ("datasets", "evaluation", "robots"):
             return _import_module(f"pdmp.{name}")
         raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
 
@@ -93,4 +93,5 @@ __all__ = [
     "load",
     "plot",
     "preprocessing",
+    "robots",
 ]

@@ -7,8 +7,8 @@ mod common;
 use std::sync::Arc;
 
 use common::*;
-use pdmp_core::motion::{Coupling, Limit, Limits};
-use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
+use pdmp_core::motion::{Coupling, Limit, Limits, TimeGrid, fastest, fastest_tau};
+use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status, rollout};
 
 /// Generator of uniform numbers in [0, 1) (Knuth's MMIX).
 struct Random(u64);
@@ -230,4 +230,58 @@ fn bad_limits_are_rejected() {
     while controller.step().unwrap() == Status::Working {
         assert!(controller.limited().iter().all(Option::is_none));
     }
+}
+
+/// Along a straight path from rest to rest the fastest movement is that of the constant acceleration ±A, or of the
+/// trapezoid below V, for any learnt profile of speed.
+#[test]
+fn fastest_straight_movement_is_that_of_the_textbook() {
+    let reach = |length: f64| {
+        let position = ndarray::Array2::from_shape_fn((101, 2), |(c, d)| {
+            let s = c as f64 / 100.0;
+            [1.0, -0.3][d] * length * s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
+        });
+        pdmp_core::Demonstration::new(position, pdmp_core::Sampling::Uniform { dt: 0.01 }).unwrap()
+    };
+    let model = learn(&[reach(0.9), reach(1.0), reach(1.1)], &options(Kind::Discrete));
+    let goal = vec![1.0, -0.3];
+    let conditions = Conditions { start: Some(vec![0.0; 2]), goal: Some(goal), ..Conditions::default() };
+    for (velocity, acceleration) in [(10.0, 4.0), (1.0, 4.0), (0.25, 0.5)] {
+        let limits =
+            Limits { velocity: Some(vec![velocity]), acceleration: Some(vec![acceleration]), ..Limits::default() };
+        let movement = fastest(model.primitive(), &limits, &conditions, 1e-4).unwrap();
+        let expected = if velocity * velocity >= acceleration {
+            2.0 / acceleration.sqrt()
+        } else {
+            1.0 / velocity + velocity / acceleration
+        };
+        let duration = movement.time[movement.time.len() - 1];
+        assert!((duration / expected - 1.0).abs() < 3e-3, "{duration} {expected}");
+        assert!(movement.velocity.iter().all(|v| v.abs() <= velocity * 1.001));
+        assert!(movement.acceleration.iter().all(|a| a.abs() <= acceleration * 1.05));
+    }
+}
+
+/// Slowed by the factor that the smallest constant τ states, the movement touches a limit and exceeds none.
+#[test]
+fn fastest_tau_touches_the_limits() {
+    let limits = Limits { velocity: Some(vec![1.1, 0.8, 0.5]), acceleration: Some(vec![9.0]), ..Limits::default() };
+    let tau = fastest_tau(REACH.primitive(), &limits, &Conditions::default()).unwrap();
+    let conditions = Conditions { tau: Some(tau), ..Conditions::default() };
+    let grid = TimeGrid { dt: tau / REACH.tau() * REACH.duration() / 2000.0, duration: None };
+    let movement = rollout(REACH.primitive(), &conditions, grid).unwrap();
+    let [velocity, acceleration] = [limits.velocity.unwrap(), vec![9.0; 3]];
+    let largest = |derivative: &ndarray::Array2<f64>, limits: &[f64]| {
+        derivative.indexed_iter().map(|((_, d), x)| x.abs() / limits[d]).fold(0.0, f64::max)
+    };
+    let worst = largest(&movement.velocity, &velocity).max(largest(&movement.acceleration, &acceleration));
+    assert!((worst - 1.0).abs() < 1e-6, "{worst}");
+    let fastest = fastest(
+        REACH.primitive(),
+        &Limits { velocity: Some(velocity), acceleration: Some(acceleration), ..Limits::default() },
+        &Conditions::default(),
+        1e-3,
+    )
+    .unwrap();
+    assert!(fastest.time[fastest.time.len() - 1] < tau / REACH.tau() * REACH.duration());
 }
