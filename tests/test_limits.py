@@ -38,10 +38,10 @@ class Judge:
         return cls(*limits.position, limits.velocity, limits.acceleration)
 
     def tick(self, before: np.ndarray, after: np.ndarray, dt: float) -> None:
-        """Compares the end of a tick, and the cubic that leads to it, with the limits.
+        """Compares the end of a tick, and a turn on the cubic that leads to it, with the limits.
 
-        A limited DoF moves on a parabola, which is the cubic. One whose velocity keeps its sign
-        does not turn round, and lies between the ends.
+        The cubic of a limited DoF is its parabola. Where the velocity has one sign at both ends, only
+        the end is compared: the cubic may then leave the limits and return.
         """
         (y, v), (y_end, v_end) = before[:2], after[:2]
         a = (v_end - v) / dt
@@ -103,9 +103,7 @@ def inside(model: pdmp.Model, limits: Limits, dt: float = 0.001) -> pdmp.Control
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_hostile_commands_keep_every_limit_at_and_between_ticks(
-    model: pdmp.Model, seed: int
-) -> None:
+def test_hostile_commands_keep_every_limit_at_ticks_and_turns(model: pdmp.Model, seed: int) -> None:
     """The excess is one of rounding for ticks from 1e-6 to 0.1 s; the motion stays finite."""
     controller, judge = inside(model, BOX), Judge.of(BOX)
     before, limited = motion(controller), 0

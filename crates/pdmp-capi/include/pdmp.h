@@ -424,8 +424,10 @@ size_t pdmp_controller_error(const pdmp_controller *controller, pdmp_text text);
 
 /// Sets the limits of the robot; NULL removes them.
 ///
-/// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower <= y <= upper
-/// at and between ticks, |y'| <= velocity, and |change of y'| <= dt acceleration. A motion inside the limits is not changed.
+/// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower <= y <= upper,
+/// |y'| <= velocity, and |change of y'| <= dt acceleration at its end, and lower <= y <= upper where y turns round within it,
+/// on the cubic through both ends unless the tick is long enough to be limited in parts. A motion inside the limits is not
+/// changed.
 /// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start outside,
 /// brakes with the limit of the acceleration and returns. The limits stay in force after pdmp_controller_reset.
 ///

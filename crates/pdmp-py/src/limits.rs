@@ -120,8 +120,9 @@ impl Limits {
 impl Controller {
     /// Limits of position, velocity and acceleration (D,) in force, or None.
     ///
-    /// Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower ≤ y ≤ upper at and
-    /// between ticks, |ẏ| ≤ V, and the change of ẏ over a tick is at most A·dt. A movement inside them is not changed.
+    /// Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower ≤ y ≤ upper and
+    /// |ẏ| ≤ V at its end, and a change of ẏ by at most A·dt. Where y turns round within a tick, it stays inside on the
+    /// cubic through both ends; ticks longer than V / 2A are limited in parts. A movement inside them is not changed.
     /// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start
     /// outside, brakes with A and returns. They stay in force after `reset`; None removes them.
     #[getter]
