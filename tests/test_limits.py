@@ -40,7 +40,7 @@ class Judge:
     def tick(self, before: np.ndarray, after: np.ndarray, dt: float) -> None:
         """Compares the end of a tick, and a turn on the cubic that leads to it, with the limits.
 
-        The cubic of a limited DoF is its parabola. Where the velocity has one sign at both ends, only
+        The cubic of a limited DoF is its parabola. If the velocity has one sign at both ends, only
         the end is compared: the cubic may then leave the limits and return.
         """
         (y, v), (y_end, v_end) = before[:2], after[:2]
