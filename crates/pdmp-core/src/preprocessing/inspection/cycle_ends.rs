@@ -1,7 +1,8 @@
 //! Cycles that are not closed, and such that repeat their first sample at the end.
 
-use super::{Finding, Survey, turn_of};
-use crate::demonstration::{Demonstration, Sampling};
+use super::{Finding, Survey};
+use crate::demonstration::{Demonstration, Sampling, turn_of};
+use crate::numerics::statistics::range;
 
 /// Minimum step from the end of a cycle to its start, relative to the largest step within it, that is reported.
 const MIN_RATIO: f64 = 4.0;
@@ -43,9 +44,7 @@ fn ends_of(demo: usize, survey: &Survey) -> Option<Finding> {
     let mut squares = [0.0; 4];
     for d in 0..survey.n_dofs {
         let (column, turn) = (survey.column(d), turn_of(survey.demo.units().map_or("", |units| &units[d])));
-        let (low, high) =
-            column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(*y), high.max(*y)));
-        let range = high - low;
+        let range = range(column.iter());
         if range == 0.0 {
             continue;
         }

@@ -27,7 +27,7 @@ pub use crate::model::finding::{Finding, Padding};
 use crate::validate::row_major;
 
 pub use cycle_ends::cycle_ends;
-pub use turns::{turn_of, unwound};
+pub use turns::unwound;
 
 /// Minimum number of samples for an estimate of the usual step of a degree of freedom.
 const MIN_SAMPLES: usize = 10;
