@@ -69,19 +69,9 @@ class Group:
 
 def groups() -> Iterator[Group]:
     """Yields every available group, and prints why others are not available."""
-    try:
-        for shape, demos in handwriting().items():
-            yield Group("handwriting", shape, "discrete", [thinned(demo) for demo in demos])
-    except ImportError as reason:
-        print(f"left out: {reason}")
-    for source, selection in DISCRETE.items():
-        if not is_available(source):
-            continue
-        members = defaultdict(list)
-        for name, demo in read_folder(folder(source), columns=selection.columns).items():
-            members["_".join(name.split("_")[: selection.group])].append(thinned(demo))
-        for name, demos in members.items():
-            yield Group(source, name, "discrete", few(demos))
+    for source, tasks in discrete():
+        for name, demos in tasks.items():
+            yield Group(source, name, "discrete", [thinned(demo) for demo in few(demos)])
     if is_available("gait_boys"):
         boys = [cycle(demo.position, 1.0) for demo in recorded("gait_boys")]
         yield Group("gait_boys", "", "rhythmic", few(boys))
@@ -90,6 +80,24 @@ def groups() -> Iterator[Group]:
     if is_available("walk_styles_bandai"):
         walks = [demo for _, demo in walking_strides(ARM, stride="0")]
         yield Group("walk_styles_bandai", "", "rhythmic", few(walks))
+
+
+def discrete() -> Iterator[tuple[str, dict[str, list[Demonstration]]]]:
+    """Yields every available set of discrete movements as its name and its tasks.
+
+    Prints why others are not available. A task has its demonstrations with all their samples.
+    """
+    try:
+        yield "handwriting", {shape: list(demos) for shape, demos in handwriting().items()}
+    except ImportError as reason:
+        print(f"left out: {reason}")
+    for source, selection in DISCRETE.items():
+        if not is_available(source):
+            continue
+        tasks = defaultdict(list)
+        for name, demo in read_folder(folder(source), columns=selection.columns).items():
+            tasks["_".join(name.split("_")[: selection.group])].append(demo)
+        yield source, tasks
 
 
 def is_available(source: str) -> bool:

@@ -175,3 +175,15 @@ def test_warnings_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["fit", str(path), "-o", str(tmp_path / "m")]) == 0
     (warning,) = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
     assert re.match(r"pdmp: warning: .*a\.csv, column 't': time stamps are read as ms", warning)
+
+
+def test_values_of_the_user_are_quoted_as_given(
+    model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A value that reads like an argument keeps its text, while arguments become options."""
+    value = "style=x: goal = 3"
+    arguments = ["rollout", str(model_file), "--context", "2", value, "-o", str(tmp_path / "r.csv")]
+    assert main(arguments) == 1
+    error = capsys.readouterr().err
+    assert f'"{value}"' in error or f"'{value}'" in error
+    assert "--context" in error

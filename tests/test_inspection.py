@@ -117,3 +117,37 @@ def test_gaps_across_a_wrap_need_the_unit(tmp_path: Path) -> None:
         else:
             whole = pdmp.preprocessing.unwrap(pdmp.io.read_csv(path, max_gap=0.5))
             np.testing.assert_allclose(whole.position[:, 0], angle, atol=1e-6)
+
+
+def test_open_cycles_are_reported_with_the_step() -> None:
+    """A reach that is fitted as a cycle is reported with the step from its end to its start."""
+    s = np.linspace(0, 1, 101)
+    reach = np.column_stack([s**3 * (10 - 15 * s + 6 * s**2), np.sin(np.pi * s) ** 2])
+    with pytest.warns(UserWarning, match=r'demo 0: "y0" steps by 1 from the end of the cycle'):
+        pdmp.fit([reach], dt=0.01, kind="rhythmic")
+
+
+def test_repeated_first_sample_of_a_cycle_is_reported() -> None:
+    """A cycle that ends with the first sample of the next one is reported, and no other."""
+    phase = np.linspace(0, 2 * np.pi, 101)
+    cycle = np.column_stack([np.sin(phase), np.cos(phase)])
+    with pytest.warns(UserWarning, match="demo 0: the last sample repeats the first"):
+        pdmp.fit([cycle], dt=0.01, kind="rhythmic")
+    model = pdmp.fit([cycle[:-1]], dt=0.01, kind="rhythmic")
+    assert np.abs(model.rollout(dt=0.001).acceleration).max() == pytest.approx(39.5, rel=0.01)
+
+
+def test_closed_cycles_are_not_reported() -> None:
+    """Cycles of any length and shape, clean or noisy, close in one sampling interval."""
+    random = np.random.default_rng(0)
+    for _ in range(100):
+        phase = np.linspace(0, 2 * np.pi, random.integers(20, 300), endpoint=False)[:, None]
+        waves = range(1, 6)
+        cycle = sum(
+            random.normal(size=3) / k**2 * np.cos(k * phase + random.uniform(0, 6, 3))
+            for k in waves
+        )
+        cycle = cycle + random.choice([0, 1e-3, 1e-2]) * random.normal(size=(len(phase), 3))
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", message=".*cycle")
+            pdmp.fit([cycle], dt=0.01, kind="rhythmic", n_styles=1)

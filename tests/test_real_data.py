@@ -109,6 +109,7 @@ def test_gait_of_boys_is_reproduced(basis: Any) -> None:
     assert worst_error(model, demos) <= 0.02
 
 
+@pytest.mark.filterwarnings("ignore:.*from the end of the cycle")
 def test_running_strides_are_reproduced() -> None:
     """Strides in three planes of three joints are reproduced to 0.5 % of their range."""
     whole = recordings("running_strides", 60)

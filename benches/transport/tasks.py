@@ -1,15 +1,14 @@
 """Tasks: the demonstrations of one primitive, from every available set of discrete movements."""
 
-from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from pdmp import Demonstration
-from pdmp.datasets import folder, handwriting
+from pdmp.datasets import folder
 from pdmp.io import read_folder
-from recordings import ARM, DISCRETE, is_available
+from recordings import ARM, discrete
 from report.sets import cut, numbers, rows
 
 
@@ -24,17 +23,7 @@ class Task:
 
 def tasks() -> Iterator[Task]:
     """Yields every available task with all its demonstrations and samples."""
-    try:
-        for shape, demos in handwriting().items():
-            yield Task("handwriting", shape, list(demos))
-    except ImportError as reason:
-        print(f"left out: {reason}")
-    for source, selection in DISCRETE.items():
-        if not is_available(source):
-            continue
-        members = defaultdict(list)
-        for name, demo in read_folder(folder(source), columns=selection.columns).items():
-            members["_".join(name.split("_")[: selection.group])].append(demo)
+    for source, members in discrete():
         for name, demos in members.items():
             yield Task(source, name, demos)
         if source == "raise_hand_bandai":

@@ -1254,10 +1254,10 @@ class Model:
         limits : Limits, optional
             Limits that every tick keeps, see `Controller.limits`.
         transition : float, optional
-            Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0
-            switches immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of
-            the period (rhythmic). A new goal takes the remaining time of the movement if that is longer, unless
-            transport is immediate.
+            Time in s to 99 % of a change of style, anchor, amplitude, tau or speed, at the model's tau; 0 switches
+            immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of the period
+            (rhythmic). It filters a new goal with immediate transport; with learnt transport a goal takes the time that
+            `Controller.goal` states, which grows with `transition`.
         context : array_like or list, (Q,), optional
             Context whose prediction supplies absent conditions.
         **changes
@@ -1363,7 +1363,8 @@ class Conditions:
         Start velocity per s; by default that of the demonstrations.
     goal_velocity : array_like, (D,), optional
         Final velocity per s with which a discrete movement passes its goal at the end, such as that of a strike; by
-        default that of the demonstrations. It needs learnt transport.
+        default that of the demonstrations. It needs learnt transport. See `Controller.goal_velocity` for changes on the
+        way.
     anchor : array_like, (D,), optional
         Anchor y_a, the centre of oscillation, in the unit of each degree of freedom; rhythmic.
     amplitude : float, optional
@@ -1728,12 +1729,12 @@ class Controller:
         A measured position and coupling terms perturb the equations::
 
             tau y' = z + w(u) + k_t d + tau c_v
-            tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
+            tau z' = alpha_z (beta_z (c - y) - z) + tau**2 c_a
             tau u' = max(0, k + k_phi sin(phase - phi))     k = 1 / (1 + k_s |d / range|**2)
             tau o' = 5 k (e - o) / extent
 
-        with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
-        tracking error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All
+        about the frame c, which is the goal or anchor with immediate transport, with the gains (k_s, k_t) of
+        `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the tracking error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All
         terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
         m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
         there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
@@ -1907,7 +1908,12 @@ class Controller:
         """Time since the start in s."""
     @property
     def goal(self) -> _Array:
-        """Goal g (D,) of a discrete movement; a read-only copy. Assign all values at once."""
+        """Goal g (D,) of a discrete movement; a read-only copy. Assign all values at once.
+
+        With learnt transport the movement goes to a new goal with minimum jerk, until its end, or for the shortest duration
+        in which it is no faster than the paper's equations if less time is left. On the way to a final velocity, a goal
+        that comes later than that is taken up past the end.
+        """
     @goal.setter
     def goal(self, goal: ArrayLike, /) -> None: ...
     @property
@@ -1919,6 +1925,9 @@ class Controller:
     def goal_velocity(self) -> _Array | None:
         """Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
         demonstrations; a read-only copy. Assign all values at once.
+
+        It is met to rounding after any change of it or of tau before the last tenth of the movement, and of goal or style
+        before the last third (at the default transition). Later changes do not affect the arrival.
         """
     @goal_velocity.setter
     def goal_velocity(self, velocity: ArrayLike | None, /) -> None: ...

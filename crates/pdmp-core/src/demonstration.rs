@@ -1,5 +1,7 @@
 //! Demonstrations: recorded movements whose shapes and numbers are checked.
 
+use std::f64::consts::TAU;
+
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
@@ -242,4 +244,20 @@ pub(crate) fn check_context(context: &[ContextValue]) -> Result<()> {
         ContextValue::Number(number) => check_number("context", index, *number),
         ContextValue::Label(_) => Ok(()),
     })
+}
+
+/// Returns a full turn in a unit of angles; `None` for other units.
+///
+/// ```
+/// use pdmp_core::demonstration::turn_of;
+///
+/// assert_eq!(turn_of("deg"), Some(360.0));
+/// assert_eq!(turn_of("m"), None);
+/// ```
+pub fn turn_of(unit: &str) -> Option<f64> {
+    match unit.trim() {
+        "rad" | "radian" | "radians" => Some(TAU),
+        "deg" | "degree" | "degrees" | "°" => Some(360.0),
+        _ => None,
+    }
 }

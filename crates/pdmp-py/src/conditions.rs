@@ -35,7 +35,8 @@ const NAMES: [&str; 10] =
 ///     Start velocity per s; by default that of the demonstrations.
 /// goal_velocity : array_like, (D,), optional
 ///     Final velocity per s with which a discrete movement passes its goal at the end, such as that of a strike; by
-///     default that of the demonstrations. It needs learnt transport.
+///     default that of the demonstrations. It needs learnt transport. See `Controller.goal_velocity` for changes on the
+///     way.
 /// anchor : array_like, (D,), optional
 ///     Anchor y_a, the centre of oscillation, in the unit of each degree of freedom; rhythmic.
 /// amplitude : float, optional

@@ -85,12 +85,12 @@ impl Controller {
     /// A measured position and coupling terms perturb the equations::
     ///
     ///     tau y' = z + w(u) + k_t d + tau c_v
-    ///     tau z' = alpha_z (beta_z (g - y) - z) + tau**2 c_a
+    ///     tau z' = alpha_z (beta_z (c - y) - z) + tau**2 c_a
     ///     tau u' = max(0, k + k_phi sin(phase - phi))     k = 1 / (1 + k_s |d / range|**2)
     ///     tau o' = 5 k (e - o) / extent
     ///
-    /// with the gains (k_s, k_t) of `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the
-    /// tracking error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All
+    /// about the frame c, which is the goal or anchor with immediate transport, with the gains (k_s, k_t) of
+    /// `compliance` and the phase x = exp(-alpha_x u) or phi = u. e = m - y is the tracking error, o its estimated systematic part, and d the part of e beyond o; extent is T / tau or 2 pi. All
     /// terms are evaluated at the start of the tick and constant over it. A tick of any length pulls y no further than
     /// m. A robot that is blocked thus holds the movement and nearly stops its phase; released, it continues from
     /// there. A robot with a constant tracking error ends no further from the goal than that error, and the movement
@@ -238,6 +238,10 @@ impl Controller {
     }
 
     /// Goal g (D,) of a discrete movement; a read-only copy. Assign all values at once.
+    ///
+    /// With learnt transport the movement goes to a new goal with minimum jerk, until its end, or for the shortest duration
+    /// in which it is no faster than the paper's equations if less time is left. On the way to a final velocity, a goal
+    /// that comes later than that is taken up past the end.
     #[getter]
     fn goal<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
         self.centre(py, Kind::Discrete, "a rhythmic primitive has no goal; it has an anchor")
@@ -265,6 +269,9 @@ impl Controller {
 
     /// Final velocity (D,) per s with which a discrete movement passes its goal at the end, or None for that of the
     /// demonstrations; a read-only copy. Assign all values at once.
+    ///
+    /// It is met to rounding after any change of it or of tau before the last tenth of the movement, and of goal or style
+    /// before the last third (at the default transition). Later changes do not affect the arrival.
     #[getter]
     fn goal_velocity<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
         self.inner.goal_velocity().map(|velocity| read_only(py, velocity))

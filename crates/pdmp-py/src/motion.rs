@@ -88,10 +88,10 @@ impl Model {
     /// limits : Limits, optional
     ///     Limits that every tick keeps, see `Controller.limits`.
     /// transition : float, optional
-    ///     Time in s to 99 % of a change of style, goal, anchor, amplitude, tau or speed, at the model's tau; 0
-    ///     switches immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of
-    ///     the period (rhythmic). A new goal takes the remaining time of the movement if that is longer, unless
-    ///     transport is immediate.
+    ///     Time in s to 99 % of a change of style, anchor, amplitude, tau or speed, at the model's tau; 0 switches
+    ///     immediately, as in the paper. By default a tenth of the nominal duration (discrete) or a quarter of the period
+    ///     (rhythmic). It filters a new goal with immediate transport; with learnt transport a goal takes the time that
+    ///     `Controller.goal` states, which grows with `transition`.
     /// context : array_like or list, (Q,), optional
     ///     Context whose prediction supplies absent conditions.
     /// **changes

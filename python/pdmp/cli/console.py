@@ -53,7 +53,13 @@ def one_line(message: object, options: Mapping[str, str]) -> str:
         r"(?= = | and | has |: | does not | is missing| needs )"
         rf"|^({name})(?=\[\d)"
     )
-    return argument.sub(lambda match: options["".join(filter(None, match.groups()))], text)
+    # Quoted parts are values of the user.
+    parts = re.split(r"""("[^"]*"|'[^']*')""", text)
+    parts[::2] = [
+        argument.sub(lambda match: options["".join(filter(None, match.groups()))], part)
+        for part in parts[::2]
+    ]
+    return "".join(parts)
 
 
 @contextmanager

@@ -86,6 +86,7 @@ fn psi(x: f64, exp: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::runge_kutta::rk4;
     use approx::assert_relative_eq;
 
     /// The output system under the braking forcing follows v·exp(−λv), by RK4, for rates below, at and above α_z.
@@ -96,17 +97,10 @@ mod tests {
             let braking = Braking::new(attractor, 2.0 * lambda);
             let forcing = |v: f64| braking.forcing(v)[0] * (-attractor.alpha_z * v).exp();
             let flow = |v: f64, [e, z]: [f64; 2]| [z + forcing(v), -25.0 * (6.25 * e + z)];
-            let add = |s: [f64; 2], k: [f64; 2], t: f64| [s[0] + t * k[0], s[1] + t * k[1]];
             let (mut state, h) = ([0.0; 2], 1e-4);
             for k in 0..5000 {
                 let v = f64::from(k) * h;
-                let a = flow(v, state);
-                let b = flow(v + h / 2.0, add(state, a, h / 2.0));
-                let c = flow(v + h / 2.0, add(state, b, h / 2.0));
-                let d = flow(v + h, add(state, c, h));
-                for i in 0..2 {
-                    state[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
-                }
+                state = rk4(flow, v, state, h);
                 assert_relative_eq!(state[0], (v + h) * (-lambda * (v + h)).exp(), epsilon = 1e-9);
             }
         }

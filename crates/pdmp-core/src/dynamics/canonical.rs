@@ -139,30 +139,23 @@ pub(crate) fn faded(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::runge_kutta::rk4;
     use approx::assert_relative_eq;
 
     /// Integrates u' = f(u) over [0, 1] by RK4, independently of the closed forms.
-    fn rk4(mut y: f64, f: impl Fn(f64) -> f64) -> f64 {
-        let h = 1e-4;
-        for _ in 0..10_000 {
-            let k1 = f(y);
-            let k2 = f(y + h / 2.0 * k1);
-            let k3 = f(y + h / 2.0 * k2);
-            let k4 = f(y + h * k3);
-            y += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
-        }
-        y
+    fn integrated(y: f64, f: impl Fn(f64) -> f64) -> f64 {
+        (0..10_000).fold([y], |y, _| rk4(|_, [y]| [f(y)], 0.0, y, 1e-4))[0]
     }
 
     #[test]
     fn x_solves_the_discrete_canonical_system() {
         let canonical = Canonical::Discrete { alpha_x: 4.6, u_end: 1.0 };
-        assert_relative_eq!(canonical.phase(1.0), rk4(1.0, |x| -4.6 * x), max_relative = 1e-12);
+        assert_relative_eq!(canonical.phase(1.0), integrated(1.0, |x| -4.6 * x), max_relative = 1e-12);
     }
 
     #[test]
     fn r_solves_the_amplitude_equation_and_converges() {
-        assert_relative_eq!(amplitude(2.5, 0.2, 1.5, 1.0), rk4(0.2, |r| 2.5 * (1.5 - r)), max_relative = 1e-12);
+        assert_relative_eq!(amplitude(2.5, 0.2, 1.5, 1.0), integrated(0.2, |r| 2.5 * (1.5 - r)), max_relative = 1e-12);
         assert_relative_eq!(amplitude(2.5, 0.2, 1.5, 40.0), 1.5, max_relative = 1e-12);
     }
 }

@@ -291,6 +291,7 @@ impl CommandFilter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::runge_kutta::rk4;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
@@ -319,17 +320,8 @@ mod tests {
     #[test]
     fn values_solve_the_filter_equation() {
         let (mut command, gains) = stepped();
-        let (mut x, mut v, n) = (2.0, 0.0, 1000);
-        let h = 0.2 / f64::from(n);
-        let f = |x: f64, v: f64| (v, -2.0 * gains.omega * v - gains.omega.powi(2) * (x - 5.0));
-        for _ in 0..n {
-            let a = f(x, v);
-            let b = f(x + h / 2.0 * a.0, v + h / 2.0 * a.1);
-            let c = f(x + h / 2.0 * b.0, v + h / 2.0 * b.1);
-            let d = f(x + h * c.0, v + h * c.1);
-            x += h / 6.0 * (a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0);
-            v += h / 6.0 * (a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1);
-        }
+        let f = |_, [x, v]: [f64; 2]| [v, -2.0 * gains.omega * v - gains.omega.powi(2) * (x - 5.0)];
+        let [x, v] = (0..1000).fold([2.0, 0.0], |state, _| rk4(f, 0.0, state, 0.2 / 1000.0));
         command.advance::<F64x4>(&gains.step_with_integral(0.2));
         assert_relative_eq!(first_element(command.value()), x, max_relative = 1e-9);
         assert_relative_eq!(first_element(command.rate()), v, max_relative = 1e-8);
@@ -358,22 +350,15 @@ mod tests {
     fn first_order_response_solves_its_equation() {
         let (start, gains) = stepped();
         for m in [0.3, gains.omega * (1.0 - 1e-9), gains.omega * 1.01, 500.0] {
-            let (mut q, n) = (1.0, 2000);
+            let n = 2000;
             let h = 0.1 / f64::from(n);
             let x = |t: f64| {
                 let mut command = start.clone();
                 command.advance::<F64x4>(&gains.step(t));
                 first_element(command.value())
             };
-            for k in 0..n {
-                let t = f64::from(k) * h;
-                let f = |t: f64, q: f64| m * (x(t) - q);
-                let a = f(t, q);
-                let b = f(t + h / 2.0, q + h / 2.0 * a);
-                let c = f(t + h / 2.0, q + h / 2.0 * b);
-                let d = f(t + h, q + h * c);
-                q += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
-            }
+            let f = |t: f64, [q]: [f64; 1]| [m * (x(t) - q)];
+            let [q] = (0..n).fold([1.0], |q, k| rk4(f, f64::from(k) * h, q, h));
             assert_relative_eq!(gains.first_order_response(&start, 1.0, m, 0.1), q, max_relative = 1e-9);
         }
     }

@@ -199,6 +199,7 @@ impl MinDurations {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::runge_kutta::rk4;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
@@ -257,20 +258,17 @@ mod tests {
             let MinDurations { by_velocity, by_acceleration } = MinDurations::new(attractor, filter / omega);
             // ωt at which 99 % of a filtered step are done.
             let rate = if filter > 0.0 { 6.638_352 * omega / filter } else { 0.0 };
-            let slopes = |[x, v, e, z]: [f64; 4]| {
+            let slopes = |_, [x, v, e, z]: [f64; 4]| {
                 [v, -2.0 * rate * v - rate * rate * (x - 1.0), z, alpha_z * (attractor.beta_z * (x - e) - z)]
             };
-            let add = |a: [f64; 4], b: [f64; 4], h: f64| std::array::from_fn(|i| a[i] + h * b[i]);
             let h = 0.02 / rate.max(omega);
             let mut state = [if filter > 0.0 { 0.0 } else { 1.0 }, 0.0, 0.0, 0.0];
             let [mut peak_velocity, mut peak_acceleration] = [0.0f64; 2];
             for _ in 0..((8.0 + filter) / (omega * h)) as usize {
-                let a = slopes(state);
-                (peak_velocity, peak_acceleration) = (peak_velocity.max(a[2].abs()), peak_acceleration.max(a[3].abs()));
-                let b = slopes(add(state, a, 0.5 * h));
-                let c = slopes(add(state, b, 0.5 * h));
-                let d = slopes(add(state, c, h));
-                state = add(state, std::array::from_fn(|i| a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]), h / 6.0);
+                let [_, _, velocity, acceleration] = slopes(0.0, state);
+                peak_velocity = peak_velocity.max(velocity.abs());
+                peak_acceleration = peak_acceleration.max(acceleration.abs());
+                state = rk4(slopes, 0.0, state, h);
             }
             prop_assert!(PEAK_VELOCITY / by_velocity <= 1.001 * peak_velocity);
             prop_assert!(PEAK_ACCELERATION / (by_acceleration * by_acceleration) <= 1.001 * peak_acceleration);

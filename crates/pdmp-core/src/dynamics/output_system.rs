@@ -274,6 +274,7 @@ fn hermite_weights(h: f64, phi: [f64; 5]) -> HermiteWeights {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::runge_kutta::rk4;
     use approx::assert_relative_eq;
     use nalgebra::Matrix2;
     use ndarray::Array1;
@@ -288,16 +289,8 @@ mod tests {
             c[0] + x * (c[1] + x * (c[2] + x * c[3]))
         };
         let f = |u: f64, [e, z]: [f64; 2]| [z + cubic(w, u), system.alpha_z * (system.beta_z * (cubic(g, u) - e) - z)];
-        let add = |a: [f64; 2], k: [f64; 2], t: f64| [a[0] + t * k[0], a[1] + t * k[1]];
         for i in 0..n {
-            let u = i as f64 * dt;
-            let k1 = f(u, s);
-            let k2 = f(u + dt / 2.0, add(s, k1, dt / 2.0));
-            let k3 = f(u + dt / 2.0, add(s, k2, dt / 2.0));
-            let k4 = f(u + dt, add(s, k3, dt));
-            for i in 0..2 {
-                s[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
-            }
+            s = rk4(f, i as f64 * dt, s, dt);
         }
         s
     }

@@ -8,6 +8,7 @@ use crate::context::{ContextColumn, ContextMap, tabulate};
 use crate::demonstration::{ContextValue, Demonstration};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
+use crate::kind::Kind;
 use crate::learning::alignment::{Aligned, TimeScaling};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::options::TransportSelection;
@@ -16,7 +17,7 @@ use crate::learning::targets::Targets;
 use crate::model::primitive::{Parts, Primitive, end_velocities};
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
-use crate::preprocessing::inspection::{inspect, unwound};
+use crate::preprocessing::inspection::{cycle_ends, inspect, unwound};
 use crate::validate::{check_length, check_names};
 
 use super::braking_rate::braking_rate;
@@ -79,6 +80,9 @@ pub fn fit_with(
     }
     let threads = options.threads;
     let mut findings = inspect(demos, options.dt);
+    if options.canonical.kind() == Kind::Rhythmic {
+        findings.extend(cycle_ends(demos));
+    }
     let whole = unwound(demos);
     let demos = &*whole;
     let mut aligned = options.alignment().align(demos, threads)?;

@@ -81,6 +81,22 @@ pub enum Finding {
         /// True if the turns were subtracted, because the unit is one of angles.
         mended: bool,
     },
+    /// A rhythmic demonstration whose end does not meet its start.
+    OpenCycle {
+        /// Index of the demonstration.
+        demo: usize,
+        /// Name of the degree of freedom.
+        dof: String,
+        /// Step from the last sample to the first one, in the unit of the degree of freedom.
+        opening: f64,
+        /// That step relative to the largest one within the cycle.
+        ratio: f64,
+    },
+    /// A rhythmic demonstration whose last sample repeats its first one.
+    RepeatedEnd {
+        /// Index of the demonstration.
+        demo: usize,
+    },
     /// Gains so high that the accelerations of the reproduction far exceed those of the demonstration.
     Stiff {
         /// Gain α_z, per unit of the clock.
@@ -205,6 +221,19 @@ impl fmt::Display for Finding {
                     "an angle? Give its unit, \"rad\" or \"deg\", to subtract the turns"
                 })
             }
+            Self::OpenCycle { demo, dof, opening, ratio } => write!(
+                f,
+                "demo {demo}: {dof:?} steps by {} from the end of the cycle to its start, {} times the largest step within: a \
+                 rhythmic demonstration is one closed cycle; cut it from a longer recording with pdmp.preprocessing.cycles, \
+                 which closes it, or fit a discrete movement",
+                short(*opening),
+                short(*ratio)
+            ),
+            Self::RepeatedEnd { demo } => write!(
+                f,
+                "demo {demo}: the last sample repeats the first: a rhythmic demonstration ends one sampling interval before \
+                 the next cycle starts; drop the last sample"
+            ),
             Self::Stiff { alpha_z, dof, demo, reproduced, shown, n_samples } => write!(
                 f,
                 "alpha_z = {}: the reproduction of demo {demo} accelerates up to {} in {dof:?}, the demonstration up to {}; \

@@ -27,6 +27,7 @@
 //! [doi:10.1016/S0079-6123(06)65027-9]: https://doi.org/10.1016/S0079-6123(06)65027-9
 //! [doi:10.1109/ROBOT.2009.5152385]: https://doi.org/10.1109/ROBOT.2009.5152385
 
+use crate::demonstration::turn_of;
 use crate::error::{Error, Result};
 use crate::motion::command::{Command, Coupling};
 use crate::numerics::simd::{F64x4, groups, pack, repack};
@@ -128,7 +129,8 @@ impl Perturbation {
         let inverse = |&range: &f64| if range > min_range { 1.0 / range } else { 0.0 };
         let zeros = vec![F64x4::ZERO; groups(ranges.len())];
         let inverse_range: Vec<f64> = ranges.iter().map(inverse).collect();
-        let turn: Vec<f64> = (0..ranges.len()).map(|d| units.get(d).map_or(0.0, |unit| full_turn(unit))).collect();
+        let turn: Vec<f64> =
+            (0..ranges.len()).map(|d| units.get(d).and_then(|unit| turn_of(unit)).unwrap_or(0.0)).collect();
         let inverse_turn: Vec<f64> = turn.iter().map(|&turn| if turn > 0.0 { 1.0 / turn } else { 0.0 }).collect();
         Self {
             terms: PerturbationTerms { velocity: zeros.clone(), acceleration: zeros.clone() },
@@ -304,17 +306,7 @@ impl Perturbation {
         Ok(())
     }
 }
-
 /// Returns 1/(1 + Σ) for the squares of a group of DoFs.
 fn stopped(squares: F64x4) -> f64 {
     1.0 / (1.0 + squares.to_array().iter().sum::<f64>())
-}
-
-/// Returns a full turn in a unit of angle, and zero for any other unit.
-fn full_turn(unit: &str) -> f64 {
-    match unit.trim() {
-        "rad" | "radian" | "radians" => std::f64::consts::TAU,
-        "deg" | "degree" | "degrees" | "°" => 360.0,
-        _ => 0.0,
-    }
 }

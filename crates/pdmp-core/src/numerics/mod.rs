@@ -2,6 +2,8 @@
 
 pub(crate) mod linear_algebra;
 pub(crate) mod orthonormal_span;
+#[cfg(test)]
+pub(crate) mod runge_kutta;
 pub(crate) mod simd;
 pub(crate) mod smoothing_spline;
 pub(crate) mod spline;

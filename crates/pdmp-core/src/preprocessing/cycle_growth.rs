@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use ndarray::{Array1, Array2};
 
+use crate::demonstration::turn_of;
 use crate::numerics::statistics::extremes;
-use crate::preprocessing::inspection::turn_of;
 
 /// Maximum deviation of the gain of an angle from whole turns, in turns: cycle onsets are accurate to about a percent.
 const ANGLE_TOLERANCE: f64 = 0.05;

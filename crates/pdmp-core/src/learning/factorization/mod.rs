@@ -21,7 +21,7 @@
 //! | 500 | 60 | 121 | 323 |
 //! | 1000 | 99 | 652 | 1412 |
 //!
-//! Where all factors of M = 20 are wanted, the second Gram pass takes 0.5 ms, and `householder` 1.0 ms.
+//! For all factors of M = 20 the second Gram pass takes 0.5 ms, and `householder` 1.0 ms.
 
 mod gram;
 mod householder;

@@ -291,6 +291,7 @@ impl Regression for NGnetRegression {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::runge_kutta::rk4;
     use approx::assert_abs_diff_eq;
     use ndarray::{Array1, Array2};
     use proptest::prelude::*;
@@ -319,20 +320,14 @@ mod tests {
 
     /// Integrates z′ = −25z + 25·6.25·(1 − y), and y′ = z + w if `w` is given, over [0, 1] by RK4. Returns rows (y, z).
     fn output_system(position: impl Fn(f64) -> f64, w: Option<&dyn Fn(f64) -> f64>, n_steps: usize) -> Vec<(f64, f64)> {
-        let rate = |u: f64, (y, z): (f64, f64)| {
+        let rate = |u: f64, [y, z]: [f64; 2]| {
             let y_driving = if w.is_some() { y } else { position(u) };
-            (w.map_or(0.0, |w| z + w(u)), -25.0 * z + 25.0 * 6.25 * (1.0 - y_driving))
+            [w.map_or(0.0, |w| z + w(u)), -25.0 * z + 25.0 * 6.25 * (1.0 - y_driving)]
         };
         let h = 1.0 / n_steps as f64;
         let mut states = vec![(0.0, 0.0)];
         for i in 0..n_steps {
-            let (u, s) = (i as f64 * h, states[i]);
-            let go = |k: (f64, f64), h: f64| (s.0 + h * k.0, s.1 + h * k.1);
-            let a = rate(u, s);
-            let b = rate(u + h / 2.0, go(a, h / 2.0));
-            let c = rate(u + h / 2.0, go(b, h / 2.0));
-            let d = rate(u + h, go(c, h));
-            states.push(go((a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0, a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1), h / 6.0));
+            states.push(rk4(rate, i as f64 * h, states[i].into(), h).into());
         }
         states
     }

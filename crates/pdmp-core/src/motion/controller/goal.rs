@@ -1,8 +1,9 @@
 //! Transition of the moving frame to a commanded goal and final velocity.
 //!
-//! The frame c(u) = g₁ + (g₀ − y₀)ℓ(u) + q(u) has a displacement q (`goal_transition`) that begins when a goal is commanded
-//! and ends, with rest, at the new goal; g₀ is the goal at the start, g₁ that before the transition. A final velocity is reached at u_end: q there compensates for the position and
-//! velocity at which the output system would arrive,
+//! The frame c(u) = g₁ + (g₀ − y₀)ℓ(u) + q(u) has a displacement q (`goal_transition`) that begins when a goal is
+//! commanded and ends, with rest, at the new goal; g₀ is the goal at the start, g₁ that before the transition. A
+//! final velocity is reached at u_end: q there compensates for the position and velocity at which the output system
+//! would arrive,
 //!
 //! ```text
 //! [e; z](u_end) = exp(A(u_end − u))·([e; z](u) − sᵀX(u)) + sᵀX(u_end),
@@ -39,19 +40,20 @@ impl Controller {
         let rest = u_end - self.clock.value();
         let late = self.started && rest < self.min_durations.by_acceleration;
         let fixed = self.started && rest < VELOCITY_DEADLINE * u_end;
-        match (self.approaching, self.conditions.has_goal_velocity) {
-            (true, true) if late && fixed => {}
-            (true, false) if late => {}
-            (true, true) if late => self.change_final_velocity(),
-            (false, true)
-                if rest > 0.0
-                    && !fixed
-                    && !(late && self.goal_transition.is_active() && self.goal_transition.end() > u_end) =>
-            {
-                self.approach(u_end, late)
+        let has_goal_velocity = self.conditions.has_goal_velocity;
+        if self.approaching && late {
+            if has_goal_velocity && !fixed {
+                self.change_final_velocity();
             }
-            (true, true) => self.approach(u_end, false),
-            _ => self.move_frame(u_end),
+            return;
+        }
+        // A transition that ends past u_end would have to be shortened.
+        let prolonged = self.goal_transition.is_active() && self.goal_transition.end() > u_end;
+        let reachable = rest > 0.0 && !fixed && !(late && prolonged);
+        if has_goal_velocity && (self.approaching || reachable) {
+            self.approach(u_end, late);
+        } else {
+            self.move_frame(u_end);
         }
     }
 

@@ -7,11 +7,13 @@
 //! | `padding` | rows that were appended to make recordings equally long |
 //! | `counters` | a column that counts samples, or repeats the time stamps |
 //! | `turns` | angles that jump by a full turn, or that are offset by whole turns between demonstrations |
+//! | `cycle_ends` | cycles that are not closed, or repeat their first sample |
 //!
 //! One pass over the samples computes the largest step and detects zeros, which rules out most faults cheaply. A fit adds
 //! its own findings, such as gains whose transients the samples do not resolve (`learning/stiffness.rs`).
 
 mod counters;
+mod cycle_ends;
 mod dropouts;
 mod padding;
 mod time_stamps;
@@ -24,7 +26,8 @@ use crate::model::finding::SampleLocation;
 pub use crate::model::finding::{Finding, Padding};
 use crate::validate::row_major;
 
-pub use turns::{turn_of, unwound};
+pub use cycle_ends::cycle_ends;
+pub use turns::unwound;
 
 /// Minimum number of samples for an estimate of the usual step of a degree of freedom.
 const MIN_SAMPLES: usize = 10;

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use super::{Finding, Survey};
-use crate::demonstration::Demonstration;
+use crate::demonstration::{Demonstration, turn_of};
 use crate::numerics::statistics::{extremes, range};
 
 /// Maximum deviation of an offset from whole turns, in turns; movements from different starts deviate more.
@@ -20,22 +20,6 @@ const MAX_TURNS_UNKNOWN: f64 = 3.0;
 const WRAPS: [f64; 2] = [0.9, 1.02];
 /// Maximum step of such an angle elsewhere, in turns.
 const MAX_STEP: f64 = 0.1;
-
-/// Returns a full turn in a unit of angles; `None` for other units.
-///
-/// ```
-/// use pdmp_core::preprocessing::inspection::turn_of;
-///
-/// assert_eq!(turn_of("deg"), Some(360.0));
-/// assert_eq!(turn_of("m"), None);
-/// ```
-pub fn turn_of(unit: &str) -> Option<f64> {
-    match unit.trim() {
-        "rad" | "radian" | "radians" => Some(TAU),
-        "deg" | "degree" | "degrees" | "°" => Some(360.0),
-        _ => None,
-    }
-}
 
 /// Kind of the unit of a degree of freedom.
 enum Unit {
