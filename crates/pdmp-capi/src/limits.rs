@@ -21,6 +21,9 @@ pub struct pdmp_limits {
     pub velocity: pdmp_vector,
     /// Limits of |y''| (1) or (n_dofs), in the unit of each DoF per second squared; positive.
     pub acceleration: pdmp_vector,
+    /// 0, the default: what one DoF cannot follow slows all of them along the path, and only then single ones are limited.
+    /// Otherwise every DoF is limited on its own.
+    pub independent: i32,
 }
 
 /// Limit that determines the acceleration of a DoF.
@@ -67,6 +70,7 @@ impl pdmp_limits {
             upper: owned("upper", self.upper)?,
             velocity: owned("velocity", self.velocity)?,
             acceleration: owned("acceleration", self.acceleration)?,
+            synchronous: self.independent == 0,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use pdmp_core::motion::{Limit, Limits as Inner};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{IntoPyDict, PyTuple};
 
 use crate::controller::Controller;
 use crate::convert::{Vector, numbers, read_only};
@@ -23,6 +23,9 @@ use crate::instance::{self, pair};
 ///     Limit of the velocity's magnitude per s, positive.
 /// acceleration : float or array_like, (D,), optional
 ///     Limit of the acceleration's magnitude per s², positive.
+/// synchronous : bool
+///     True: a controller slows all degrees of freedom along the path if one cannot follow it, and only then limits single
+///     ones. False: it limits every degree of freedom on its own.
 ///
 /// Raises
 /// ------
@@ -47,11 +50,12 @@ pub(crate) struct Limits(pub(crate) Inner);
 #[pymethods]
 impl Limits {
     #[new]
-    #[pyo3(signature = (position=None, velocity=None, acceleration=None))]
+    #[pyo3(signature = (position=None, velocity=None, acceleration=None, *, synchronous=true))]
     fn new(
         position: Option<&Bound<'_, PyAny>>,
         velocity: Option<&Bound<'_, PyAny>>,
         acceleration: Option<&Bound<'_, PyAny>>,
+        synchronous: bool,
     ) -> PyResult<Self> {
         let limit = |name: &str, value: Option<&Bound<'_, PyAny>>| {
             value.filter(|value| !value.is_none()).map(|value| numbers(name, Some(value))).transpose()
@@ -63,6 +67,7 @@ impl Limits {
             upper: limit("upper", upper.as_ref())?,
             velocity: limit("velocity", velocity)?,
             acceleration: limit("acceleration", acceleration)?,
+            synchronous,
         };
         let vectors = [&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration];
         let n_dofs = vectors.into_iter().flatten().map(Vec::len).fold(1, usize::max);
@@ -94,14 +99,21 @@ impl Limits {
         self.0.acceleration.as_ref().map(|limits| read_only(py, limits))
     }
 
-    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        let Inner { lower, upper, velocity, acceleration } = &self.0;
+    /// True if a controller slows all degrees of freedom along the path before it limits single ones.
+    #[getter]
+    fn synchronous(&self) -> bool {
+        self.0.synchronous
+    }
+
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let Inner { lower, upper, velocity, acceleration, synchronous } = &self.0;
         let position = (lower.is_some() || upper.is_some()).then_some((lower, upper));
-        (position, velocity, acceleration).into_pyobject(py)
+        let options = [("synchronous", synchronous)].into_py_dict(py)?;
+        ((position, velocity, acceleration), options).into_pyobject(py)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let Inner { lower, upper, velocity, acceleration } = &self.0;
+        let Inner { lower, upper, velocity, acceleration, synchronous } = &self.0;
         let text = |limits: &Option<Vec<f64>>| Ok::<_, PyErr>(limits.into_pyobject(py)?.repr()?.to_string());
         let mut parts = Vec::new();
         if lower.is_some() || upper.is_some() {
@@ -111,6 +123,9 @@ impl Limits {
             if limits.is_some() {
                 parts.push(format!("{name}={}", text(limits)?));
             }
+        }
+        if !synchronous {
+            parts.push("synchronous=False".to_owned());
         }
         Ok(format!("pdmp.Limits({})", parts.join(", ")))
     }
@@ -163,7 +178,8 @@ impl Limits {
             upper: finite(limits.upper),
             velocity: finite(limits.velocity),
             acceleration: finite(limits.acceleration),
+            synchronous: limits.synchronous,
         };
-        (limits != Inner::default()).then_some(Self(limits))
+        (limits != Inner { synchronous: limits.synchronous, ..Inner::default() }).then_some(Self(limits))
     }
 }

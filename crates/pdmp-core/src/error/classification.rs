@@ -61,6 +61,7 @@ impl Error {
             | Self::Kind { .. }
             | Self::LimitOrder { .. }
             | Self::LeavesLimits { .. }
+            | Self::StartsTooFast { .. }
             | Self::Argument { .. }
             | Self::Conflict { .. } => ErrorKind::Argument,
         }
@@ -99,6 +100,7 @@ impl Error {
             Self::Styles { .. } => Some("n_styles"),
             Self::Label { .. } | Self::NoNumber { .. } | Self::ContextNames { .. } => Some("context"),
             Self::Mixed { .. } => Some("contexts"),
+            Self::StartsTooFast { .. } => Some("velocity"),
             Self::LimitOrder { .. } | Self::LeavesLimits { .. } => Some("limits"),
             Self::Gap { .. }
             | Self::WrapInGap { .. }

@@ -368,6 +368,15 @@ pub enum Error {
         /// Fraction of the clock.
         phase: f64,
     },
+    /// A start from which the limits cannot be kept.
+    #[error(
+        "velocity: the movement starts {ratio:.3} times too fast to keep its limits on the path; start slower, or let a \
+         controller with these limits bend the path"
+    )]
+    StartsTooFast {
+        /// Rate at the start, relative to the largest admissible one.
+        ratio: f64,
+    },
     /// An argument that is missing, empty or unsuitable.
     #[error("{name} {problem}")]
     Argument {

@@ -18,6 +18,8 @@ const FREE_VELOCITY: f64 = 10.0;
 #[derive(Debug)]
 pub(super) struct Limiter {
     active: bool,
+    /// True if the rate of the clock is limited before single DoFs are.
+    synchronous: bool,
     /// True if no DoF was limited in the last tick.
     pub(super) is_free: bool,
     pub(super) bounds: Vec<Bounds>,
@@ -35,7 +37,18 @@ pub(super) struct Limiter {
     pub(super) substep_rate: f64,
 }
 
-clone_in_place!(Limiter { active, is_free, bounds, before, limited, excess, ranges, centre, substep_rate });
+clone_in_place!(Limiter {
+    active,
+    synchronous,
+    is_free,
+    bounds,
+    before,
+    limited,
+    excess,
+    ranges,
+    centre,
+    substep_rate
+});
 
 impl Limiter {
     /// Returns no limits for DoFs with the given ranges.
@@ -47,6 +60,7 @@ impl Limiter {
             Bounds { lower: -infinite, upper: infinite, velocity: infinite, acceleration: infinite, braking: infinite };
         Self {
             active: false,
+            synchronous: true,
             is_free: true,
             bounds: vec![none; groups(n_dofs)],
             before: vec![[F64x4::ZERO; 2]; groups(n_dofs)],
@@ -101,7 +115,8 @@ impl Limiter {
                 braking: lanes(&braking, infinity),
             };
         }
-        self.active = *limits != Limits::default();
+        self.active = *limits != Limits { synchronous: limits.synchronous, ..Limits::default() };
+        self.synchronous = limits.synchronous;
         self.substep_rate = substep_rate;
         Ok(())
     }
@@ -110,6 +125,12 @@ impl Limiter {
     #[inline(always)]
     pub(super) fn is_active(&self) -> bool {
         self.active
+    }
+
+    /// Returns whether limits of velocity or acceleration bound the rate of the clock.
+    pub(super) fn limits_rate(&self) -> bool {
+        let finite = |limit: F64x4| limit.to_array().iter().any(|limit| limit.is_finite());
+        self.synchronous && self.bounds.iter().any(|bounds| finite(bounds.velocity) || finite(bounds.acceleration))
     }
 
     /// Returns the limit that determined the acceleration of each DoF in the last tick.
@@ -151,6 +172,7 @@ impl Limiter {
             upper: vector(|bounds| bounds.upper),
             velocity: vector(|bounds| bounds.velocity),
             acceleration: vector(|bounds| bounds.acceleration),
+            synchronous: self.synchronous,
         }
     }
 
@@ -160,7 +182,8 @@ impl Limiter {
         let mut active = self.active;
         visit_flag(visit, &mut active)?;
         let mut limits = self.limits();
-        let Limits { lower, upper, velocity, acceleration } = &mut limits;
+        let Limits { lower, upper, velocity, acceleration, synchronous } = &mut limits;
+        visit_flag(visit, synchronous)?;
         for vector in [lower, upper, velocity, acceleration].into_iter().flatten() {
             visit(vector, [f64::NEG_INFINITY, f64::INFINITY])?;
         }

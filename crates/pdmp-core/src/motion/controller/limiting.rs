@@ -48,6 +48,7 @@ impl Controller {
     /// limits too tight for a tick of [`Controller::dt`]. The limits then remain unchanged.
     pub fn set_limits(&mut self, limits: &Limits) -> Result<()> {
         self.limiter.set(limits, self.primitive.duration(), self.dt)?;
+        self.limit_path();
         if !self.started {
             self.begin();
             return Ok(());
@@ -58,6 +59,7 @@ impl Controller {
         if self.has_frame() {
             self.start_goal_transition();
         }
+        self.look_ahead();
         self.read_out();
         Ok(())
     }
@@ -92,6 +94,7 @@ impl Controller {
     fn limit(&mut self, dt: f64) {
         self.limiter.is_free = true;
         self.limiter.limited.fill(None);
+        self.leave_path();
         for index in 0..self.groups.len() {
             let (bounds, before) = (self.limiter.bounds[index], self.limiter.before[index]);
             let wanted = [self.position[index], self.velocity[index]];

@@ -1,6 +1,6 @@
 //! Commands between ticks. A rejected command leaves the last valid one in force.
 
-use super::{Controller, Status};
+use super::{Controller, MAX_SPEED, Status};
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
 use crate::motion::perturbation::Compliance;
@@ -143,7 +143,7 @@ impl Controller {
     }
 
     /// Sets the speed, a factor of the rate 1/τ: 1 by default, 0 for a pause on the path. The change is filtered as that of
-    /// τ. The speed remains in force after [`Controller::reset`].
+    /// τ. Infinity is as fast as limits of velocity and acceleration allow ([`Controller::set_limits`]). The speed remains in force after [`Controller::reset`].
     ///
     /// ```
     /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
@@ -162,15 +162,19 @@ impl Controller {
     /// # Errors
     /// A speed outside [0, 1e6]. It then remains unchanged.
     pub fn set_speed(&mut self, speed: f64) -> Result<()> {
-        if !(0.0..=1e6).contains(&speed) {
-            return Err(Error::Range { name: "speed", value: speed, allowed: "must lie between 0, a pause, and 1e6" });
+        let unlimited = speed == f64::INFINITY && self.path_ahead.is_some();
+        if !((0.0..=1e6).contains(&speed) || unlimited) {
+            let allowed = "must lie between 0, a pause, and 1e6, or be infinite within synchronous limits of velocity or \
+                           acceleration";
+            return Err(Error::Range { name: "speed", value: speed, allowed });
         }
         self.speed = speed;
-        let rate = [speed / self.conditions.tau];
+        let rate = [self.commanded_rate()];
         if self.started {
             self.rate.set_target(&rate, &self.rate_gains);
         } else {
             self.rate.reset(&rate);
+            self.start_rate();
         }
         self.read_out();
         Ok(())
@@ -244,7 +248,13 @@ impl Controller {
         }
         self.perturbation.clear();
         self.change_phase_rate();
+        self.leave_path();
         self.read_out();
+    }
+
+    /// Returns the commanded rate: speed/τ, or that of an unlimited speed.
+    pub(super) fn commanded_rate(&self) -> f64 {
+        if self.speed.is_infinite() { MAX_SPEED / self.primitive.tau() } else { self.speed / self.conditions.tau }
     }
 
     /// Checks and applies a command.
@@ -282,7 +292,7 @@ impl Controller {
         if let Some(tau) = command.tau.filter(|tau| *tau != self.conditions.tau) {
             self.conditions.tau = tau;
             self.max_tau = self.max_tau.max(tau);
-            self.rate.set_target(&[self.speed / tau], &self.rate_gains);
+            self.rate.set_target(&[self.commanded_rate()], &self.rate_gains);
             changed = true;
         }
         if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != self.conditions.amplitude) {
@@ -306,6 +316,7 @@ impl Controller {
         if goal_changed || self.approaching || velocity_changed {
             self.start_goal_transition();
         }
+        self.look_ahead();
     }
 
     /// Commands the goal or anchor, moved inside the limits.

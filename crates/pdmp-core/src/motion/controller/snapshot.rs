@@ -133,6 +133,8 @@ impl Controller {
             acceleration,
             perturbation,
             limiter,
+            path_ahead: _,
+            rate_slope: _,
             phase_gain,
             command_step,
             min_durations: _,
@@ -178,7 +180,7 @@ impl Controller {
         time.walk(visit, TIME)?;
         clock.walk(visit, clocks)?;
         visit_number(visit, r, [0.0, MAX_MAGNITUDE])?;
-        visit_number(visit, speed, [0.0, 1e6])?;
+        visit_number(visit, speed, [0.0, f64::INFINITY])?;
         visit_number(visit, tolerance, [f64::MIN_POSITIVE, 1.0])?;
         visit_number(visit, phase_gain, [0.0, super::phase::MAX_PHASE_GAIN])?;
 

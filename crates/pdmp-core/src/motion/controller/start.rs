@@ -39,11 +39,12 @@ impl Controller {
         self.perturbation.clear();
         self.limiter.clear();
         (self.time, self.clock) = (CompensatedSum::default(), CompensatedSum::default());
+        let rate = self.commanded_rate();
         let conditions = &self.conditions;
         self.max_tau = conditions.tau;
         self.r = conditions.amplitude;
         self.style.reset(&conditions.style);
-        self.rate.reset(&[self.speed / conditions.tau]);
+        self.rate.reset(&[rate]);
         self.amplitude.reset(&[conditions.amplitude]);
         self.centre.reset(self.limiter.accept(&conditions.centre));
         if let (Kind::Discrete, Some(start)) = (self.primitive.kind(), &conditions.start) {
@@ -61,6 +62,7 @@ impl Controller {
         }
         self.update_lengths();
         self.read_out();
+        self.start_rate();
         self.limiter.begin(&self.position, &self.velocity);
     }
 

@@ -1,0 +1,291 @@
+//! Path of the movement ahead, and the rates at which the limits of velocity and acceleration admit to follow it.
+//!
+//! The path under the present commands does not depend on the rate ρ of the clock. A copy of the controller samples it at
+//! knots, and a backward pass (`time_law`) computes the largest ρ at each of them from which the rest can be followed. Between
+//! knots ρ² is linear. The limits of the path are slightly tighter than those of the DoFs, so that what lies between knots, and
+//! the last digits of the tick, keep the latter.
+
+use super::Controller;
+use super::step::first_element;
+use crate::dynamics::canonical::Canonical;
+use crate::kind::Kind;
+use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, max_constant};
+use crate::motion::viability::Bounds;
+use crate::numerics::simd::F64x4;
+use crate::numerics::state::clone_in_place;
+
+/// Number of intervals of the path.
+const N_INTERVALS: usize = 128;
+/// Number of intervals past the end of a discrete movement.
+const N_TAIL: usize = 32;
+/// Clock between the knots on both sides of the end, where y″ is not continuous, relative to the clock until then.
+const KINK: f64 = 1e-6;
+/// Margins of velocity and acceleration in the backward pass.
+const MARGINS: [f64; 2] = [0.005, 0.02];
+/// Margin of the acceleration at a tick: smaller than that of the path, so that the path can be followed.
+const TICK_MARGIN: f64 = 0.01;
+/// Clock past the end of a discrete movement, relative to its extent.
+const TAIL: f64 = 0.3;
+/// Number of periods of a rhythmic movement. The rate at the last knot is that of the slowest part; a period later it has no
+/// effect.
+const N_PERIODS: f64 = 1.5;
+/// Maximum ωh of a substep of the path during a transition of commands; the path then deviates by 1e-5 of the change.
+const MAX_TRANSITION_STEP: f64 = 14.0;
+
+/// Path ahead, with the largest ρ² at its knots.
+#[derive(Debug)]
+pub(super) struct PathAhead {
+    /// Copy of the controller that samples the path; itself without one.
+    sampler: Option<Box<Controller>>,
+    /// Limits of the backward pass.
+    limits: Vec<RateLimits>,
+    pub(super) path: SampledPath,
+    pub(super) curve: RateCurve,
+    /// Largest ρ² that can be kept constant in each interval and the next one.
+    constant: Vec<f64>,
+    pieces: [Piece; 2],
+    /// Clock of the phase since the path was sampled.
+    progress: f64,
+    /// False once a perturbation or a limit has moved the movement off the path.
+    is_current: bool,
+}
+
+clone_in_place!(PathAhead { sampler, limits, path, curve, constant, pieces, progress, is_current });
+
+impl PathAhead {
+    /// Returns memory for the path of a controller without one.
+    fn new(controller: &Controller) -> Self {
+        let n_groups = controller.groups.len();
+        Self {
+            sampler: Some(Box::new(controller.clone())),
+            limits: Vec::with_capacity(n_groups),
+            path: SampledPath::at(vec![0.0; N_INTERVALS + 1], n_groups),
+            curve: RateCurve::new(N_INTERVALS + 1, n_groups),
+            constant: vec![0.0; N_INTERVALS + 1],
+            pieces: [Piece::default(); 2],
+            progress: 0.0,
+            is_current: false,
+        }
+    }
+
+    /// Sets the limits of all groups.
+    fn set_limits(&mut self, bounds: &[Bounds]) {
+        self.limits.clear();
+        self.limits.extend(bounds.iter().map(|bounds| RateLimits {
+            velocity: bounds.velocity * (1.0 - MARGINS[0]),
+            acceleration: bounds.acceleration * (1.0 - MARGINS[1]),
+        }));
+    }
+
+    /// Samples the path of a controller.
+    fn compute(&mut self, controller: &Controller) {
+        let Some(mut sampler) = self.sampler.take() else { return };
+        (*sampler).clone_from(controller);
+        self.pieces = controller.pieces();
+        for Piece { first, start, interval } in self.pieces {
+            for (i, knot) in self.path.clock[first..].iter_mut().enumerate() {
+                *knot = start + interval * i as f64;
+            }
+        }
+        let longest = self.pieces[0].interval.max(self.pieces[1].interval);
+        sampler.max_clock_step = longest * (1.0 + 1e-9);
+        sampler.sample_path(&mut self.path);
+        self.sampler = Some(sampler);
+        for (i, constant) in self.constant.iter_mut().enumerate() {
+            let interval = i.min(N_INTERVALS - 1);
+            let here = max_constant(self.path.within(interval, (i - interval) as f64), &self.limits);
+            *constant = here.min(max_constant(self.path.within(interval, 0.5), &self.limits));
+        }
+        let rhythmic = controller.primitive.kind() == Kind::Rhythmic;
+        let end = if rhythmic { self.constant.iter().copied().fold(f64::INFINITY, f64::min) } else { f64::INFINITY };
+        self.curve.compute(&self.path, &self.limits, end, controller.max_rate().powi(2));
+        let mut following = [f64::INFINITY; 2];
+        for (constant, max) in self.constant.iter_mut().zip(&self.curve.max).rev() {
+            let here = constant.min(*max);
+            *constant = here.min(following[0]).min(following[1]);
+            following = [here, following[0]];
+        }
+        (self.progress, self.is_current) = (0.0, true);
+    }
+
+    /// Returns the interval that contains a progress, and the position in it from 0 to 1, past the end that at its end.
+    #[inline(always)]
+    fn locate(&self, progress: f64) -> (usize, f64) {
+        let piece = &self.pieces[usize::from(progress >= self.pieces[1].start)];
+        let position = (progress - piece.start) / piece.interval;
+        let index = (position as usize).min(N_INTERVALS - 1 - piece.first);
+        (piece.first + index, (position - index as f64).min(1.0))
+    }
+
+    /// Returns whether the rate of square `x` can be kept constant from the present clock on.
+    #[inline(always)]
+    pub(super) fn admits_constant(&self, x: f64) -> bool {
+        x <= self.constant[self.locate(self.progress).0]
+    }
+
+    /// Returns the largest ρ² at `ahead` on the clock from now.
+    pub(super) fn max(&self, ahead: f64) -> f64 {
+        let (index, t) = self.locate(self.progress + ahead);
+        self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t
+    }
+
+    /// Returns the largest constant ρ̇ from ρ over `dt` seconds that ends below the largest ρ² at the end.
+    pub(super) fn max_slope(&self, rate: f64, dt: f64, h: f64) -> f64 {
+        let (index, t) = self.locate(self.progress + h);
+        // ρ² is linear in the clock for constant ρ̇: x₀ + 2ρ̇(ρdt + ½ρ̇dt²) ≤ K + K′(ρdt + ½ρ̇dt² − h).
+        let slope = (self.curve.max[index + 1] - self.curve.max[index]) / self.path.interval(index);
+        let at_end = self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t;
+        let (square, linear) = (dt * dt, (2.0 * rate - 0.5 * slope * dt) * dt);
+        let constant = rate * rate - at_end - slope * (rate * dt - h);
+        // With a negative discriminant no ρ̇ suffices: the closest one is that of its vertex.
+        let root = (linear * linear - 4.0 * square * constant).max(0.0).sqrt();
+        (root - linear) / (2.0 * square)
+    }
+
+    /// Returns the smallest and the largest ρ̇ for which the accelerations y″(x + 2hρ̇) + y′ρ̇ are within their limits, with the
+    /// path at `ahead` on the clock from now and `twice` = 2h.
+    pub(super) fn slopes(&self, ahead: f64, x: f64, twice: f64) -> [f64; 2] {
+        let (index, t) = self.locate(self.progress + ahead);
+        let infinity = F64x4::splat(f64::INFINITY);
+        let [mut least, mut most] = [-infinity, infinity];
+        for ([slope, bend], limits) in self.path.within(index, t).zip(&self.limits) {
+            let acceleration = limits.acceleration * ((1.0 - TICK_MARGIN) / (1.0 - MARGINS[1]));
+            let inverse = F64x4::ONE / (slope + bend * twice);
+            let (centre, half) = (-bend * x * inverse, acceleration * inverse.abs());
+            least = least.max(centre - half);
+            most = most.min(centre + half);
+        }
+        [
+            least.to_array().into_iter().fold(f64::NEG_INFINITY, f64::max),
+            most.to_array().into_iter().fold(f64::INFINITY, f64::min),
+        ]
+    }
+
+    /// Adds a clock interval of the phase.
+    #[inline(always)]
+    pub(super) fn advance(&mut self, h: f64) {
+        self.progress += h;
+    }
+
+    /// Returns whether the path has to be sampled again: after an interval that left it, or at a third of a rhythmic one.
+    fn is_due(&self, rhythmic: bool) -> bool {
+        let intervals = self.progress / self.pieces[0].interval;
+        intervals >= 1.0 && (!self.is_current || (rhythmic && 3.0 * intervals >= N_INTERVALS as f64))
+    }
+}
+
+/// Equidistant knots of a piece of the path.
+#[derive(Clone, Copy, Debug, Default)]
+struct Piece {
+    first: usize,
+    /// Clock of the first knot.
+    start: f64,
+    interval: f64,
+}
+
+impl Controller {
+    /// Returns the pieces of the path ahead: up to the end of a discrete movement and past it.
+    fn pieces(&self) -> [Piece; 2] {
+        let extent = self.primitive.canonical().extent();
+        let Canonical::Discrete { u_end, .. } = self.primitive.canonical() else {
+            let interval = N_PERIODS * extent / N_INTERVALS as f64;
+            return [Piece { first: 0, start: 0.0, interval }, Piece { first: 0, start: f64::INFINITY, interval }];
+        };
+        let (rest, end) = (u_end - self.clock.value(), self.goal_transition.end() - self.clock.value());
+        let end = if self.goal_transition.is_active() { end } else { 0.0 };
+        let tail = end.max(rest).max(0.0) - rest.max(0.0) + TAIL * extent;
+        if rest <= KINK * extent {
+            let interval = tail / N_INTERVALS as f64;
+            return [Piece { first: 0, start: 0.0, interval }, Piece { first: 0, start: f64::INFINITY, interval }];
+        }
+        let first = N_INTERVALS - N_TAIL;
+        let interval = rest * (1.0 - KINK) / (first - 1) as f64;
+        [Piece { first: 0, start: 0.0, interval }, Piece { first, start: rest, interval: tail / N_TAIL as f64 }]
+    }
+
+    /// Looks ahead along the path if the limits bound its rate. The first time it takes memory for the path.
+    pub(super) fn limit_path(&mut self) {
+        if !self.limiter.limits_rate() {
+            self.path_ahead = None;
+            return;
+        }
+        let mut ahead = self.path_ahead.take().unwrap_or_else(|| Box::new(PathAhead::new(self)));
+        ahead.set_limits(&self.limiter.bounds);
+        self.path_ahead = Some(ahead);
+    }
+
+    /// Looks ahead at the start, and reduces the rate there to what the path ahead admits. A given velocity is kept.
+    pub(super) fn start_rate(&mut self) {
+        self.look_ahead();
+        if self.conditions.velocity.is_some() {
+            return;
+        }
+        let most = self.path_ahead.as_ref().map_or(f64::INFINITY, |ahead| ahead.max(0.0).sqrt());
+        if first_element(self.rate.value()) > most {
+            self.rate.start(most, &self.rate_gains);
+            self.read_out();
+        }
+    }
+
+    /// Marks the path ahead as left.
+    pub(super) fn leave_path(&mut self) {
+        if let Some(ahead) = &mut self.path_ahead {
+            ahead.is_current = false;
+        }
+    }
+
+    /// Samples the path ahead under the present commands.
+    pub(super) fn look_ahead(&mut self) {
+        let Some(mut ahead) = self.path_ahead.take() else { return };
+        ahead.compute(self);
+        self.path_ahead = Some(ahead);
+    }
+
+    /// Samples the path ahead again once the movement has left it or nears its end.
+    pub(super) fn refresh_path(&mut self) {
+        let rhythmic = self.primitive.kind() == Kind::Rhythmic;
+        if self.path_ahead.as_ref().is_some_and(|ahead| ahead.is_due(rhythmic)) {
+            self.look_ahead();
+        }
+    }
+
+    /// Samples y, y′ and y″ under the present commands at the knots of a path, which begins at the present clock.
+    pub(crate) fn sample_path(&mut self, path: &mut SampledPath) {
+        // At the rate 1 the derivatives with respect to the clock are those with respect to time.
+        self.release();
+        self.rate.reset(&[1.0]);
+        self.read_out();
+        let n_groups = self.groups.len();
+        let mut u = path.clock[0];
+        for (knot, samples) in path.clock.iter().zip(path.samples.chunks_exact_mut(n_groups)) {
+            let h = knot - u;
+            if h > 0.0 {
+                self.follow_path(h);
+            }
+            for (group, sample) in samples.iter_mut().enumerate() {
+                *sample = [self.position[group], self.velocity[group], self.acceleration[group]];
+            }
+            u = *knot;
+        }
+    }
+
+    /// Advances by `h` on the clock at the rate 1.
+    fn follow_path(&mut self, h: f64) {
+        let mut n_substeps = h / self.max_clock_step;
+        if !self.are_commands_settled() {
+            n_substeps = n_substeps.max(self.command_gains.substeps(h) / MAX_TRANSITION_STEP);
+        }
+        let n_substeps = n_substeps.ceil().max(1.0);
+        for _ in 0..n_substeps as u32 {
+            self.substep(h / n_substeps, h / n_substeps);
+            if self.approaching && !self.style.is_settled() {
+                self.correct_arrival();
+            }
+        }
+    }
+
+    /// Returns the rate above which none is needed: the commanded one, or that of an unlimited speed.
+    pub(super) fn max_rate(&self) -> f64 {
+        first_element(self.rate.target()).max(super::MAX_SPEED / self.primitive.tau())
+    }
+}

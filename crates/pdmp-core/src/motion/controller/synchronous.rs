@@ -1,0 +1,83 @@
+//! Rate of the clock within the limits of velocity and acceleration: what one DoF cannot follow slows all of them along the
+//! path.
+//!
+//! ```text
+//! ẏ = ρy′,  ÿ = ρ²y″ + ρ̇y′:    |ẏ| ≤ V and |ÿ| ≤ A bound ρ and ρ̇,    ρ² ≤ K(u)
+//! ```
+//!
+//! K is the largest ρ² from which the path ahead can be followed (`path_ahead`). While the filter of the commanded rate keeps
+//! these limits, the movement is to the bit that without limits. Otherwise ρ is linear over the substep, with the ρ̇ closest to
+//! that of the filter, which then continues from there.
+
+use super::Controller;
+use super::step::first_element;
+use crate::numerics::simd::Register;
+
+impl Controller {
+    /// Returns whether the rate of the next substep needs no limit, at a settled rate.
+    #[inline(always)]
+    pub(super) fn admits_rate(&self) -> bool {
+        match &self.path_ahead {
+            None => true,
+            Some(ahead) => {
+                let rate = first_element(self.rate.value());
+                self.rate.is_settled() && ahead.admits_constant(rate * rate)
+            }
+        }
+    }
+
+    /// Determines the rate over the next `dt` seconds. Returns the clock interval if it deviates from the filter of the
+    /// commanded rate.
+    #[inline(never)]
+    pub(super) fn limit_rate(&mut self, dt: f64) -> Option<f64> {
+        self.update_rate_step(dt);
+        let ahead = self.path_ahead.as_ref()?;
+        let rate = first_element(self.rate.value());
+        let [next, next_slope] = self.rate.preview(&self.rate_step);
+        let h = if self.rate.is_settled() { rate * dt } else { self.rate.integral(&self.rate_step).max(0.0) };
+        let wanted = (next - rate) / dt;
+        let [least, most] = ahead.slopes(0.0, rate * rate, 0.0);
+        let is_kept = |[least, most]: [f64; 2], slope: f64| (least..=most).contains(&slope);
+        if next * next <= ahead.max(h)
+            && is_kept([least, most], wanted)
+            && is_kept(ahead.slopes(h, next * next, 0.0), next_slope)
+        {
+            return None;
+        }
+        // Off the path no ρ̇ may suffice; the clock is then slowed, and the DoFs are limited on their own.
+        let within = |slope: f64, [least, most]: [f64; 2]| {
+            if least <= most { slope.max(least).min(most) } else { slope.min(most).min(0.0) }
+        };
+        let end = |slope: f64| (rate + 0.5 * slope * dt) * dt;
+        let mut slope = within(wanted.min(ahead.max_slope(rate, dt, rate * dt)), [least, most]).max(-rate / dt);
+        let h = end(slope);
+        slope = slope.min(ahead.max_slope(rate, dt, h));
+        slope = within(slope, ahead.slopes(h, rate * rate, 2.0 * h)).max(-rate / dt);
+        self.rate_slope = Some(slope);
+        Some(end(slope))
+    }
+
+    /// Advances the rate by `dt` seconds.
+    #[inline(always)]
+    pub(super) fn advance_rate<T: Register>(&mut self, dt: f64) {
+        match self.rate_slope.take() {
+            None => {
+                self.update_rate_step(dt);
+                self.rate.advance::<T>(&self.rate_step);
+            }
+            Some(slope) => self.rate.move_on(slope, dt, &self.rate_gains),
+        }
+    }
+
+    /// Returns the time in [0, dt] after which the clock has advanced by `area`.
+    pub(super) fn time_to(&self, area: f64, dt: f64) -> f64 {
+        match self.rate_slope {
+            None => self.rate.integral_time(area, dt, &self.rate_gains),
+            Some(slope) => {
+                let rate = first_element(self.rate.value());
+                // ρt + ½ρ̇t² = area, without cancellation.
+                (2.0 * area / (rate + (rate * rate + 2.0 * slope * area).max(0.0).sqrt())).min(dt)
+            }
+        }
+    }
+}
