@@ -172,11 +172,10 @@ impl Controller {
         let rate = [self.commanded_rate()];
         if self.started {
             self.rate.set_target(&rate, &self.rate_gains);
+            self.read_out();
         } else {
-            self.rate.reset(&rate);
-            self.start_rate();
+            self.begin();
         }
-        self.read_out();
         Ok(())
     }
 
