@@ -110,11 +110,13 @@ pub(crate) struct RateCurve {
     /// Largest x from which the rest of the path can be followed.
     pub(crate) max: Vec<f64>,
     rows: Vec<Rows>,
+    /// Largest a at the start of the interval due to the limit of the velocity in its middle.
+    middle: Line,
 }
 
 impl Clone for RateCurve {
     fn clone(&self) -> Self {
-        Self { max: self.max.clone(), rows: Vec::with_capacity(self.rows.capacity()) }
+        Self { max: self.max.clone(), rows: Vec::with_capacity(self.rows.capacity()), middle: self.middle }
     }
 
     fn clone_from(&mut self, source: &Self) {
@@ -125,7 +127,7 @@ impl Clone for RateCurve {
 impl RateCurve {
     /// Returns a curve of `n_knots` knots for a path of `n_groups` groups, to be computed by [`RateCurve::compute`].
     pub(crate) fn new(n_knots: usize, n_groups: usize) -> Self {
-        Self { max: vec![0.0; n_knots], rows: Vec::with_capacity(3 * n_groups) }
+        Self { max: vec![0.0; n_knots], rows: Vec::with_capacity(3 * n_groups), middle: [0.0; 2] }
     }
 
     /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x.
@@ -148,6 +150,7 @@ impl RateCurve {
             let x = self.max[i];
             let ends = self.rows.iter().map(|row| row.slope * x + row.half);
             let most = smallest(ends.fold(F64x4::splat(f64::INFINITY), F64x4::fast_min));
+            let most = most.min(self.middle[0] + self.middle[1] * x);
             self.max[i + 1] = self.max[i + 1].min(x + twice * most).max(0.0);
         }
     }
@@ -155,12 +158,14 @@ impl RateCurve {
     /// Writes the limits of interval `i`; returns the largest x at its start that they admit on its own.
     fn write_rows(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) -> f64 {
         let interval = path.interval(i);
-        let mut most = F64x4::splat(f64::INFINITY);
+        let [mut most, mut in_middle] = [F64x4::splat(f64::INFINITY); 2];
         self.rows.clear();
         for ((here, next), limits) in path.knot(i).iter().zip(path.knot(i + 1)).zip(limits) {
             let rate = limits.velocity / here[1].abs();
             most = most.fast_min(rate * rate);
             let middle = between(here, next, interval, 0.5);
+            let rate = limits.velocity / middle[0].abs();
+            in_middle = in_middle.fast_min(rate * rate);
             let samples = [([here[1], here[2]], 0.0), (middle, interval), ([next[1], next[2]], 2.0 * interval)];
             for (sample, twice) in samples {
                 let (rows, bound) = Rows::new(sample, limits, twice);
@@ -168,6 +173,7 @@ impl RateCurve {
                 most = most.fast_min(bound);
             }
         }
+        self.middle = [smallest(in_middle) / interval, -interval.recip()];
         smallest(most)
     }
 
@@ -186,7 +192,11 @@ impl RateCurve {
                 lower = [tighter_lower.select(ends[0], lower[0]), tighter_lower.select(row.slope, lower[1])];
                 upper = [tighter_upper.select(ends[1], upper[0]), tighter_upper.select(row.slope, upper[1])];
             }
-            let [lower, upper] = [tightest(lower, |a, b| a > b), tightest(upper, |a, b| a < b)];
+            let [lower, mut upper] = [tightest(lower, |a, b| a > b), tightest(upper, |a, b| a < b)];
+            let middle = self.middle[0] + self.middle[1] * x;
+            if middle < upper[0] {
+                upper = [middle, self.middle[1]];
+            }
             let gap = upper[0] - lower[0];
             if gap >= 0.0 {
                 break;

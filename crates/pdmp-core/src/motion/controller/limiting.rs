@@ -81,6 +81,8 @@ impl Controller {
         for index in 0..self.groups.len() {
             let (bounds, before) = (&self.limiter.bounds[index], self.limiter.before[index]);
             let motion = [self.position[index], self.velocity[index]];
+            // The acceleration at the end of the tick, of which little belongs to this tick, is published within its limit.
+            self.acceleration[index] = self.acceleration[index].max(-bounds.acceleration).min(bounds.acceleration);
             kept_by_all &= bounds.admits(before, motion, self.acceleration[index], dt).all();
         }
         if !(kept_by_all && self.limiter.is_free) {

@@ -144,6 +144,14 @@ impl PathAhead {
         (root - linear) / (2.0 * square)
     }
 
+    /// Returns the largest ρ that the limits of the velocity admit at `ahead` on the clock from now.
+    pub(super) fn max_by_velocity(&self, ahead: f64) -> f64 {
+        let (index, t) = self.locate(self.progress + ahead);
+        let ratios = self.path.within(index, t).zip(&self.limits).map(|([slope, _], limits)| limits.velocity / slope.abs());
+        let most = ratios.fold(F64x4::splat(f64::INFINITY), F64x4::fast_min);
+        most.to_array().into_iter().fold(f64::INFINITY, f64::min)
+    }
+
     /// Returns the smallest and the largest ρ̇ for which the accelerations y″(x + 2hρ̇) + y′ρ̇ are within their limits, with the
     /// path at `ahead` on the clock from now and `twice` = 2h.
     pub(super) fn slopes(&self, ahead: f64, x: f64, twice: f64) -> [f64; 2] {

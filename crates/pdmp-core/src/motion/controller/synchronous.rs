@@ -13,6 +13,11 @@ use super::Controller;
 use super::step::first_element;
 use crate::numerics::simd::Register;
 
+/// Largest decrease of the rate over a substep off the path, relative to it.
+const MAX_DECREASE: f64 = 0.1;
+/// Relative excess of ρ² over the largest one that still counts as rounding.
+const ROUNDING: f64 = 1e-6;
+
 impl Controller {
     /// Returns whether the rate of the next substep needs no limit, at a settled rate.
     #[inline(always)]
@@ -38,21 +43,29 @@ impl Controller {
         let wanted = (next - rate) / dt;
         let [least, most] = ahead.slopes(0.0, rate * rate, 0.0);
         let is_kept = |[least, most]: [f64; 2], slope: f64| (least..=most).contains(&slope);
-        if next * next <= ahead.max(h)
+        if next <= ahead.max(h).sqrt().min(ahead.max_by_velocity(h))
             && is_kept([least, most], wanted)
             && is_kept(ahead.slopes(h, next * next, 0.0), next_slope)
         {
             return None;
         }
-        // Off the path no ρ̇ may suffice; the clock is then slowed, and the DoFs are limited on their own.
-        let within = |slope: f64, [least, most]: [f64; 2]| {
-            if least <= most { slope.max(least).min(most) } else { slope.min(most).min(0.0) }
-        };
         let end = |slope: f64| (rate + 0.5 * slope * dt) * dt;
-        let mut slope = within(wanted.min(ahead.max_slope(rate, dt, rate * dt)), [least, most]).max(-rate / dt);
-        let h = end(slope);
-        slope = slope.min(ahead.max_slope(rate, dt, h));
-        slope = within(slope, ahead.slopes(h, rate * rate, 2.0 * h)).max(-rate / dt);
+        let admitted = |slope: f64, h: f64| {
+            let by_velocity = (ahead.max_by_velocity(h) - rate) / dt;
+            slope.min(ahead.max_slope(rate, dt, h)).min(by_velocity).max(-MAX_DECREASE * rate / dt)
+        };
+        let mut slope = admitted(wanted, rate * dt);
+        // Off the path, at a rate from which it cannot be followed, the clock is slowed and the DoFs are limited on their own.
+        if rate * rate <= ahead.max(0.0) * (1.0 + ROUNDING) && least <= most {
+            slope = slope.max(least).min(most);
+            let h = end(slope);
+            let [least, most] = ahead.slopes(h, rate * rate, 2.0 * h);
+            slope = admitted(slope, h);
+            if least <= most {
+                slope = slope.max(least).min(most);
+            }
+        }
+        let slope = slope.max(-rate / dt);
         self.rate_slope = Some(slope);
         Some(end(slope))
     }
