@@ -20,6 +20,8 @@ use crate::numerics::state::clone_in_place;
 const MAX_NEWTON_STEPS: usize = 64;
 /// Share of |y″|Δ below which y′ counts as zero: the limit of the acceleration then bounds x alone.
 const MIN_SLOPE: f64 = 1e-9;
+/// Number of intervals from a reversal of a DoF within which its limits also hold in the quarters of an interval.
+const REVERSAL: f64 = 4.0;
 
 /// Path at knots of the clock.
 #[derive(Debug)]
@@ -127,7 +129,7 @@ impl Clone for RateCurve {
 impl RateCurve {
     /// Returns a curve of `n_knots` knots for a path of `n_groups` groups, to be computed by [`RateCurve::compute`].
     pub(crate) fn new(n_knots: usize, n_groups: usize) -> Self {
-        Self { max: vec![0.0; n_knots], rows: Vec::with_capacity(3 * n_groups), middle: [0.0; 2] }
+        Self { max: vec![0.0; n_knots], rows: Vec::with_capacity(5 * n_groups), middle: [0.0; 2] }
     }
 
     /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x.
@@ -167,7 +169,12 @@ impl RateCurve {
             let rate = limits.velocity / middle[0].abs();
             in_middle = in_middle.fast_min(rate * rate);
             let samples = [([here[1], here[2]], 0.0), (middle, interval), ([next[1], next[2]], 2.0 * interval)];
-            for (sample, twice) in samples {
+            // Near a reversal of a DoF its acceleration hardly depends on a, and varies most within the interval.
+            let (slowest, bend) = (here[1].abs().fast_min(next[1].abs()), here[2].abs().fast_max(next[2].abs()));
+            let reverses = slowest.simd_lt(bend * (REVERSAL * interval)).any();
+            let quarters = [0.25, 0.75].map(|t| (between(here, next, interval, t), 2.0 * t * interval));
+            let n_quarters = if reverses { quarters.len() } else { 0 };
+            for (sample, twice) in samples.into_iter().chain(quarters.into_iter().take(n_quarters)) {
                 let (rows, bound) = Rows::new(sample, limits, twice);
                 self.rows.push(rows);
                 most = most.fast_min(bound);
