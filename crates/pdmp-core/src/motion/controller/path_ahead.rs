@@ -125,49 +125,49 @@ impl PathAhead {
         x <= self.constant[self.locate(self.progress).0]
     }
 
-    /// Returns the largest ρ² at `ahead` on the clock from now.
-    pub(super) fn max(&self, ahead: f64) -> f64 {
-        let (index, t) = self.locate(self.progress + ahead);
+    /// Returns the largest ρ² at the present clock.
+    pub(super) fn max(&self) -> f64 {
+        let (index, t) = self.locate(self.progress);
         self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t
     }
 
-    /// Returns the largest constant ρ̇ from ρ over `dt` seconds that ends below the largest ρ² at the end.
-    pub(super) fn max_slope(&self, rate: f64, dt: f64, h: f64) -> f64 {
-        let (index, t) = self.locate(self.progress + h);
-        // ρ² is linear in the clock for constant ρ̇: x₀ + 2ρ̇(ρdt + ½ρ̇dt²) ≤ K + K′(ρdt + ½ρ̇dt² − h).
-        let slope = (self.curve.max[index + 1] - self.curve.max[index]) / self.path.interval(index);
-        let at_end = self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t;
-        let (square, linear) = (dt * dt, (2.0 * rate - 0.5 * slope * dt) * dt);
-        let constant = rate * rate - at_end - slope * (rate * dt - h);
-        // With a negative discriminant no ρ̇ suffices: the closest one is that of its vertex.
-        let root = (linear * linear - 4.0 * square * constant).max(0.0).sqrt();
-        (root - linear) / (2.0 * square)
-    }
-
-    /// Returns the largest ρ that the limits of the velocity admit at `ahead` on the clock from now.
-    pub(super) fn max_by_velocity(&self, ahead: f64) -> f64 {
-        let (index, t) = self.locate(self.progress + ahead);
-        let ratios = self.path.within(index, t).zip(&self.limits).map(|([slope, _], limits)| limits.velocity / slope.abs());
-        let most = ratios.fold(F64x4::splat(f64::INFINITY), F64x4::fast_min);
-        most.to_array().into_iter().fold(f64::INFINITY, f64::min)
-    }
-
-    /// Returns the smallest and the largest ρ̇ for which the accelerations y″(x + 2hρ̇) + y′ρ̇ are within their limits, with the
-    /// path at `ahead` on the clock from now and `twice` = 2h.
-    pub(super) fn slopes(&self, ahead: f64, x: f64, twice: f64) -> [f64; 2] {
-        let (index, t) = self.locate(self.progress + ahead);
+    /// Returns the smallest and the largest constant ρ̇, for ρ² = `x` now and over `h` on the clock at least, that keep the
+    /// limits in the quarters of each interval and arrive below the curve at its end.
+    pub(super) fn slopes(&self, x: f64, h: f64) -> [f64; 2] {
         let infinity = F64x4::splat(f64::INFINITY);
-        let [mut least, mut most] = [-infinity, infinity];
-        for ([slope, bend], limits) in self.path.within(index, t).zip(&self.limits) {
-            let acceleration = limits.acceleration * ((1.0 - TICK_MARGIN) / (1.0 - MARGINS[1]));
-            let inverse = F64x4::ONE / (slope + bend * twice);
-            let (centre, half) = (-bend * x * inverse, acceleration * inverse.abs());
-            least = least.max(centre - half);
-            most = most.min(centre + half);
+        let (mut least, mut most, mut largest) = (-infinity, infinity, f64::INFINITY);
+        let mut row = |index: usize, t: f64, since: f64| {
+            for ([slope, bend], limits) in self.path.within(index, t).zip(&self.limits) {
+                let acceleration = limits.acceleration * ((1.0 - TICK_MARGIN) / (1.0 - MARGINS[1]));
+                let inverse = F64x4::ONE / (slope + bend * (2.0 * since));
+                let (centre, half) = (-bend * x * inverse, acceleration * inverse.abs());
+                least = least.max(centre - half);
+                most = most.min(centre + half);
+                let rate = limits.velocity / slope.abs();
+                // At the present clock the velocity does not depend on ρ̇.
+                let rest = (rate * rate - x) * (0.5 / since.max(h));
+                most = most.min(rest);
+            }
+        };
+        let (first, t) = self.locate(self.progress);
+        let (last, t_end) = self.locate(self.progress + h);
+        row(first, t, 0.0);
+        row(last, t_end, h);
+        for index in first..=last {
+            let (start, interval) = (self.path.clock[index], self.path.interval(index));
+            for quarter in [0.25, 0.5, 0.75, 1.0] {
+                let since = start + quarter * interval - self.progress;
+                if since > 0.0 {
+                    row(index, quarter, since);
+                }
+            }
+            let (since, rest) = (start + interval - self.progress, self.curve.max[index + 1] - x);
+            // Above the curve, within rounding of a knot, the rate must not drop at once.
+            largest = largest.min(0.5 * rest / if rest < 0.0 { since.max(h) } else { since });
         }
         [
             least.to_array().into_iter().fold(f64::NEG_INFINITY, f64::max),
-            most.to_array().into_iter().fold(f64::INFINITY, f64::min),
+            most.to_array().into_iter().fold(largest, f64::min),
         ]
     }
 
@@ -230,7 +230,7 @@ impl Controller {
         if self.conditions.velocity.is_some() {
             return;
         }
-        let most = self.path_ahead.as_ref().map_or(f64::INFINITY, |ahead| ahead.max(0.0).sqrt());
+        let most = self.path_ahead.as_ref().map_or(f64::INFINITY, |ahead| ahead.max().sqrt());
         if first_element(self.rate.value()) > most {
             self.rate.start(most, &self.rate_gains);
             self.read_out();

@@ -39,35 +39,20 @@ impl Controller {
         let ahead = self.path_ahead.as_ref()?;
         let rate = first_element(self.rate.value());
         let [next, next_slope] = self.rate.preview(&self.rate_step);
-        let h = if self.rate.is_settled() { rate * dt } else { self.rate.integral(&self.rate_step).max(0.0) };
         let wanted = (next - rate) / dt;
-        let [least, most] = ahead.slopes(0.0, rate * rate, 0.0);
-        let is_kept = |[least, most]: [f64; 2], slope: f64| (least..=most).contains(&slope);
-        if next <= ahead.max(h).sqrt().min(ahead.max_by_velocity(h))
-            && is_kept([least, most], wanted)
-            && is_kept(ahead.slopes(h, next * next, 0.0), next_slope)
-        {
+        let [least, most] = ahead.slopes(rate * rate, rate.max(next) * dt);
+        if [wanted, next_slope].iter().all(|slope| (least..=most).contains(slope)) {
             return None;
         }
-        let end = |slope: f64| (rate + 0.5 * slope * dt) * dt;
-        let admitted = |slope: f64, h: f64| {
-            let by_velocity = (ahead.max_by_velocity(h) - rate) / dt;
-            slope.min(ahead.max_slope(rate, dt, h)).min(by_velocity).max(-MAX_DECREASE * rate / dt)
+        let slope = if least <= most && rate * rate <= ahead.max() * (1.0 + ROUNDING) {
+            wanted.max(least).min(most)
+        } else {
+            // Off the path, at a rate from which it cannot be followed, the clock is slowed and the DoFs are limited on their own.
+            wanted.min(most).max(-MAX_DECREASE * rate / dt)
         };
-        let mut slope = admitted(wanted, rate * dt);
-        // Off the path, at a rate from which it cannot be followed, the clock is slowed and the DoFs are limited on their own.
-        if rate * rate <= ahead.max(0.0) * (1.0 + ROUNDING) && least <= most {
-            slope = slope.max(least).min(most);
-            let h = end(slope);
-            let [least, most] = ahead.slopes(h, rate * rate, 2.0 * h);
-            slope = admitted(slope, h);
-            if least <= most {
-                slope = slope.max(least).min(most);
-            }
-        }
         let slope = slope.max(-rate / dt);
         self.rate_slope = Some(slope);
-        Some(end(slope))
+        Some((rate + 0.5 * slope * dt) * dt)
     }
 
     /// Advances the rate by `dt` seconds.
