@@ -24,8 +24,8 @@ const REFRESH: f64 = 8.0;
 const KINK: f64 = 1e-6;
 /// Margins of velocity and acceleration in the backward pass.
 const MARGINS: [f64; 2] = [0.005, 0.02];
-/// Margin of the acceleration at a tick: smaller than that of the path, so that the path can be followed.
-const TICK_MARGIN: f64 = 0.01;
+/// Margins of the acceleration at a tick: smaller than that of the path, so that the path can be followed.
+const TICK_MARGINS: [f64; 2] = [0.01, 0.001];
 /// Clock past the end of a discrete movement, relative to its extent.
 const TAIL: f64 = 0.3;
 /// Number of periods of a rhythmic movement. The rate at the last knot is that of the slowest part; a period later it has no
@@ -138,32 +138,40 @@ impl PathAhead {
         let (mut least, mut most, mut largest) = (-infinity, infinity, f64::INFINITY);
         let mut row = |index: usize, t: f64, since: f64| {
             for ([slope, bend], limits) in self.path.within(index, t).zip(&self.limits) {
-                let acceleration = limits.acceleration * ((1.0 - TICK_MARGIN) / (1.0 - MARGINS[1]));
-                let inverse = F64x4::ONE / (slope + bend * (2.0 * since));
+                // Near a reversal, where y″ρ² alone reaches the tighter limit, ρ̇ has no effect and must not be driven by it.
+                let [tight, wide] = TICK_MARGINS.map(|margin| limits.acceleration * ((1.0 - margin) / (1.0 - MARGINS[1])));
+                let (acceleration, inverse) =
+                    ((bend * x).abs().max(tight).min(wide), F64x4::ONE / (slope + bend * (2.0 * since)));
                 let (centre, half) = (-bend * x * inverse, acceleration * inverse.abs());
                 least = least.max(centre - half);
                 most = most.min(centre + half);
-                let rate = limits.velocity / slope.abs();
                 // At the present clock the velocity does not depend on ρ̇.
-                let rest = (rate * rate - x) * (0.5 / since.max(h));
-                most = most.min(rest);
+                if since > 0.0 {
+                    let rate = limits.velocity / slope.abs();
+                    most = most.min((rate * rate - x) * (0.5 / since.max(h)));
+                }
             }
         };
         let (first, t) = self.locate(self.progress);
         let (last, t_end) = self.locate(self.progress + h);
+        let horizon = h.max(self.path.clock[first + 1] - self.progress);
+        // Above the curve, within rounding of a knot, the rate must not drop at once.
+        let mut arrive = |max: f64, since: f64| {
+            largest = largest.min(0.5 * (max - x) / if max < x { since.max(h) } else { since });
+        };
         row(first, t, 0.0);
         row(last, t_end, h);
+        arrive(self.curve.max[last] + (self.curve.max[last + 1] - self.curve.max[last]) * t_end, h);
         for index in first..=last {
-            let (start, interval) = (self.path.clock[index], self.path.interval(index));
             for quarter in [0.25, 0.5, 0.75, 1.0] {
-                let since = start + quarter * interval - self.progress;
-                if since > 0.0 {
+                let since = self.path.clock[index] + quarter * self.path.interval(index) - self.progress;
+                if since > 0.0 && since <= horizon {
                     row(index, quarter, since);
+                    if quarter == 1.0 {
+                        arrive(self.curve.max[index + 1], since);
+                    }
                 }
             }
-            let (since, rest) = (start + interval - self.progress, self.curve.max[index + 1] - x);
-            // Above the curve, within rounding of a knot, the rate must not drop at once.
-            largest = largest.min(0.5 * rest / if rest < 0.0 { since.max(h) } else { since });
         }
         [
             least.to_array().into_iter().fold(f64::NEG_INFINITY, f64::max),

@@ -15,8 +15,8 @@ use crate::numerics::simd::Register;
 
 /// Largest decrease of the rate over a substep off the path, relative to it.
 const MAX_DECREASE: f64 = 0.1;
-/// Relative excess of ρ² over the largest one that still counts as rounding.
-const ROUNDING: f64 = 1e-6;
+/// Relative excess of ρ² over the largest one from which the margins of the path ahead return.
+const TOLERANCE: f64 = 0.01;
 
 impl Controller {
     /// Returns whether the rate of the next substep needs no limit, at a settled rate.
@@ -44,7 +44,7 @@ impl Controller {
         if [wanted, next_slope].iter().all(|slope| (least..=most).contains(slope)) {
             return None;
         }
-        let slope = if least <= most && rate * rate <= ahead.max() * (1.0 + ROUNDING) {
+        let slope = if least <= most && rate * rate <= ahead.max() * (1.0 + TOLERANCE) {
             wanted.max(least).min(most)
         } else {
             // Off the path, at a rate from which it cannot be followed, the clock is slowed and the DoFs are limited on their own.
