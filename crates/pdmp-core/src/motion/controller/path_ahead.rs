@@ -25,7 +25,7 @@ const KINK: f64 = 1e-6;
 /// Margins of velocity and acceleration in the backward pass.
 const MARGINS: [f64; 2] = [0.005, 0.02];
 /// Margins of the acceleration at a tick: smaller than that of the path, so that the path can be followed.
-const TICK_MARGINS: [f64; 2] = [0.01, 0.001];
+const TICK_MARGINS: [f64; 2] = [0.012, 0.005];
 /// Clock past the end of a discrete movement, relative to its extent.
 const TAIL: f64 = 0.3;
 /// Number of periods of a rhythmic movement. The rate at the last knot is that of the slowest part; a period later it has no
@@ -201,20 +201,25 @@ struct Piece {
     interval: f64,
 }
 
+impl Piece {
+    /// Piece without knots.
+    const NONE: Self = Self { first: N_INTERVALS + 1, start: f64::INFINITY, interval: 0.0 };
+}
+
 impl Controller {
     /// Returns the pieces of the path ahead: up to the end of a discrete movement and past it.
     fn pieces(&self) -> [Piece; 2] {
         let extent = self.primitive.canonical().extent();
         let Canonical::Discrete { u_end, .. } = self.primitive.canonical() else {
             let interval = N_PERIODS * extent / N_INTERVALS as f64;
-            return [Piece { first: 0, start: 0.0, interval }, Piece { first: 0, start: f64::INFINITY, interval }];
+            return [Piece { first: 0, start: 0.0, interval }, Piece::NONE];
         };
         let (rest, end) = (u_end - self.clock.value(), self.goal_transition.end() - self.clock.value());
         let end = if self.goal_transition.is_active() { end } else { 0.0 };
         let tail = end.max(rest).max(0.0) - rest.max(0.0) + TAIL * extent;
         if rest <= KINK * extent {
             let interval = tail / N_INTERVALS as f64;
-            return [Piece { first: 0, start: 0.0, interval }, Piece { first: 0, start: f64::INFINITY, interval }];
+            return [Piece { first: 0, start: 0.0, interval }, Piece::NONE];
         }
         let first = N_INTERVALS - N_TAIL;
         let interval = rest * (1.0 - KINK) / (first - 1) as f64;
