@@ -16,8 +16,8 @@ use crate::numerics::state::clone_in_place;
 
 /// Number of intervals of the path. Learnt from recordings, y″ between the knots is within 1 % of its maximum.
 const N_INTERVALS: usize = 640;
-/// Number of intervals past the end of a discrete movement.
-const N_TAIL: usize = 128;
+/// Number of intervals of a whole movement or period; past the end of a discrete movement are the others.
+const N_MOVEMENT: usize = 512;
 /// Number of intervals after which a path that was left is sampled again.
 const REFRESH: f64 = 8.0;
 /// Clock between the knots on both sides of the end, where y″ is not continuous, relative to the clock until then.
@@ -30,7 +30,9 @@ const TICK_MARGINS: [f64; 2] = [0.012, 0.005];
 const TAIL: f64 = 0.3;
 /// Number of periods of a rhythmic movement. The rate at the last knot is that of the slowest part; a period later it has no
 /// effect.
-const N_PERIODS: f64 = 1.5;
+const N_PERIODS: f64 = N_INTERVALS as f64 / N_MOVEMENT as f64;
+/// Part of an interval by which rounding may miss a knot.
+const ROUNDING: f64 = 1e-9;
 /// Maximum ωh of a substep of the path during a transition of commands; the path then deviates by 1e-5 of the change.
 const MAX_TRANSITION_STEP: f64 = 14.0;
 
@@ -101,11 +103,12 @@ impl PathAhead {
         let rhythmic = controller.primitive.kind() == Kind::Rhythmic;
         let end = if rhythmic { self.constant.iter().copied().fold(f64::INFINITY, f64::min) } else { f64::INFINITY };
         self.curve.compute(&self.path, &self.limits, end, controller.max_rate().powi(2));
-        let mut following = [f64::INFINITY; 2];
-        for (constant, max) in self.constant.iter_mut().zip(&self.curve.max).rev() {
-            let here = constant.min(*max);
-            *constant = here.min(following[0]).min(following[1]);
-            following = [here, following[0]];
+        self.constant.iter_mut().zip(&self.curve.max).for_each(|(constant, max)| *constant = constant.min(*max));
+        for i in 0..self.constant.len() {
+            let end = self.path.clock[i] + controller.max_clock_step;
+            let within =
+                (i + 1..self.constant.len()).take_while(|k| self.path.clock[k - 1] <= end + self.path.interval(i));
+            self.constant[i] = within.fold(self.constant[i], |least, k| least.min(self.constant[k]));
         }
         (self.progress, self.is_current) = (0.0, true);
     }
@@ -113,8 +116,8 @@ impl PathAhead {
     /// Returns the interval that contains a progress, and the position in it from 0 to 1, past the end that at its end.
     #[inline(always)]
     fn locate(&self, progress: f64) -> (usize, f64) {
-        let piece = &self.pieces[usize::from(progress >= self.pieces[1].start)];
-        let position = (progress - piece.start) / piece.interval;
+        let piece = &self.pieces[usize::from(progress >= self.pieces[1].start * (1.0 - ROUNDING))];
+        let position = (progress - piece.start) / piece.interval + ROUNDING;
         let index = (position as usize).min(N_INTERVALS - 1 - piece.first);
         (piece.first + index, (position - index as f64).min(1.0))
     }
@@ -131,15 +134,35 @@ impl PathAhead {
         self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t
     }
 
-    /// Returns the smallest and the largest constant ρ̇, for ρ² = `x` now and over `h` on the clock at least, that keep the
-    /// limits in the quarters of each interval and arrive below the curve at its end.
-    pub(super) fn slopes(&self, x: f64, h: f64) -> [f64; 2] {
+    /// Returns the clock until the next knot.
+    pub(super) fn rest(&self) -> f64 {
+        let (index, _) = self.locate(self.progress);
+        (self.path.clock[index + 1] - self.progress).max(0.0)
+    }
+
+    /// Returns the smallest and the largest constant ρ̇ to the end of the interval, for ρ² = `x` now, that keep the limits in the
+    /// quarters of the interval and arrive below the curve.
+    pub(super) fn slopes(&self, x: f64) -> [f64; 2] {
+        let (index, t) = self.locate(self.progress);
+        self.slopes_within(index, t, x)
+    }
+
+    /// Returns the slopes as [`PathAhead::slopes`] at the next knot, for ρ² = `x` there.
+    pub(super) fn next_slopes(&self, x: f64) -> [f64; 2] {
+        let (index, _) = self.locate(self.progress);
+        self.slopes_within((index + 1).min(N_INTERVALS - 1), 0.0, x)
+    }
+
+    fn slopes_within(&self, index: usize, t: f64, x: f64) -> [f64; 2] {
         let infinity = F64x4::splat(f64::INFINITY);
-        let (mut least, mut most, mut largest) = (-infinity, infinity, f64::INFINITY);
-        let mut row = |index: usize, t: f64, since: f64| {
-            for ([slope, bend], limits) in self.path.within(index, t).zip(&self.limits) {
+        let (mut least, mut most) = (-infinity, infinity);
+        let interval = self.path.interval(index);
+        let mut limit_at = |position: f64| {
+            let since = (position - t) * interval;
+            for ([slope, bend], limits) in self.path.within(index, position).zip(&self.limits) {
                 // Near a reversal, where y″ρ² alone reaches the tighter limit, ρ̇ has no effect and must not be driven by it.
-                let [tight, wide] = TICK_MARGINS.map(|margin| limits.acceleration * ((1.0 - margin) / (1.0 - MARGINS[1])));
+                let [tight, wide] =
+                    TICK_MARGINS.map(|margin| limits.acceleration * ((1.0 - margin) / (1.0 - MARGINS[1])));
                 let (acceleration, inverse) =
                     ((bend * x).abs().max(tight).min(wide), F64x4::ONE / (slope + bend * (2.0 * since)));
                 let (centre, half) = (-bend * x * inverse, acceleration * inverse.abs());
@@ -148,34 +171,16 @@ impl PathAhead {
                 // At the present clock the velocity does not depend on ρ̇.
                 if since > 0.0 {
                     let rate = limits.velocity / slope.abs();
-                    most = most.min((rate * rate - x) * (0.5 / since.max(h)));
+                    most = most.min((rate * rate - x) * (0.5 / since));
                 }
             }
         };
-        let (first, t) = self.locate(self.progress);
-        let (last, t_end) = self.locate(self.progress + h);
-        let horizon = h.max(self.path.clock[first + 1] - self.progress);
-        // Above the curve, within rounding of a knot, the rate must not drop at once.
-        let mut arrive = |max: f64, since: f64| {
-            largest = largest.min(0.5 * (max - x) / if max < x { since.max(h) } else { since });
-        };
-        row(first, t, 0.0);
-        row(last, t_end, h);
-        arrive(self.curve.max[last] + (self.curve.max[last + 1] - self.curve.max[last]) * t_end, h);
-        for index in first..=last {
-            for quarter in [0.25, 0.5, 0.75, 1.0] {
-                let since = self.path.clock[index] + quarter * self.path.interval(index) - self.progress;
-                if since > 0.0 && since <= horizon {
-                    row(index, quarter, since);
-                    if quarter == 1.0 {
-                        arrive(self.curve.max[index + 1], since);
-                    }
-                }
-            }
-        }
+        limit_at(t);
+        [0.25, 0.5, 0.75, 1.0].into_iter().filter(|position| *position > t + ROUNDING).for_each(&mut limit_at);
+        let arrival = 0.5 * (self.curve.max[index + 1] - x) / ((1.0 - t) * interval);
         [
             least.to_array().into_iter().fold(f64::NEG_INFINITY, f64::max),
-            most.to_array().into_iter().fold(largest, f64::min),
+            most.to_array().into_iter().fold(arrival, f64::min),
         ]
     }
 
@@ -221,9 +226,12 @@ impl Controller {
             let interval = tail / N_INTERVALS as f64;
             return [Piece { first: 0, start: 0.0, interval }, Piece::NONE];
         }
-        let first = N_INTERVALS - N_TAIL;
-        let interval = rest * (1.0 - KINK) / (first - 1) as f64;
-        [Piece { first: 0, start: 0.0, interval }, Piece { first, start: rest, interval: tail / N_TAIL as f64 }]
+        let n = (rest / extent * N_MOVEMENT as f64).ceil().clamp(1.0, N_MOVEMENT as f64) as usize;
+        let n_tail = N_INTERVALS - n - 1;
+        [
+            Piece { first: 0, start: 0.0, interval: rest * (1.0 - KINK) / n as f64 },
+            Piece { first: n + 1, start: rest, interval: tail / n_tail as f64 },
+        ]
     }
 
     /// Looks ahead along the path if the limits bound its rate. The first time it takes memory for the path.

@@ -107,9 +107,18 @@ impl Controller {
         self.style.is_settled() && self.centre.is_settled() && self.amplitude.is_settled()
     }
 
-    /// Advances by `dt` seconds and `h` on the clock, split at u_end, where the forcing has a kink.
+    /// Advances by `dt` seconds and `h` on the clock.
     #[inline(always)]
     pub(super) fn substep(&mut self, dt: f64, h: f64) {
+        if self.rate_slope.is_some() {
+            return self.limited_substep(dt, h);
+        }
+        self.free_substep(dt, h);
+    }
+
+    /// Advances by `dt` seconds and `h` on the clock, split at u_end, where the forcing has a kink.
+    #[inline(always)]
+    pub(super) fn free_substep(&mut self, dt: f64, h: f64) {
         let Canonical::Discrete { u_end, .. } = self.primitive.canonical() else {
             return self.advance(dt, h);
         };

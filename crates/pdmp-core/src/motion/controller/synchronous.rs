@@ -15,6 +15,8 @@ use crate::numerics::simd::Register;
 
 /// Largest decrease of the rate over a substep off the path, relative to it.
 const MAX_DECREASE: f64 = 0.1;
+/// Maximum number of parts of a substep.
+const MAX_PARTS: usize = 16;
 /// Relative excess of ρ² over the largest one from which the margins of the path ahead return.
 const TOLERANCE: f64 = 0.01;
 
@@ -40,8 +42,10 @@ impl Controller {
         let rate = first_element(self.rate.value());
         let [next, next_slope] = self.rate.preview(&self.rate_step);
         let wanted = (next - rate) / dt;
-        let [least, most] = ahead.slopes(rate * rate, rate.max(next) * dt);
-        if [wanted, next_slope].iter().all(|slope| (least..=most).contains(slope)) {
+        let [least, most] = ahead.slopes(rate * rate);
+        let keeps = |[least, most]: [f64; 2]| [wanted, next_slope].iter().all(|slope| (least..=most).contains(slope));
+        let crosses = rate.max(next) * dt > ahead.rest();
+        if keeps([least, most]) && (!crosses || keeps(ahead.next_slopes(next * next))) {
             return None;
         }
         let slope = if least <= most && rate * rate <= ahead.max() * (1.0 + TOLERANCE) {
@@ -53,6 +57,23 @@ impl Controller {
         let slope = slope.max(-rate / dt);
         self.rate_slope = Some(slope);
         Some((rate + 0.5 * slope * dt) * dt)
+    }
+
+    /// Advances by `dt` seconds and `h` on the clock at a limited rate, which changes its slope at the knots of the path ahead.
+    #[inline(never)]
+    pub(super) fn limited_substep(&mut self, mut dt: f64, mut h: f64) {
+        for _ in 0..MAX_PARTS {
+            let Some(ahead) = &self.path_ahead else { break };
+            let rest = ahead.rest() / self.perturbation.phase_rate();
+            if self.rate_slope.is_none() || rest >= h {
+                break;
+            }
+            let part = self.time_to(rest, dt);
+            self.free_substep(part, rest);
+            dt -= part;
+            h = self.clock_step(dt);
+        }
+        self.free_substep(dt, h);
     }
 
     /// Advances the rate by `dt` seconds.
