@@ -23,9 +23,9 @@ const REFRESH: f64 = 8.0;
 /// Clock between the knots on both sides of the end, where y″ is not continuous, relative to the clock until then.
 const KINK: f64 = 1e-6;
 /// Margins of velocity and acceleration in the backward pass.
-const MARGINS: [f64; 2] = [0.005, 0.02];
+const MARGINS: [f64; 2] = [0.005, 0.03];
 /// Margins of the acceleration at a tick: smaller than that of the path, so that the path can be followed.
-const TICK_MARGINS: [f64; 2] = [0.012, 0.005];
+const TICK_MARGINS: [f64; 2] = [0.022, 0.008];
 /// Clock past the end of a discrete movement, relative to its extent.
 const TAIL: f64 = 0.3;
 /// Number of periods of a rhythmic movement. The rate at the last knot is that of the slowest part; a period later it has no
