@@ -15,12 +15,14 @@ use std::hint::black_box;
 use common::*;
 use counting::{Random, allocations};
 use pdmp_core::motion::Compliance;
-use pdmp_core::motion::Coupling;
+use pdmp_core::motion::{Coupling, Limits};
 use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
 /// A controller with the memory of its caller.
 struct Loop {
     controller: Controller,
+    /// No limits, and limits that bind.
+    limits: [Limits; 2],
     random: Random,
     values: Vec<f64>,
     position: Vec<f64>,
@@ -33,7 +35,14 @@ impl Loop {
         let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
         let model = learn(&demos, &options(kind));
         let n_dofs = model.n_dofs();
+        let limits = Limits {
+            lower: Some(vec![-0.5]),
+            upper: Some(vec![0.5; n_dofs]),
+            velocity: Some(vec![1.0]),
+            acceleration: Some(vec![20.0; n_dofs]),
+        };
         Self {
+            limits: [Limits::default(), limits],
             random: Random(1),
             values: vec![0.0; n_dofs.max(model.n_styles())],
             position: vec![0.0; n_dofs],
@@ -46,7 +55,7 @@ impl Loop {
     /// Sends one valid or invalid command by a setter, and performs one tick under another.
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     fn tick(&mut self) {
-        let Self { controller, random, values, position, velocity, acceleration } = self;
+        let Self { controller, limits, random, values, position, velocity, acceleration } = self;
         let (n_dofs, n_styles) = (controller.primitive().n_dofs(), controller.primitive().n_styles());
         let (kind, nominal_tau) = (controller.primitive().kind(), controller.primitive().tau());
         values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
@@ -68,6 +77,7 @@ impl Loop {
             7 => controller.set_phase(10.0 * size),
             8 => controller.set_phase_gain(10.0 * size),
             9 => controller.set_goal_velocity((size < 0.5).then_some(vector)),
+            10 => controller.set_limits(&limits[usize::from(size < 0.5)]),
             _ => Ok(()),
         });
         let command = Command {

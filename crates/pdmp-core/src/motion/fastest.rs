@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, LimitError, Result};
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
@@ -14,7 +14,7 @@ use crate::motion::trajectory::Trajectory;
 use crate::numerics::simd::groups;
 
 /// Number of intervals of the path. Durations then are within 1e-3 of those of ten times as many.
-const N_INTERVALS: usize = 500;
+const N_INTERVALS: usize = 1000;
 /// Number of halvings of the first and the last interval.
 const N_HALVINGS: i32 = 12;
 /// Distance of the last knot from the end, where y″ is not continuous, relative to the path.
@@ -133,7 +133,7 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
     let mut curve = RateCurve::new(path.clock.len(), bounds.len());
     curve.compute(&path, &bounds, end, (MAX_RATE / primitive.tau()).powi(2));
     if start > curve.max[0] * (1.0 + 1e-9) {
-        return Err(Error::StartsTooFast { ratio: (start / curve.max[0]).sqrt() });
+        return Err(Error::Limits(LimitError::StartTooFast { ratio: (start / curve.max[0]).sqrt() }));
     }
     let start = start.min(curve.max[0]);
     curve.reach(&path, &bounds, start);
@@ -151,7 +151,8 @@ fn check_positions(path: &SampledPath, limits: &Limits, primitive: &Primitive) -
         for (dof, value) in positions.take(primitive.n_dofs()).enumerate() {
             if value < lower[dof] || value > upper[dof] {
                 let phase = u / primitive.canonical().extent();
-                return Err(Error::LeavesLimits { dof, value, lower: lower[dof], upper: upper[dof], phase });
+                let (lower, upper) = (lower[dof], upper[dof]);
+                return Err(Error::Limits(LimitError::LeftByPath { dof, value, lower, upper, phase }));
             }
         }
     }

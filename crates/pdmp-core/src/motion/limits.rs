@@ -1,8 +1,9 @@
 //! Kinematic limits of a robot.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, LimitError, Result};
 use crate::motion::time_law::RateLimits;
 use crate::numerics::simd::{F64x4, WIDTH, groups};
+use crate::validate::MAX_MAGNITUDE;
 
 /// Limits of position, velocity and acceleration: one number for all DoFs, or one for each. `None` or infinity is no limit.
 ///
@@ -48,7 +49,8 @@ impl Limits {
     /// Checks shapes and values for `n_dofs` DoFs.
     ///
     /// # Errors
-    /// A wrong length, a lower limit that is not below the upper one, or a velocity or acceleration that is not positive.
+    /// A wrong length, a finite limit above 1e150 in magnitude, a lower limit that is not below the upper one, or a velocity or
+    /// acceleration that is not positive.
     pub fn check(&self, n_dofs: usize) -> Result<()> {
         let vectors = [
             ("lower", &self.lower),
@@ -64,6 +66,10 @@ impl Limits {
             if let Some(index) = vector.iter().position(|limit| limit.is_nan()) {
                 return Err(Error::NotFinite { name, index, value: vector[index] });
             }
+            let too_large = |limit: &f64| limit.is_finite() && limit.abs() > MAX_MAGNITUDE;
+            if let Some(index) = vector.iter().position(too_large) {
+                return Err(Error::TooLarge { name, index, value: vector[index], limit: MAX_MAGNITUDE });
+            }
             let positive = name == "velocity" || name == "acceleration";
             if let Some(&value) = vector.iter().find(|limit| positive && **limit <= 0.0) {
                 return Err(Error::Range { name, value, allowed: "every limit must be positive; infinity is none" });
@@ -72,7 +78,7 @@ impl Limits {
         (0..n_dofs).try_for_each(|dof| {
             let lower = limit_of_dof(&self.lower, dof, f64::NEG_INFINITY);
             let upper = limit_of_dof(&self.upper, dof, f64::INFINITY);
-            if lower < upper { Ok(()) } else { Err(Error::LimitOrder { dof, lower, upper }) }
+            if lower < upper { Ok(()) } else { Err(Error::Limits(LimitError::Order { dof, lower, upper })) }
         })
     }
 

@@ -209,7 +209,7 @@ impl RateCurve {
                 break;
             }
             let crossing = x + gap / (lower[1] - upper[1]);
-            if !(crossing < x) {
+            if crossing >= x || crossing.is_nan() {
                 break;
             }
             x = crossing.max(0.0);

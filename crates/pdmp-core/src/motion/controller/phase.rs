@@ -89,7 +89,7 @@ impl Controller {
         self.read_forcing();
         self.groups.iter_mut().for_each(|group| group.z -= group.forcing.value * r);
         self.leave_path();
-        self.read_out();
+        self.publish();
         Ok(())
     }
 

@@ -172,7 +172,7 @@ impl Controller {
         let rate = [self.commanded_rate()];
         if self.started {
             self.rate.set_target(&rate, &self.rate_gains);
-            self.read_out();
+            self.publish();
         } else {
             self.begin();
         }
@@ -245,10 +245,10 @@ impl Controller {
         for (group, pull) in self.groups.iter_mut().zip(self.perturbation.pull()) {
             group.z += *pull * tau;
         }
-        self.perturbation.clear();
+        self.perturbation.release();
         self.change_phase_rate();
         self.leave_path();
-        self.read_out();
+        self.publish();
     }
 
     /// Returns the commanded rate: speed/τ, or that of an unlimited speed.
@@ -309,7 +309,7 @@ impl Controller {
         // Without transition, style and τ change the motion at once.
         if gains.is_immediate() {
             self.read_forcing();
-            self.read_out();
+            self.publish();
         }
         // The velocity at the end depends on style and τ.
         if goal_changed || self.approaching || velocity_changed {

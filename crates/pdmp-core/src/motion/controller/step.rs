@@ -52,7 +52,7 @@ impl Controller {
         }
         self.time.add(dt);
         if self.limiter.is_active() {
-            self.enforce_limits(dt);
+            self.enforce_limits(dt, h);
         }
         if self.perturbation.terms().is_some() {
             self.leave_path();

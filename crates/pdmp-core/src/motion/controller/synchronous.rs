@@ -11,6 +11,7 @@
 
 use super::Controller;
 use super::step::first_element;
+use crate::motion::viability::MIN_TICK;
 use crate::numerics::simd::Register;
 
 /// Largest decrease of the rate over a substep off the path, relative to it.
@@ -37,6 +38,9 @@ impl Controller {
     /// commanded rate.
     #[inline(never)]
     pub(super) fn limit_rate(&mut self, dt: f64) -> Option<f64> {
+        if dt < MIN_TICK {
+            return None;
+        }
         self.update_rate_step(dt);
         let ahead = self.path_ahead.as_ref()?;
         let rate = first_element(self.rate.value());
