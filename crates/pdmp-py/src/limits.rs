@@ -156,6 +156,13 @@ impl Controller {
         self.command(result)
     }
 
+    /// True while a part of a commanded style, goal, anchor or amplitude is not yet accepted, as the movement ahead would leave
+    /// its limits with it.
+    #[getter]
+    fn pending(&self) -> bool {
+        self.inner.is_pending()
+    }
+
     /// Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
     /// "acceleration", or None for a free one.
     ///

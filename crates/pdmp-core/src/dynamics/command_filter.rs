@@ -203,16 +203,25 @@ impl CommandFilter {
 
     /// Sets the targets and starts a transition.
     pub(crate) fn set_target(&mut self, target: &[f64], gains: &FilterGains) {
-        if gains.is_immediate() {
-            return self.reset(target);
-        }
-        repack(&mut self.target, target);
-        self.remaining = gains.decay_time;
+        self.move_target(target, 1.0, gains);
     }
 
-    /// Sets the targets and leaves the values, which do not move.
-    pub(crate) fn set_target_only(&mut self, target: &[f64]) {
-        repack(&mut self.target, target);
+    /// Moves the targets by a share of the distance to others and starts a transition.
+    pub(crate) fn move_target(&mut self, target: &[f64], share: f64, gains: &FilterGains) {
+        self.move_target_only(target, share);
+        if gains.is_immediate() {
+            self.settle();
+        } else {
+            self.remaining = gains.decay_time;
+        }
+    }
+
+    /// Moves the targets by a share of the distance to others and leaves the values, which do not move.
+    pub(crate) fn move_target_only(&mut self, target: &[f64], share: f64) {
+        for (present, target) in bytemuck::cast_slice_mut::<F64x4, f64>(&mut self.target).iter_mut().zip(target) {
+            // Exactly the target for the whole of the distance.
+            *present = *present * (1.0 - share) + target * share;
+        }
     }
 
     /// Sets the value of a group without a transition and leaves its target.
@@ -223,6 +232,11 @@ impl CommandFilter {
     /// Sets targets and values.
     pub(crate) fn reset(&mut self, target: &[f64]) {
         repack(&mut self.target, target);
+        self.settle();
+    }
+
+    /// Sets the values to their targets, at rest.
+    fn settle(&mut self) {
         self.value.copy_from_slice(&self.target);
         self.rate.fill(F64x4::ZERO);
         self.remaining = 0.0;

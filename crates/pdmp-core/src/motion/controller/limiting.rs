@@ -60,7 +60,7 @@ impl Controller {
             return Ok(());
         }
         self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
-        self.command_centre();
+        self.move_centre(1.0);
         self.status = Status::Working;
         if self.has_frame() {
             self.start_goal_transition();

@@ -16,6 +16,7 @@ mod avx;
 mod forecast;
 mod getters;
 mod goal;
+mod governor;
 mod group;
 mod limiter;
 mod limiting;
@@ -45,9 +46,9 @@ use crate::motion::perturbation::{Perturbation, largest_range};
 use crate::numerics::simd::{F64x4, copy};
 use crate::numerics::state::clone_in_place;
 use crate::validate::check_positive;
+use governor::Governor;
 use group::Group;
 use limiter::Limiter;
-use path_ahead::PathAhead;
 
 /// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
@@ -136,8 +137,8 @@ pub struct Controller {
     flush_level: f64,
     perturbation: Perturbation,
     limiter: Limiter,
-    /// Path ahead, if limits bound its rate.
-    path_ahead: Option<Box<PathAhead>>,
+    /// Governor of the commands, if limits bound the rate of the path.
+    governor: Option<Box<Governor>>,
     /// ρ̇ of the next substep where the limits determine it.
     rate_slope: Option<f64>,
     /// k_φ.
@@ -189,7 +190,7 @@ clone_in_place!(Controller {
     flush_level,
     perturbation,
     limiter,
-    path_ahead,
+    governor,
     rate_slope,
     phase_gain,
     max_clock_step,
@@ -259,7 +260,7 @@ impl Controller {
             flush_level: FLUSH_RATIO * largest_range(primitive.ranges()),
             perturbation: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
             limiter: Limiter::none(primitive.ranges()),
-            path_ahead: None,
+            governor: None,
             rate_slope: None,
             phase_gain: phase::PHASE_GAIN,
             max_clock_step,

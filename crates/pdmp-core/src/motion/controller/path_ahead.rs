@@ -6,13 +6,16 @@
 //! the last digits of the tick, keep the latter.
 
 use super::Controller;
+use super::governor::MARGINS;
+use super::group::Group;
 use super::step::first_element;
 use crate::dynamics::canonical::Canonical;
+use crate::error::Result;
 use crate::kind::Kind;
 use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, max_constant};
 use crate::motion::viability::Bounds;
 use crate::numerics::simd::F64x4;
-use crate::numerics::state::clone_in_place;
+use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Number of intervals of the path. Learnt from recordings, y″ between the knots is within 1 % of its maximum.
 const N_INTERVALS: usize = 640;
@@ -22,8 +25,6 @@ const N_MOVEMENT: usize = 512;
 const REFRESH: f64 = 8.0;
 /// Clock between the knots on both sides of the end, where y″ is not continuous, relative to the clock until then.
 const KINK: f64 = 1e-6;
-/// Margins of velocity and acceleration in the backward pass.
-const MARGINS: [f64; 2] = [0.005, 0.03];
 /// Margins of the acceleration at a tick: smaller than that of the path, so that the path can be followed.
 const TICK_MARGINS: [f64; 2] = [0.022, 0.008];
 /// Clock past the end of a discrete movement, relative to its extent.
@@ -39,13 +40,9 @@ const MAX_TRANSITION_STEP: f64 = 14.0;
 /// Path ahead, with the largest ρ² at its knots.
 #[derive(Debug)]
 pub(super) struct PathAhead {
-    /// Copy of the controller that samples the path; itself without one.
-    sampler: Option<Box<Controller>>,
-    /// Limits of the backward pass.
-    limits: Vec<RateLimits>,
-    pub(super) path: SampledPath,
-    pub(super) curve: RateCurve,
-    /// Largest ρ² that can be kept constant in each interval and the next one.
+    path: SampledPath,
+    curve: RateCurve,
+    /// Largest ρ² that can be kept constant from each interval on for the longest substep.
     constant: Vec<f64>,
     pieces: [Piece; 2],
     /// Clock of the phase since the path was sampled.
@@ -54,15 +51,12 @@ pub(super) struct PathAhead {
     is_current: bool,
 }
 
-clone_in_place!(PathAhead { sampler, limits, path, curve, constant, pieces, progress, is_current });
+clone_in_place!(PathAhead { path, curve, constant, pieces, progress, is_current });
 
 impl PathAhead {
-    /// Returns memory for the path of a controller without one.
-    fn new(controller: &Controller) -> Self {
-        let n_groups = controller.groups.len();
+    /// Returns memory for a path of groups of DoFs.
+    pub(super) fn new(n_groups: usize) -> Self {
         Self {
-            sampler: Some(Box::new(controller.clone())),
-            limits: Vec::with_capacity(n_groups),
             path: SampledPath::at(vec![0.0; N_INTERVALS + 1], n_groups),
             curve: RateCurve::new(N_INTERVALS + 1, n_groups),
             constant: vec![0.0; N_INTERVALS + 1],
@@ -72,19 +66,9 @@ impl PathAhead {
         }
     }
 
-    /// Sets the limits of all groups.
-    fn set_limits(&mut self, bounds: &[Bounds]) {
-        self.limits.clear();
-        self.limits.extend(bounds.iter().map(|bounds| RateLimits {
-            velocity: bounds.velocity * (1.0 - MARGINS[0]),
-            acceleration: bounds.acceleration * (1.0 - MARGINS[1]),
-        }));
-    }
-
-    /// Samples the path of a controller.
-    fn compute(&mut self, controller: &Controller) {
-        let Some(mut sampler) = self.sampler.take() else { return };
-        (*sampler).clone_from(controller);
+    /// Samples the path of a controller by a copy of it.
+    pub(super) fn compute(&mut self, controller: &Controller, sampler: &mut Controller, limits: &[RateLimits]) {
+        sampler.clone_from(controller);
         self.pieces = controller.pieces();
         for Piece { first, start, interval } in self.pieces {
             for (i, knot) in self.path.clock[first..].iter_mut().enumerate() {
@@ -94,15 +78,14 @@ impl PathAhead {
         let longest = self.pieces[0].interval.max(self.pieces[1].interval);
         sampler.max_clock_step = longest * (1.0 + 1e-9);
         sampler.sample_path(&mut self.path);
-        self.sampler = Some(sampler);
         for (i, constant) in self.constant.iter_mut().enumerate() {
             let interval = i.min(N_INTERVALS - 1);
-            let here = max_constant(self.path.within(interval, (i - interval) as f64), &self.limits);
-            *constant = here.min(max_constant(self.path.within(interval, 0.5), &self.limits));
+            let here = max_constant(self.path.within(interval, (i - interval) as f64), limits);
+            *constant = here.min(max_constant(self.path.within(interval, 0.5), limits));
         }
         let rhythmic = controller.primitive.kind() == Kind::Rhythmic;
         let end = if rhythmic { self.constant.iter().copied().fold(f64::INFINITY, f64::min) } else { f64::INFINITY };
-        self.curve.compute(&self.path, &self.limits, end, controller.max_rate().powi(2));
+        self.curve.compute(&self.path, limits, end, controller.max_rate().powi(2));
         self.constant.iter_mut().zip(&self.curve.max).for_each(|(constant, max)| *constant = constant.min(*max));
         for i in 0..self.constant.len() {
             let end = self.path.clock[i] + controller.max_clock_step;
@@ -111,6 +94,17 @@ impl PathAhead {
             self.constant[i] = within.fold(self.constant[i], |least, k| least.min(self.constant[k]));
         }
         (self.progress, self.is_current) = (0.0, true);
+    }
+
+    /// Returns the largest distance of the rest of the path beyond the limits of the position, relative to the ranges.
+    pub(super) fn distance_outside(&self, bounds: &[Bounds], groups: &[Group]) -> f64 {
+        let (first, _) = self.locate(self.progress);
+        let knots = (first..=N_INTERVALS).flat_map(|knot| self.path.knot(knot).iter().zip(bounds).zip(groups));
+        let farthest = knots.fold(F64x4::ZERO, |farthest, (([position, ..], bounds), group)| {
+            let outside = (*position - bounds.upper).max(bounds.lower - *position);
+            farthest.max(outside / group.range)
+        });
+        farthest.to_array().into_iter().fold(0.0, f64::max)
     }
 
     /// Returns the interval that contains a progress, and the position in it from 0 to 1, past the end that at its end.
@@ -135,6 +129,7 @@ impl PathAhead {
     }
 
     /// Returns the clock until the next knot.
+    #[inline(always)]
     pub(super) fn rest(&self) -> f64 {
         let (index, _) = self.locate(self.progress);
         (self.path.clock[index + 1] - self.progress).max(0.0)
@@ -142,24 +137,24 @@ impl PathAhead {
 
     /// Returns the smallest and the largest constant ρ̇ to the end of the interval, for ρ² = `x` now, that keep the limits in the
     /// quarters of the interval and arrive below the curve.
-    pub(super) fn slopes(&self, x: f64) -> [f64; 2] {
+    pub(super) fn slopes(&self, x: f64, limits: &[RateLimits]) -> [f64; 2] {
         let (index, t) = self.locate(self.progress);
-        self.slopes_within(index, t, x)
+        self.slopes_within(index, t, x, limits)
     }
 
     /// Returns the slopes as [`PathAhead::slopes`] at the next knot, for ρ² = `x` there.
-    pub(super) fn next_slopes(&self, x: f64) -> [f64; 2] {
+    pub(super) fn next_slopes(&self, x: f64, limits: &[RateLimits]) -> [f64; 2] {
         let (index, _) = self.locate(self.progress);
-        self.slopes_within((index + 1).min(N_INTERVALS - 1), 0.0, x)
+        self.slopes_within((index + 1).min(N_INTERVALS - 1), 0.0, x, limits)
     }
 
-    fn slopes_within(&self, index: usize, t: f64, x: f64) -> [f64; 2] {
+    fn slopes_within(&self, index: usize, t: f64, x: f64, limits: &[RateLimits]) -> [f64; 2] {
         let infinity = F64x4::splat(f64::INFINITY);
         let (mut least, mut most) = (-infinity, infinity);
         let interval = self.path.interval(index);
         let mut limit_at = |position: f64| {
             let since = (position - t) * interval;
-            for ([slope, bend], limits) in self.path.within(index, position).zip(&self.limits) {
+            for ([slope, bend], limits) in self.path.within(index, position).zip(limits) {
                 // Near a reversal, where y″ρ² alone reaches the tighter limit, ρ̇ has no effect and must not be driven by it.
                 let [tight, wide] =
                     TICK_MARGINS.map(|margin| limits.acceleration * ((1.0 - margin) / (1.0 - MARGINS[1])));
@@ -190,10 +185,29 @@ impl PathAhead {
         self.progress += h;
     }
 
-    /// Returns whether the path has to be sampled again: after an interval that left it, or at a third of a rhythmic one.
-    fn is_due(&self, rhythmic: bool) -> bool {
-        let intervals = self.progress / self.pieces[0].interval;
-        intervals >= REFRESH && (!self.is_current || (rhythmic && 3.0 * intervals >= N_INTERVALS as f64))
+    /// Marks the path as left.
+    pub(super) fn leave(&mut self) {
+        self.is_current = false;
+    }
+
+    /// Returns whether the path has to be sampled again: when it was left, or at a third of a rhythmic one.
+    pub(super) fn is_due(&self, rhythmic: bool) -> bool {
+        self.has_progressed() && (!self.is_current || (rhythmic && 3.0 * self.intervals() >= N_INTERVALS as f64))
+    }
+
+    /// Returns whether enough of the path has passed for a new attempt.
+    pub(super) fn has_progressed(&self) -> bool {
+        self.intervals() >= REFRESH
+    }
+
+    fn intervals(&self) -> f64 {
+        self.progress / self.pieces[0].interval
+    }
+
+    /// Visits the state that does not follow from the path.
+    pub(super) fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+        visit_number(visit, &mut self.progress, [0.0, 1e300])?;
+        visit_flag(visit, &mut self.is_current)
     }
 }
 
@@ -234,56 +248,10 @@ impl Controller {
         ]
     }
 
-    /// Looks ahead along the path if the limits bound its rate. The first time it takes memory for the path.
-    pub(super) fn limit_path(&mut self) {
-        if !self.limiter.limits_rate() {
-            self.path_ahead = None;
-            return;
-        }
-        let mut ahead = self.path_ahead.take().unwrap_or_else(|| Box::new(PathAhead::new(self)));
-        ahead.set_limits(&self.limiter.bounds);
-        self.path_ahead = Some(ahead);
-    }
-
-    /// Looks ahead at the start, and reduces the rate there to what the path ahead admits. A given velocity is kept.
-    pub(super) fn start_rate(&mut self) {
-        self.look_ahead();
-        if self.conditions.velocity.is_some() {
-            return;
-        }
-        let most = self.path_ahead.as_ref().map_or(f64::INFINITY, |ahead| ahead.max().sqrt());
-        if first_element(self.rate.value()) > most {
-            self.rate.start(most, &self.rate_gains);
-            self.read_out();
-        }
-    }
-
-    /// Marks the path ahead as left.
-    pub(super) fn leave_path(&mut self) {
-        if let Some(ahead) = &mut self.path_ahead {
-            ahead.is_current = false;
-        }
-    }
-
-    /// Samples the path ahead under the present commands.
-    pub(super) fn look_ahead(&mut self) {
-        let Some(mut ahead) = self.path_ahead.take() else { return };
-        ahead.compute(self);
-        self.path_ahead = Some(ahead);
-    }
-
-    /// Samples the path ahead again once the movement has left it or nears its end.
-    pub(super) fn refresh_path(&mut self) {
-        let rhythmic = self.primitive.kind() == Kind::Rhythmic;
-        if self.path_ahead.as_ref().is_some_and(|ahead| ahead.is_due(rhythmic)) {
-            self.look_ahead();
-        }
-    }
-
     /// Samples y, y′ and y″ under the present commands at the knots of a path, which begins at the present clock.
     pub(crate) fn sample_path(&mut self, path: &mut SampledPath) {
-        // At the rate 1 the derivatives with respect to the clock are those with respect to time.
         self.release();
+        // At the rate 1 the derivatives with respect to the clock are those with respect to time.
         self.rate.reset(&[1.0]);
         self.read_out();
         let n_groups = self.groups.len();

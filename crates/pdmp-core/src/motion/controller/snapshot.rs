@@ -75,14 +75,8 @@ impl Controller {
         }
         let mut controller = Self::new(primitive, head[HEADER - 2], &Conditions::default(), Some(head[HEADER - 1]))?;
         let mut expected = HEADER;
-        controller.clone().walk(&mut |quantity, _| {
-            expected += quantity.len();
-            Ok(())
-        })?;
-        if snapshot.len() != expected {
-            return Err(length(expected));
-        }
         controller.walk(&mut |quantity, [least, greatest]| {
+            expected += quantity.len();
             let (saved, remaining) = rest.split_at_checked(quantity.len()).ok_or_else(|| length(expected))?;
             if let Some(index) = saved.iter().position(|number| !(least..=greatest).contains(number)) {
                 let (value, index) = (saved[index], snapshot.len() - rest.len() + index);
@@ -97,12 +91,15 @@ impl Controller {
             rest = remaining;
             Ok(())
         })?;
+        if !rest.is_empty() {
+            return Err(length(expected));
+        }
         controller.check_restored()?;
         Ok(controller)
     }
 
     /// Visits every number of the state, in the order of the snapshot.
-    fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+    pub(super) fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
         // The pattern names every field, so that a new one is saved or listed as derived.
         let Self {
             primitive,
@@ -133,7 +130,7 @@ impl Controller {
             acceleration,
             perturbation,
             limiter,
-            path_ahead: _,
+            governor: _,
             rate_slope: _,
             phase_gain,
             command_step,
@@ -205,7 +202,7 @@ impl Controller {
         perturbation.walk(visit, QUANTITY)?;
         limiter.walk(visit, QUANTITY, primitive.duration(), *dt)?;
         *command_step = FilterStep::IDENTITY;
-        Ok(())
+        self.walk_governor(visit)
     }
 
     /// Checks quantities that depend on several numbers of a snapshot.

@@ -60,7 +60,7 @@ impl Controller {
         self.read_forcing();
         self.set_initial_state();
         if rhythmic && self.limiter.is_active() {
-            self.command_centre();
+            self.move_centre(1.0);
         }
         if self.conditions.has_goal_velocity {
             self.start_goal_transition();

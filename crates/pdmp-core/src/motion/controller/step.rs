@@ -185,8 +185,8 @@ impl Controller {
         let moving = self.centre.begin_step(&self.command_step);
         let phase_step = self.perturbation.phase_rate() * h;
         self.clock.add(phase_step);
-        if let Some(ahead) = &mut self.path_ahead {
-            ahead.advance(phase_step);
+        if let Some(governor) = &mut self.governor {
+            governor.ahead.advance(phase_step);
         }
         if let Canonical::Rhythmic { mu } = self.primitive.canonical() {
             self.clock.wrap();

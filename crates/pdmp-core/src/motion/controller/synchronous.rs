@@ -10,6 +10,7 @@
 //! that of the filter, which then continues from there.
 
 use super::Controller;
+use super::governor::Governor;
 use super::step::first_element;
 use crate::motion::viability::MIN_TICK;
 use crate::numerics::simd::Register;
@@ -25,11 +26,11 @@ impl Controller {
     /// Returns whether the rate of the next substep needs no limit, at a settled rate.
     #[inline(always)]
     pub(super) fn admits_rate(&self) -> bool {
-        match &self.path_ahead {
+        match &self.governor {
             None => true,
-            Some(ahead) => {
+            Some(governor) => {
                 let rate = first_element(self.rate.value());
-                self.rate.is_settled() && ahead.admits_constant(rate * rate)
+                self.rate.is_settled() && governor.ahead.admits_constant(rate * rate)
             }
         }
     }
@@ -42,14 +43,14 @@ impl Controller {
             return None;
         }
         self.update_rate_step(dt);
-        let ahead = self.path_ahead.as_ref()?;
+        let Governor { ahead, limits, .. } = &**self.governor.as_ref()?;
         let rate = first_element(self.rate.value());
         let [next, next_slope] = self.rate.preview(&self.rate_step);
         let wanted = (next - rate) / dt;
-        let [least, most] = ahead.slopes(rate * rate);
+        let [least, most] = ahead.slopes(rate * rate, limits);
         let keeps = |[least, most]: [f64; 2]| [wanted, next_slope].iter().all(|slope| (least..=most).contains(slope));
         let crosses = rate.max(next) * dt > ahead.rest();
-        if keeps([least, most]) && (!crosses || keeps(ahead.next_slopes(next * next))) {
+        if keeps([least, most]) && (!crosses || keeps(ahead.next_slopes(next * next, limits))) {
             return None;
         }
         let slope = if least <= most && rate * rate <= ahead.max() * (1.0 + TOLERANCE) {
@@ -67,8 +68,8 @@ impl Controller {
     #[inline(never)]
     pub(super) fn limited_substep(&mut self, mut dt: f64, mut h: f64) {
         for _ in 0..MAX_PARTS {
-            let Some(ahead) = &self.path_ahead else { break };
-            let rest = ahead.rest() / self.perturbation.phase_rate();
+            let Some(governor) = &self.governor else { break };
+            let rest = governor.ahead.rest() / self.perturbation.phase_rate();
             if self.rate_slope.is_none() || rest >= h {
                 break;
             }
