@@ -43,10 +43,15 @@ pub(crate) enum CommandLoad {
     Commanded,
     /// As settled, within limits that do not bind.
     Limited,
+    /// As settled, along a path that limits slow down.
+    Slowed,
+    /// As commanded, by a governor within limits.
+    Governed,
 }
 
 impl CommandLoad {
-    pub(crate) const ALL: [Self; 4] = [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited, Self::Slowed, Self::Governed];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -54,6 +59,17 @@ impl CommandLoad {
             Self::InTransition => "in transition",
             Self::Commanded => "commanded",
             Self::Limited => "within limits",
+            Self::Slowed => "slowed",
+            Self::Governed => "governed",
+        }
+    }
+
+    /// Returns the limit of the velocity, if there are limits. Without it, the velocity of a DoF reaches twenty.
+    fn max_velocity(self) -> Option<f64> {
+        match self {
+            Self::Settled | Self::InTransition | Self::Commanded => None,
+            Self::Limited | Self::Governed => Some(1e3),
+            Self::Slowed => Some(2.0),
         }
     }
 }
@@ -81,12 +97,13 @@ impl ControlLoop {
     pub(crate) fn new(model: &Arc<Model>, load: CommandLoad) -> Self {
         let mut controller =
             Controller::new(model.primitive(), DT, &Conditions::default(), None).expect("a controller");
-        if load == CommandLoad::Limited {
+        if let Some(velocity) = load.max_velocity() {
             let limits = Limits {
                 lower: Some(vec![-1e3]),
                 upper: Some(vec![1e3]),
-                velocity: Some(vec![1e3]),
-                acceleration: Some(vec![1e6]),
+                velocity: Some(vec![velocity]),
+                acceleration: Some(vec![1e3]),
+                ..Limits::default()
             };
             controller.set_limits(&limits).expect("limits");
         }
@@ -112,7 +129,7 @@ impl ControlLoop {
 
     /// Executes the measured tick.
     pub(crate) fn tick(&mut self) {
-        if self.load == CommandLoad::Commanded {
+        if matches!(self.load, CommandLoad::Commanded | CommandLoad::Governed) {
             self.command();
         } else {
             black_box(self.controller.step().expect("a tick"));

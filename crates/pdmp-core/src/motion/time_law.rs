@@ -18,8 +18,8 @@ use crate::numerics::state::clone_in_place;
 
 /// Maximum number of Newton steps to a vertex; each removes a limit, and two to five suffice on recordings.
 const MAX_NEWTON_STEPS: usize = 64;
-/// Share of |y″|Δ below which y′ counts as zero: the limit of the acceleration then bounds x alone.
-const MIN_SLOPE: f64 = 1e-9;
+/// Number added to β, far below any other: its inverse is finite.
+const MIN_BETA: f64 = 1e-200;
 /// Number of intervals from a reversal of a DoF within which its limits also hold in the quarters of an interval.
 const REVERSAL: f64 = 4.0;
 
@@ -52,6 +52,7 @@ impl SampledPath {
     }
 
     /// Returns y′ and y″ of all groups within interval `index`, at a position `t` from 0 to 1.
+    #[inline(always)]
     pub(crate) fn within(&self, index: usize, t: f64) -> impl Iterator<Item = [F64x4; 2]> {
         let interval = self.interval(index);
         self.knot(index).iter().zip(self.knot(index + 1)).map(move |(here, next)| between(here, next, interval, t))
@@ -81,25 +82,20 @@ pub(crate) struct RateLimits {
     pub(crate) acceleration: F64x4,
 }
 
-/// Limits |αx + βa| ≤ A of a group, as −α/β and A/|β|.
+/// Limits |αx + βa| ≤ A of a group, as −α/β and A/|β|: a lies between slope·x − half and slope·x + half.
 #[derive(Clone, Copy, Debug)]
-struct Rows {
+struct Row {
     slope: F64x4,
     half: F64x4,
 }
 
-impl Rows {
-    /// Returns the limits for α = y″ and β = y′ + `twice`·y″, and the largest x that those with β = 0 admit.
-    fn new([slope, bend]: [F64x4; 2], limits: &RateLimits, twice: f64) -> (Self, F64x4) {
-        let (beta, infinity) = (slope + bend * twice, F64x4::splat(f64::INFINITY));
-        let is_zero = beta.abs().simd_le(bend.abs() * (MIN_SLOPE * twice));
-        let inverse = F64x4::ONE / is_zero.select(F64x4::ONE, beta);
-        let rows = Self {
-            slope: is_zero.select(F64x4::ZERO, -bend * inverse),
-            half: is_zero.select(infinity, limits.acceleration * inverse.abs()),
-        };
-        let bound = limits.acceleration / bend.abs();
-        (rows, (is_zero & bend.simd_ne(F64x4::ZERO)).select(bound, infinity))
+impl Row {
+    /// Returns the limits for α = y″ and β = y′ + `twice`·y″.
+    #[inline(always)]
+    fn new([slope, bend]: [F64x4; 2], limits: &RateLimits, twice: f64) -> Self {
+        // For β = 0 the ends become steep lines instead of a bound of x.
+        let inverse = F64x4::ONE / (slope + bend * twice + F64x4::splat(MIN_BETA));
+        Self { slope: -bend * inverse, half: limits.acceleration * inverse.abs() }
     }
 }
 
@@ -111,7 +107,7 @@ type Line = [f64; 2];
 pub(crate) struct RateCurve {
     /// Largest x from which the rest of the path can be followed.
     pub(crate) max: Vec<f64>,
-    rows: Vec<Rows>,
+    rows: Vec<Row>,
     /// Largest a at the start of the interval due to the limit of the velocity in its middle.
     middle: Line,
 }
@@ -150,38 +146,55 @@ impl RateCurve {
             let twice = 2.0 * path.interval(i);
             self.write_rows(path, limits, i);
             let x = self.max[i];
-            let ends = self.rows.iter().map(|row| row.slope * x + row.half);
-            let most = smallest(ends.fold(F64x4::splat(f64::INFINITY), F64x4::fast_min));
-            let most = most.min(self.middle[0] + self.middle[1] * x);
+            let [_, upper] = self.ends(x);
+            let most = upper.min(self.middle[0] + self.middle[1] * x);
             self.max[i + 1] = self.max[i + 1].min(x + twice * most).max(0.0);
         }
     }
 
-    /// Writes the limits of interval `i`; returns the largest x at its start that they admit on its own.
+    /// Writes the limits of interval `i`; returns the largest x at its start that the limits of the velocity admit.
     fn write_rows(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) -> f64 {
         let interval = path.interval(i);
         let [mut most, mut in_middle] = [F64x4::splat(f64::INFINITY); 2];
         self.rows.clear();
         for ((here, next), limits) in path.knot(i).iter().zip(path.knot(i + 1)).zip(limits) {
-            let rate = limits.velocity / here[1].abs();
-            most = most.fast_min(rate * rate);
             let middle = between(here, next, interval, 0.5);
-            let rate = limits.velocity / middle[0].abs();
-            in_middle = in_middle.fast_min(rate * rate);
-            let samples = [([here[1], here[2]], 0.0), (middle, interval), ([next[1], next[2]], 2.0 * interval)];
+            let [rate, middle_rate] = [here[1], middle[0]].map(|slope| limits.velocity / slope.abs());
+            (most, in_middle) = (most.fast_min(rate * rate), in_middle.fast_min(middle_rate * middle_rate));
+            self.rows.push(Row::new([here[1], here[2]], limits, 0.0));
+            self.rows.push(Row::new(middle, limits, interval));
+            self.rows.push(Row::new([next[1], next[2]], limits, 2.0 * interval));
             // Near a reversal of a DoF its acceleration hardly depends on a, and varies most within the interval.
             let (slowest, bend) = (here[1].abs().fast_min(next[1].abs()), here[2].abs().fast_max(next[2].abs()));
-            let reverses = slowest.simd_lt(bend * (REVERSAL * interval)).any();
-            let quarters = [0.25, 0.75].map(|t| (between(here, next, interval, t), 2.0 * t * interval));
-            let n_quarters = if reverses { quarters.len() } else { 0 };
-            for (sample, twice) in samples.into_iter().chain(quarters.into_iter().take(n_quarters)) {
-                let (rows, bound) = Rows::new(sample, limits, twice);
-                self.rows.push(rows);
-                most = most.fast_min(bound);
+            if slowest.simd_lt(bend * (REVERSAL * interval)).any() {
+                for t in [0.25, 0.75] {
+                    self.rows.push(Row::new(between(here, next, interval, t), limits, 2.0 * t * interval));
+                }
             }
         }
         self.middle = [smallest(in_middle) / interval, -interval.recip()];
         smallest(most)
+    }
+
+    /// Returns the largest lower and the smallest upper end of a for a given x.
+    #[inline(always)]
+    fn ends(&self, x: f64) -> [f64; 2] {
+        let mut upper = F64x4::splat(f64::INFINITY);
+        let mut lower = -upper;
+        for row in &self.rows {
+            let centre = row.slope * x;
+            (lower, upper) = (lower.fast_max(centre - row.half), upper.fast_min(centre + row.half));
+        }
+        [-smallest(-lower), smallest(upper)]
+    }
+
+    /// Returns the slope of the row whose lower (`side` −1) or upper (1) end has a given value at x.
+    fn slope_of(&self, value: f64, x: f64, side: f64) -> f64 {
+        let ends = self.rows.iter().flat_map(|row| {
+            let end = row.slope * x + row.half * side;
+            end.to_array().into_iter().zip(row.slope.to_array())
+        });
+        ends.into_iter().find(|(end, _)| *end == value).map_or(0.0, |(_, slope)| slope)
     }
 
     /// Returns the largest x up to `most` for which some a lies within all rows and between the lines `next`.
@@ -191,24 +204,17 @@ impl RateCurve {
     fn vertex(&self, most: f64, next: [Line; 2]) -> f64 {
         let mut x = most;
         for _ in 0..MAX_NEWTON_STEPS {
-            let [mut lower, mut upper] = next.map(|[value, slope]| [value + slope * x, slope].map(F64x4::splat));
-            for row in &self.rows {
-                let centre = row.slope * x;
-                let ends = [centre - row.half, centre + row.half];
-                let [tighter_lower, tighter_upper] = [ends[0].simd_gt(lower[0]), ends[1].simd_lt(upper[0])];
-                lower = [tighter_lower.select(ends[0], lower[0]), tighter_lower.select(row.slope, lower[1])];
-                upper = [tighter_upper.select(ends[1], upper[0]), tighter_upper.select(row.slope, upper[1])];
-            }
-            let [lower, mut upper] = [tightest(lower, |a, b| a > b), tightest(upper, |a, b| a < b)];
-            let middle = self.middle[0] + self.middle[1] * x;
-            if middle < upper[0] {
-                upper = [middle, self.middle[1]];
-            }
-            let gap = upper[0] - lower[0];
+            let [lower, upper] = self.ends(x);
+            let [least, arrival, middle] =
+                [next[0], next[1], self.middle].map(|[value, slope]| [value + slope * x, slope]);
+            let line = if middle[0] < arrival[0] { middle } else { arrival };
+            let gap = upper.min(line[0]) - lower.max(least[0]);
             if gap >= 0.0 {
                 break;
             }
-            let crossing = x + gap / (lower[1] - upper[1]);
+            let upper_slope = if line[0] <= upper { line[1] } else { self.slope_of(upper, x, 1.0) };
+            let lower_slope = if least[0] >= lower { least[1] } else { self.slope_of(lower, x, -1.0) };
+            let crossing = x + gap / (lower_slope - upper_slope);
             if crossing >= x || crossing.is_nan() {
                 break;
             }
@@ -219,6 +225,7 @@ impl RateCurve {
 }
 
 /// Returns the largest x with a = 0 that the limits admit at y′ and y″ of all groups.
+#[inline(always)]
 pub(crate) fn max_constant(derivatives: impl Iterator<Item = [F64x4; 2]>, limits: &[RateLimits]) -> f64 {
     let most = derivatives.zip(limits).fold(F64x4::splat(f64::INFINITY), |most, ([slope, bend], limits)| {
         let rate = limits.velocity / slope.abs();
@@ -228,15 +235,10 @@ pub(crate) fn max_constant(derivatives: impl Iterator<Item = [F64x4; 2]>, limits
 }
 
 /// Returns the smallest lane.
+#[inline(always)]
 fn smallest(lanes: F64x4) -> f64 {
-    lanes.to_array().into_iter().fold(f64::INFINITY, f64::min)
-}
-
-/// Returns the value and slope of the lane whose value comes first in an order.
-fn tightest([values, slopes]: [F64x4; 2], before: fn(f64, f64) -> bool) -> Line {
-    let (values, slopes) = (values.to_array(), slopes.to_array());
-    let first = (1..values.len()).fold(0, |first, lane| if before(values[lane], values[first]) { lane } else { first });
-    [values[first], slopes[first]]
+    let [a, b, c, d] = lanes.to_array();
+    a.min(b).min(c.min(d))
 }
 
 /// Time law u(t): pieces of constant ü.
