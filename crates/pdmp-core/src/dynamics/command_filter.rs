@@ -218,9 +218,11 @@ impl CommandFilter {
 
     /// Moves the targets by a share of the distance to others and leaves the values, which do not move.
     pub(crate) fn move_target_only(&mut self, target: &[f64], share: f64) {
+        if share >= 1.0 {
+            return repack(&mut self.target, target);
+        }
         for (present, target) in bytemuck::cast_slice_mut::<F64x4, f64>(&mut self.target).iter_mut().zip(target) {
-            // Exactly the target for the whole of the distance.
-            *present = *present * (1.0 - share) + target * share;
+            *present += share * (target - *present);
         }
     }
 

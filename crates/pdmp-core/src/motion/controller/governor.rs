@@ -28,6 +28,8 @@ pub(super) struct Governor {
     /// Limits along the path.
     pub(super) limits: Vec<RateLimits>,
     pub(super) ahead: PathAhead,
+    /// True if the limits determined the rate in the present tick.
+    pub(super) slows: bool,
     /// Path ahead of `trial`.
     candidate: PathAhead,
     /// Controller whose path was sampled last.
@@ -42,7 +44,7 @@ pub(super) struct Governor {
     share: f64,
 }
 
-clone_in_place!(Governor { limits, ahead, candidate, origin, trial, sampler, pending, share });
+clone_in_place!(Governor { limits, ahead, slows, candidate, origin, trial, sampler, pending, share });
 
 impl Governor {
     /// Returns a governor of a controller, which has none.
@@ -52,6 +54,7 @@ impl Governor {
         Self {
             limits: Vec::with_capacity(n_groups),
             ahead: PathAhead::new(n_groups),
+            slows: false,
             candidate: PathAhead::new(n_groups),
             origin: copy(),
             trial: copy(),

@@ -22,6 +22,8 @@ pub(super) struct Limiter {
     synchronous: bool,
     /// True if no DoF was limited in the last tick.
     pub(super) is_free: bool,
+    /// True if `limited` names limits that slowed the clock.
+    pub(super) slows: bool,
     pub(super) bounds: Vec<Bounds>,
     /// Position, velocity and acceleration at the start of the tick.
     pub(super) before: Vec<[F64x4; 3]>,
@@ -41,6 +43,7 @@ clone_in_place!(Limiter {
     active,
     synchronous,
     is_free,
+    slows,
     bounds,
     before,
     limited,
@@ -62,6 +65,7 @@ impl Limiter {
             active: false,
             synchronous: true,
             is_free: true,
+            slows: false,
             bounds: vec![none; groups(n_dofs)],
             before: vec![[F64x4::ZERO; 3]; groups(n_dofs)],
             limited: vec![None; n_dofs],
@@ -192,6 +196,7 @@ impl Limiter {
         }
         self.set(&limits, duration, dt)?;
         visit_flag(visit, &mut self.is_free)?;
+        visit_flag(visit, &mut self.slows)?;
         for lanes in self.before.iter_mut().flatten() {
             visit(lanes.as_mut_array(), quantity)?;
         }

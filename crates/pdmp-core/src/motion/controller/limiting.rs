@@ -20,6 +20,9 @@ use crate::numerics::simd::{F64x4, WIDTH};
 /// Rate ρ, relative to the nominal one, below which the change of z is that of this rate: it would be unbounded in a pause.
 const MIN_RATE: f64 = 0.01;
 
+/// Share of a limit from which a DoF slows the clock; the margins of the path ahead are smaller.
+const NEAR_LIMIT: f64 = 0.95;
+
 impl Controller {
     /// Sets the limits of position, velocity and acceleration; those of [`Limits::default`] are none.
     ///
@@ -113,7 +116,43 @@ impl Controller {
         if !(kept_by_all && self.limiter.is_free && self.perturbation.limited_rate() == 1.0) {
             self.limit(dt, h);
         }
+        if self.perturbation.terms().is_some() {
+            self.leave_path();
+        }
+        let slows = self.governor.as_mut().is_some_and(|governor| std::mem::take(&mut governor.slows));
+        if slows || self.limiter.slows {
+            self.name_limits(dt, slows);
+        }
         self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
+    }
+
+    /// Names the DoFs that are near a limit which slows the clock.
+    #[inline(never)]
+    fn name_limits(&mut self, dt: f64, slows: bool) {
+        if self.limiter.is_free {
+            self.limiter.limited.fill(None);
+        }
+        self.limiter.slows = slows;
+        let before = self.limiter.before.iter().flat_map(|[_, v, _]| v.to_array());
+        let after = self.velocity.iter().flat_map(|v| v.to_array());
+        let bounds = self
+            .limiter
+            .bounds
+            .iter()
+            .flat_map(|bounds| bounds.velocity.to_array().into_iter().zip(bounds.acceleration.to_array()));
+        for (limited, ((v, next), (velocity, acceleration))) in self
+            .limiter
+            .limited
+            .iter_mut()
+            .zip(before.zip(after).zip(bounds))
+            .filter(|(limited, _)| slows && limited.is_none())
+        {
+            if next.abs() > NEAR_LIMIT * velocity {
+                *limited = Some(Limit::Velocity);
+            } else if (next - v).abs() > NEAR_LIMIT * acceleration * dt {
+                *limited = Some(Limit::Acceleration);
+            }
+        }
     }
 
     /// Limits the DoFs that do not keep their limits over a tick of `dt` seconds and `h` on the clock.

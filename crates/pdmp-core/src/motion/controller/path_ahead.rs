@@ -34,6 +34,8 @@ const TAIL: f64 = 0.3;
 const N_PERIODS: f64 = N_INTERVALS as f64 / N_MOVEMENT as f64;
 /// Part of an interval by which rounding may miss a knot.
 const ROUNDING: f64 = 1e-9;
+/// Last position in an interval, past which there is still a distance to its end.
+const LAST: f64 = 1.0 - 1e-6;
 /// Maximum ωh of a substep of the path during a transition of commands; the path then deviates by 1e-5 of the change.
 const MAX_TRANSITION_STEP: f64 = 14.0;
 
@@ -113,7 +115,7 @@ impl PathAhead {
         let piece = &self.pieces[usize::from(progress >= self.pieces[1].start * (1.0 - ROUNDING))];
         let position = (progress - piece.start) / piece.interval + ROUNDING;
         let index = (position as usize).min(N_INTERVALS - 1 - piece.first);
-        (piece.first + index, (position - index as f64).min(1.0))
+        (piece.first + index, (position - index as f64).min(LAST))
     }
 
     /// Returns whether the rate of square `x` can be kept constant from the present clock on.
@@ -128,11 +130,12 @@ impl PathAhead {
         self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t
     }
 
-    /// Returns the clock until the next knot.
+    /// Returns the clock until the next knot, infinity past the last one.
     #[inline(always)]
     pub(super) fn rest(&self) -> f64 {
         let (index, _) = self.locate(self.progress);
-        (self.path.clock[index + 1] - self.progress).max(0.0)
+        let rest = self.path.clock[index + 1] - self.progress;
+        if rest > 0.0 { rest } else { f64::INFINITY }
     }
 
     /// Returns the smallest and the largest constant ρ̇ to the end of the interval, for ρ² = `x` now, that keep the limits in the

@@ -54,9 +54,6 @@ impl Controller {
         if self.limiter.is_active() {
             self.enforce_limits(dt, h);
         }
-        if self.perturbation.terms().is_some() {
-            self.leave_path();
-        }
         // The style's transition and perturbations change the arrival that the final velocity compensates for.
         if self.approaching && !(self.style.is_settled() && self.perturbation.terms().is_none()) {
             self.correct_arrival();

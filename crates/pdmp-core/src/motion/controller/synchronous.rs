@@ -61,6 +61,9 @@ impl Controller {
         };
         let slope = slope.max(-rate / dt);
         self.rate_slope = Some(slope);
+        if let Some(governor) = &mut self.governor {
+            governor.slows = true;
+        }
         Some((rate + 0.5 * slope * dt) * dt)
     }
 
@@ -74,10 +77,16 @@ impl Controller {
                 break;
             }
             let part = self.time_to(rest, dt);
-            self.free_substep(part, rest);
+            self.advance_part(part, rest);
             dt -= part;
             h = self.clock_step(dt);
         }
+        self.advance_part(dt, h);
+    }
+
+    /// Advances by `dt` seconds and `h` on the clock. It stays a call, so that the tick of a free movement stays small.
+    #[inline(never)]
+    fn advance_part(&mut self, dt: f64, h: f64) {
         self.free_substep(dt, h);
     }
 
