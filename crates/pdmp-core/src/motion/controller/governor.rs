@@ -178,9 +178,11 @@ impl Controller {
     pub(super) fn walk_governor(&mut self, visit: &mut Visitor) -> Result<()> {
         self.limit_path();
         let Some(governor) = &mut self.governor else { return Ok(()) };
-        governor.origin.walk(visit)?;
+        governor.origin.walk_motion(visit)?;
+        let mut position = governor.ahead.position();
+        position.walk(visit)?;
         governor.ahead.compute(&governor.origin, &mut governor.sampler, &governor.limits);
-        governor.ahead.walk(visit)?;
+        governor.ahead.set_position(position);
         visit_flag(visit, &mut governor.pending)?;
         visit_number(visit, &mut governor.share, [MIN_SHARE, 1.0])
     }

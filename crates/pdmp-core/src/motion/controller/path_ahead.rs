@@ -55,6 +55,21 @@ pub(super) struct PathAhead {
 
 clone_in_place!(PathAhead { path, curve, constant, pieces, progress, is_current });
 
+/// Position of a movement on its path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PathPosition {
+    progress: f64,
+    is_current: bool,
+}
+
+impl PathPosition {
+    /// Visits the state.
+    pub(super) fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+        visit_number(visit, &mut self.progress, [0.0, 1e300])?;
+        visit_flag(visit, &mut self.is_current)
+    }
+}
+
 impl PathAhead {
     /// Returns memory for a path of groups of DoFs.
     pub(super) fn new(n_groups: usize) -> Self {
@@ -207,10 +222,14 @@ impl PathAhead {
         self.progress / self.pieces[0].interval
     }
 
-    /// Visits the state that does not follow from the path.
-    pub(super) fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
-        visit_number(visit, &mut self.progress, [0.0, 1e300])?;
-        visit_flag(visit, &mut self.is_current)
+    /// Returns the position of the movement.
+    pub(super) fn position(&self) -> PathPosition {
+        PathPosition { progress: self.progress, is_current: self.is_current }
+    }
+
+    /// Sets the position of the movement.
+    pub(super) fn set_position(&mut self, PathPosition { progress, is_current }: PathPosition) {
+        (self.progress, self.is_current) = (progress, is_current);
     }
 }
 

@@ -99,7 +99,13 @@ impl Controller {
     }
 
     /// Visits every number of the state, in the order of the snapshot.
-    pub(super) fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+    fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+        self.walk_motion(visit)?;
+        self.walk_governor(visit)
+    }
+
+    /// Visits every number of the state without the governor.
+    pub(super) fn walk_motion(&mut self, visit: &mut Visitor) -> Result<()> {
         // The pattern names every field, so that a new one is saved or listed as derived.
         let Self {
             primitive,
@@ -202,7 +208,7 @@ impl Controller {
         perturbation.walk(visit, QUANTITY)?;
         limiter.walk(visit, QUANTITY, primitive.duration(), *dt)?;
         *command_step = FilterStep::IDENTITY;
-        self.walk_governor(visit)
+        Ok(())
     }
 
     /// Checks quantities that depend on several numbers of a snapshot.
