@@ -180,7 +180,13 @@ fn governed_commands_never_make_a_dof_leave_the_path() {
             let [velocity, acceleration] = used(&limits, &before, controller.velocity(), dt);
             assert!(
                 velocity <= ALONG_PATH + 1e-3 && acceleration <= ALONG_PATH,
-                "{case} {tick}: {velocity} {acceleration}"
+                "{case} {tick}: {velocity} {acceleration} {:?} {:?} of {:?} {:?} pending {} a {:?}",
+                controller.limited(),
+                controller.position(),
+                limits.lower,
+                limits.upper,
+                controller.is_pending(),
+                controller.acceleration()
             );
             for (d, y) in controller.position().iter().enumerate() {
                 let [lower, upper] = [&limits.lower, &limits.upper].map(|limit| limit.as_ref().unwrap()[d]);
@@ -212,7 +218,14 @@ fn pending_goal_is_reached_at_last() {
             break;
         }
     }
-    assert!(was_pending && !controller.is_pending());
+    assert!(
+        was_pending && !controller.is_pending(),
+        "{was_pending} {} {} {:?} {:?}",
+        controller.is_pending(),
+        controller.time(),
+        controller.centre(),
+        upper
+    );
     assert_eq!(controller.status(), Status::Finished);
     assert_eq!(controller.centre(), upper);
 }

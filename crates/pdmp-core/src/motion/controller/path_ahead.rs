@@ -27,6 +27,8 @@ const REFRESH: f64 = 8.0;
 const KINK: f64 = 1e-6;
 /// Margins of the acceleration at a tick: smaller than that of the path, so that the path can be followed.
 const TICK_MARGINS: [f64; 2] = [0.022, 0.008];
+/// Error of the position at which a DoF turns round between knots, relative to the range.
+const TURNING: f64 = 1e-5;
 /// Clock past the end of a discrete movement, relative to its extent.
 const TAIL: f64 = 0.3;
 /// Number of periods of a rhythmic movement. The rate at the last knot is that of the slowest part; a period later it has no
@@ -116,11 +118,20 @@ impl PathAhead {
     /// Returns the largest distance of the rest of the path beyond the limits of the position, relative to the ranges.
     pub(super) fn distance_outside(&self, bounds: &[Bounds], groups: &[Group]) -> f64 {
         let (first, _) = self.locate(self.progress);
-        let knots = (first..=N_INTERVALS).flat_map(|knot| self.path.knot(knot).iter().zip(bounds).zip(groups));
-        let farthest = knots.fold(F64x4::ZERO, |farthest, (([position, ..], bounds), group)| {
-            let outside = (*position - bounds.upper).max(bounds.lower - *position);
-            farthest.max(outside / group.range)
-        });
+        let mut farthest = F64x4::ZERO;
+        for knot in first..N_INTERVALS {
+            let interval = self.path.interval(knot);
+            let samples = self.path.knot(knot).iter().zip(self.path.knot(knot + 1));
+            for ((([y, slope, _], [next, next_slope, _]), bounds), group) in samples.zip(bounds).zip(groups) {
+                let outside = |y: F64x4| (y - bounds.upper).max(bounds.lower - y) / group.range;
+                farthest = farthest.max(outside(*next));
+                let turns = (*slope * *next_slope).simd_lt(F64x4::ZERO);
+                if turns.any() {
+                    let turning = *y + *slope * *slope / (*slope - *next_slope) * (0.5 * interval);
+                    farthest = farthest.max(turns.select(outside(turning) + TURNING, F64x4::ZERO));
+                }
+            }
+        }
         farthest.to_array().into_iter().fold(0.0, f64::max)
     }
 
@@ -184,13 +195,17 @@ impl PathAhead {
                 // At the present clock the velocity does not depend on ρ̇.
                 if since > 0.0 {
                     let rate = limits.velocity / slope.abs();
-                    most = most.min((rate * rate - x) * (0.5 / since));
+                    let rest = (rate * rate - x) * 0.5;
+                    most = most.min((rest * since.recip()).max(rest * interval.recip()));
                 }
             }
         };
         limit_at(t);
         [0.25, 0.5, 0.75, 1.0].into_iter().filter(|position| *position > t + ROUNDING).for_each(&mut limit_at);
-        let arrival = 0.5 * (self.curve.max[index + 1] - x) / ((1.0 - t) * interval);
+        // A rate above the curve, by what the margins allow, returns over an interval even shortly before a knot.
+        let change = self.curve.max[index + 1] - self.curve.max[index];
+        let gap = self.curve.max[index] + change * t - x;
+        let arrival = 0.5 * (change + gap / if gap < 0.0 { 1.0 } else { 1.0 - t }) / interval;
         [
             least.to_array().into_iter().fold(f64::NEG_INFINITY, f64::max),
             most.to_array().into_iter().fold(arrival, f64::min),
