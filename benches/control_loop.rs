@@ -87,6 +87,7 @@ impl ControlLoop {
                 upper: Some(vec![1e3]),
                 velocity: Some(vec![1e3]),
                 acceleration: Some(vec![1e6]),
+                jerk: None,
             };
             controller.set_limits(&limits).expect("limits");
         }
