@@ -183,9 +183,13 @@ fn movement_begins_smoothly_and_finishes() {
             if controller.time() > 0.4 && controller.centre() != goal {
                 controller.set_goal(&goal).unwrap();
             }
-            for d in 0..3 {
-                farthest = farthest.max((controller.position()[d] - goal[d]) / REACH.ranges()[d]);
-            }
+            let past = controller
+                .position()
+                .iter()
+                .zip(&goal)
+                .zip(REACH.ranges())
+                .map(|((y, goal), range)| (y - goal) / range);
+            farthest = past.fold(farthest, f64::max);
             assert!(controller.time() < 10.0, "{ratio}");
         }
         assert!(farthest < 0.15, "{ratio}: {farthest}");
