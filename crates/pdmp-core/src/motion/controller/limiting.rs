@@ -7,6 +7,8 @@
 //! displacement of the goal, its rate is divided by 1 + k_s‖δ/range‖², as for a tracking error, through a filter with the
 //! natural frequency of the attractor: unfiltered, κ alternates between its bounds, and with it the acceleration. A limit of
 //! the position does not slow the phase, which would stop for good on a path beyond it.
+//!
+//! A DoF whose jerk is limited follows its stopping motions instead (`jerk`).
 
 use super::limiter::MAX_SUBSTEPS;
 use super::step::first_element;
