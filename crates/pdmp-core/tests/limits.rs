@@ -397,7 +397,8 @@ fn commands_between_ticks_publish_no_motion_beyond_the_limits() {
 fn ticks_of_any_length_keep_the_limits() {
     let wide = [None, Some(vec![0.5])];
     for model in [&*REACH, &*CYCLE] {
-        for (velocity, acceleration) in wide.iter().flat_map(|v| wide.iter().map(move |a| (v.clone(), a.clone()))) {
+        let pairs = wide.iter().flat_map(|v| wide.iter().map(move |a| (v.clone(), a.clone(), None)));
+        for (velocity, acceleration, jerk) in pairs.chain([(None, Some(vec![0.5]), Some(vec![5.0]))]) {
             for dt in [5e-324, 1e-310, 1e-300, 1e-200, 1e-100, 1e-30, 1e-12] {
                 let mut controller = controller(model);
                 let start = controller.position().iter();
@@ -408,6 +409,7 @@ fn ticks_of_any_length_keep_the_limits() {
                         upper,
                         velocity: velocity.clone(),
                         acceleration: acceleration.clone(),
+                        jerk: jerk.clone(),
                         ..Limits::default()
                     })
                     .unwrap();
@@ -476,6 +478,35 @@ fn rhythmic_movement_does_not_start_with_a_jump() {
         before = after;
     }
     assert!(before.0.iter().zip(&upper).all(|(y, u)| y <= u));
+}
+
+/// A pause stops the movement where it is, at the pace that the limits allow, and it continues from there.
+#[test]
+fn pause_within_limits_stops_the_movement() {
+    for (model, jerk) in [(&*REACH, None), (&*REACH, Some(vec![50.0])), (&*CYCLE, None), (&*CYCLE, Some(vec![50.0]))] {
+        let mut controller = controller(model);
+        controller.set_limits(&Limits { acceleration: Some(vec![4.0]), jerk, ..Limits::default() }).unwrap();
+        for _ in 0..300 {
+            controller.step().unwrap();
+        }
+        controller.set_speed(0.0).unwrap();
+        let fastest = controller.velocity().iter().fold(0.0f64, |fastest, v| fastest.max(v.abs()));
+        let n_ticks = 2000 + (fastest / 4.0 * 1e3) as usize;
+        for _ in 0..n_ticks {
+            controller.step().unwrap();
+        }
+        let paused = controller.position().to_vec();
+        assert!(controller.velocity().iter().all(|v| v.abs() < 1e-6), "{:?}", controller.velocity());
+        for _ in 0..1000 {
+            controller.step().unwrap();
+        }
+        assert!(controller.position().iter().zip(&paused).all(|(y, paused)| (y - paused).abs() < 1e-6));
+        controller.set_speed(1.0).unwrap();
+        for _ in 0..1500 {
+            controller.step().unwrap();
+        }
+        assert!(model.kind() == Kind::Rhythmic || controller.status() == Status::Finished);
+    }
 }
 
 /// A smaller limit of the velocity is kept from the first tick at which braking with A can have reached it.

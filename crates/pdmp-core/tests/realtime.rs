@@ -40,6 +40,8 @@ impl Loop {
             upper: Some(vec![0.5; n_dofs]),
             velocity: Some(vec![1.0]),
             acceleration: Some(vec![20.0; n_dofs]),
+            jerk: Some(vec![500.0]),
+            ..Limits::default()
         };
         Self {
             limits: [Limits::default(), limits],

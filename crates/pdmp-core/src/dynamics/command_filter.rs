@@ -302,10 +302,13 @@ impl CommandFilter {
         self.remaining = gains.decay_time.max(f64::MIN_POSITIVE);
     }
 
-    /// Advances the first value by `dt` at a constant rate; the filter continues from there.
+    /// Advances the first value, which is not negative, by `dt` at a constant rate. The filter continues from there, at a rate
+    /// from which it passes neither zero nor the target.
     pub(crate) fn move_on(&mut self, rate: f64, dt: f64, gains: &FilterGains) {
-        let value = self.value[0].as_array()[0] + rate * dt;
-        (self.value[0], self.rate[0]) = (padded(&[value.max(0.0)]), padded(&[rate]));
+        let value = (self.value[0].as_array()[0] + rate * dt).max(0.0);
+        let rest = (self.target[0].as_array()[0] - value).max(0.0);
+        let omega = if gains.is_immediate() { 0.0 } else { gains.omega };
+        (self.value[0], self.rate[0]) = (padded(&[value]), padded(&[rate.clamp(-omega * value, omega * rest)]));
         self.remaining = gains.decay_time.max(f64::MIN_POSITIVE);
     }
 

@@ -18,6 +18,7 @@ mod getters;
 mod goal;
 mod governor;
 mod group;
+mod jerk;
 mod limiter;
 mod limiting;
 mod path_ahead;
