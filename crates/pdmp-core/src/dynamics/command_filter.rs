@@ -308,7 +308,7 @@ impl CommandFilter {
         let value = (self.value[0].as_array()[0] + rate * dt).max(0.0);
         let rest = (self.target[0].as_array()[0] - value).max(0.0);
         let omega = if gains.is_immediate() { 0.0 } else { gains.omega };
-        (self.value[0], self.rate[0]) = (padded(&[value]), padded(&[rate.clamp(-omega * value, omega * rest)]));
+        (self.value[0], self.rate[0]) = (padded(&[value]), padded(&[rate.max(-omega * value).min(omega * rest)]));
         self.remaining = gains.decay_time.max(f64::MIN_POSITIVE);
     }
 

@@ -59,7 +59,8 @@ impl Controller {
             // Off the path, at a rate from which it cannot be followed, the clock is slowed and the DoFs are limited on their own.
             wanted.min(most).max(-MAX_DECREASE * rate / dt)
         };
-        let slope = slope.max(-rate / dt);
+        // Numbers near overflow leave no slope to follow; the DoFs are then limited on their own.
+        let slope = Some(slope.max(-rate / dt)).filter(|slope| slope.is_finite())?;
         self.rate_slope = Some(slope);
         if let Some(governor) = &mut self.governor {
             governor.slows = true;
