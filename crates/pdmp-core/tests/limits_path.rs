@@ -230,6 +230,44 @@ fn pending_goal_is_reached_at_last() {
     assert_eq!(controller.centre(), upper);
 }
 
+/// A command of τ leaves a pending goal pending: it is accepted at last.
+#[test]
+fn other_commands_do_not_discard_a_pending_goal() {
+    let mut controller = controller(&REACH, 1e-3);
+    let mut limits = limits(&REACH, [2.0, 2.0]);
+    let upper: Vec<f64> = controller.centre().iter().zip(REACH.ranges()).map(|(g, range)| g + 0.35 * range).collect();
+    limits.upper = Some(upper.clone());
+    controller.set_limits(&limits).unwrap();
+    for _ in 0..200 {
+        controller.step().unwrap();
+    }
+    controller.set_goal(&upper).unwrap();
+    controller.step().unwrap();
+    assert!(controller.is_pending());
+    controller.set_tau(1.1 * REACH.tau()).unwrap();
+    while controller.step().unwrap() == Status::Working {
+        assert!(controller.time() < 6.0);
+    }
+    assert_eq!(controller.centre(), upper);
+}
+
+/// A movement starts with its given velocity at any speed.
+#[test]
+fn given_velocity_does_not_depend_on_the_speed() {
+    let velocity = vec![0.3, -0.2, 0.1];
+    let conditions = Conditions { velocity: Some(velocity.clone()), ..Conditions::default() };
+    for (speed, limited) in [(0.5, false), (2.0, false), (0.5, true), (f64::INFINITY, true)] {
+        let mut controller = Controller::new(REACH.primitive(), 1e-3, &conditions, None).unwrap();
+        if limited {
+            controller.set_limits(&limits(&REACH, [2.0, 2.0])).unwrap();
+        }
+        controller.set_speed(speed).unwrap();
+        for (found, expected) in controller.velocity().iter().zip(&velocity) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected} at {speed}");
+        }
+    }
+}
+
 /// A restored controller continues to the bit, slowed, governed or perturbed.
 #[test]
 fn snapshots_continue_within_limits() {

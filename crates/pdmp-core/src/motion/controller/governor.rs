@@ -113,9 +113,14 @@ impl Controller {
         self.look_ahead();
         let Some(governor) = &mut self.governor else { return };
         governor.pending = false;
-        let most = governor.ahead.max().sqrt();
-        if self.conditions.velocity.is_none() && first_element(self.rate.value()) > most {
-            self.rate.start(most, &self.rate_gains);
+        let rate = first_element(self.rate.value());
+        let admitted = match self.conditions.velocity {
+            None => rate.min(governor.ahead.max().sqrt()),
+            Some(_) if self.speed.is_infinite() => self.conditions.tau.recip(),
+            Some(_) => rate,
+        };
+        if admitted < rate {
+            self.rate.start(admitted, &self.rate_gains);
             self.read_out();
         }
     }
@@ -146,6 +151,7 @@ impl Controller {
             self.take_up(changes, 1.0);
             return self.look_ahead();
         };
+        let changes = if governor.pending { changes | Changes::PATH } else { changes };
         (governor.pending, governor.share) = (true, 1.0);
         self.accept(changes);
     }

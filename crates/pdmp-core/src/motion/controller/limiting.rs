@@ -67,6 +67,10 @@ impl Controller {
             self.begin();
             return Ok(());
         }
+        // An acceleration beyond its limit would be reduced by the jerk for so long that the DoF could not stop.
+        for (acceleration, bounds) in self.acceleration.iter_mut().zip(&self.limiter.bounds) {
+            *acceleration = acceleration.max(-bounds.acceleration).min(bounds.acceleration);
+        }
         self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
         self.move_centre(1.0);
         self.status = Status::Working;

@@ -1,5 +1,7 @@
 //! Commands between ticks. A rejected command leaves the last valid one in force.
 
+use std::ops::BitOr;
+
 use super::{Controller, MAX_SPEED, Status};
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
@@ -333,6 +335,20 @@ impl Controller {
             self.centre.move_target_only(accepted, share);
         }
         self.update_lengths();
+    }
+}
+
+impl BitOr for Changes {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        Self {
+            style: self.style | other.style,
+            centre: self.centre | other.centre,
+            goal_velocity: self.goal_velocity | other.goal_velocity,
+            amplitude: self.amplitude | other.amplitude,
+            tau: self.tau | other.tau,
+        }
     }
 }
 

@@ -94,13 +94,19 @@ impl Controller {
             self.clock = CompensatedSum::at(phase);
             self.read_forcing();
         }
+        // The rate at the start is that of the speed; a movement at an unlimited speed starts at that of τ, as one in a pause.
+        let tau = if self.speed > 0.0 && self.speed.is_finite() {
+            self.conditions.tau / self.speed
+        } else {
+            self.conditions.tau
+        };
         let Self { conditions, r, .. } = self;
         if let Some(start) = &conditions.start {
             repack(&mut self.position, start);
         }
         if let Some(velocity) = &conditions.velocity {
             for (group, velocity) in self.groups.iter_mut().zip(velocity.chunks(WIDTH)) {
-                group.z = padded(velocity) * conditions.tau - group.forcing.value * *r;
+                group.z = padded(velocity) * tau - group.forcing.value * *r;
             }
         }
     }
