@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 import pdmp
 from reproduction.reaching import Reaching
-from reproduction.robot import DT, Robot, boxes
+from reproduction.robot import Robot, boxes
+from reproduction.torques import DT
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,9 @@ from reproduction.demo import main as demo_main
 from reproduction.human import BOX, HAND_HEIGHT, minimum_jerk
 from reproduction.loop import NewGoal, from_rest, reach_over
 from reproduction.reaching import GOAL, Reaching, demonstrate, height_of
-from reproduction.robot import DT, Robot, boxes
+from reproduction.robot import Robot, boxes
 from reproduction.run import reproduce
+from reproduction.torques import DT
 
 CLOSE = 1.0  # mm
 
