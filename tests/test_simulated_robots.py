@@ -7,8 +7,8 @@ import pytest
 
 import pdmp
 from robots.arms import ROBOTS, Arms
-from robots.commands import run
-from robots.excess import Excess, excess
+from robots.commands import Record, run
+from robots.excess import Excess, excess, turns
 from synthetic import reaches
 
 SECONDS = 30.0
@@ -69,6 +69,15 @@ def test_robots_follow_limited_commands(runs: Runs) -> None:
     assert runs.kept.median < 2e-3
     assert runs.kept.worst < 0.1 < 0.5 < runs.free.worst
     assert runs.kept.saturated < runs.free.saturated
+
+
+def test_turns_between_ticks_count() -> None:
+    """Between two ticks at one position, a joint that turns round is farther out."""
+    record = Record.empty(3, 2)
+    record.velocity[:] = [[1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]]
+    record.position[:, 1] = [0.0, -0.001, -0.001]
+    # On the parabola of the first joint, the turn is 1² / (2 · 2 / 0.001) away.
+    np.testing.assert_allclose(turns(record), [[0.00025, -0.001], [0.0, -0.00125]], atol=1e-15)
 
 
 def test_demonstrations_are_mapped_into_the_joint_range(arms: Arms) -> None:
