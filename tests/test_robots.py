@@ -8,7 +8,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,6 +16,7 @@ from hypothesis import strategies as st
 import pdmp
 from pdmp import Limits
 from pdmp.robots import REGISTRY
+from reproduction.baxter import engine
 
 ARM = """<?xml version="1.0"?>
 <robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -53,6 +53,8 @@ MJCF = """<mujoco><compiler angle="{angle}"/><worldbody>
   </body></worldbody>
   <equality><joint joint1="twin" joint2="knee"/></equality>
 </mujoco>"""
+# Imported with a renderer for the tests that need one: the first import chooses it.
+mujoco = engine()
 ROBOSUITE = find_spec("robosuite")
 needs_models = pytest.mark.skipif(ROBOSUITE is None, reason="models of robosuite not installed")
 
