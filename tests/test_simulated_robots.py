@@ -81,7 +81,7 @@ def test_turns_between_ticks_count() -> None:
 
 
 def test_demonstrations_are_mapped_into_the_joint_range(arms: Arms) -> None:
-    """All demonstrations are in the middle of the range; small ones keep their size."""
+    """Demonstrations take up the middle of the range; small ones keep their size."""
     lower, upper = arms.limits.position
     n_dofs = len(arms.joints)
     ramp = np.linspace(0, 1, 50)[:, None]
