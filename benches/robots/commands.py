@@ -31,7 +31,7 @@ class Record:
         Ticks in which a limit determined the motion of a joint.
     held : (T,) array of bool
         Ticks in which a joint is held or returns after its release.
-    saturated : int
+    saturated : (T,) array of bool
         Ticks in which a motor was at its limit.
     commands : Counter
         Number of commands of each kind; "start" counts the movements.
@@ -42,13 +42,13 @@ class Record:
     measured: np.ndarray
     limited: np.ndarray
     held: np.ndarray
-    saturated: int = 0
+    saturated: np.ndarray
     commands: Counter = field(default_factory=Counter)
 
     @classmethod
     def empty(cls, n_ticks: int, n_dofs: int) -> "Record":
         """Returns a record without ticks."""
-        rows, flags = np.zeros((3, n_ticks, n_dofs)), np.zeros((2, n_ticks), dtype=bool)
+        rows, flags = np.zeros((3, n_ticks, n_dofs)), np.zeros((3, n_ticks), dtype=bool)
         return cls(*rows, *flags)
 
 
@@ -171,6 +171,6 @@ def run(
         record.velocity[tick] = controller.velocity
         record.measured[tick] = robot.position
         record.limited[tick] = any(controller.limited)
-        record.saturated += robot.saturated
+        record.saturated[tick] = robot.saturated
     record.commands = hostile.counts
     return record

@@ -30,7 +30,7 @@ class Excess:
     held : float
         Its largest value in those ticks [rad].
     saturated : float
-        Share of the ticks in which a motor was at its limit.
+        Share of the ticks in which a motor was at its limit, of those without a held joint.
     n_commands, n_movements : int
         Numbers of commands, and of movements.
     """
@@ -64,7 +64,7 @@ def excess(record: Record, limits: pdmp.Limits) -> Excess:
         median=float(np.median(error[~record.held])),
         worst=float(error[~record.held].max()),
         held=float(error[record.held].max(initial=0.0)),
-        saturated=record.saturated / len(error),
+        saturated=float(record.saturated[~record.held].mean()),
         n_commands=record.commands.total(),
         n_movements=1 + record.commands["start"],
     )
