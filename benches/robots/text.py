@@ -38,7 +38,8 @@ TRACKING = """\
 The excess of positions is over the range of the joint. The acceleration is the change of the
 commanded velocity over the tick, and a jump is its change by more than the limit from one tick to
 the next. Tracking errors are those of the worst joint, and motors are counted, while none is held
-nor was in the last {recovery:g} s; a command leads the measured position by one tick, 1.5 mrad at 1.5 rad/s.
+nor was in the last {recovery:g} s; a command leads the measured position by one tick, 1.5 mrad at
+1.5 rad/s.
 """
 
 
