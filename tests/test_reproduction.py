@@ -150,6 +150,8 @@ def test_four_boxes_are_touched_briefly(reaching: Reaching) -> None:
 
 def test_limits_keep_the_command_over_four_boxes(reaching: Reaching) -> None:
     """A controller with limits stops the elbow at its limit; the path beyond it is refused."""
+    ends = reaching.arm.lowest, reaching.arm.highest
+    np.testing.assert_allclose(bounded.ARM.position, ends, atol=5e-6)
     model = heights.learn(reaching, 2)
     style = heights.predicted_style(model, 0.60)
     free = heights.reach_predicted(model, reaching, 0.60)
