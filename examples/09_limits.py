@@ -26,12 +26,13 @@ model = pdmp.fit(demos)
 limits = pdmp.robots.REGISTRY["panda"].limits(model.names)
 
 
-def run(name: str, kept: pdmp.Limits | None) -> None:
+def run(name: str, kept: pdmp.Limits | None, push: float = 0.0) -> None:
     """Gives a new goal and half the time to a movement, and prints how far it goes."""
     controller = model.controller(dt=DT, limits=kept, style=model.styles[1])
     active: Counter[str] = Counter()
     motion = []
-    while controller.step():
+    # A push by an acceleration in rad/s², for a tenth of a second.
+    while controller.step(coupling=([0, 0], [push * (600 <= len(motion) < 700), 0])):
         if len(motion) == 500:
             controller.goal = [2.1, -1.6]  # that of the first joint is beyond its limit
             controller.tau = 0.5 * model.tau
@@ -43,11 +44,12 @@ def run(name: str, kept: pdmp.Limits | None) -> None:
     print(f"largest velocity {np.abs(velocity).max():.2f} rad/s,", end=" ")
     print(f"acceleration {np.abs(acceleration).max():.1f} rad/s²")
     if kept is not None:
-        print("ticks with an active limit:", dict(active))
+        print(f"{name}: ticks with an active limit: {dict(active)}")
 
 
 run("without limits", None)
-run("with limits", limits)
+run("with limits", limits)  # slows down on the path
+run("pushed, with limits", limits, push=500.0)  # leaves the path
 
 # The learnt path in the shortest time, and with the best constant tau.
 fastest = model.fastest(limits, style=model.styles[1], dt=DT)

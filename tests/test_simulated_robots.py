@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import pdmp
+from pdmp.robots import REGISTRY
 from robots.arms import ROBOTS, Arms
 from robots.commands import Record, run
 from robots.excess import Excess, excess, turns
+from robots.pictures import JOINTS, NEW_GOAL, commanded
 from synthetic import reaches
 
 SECONDS = 30.0
@@ -69,6 +71,14 @@ def test_robots_follow_limited_commands(runs: Runs) -> None:
     assert runs.kept.median < 2e-3
     assert runs.kept.worst < 0.1 < 0.5 < runs.free.worst
     assert runs.kept.saturated < runs.free.saturated
+
+
+def test_the_drawn_command_ends_at_the_limit_and_at_its_goal() -> None:
+    """The goal of one joint is beyond its limit, that of the other one inside."""
+    limits = REGISTRY["panda"].limits(JOINTS)
+    for kept, expected in ((None, NEW_GOAL), (limits, [limits.position[1][0], NEW_GOAL[1]])):
+        _, position, *_ = commanded(kept)
+        np.testing.assert_allclose(position[-1], expected, atol=2e-3)
 
 
 def test_turns_between_ticks_count() -> None:

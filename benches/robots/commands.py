@@ -28,7 +28,9 @@ class Record:
     position, velocity, measured : (T, D) array
         Commands and measured joint angles [rad, rad/s, rad].
     limited : (T,) array of bool
-        Ticks in which a limit determined the motion of a joint.
+        Ticks in which a limit slowed the movement down or determined the motion of a joint.
+    pending : (T,) array of bool
+        Ticks in which a part of a command waits, as the limits would not be kept with it.
     held : (T,) array of bool
         Ticks in which a joint is held or returns after its release.
     saturated : (T,) array of bool
@@ -41,6 +43,7 @@ class Record:
     velocity: np.ndarray
     measured: np.ndarray
     limited: np.ndarray
+    pending: np.ndarray
     held: np.ndarray
     saturated: np.ndarray
     commands: Counter = field(default_factory=Counter)
@@ -48,7 +51,7 @@ class Record:
     @classmethod
     def empty(cls, n_ticks: int, n_dofs: int) -> "Record":
         """Returns a record without ticks."""
-        rows, flags = np.zeros((3, n_ticks, n_dofs)), np.zeros((3, n_ticks), dtype=bool)
+        rows, flags = np.zeros((3, n_ticks, n_dofs)), np.zeros((4, n_ticks), dtype=bool)
         return cls(*rows, *flags)
 
 
@@ -171,6 +174,7 @@ def run(
         record.velocity[tick] = controller.velocity
         record.measured[tick] = robot.position
         record.limited[tick] = any(controller.limited)
+        record.pending[tick] = controller.pending
         record.saturated[tick] = robot.saturated
     record.commands = hostile.counts
     return record

@@ -23,8 +23,8 @@ class Excess:
         commanded velocity over the tick.
     jumps : float
         Share of the ticks in which the acceleration of a joint changes by more than its limit.
-    limited : float
-        Share of the ticks in which a limit was active.
+    limited, pending : float
+        Shares of the ticks in which a limit was active, and in which a command waited.
     median, worst : float
         Tracking error, the largest of the joints, without ticks in which a joint is held [rad].
     held : float
@@ -40,6 +40,7 @@ class Excess:
     acceleration: float
     jumps: float
     limited: float
+    pending: float
     median: float
     worst: float
     held: float
@@ -61,6 +62,7 @@ def excess(record: Record, limits: pdmp.Limits) -> Excess:
         acceleration=float((np.abs(acceleration) / limits.acceleration).max()),
         jumps=float((np.abs(np.diff(acceleration, axis=0)) > limits.acceleration).any(1).mean()),
         limited=float(record.limited.mean()),
+        pending=float(record.pending.mean()),
         median=float(np.median(error[~record.held])),
         worst=float(error[~record.held].max()),
         held=float(error[record.held].max(initial=0.0)),

@@ -15,7 +15,8 @@ this file and its figure.
 
 ![The same command with and without limits, on two joints of a Panda](limits.png)
 
-A reach gets a new goal, which is beyond the limit of the first joint, and half the time.
+A reach gets a new goal, which is beyond the limit of the first joint, and half the time. With
+limits, both joints slow down on the path, and the first one ends at its limit.
 
 ## Random commands
 
@@ -35,11 +36,12 @@ movement from the present position and velocity; or a joint is held for {hold[0]
 """
 KINDS = ("with limits", "without")
 TRACKING = """\
-The excess of positions is over the range of the joint. The acceleration is the change of the
-commanded velocity over the tick, and a jump is its change by more than the limit from one tick to
-the next. Tracking errors are those of the worst joint, and motors are counted, while none is held
-nor was in the last {recovery:g} s; a command leads the measured position by one tick, 1.5 mrad at
-1.5 rad/s.
+The excess of positions, at the ticks and between them, is over the range of the joint. A limit is
+active if it slows the movement down on its path, or turns a joint off it. The acceleration is the
+change of the commanded velocity over the tick, and a jump is its change by more than the limit from
+one tick to the next. Tracking errors are those of the worst joint, and motors are counted, while
+none is held nor was in the last {recovery:g} s; a command leads the measured position by one tick,
+1.5 mrad at 1.5 rad/s.
 """
 
 
@@ -86,6 +88,7 @@ def table(results: list[tuple[Arms, int, float, Excess, Excess]]) -> str:
         ["velocity / limit, worst", *(ratio(run.velocity) for run in runs)],
         ["acceleration / limit, worst", *(ratio(run.acceleration) for run in runs)],
         ["ticks with an active limit", *(f"{run.limited:.1%}" for run in runs)],
+        ["ticks with a command that waits", *(f"{run.pending:.1%}" for run in runs)],
         ["ticks with a jump", *(f"{run.jumps:.1%}" for run in runs)],
         ["tracking error, median [mrad]", *(f"{1e3 * run.median:.2f}" for run in runs)],
         ["tracking error, worst [mrad]", *(f"{1e3 * run.worst:.2f}" for run in runs)],
