@@ -111,6 +111,7 @@ def test_published_limits_become_limits(name: str) -> None:
     for column, limit in (
         (robot.velocity, limits.velocity),
         (robot.acceleration, limits.acceleration),
+        (robot.jerk, limits.jerk),
     ):
         if column is None:
             assert limit is None
@@ -291,7 +292,7 @@ def test_joints_that_cannot_be_moved_are_refused(
         ("fast", "= 'fast': expected one number or 3"),
     ],
 )
-@pytest.mark.parametrize("argument", ["velocity", "acceleration"])
+@pytest.mark.parametrize("argument", ["velocity", "acceleration", "jerk"])
 def test_bounds_that_bound_nothing_are_refused(
     argument: str, bound: Any, message: str, arm: Path
 ) -> None:

@@ -21,6 +21,7 @@ def from_urdf(
     *,
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
+    jerk: ArrayLike | None = None,
 ) -> Limits:
     """Reads the joint limits of a robot from a URDF file.
 
@@ -35,10 +36,10 @@ def from_urdf(
     joints : sequence of str, optional
         Joints in the order of the degrees of freedom, such as those of a fitted model;
         by default all that can be moved, in the order of the file.
-    velocity, acceleration : float or array_like, (D,), optional
-        Bounds per s and per s², where the file has none or where the task needs smaller ones: of
-        two bounds of a joint the smaller holds. Most files have no acceleration, which URDF has
-        since version 1.2; of acceleration and deceleration the smaller holds.
+    velocity, acceleration, jerk : float or array_like, (D,), optional
+        Bounds per s, s² and s³, where the file has none or where the task needs smaller ones: of
+        two bounds of a joint the smaller holds. Most files have no acceleration and jerk, which
+        URDF has since version 1.2; of acceleration and deceleration the smaller holds.
 
     Raises
     ------
@@ -62,7 +63,8 @@ def from_urdf(
     """
     from pdmp.robots import _urdf  # at the first use: a control loop may do without
 
-    return _urdf.read(path, joints, {"velocity": velocity, "acceleration": acceleration})
+    given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+    return _urdf.read(path, joints, given)
 
 
 def from_mujoco(
@@ -71,12 +73,13 @@ def from_mujoco(
     *,
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
+    jerk: ArrayLike | None = None,
 ) -> Limits:
     """Reads the joint limits of a robot from a MuJoCo model; needs the package mujoco.
 
     Positions are in rad or m, for files in degrees too. A joint that is not limited has no limits
     of position. Joints that follow another one through an active equality constraint, free
-    joints and ball joints are left out. MuJoCo has no limits of velocity and acceleration.
+    joints and ball joints are left out. MuJoCo has limits of the position alone.
 
     Parameters
     ----------
@@ -85,8 +88,8 @@ def from_mujoco(
     joints : sequence of str, optional
         Joints in the order of the degrees of freedom, such as those of a fitted model;
         by default all that can be moved, in the order of the MuJoCo model.
-    velocity, acceleration : float or array_like, (D,), optional
-        Bounds per s and per s².
+    velocity, acceleration, jerk : float or array_like, (D,), optional
+        Bounds per s, s² and s³.
 
     Raises
     ------
@@ -101,7 +104,8 @@ def from_mujoco(
     """
     from pdmp.robots import _mujoco
 
-    return _mujoco.read(model, joints, {"velocity": velocity, "acceleration": acceleration})
+    given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+    return _mujoco.read(model, joints, given)
 
 
 # The readers are in Python, which the compiled class does not import.

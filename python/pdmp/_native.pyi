@@ -1493,6 +1493,7 @@ class Limits:
         *,
         velocity: ArrayLike | None = None,  # one, or (D,)
         acceleration: ArrayLike | None = None,  # one, or (D,)
+        jerk: ArrayLike | None = None,  # one, or (D,)
     ) -> Limits:
         """Reads the joint limits of a robot from a URDF file.
 
@@ -1539,6 +1540,7 @@ class Limits:
         *,
         velocity: ArrayLike | None = None,  # one, or (D,)
         acceleration: ArrayLike | None = None,  # one, or (D,)
+        jerk: ArrayLike | None = None,  # one, or (D,)
     ) -> Limits:
         """Reads the joint limits of a robot from a MuJoCo model; needs the package mujoco.
 

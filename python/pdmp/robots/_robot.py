@@ -29,14 +29,15 @@ class Joint:
     ----------
     lower, upper : float
         Limits of the position; infinite without any.
-    velocity, acceleration : float
-        Limits of the magnitude, per s and per s²; infinite without any.
+    velocity, acceleration, jerk : float
+        Limits of the magnitude, per s, s² and s³; infinite without any.
     """
 
     lower: float = -math.inf
     upper: float = math.inf
     velocity: float = math.inf
     acceleration: float = math.inf
+    jerk: float = math.inf
 
 
 def chosen(
@@ -182,6 +183,7 @@ class Robot:
         *,
         velocity: Bound = None,
         acceleration: Bound = None,
+        jerk: Bound = None,
     ) -> Limits:
         """Returns the limits, for a controller or a planner.
 
@@ -189,8 +191,8 @@ class Robot:
         ----------
         joints : sequence of str, optional
             Joints in the order of the degrees of freedom; all by default.
-        velocity, acceleration : float or array_like, (D,), optional
-            Bounds per s and per s², where the maker publishes none or where the task needs smaller
+        velocity, acceleration, jerk : float or array_like, (D,), optional
+            Bounds per s, s² and s³, where the maker publishes none or where the task needs smaller
             ones: of two bounds of a joint the smaller holds.
 
         Raises
@@ -205,7 +207,7 @@ class Robot:
         (np.float64(3.141592653589793), np.float64(4.0))
         """
         names = chosen(self.name, self.joints, joints, lambda _: "")
-        given = {"velocity": velocity, "acceleration": acceleration}
+        given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
         columns = {key: getattr(self, key) for key in ("lower", "upper", *given)}
         described = [
             Joint(**{key: column[k] for key, column in columns.items() if column is not None})

@@ -23,7 +23,11 @@ RANGED = {"revolute", "prismatic"}
 SINGLE = RANGED | {"continuous"}
 """Types of joints with one degree of freedom."""
 OTHERS = {"fixed", "floating", "planar"}
-KEYS = {"velocity": ("velocity",), "acceleration": ("acceleration", "deceleration")}
+KEYS = {
+    "velocity": ("velocity",),
+    "acceleration": ("acceleration", "deceleration"),
+    "jerk": ("jerk",),
+}
 """Attributes of a limit of magnitude, of which the smallest holds."""
 
 
@@ -112,7 +116,7 @@ def _bound(where: str, written: dict[str, str], key: str, given: bool) -> float:
         return number
     if number == 0 and given:
         return math.inf
-    argument = "velocity" if key == "velocity" else "acceleration"
+    argument = "acceleration" if key == "deceleration" else key
     raise value_error(
         f"{where}: {key} = {written[key]}: "
         + (f"pass {argument}=, as exporters write 0 for unknown" if number == 0 else "correct it")
