@@ -1490,6 +1490,89 @@ class Limits:
         acceleration: ArrayLike | None = None,  # one, or (D,)
         jerk: ArrayLike | None = None,  # one, or (D,)
     ) -> Limits: ...
+    @staticmethod
+    def from_urdf(
+        path: str | PathLike[str],
+        joints: Sequence[str] | None = None,
+        *,
+        velocity: ArrayLike | None = None,  # one, or (D,)
+        acceleration: ArrayLike | None = None,  # one, or (D,)
+        jerk: ArrayLike | None = None,  # one, or (D,)
+    ) -> Limits:
+        """Reads the joint limits of a robot from a URDF file.
+
+        Positions are in rad or m. Continuous joints have no limits of position. Joints that are fixed,
+        that mimic another one or that have several degrees of freedom, floating and planar, are left
+        out. The soft limits of a safety controller are not used.
+
+        Parameters
+        ----------
+        path : path
+            A URDF file; one in xacro must be expanded first.
+        joints : sequence of str, optional
+            Joints in the order of the degrees of freedom, such as those of a fitted model;
+            by default all that can be moved, in the order of the file.
+        velocity, acceleration : float or array_like, (D,), optional
+            Bounds per s and per s², where the file has none or where the task needs smaller ones: of
+            two bounds of a joint the smaller holds. Most files have no acceleration, which URDF has
+            since version 1.2; of acceleration and deceleration the smaller holds.
+
+        Raises
+        ------
+        ValueError
+            A file that is not URDF, incomplete or has a document type declaration; a joint that is
+            missing or cannot be moved; a limit that is missing, not a number or, as some exporters
+            write it, 0 for unknown, unless the argument replaces it.
+        OSError
+            A file that cannot be read.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> path = pathlib.Path(tempfile.mkdtemp(), "arm.urdf")
+        >>> _ = path.write_text(
+        ...     "<robot name='arm'><joint name='elbow' type='revolute'>"
+        ...     "<limit lower='-1.5' upper='2' velocity='3' effort='10'/></joint></robot>"
+        ... )
+        >>> pdmp.Limits.from_urdf(path, acceleration=8.0)
+        pdmp.Limits(position=([-1.5], [2.0]), velocity=[3.0], acceleration=[8.0])
+        """
+    @staticmethod
+    def from_mujoco(
+        model: Any,  # path or mujoco.MjModel
+        joints: Sequence[str] | None = None,
+        *,
+        velocity: ArrayLike | None = None,  # one, or (D,)
+        acceleration: ArrayLike | None = None,  # one, or (D,)
+        jerk: ArrayLike | None = None,  # one, or (D,)
+    ) -> Limits:
+        """Reads the joint limits of a robot from a MuJoCo model; needs the package mujoco.
+
+        Positions are in rad or m, for files in degrees too. A joint that is not limited has no limits
+        of position. Joints that follow another one through an active equality constraint, free
+        joints and ball joints are left out. MuJoCo has no limits of velocity and acceleration.
+
+        Parameters
+        ----------
+        model : path or mujoco.MjModel
+            A file in MJCF, with its meshes, or a compiled model.
+        joints : sequence of str, optional
+            Joints in the order of the degrees of freedom, such as those of a fitted model;
+            by default all that can be moved, in the order of the MuJoCo model.
+        velocity, acceleration : float or array_like, (D,), optional
+            Bounds per s and per s².
+
+        Raises
+        ------
+        ImportError
+            The package mujoco is not installed.
+        ValueError
+            A file that MuJoCo does not compile, or a joint that is missing or cannot be moved.
+        TypeError
+            A model that is neither a path nor a compiled model.
+        OSError
+            A file that cannot be read.
+        """
     @property
     def position(self) -> tuple[_Array, _Array] | None:
         """Lower and upper limits of the position, each (1,) or (D,) and infinite where there is none, or None."""
