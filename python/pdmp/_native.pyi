@@ -1465,6 +1465,9 @@ class Limits:
     jerk : float or array_like, (D,), optional
         Limit of the jerk's magnitude per s³, positive; it needs a limit of the acceleration. Controllers keep it,
         `Model.fastest` does not.
+    synchronous : bool
+        True: a controller slows all degrees of freedom along the path if one cannot follow it, and only then limits single
+        ones. False: it limits every degree of freedom on its own.
 
     Raises
     ------
@@ -1512,10 +1515,10 @@ class Limits:
         joints : sequence of str, optional
             Joints in the order of the degrees of freedom, such as those of a fitted model;
             by default all that can be moved, in the order of the file.
-        velocity, acceleration : float or array_like, (D,), optional
-            Bounds per s and per s², where the file has none or where the task needs smaller ones: of
-            two bounds of a joint the smaller holds. Most files have no acceleration, which URDF has
-            since version 1.2; of acceleration and deceleration the smaller holds.
+        velocity, acceleration, jerk : float or array_like, (D,), optional
+            Bounds per s, s² and s³, where the file has none or where the task needs smaller ones: of
+            two bounds of a joint the smaller holds. Most files have no acceleration and jerk, which
+            URDF has since version 1.2; of acceleration and deceleration the smaller holds.
 
         Raises
         ------
@@ -1550,7 +1553,7 @@ class Limits:
 
         Positions are in rad or m, for files in degrees too. A joint that is not limited has no limits
         of position. Joints that follow another one through an active equality constraint, free
-        joints and ball joints are left out. MuJoCo has no limits of velocity and acceleration.
+        joints and ball joints are left out. MuJoCo has limits of the position alone.
 
         Parameters
         ----------
@@ -1559,8 +1562,8 @@ class Limits:
         joints : sequence of str, optional
             Joints in the order of the degrees of freedom, such as those of a fitted model;
             by default all that can be moved, in the order of the MuJoCo model.
-        velocity, acceleration : float or array_like, (D,), optional
-            Bounds per s and per s².
+        velocity, acceleration, jerk : float or array_like, (D,), optional
+            Bounds per s, s² and s³.
 
         Raises
         ------
