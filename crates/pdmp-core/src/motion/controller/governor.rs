@@ -137,10 +137,13 @@ impl Controller {
     pub(super) fn refresh_path(&mut self) {
         let rhythmic = self.primitive.kind() == Kind::Rhythmic;
         let Some(governor) = &self.governor else { return };
-        if governor.ahead.is_due(rhythmic) {
+        let is_due = governor.ahead.is_due(rhythmic);
+        let tries = governor.pending && (governor.share < 1.0 || governor.ahead.has_progressed());
+        if tries && self.accept(Changes::PATH) {
+            return;
+        }
+        if is_due {
             self.look_ahead();
-        } else if governor.pending && (governor.share < 1.0 || governor.ahead.has_progressed()) {
-            self.accept(Changes::PATH);
         }
     }
 
@@ -156,11 +159,12 @@ impl Controller {
         self.accept(changes);
     }
 
-    /// Accepts a share of changed commands if the path ahead can then be followed.
+    /// Accepts a share of changed commands if the path ahead can then be followed. Returns whether it does.
     #[inline(never)]
-    fn accept(&mut self, changes: Changes) {
-        let Some(mut governor) = self.governor.take() else { return };
-        if governor.admits(self, changes) {
+    fn accept(&mut self, changes: Changes) -> bool {
+        let Some(mut governor) = self.governor.take() else { return false };
+        let accepted = governor.admits(self, changes);
+        if accepted {
             self.take_up(changes, governor.share);
             std::mem::swap(&mut governor.ahead, &mut governor.candidate);
             std::mem::swap(&mut governor.origin, &mut governor.trial);
@@ -172,6 +176,7 @@ impl Controller {
             governor.share = 1.0;
         }
         self.governor = Some(governor);
+        accepted
     }
 
     /// Returns whether a part of a commanded style, goal, anchor or amplitude is not yet accepted, as the movement ahead would
