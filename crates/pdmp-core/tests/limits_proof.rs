@@ -1,0 +1,18 @@
+//! Limits under adversarial commands: ten million joint-ticks of random models, limits and movements.
+//!
+//! The bench `limits_proof` runs more of the same cases.
+#![cfg(feature = "learning")]
+#![allow(missing_docs)]
+
+mod adversary;
+
+use adversary::models::models;
+use adversary::report::Report;
+
+/// No sequence of commands, perturbations, limits and ticks leads out of the limits, and a state outside returns.
+#[test]
+fn limits_hold_in_ten_million_joint_ticks() {
+    let report = Report::run(&models(), 1, 10_000_000);
+    report.print();
+    assert!(report.holds(), "see the table; the bench limits_proof prints the violations of a seed");
+}
