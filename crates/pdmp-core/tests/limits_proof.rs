@@ -8,6 +8,7 @@ mod adversary;
 
 use adversary::models::models;
 use adversary::report::Report;
+use adversary::slack::SlackReport;
 
 /// No sequence of commands, perturbations, limits and ticks leads out of the limits, and a state outside returns.
 #[test]
@@ -15,4 +16,14 @@ fn limits_hold_in_ten_million_joint_ticks() {
     let report = Report::run(&models(), 1, 10_000_000);
     report.print();
     assert!(report.holds(), "see the table; the bench limits_proof prints the violations of a seed");
+}
+
+/// Limits that do not bind leave the motion as it is, to the last bit.
+#[test]
+fn limits_that_do_not_bind_change_nothing() {
+    let (models, mut report) = (models(), SlackReport::default());
+    (1..=11_000).for_each(|seed| report.add(&models, seed));
+    report.print();
+    assert!(report.rollouts >= 10_000, "{report:?}");
+    assert_eq!((report.changed, report.limited), (0, 0), "{report:?}");
 }

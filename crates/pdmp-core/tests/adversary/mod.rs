@@ -11,6 +11,7 @@ pub(crate) mod oracle;
 pub(crate) mod random;
 pub(crate) mod report;
 pub(crate) mod settings;
+pub(crate) mod slack;
 
 use std::sync::Arc;
 
@@ -23,7 +24,7 @@ use report::Report;
 use settings::Settings;
 
 /// Joint-ticks of a case, about.
-const JOINT_TICKS: usize = 6000;
+const JOINT_TICKS: usize = 4000;
 
 /// Runs the case of a seed and adds it to the report.
 pub(crate) fn run_case(models: &[Arc<Model>], seed: u64, report: &mut Report) {

@@ -17,9 +17,9 @@ enum TickMode {
     Usual,
     /// One length for all.
     Constant(f64),
-    /// Any length from the shortest to the longest.
-    Varying,
-    /// The shortest and the longest alternately, at random.
+    /// Any length from the shortest to a longest one.
+    Varying(f64),
+    /// The shortest, and at random the longest.
     Extreme,
 }
 
@@ -73,7 +73,7 @@ impl Settings {
             0 | 1 => TickMode::Usual,
             2 | 3 => TickMode::Constant(random.scale(TICKS[0], TICKS[1])),
             4 => TickMode::Extreme,
-            _ => TickMode::Varying,
+            _ => TickMode::Varying(*random.choose(&[TICKS[1], 0.01, 0.01])),
         };
         let push = *random.choose(&[Push::None, Push::None, Push::Random, Push::Steady, Push::Measured]);
         Self {
@@ -110,8 +110,8 @@ impl Settings {
         match self.tick_mode {
             TickMode::Usual => 1e-3,
             TickMode::Constant(dt) => dt,
-            TickMode::Varying => random.scale(TICKS[0], TICKS[1]),
-            TickMode::Extreme => TICKS[random.index(2)],
+            TickMode::Varying(longest) => random.scale(TICKS[0], longest),
+            TickMode::Extreme => TICKS[usize::from(random.chance(0.1))],
         }
     }
 
@@ -119,8 +119,8 @@ impl Settings {
     fn nominal_tick(&self) -> f64 {
         match self.tick_mode {
             TickMode::Usual => 1e-3,
-            TickMode::Constant(dt) => dt,
-            TickMode::Varying | TickMode::Extreme => TICKS[1],
+            TickMode::Constant(dt) | TickMode::Varying(dt) => dt,
+            TickMode::Extreme => TICKS[1],
         }
     }
 
