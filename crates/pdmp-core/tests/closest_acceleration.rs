@@ -176,14 +176,28 @@ fn limited_tick_takes_the_closest_acceleration() {
                 exact.set(exact.get() + 1);
             }
             worst.set(worst.get().max(gap));
-            prop_assert!(gap < 1e-6, "DoF {d}: {found}, {expected} by brute force, {:?} {y} {v} {wanted} {h}", joint(d));
+            prop_assert!(
+                gap < 1e-6,
+                "DoF {d}: {found}, {expected} by brute force, {:?} {y} {v} {wanted} {h}",
+                joint(d)
+            );
         }
         Ok(())
     };
     mostly_accepted(prop::collection::vec(case, 8), |cases, tally| {
         cases.into_iter().try_for_each(|case| compare(case, tally))
     });
-    println!("{} limited, {} compared, largest gap {:e} of A beyond rounding", limited.get(), compared.get(), worst.get());
-    println!("{} within A, {} of them without rounding above 1e-6, largest gap {:e} of A", inner.get(), exact.get(), worst_exact.get());
+    println!(
+        "{} limited, {} compared, largest gap {:e} of A beyond rounding",
+        limited.get(),
+        compared.get(),
+        worst.get()
+    );
+    println!(
+        "{} within A, {} of them without rounding above 1e-6, largest gap {:e} of A",
+        inner.get(),
+        exact.get(),
+        worst_exact.get()
+    );
     assert!(10 * compared.get() >= 9 * limited.get() && compared.get() > 200);
 }

@@ -175,7 +175,8 @@ fn extreme_numbers_are_rejected_or_bounded() {
 /// Extreme limits are rejected, or the motion within them stays finite, also under extreme commands.
 #[test]
 fn extreme_limits_are_rejected_or_obeyed() {
-    const EXTREMES: [f64; 10] = [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e300, -1e200, 1e150, 1e-150, 1e-300, 5e-324, 0.0];
+    const EXTREMES: [f64; 10] =
+        [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e300, -1e200, 1e150, 1e-150, 1e-300, 5e-324, 0.0];
     for kind in [Kind::Discrete, Kind::Rhythmic] {
         let Loop { controller: fresh, limits: [_, tight, _], .. } = Loop::new(kind);
         let n_dofs = fresh.primitive().n_dofs();

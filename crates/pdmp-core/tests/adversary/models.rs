@@ -19,8 +19,7 @@ const N_DEMOS: usize = 6;
 
 /// Fits every model.
 pub(crate) fn models() -> Vec<Arc<Model>> {
-    let immediate =
-        CanonicalOptions::Discrete { tau: None, alpha_x: None, transport: TransportSelection::Immediate };
+    let immediate = CanonicalOptions::Discrete { tau: None, alpha_x: None, transport: TransportSelection::Immediate };
     let mut random = Random::new(1);
     let mut models = Vec::new();
     for (index, n_dofs) in N_DOFS.into_iter().enumerate() {
@@ -38,9 +37,8 @@ pub(crate) fn models() -> Vec<Arc<Model>> {
 
 /// Returns smooth random movements. Some DoFs do not move, and some are angles.
 fn demonstrations(kind: Kind, n_dofs: usize, duration: f64, random: &mut Random) -> Vec<Demonstration> {
-    let scales: Vec<f64> = (0..n_dofs)
-        .map(|dof| if dof > 0 && random.chance(0.1) { 0.0 } else { random.scale(0.01, 100.0) })
-        .collect();
+    let scales: Vec<f64> =
+        (0..n_dofs).map(|dof| if dof > 0 && random.chance(0.1) { 0.0 } else { random.scale(0.01, 100.0) }).collect();
     let units: Vec<String> = (0..n_dofs).map(|_| random.choose(&["rad", "m", "deg"]).to_string()).collect();
     let shapes: Vec<[f64; 4]> = (0..n_dofs).map(|_| [(); 4].map(|()| random.between(-1.0, 1.0))).collect();
     let demonstration = |_| {

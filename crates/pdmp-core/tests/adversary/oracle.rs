@@ -178,7 +178,15 @@ impl Oracle {
             excess: [0.0; 3],
             time: [0.0; 2],
         };
-        Self { dofs: ranges.iter().map(dof).collect(), findings: Findings::default(), tick: 0, command: "", after: [0.0; 3], limit: None, trace: false }
+        Self {
+            dofs: ranges.iter().map(dof).collect(),
+            findings: Findings::default(),
+            tick: 0,
+            command: "",
+            after: [0.0; 3],
+            limit: None,
+            trace: false,
+        }
     }
 
     /// Prints every violation above 1e-12 from now on.
@@ -199,7 +207,10 @@ impl Oracle {
         if self.trace && violation > 1e-12 {
             let (tick, name) = (self.tick, property.name());
             let command = if dt == 0.0 { self.command } else { "" };
-            println!("tick {tick} DoF {dof} dt {dt:e}: {name} by {violation:e} {command}; {:?}, {:?} after {:?}", self.limit, self.after, self.dofs[dof]);
+            println!(
+                "tick {tick} DoF {dof} dt {dt:e}: {name} by {violation:e} {command}; {:?}, {:?} after {:?}",
+                self.limit, self.after, self.dofs[dof]
+            );
         }
     }
 
@@ -238,7 +249,12 @@ impl Oracle {
         let step = dof.acceleration * dt;
         self.note(Property::Acceleration, index, dt, ((v - dof.v).abs() - step - digit) / step);
         let mean = ((y - dof.y).abs() - 2.0 * f64::EPSILON * y.abs()) / dt;
-        self.note(Property::MeanVelocity, index, dt, (mean - dof.velocity - dof.excess[0]) / dof.velocity.max(dof.excess[0]));
+        self.note(
+            Property::MeanVelocity,
+            index,
+            dt,
+            (mean - dof.velocity - dof.excess[0]) / dof.velocity.max(dof.excess[0]),
+        );
         let (way, free) = (y - dof.y - 0.5 * dt * (dof.v + v), 0.25 * step * dt);
         let digit = 2.0 * f64::EPSILON * (y.abs() + dt * v.abs());
         self.note(Property::Consistency, index, dt, (way.abs() - free - digit) / dof.scale());

@@ -1,8 +1,8 @@
 //! Report of many cases.
 
+use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::Arc;
 use std::thread;
 
 use pdmp_core::Model;
@@ -86,10 +86,15 @@ impl Report {
         let Findings { joint_ticks, outside, limited, not_finite, .. } = findings;
         let [position, velocity, acceleration] = limited;
         println!("{joint_ticks} joint-ticks in {cases} cases");
-        println!("{} limited: {position} by position, {velocity} by velocity, {acceleration} by acceleration", limited.iter().sum::<usize>());
+        println!(
+            "{} limited: {position} by position, {velocity} by velocity, {acceleration} by acceleration",
+            limited.iter().sum::<usize>()
+        );
         println!("{outside} outside, braking or returning; {not_finite} not finite {:?}", self.not_finite);
         let Tally { commands, limits, refused_limits, refused_ticks, restarts } = tally;
-        println!("{commands} commands; {limits} limits set, {refused_limits} of them refused as too tight for the tick; {restarts} restarts; {refused_ticks} ticks refused");
+        println!(
+            "{commands} commands; {limits} limits set, {refused_limits} of them refused as too tight for the tick; {restarts} restarts; {refused_ticks} ticks refused"
+        );
         println!("\n| property | worst violation | cases | seed | tick | DoF | dt |");
         println!("|---|---:|---:|---:|---:|---:|---:|");
         for (property, name) in Property::ALL.iter().map(|property| property.name()).enumerate() {

@@ -163,9 +163,7 @@ impl Settings {
         let discrete = self.is_discrete();
         let with_goal = random.chance(0.5);
         Conditions {
-            style: random
-                .chance(0.5)
-                .then(|| (0..self.model.n_styles()).map(|_| random.between(-1.0, 1.0)).collect()),
+            style: random.chance(0.5).then(|| (0..self.model.n_styles()).map(|_| random.between(-1.0, 1.0)).collect()),
             goal: (discrete && with_goal).then(|| centre.clone()),
             anchor: (!discrete && with_goal).then_some(centre),
             start: random.chance(0.3).then_some(start),

@@ -96,8 +96,7 @@ impl Observer for Recorder {
             let [before, speed] = [self.last[0][dof], self.last[1][dof]];
             let mean = (y - before) / dt;
             // Accelerations of the cubic at both ends, and its velocity where they change sign.
-            let [start, end] =
-                [(6.0 * mean - 4.0 * speed - 2.0 * v) / dt, (2.0 * speed + 4.0 * v - 6.0 * mean) / dt];
+            let [start, end] = [(6.0 * mean - 4.0 * speed - 2.0 * v) / dt, (2.0 * speed + 4.0 * v - 6.0 * mean) / dt];
             let share = if start * end < 0.0 { start / (start - end) } else { 0.0 };
             let peak = speed + 0.5 * start * share * dt;
             self.velocity[dof] = self.velocity[dof].max(mean.abs()).max(peak.abs());
@@ -144,7 +143,9 @@ impl SlackReport {
         let run = |mut controller: Controller, mut attack: Attack, limits: Option<&Limits>| {
             let mut recorder = Recorder::new(&controller);
             for tick in 0..n_ticks {
-                if tick == since && let Some(limits) = limits {
+                if tick == since
+                    && let Some(limits) = limits
+                {
                     controller.set_limits(limits)?;
                 }
                 attack.between_ticks(&mut controller, &mut recorder);
@@ -166,7 +167,14 @@ impl SlackReport {
             if std::env::var("DBG").is_ok() {
                 let block = 3 * model.n_dofs() + 2;
                 let k = free.bits.iter().zip(&limited.bits).position(|(a, b)| a != b).unwrap();
-                println!("seed {seed} margin {margin} since {since} record {} item {} {:e} {:e} {:?}", k / block, k % block, f64::from_bits(free.bits[k]), f64::from_bits(limited.bits[k]), model.kind());
+                println!(
+                    "seed {seed} margin {margin} since {since} record {} item {} {:e} {:e} {:?}",
+                    k / block,
+                    k % block,
+                    f64::from_bits(free.bits[k]),
+                    f64::from_bits(limited.bits[k]),
+                    model.kind()
+                );
             }
             self.first_changed = self.first_changed.or(Some(seed));
         }
