@@ -81,6 +81,13 @@ fn targets(model: &Model) -> [Vec<f64>; 2] {
     [goal.clone(), goal.iter().map(|g| g + 0.1).collect()]
 }
 
+/// Returns positions (D,) as those of rsruckig, without an allocation.
+fn joints(position: &[f64]) -> DataArrayOrVec<f64, N_DOFS> {
+    let mut joints = DataArrayOrVec::new(None, 0.0);
+    position.iter().enumerate().for_each(|(dof, y)| joints[dof] = *y);
+    joints
+}
+
 /// Returns the loop of rsruckig, with a new target at every tick or one.
 fn ruckig(name: &'static str, model: &Arc<Model>, new_targets: bool) -> Timed {
     struct State {
@@ -92,12 +99,10 @@ fn ruckig(name: &'static str, model: &Arc<Model>, new_targets: bool) -> Timed {
     let start = model.demonstrated().starts.row(0).to_vec();
     let goals = targets(model);
     let mut input = InputParameter::new(None);
-    for dof in 0..N_DOFS {
-        input.target_position[dof] = goals[0][dof];
-        input.max_velocity[dof] = VELOCITY;
-        input.max_acceleration[dof] = ACCELERATION;
-        input.max_jerk[dof] = JERK;
-    }
+    input.target_position = joints(&goals[0]);
+    input.max_velocity = DataArrayOrVec::new(None, VELOCITY);
+    input.max_acceleration = DataArrayOrVec::new(None, ACCELERATION);
+    input.max_jerk = DataArrayOrVec::new(None, JERK);
     input.min_position = Some(DataArrayOrVec::new(None, POSITION[0]));
     input.max_position = Some(DataArrayOrVec::new(None, POSITION[1]));
     let state = State { generator: Ruckig::new(None, DT), input, output: OutputParameter::new(None) };
@@ -111,11 +116,9 @@ fn ruckig(name: &'static str, model: &Arc<Model>, new_targets: bool) -> Timed {
         name,
         restart: Box::new(move || {
             let state = &mut *shared.borrow_mut();
-            for dof in 0..N_DOFS {
-                state.input.current_position[dof] = start[dof];
-                state.input.current_velocity[dof] = 0.0;
-                state.input.current_acceleration[dof] = 0.0;
-            }
+            state.input.current_position = joints(&start);
+            state.input.current_velocity = DataArrayOrVec::new(None, 0.0);
+            state.input.current_acceleration = DataArrayOrVec::new(None, 0.0);
             // The first update computes the trajectory.
             update(state);
         }),
@@ -123,7 +126,7 @@ fn ruckig(name: &'static str, model: &Arc<Model>, new_targets: bool) -> Timed {
             let state = &mut *state.borrow_mut();
             if new_targets {
                 count += 1;
-                (0..N_DOFS).for_each(|dof| state.input.target_position[dof] = goals[count % 2][dof]);
+                state.input.target_position = joints(&goals[count % 2]);
             }
             update(state);
         }),
