@@ -33,6 +33,8 @@ pub(crate) struct Attack {
     pub(crate) settings: Settings,
     random: Random,
     pub(crate) tally: Tally,
+    /// False for a control of the oracle: the controller then does not get the limits by which it is judged.
+    pub(crate) sets_limits: bool,
     sign: f64,
     vectors: [Vec<f64>; 5],
     style: Vec<f64>,
@@ -46,6 +48,7 @@ impl Attack {
             settings,
             random,
             tally: Tally::default(),
+            sets_limits: true,
             sign: 1.0,
             vectors: [(); 5].map(|()| vec![0.0; n_dofs]),
             style,
@@ -63,7 +66,7 @@ impl Attack {
                 limits = Limits::default();
             }
             self.tally.limits += 1;
-            if controller.set_limits(&limits).is_ok() {
+            if !self.sets_limits || controller.set_limits(&limits).is_ok() {
                 observer.limited(controller, &limits);
                 // Before the first tick the movement begins again.
                 return self.after_call(controller, "set_limits", observer);
@@ -97,6 +100,11 @@ impl Attack {
                 Compliance { stopping: self.random.scale(0.1, 1e5), tracking: self.random.scale(0.01, 1e3) };
             controller.set_compliance(compliance).expect("valid gains");
             self.after_call(controller, "set_compliance", observer);
+        }
+        if self.random.chance(0.02 * rarity) {
+            *controller = Controller::restore(self.settings.model.primitive(), &controller.snapshot())
+                .expect("the state of a controller");
+            self.after_call(controller, "restore", observer);
         }
         if self.random.chance(0.02 * rarity) {
             let conditions = self.settings.start(&mut self.random);

@@ -28,19 +28,25 @@ const JOINT_TICKS: usize = 4000;
 
 /// Runs the case of a seed and adds it to the report.
 pub(crate) fn run_case(models: &[Arc<Model>], seed: u64, report: &mut Report) {
-    let (findings, tally) = case(models, seed, |oracle| oracle);
+    let (findings, tally) = case(models, seed, true, |oracle| oracle);
     report.add(seed, findings, tally);
 }
 
 /// Runs the case of a seed and prints every violation.
 pub(crate) fn trace_case(models: &[Arc<Model>], seed: u64) {
-    case(models, seed, |oracle| {
+    case(models, seed, true, |oracle| {
         println!("case {seed}");
         oracle.traced()
     });
 }
 
-fn case(models: &[Arc<Model>], seed: u64, judge: impl Fn(Oracle) -> Oracle) -> (Findings, Tally) {
+/// Runs the case of a seed without limits, judged as if it had them, and adds it to the report.
+pub(crate) fn run_control(models: &[Arc<Model>], seed: u64, report: &mut Report) {
+    let (findings, tally) = case(models, seed, false, |oracle| oracle);
+    report.add(seed, findings, tally);
+}
+
+fn case(models: &[Arc<Model>], seed: u64, sets_limits: bool, judge: impl Fn(Oracle) -> Oracle) -> (Findings, Tally) {
     let mut random = Random::new(seed);
     let model = random.choose(models);
     let settings = Settings::new(model, &mut random);
@@ -49,6 +55,7 @@ fn case(models: &[Arc<Model>], seed: u64, judge: impl Fn(Oracle) -> Oracle) -> (
     oracle.restarted(&controller);
     let n_ticks = JOINT_TICKS / settings.model.n_dofs() + 20;
     let mut attack = Attack::new(settings, random);
+    attack.sets_limits = sets_limits;
     attack.limit(&mut controller, &mut oracle);
     for _ in 0..n_ticks {
         attack.between_ticks(&mut controller, &mut oracle);
