@@ -43,10 +43,12 @@ pub(crate) enum CommandLoad {
     Commanded,
     /// As settled, within limits that do not bind.
     Limited,
+    /// As settled, within limits of velocity and acceleration that bind in most ticks.
+    Bound,
 }
 
 impl CommandLoad {
-    pub(crate) const ALL: [Self; 4] = [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited];
+    pub(crate) const ALL: [Self; 5] = [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited, Self::Bound];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -54,6 +56,7 @@ impl CommandLoad {
             Self::InTransition => "in transition",
             Self::Commanded => "commanded",
             Self::Limited => "within limits",
+            Self::Bound => "at limits",
         }
     }
 }
@@ -81,13 +84,7 @@ impl ControlLoop {
     pub(crate) fn new(model: &Arc<Model>, load: CommandLoad) -> Self {
         let mut controller =
             Controller::new(model.primitive(), DT, &Conditions::default(), None).expect("a controller");
-        if load == CommandLoad::Limited {
-            let limits = Limits {
-                lower: Some(vec![-1e3]),
-                upper: Some(vec![1e3]),
-                velocity: Some(vec![1e3]),
-                acceleration: Some(vec![1e6]),
-            };
+        if let Some(limits) = limits(model, load) {
             controller.set_limits(&limits).expect("limits");
         }
         // τ is at least that of the model, so that the measured second ends before the movement does.
@@ -143,6 +140,19 @@ impl ControlLoop {
         let mut motion = Motion { position, velocity, acceleration };
         black_box(self.controller.update(&command, &mut motion).expect("a tick"));
     }
+}
+
+/// Returns the limits of a load.
+fn limits(model: &Model, load: CommandLoad) -> Option<Limits> {
+    let of_ranges = |factor: f64| Some(model.ranges().iter().map(|range| factor * range).collect());
+    // The nominal movement takes up to twice its range per second, and ten times its range per second squared.
+    let [velocity, acceleration] = match load {
+        CommandLoad::Limited => [of_ranges(1e3), of_ranges(1e6)],
+        CommandLoad::Bound => [of_ranges(1.0), of_ranges(5.0)],
+        _ => return None,
+    };
+    let limits = Limits { lower: Some(vec![-1e3]), upper: Some(vec![1e3]), velocity, ..Limits::default() };
+    Some(Limits { acceleration, ..limits })
 }
 
 /// Fits a model with J styles to ten movements of one second, whose forcing terms have full rank.

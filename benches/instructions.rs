@@ -50,13 +50,15 @@ fn per_tick(n_dofs: usize, n_styles: usize, load: CommandLoad) -> u64 {
 /// Prints the table of all sizes and loads.
 fn print_table() {
     println!("Instructions per tick\n");
-    println!("| D  | J | settled | in transition | commanded | within limits |");
-    println!("|---:|--:|--------:|--------------:|----------:|--------------:|");
+    println!("| D  | J | settled | in transition | commanded | within limits | at limits |");
+    println!("|---:|--:|--------:|--------------:|----------:|--------------:|----------:|");
     for n_dofs in N_DOFS {
         for n_styles in N_STYLES {
-            let [settled, transition, commanded, limited] =
+            let [settled, transition, commanded, limited, bound] =
                 CommandLoad::ALL.map(|load| per_tick(n_dofs, n_styles, load));
-            println!("| {n_dofs:>2} | {n_styles} | {settled:>7} | {transition:>13} | {commanded:>9} | {limited:>13} |");
+            println!(
+                "| {n_dofs:>2} | {n_styles} | {settled:>7} | {transition:>13} | {commanded:>9} | {limited:>13} | {bound:>9} |"
+            );
         }
     }
 }
