@@ -1,6 +1,7 @@
-//! Limits under adversarial commands: a thousand million joint-ticks of random models, limits and movements.
+//! Limits under adversarial commands: a thousand million joint-ticks of random models, limits and movements, and a million
+//! rollouts within limits that do not bind.
 //!
-//! `cargo bench --bench limits_proof -- joint_ticks=1e8 seed=5` runs another number of joint-ticks, from another seed on, and
+//! `cargo bench --bench limits_proof -- joint_ticks=1e8 rollouts=1e5 seed=5` runs other numbers from another seed on, and
 //! `cargo bench --bench limits_proof -- case=17` prints every violation in the case of one seed.
 #![allow(missing_docs)]
 
@@ -13,10 +14,13 @@ use std::time::Instant;
 
 use adversary::models::models;
 use adversary::report::Report;
+use adversary::slack::SlackReport;
 use adversary::trace_case;
 
 /// Joint-ticks of the proof.
 const JOINT_TICKS: f64 = 1e9;
+/// Rollouts within limits that do not bind.
+const ROLLOUTS: f64 = 1e6;
 
 /// Returns the number of an argument `name=number`.
 fn argument(name: &str) -> Option<f64> {
@@ -33,8 +37,12 @@ fn main() -> ExitCode {
     }
     let joint_ticks = argument("joint_ticks").unwrap_or(if is_benchmark { JOINT_TICKS } else { 1e5 });
     let begin = Instant::now();
-    let report = Report::run(&models, argument("seed").unwrap_or(1.0) as u64, joint_ticks as usize);
+    let seed = argument("seed").unwrap_or(1.0) as u64;
+    let report = Report::run(&models, seed, joint_ticks as usize);
     report.print();
-    println!("\n{:.0} s", begin.elapsed().as_secs_f64());
-    ExitCode::from(u8::from(!report.holds()))
+    println!("\n{:.0} s\n", begin.elapsed().as_secs_f64());
+    let rollouts = argument("rollouts").unwrap_or(if is_benchmark { ROLLOUTS } else { 1e3 });
+    let slack = SlackReport::run(&models, seed, rollouts as usize);
+    slack.print();
+    ExitCode::from(u8::from(!(report.holds() && slack.holds())))
 }

@@ -26,6 +26,8 @@ pub(crate) struct Tally {
     pub(crate) refused_limits: usize,
     pub(crate) refused_ticks: usize,
     pub(crate) restarts: usize,
+    /// Snapshots that are rejected.
+    pub(crate) lost: usize,
 }
 
 /// Commands of a case.
@@ -102,8 +104,10 @@ impl Attack {
             self.after_call(controller, "set_compliance", observer);
         }
         if self.random.chance(0.02 * rarity) {
-            *controller = Controller::restore(self.settings.model.primitive(), &controller.snapshot())
-                .expect("the state of a controller");
+            match Controller::restore(self.settings.model.primitive(), &controller.snapshot()) {
+                Ok(restored) => *controller = restored,
+                Err(_) => self.tally.lost += 1,
+            }
             self.after_call(controller, "restore", observer);
         }
         if self.random.chance(0.02 * rarity) {

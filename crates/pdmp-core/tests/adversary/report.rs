@@ -14,6 +14,26 @@ use super::run_case;
 /// Largest permitted violation: that of rounding.
 pub(crate) const MAX_VIOLATION: f64 = 1e-12;
 
+/// Runs seeds from the first on, on all processors, until `run` returns false, and merges the reports of the processors.
+pub(crate) fn parallel<R: Default + Send>(
+    first_seed: u64,
+    run: impl Fn(u64, &mut R) -> bool + Sync,
+    merge: impl Fn(&mut R, R) + Sync,
+) -> R {
+    let (next, total) = (AtomicU64::new(first_seed), Mutex::new(R::default()));
+    let n_threads = thread::available_parallelism().map_or(1, |n| n.get());
+    thread::scope(|scope| {
+        for _ in 0..n_threads {
+            scope.spawn(|| {
+                let mut report = R::default();
+                while run(next.fetch_add(1, Ordering::Relaxed), &mut report) {}
+                merge(&mut *total.lock().expect("no case panics"), report);
+            });
+        }
+    });
+    total.into_inner().expect("no case panics")
+}
+
 /// Sums and maxima of many cases.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Report {
@@ -54,31 +74,24 @@ impl Report {
         self.tally.refused_limits += other.tally.refused_limits;
         self.tally.refused_ticks += other.tally.refused_ticks;
         self.tally.restarts += other.tally.restarts;
+        self.tally.lost += other.tally.lost;
     }
 
     /// Runs cases from a seed on, on all processors, until the given number of joint-ticks is reached.
     pub(crate) fn run(models: &[Arc<Model>], first_seed: u64, joint_ticks: usize) -> Self {
-        let (next, done, total) = (AtomicU64::new(first_seed), AtomicUsize::new(0), Mutex::new(Self::default()));
-        let n_threads = thread::available_parallelism().map_or(1, |n| n.get());
-        thread::scope(|scope| {
-            for _ in 0..n_threads {
-                scope.spawn(|| {
-                    let mut report = Self::default();
-                    while done.load(Ordering::Relaxed) < joint_ticks {
-                        let before = report.findings.joint_ticks;
-                        run_case(models, next.fetch_add(1, Ordering::Relaxed), &mut report);
-                        done.fetch_add(report.findings.joint_ticks - before, Ordering::Relaxed);
-                    }
-                    total.lock().expect("no case panics").merge(report);
-                });
-            }
-        });
-        total.into_inner().expect("no case panics")
+        let done = AtomicUsize::new(0);
+        let run = |seed: u64, report: &mut Self| {
+            let before = report.findings.joint_ticks;
+            run_case(models, seed, report);
+            done.fetch_add(report.findings.joint_ticks - before, Ordering::Relaxed) < joint_ticks
+        };
+        parallel(first_seed, run, Self::merge)
     }
 
     /// Returns true if every property holds.
     pub(crate) fn holds(&self) -> bool {
-        self.findings.not_finite == 0 && self.findings.worst.iter().all(|worst| worst.violation <= MAX_VIOLATION)
+        (self.findings.not_finite, self.tally.lost) == (0, 0)
+            && self.findings.worst.iter().all(|worst| worst.violation <= MAX_VIOLATION)
     }
 
     pub(crate) fn print(&self) {
@@ -91,9 +104,9 @@ impl Report {
             limited.iter().sum::<usize>()
         );
         println!("{outside} outside, braking or returning; {not_finite} not finite {:?}", self.not_finite);
-        let Tally { commands, limits, refused_limits, refused_ticks, restarts } = tally;
+        let Tally { commands, limits, refused_limits, refused_ticks, restarts, lost } = tally;
         println!(
-            "{commands} commands; {limits} limits set, {refused_limits} of them refused as too tight for the tick; {restarts} restarts; {refused_ticks} ticks refused"
+            "{commands} commands; {limits} limits set, {refused_limits} of them refused as too tight for the tick; {restarts} restarts; {refused_ticks} ticks refused; {lost} snapshots rejected"
         );
         println!("\n| property | worst violation | cases | seed | tick | DoF | dt |");
         println!("|---|---:|---:|---:|---:|---:|---:|");

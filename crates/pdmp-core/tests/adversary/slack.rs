@@ -1,12 +1,14 @@
 //! Movements within limits that do not bind.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use pdmp_core::motion::Limits;
 use pdmp_core::{Controller, Error, Model};
 
 use super::attack::{Attack, Observer};
 use super::random::Random;
+use super::report::parallel;
 use super::settings::Settings;
 
 /// Shares by which limits exceed the extremes of the motion.
@@ -127,8 +129,29 @@ pub(crate) struct SlackReport {
 }
 
 impl SlackReport {
+    /// Runs rollouts from a seed on, on all processors, until the given number is reached.
+    pub(crate) fn run(models: &[Arc<Model>], first_seed: u64, rollouts: usize) -> Self {
+        let done = AtomicUsize::new(0);
+        let run = |seed: u64, report: &mut Self| {
+            let before = report.rollouts;
+            report.add(models, seed);
+            done.fetch_add(report.rollouts - before, Ordering::Relaxed) < rollouts
+        };
+        parallel(first_seed, run, Self::merge)
+    }
+
+    fn merge(&mut self, other: Self) {
+        self.rollouts += other.rollouts;
+        self.joint_ticks += other.joint_ticks;
+        self.commands += other.commands;
+        self.refused += other.refused;
+        self.changed += other.changed;
+        self.limited += other.limited;
+        self.first_changed = self.first_changed.or(other.first_changed);
+    }
+
     /// Adds the rollout of a seed.
-    pub(crate) fn add(&mut self, models: &[Arc<Model>], seed: u64) {
+    fn add(&mut self, models: &[Arc<Model>], seed: u64) {
         let mut random = Random::new(seed);
         let model = random.choose(models);
         let mut settings = Settings::new(model, &mut random);
@@ -164,20 +187,13 @@ impl SlackReport {
         self.limited += limited.limited;
         if free.bits != limited.bits {
             self.changed += 1;
-            if std::env::var("DBG").is_ok() {
-                let block = 3 * model.n_dofs() + 2;
-                let k = free.bits.iter().zip(&limited.bits).position(|(a, b)| a != b).unwrap();
-                println!(
-                    "seed {seed} margin {margin} since {since} record {} item {} {:e} {:e} {:?}",
-                    k / block,
-                    k % block,
-                    f64::from_bits(free.bits[k]),
-                    f64::from_bits(limited.bits[k]),
-                    model.kind()
-                );
-            }
             self.first_changed = self.first_changed.or(Some(seed));
         }
+    }
+
+    /// Returns true if no rollout changed.
+    pub(crate) fn holds(&self) -> bool {
+        (self.changed, self.limited) == (0, 0)
     }
 
     pub(crate) fn print(&self) {
