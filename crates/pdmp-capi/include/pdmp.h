@@ -15,7 +15,7 @@
 // - Lengths: n_dofs, n_styles, n_contexts and n_conditions are members of pdmp_info. Numbers are counted in elements,
 //   text and memory in bytes. All numbers are double precision, all strings UTF-8.
 // - Threads: any number of threads may use a model; one thread at a time may use a controller.
-// - Real time: pdmp_controller_step, _update, _set_... except _set_limits, _release, _copy, _read, _limited, _progress
+// - Real time: pdmp_controller_step, _update, _set_..., _release, _copy, _read, _limited, _progress
 //   and _error neither allocate nor lock.
 // - ABI: structs may grow between minor versions before 1.0; recompile for each.
 //
@@ -424,14 +424,15 @@ size_t pdmp_controller_error(const pdmp_controller *controller, pdmp_text text);
 
 /// Sets the limits of the robot; NULL removes them.
 ///
-/// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower <= y <= upper,
-/// |y'| <= velocity, and |change of y'| <= dt acceleration at its end, and lower <= y <= upper where y turns round within it,
-/// on the cubic through both ends unless the tick is long enough to be limited in parts. A motion inside the limits is not
-/// changed.
-/// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start outside,
-/// brakes with the limit of the acceleration and returns. The limits stay in force after pdmp_controller_reset.
+/// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: at its end
+/// lower <= y <= upper, |y'| <= velocity, |y''| <= acceleration, and |change of y'| <= dt acceleration; between its ends
+/// lower <= y <= upper on the cubic through position and velocity at both, by which a robot interpolates. A tick longer than
+/// half of velocity / acceleration is limited in parts of constant acceleration, and is no single cubic. A motion inside the
+/// limits is not changed. A goal or anchor outside is moved to the limit, where a movement is finished as at any goal. A
+/// movement outside, after limits that shrink or at a start outside, brakes with the limit of the acceleration and returns. The
+/// limits stay in force after pdmp_controller_reset.
 ///
-/// This function allocates. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE also if the limits are too tight for a tick. The
+/// This function does not allocate. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE also if the limits are too tight for a tick. The
 /// present limits then stay in force.
 pdmp_status pdmp_controller_set_limits(pdmp_controller *controller,
                                        const pdmp_limits *limits);

@@ -3,13 +3,14 @@
 use std::mem::{MaybeUninit, align_of, size_of};
 use std::ptr;
 
-use pdmp_core::motion::Compliance;
+use pdmp_core::motion::{Compliance, Limits};
 use pdmp_core::{Command, Controller};
 
 use crate::buffers::{pdmp_memory, pdmp_text, pdmp_vector};
 use crate::command::{pdmp_command, pdmp_conditions, pdmp_motion};
 use crate::fault::Fault;
 use crate::guard::{guard, guard_with_text};
+use crate::limits::memory_of_limits;
 use crate::model::pdmp_model;
 use crate::status::pdmp_status;
 
@@ -18,6 +19,8 @@ use pdmp_status::PDMP_OK;
 /// Controller of one movement: a primitive, its commands and its state. One thread at a time may use it.
 pub struct pdmp_controller {
     pub(crate) inner: Controller,
+    /// Memory for the limits of a call.
+    pub(crate) limits: Limits,
     /// Error of the last call that failed.
     fault: Option<Fault>,
     /// True if the library allocated the memory.
@@ -102,7 +105,8 @@ pub(crate) fn aligned(memory: pdmp_memory) -> Result<Option<*mut pdmp_controller
 /// # Safety
 /// The memory comes from [`aligned`], and nothing else uses it.
 pub(crate) unsafe fn emplace(inner: Controller, memory: Option<*mut pdmp_controller>) -> *mut pdmp_controller {
-    let controller = pdmp_controller { inner, fault: None, owned: memory.is_none() };
+    let limits = memory_of_limits(inner.primitive().n_dofs());
+    let controller = pdmp_controller { inner, limits, fault: None, owned: memory.is_none() };
     match memory {
         // SAFETY: `aligned` has checked size and alignment, and the contract of this function excludes other users.
         Some(memory) => unsafe {

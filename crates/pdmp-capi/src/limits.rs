@@ -51,36 +51,53 @@ impl From<Option<Limit>> for pdmp_limit {
 }
 
 impl pdmp_limits {
-    /// Returns the limits as the core takes them.
+    /// No limits.
+    const NONE: Self = {
+        let none = pdmp_vector { data: std::ptr::null(), length: 0 };
+        Self { lower: none, upper: none, velocity: none, acceleration: none }
+    };
+
+    /// Writes the limits to those that the core takes, without allocation.
     ///
     /// # Safety
     /// Every pointer is NULL or valid for reads over its length.
-    unsafe fn get(&self, n_dofs: usize) -> Result<Limits, Fault> {
-        let owned = |name, vector: pdmp_vector| {
+    unsafe fn write(&self, limits: &mut Limits, n_dofs: usize) -> Result<(), Fault> {
+        let infinity = f64::INFINITY;
+        let members = [
+            ("lower", self.lower, &mut limits.lower, -infinity),
+            ("upper", self.upper, &mut limits.upper, infinity),
+            ("velocity", self.velocity, &mut limits.velocity, infinity),
+            ("acceleration", self.acceleration, &mut limits.acceleration, infinity),
+        ];
+        for (name, vector, written, none) in members {
             let expected = if vector.length == 1 { 1 } else { n_dofs };
             // SAFETY: this function has the same contract.
             let numbers = unsafe { vector.get(name, expected, "DoF") }?;
-            Ok::<_, Fault>(numbers.map(<[f64]>::to_vec))
-        };
-        Ok(Limits {
-            lower: owned("lower", self.lower)?,
-            upper: owned("upper", self.upper)?,
-            velocity: owned("velocity", self.velocity)?,
-            acceleration: owned("acceleration", self.acceleration)?,
-        })
+            let written = written.get_or_insert_default();
+            written.clear();
+            written.extend_from_slice(numbers.unwrap_or(&[none]));
+        }
+        Ok(())
     }
+}
+
+/// Returns memory for the limits of each DoF.
+pub(crate) fn memory_of_limits(n_dofs: usize) -> Limits {
+    let memory = || Some(Vec::with_capacity(n_dofs.max(1)));
+    Limits { lower: memory(), upper: memory(), velocity: memory(), acceleration: memory() }
 }
 
 /// Sets the limits of the robot; NULL removes them.
 ///
-/// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower <= y <= upper,
-/// |y'| <= velocity, and |change of y'| <= dt acceleration at its end, and lower <= y <= upper where y turns round within it,
-/// on the cubic through both ends unless the tick is long enough to be limited in parts. A motion inside the limits is not
-/// changed.
-/// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start outside,
-/// brakes with the limit of the acceleration and returns. The limits stay in force after pdmp_controller_reset.
+/// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: at its end
+/// lower <= y <= upper, |y'| <= velocity, |y''| <= acceleration, and |change of y'| <= dt acceleration; between its ends
+/// lower <= y <= upper on the cubic through position and velocity at both, by which a robot interpolates. A tick longer than
+/// half of velocity / acceleration is limited in parts of constant acceleration, and is no single cubic. A motion inside the
+/// limits is not changed. A goal or anchor outside is moved to the limit, where a movement is finished as at any goal. A
+/// movement outside, after limits that shrink or at a start outside, brakes with the limit of the acceleration and returns. The
+/// limits stay in force after pdmp_controller_reset.
 ///
-/// This function allocates. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE also if the limits are too tight for a tick. The
+/// This function does not allocate. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE also if the limits are too tight for a tick. The
 /// present limits then stay in force.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_set_limits(
@@ -90,8 +107,8 @@ pub unsafe extern "C" fn pdmp_controller_set_limits(
     call_on(controller, |controller| {
         let n_dofs = controller.inner.primitive().n_dofs();
         // SAFETY: the contract of the C ABI covers the pointers of this argument.
-        let limits = limits.map(|limits| unsafe { limits.get(n_dofs) }).transpose()?.unwrap_or_default();
-        controller.inner.set_limits(&limits)?;
+        unsafe { limits.unwrap_or(&pdmp_limits::NONE).write(&mut controller.limits, n_dofs) }?;
+        controller.inner.set_limits(&controller.limits)?;
         Ok(pdmp_status::PDMP_OK)
     })
 }

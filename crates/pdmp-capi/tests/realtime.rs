@@ -71,17 +71,15 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
             pdmp_controller_new(Some(&model), Some(&settings), None, Some(&mut made), none);
             made.assume_init()
         };
-        if is_limited {
-            let each = |limit| Some(vec![limit; n_dofs]);
-            let limits = Limits { lower: each(-0.5), upper: each(0.75), velocity: each(1.5), acceleration: each(20.0) };
-            let Limits { lower, upper, velocity, acceleration } = &limits;
-            let [lower, upper, velocity, acceleration] =
-                [lower, upper, velocity, acceleration].map(|limits| vector(limits.as_deref()));
-            rust.set_limits(&limits).unwrap();
-            let limits = pdmp_limits { lower, upper, velocity, acceleration };
-            // SAFETY: the controller is alive, and the vectors are valid.
-            assert_eq!(unsafe { pdmp_controller_set_limits(c.as_mut(), Some(&limits)) }, pdmp_status::PDMP_OK);
-        }
+        let each = |limit| is_limited.then(|| vec![limit; n_dofs]);
+        let limits = Limits { lower: each(-0.5), upper: each(0.75), velocity: each(1.5), acceleration: each(20.0) };
+        let Limits { lower, upper, velocity, acceleration } = &limits;
+        let [lower, upper, velocity, acceleration] =
+            [lower, upper, velocity, acceleration].map(|limits| vector(limits.as_deref()));
+        let c_limits = pdmp_limits { lower, upper, velocity, acceleration };
+        rust.set_limits(&limits).unwrap();
+        // SAFETY: the controller is alive, and the vectors are valid.
+        assert_eq!(unsafe { pdmp_controller_set_limits(c.as_mut(), Some(&c_limits)) }, pdmp_status::PDMP_OK);
         let mut cloned = MaybeUninit::uninit();
         // SAFETY: the controller is alive.
         let copy = unsafe {
@@ -147,6 +145,7 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
                     7 => (rust.set_phase(tau), pdmp_controller_set_phase(c.as_mut(), tau)),
                     8 => (rust.set_phase_gain(tau), pdmp_controller_set_phase_gain(c.as_mut(), tau)),
                     9 => (rust.set_tolerance(tau - own), pdmp_controller_set_tolerance(c.as_mut(), tau - own)),
+                    10 => (rust.set_limits(&limits), pdmp_controller_set_limits(c.as_mut(), Some(&c_limits))),
                     _ => (Ok(()), pdmp_status::PDMP_OK),
                 }
             };

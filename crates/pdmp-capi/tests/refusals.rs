@@ -341,7 +341,7 @@ fn invalid_limits_leave_the_present_ones_and_a_message() {
         (
             pdmp_limits { velocity: vector(&[1e-3; 3]), acceleration: vector(&[1e6; 3]), ..NO_LIMITS },
             PDMP_RANGE,
-            "dt = 0.001: ",
+            "limits of DoF 0: too tight for a tick of 0.001 s: with an acceleration of 1000000, ",
         ),
     ] {
         assert_eq!(set(&mut running, &limits), status, "{text}");

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use common::*;
 use pdmp_core::motion::{Coupling, Limit, Limits, TimeGrid, fastest, fastest_tau};
-use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status, rollout};
+use pdmp_core::{Command, Conditions, Controller, Error, Kind, LimitError, Model, Status, rollout};
 
 /// Generator of uniform numbers in [0, 1) (Knuth's MMIX).
 struct Random(u64);
@@ -69,11 +69,27 @@ fn limits_around(controller: &Controller, ranges: &[f64], random: &mut Random) -
     }
 }
 
+/// Returns the positions furthest below the lower and above the upper limits, relative to the range between them, at 100
+/// points of the cubic through two motions `h` apart.
+fn violation_between(limits: &Limits, before: &Motion, after: &Motion, h: f64) -> f64 {
+    let [lower, upper] = [&limits.lower, &limits.upper].map(|limit| limit.as_ref().unwrap());
+    let of_dof = |d: usize| {
+        let (from, to) = ([before.0[d], h * before.1[d]], [after.0[d], h * after.1[d]]);
+        let past = |s: f64| {
+            let r = 1.0 - s;
+            let y = r * r * ((1.0 + 2.0 * s) * from[0] + s * from[1]) + s * s * ((1.0 + 2.0 * r) * to[0] - r * to[1]);
+            (y - upper[d]).max(lower[d] - y) / (upper[d] - lower[d])
+        };
+        (0..=100).map(|s| past(f64::from(s) / 100.0)).fold(0.0, f64::max)
+    };
+    (0..before.0.len()).map(of_dof).fold(0.0, f64::max)
+}
+
 /// No sequence of commands, measurements, coupling terms and tick lengths leaves the limits.
 #[test]
 fn no_command_leaves_the_limits() {
     let mut random = Random(7);
-    let (mut joint_ticks, mut limited) = (0, 0);
+    let (mut joint_ticks, mut limited, mut cubics) = (0, 0, 0);
     for case in 0..60 {
         let model = [&*REACH, &*CYCLE][case % 2];
         let (n, j) = (model.n_dofs(), model.n_styles());
@@ -120,6 +136,15 @@ fn no_command_leaves_the_limits() {
             let violation = violation(&limits, &after);
             if inside {
                 assert!(violation <= 1e-12, "{case} {tick}: {violation}, {before:?} to {after:?} in {h}");
+                // A longer tick is limited in parts, and is not a single cubic.
+                let short = (0..n).all(|d| {
+                    let [l, u, v, a] = [&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration]
+                        .map(|limit| limit.as_ref().unwrap()[d]);
+                    2.0 * a * h <= v && a * h * h <= u - l
+                });
+                let between = if short { violation_between(&limits, &before, &after, h) } else { 0.0 };
+                assert!(between <= 1e-12, "{case} {tick}: {between}, {before:?} to {after:?} in {h}");
+                cubics += usize::from(short);
             }
             inside |= violation == 0.0;
             before = after;
@@ -135,6 +160,7 @@ fn no_command_leaves_the_limits() {
         assert!(inside);
     }
     assert!(limited > joint_ticks / 10, "{limited} of {joint_ticks}");
+    assert!(cubics > 50_000, "{cubics}");
 }
 
 /// Limits that do not bind leave the motion as it is, to the last bit.
@@ -215,13 +241,16 @@ fn bad_limits_are_rejected() {
     let mut controller = controller(&REACH);
     let limits = |lower, upper, velocity, acceleration| Limits { lower, upper, velocity, acceleration };
     let error = controller.set_limits(&limits(Some(vec![0.0, 1.0, 0.0]), Some(vec![1.0; 3]), None, None)).unwrap_err();
-    assert!(matches!(error, Error::LimitOrder { dof: 1, lower: 1.0, upper: 1.0 }));
+    assert!(matches!(error, Error::Limits(LimitError::Order { dof: 1, lower: 1.0, upper: 1.0 })));
     let bad = [
         (limits(Some(vec![0.0; 2]), None, None, None), "lower"),
         (limits(None, Some(vec![f64::NAN; 3]), None, None), "upper"),
         (limits(None, None, Some(vec![1.0, 0.0, 1.0]), None), "velocity"),
         (limits(None, None, None, Some(vec![1.0, -1.0, 1.0])), "acceleration"),
-        (limits(None, None, Some(vec![1e-3; 3]), Some(vec![1e6; 3])), "dt"),
+        (
+            limits(None, None, Some(vec![1e-3; 3]), Some(vec![1e6; 3])),
+            "limits of DoF 0: too tight for a tick of 0.001 s",
+        ),
     ];
     for (limits, name) in bad {
         let text = controller.set_limits(&limits).unwrap_err().to_string();
@@ -229,6 +258,236 @@ fn bad_limits_are_rejected() {
     }
     while controller.step().unwrap() == Status::Working {
         assert!(controller.limited().iter().all(Option::is_none));
+    }
+}
+
+/// Limits are refused from the tick on that the error states, and with the numbers of the DoF that cannot keep them.
+#[test]
+fn limits_too_tight_for_a_tick_state_the_longest_one() {
+    for (tight, max) in [
+        (Limits { velocity: Some(vec![1.0, 1e-3, 1.0]), acceleration: Some(vec![1e6]), ..Limits::default() }, 5e-7),
+        (
+            Limits {
+                lower: Some(vec![-10.0, -1e-9, -10.0]),
+                upper: Some(vec![10.0, 1e-9, 10.0]),
+                acceleration: Some(vec![2e-3]),
+                ..Limits::default()
+            },
+            1.0,
+        ),
+    ] {
+        for (factor, accepted) in [(0.99, true), (1.01, false)] {
+            let dt = max * factor;
+            let mut controller = Controller::new(REACH.primitive(), dt, &Conditions::default(), None).unwrap();
+            match controller.set_limits(&tight) {
+                Ok(()) => assert!(accepted, "{tight:?} {dt}"),
+                Err(Error::Limits(LimitError::TooTight { dof, dt: stated, max_dt, .. })) => {
+                    assert!(!accepted, "{tight:?} {dt}");
+                    assert_eq!((dof, stated), (1, dt));
+                    assert!((max_dt / max - 1.0).abs() < 1e-9, "{max_dt}");
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
+}
+
+/// A DoF that rides on a limit neither alternates between free and limited, nor does its acceleration jump from tick to tick,
+/// while a noisy goal or anchor is commanded.
+#[test]
+fn movement_on_a_limit_does_not_chatter() {
+    let mut random = Random(3);
+    for (model, noise) in [(&*REACH, 0.0), (&*REACH, 0.1), (&*CYCLE, 0.0), (&*CYCLE, 0.1)] {
+        let free =
+            rollout(model.primitive(), &Conditions::default(), TimeGrid { dt: 1e-3, duration: Some(2.0) }).unwrap();
+        let peak = |rate: &ndarray::Array2<f64>, share: f64| {
+            Some(rate.columns().into_iter().map(|dof| share * dof.fold(0.0, |peak, x| x.abs().max(peak))).collect())
+        };
+        for share in [0.3, 0.6, 0.9] {
+            let by_velocity = Limits {
+                velocity: peak(&free.velocity, share),
+                acceleration: peak(&free.acceleration, 2.0),
+                ..Limits::default()
+            };
+            let by_acceleration = Limits { acceleration: peak(&free.acceleration, share), ..Limits::default() };
+            for limits in [by_velocity, by_acceleration] {
+                let mut controller = controller(model);
+                let centre = controller.centre().to_vec();
+                controller.set_limits(&limits).unwrap();
+                let (mut changes, mut limited, mut squares) = (0, 0, 0.0);
+                let mut before = (controller.limited().to_vec(), controller.acceleration().to_vec());
+                for _ in 0..2000 {
+                    let noisy: Vec<f64> = centre
+                        .iter()
+                        .zip(model.ranges())
+                        .map(|(y, range)| y + noise * range * random.between(-0.5, 0.5))
+                        .collect();
+                    let command = match model.kind() {
+                        Kind::Discrete => Command { goal: Some(&noisy), ..Command::default() },
+                        Kind::Rhythmic => Command { anchor: Some(&noisy), ..Command::default() },
+                    };
+                    controller.step_with(&command).unwrap();
+                    let after = (controller.limited().to_vec(), controller.acceleration().to_vec());
+                    for (d, most) in limits.acceleration.iter().flatten().enumerate() {
+                        limited += usize::from(after.0[d].is_some());
+                        changes += usize::from(after.0[d].is_some() != before.0[d].is_some());
+                        squares += ((after.1[d] - before.1[d]) / most).powi(2);
+                    }
+                    before = after;
+                }
+                // One step of the whole acceleration per touch of a limit is unavoidable without a limit of the jerk.
+                let step = (squares / (2000.0 * model.n_dofs() as f64)).sqrt();
+                assert!(limited > 200 && changes <= 40 && step < 0.08, "{limited} {changes} {step} at {limits:?}");
+            }
+        }
+    }
+}
+
+/// A command between ticks publishes no velocity that the last tick has not reached, and no acceleration beyond its limit,
+/// even where it takes effect at once.
+#[test]
+fn commands_between_ticks_publish_no_motion_beyond_the_limits() {
+    type Setter = fn(&mut Controller, &[f64]);
+    let setters: [Setter; 9] = [
+        |controller, _| controller.release(),
+        |controller, _| controller.set_speed(3.0).unwrap(),
+        |controller, _| controller.set_speed(0.0).unwrap(),
+        |controller, x| controller.set_tau(0.2 * (1.1 + x[0])).unwrap(),
+        |controller, x| controller.set_style(&x[..controller.style().len()]).unwrap(),
+        |controller, x| drop(controller.set_goal(x)),
+        |controller, x| drop(controller.set_anchor(x)),
+        |controller, x| drop(controller.set_phase(3.0 * x[0])),
+        |controller, _| controller.set_limits(&Limits { upper: Some(vec![0.3]), ..controller.limits() }).unwrap(),
+    ];
+    let mut random = Random(5);
+    for (model, transition) in [(&*REACH, None), (&*REACH, Some(0.0)), (&*CYCLE, None), (&*CYCLE, Some(0.0))] {
+        let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), transition).unwrap();
+        controller
+            .set_limits(&Limits { velocity: Some(vec![1.0]), acceleration: Some(vec![6.0]), ..Limits::default() })
+            .unwrap();
+        for tick in 0..3000 {
+            let x: Vec<f64> = (0..model.n_dofs()).map(|_| random.between(-1.0, 1.0)).collect();
+            let measured = random.next() < 0.1;
+            let coupling = (random.next() < 0.1).then_some(Coupling { velocity: &x, acceleration: &x });
+            controller
+                .step_with(&Command { measured: measured.then_some(&x), coupling, ..Command::default() })
+                .unwrap();
+            let (before, settled) = (motion(&controller), controller.acceleration().iter().all(|a| a.abs() <= 6.0));
+            setters[tick % setters.len()](&mut controller, &x);
+            assert_eq!(motion(&controller), before, "{tick}");
+            assert!(!settled || controller.acceleration().iter().all(|a| a.abs() <= 6.0), "{tick}");
+            // Wide limits of the position again.
+            controller.set_limits(&Limits { upper: None, ..controller.limits() }).unwrap();
+        }
+    }
+}
+
+/// Ticks down to the shortest positive number of seconds leave the motion finite and inside.
+#[test]
+fn ticks_of_any_length_keep_the_limits() {
+    let wide = [None, Some(vec![0.5])];
+    for model in [&*REACH, &*CYCLE] {
+        for (velocity, acceleration) in wide.iter().flat_map(|v| wide.iter().map(move |a| (v.clone(), a.clone()))) {
+            for dt in [5e-324, 1e-310, 1e-300, 1e-200, 1e-100, 1e-30, 1e-12] {
+                let mut controller = controller(model);
+                let start = controller.position().iter();
+                let [lower, upper] = [-0.3, 0.3].map(|side| Some(start.clone().map(|y| y + side).collect()));
+                controller
+                    .set_limits(&Limits {
+                        lower,
+                        upper,
+                        velocity: velocity.clone(),
+                        acceleration: acceleration.clone(),
+                    })
+                    .unwrap();
+                for tick in 0..600 {
+                    let goal = vec![if tick % 200 < 100 { 2.0 } else { -2.0 }; 3];
+                    let goal = (model.kind() == Kind::Discrete).then_some(&*goal);
+                    let h = if tick % 3 == 0 { 0.01 } else { dt };
+                    controller.step_with(&Command { dt: Some(h), goal, ..Command::default() }).unwrap();
+                    let numbers = [controller.position(), controller.velocity(), controller.acceleration()].concat();
+                    assert!(numbers.iter().all(|x| x.is_finite()), "{dt} {tick} {numbers:?}");
+                    assert!(controller.phase().is_finite());
+                }
+            }
+        }
+    }
+}
+
+/// Without a limit of the acceleration, limits of the position alone name themselves, also with infinite elements; a start on
+/// the limit that moves outwards stays there.
+#[test]
+fn limits_of_the_position_alone_are_kept_and_named() {
+    for is_infinite in [false, true] {
+        for model in [&*REACH, &*CYCLE] {
+            let acceleration = is_infinite.then(|| vec![f64::INFINITY; model.n_dofs()]);
+            let start = controller(model).position().to_vec();
+            let upper: Vec<f64> = start.clone();
+            let lower = Some(start.iter().zip(model.ranges()).map(|(y, range)| y - 0.3 * range).collect());
+            let velocity = (model.kind() == Kind::Discrete).then(|| vec![1.0; model.n_dofs()]);
+            let conditions = Conditions { velocity, ..Conditions::default() };
+            let mut controller = Controller::new(model.primitive(), 1e-3, &conditions, None).unwrap();
+            let limits = Limits { lower, upper: Some(upper), acceleration, ..Limits::default() };
+            controller.set_limits(&limits).unwrap();
+            let mut named = 0;
+            for tick in 0..2000 {
+                controller.step().unwrap();
+                for (d, y) in controller.position().iter().enumerate() {
+                    let [lower, upper] = [&limits.lower, &limits.upper].map(|limit| limit.as_ref().unwrap()[d]);
+                    // The first tick ends the velocity out of the limit.
+                    assert!(tick < 2 || (lower..=upper).contains(y), "{tick} {d}: {lower} {y} {upper}");
+                }
+                assert!(controller.limited().iter().flatten().all(|limit| *limit == Limit::Position));
+                named += controller.limited().iter().flatten().count();
+            }
+            assert!(named > 20, "{named}");
+        }
+    }
+}
+
+/// Limits that exclude the anchor leave the start of a rhythmic movement where it was, and move the anchor from there on.
+#[test]
+fn rhythmic_movement_does_not_start_with_a_jump() {
+    let mut controller = controller(&CYCLE);
+    let (start, anchor) = (controller.position().to_vec(), controller.centre().to_vec());
+    let upper: Vec<f64> = anchor.iter().zip(CYCLE.ranges()).map(|(y, range)| y - range).collect();
+    let acceleration = 50.0;
+    controller
+        .set_limits(&Limits { upper: Some(upper.clone()), acceleration: Some(vec![acceleration]), ..Limits::default() })
+        .unwrap();
+    assert_eq!(controller.position(), start);
+    assert_eq!(controller.centre(), upper);
+    let mut before = motion(&controller);
+    for _ in 0..5000 {
+        controller.step().unwrap();
+        let after = motion(&controller);
+        assert!(after.1.iter().zip(&before.1).all(|(v, w)| (v - w).abs() <= acceleration * 1e-3 * (1.0 + 1e-9)));
+        before = after;
+    }
+    assert!(before.0.iter().zip(&upper).all(|(y, u)| y <= u));
+}
+
+/// A smaller limit of the velocity is kept from the first tick at which braking with A can have reached it.
+#[test]
+fn shrinking_velocity_is_kept_as_soon_as_possible() {
+    let mut controller = controller(&REACH);
+    while controller.velocity()[0].abs() < 0.8 {
+        controller.step().unwrap();
+    }
+    let (v, limit, acceleration) = (controller.velocity()[0].abs(), 0.3, 4.0);
+    controller
+        .set_limits(&Limits {
+            velocity: Some(vec![limit]),
+            acceleration: Some(vec![acceleration]),
+            ..Limits::default()
+        })
+        .unwrap();
+    let ticks = ((v - limit) / (acceleration * 1e-3)).ceil() as usize;
+    for tick in 1..1000 {
+        controller.step().unwrap();
+        let bound = (v - acceleration * 1e-3 * tick as f64).max(limit);
+        let found = controller.velocity()[0].abs();
+        assert!(found <= bound * (1.0 + 1e-12), "{tick} of {ticks}: {found} > {bound}");
     }
 }
 

@@ -120,11 +120,13 @@ impl Limits {
 impl Controller {
     /// Limits of position, velocity and acceleration (D,) in force, or None.
     ///
-    /// Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: lower ≤ y ≤ upper and
-    /// |ẏ| ≤ V at its end, and a change of ẏ by at most A·dt. Where y turns round within a tick, it stays inside on the
-    /// cubic through both ends; ticks longer than V / 2A are limited in parts. A movement inside them is not changed.
-    /// A goal or anchor outside is moved to the limit. A movement outside, after limits that shrink or at a start
-    /// outside, brakes with A and returns. They stay in force after `reset`; None removes them.
+    /// Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: at its end lower ≤ y ≤ upper,
+    /// |ẏ| ≤ V, |ÿ| ≤ A and a change of ẏ by at most A·dt, and between its ends lower ≤ y ≤ upper on the cubic through
+    /// position and velocity at both, by which a robot interpolates. A tick longer than V / 2A is limited in parts of
+    /// constant acceleration, and is no single cubic. A movement inside the limits is not changed.
+    /// A goal or anchor outside is moved to the limit: `goal` and `anchor` return it, and a movement finishes there. A
+    /// movement outside, after limits that shrink or at a start outside, brakes with A and returns. They stay in force
+    /// after `reset`; None removes them.
     #[getter]
     fn limits(&self) -> Option<Limits> {
         Limits::of(self.inner.limits())

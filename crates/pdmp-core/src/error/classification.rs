@@ -59,8 +59,7 @@ impl Error {
             | Self::ContextNames { .. }
             | Self::NoNumber { .. }
             | Self::Kind { .. }
-            | Self::LimitOrder { .. }
-            | Self::LeavesLimits { .. }
+            | Self::Limits(_)
             | Self::Argument { .. }
             | Self::Conflict { .. } => ErrorKind::Argument,
         }
@@ -99,7 +98,7 @@ impl Error {
             Self::Styles { .. } => Some("n_styles"),
             Self::Label { .. } | Self::NoNumber { .. } | Self::ContextNames { .. } => Some("context"),
             Self::Mixed { .. } => Some("contexts"),
-            Self::LimitOrder { .. } | Self::LeavesLimits { .. } => Some("limits"),
+            Self::Limits(_) => Some("limits"),
             Self::Gap { .. }
             | Self::WrapInGap { .. }
             | Self::Aperiodic { .. }

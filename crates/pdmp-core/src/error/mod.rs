@@ -6,12 +6,14 @@
 
 mod classification;
 mod format;
+mod limits;
 
 use std::path::PathBuf;
 
 use crate::kind::Kind;
 pub use classification::ErrorKind;
 use format::{Column, Count, Gap, Number, Rounded, Times};
+pub use limits::LimitError;
 
 /// Any error of this crate.
 ///
@@ -340,34 +342,9 @@ pub enum Error {
         /// Its size over the largest of the demonstrations'.
         ratio: f64,
     },
-    /// A lower limit of the position that is not below the upper one.
-    #[error("limits of DoF {dof}: the lower limit {lower} must be below the upper limit {upper}")]
-    LimitOrder {
-        /// Index of the DoF.
-        dof: usize,
-        /// Its lower limit.
-        lower: f64,
-        /// Its upper limit.
-        upper: f64,
-    },
-    /// A path that leaves the limits of the position.
-    #[error(
-        "limits of DoF {dof}: the path reaches {value:.6} at {:.1} % of its clock, outside {lower} to {upper}; change goal or \
-         style, or let a controller with these limits bend the path",
-        100.0 * phase
-    )]
-    LeavesLimits {
-        /// Index of the DoF.
-        dof: usize,
-        /// Its position.
-        value: f64,
-        /// Its lower limit.
-        lower: f64,
-        /// Its upper limit.
-        upper: f64,
-        /// Fraction of the clock.
-        phase: f64,
-    },
+    /// Limits of a robot that are wrong, that a path leaves, or that no tick can keep.
+    #[error(transparent)]
+    Limits(LimitError),
     /// An argument that is missing, empty or unsuitable.
     #[error("{name} {problem}")]
     Argument {

@@ -1,7 +1,8 @@
 //! Kinematic limits of a robot.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, LimitError, Result};
 use crate::motion::trajectory::Trajectory;
+use crate::validate::MAX_MAGNITUDE;
 
 /// Limits of position, velocity and acceleration: one number for all DoFs, or one for each. `None` or infinity is no limit.
 ///
@@ -39,7 +40,8 @@ impl Limits {
     /// Checks shapes and values for `n_dofs` DoFs.
     ///
     /// # Errors
-    /// A wrong length, a lower limit that is not below the upper one, or a velocity or acceleration that is not positive.
+    /// A wrong length, a finite limit above 1e150 in magnitude, a lower limit that is not below the upper one, or a velocity or
+    /// acceleration that is not positive.
     pub fn check(&self, n_dofs: usize) -> Result<()> {
         let vectors = [
             ("lower", &self.lower),
@@ -55,6 +57,10 @@ impl Limits {
             if let Some(index) = vector.iter().position(|limit| limit.is_nan()) {
                 return Err(Error::NotFinite { name, index, value: vector[index] });
             }
+            let too_large = |limit: &f64| limit.is_finite() && limit.abs() > MAX_MAGNITUDE;
+            if let Some(index) = vector.iter().position(too_large) {
+                return Err(Error::TooLarge { name, index, value: vector[index], limit: MAX_MAGNITUDE });
+            }
             let positive = name == "velocity" || name == "acceleration";
             if let Some(&value) = vector.iter().find(|limit| positive && **limit <= 0.0) {
                 return Err(Error::Range { name, value, allowed: "every limit must be positive; infinity is none" });
@@ -63,7 +69,7 @@ impl Limits {
         (0..n_dofs).try_for_each(|dof| {
             let lower = limit_of_dof(&self.lower, dof, f64::NEG_INFINITY);
             let upper = limit_of_dof(&self.upper, dof, f64::INFINITY);
-            if lower < upper { Ok(()) } else { Err(Error::LimitOrder { dof, lower, upper }) }
+            if lower < upper { Ok(()) } else { Err(Error::Limits(LimitError::Order { dof, lower, upper })) }
         })
     }
 
@@ -86,7 +92,8 @@ impl Limits {
         for ((sample, dof), &value) in trajectory.position.indexed_iter() {
             if value < lower[dof] || value > upper[dof] {
                 let phase = trajectory.time[sample] / trajectory.time[trajectory.time.len() - 1];
-                return Err(Error::LeavesLimits { dof, value, lower: lower[dof], upper: upper[dof], phase });
+                let (lower, upper) = (lower[dof], upper[dof]);
+                return Err(Error::Limits(LimitError::LeftByPath { dof, value, lower, upper, phase }));
             }
         }
         Ok(())

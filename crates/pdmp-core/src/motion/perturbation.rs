@@ -43,6 +43,8 @@ const TRACKING_GAIN: f64 = 10.0;
 const ADAPTATION_RATE: f64 = 5.0;
 /// Bound of κ, above the sum of 1 and the largest gain of a measured phase.
 pub(crate) const MAX_PHASE_RATE: f64 = 1e4;
+/// Factor of κ due to limits from which it counts as 1 again.
+const FULL_RATE: f64 = 1.0 - 1e-6;
 /// Maximum gain. It keeps products finite.
 const MAX_GAIN: f64 = 1e100;
 /// Range, relative to the largest one, up to which a DoF is stationary.
@@ -155,9 +157,14 @@ impl Perturbation {
         (self.active, self.phase_rate) = (false, self.limited_rate);
     }
 
-    /// Discards terms, measurement and expected error.
+    /// Discards terms, measurement, expected error and the effect of limits.
     pub(crate) fn clear(&mut self) {
         self.limited_rate = 1.0;
+        self.release();
+    }
+
+    /// Discards terms, measurement and expected error.
+    pub(crate) fn release(&mut self) {
         self.clear_terms();
         self.measured = false;
         self.expected_error.fill(F64x4::ZERO);
@@ -231,11 +238,23 @@ impl Perturbation {
         }
     }
 
-    /// Sets the displacements (D,) of the goal that are equivalent to the accelerations beyond the limits.
-    pub(crate) fn set_excess(&mut self, excess: impl Iterator<Item = F64x4>) {
+    /// Returns the factor of κ due to limits, 1 without any.
+    pub(crate) fn limited_rate(&self) -> f64 {
+        self.limited_rate
+    }
+
+    /// Sets the displacements (D,) of the goal that are equivalent to the accelerations beyond the limits, over a tick of `h`
+    /// time constants of the filter of κ.
+    ///
+    /// The excess depends on κ at once, with a gain that would make an unfiltered κ alternate between its bounds.
+    pub(crate) fn set_excess(&mut self, excess: impl Iterator<Item = F64x4>, h: f64) {
         let scaled = excess.zip(&self.inverse_range).map(|(excess, inverse_range)| excess * *inverse_range);
         let squares = scaled.fold(F64x4::ZERO, |sum, scaled| sum + scaled * scaled);
-        self.limited_rate = stopped(squares * self.compliance.stopping);
+        let rate = stopped(squares * self.compliance.stopping);
+        self.limited_rate += (rate - self.limited_rate) * -(-h).exp_m1();
+        if rate == 1.0 && self.limited_rate > FULL_RATE {
+            self.limited_rate = 1.0;
+        }
     }
 
     /// Returns the terms of the tick, `None` without a perturbation.

@@ -23,7 +23,7 @@ use crate::motion::limits::Limits;
 use crate::motion::rollout::{TimeGrid, follow, rollout};
 use crate::motion::trajectory::Trajectory;
 
-/// Number of intervals of the path. Durations then are within 1e-3 of those of ten times as many.
+/// Number of intervals of the path. Durations then are within 1e-3 of those of ten times this number.
 const N_INTERVALS: usize = 1000;
 /// Maximum rate relative to the nominal one, where no limit bounds it.
 const MAX_RATE: f64 = 1e4;
@@ -183,7 +183,7 @@ fn vertex(rows: &[Row], most: f64, next: [[f64; 2]; 2]) -> f64 {
             break;
         }
         let crossing = (upper[0] - lower[0]) / (lower[1] - upper[1]);
-        if !(crossing < x) {
+        if crossing >= x || crossing.is_nan() {
             break;
         }
         x = crossing.max(0.0);

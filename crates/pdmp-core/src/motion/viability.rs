@@ -22,6 +22,9 @@
 use crate::motion::limits::Limit;
 use crate::numerics::simd::F64x4;
 
+/// Shortest length of a tick in seconds whose accelerations are finite. What a longer tick may do, a shorter one may too.
+pub(crate) const MIN_TICK: f64 = 1e-100;
+
 /// Limits of a group of DoFs, infinite where there are none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
@@ -34,8 +37,9 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Returns the lanes in which the motion over a tick of length `h` keeps the limits and ends in a viable state, where
-    /// `from` and `to` are position and velocity at its ends, and `acceleration` that at the end.
+    /// Returns the lanes in which a tick of length `h` keeps the limits and ends in a viable state, where `from` and `to` are
+    /// position and velocity at its ends, and `acceleration` that at the end. Between them the cubic through both, by which a
+    /// robot interpolates, keeps the limits of the position.
     #[inline(always)]
     pub(crate) fn admits(&self, from: [F64x4; 2], to: [F64x4; 2], acceleration: F64x4, h: f64) -> F64x4 {
         let [[y, v], [y_end, v_end]] = [from, to];
@@ -49,15 +53,30 @@ impl Bounds {
             & (behind * behind).simd_le(braking * below)
             & above.simd_ge(F64x4::ZERO)
             & below.simd_ge(F64x4::ZERO);
-        if (v * v_end).simd_ge(F64x4::ZERO).all() {
+        // The cubic lies between the least and the greatest of its Bézier points.
+        let (first, last) = (y + v * (h / 3.0), y_end - v_end * (h / 3.0));
+        let (least, greatest) = (first.min(last), first.max(last));
+        if (greatest.simd_le(self.upper) & least.simd_ge(self.lower)).all() {
             return kept;
         }
-        let turning = turning_point([y, v], [y_end, v_end], h);
-        kept & turning.simd_le(self.upper) & turning.simd_ge(self.lower)
+        let [least, greatest] = extremes([y, v], [y_end, v_end], h);
+        kept & greatest.simd_le(self.upper) & least.simd_ge(self.lower)
+    }
+
+    /// Returns the lanes in which the velocity may change to `to` at once: those where it does not change, or where its change
+    /// has no limit and the new one can brake.
+    pub(crate) fn admits_change(&self, y: F64x4, from: F64x4, to: F64x4) -> F64x4 {
+        let (ahead, behind) = (to.max(F64x4::ZERO), (-to).max(F64x4::ZERO));
+        let kept = self.acceleration.simd_eq(F64x4::splat(f64::INFINITY))
+            & to.abs().simd_le(self.velocity)
+            & (ahead * ahead).simd_le(self.braking * 2.0 * (self.upper - y))
+            & (behind * behind).simd_le(self.braking * 2.0 * (y - self.lower));
+        kept | to.simd_eq(from)
     }
 
     /// Returns the constant accelerations over a tick of length `h` that keep the limits and end in a viable state.
     pub(crate) fn interval(&self, y: F64x4, v: F64x4, h: f64) -> Interval {
+        let h = h.max(MIN_TICK);
         let position = [
             -max_acceleration(y - self.lower, -v, self.braking, h),
             max_acceleration(self.upper - y, v, self.braking, h),
@@ -81,26 +100,29 @@ pub(crate) struct Interval {
 impl Interval {
     /// Returns the smallest and the largest acceleration.
     fn ends(&self) -> [F64x4; 2] {
-        let clamp = |bound: F64x4| bound.max(-self.acceleration).min(self.acceleration);
-        [clamp(self.position[0].max(self.velocity[0])), clamp(self.position[1].min(self.velocity[1]))]
+        let within = |bound: F64x4| bound.max(-self.acceleration).min(self.acceleration);
+        [within(self.position[0].max(self.velocity[0])), within(self.position[1].min(self.velocity[1]))]
     }
 
     /// Returns the acceleration closest to the wanted one.
-    pub(crate) fn clamp(&self, wanted: F64x4) -> F64x4 {
+    pub(crate) fn nearest(&self, wanted: F64x4) -> F64x4 {
         let [least, most] = self.ends();
         wanted.max(least).min(most)
     }
 
-    /// Returns the limit that determines the acceleration of one DoF. Inside the interval it is that of the acceleration,
-    /// which the motion within the tick exceeds.
-    pub(crate) fn limit(&self, wanted: F64x4, lane: usize) -> Limit {
+    /// Returns the limit that determines the acceleration of one DoF. Inside the interval it is that of the acceleration if
+    /// the acceleration at the end of the tick exceeds it, and otherwise that of the position, beyond which the DoF turns round
+    /// within the tick.
+    pub(crate) fn limit(&self, wanted: F64x4, at_end: F64x4, lane: usize) -> Limit {
         let [least, most] = self.ends();
         let (side, sign) = if (wanted.as_array()[lane]) > most.as_array()[lane] {
             (1, 1.0)
         } else if wanted.as_array()[lane] < least.as_array()[lane] {
             (0, -1.0)
-        } else {
+        } else if at_end.as_array()[lane].abs() > self.acceleration.as_array()[lane] {
             return Limit::Acceleration;
+        } else {
+            return Limit::Position;
         };
         let [position, velocity] = [self.position, self.velocity].map(|ends| sign * ends[side].as_array()[lane]);
         let acceleration = self.acceleration.as_array()[lane];
@@ -119,26 +141,32 @@ fn max_acceleration(d: F64x4, v: F64x4, braking: F64x4, h: f64) -> F64x4 {
     let ah = braking * h;
     let root = (ah * ah + braking * d * 8.0 - ah * v * 4.0).max(F64x4::ZERO).sqrt();
     let arriving = (root * 0.5 - v - ah * 0.5) * (1.0 / h);
-    let turning = -(v * v) / (d * 2.0);
+    // A state that cannot brake, at the start or after limits that shrink, would turn round ever harder close to the limit.
+    let turning = (-(v * v) / (d * 2.0)).max(-v * (1.0 / h) - braking);
     let returning = (-(-braking * d).max(F64x4::ZERO).sqrt() - v) * (1.0 / h);
     let inside = (d * 2.0).simd_ge(v * h).select(arriving, turning);
     let finite = d.simd_lt(F64x4::splat(f64::INFINITY)).select(inside, F64x4::splat(f64::INFINITY));
     d.simd_ge(F64x4::ZERO).select(finite, returning)
 }
 
-/// Returns the position at which the cubic between two states turns round, or that of its end where it does not.
-fn turning_point(from: [F64x4; 2], to: [F64x4; 2], h: f64) -> F64x4 {
+/// Returns the least and the greatest position on the cubic between two states.
+pub(crate) fn extremes(from: [F64x4; 2], to: [F64x4; 2], h: f64) -> [F64x4; 2] {
     let [[y, v], [y_end, v_end]] = [from, to];
-    // ẏ(s) = v + bs + cs² with s = t/h, whose root in (0, 1) is unique if the signs of v and v_end differ.
-    let mean = (y_end - y) * (1.0 / h);
-    let b = mean * 6.0 - v * 4.0 - v_end * 2.0;
-    let c = (v + v_end - mean * 2.0) * 3.0;
-    let root = (b * b - c * v * 4.0).max(F64x4::ZERO).sqrt();
-    // The root of larger sum in the denominator avoids cancellation; at the other one ẏ has the same sign at both ends.
-    let denominator = b + v.simd_gt(F64x4::ZERO).select(-root, root);
-    let s = (v * -2.0) / denominator;
-    let turning = y + (v + (b * 0.5 + c * s * (1.0 / 3.0)) * s) * s * h;
-    (v * v_end).simd_lt(F64x4::ZERO).select(turning, y_end)
+    // hẏ(s) = hv + bs + cs² with s = t/h.
+    let (start, end, change) = (v * h, v_end * h, y_end - y);
+    let b = change * 6.0 - start * 4.0 - end * 2.0;
+    let c = (start + end - change * 2.0) * 3.0;
+    // This sum avoids cancellation: one root is q/c, the other one hv/q.
+    let root = (b * b - c * start * 4.0).max(F64x4::ZERO).sqrt();
+    let q = (b + b.simd_lt(F64x4::ZERO).select(-root, root)) * -0.5;
+    let mut extremes = [y.min(y_end), y.max(y_end)];
+    for s in [q / c, start / q] {
+        let is_inside = s.simd_gt(F64x4::ZERO) & s.simd_lt(F64x4::splat(1.0));
+        let turning = y + (start + (b * 0.5 + c * s * (1.0 / 3.0)) * s) * s;
+        let turning = is_inside.select(turning, y);
+        extremes = [extremes[0].min(turning), extremes[1].max(turning)];
+    }
+    extremes
 }
 
 #[cfg(test)]
@@ -184,11 +212,10 @@ mod tests {
                 let size = if free { 1.0 } else { 10f64.powf(6.0 * random.next() - 3.0) };
                 let scale = if free { velocity * (1.0 / h) } else { bounds.acceleration };
                 let wanted = (random.lanes(|x| 2.0 * x - 1.0) + F64x4::splat(random.next() - 0.5)) * scale * size;
-                let a = interval.clamp(wanted);
+                let a = interval.nearest(wanted);
                 let next = [y + v * h + a * (0.5 * h * h), v + a * h];
-                let turning = turning_point([y, v], next, h);
                 let tolerance = range * 1e-12;
-                for position in [next[0], turning] {
+                for position in extremes([y, v], next, h) {
                     assert!(position.simd_le(bounds.upper + tolerance).all(), "{bounds:?} {y} {v} {h} {a}");
                     assert!(position.simd_ge(bounds.lower - tolerance).all(), "{bounds:?} {y} {v} {h} {a}");
                 }

@@ -1,6 +1,6 @@
 //! Limits of all groups of DoFs in the control loop.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, LimitError, Result};
 use crate::motion::limits::{Limit, Limits, limit_of_dof};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
 use crate::motion::viability::Bounds;
@@ -21,8 +21,8 @@ pub(super) struct Limiter {
     /// True if no DoF was limited in the last tick.
     pub(super) is_free: bool,
     pub(super) bounds: Vec<Bounds>,
-    /// Position and velocity at the start of the tick.
-    pub(super) before: Vec<[F64x4; 2]>,
+    /// Position, velocity and acceleration at the start of the tick.
+    pub(super) before: Vec<[F64x4; 3]>,
     /// Limit that determined the acceleration of each DoF in the last tick.
     pub(super) limited: Vec<Option<Limit>>,
     /// Displacement of the goal that is equivalent to the excess of the acceleration over its limit in the last tick.
@@ -49,10 +49,10 @@ impl Limiter {
             active: false,
             is_free: true,
             bounds: vec![none; groups(n_dofs)],
-            before: vec![[F64x4::ZERO; 2]; groups(n_dofs)],
+            before: vec![[F64x4::ZERO; 3]; groups(n_dofs)],
             limited: vec![None; n_dofs],
             excess: vec![F64x4::ZERO; groups(n_dofs)],
-            ranges: ranges.iter().map(|range| range.max(min_range)).collect(),
+            ranges: ranges.iter().map(|range| range.max(min_range).max(f64::MIN_POSITIVE)).collect(),
             centre: vec![0.0; n_dofs],
             substep_rate: 0.0,
         }
@@ -68,23 +68,26 @@ impl Limiter {
         let infinity = f64::INFINITY;
         let distance =
             |dof: usize| limit_of_dof(&limits.upper, dof, infinity) - limit_of_dof(&limits.lower, dof, -infinity);
+        let velocity = |dof: usize| limit_of_dof(&limits.velocity, dof, infinity);
+        let acceleration = |dof: usize| limit_of_dof(&limits.acceleration, dof, infinity);
         let braking = |dof: usize| {
-            let velocity =
-                limit_of_dof(&limits.velocity, dof, infinity).min(FREE_VELOCITY * self.ranges[dof] / duration);
-            let free = velocity * velocity / (2.0 * BRAKING_SHARE * distance(dof).min(self.ranges[dof]));
-            limit_of_dof(&limits.acceleration, dof, free)
+            if acceleration(dof) < infinity {
+                return acceleration(dof);
+            }
+            let velocity = velocity(dof).min(FREE_VELOCITY * self.ranges[dof] / duration);
+            velocity * velocity / (2.0 * BRAKING_SHARE * distance(dof).min(self.ranges[dof]))
         };
-        let substep_rate = (0..n_dofs).fold(0.0, |rate: f64, dof| {
-            let by_velocity = 2.0 * braking(dof) / limit_of_dof(&limits.velocity, dof, infinity);
-            rate.max(by_velocity).max((braking(dof) / distance(dof)).sqrt())
-        });
-        if dt * substep_rate > MAX_SUBSTEPS {
-            return Err(Error::Range {
-                name: "dt",
-                value: dt,
-                allowed: "is too long for these limits: within a tick, the limit of the acceleration must neither change the \
-                          velocity by 500 times its limit nor move a million times the distance between the limits",
-            });
+        let rate = |dof: usize| (2.0 * braking(dof) / velocity(dof)).max((braking(dof) / distance(dof)).sqrt());
+        let substep_rate = (0..n_dofs).map(rate).fold(0.0, f64::max);
+        if let Some(dof) = (0..n_dofs).find(|&dof| dt * rate(dof) > MAX_SUBSTEPS) {
+            return Err(Error::Limits(LimitError::TooTight {
+                dof,
+                dt,
+                acceleration: braking(dof),
+                velocity: velocity(dof),
+                distance: distance(dof),
+                max_dt: MAX_SUBSTEPS / rate(dof),
+            }));
         }
         for (group, bounds) in self.bounds.iter_mut().enumerate() {
             let lanes = |number: &dyn Fn(usize) -> f64, none: f64| {
@@ -96,12 +99,14 @@ impl Limiter {
             *bounds = Bounds {
                 lower: lanes(&|dof| limit_of_dof(&limits.lower, dof, -infinity), -infinity),
                 upper: lanes(&|dof| limit_of_dof(&limits.upper, dof, infinity), infinity),
-                velocity: lanes(&|dof| limit_of_dof(&limits.velocity, dof, infinity), infinity),
-                acceleration: lanes(&|dof| limit_of_dof(&limits.acceleration, dof, infinity), infinity),
+                velocity: lanes(&velocity, infinity),
+                acceleration: lanes(&acceleration, infinity),
                 braking: lanes(&braking, infinity),
             };
         }
-        self.active = *limits != Limits::default();
+        let Limits { lower, upper, velocity, acceleration } = limits;
+        let is_finite = |vector: &Option<Vec<f64>>| vector.iter().flatten().any(|limit| limit.is_finite());
+        self.active = [lower, upper, velocity, acceleration].into_iter().any(is_finite);
         self.substep_rate = substep_rate;
         Ok(())
     }
@@ -127,9 +132,9 @@ impl Limiter {
     }
 
     /// Sets the motion at the start of a tick.
-    pub(super) fn begin(&mut self, position: &[F64x4], velocity: &[F64x4]) {
-        for (before, (y, v)) in self.before.iter_mut().zip(position.iter().zip(velocity)) {
-            *before = [*y, *v];
+    pub(super) fn begin(&mut self, position: &[F64x4], velocity: &[F64x4], acceleration: &[F64x4]) {
+        for (group, before) in self.before.iter_mut().enumerate() {
+            *before = [position[group], velocity[group], acceleration[group]];
         }
     }
 
@@ -157,19 +162,15 @@ impl Limiter {
     /// Visits the state, with the bounds of a quantity in units of a DoF, for movements of a `duration` and ticks of `dt`
     /// seconds.
     pub(super) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2], duration: f64, dt: f64) -> Result<()> {
-        let mut active = self.active;
-        visit_flag(visit, &mut active)?;
         let mut limits = self.limits();
         let Limits { lower, upper, velocity, acceleration } = &mut limits;
         for vector in [lower, upper, velocity, acceleration].into_iter().flatten() {
             visit(vector, [f64::NEG_INFINITY, f64::INFINITY])?;
         }
-        let limits = if active { limits } else { Limits::default() };
         self.set(&limits, duration, dt)?;
         visit_flag(visit, &mut self.is_free)?;
-        for [position, velocity] in &mut self.before {
-            visit(position.as_mut_array(), quantity)?;
-            visit(velocity.as_mut_array(), quantity)?;
+        for lanes in self.before.iter_mut().flatten() {
+            visit(lanes.as_mut_array(), quantity)?;
         }
         let kinds = [None, Some(Limit::Position), Some(Limit::Velocity), Some(Limit::Acceleration)];
         for limited in &mut self.limited {

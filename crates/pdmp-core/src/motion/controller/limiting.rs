@@ -4,8 +4,9 @@
 //! bit as without limits. Any other one takes the acceleration closest to the wanted one, (ẏ_wanted − ẏ)/h, in the interval
 //! that keeps the limits, and z takes the value with which the primitive continues from the commanded position and velocity.
 //! While a velocity or acceleration is limited, the phase waits: with the excess δ = (ÿ_wanted − ÿ)τ²/(α_zβ_z) as a
-//! displacement of the goal, its rate is divided by 1 + k_s‖δ/range‖², as for a tracking error. A limit of the position does
-//! not slow the phase, which would stop for good on a path beyond it.
+//! displacement of the goal, its rate is divided by 1 + k_s‖δ/range‖², as for a tracking error, through a filter with the
+//! natural frequency of the attractor: unfiltered, κ alternates between its bounds, and with it the acceleration. A limit of
+//! the position does not slow the phase, which would stop for good on a path beyond it.
 
 use super::limiter::MAX_SUBSTEPS;
 use super::step::first_element;
@@ -13,6 +14,7 @@ use super::{Controller, Status};
 use crate::dynamics::output_system::Attractor;
 use crate::error::Result;
 use crate::motion::limits::{Limit, Limits};
+use crate::motion::viability::MIN_TICK;
 use crate::numerics::simd::{F64x4, WIDTH};
 
 /// Rate ρ, relative to the nominal one, below which the change of z is that of this rate: it would be unbounded in a pause.
@@ -21,11 +23,15 @@ const MIN_RATE: f64 = 0.01;
 impl Controller {
     /// Sets the limits of position, velocity and acceleration; those of [`Limits::default`] are none.
     ///
-    /// From then on every tick keeps them, whatever is commanded, measured or coupled, for any sequence of tick lengths: lower
-    /// ≤ y ≤ upper at and between ticks, |ẏ| ≤ V, |Δẏ|/Δt ≤ A, and the state can always brake to rest inside. A motion inside
-    /// the limits is not changed. A goal or anchor outside is moved to the limit. A state outside, after limits that shrink or
-    /// at a start outside, brakes with A and returns. [`Controller::limited`] names the limits that bind. The limits remain in
-    /// force after [`Controller::reset`].
+    /// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: at its end lower ≤ y
+    /// ≤ upper, |ẏ| ≤ V, |Δẏ|/Δt ≤ A, |ÿ| ≤ A, and the state can brake to rest inside; between its ends lower ≤ y ≤ upper on the
+    /// cubic through position and velocity at both, by which a robot interpolates. A tick longer than V/2A or √((upper −
+    /// lower)/A) is limited in parts of constant acceleration, each of which keeps the limits, and is no single cubic. Commands
+    /// between ticks change neither position nor velocity at once. A motion inside the limits is not changed.
+    ///
+    /// A goal or anchor outside is moved to the limit, where a movement is finished as at any goal; [`Controller::centre`] returns
+    /// it. A state outside, after limits that shrink or at a start outside, brakes with A and returns. [`Controller::limited`]
+    /// names the limits that bind. The limits remain in force after [`Controller::reset`]. This function does not allocate.
     ///
     /// ```
     /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Status, fit};
@@ -52,13 +58,13 @@ impl Controller {
             self.begin();
             return Ok(());
         }
-        self.limiter.begin(&self.position, &self.velocity);
+        self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
         self.command_centre();
         self.status = Status::Working;
         if self.has_frame() {
             self.start_goal_transition();
         }
-        self.read_out();
+        self.publish();
         Ok(())
     }
 
@@ -72,45 +78,65 @@ impl Controller {
         self.limiter.limited()
     }
 
-    /// Applies the limits to the tick of `dt` seconds that has just been computed.
-    #[inline(always)]
-    pub(super) fn enforce_limits(&mut self, dt: f64) {
-        let mut kept_by_all = true;
-        for index in 0..self.groups.len() {
-            let (bounds, before) = (&self.limiter.bounds[index], self.limiter.before[index]);
-            let motion = [self.position[index], self.velocity[index]];
-            kept_by_all &= bounds.admits(before, motion, self.acceleration[index], dt).all();
+    /// Computes velocity and acceleration after a command between ticks.
+    ///
+    /// Within limits, a DoF keeps the velocity and acceleration of the last tick where the new ones break a limit: no time has
+    /// passed for a change of the velocity. The next tick begins the change.
+    pub(super) fn publish(&mut self) {
+        self.read_out();
+        if !(self.started && self.limiter.is_active()) {
+            return;
         }
-        if !(kept_by_all && self.limiter.is_free) {
-            self.limit(dt);
+        for (index, &[y, v, a]) in self.limiter.before.iter().enumerate() {
+            let (bounds, velocity) = (&self.limiter.bounds[index], &mut self.velocity[index]);
+            let kept = bounds.admits_change(y, v, *velocity);
+            *velocity = kept.select(*velocity, v);
+            let acceleration = &mut self.acceleration[index];
+            let kept = kept & acceleration.abs().simd_le(bounds.acceleration);
+            *acceleration = kept.select(*acceleration, a);
         }
-        self.limiter.begin(&self.position, &self.velocity);
     }
 
-    /// Limits the DoFs that do not keep their limits over a tick of `dt` seconds.
+    /// Applies the limits to the tick of `dt` seconds and `h` on the clock that has just been computed.
+    #[inline(always)]
+    pub(super) fn enforce_limits(&mut self, dt: f64, h: f64) {
+        let mut kept_by_all = true;
+        for index in 0..self.groups.len() {
+            let (bounds, [y, v, _]) = (&self.limiter.bounds[index], self.limiter.before[index]);
+            let motion = [self.position[index], self.velocity[index]];
+            kept_by_all &= bounds.admits([y, v], motion, self.acceleration[index], dt).all();
+        }
+        if !(kept_by_all && self.limiter.is_free && self.perturbation.limited_rate() == 1.0) {
+            self.limit(dt, h);
+        }
+        self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
+    }
+
+    /// Limits the DoFs that do not keep their limits over a tick of `dt` seconds and `h` on the clock.
     #[inline(never)]
-    fn limit(&mut self, dt: f64) {
+    fn limit(&mut self, dt: f64, h: f64) {
         self.limiter.is_free = true;
         self.limiter.limited.fill(None);
         for index in 0..self.groups.len() {
-            let (bounds, before) = (self.limiter.bounds[index], self.limiter.before[index]);
+            let (bounds, [y, v, _]) = (self.limiter.bounds[index], self.limiter.before[index]);
             let wanted = [self.position[index], self.velocity[index]];
-            let kept = bounds.admits(before, wanted, self.acceleration[index], dt);
+            let kept = bounds.admits([y, v], wanted, self.acceleration[index], dt);
             self.limiter.excess[index] = F64x4::ZERO;
             if !kept.all() {
                 self.limiter.is_free = false;
                 self.limiter.excess[index] = self.limit_group(index, kept, dt);
             }
         }
-        self.perturbation.set_excess(self.limiter.excess.iter().copied());
+        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
+        self.perturbation.set_excess(self.limiter.excess.iter().copied(), h * (alpha_z * beta_z).sqrt());
     }
 
     /// Limits the DoFs of a group that are not `kept`, and returns the excess δ of those whose velocity or acceleration is
     /// limited.
     fn limit_group(&mut self, index: usize, kept: F64x4, dt: f64) -> F64x4 {
         let bounds = self.limiter.bounds[index];
-        let [mut y, mut v] = self.limiter.before[index];
-        let wanted = (self.velocity[index] - v) * (1.0 / dt);
+        let [mut y, mut v, _] = self.limiter.before[index];
+        let (wanted, at_end) = ((self.velocity[index] - v) * (1.0 / dt.max(MIN_TICK)), self.acceleration[index]);
         let n_substeps = (dt * self.limiter.substep_rate).ceil().clamp(1.0, MAX_SUBSTEPS);
         let h = dt / n_substeps;
         let mut interval = bounds.interval(y, v, h);
@@ -119,7 +145,7 @@ impl Controller {
             if substep > 0 {
                 interval = bounds.interval(y, v, h);
             }
-            a = interval.clamp(wanted);
+            a = interval.nearest(wanted);
             let inside = y.simd_ge(bounds.lower) & y.simd_le(bounds.upper);
             let next = y + v * h + a * (0.5 * h * h);
             // From inside, a position past the limit is one of rounding.
@@ -133,11 +159,13 @@ impl Controller {
         self.position[index] = kept.select(self.position[index], y);
         self.velocity[index] = kept.select(self.velocity[index], v);
         self.acceleration[index] = kept.select(self.acceleration[index], a);
-        let mut excess = ((wanted - a) * (1.0 / (rate * rate * alpha_z * beta_z))).to_array();
+        let largest = F64x4::splat(f64::MAX);
+        let excess = (wanted - a) * (1.0 / (rate * rate * alpha_z * beta_z));
+        let mut excess = excess.max(-largest).min(largest).to_array();
         let limited = self.limiter.limited.iter_mut().skip(index * WIDTH).zip(&mut excess).enumerate();
         for (lane, (limited, excess)) in limited {
             if kept.to_bitmask() & (1 << lane) == 0 {
-                *limited = Some(interval.limit(wanted, lane));
+                *limited = Some(interval.limit(wanted, at_end, lane));
             }
             if matches!(limited, None | Some(Limit::Position)) {
                 *excess = 0.0;

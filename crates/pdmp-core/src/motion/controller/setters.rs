@@ -172,7 +172,7 @@ impl Controller {
         } else {
             self.rate.reset(&rate);
         }
-        self.read_out();
+        self.publish();
         Ok(())
     }
 
@@ -242,9 +242,9 @@ impl Controller {
         for (group, pull) in self.groups.iter_mut().zip(self.perturbation.pull()) {
             group.z += *pull * tau;
         }
-        self.perturbation.clear();
+        self.perturbation.release();
         self.change_phase_rate();
-        self.read_out();
+        self.publish();
     }
 
     /// Checks and applies a command.
@@ -300,7 +300,7 @@ impl Controller {
         // Without transition, style and τ change the motion at once.
         if gains.is_immediate() {
             self.read_forcing();
-            self.read_out();
+            self.publish();
         }
         // The velocity at the end depends on style and τ.
         if goal_changed || self.approaching || velocity_changed {

@@ -45,7 +45,9 @@ impl Controller {
         self.style.reset(&conditions.style);
         self.rate.reset(&[self.speed / conditions.tau]);
         self.amplitude.reset(&[conditions.amplitude]);
-        self.centre.reset(self.limiter.accept(&conditions.centre));
+        // A rhythmic movement starts where its commanded anchor places it, and moves to the anchor within the limits.
+        let rhythmic = self.primitive.kind() == Kind::Rhythmic;
+        self.centre.reset(if rhythmic { &conditions.centre } else { self.limiter.accept(&conditions.centre) });
         if let (Kind::Discrete, Some(start)) = (self.primitive.kind(), &conditions.start) {
             for ((group, goal), start) in self.groups.iter_mut().zip(self.centre.value()).zip(start.chunks(WIDTH)) {
                 group.displacement = *goal - padded(start);
@@ -56,12 +58,15 @@ impl Controller {
         self.read_frame();
         self.read_forcing();
         self.set_initial_state();
+        if rhythmic && self.limiter.is_active() {
+            self.command_centre();
+        }
         if self.conditions.has_goal_velocity {
             self.start_goal_transition();
         }
         self.update_lengths();
         self.read_out();
-        self.limiter.begin(&self.position, &self.velocity);
+        self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
     }
 
     /// Sets position and z at the start: z = 0 for a discrete movement, the limit cycle of the style for a rhythmic one.

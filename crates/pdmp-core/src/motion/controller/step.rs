@@ -50,7 +50,7 @@ impl Controller {
         }
         self.time.add(dt);
         if self.limiter.is_active() {
-            self.enforce_limits(dt);
+            self.enforce_limits(dt, h);
         }
         // The style's transition and perturbations change the arrival that the final velocity compensates for.
         if self.approaching && !(self.style.is_settled() && self.perturbation.terms().is_none()) {

@@ -1,0 +1,61 @@
+//! Errors about limits of a robot.
+
+use super::format::Number;
+
+/// Error about the limits of one DoF.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LimitError {
+    /// A lower limit of the position that is not below the upper one.
+    #[error("limits of DoF {dof}: the lower limit {lower} must be below the upper limit {upper}")]
+    Order {
+        /// Index of the DoF.
+        dof: usize,
+        /// Its lower limit.
+        lower: f64,
+        /// Its upper limit.
+        upper: f64,
+    },
+    /// A path that leaves the limits of the position.
+    #[error(
+        "limits of DoF {dof}: the path reaches {value:.6} at {:.1} % of its clock, outside {lower} to {upper}; change goal or \
+         style, or let a controller with these limits bend the path",
+        100.0 * phase
+    )]
+    LeftByPath {
+        /// Index of the DoF.
+        dof: usize,
+        /// Its position.
+        value: f64,
+        /// Its lower limit.
+        lower: f64,
+        /// Its upper limit.
+        upper: f64,
+        /// Fraction of the clock.
+        phase: f64,
+    },
+    /// Limits that no tick of the control loop can keep.
+    #[error(
+        "limits of DoF {dof}: too tight for a tick of {} s: with an acceleration of {}, a velocity of {} and a distance of {} \
+         between the limits of the position a tick must not exceed {max_dt:.1e} s; lower the acceleration, raise the others or \
+         shorten dt",
+        Number(*dt),
+        Number(*acceleration),
+        Number(*velocity),
+        Number(*distance)
+    )]
+    TooTight {
+        /// Index of the DoF.
+        dof: usize,
+        /// Length of the tick, in seconds.
+        dt: f64,
+        /// Limit of the acceleration, or the deceleration in front of a limit of the position.
+        acceleration: f64,
+        /// Limit of the velocity.
+        velocity: f64,
+        /// Distance between the limits of the position.
+        distance: f64,
+        /// Longest possible tick, in seconds.
+        max_dt: f64,
+    },
+}
