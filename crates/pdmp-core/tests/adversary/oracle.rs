@@ -236,14 +236,17 @@ impl Oracle {
         let excess = dof.excess(y, v);
         // Where the point of rest was outside, the position may go as far.
         let [above, below] = [(y - dof.upper).max(0.0), (dof.lower - y).max(0.0)];
-        self.note(Property::Position, index, dt, rise(above, 1).max(rise(below, 2)) / dof.scale());
-        self.note(Property::Stop, index, dt, rise(excess[1], 1).max(rise(excess[2], 2)) / dof.scale());
+        // From outside and without a limit of the acceleration, a DoF stops within a tick.
+        let is_unbraked = dof.acceleration.is_infinite() && dof.excess[1].max(dof.excess[2]) > 0.0;
+        let way = if is_unbraked { 0.5 * dof.v.abs() * dt } else { 0.0 };
+        self.note(Property::Position, index, dt, (rise(above, 1).max(rise(below, 2)) - way) / dof.scale());
+        self.note(Property::Stop, index, dt, (rise(excess[1], 1).max(rise(excess[2], 2)) - way) / dof.scale());
         self.note(Property::Velocity, index, dt, rise(excess[0], 0) / dof.velocity.max(dof.excess[0]));
         for turning in turning_points(y - dof.y, dof.v, v, dt) {
             let above = turning - (dof.upper - dof.y) - dof.excess[1];
             let below = (dof.lower - dof.y) - turning - dof.excess[2];
             let digit = 2.0 * f64::EPSILON * y.abs();
-            self.note(Property::Between, index, dt, (above.max(below) - digit) / dof.scale());
+            self.note(Property::Between, index, dt, (above.max(below) - digit - way) / dof.scale());
         }
         let digit = f64::EPSILON * v.abs().max(dof.v.abs());
         let step = dof.acceleration * dt;
