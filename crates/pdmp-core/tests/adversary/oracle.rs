@@ -101,6 +101,10 @@ struct Dof {
     upper: f64,
     velocity: f64,
     acceleration: f64,
+    /// Deceleration with which a DoF can stop inside in ticks of the default length: min(A, V/2Δt, (u − l)/Δt²).
+    braking: f64,
+    /// Default length of a tick.
+    dt: f64,
     /// Range between the limits of the position, of the demonstrations where there is none.
     range: f64,
     demonstrated_range: f64,
@@ -128,7 +132,7 @@ pub(crate) struct Oracle {
 impl Dof {
     /// Returns the excesses of a state: of the speed, and of the point of rest beyond the upper and the lower limit.
     fn excess(&self, y: f64, v: f64) -> [f64; 3] {
-        let way = v * v / (2.0 * self.acceleration);
+        let way = v * v / (2.0 * self.braking);
         let above = if v > 0.0 { y - self.upper + way } else { y - self.upper };
         let below = if v < 0.0 { self.lower - y + way } else { self.lower - y };
         [v.abs() - self.velocity, above, below].map(|excess| excess.max(0.0))
@@ -138,8 +142,14 @@ impl Dof {
     fn set(&mut self, y: f64, v: f64) {
         (self.y, self.v) = (y, v);
         self.excess = self.excess(y, v);
+        if self.braking < self.acceleration || self.acceleration.is_infinite() {
+            let way = 0.5 * v.abs() * self.dt;
+            let [above, below] = [y + way - self.upper, self.lower - (y - way)];
+            self.excess[1] = if v > 0.0 { self.excess[1].max(above) } else { self.excess[1] };
+            self.excess[2] = if v < 0.0 { self.excess[2].max(below) } else { self.excess[2] };
+        }
         let beyond = self.excess[1].max(self.excess[2]);
-        let (a, speed) = (self.acceleration, self.velocity);
+        let (a, speed) = (self.braking, self.velocity);
         self.time = [0.0, 4.0 * (v.abs() / a + 2.0 * (2.0 * beyond / a).sqrt() + beyond / speed)];
     }
 
@@ -171,6 +181,8 @@ impl Oracle {
             upper: infinity,
             velocity: infinity,
             acceleration: infinity,
+            braking: infinity,
+            dt: 0.0,
             range: *range,
             demonstrated_range: if *range > 0.0 { *range } else { 1.0 },
             y: 0.0,
@@ -236,17 +248,25 @@ impl Oracle {
         let excess = dof.excess(y, v);
         // Where the point of rest was outside, the position may go as far.
         let [above, below] = [(y - dof.upper).max(0.0), (dof.lower - y).max(0.0)];
-        // From outside and without a limit of the acceleration, a DoF stops within a tick.
-        let is_unbraked = dof.acceleration.is_infinite() && dof.excess[1].max(dof.excess[2]) > 0.0;
-        let way = if is_unbraked { 0.5 * dof.v.abs() * dt } else { 0.0 };
-        self.note(Property::Position, index, dt, (rise(above, 1).max(rise(below, 2)) - way) / dof.scale());
-        self.note(Property::Stop, index, dt, (rise(excess[1], 1).max(rise(excess[2], 2)) - way) / dof.scale());
+        // From outside, a DoF whose limits of velocity and position allow less than A in a tick stops within one, and one that
+        // turns round brakes less than with A, as it then returns.
+        let is_outside = dof.excess[1].max(dof.excess[2]) > 0.0;
+        let is_unbraked = dof.braking < dof.acceleration || dof.acceleration.is_infinite() || dof.v * v < 0.0;
+        let grace = if is_outside && is_unbraked { 0.5 * dof.v.abs() * dt } else { 0.0 };
+        // Roundings of the position add up while a DoF brakes.
+        let digits = 16.0 * f64::EPSILON * y.abs();
+        self.note(Property::Position, index, dt, (rise(above, 1).max(rise(below, 2)) - grace) / dof.scale());
+        self.note(
+            Property::Stop,
+            index,
+            dt,
+            (rise(excess[1], 1).max(rise(excess[2], 2)) - grace - digits) / dof.scale(),
+        );
         self.note(Property::Velocity, index, dt, rise(excess[0], 0) / dof.velocity.max(dof.excess[0]));
         for turning in turning_points(y - dof.y, dof.v, v, dt) {
             let above = turning - (dof.upper - dof.y) - dof.excess[1];
             let below = (dof.lower - dof.y) - turning - dof.excess[2];
-            let digit = 2.0 * f64::EPSILON * y.abs();
-            self.note(Property::Between, index, dt, (above.max(below) - digit - way) / dof.scale());
+            self.note(Property::Between, index, dt, (above.max(below) - digits - grace) / dof.scale());
         }
         let digit = f64::EPSILON * v.abs().max(dof.v.abs());
         let step = dof.acceleration * dt;
@@ -265,7 +285,7 @@ impl Oracle {
         let dof = &mut self.dofs[index];
         (dof.y, dof.v) = (y, v);
         for (least, excess) in dof.excess.iter_mut().zip(excess) {
-            *least = least.min(excess);
+            *least = if grace > 0.0 { excess } else { least.min(excess) };
         }
         if self.dofs[index].is_outside() {
             self.findings.outside += 1;
@@ -287,6 +307,9 @@ impl Observer for Oracle {
             (dof.lower, dof.upper) = (of(&limits.lower, -infinity), of(&limits.upper, infinity));
             (dof.velocity, dof.acceleration) = (of(&limits.velocity, infinity), of(&limits.acceleration, infinity));
             dof.range = dof.upper - dof.lower;
+            dof.dt = controller.dt();
+            let within_tick = (0.5 * dof.velocity / dof.dt).min(dof.range / (dof.dt * dof.dt));
+            dof.braking = dof.acceleration.min(within_tick);
             if dof.range.is_infinite() {
                 dof.range = dof.demonstrated_range;
             }
@@ -316,7 +339,8 @@ impl Observer for Oracle {
             self.note(Property::Call, index, 0.0, (y - dof.y).abs() / dof.range);
             let [speed, above, below] = dof.excess(y, v);
             self.note(Property::CallVelocity, index, 0.0, (speed - dof.excess[0]) / dof.velocity.max(dof.excess[0]));
-            let rise = (above - dof.excess[1]).max(below - dof.excess[2]);
+            let digits = 16.0 * f64::EPSILON * y.abs();
+            let rise = (above - dof.excess[1]).max(below - dof.excess[2]) - digits;
             self.note(Property::CallVelocity, index, 0.0, rise / dof.scale());
         }
         self.judge_goal(controller);

@@ -28,6 +28,8 @@ struct Recorder {
     last: [Vec<f64>; 2],
     limited: usize,
     joint_ticks: usize,
+    /// Default length of a tick.
+    dt: f64,
 }
 
 impl Recorder {
@@ -42,6 +44,7 @@ impl Recorder {
             last: [controller.position().to_vec(), controller.velocity().to_vec()],
             limited: 0,
             joint_ticks: 0,
+            dt: controller.dt(),
         };
         recorder.restarted(controller);
         recorder
@@ -54,6 +57,11 @@ impl Recorder {
         }
         self.bits.extend([controller.phase().to_bits(), controller.status() as u64]);
         self.limited += controller.limited().iter().flatten().count();
+        self.extend(controller);
+    }
+
+    /// Extends the extremes by the present state and goal.
+    fn extend(&mut self, controller: &Controller) {
         for (dof, (y, goal)) in controller.position().iter().zip(controller.centre()).enumerate() {
             self.lower[dof] = self.lower[dof].min(*y).min(*goal);
             self.upper[dof] = self.upper[dof].max(*y).max(*goal);
@@ -68,7 +76,9 @@ impl Recorder {
         let (velocity, acceleration): (Vec<f64>, Vec<f64>) = (beyond(&self.velocity), beyond(&self.acceleration));
         let way = |dof: usize| {
             let size = (self.upper[dof] - self.lower[dof]).max(self.upper[dof].abs()).max(self.lower[dof].abs());
-            velocity[dof] * velocity[dof] / (2.0 * acceleration[dof]) + margin * size + f64::MIN_POSITIVE
+            // A DoF brakes over two ticks or more.
+            let braking = velocity[dof] * velocity[dof] / (2.0 * acceleration[dof]) + 2.0 * velocity[dof] * self.dt;
+            braking + margin * size + f64::MIN_POSITIVE
         };
         let mut limits = Limits {
             lower: Some((0..velocity.len()).map(|dof| self.lower[dof] - way(dof)).collect()),
@@ -90,7 +100,9 @@ impl Observer for Recorder {
     }
 
     // A command that changes the velocity without a tick exceeds any limit of the acceleration until the next tick.
-    fn called(&mut self, _: &Controller, _: &'static str) {}
+    fn called(&mut self, controller: &Controller, _: &'static str) {
+        self.extend(controller);
+    }
 
     fn ticked(&mut self, controller: &Controller, dt: f64) {
         for (dof, (y, v)) in controller.position().iter().zip(controller.velocity()).enumerate() {
