@@ -192,7 +192,8 @@ impl Settings {
         let (mut velocity, mut acceleration) = (vec![0.0; n_dofs], vec![0.0; n_dofs]);
         for dof in 0..n_dofs {
             let range = self.range(dof);
-            let width = range * size(0.02, 10.0, random);
+            // Positions have at least twelve digits within the limits.
+            let width = (range * size(0.02, 10.0, random)).max(1e-3 * controller.position()[dof].abs());
             // The share of the width below the present position is outside [0, 1] where this is outside the limits.
             let share = if outside && random.chance(0.5) { random.between(-1.0, 2.0) } else { random.next() };
             lower[dof] = controller.position()[dof] - share * width;
