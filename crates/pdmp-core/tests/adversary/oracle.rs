@@ -245,17 +245,20 @@ impl Oracle {
             return;
         }
         let rise = |excess: f64, k: usize| excess - dof.excess[k];
+        // Inside, the position has no roundings to spare.
+        let inside = 1e-9 * dof.range;
+        let beyond = |excess: f64, k: usize| if dof.excess[k] > inside { rise(excess, k) } else { excess };
         let excess = dof.excess(y, v);
         // Where the point of rest was outside, the position may go as far.
         let [above, below] = [(y - dof.upper).max(0.0), (dof.lower - y).max(0.0)];
         // From outside, a DoF whose limits of velocity and position allow less than A in a tick stops within one, and one that
         // turns round brakes less than with A, as it then returns.
-        let is_outside = dof.excess[1].max(dof.excess[2]) > 0.0;
+        let is_outside = dof.excess[1].max(dof.excess[2]) > inside;
         let is_unbraked = dof.braking < dof.acceleration || dof.acceleration.is_infinite() || dof.v * v < 0.0;
         let grace = if is_outside && is_unbraked { 0.5 * dof.v.abs() * dt } else { 0.0 };
-        // Roundings of the position add up while a DoF brakes.
-        let digits = 16.0 * f64::EPSILON * y.abs();
-        self.note(Property::Position, index, dt, (rise(above, 1).max(rise(below, 2)) - grace) / dof.scale());
+        // Roundings of the position add up while a DoF brakes; those of one tick are allowed for.
+        let digits = 16.0 * f64::EPSILON * (y.abs() + dt * dof.v.abs());
+        self.note(Property::Position, index, dt, (beyond(above, 1).max(beyond(below, 2)) - grace) / dof.scale());
         self.note(
             Property::Stop,
             index,
@@ -284,8 +287,9 @@ impl Oracle {
         self.note(Property::Published, index, dt, a.abs() / dof.acceleration - 1.0);
         let dof = &mut self.dofs[index];
         (dof.y, dof.v) = (y, v);
-        for (least, excess) in dof.excess.iter_mut().zip(excess) {
-            *least = if grace > 0.0 { excess } else { least.min(excess) };
+        dof.excess[0] = dof.excess[0].min(excess[0]);
+        for (least, excess) in dof.excess.iter_mut().zip(excess).skip(1) {
+            *least = if grace > 0.0 { excess } else { least.min(excess).max(excess.min(*least + digits)) };
         }
         if self.dofs[index].is_outside() {
             self.findings.outside += 1;
