@@ -112,6 +112,35 @@ def test_hostile_commands_keep_every_limit_at_ticks_and_turns(model: pdmp.Model,
     assert limited > 400
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_hostile_commands_keep_a_limit_of_the_jerk(model: pdmp.Model, seed: int) -> None:
+    """Position, velocity, acceleration and its change keep their limits at every tick."""
+    assert BOX.position is not None
+    jerk = np.array([500.0, 80.0])
+    limits = Limits(BOX.position, BOX.velocity, BOX.acceleration, jerk)
+    controller, (lower, upper) = inside(model, limits), BOX.position
+    assert controller.limits == limits
+    before, named = motion(controller), set()
+    for after, dt in attack(controller, model, seed, 3000):
+        assert np.isfinite(after).all()
+        assert ((after[0] >= lower - 1e-12) & (after[0] <= upper + 1e-12)).all()
+        assert (abs(after[1]) <= np.multiply(BOX.velocity, 1 + 1e-12)).all()
+        assert (abs(after[2]) <= np.multiply(BOX.acceleration, 1 + 1e-12)).all()
+        assert (abs(after[2] - before[2]) <= jerk * dt + 1e-13).all()
+        before = after
+        named |= set(controller.limited)
+    assert named >= {None, "position", "velocity", "jerk"}
+
+
+def test_a_movement_with_limited_jerk_starts_without_acceleration(reach: pdmp.Model) -> None:
+    """It still finishes at its goal."""
+    controller = reach.controller(limits=Limits(acceleration=9.0, jerk=60.0))
+    assert not controller.acceleration.any()
+    while controller.step():
+        assert controller.time < 5
+    np.testing.assert_allclose(controller.position, controller.goal, atol=0.01)
+
+
 @pytest.mark.parametrize("kind", ["discrete", "rhythmic"])
 @pytest.mark.parametrize("n_dofs", [1, 5, 9])
 def test_random_limits_of_any_number_of_dofs_are_kept(kind: str, n_dofs: int) -> None:
@@ -329,6 +358,7 @@ SETTERS: list[tuple[str, Any]] = [
     ("speed", 0.0),
     ("compliance", (1.0, 50.0)),
     ("limits", Limits(([-0.4, -0.2], [0.5, 0.3]), velocity=[1.0, 1.0], acceleration=[9.0, 9.0])),
+    ("limits", Limits(acceleration=[9.0, 9.0], jerk=[100.0, 100.0])),
     ("goal", [3.0, -3.0]),
     ("goal_velocity", [3.0, -3.0]),
     ("anchor", [3.0, -3.0]),
@@ -450,6 +480,7 @@ def test_limits_print_compare_and_pickle() -> None:
         Limits(position=(None, [1.0, 2.5])),
         Limits(position=([0.0, -1.0], None), acceleration=3),
         Limits((-2.9, 2.9), 2.0, [8.0, 10.0]),
+        Limits(acceleration=[8.0, 10.0], jerk=500.0),
     ):
         assert eval(repr(limits)) == limits
         for twin in (pickle.loads(pickle.dumps(limits)), copy.copy(limits), copy.deepcopy(limits)):
@@ -457,6 +488,8 @@ def test_limits_print_compare_and_pickle() -> None:
             assert repr(twin) == repr(limits)
     assert Limits(velocity=1) != Limits(velocity=2)
     assert Limits(velocity=1) != 1
+    assert Limits(acceleration=1, jerk=2) != Limits(acceleration=1)
+    assert repr(Limits(acceleration=1, jerk=2)) == "pdmp.Limits(acceleration=[1.0], jerk=[2.0])"
     assert (
         repr(Limits((-1, None), velocity=2))
         == "pdmp.Limits(position=([-1.0], None), velocity=[2.0])"
@@ -470,6 +503,12 @@ def test_limits_print_compare_and_pickle() -> None:
 
 WRONG: list[tuple[Callable[[pdmp.Model], Any], str]] = [
     (lambda m: Limits(velocity=0), "velocity = 0: every limit must be positive"),
+    (lambda m: Limits(acceleration=1, jerk=0), "jerk = 0: every limit must be positive"),
+    (
+        lambda m: Limits(velocity=1, jerk=50),
+        "limits of DoF 0: a jerk of 50 needs a limit of the acceleration, .*; give both",
+    ),
+    (lambda m: Limits(position=(0, 1e200)), r"upper\[0\] = 1e200: magnitudes above 1e150"),
     (lambda m: Limits(velocity=[1, -1]), "velocity = -1: every limit must be positive"),
     (lambda m: Limits(acceleration=-INF), "acceleration = -inf: every limit must be positive"),
     (lambda m: Limits(velocity=NAN), r"velocity\[0\] = NaN"),

@@ -244,12 +244,12 @@ impl Caller<'_> {
     }
 
     fn set_limits(&mut self, slot: usize, input: &mut Input) {
-        let vectors: [Numbers; 4] = std::array::from_fn(|_| {
+        let vectors: [Numbers; 5] = std::array::from_fn(|_| {
             let n = if input.byte() < 64 { 1 } else { self.info.n_dofs };
             Numbers::new(n, input)
         });
-        let [lower, upper, velocity, acceleration] = vectors.each_ref().map(Numbers::vector);
-        let limits = pdmp_limits { lower, upper, velocity, acceleration };
+        let [lower, upper, velocity, acceleration, jerk] = vectors.each_ref().map(Numbers::vector);
+        let limits = pdmp_limits { lower, upper, velocity, acceleration, jerk };
         let given = !input.byte().is_multiple_of(8);
         // SAFETY: every pointer is valid over its stated length, or NULL.
         let status = unsafe { pdmp_controller_set_limits(self.handle(slot), given.then_some(&limits)) };

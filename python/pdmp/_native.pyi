@@ -1448,7 +1448,7 @@ class Conditions:
 
 @final
 class Limits:
-    """Limits of position, velocity and acceleration.
+    """Limits of position, velocity, acceleration and jerk.
 
     Each limit is one number for all degrees of freedom or an array (D,); None and infinity are no limit.
     `Model.controller` keeps them at every tick, `Model.fastest` along a path, and `Model.fastest_tau` with a constant
@@ -1462,12 +1462,15 @@ class Limits:
         Limit of the velocity's magnitude per s, positive.
     acceleration : float or array_like, (D,), optional
         Limit of the acceleration's magnitude per s², positive.
+    jerk : float or array_like, (D,), optional
+        Limit of the jerk's magnitude per s³, positive; it needs a limit of the acceleration. Controllers keep it,
+        `Model.fastest` does not.
 
     Raises
     ------
     ValueError
-        A limit is not a number or a vector, lengths differ, a lower limit is not below the upper one, or a velocity or
-        acceleration is not positive. Models check lengths when they take limits.
+        A limit is not a number or a vector, lengths differ, a lower limit is not below the upper one, a velocity,
+        acceleration or jerk is not positive, or a jerk has no acceleration. Models check lengths when they take limits.
     TypeError
         `position` does not have two items.
 
@@ -1485,6 +1488,7 @@ class Limits:
         position: tuple[ArrayLike | None, ArrayLike | None] | None = None,  # each one, or (D,)
         velocity: ArrayLike | None = None,  # one, or (D,)
         acceleration: ArrayLike | None = None,  # one, or (D,)
+        jerk: ArrayLike | None = None,  # one, or (D,)
     ) -> Limits: ...
     @property
     def position(self) -> tuple[_Array, _Array] | None:
@@ -1495,12 +1499,18 @@ class Limits:
     @property
     def acceleration(self) -> _Array | None:
         """Limit of the acceleration's magnitude (1,) or (D,) per s², or None."""
+    @property
+    def jerk(self) -> _Array | None:
+        """Limit of the jerk's magnitude (1,) or (D,) per s³, or None."""
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __getnewargs__(
         self,
     ) -> tuple[
-        tuple[list[float] | None, list[float] | None] | None, list[float] | None, list[float] | None
+        tuple[list[float] | None, list[float] | None] | None,
+        list[float] | None,
+        list[float] | None,
+        list[float] | None,
     ]: ...
 
 def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
@@ -1971,6 +1981,8 @@ class Controller:
         |ẏ| ≤ V, |ÿ| ≤ A and a change of ẏ by at most A·dt, and between its ends lower ≤ y ≤ upper on the cubic through
         position and velocity at both, by which a robot interpolates. A tick longer than V / 2A is limited in parts of
         constant acceleration, and is no single cubic. A movement inside the limits is not changed.
+        With a limit of the jerk, ÿ changes by at most J·dt, the degree of freedom can always stop inside, and a movement
+        begins with ÿ = 0; where one comes to rest within a tick, the cubic may pass the limit by J·dt³/150.
         A goal or anchor outside is moved to the limit: `goal` and `anchor` return it, and a movement finishes there. A
         movement outside, after limits that shrink or at a start outside, brakes with A and returns. They stay in force
         after `reset`; None removes them.
@@ -1978,9 +1990,9 @@ class Controller:
     @limits.setter
     def limits(self, limits: Limits | None, /) -> None: ...
     @property
-    def limited(self) -> list[Literal["position", "velocity", "acceleration"] | None]:  # D
+    def limited(self) -> list[Literal["position", "velocity", "acceleration", "jerk"] | None]:  # D
         """Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
-        "acceleration", or None for a free one.
+        "acceleration", "jerk", or None for a free one.
 
         A limit of the position counts from where the degree of freedom brakes in front of it.
         """

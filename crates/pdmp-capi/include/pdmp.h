@@ -74,6 +74,8 @@ typedef enum {
     PDMP_LIMIT_VELOCITY = 2,
     /// The limit of the acceleration.
     PDMP_LIMIT_ACCELERATION = 3,
+    /// The limit of the jerk.
+    PDMP_LIMIT_JERK = 4,
 } pdmp_limit;
 
 /// Controller of one movement: a primitive, its commands and its state. One thread at a time may use it.
@@ -221,7 +223,7 @@ typedef struct {
     pdmp_buffer acceleration;
 } pdmp_motion;
 
-/// Limits of position, velocity and acceleration. Each member is one number for all DoFs or n_dofs numbers; `{NULL, 0}` and
+/// Limits of position, velocity, acceleration and jerk. Each member is one number for all DoFs or n_dofs numbers; `{NULL, 0}` and
 /// infinity are no limit.
 typedef struct {
     /// Lower limits of the position (1) or (n_dofs), in the unit of each DoF; below the upper ones.
@@ -232,6 +234,9 @@ typedef struct {
     pdmp_vector velocity;
     /// Limits of |y''| (1) or (n_dofs), in the unit of each DoF per second squared; positive.
     pdmp_vector acceleration;
+    /// Limits of |y'''| (1) or (n_dofs), in the unit of each DoF per second cubed; positive, for DoFs with a limit of the
+    /// acceleration.
+    pdmp_vector jerk;
 } pdmp_limits;
 
 #ifdef __cplusplus
@@ -428,7 +433,8 @@ size_t pdmp_controller_error(const pdmp_controller *controller, pdmp_text text);
 /// lower <= y <= upper, |y'| <= velocity, |y''| <= acceleration, and |change of y'| <= dt acceleration; between its ends
 /// lower <= y <= upper on the cubic through position and velocity at both, by which a robot interpolates. A tick longer than
 /// half of velocity / acceleration is limited in parts of constant acceleration, and is no single cubic. A motion inside the
-/// limits is not changed. A goal or anchor outside is moved to the limit, where a movement is finished as at any goal. A
+/// limits is not changed. With a limit of the jerk, the change of y'' is at most dt jerk, the DoF can always stop inside, and the
+/// cubic may pass the limit by dt^3 jerk / 150 where it comes to rest within a tick. A goal or anchor outside is moved to the limit, where a movement is finished as at any goal. A
 /// movement outside, after limits that shrink or at a start outside, brakes with the limit of the acceleration and returns. The
 /// limits stay in force after pdmp_controller_reset.
 ///

@@ -46,10 +46,10 @@ struct Conditions {
     std::optional<double> amplitude, tau, phase;
 };
 
-/// Limits of position, velocity and acceleration, see pdmp_limits: one number for all degrees of freedom, or n_dofs. An
+/// Limits of position, velocity, acceleration and jerk, see pdmp_limits: one number for all degrees of freedom, or n_dofs. An
 /// empty member is no limit.
 struct Limits {
-    std::vector<double> lower, upper, velocity, acceleration;
+    std::vector<double> lower{}, upper{}, velocity{}, acceleration{}, jerk{};
 };
 
 /// Motion with n_dofs elements in each vector, see pdmp_motion.
@@ -83,7 +83,8 @@ inline pdmp_conditions to_c(const Conditions &c) noexcept {
 }
 
 inline pdmp_limits to_c(const Limits &limits) noexcept {
-    return {to_c(limits.lower), to_c(limits.upper), to_c(limits.velocity), to_c(limits.acceleration)};
+    return {to_c(limits.lower), to_c(limits.upper), to_c(limits.velocity), to_c(limits.acceleration),
+            to_c(limits.jerk)};
 }
 
 inline std::vector<double> copy(pdmp_vector numbers) { return {numbers.data, numbers.data + numbers.length}; }

@@ -8,7 +8,7 @@ use crate::controller::{call_on, pdmp_controller};
 use crate::fault::Fault;
 use crate::status::pdmp_status;
 
-/// Limits of position, velocity and acceleration. Each member is one number for all DoFs or n_dofs numbers; `{NULL, 0}` and
+/// Limits of position, velocity, acceleration and jerk. Each member is one number for all DoFs or n_dofs numbers; `{NULL, 0}` and
 /// infinity are no limit.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -21,6 +21,9 @@ pub struct pdmp_limits {
     pub velocity: pdmp_vector,
     /// Limits of |y''| (1) or (n_dofs), in the unit of each DoF per second squared; positive.
     pub acceleration: pdmp_vector,
+    /// Limits of |y'''| (1) or (n_dofs), in the unit of each DoF per second cubed; positive, for DoFs with a limit of the
+    /// acceleration.
+    pub jerk: pdmp_vector,
 }
 
 /// Limit that determines the acceleration of a DoF.
@@ -35,6 +38,8 @@ pub enum pdmp_limit {
     PDMP_LIMIT_VELOCITY = 2,
     /// The limit of the acceleration.
     PDMP_LIMIT_ACCELERATION = 3,
+    /// The limit of the jerk.
+    PDMP_LIMIT_JERK = 4,
 }
 
 use pdmp_limit::*;
@@ -46,6 +51,7 @@ impl From<Option<Limit>> for pdmp_limit {
             Some(Limit::Position) => PDMP_LIMIT_POSITION,
             Some(Limit::Velocity) => PDMP_LIMIT_VELOCITY,
             Some(Limit::Acceleration) => PDMP_LIMIT_ACCELERATION,
+            Some(Limit::Jerk) => PDMP_LIMIT_JERK,
         }
     }
 }
@@ -54,7 +60,7 @@ impl pdmp_limits {
     /// No limits.
     const NONE: Self = {
         let none = pdmp_vector { data: std::ptr::null(), length: 0 };
-        Self { lower: none, upper: none, velocity: none, acceleration: none }
+        Self { lower: none, upper: none, velocity: none, acceleration: none, jerk: none }
     };
 
     /// Writes the limits to those that the core takes, without allocation.
@@ -68,6 +74,7 @@ impl pdmp_limits {
             ("upper", self.upper, &mut limits.upper, infinity),
             ("velocity", self.velocity, &mut limits.velocity, infinity),
             ("acceleration", self.acceleration, &mut limits.acceleration, infinity),
+            ("jerk", self.jerk, &mut limits.jerk, infinity),
         ];
         for (name, vector, written, none) in members {
             let expected = if vector.length == 1 { 1 } else { n_dofs };
@@ -84,7 +91,7 @@ impl pdmp_limits {
 /// Returns memory for the limits of each DoF.
 pub(crate) fn memory_of_limits(n_dofs: usize) -> Limits {
     let memory = || Some(Vec::with_capacity(n_dofs.max(1)));
-    Limits { lower: memory(), upper: memory(), velocity: memory(), acceleration: memory() }
+    Limits { lower: memory(), upper: memory(), velocity: memory(), acceleration: memory(), jerk: memory() }
 }
 
 /// Sets the limits of the robot; NULL removes them.
@@ -93,7 +100,8 @@ pub(crate) fn memory_of_limits(n_dofs: usize) -> Limits {
 /// lower <= y <= upper, |y'| <= velocity, |y''| <= acceleration, and |change of y'| <= dt acceleration; between its ends
 /// lower <= y <= upper on the cubic through position and velocity at both, by which a robot interpolates. A tick longer than
 /// half of velocity / acceleration is limited in parts of constant acceleration, and is no single cubic. A motion inside the
-/// limits is not changed. A goal or anchor outside is moved to the limit, where a movement is finished as at any goal. A
+/// limits is not changed. With a limit of the jerk, the change of y'' is at most dt jerk, the DoF can always stop inside, and the
+/// cubic may pass the limit by dt^3 jerk / 150 where it comes to rest within a tick. A goal or anchor outside is moved to the limit, where a movement is finished as at any goal. A
 /// movement outside, after limits that shrink or at a start outside, brakes with the limit of the acceleration and returns. The
 /// limits stay in force after pdmp_controller_reset.
 ///

@@ -72,11 +72,17 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
             made.assume_init()
         };
         let each = |limit| is_limited.then(|| vec![limit; n_dofs]);
-        let limits = Limits { lower: each(-0.5), upper: each(0.75), velocity: each(1.5), acceleration: each(20.0) };
-        let Limits { lower, upper, velocity, acceleration } = &limits;
-        let [lower, upper, velocity, acceleration] =
-            [lower, upper, velocity, acceleration].map(|limits| vector(limits.as_deref()));
-        let c_limits = pdmp_limits { lower, upper, velocity, acceleration };
+        let limits = Limits {
+            lower: each(-0.5),
+            upper: each(0.75),
+            velocity: each(1.5),
+            acceleration: each(20.0),
+            jerk: each(500.0),
+        };
+        let Limits { lower, upper, velocity, acceleration, jerk } = &limits;
+        let [lower, upper, velocity, acceleration, jerk] =
+            [lower, upper, velocity, acceleration, jerk].map(|limits| vector(limits.as_deref()));
+        let c_limits = pdmp_limits { lower, upper, velocity, acceleration, jerk };
         rust.set_limits(&limits).unwrap();
         // SAFETY: the controller is alive, and the vectors are valid.
         assert_eq!(unsafe { pdmp_controller_set_limits(c.as_mut(), Some(&c_limits)) }, pdmp_status::PDMP_OK);

@@ -46,7 +46,7 @@ const SETTINGS: pdmp_settings =
     pdmp_settings { dt: 1e-3, transition: ptr::null(), memory: pdmp_memory { data: ptr::null_mut(), size: 0 } };
 
 const NO_LIMITS: pdmp_limits =
-    pdmp_limits { lower: NO_VECTOR, upper: NO_VECTOR, velocity: NO_VECTOR, acceleration: NO_VECTOR };
+    pdmp_limits { lower: NO_VECTOR, upper: NO_VECTOR, velocity: NO_VECTOR, acceleration: NO_VECTOR, jerk: NO_VECTOR };
 
 fn vector(numbers: &[f64]) -> pdmp_vector {
     pdmp_vector { data: numbers.as_ptr(), length: numbers.len() }
@@ -337,6 +337,11 @@ fn invalid_limits_leave_the_present_ones_and_a_message() {
             pdmp_limits { lower: vector(&[0.0, 1.0, 0.0]), upper: vector(&[1.0; 3]), ..NO_LIMITS },
             PDMP_RANGE,
             "limits of DoF 1: the lower limit 1 must be below the upper limit 1",
+        ),
+        (
+            pdmp_limits { jerk: vector(&[1e3; 3]), ..NO_LIMITS },
+            PDMP_RANGE,
+            "limits of DoF 0: a jerk of 1000 needs a limit of the acceleration",
         ),
         (
             pdmp_limits { velocity: vector(&[1e-3; 3]), acceleration: vector(&[1e6; 3]), ..NO_LIMITS },

@@ -54,7 +54,7 @@ int main(int, char **argv) try {
     const std::array<double, 3> goal{0.75, 0.5, 0.25};
     const double measured[] = {0.5, 0.25, 0.0};
     const auto style = model.demonstration(0).style;
-    const pdmp::Limits limits{{}, {1.0, 1.0, 1.0}, {0.25, 0.25, 0.25}, {5.0, 5.0, 5.0}};
+    const pdmp::Limits limits{{}, {1.0, 1.0, 1.0}, {0.25, 0.25, 0.25}, {5.0, 5.0, 5.0}, {100.0}};
     std::vector<pdmp_limit> limited(3);
     int n_limited = 0;
     for (int tick = 0; tick < 500; ++tick) {

@@ -66,6 +66,7 @@ fn limits_around(controller: &Controller, ranges: &[f64], random: &mut Random) -
         upper: Some(sides.iter().map(|side| side[1]).collect()),
         velocity: Some(velocity),
         acceleration: Some(acceleration),
+        jerk: None,
     }
 }
 
@@ -170,7 +171,8 @@ fn wide_limits_change_nothing() {
         let n = model.n_dofs();
         let (mut free, mut limited) = (controller(model), controller(model));
         let wide = |factor: f64| Some(model.ranges().iter().map(|range| factor * range).collect::<Vec<f64>>());
-        let limits = Limits { lower: wide(-1e3), upper: wide(1e3), velocity: wide(1e3), acceleration: wide(1e5) };
+        let limits =
+            Limits { lower: wide(-1e3), upper: wide(1e3), velocity: wide(1e3), acceleration: wide(1e5), jerk: None };
         limited.set_limits(&limits).unwrap();
         for tick in 0..3000 {
             let goal = vec![0.3; n];
@@ -239,7 +241,7 @@ fn movement_outside_comes_back() {
 #[test]
 fn bad_limits_are_rejected() {
     let mut controller = controller(&REACH);
-    let limits = |lower, upper, velocity, acceleration| Limits { lower, upper, velocity, acceleration };
+    let limits = |lower, upper, velocity, acceleration| Limits { lower, upper, velocity, acceleration, jerk: None };
     let error = controller.set_limits(&limits(Some(vec![0.0, 1.0, 0.0]), Some(vec![1.0; 3]), None, None)).unwrap_err();
     assert!(matches!(error, Error::Limits(LimitError::Order { dof: 1, lower: 1.0, upper: 1.0 })));
     let bad = [
@@ -387,7 +389,8 @@ fn commands_between_ticks_publish_no_motion_beyond_the_limits() {
 fn ticks_of_any_length_keep_the_limits() {
     let wide = [None, Some(vec![0.5])];
     for model in [&*REACH, &*CYCLE] {
-        for (velocity, acceleration) in wide.iter().flat_map(|v| wide.iter().map(move |a| (v.clone(), a.clone()))) {
+        let pairs = wide.iter().flat_map(|v| wide.iter().map(move |a| (v.clone(), a.clone(), None)));
+        for (velocity, acceleration, jerk) in pairs.chain([(None, Some(vec![0.5]), Some(vec![5.0]))]) {
             for dt in [5e-324, 1e-310, 1e-300, 1e-200, 1e-100, 1e-30, 1e-12] {
                 let mut controller = controller(model);
                 let start = controller.position().iter();
@@ -398,6 +401,7 @@ fn ticks_of_any_length_keep_the_limits() {
                         upper,
                         velocity: velocity.clone(),
                         acceleration: acceleration.clone(),
+                        jerk: jerk.clone(),
                     })
                     .unwrap();
                 for tick in 0..600 {
@@ -465,6 +469,35 @@ fn rhythmic_movement_does_not_start_with_a_jump() {
         before = after;
     }
     assert!(before.0.iter().zip(&upper).all(|(y, u)| y <= u));
+}
+
+/// A pause stops the movement where it is, at the pace that the limits allow, and it continues from there.
+#[test]
+fn pause_within_limits_stops_the_movement() {
+    for (model, jerk) in [(&*REACH, None), (&*REACH, Some(vec![50.0])), (&*CYCLE, None), (&*CYCLE, Some(vec![50.0]))] {
+        let mut controller = controller(model);
+        controller.set_limits(&Limits { acceleration: Some(vec![4.0]), jerk, ..Limits::default() }).unwrap();
+        for _ in 0..300 {
+            controller.step().unwrap();
+        }
+        controller.set_speed(0.0).unwrap();
+        let fastest = controller.velocity().iter().fold(0.0f64, |fastest, v| fastest.max(v.abs()));
+        let n_ticks = 2000 + (fastest / 4.0 * 1e3) as usize;
+        for _ in 0..n_ticks {
+            controller.step().unwrap();
+        }
+        let paused = controller.position().to_vec();
+        assert!(controller.velocity().iter().all(|v| v.abs() < 1e-6), "{:?}", controller.velocity());
+        for _ in 0..1000 {
+            controller.step().unwrap();
+        }
+        assert!(controller.position().iter().zip(&paused).all(|(y, paused)| (y - paused).abs() < 1e-6));
+        controller.set_speed(1.0).unwrap();
+        for _ in 0..1500 {
+            controller.step().unwrap();
+        }
+        assert!(model.kind() == Kind::Rhythmic || controller.status() == Status::Finished);
+    }
 }
 
 /// A smaller limit of the velocity is kept from the first tick at which braking with A can have reached it.

@@ -40,6 +40,7 @@ impl Loop {
         let share = |share: f64| Some(ranges.iter().map(|range| share * range).collect::<Vec<f64>>());
         let mut tight = Limits { lower: share(-0.3), upper: share(0.6), velocity: share(1.0), ..Limits::default() };
         tight.acceleration = share(5.0);
+        tight.jerk = share(200.0);
         let mut other = Limits { upper: share(5.0), ..Limits::default() };
         other.acceleration = share(100.0);
         Self {

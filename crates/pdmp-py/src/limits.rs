@@ -9,7 +9,7 @@ use crate::convert::{Vector, numbers, read_only};
 use crate::error::raise;
 use crate::instance::{self, pair};
 
-/// Limits of position, velocity and acceleration.
+/// Limits of position, velocity, acceleration and jerk.
 ///
 /// Each limit is one number for all degrees of freedom or an array (D,); None and infinity are no limit.
 /// `Model.controller` keeps them at every tick, `Model.fastest` along a path, and `Model.fastest_tau` with a constant
@@ -23,12 +23,15 @@ use crate::instance::{self, pair};
 ///     Limit of the velocity's magnitude per s, positive.
 /// acceleration : float or array_like, (D,), optional
 ///     Limit of the acceleration's magnitude per s², positive.
+/// jerk : float or array_like, (D,), optional
+///     Limit of the jerk's magnitude per s³, positive; it needs a limit of the acceleration. Controllers keep it,
+///     `Model.fastest` does not.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A limit is not a number or a vector, lengths differ, a lower limit is not below the upper one, or a velocity or
-///     acceleration is not positive. Models check lengths when they take limits.
+///     A limit is not a number or a vector, lengths differ, a lower limit is not below the upper one, a velocity,
+///     acceleration or jerk is not positive, or a jerk has no acceleration. Models check lengths when they take limits.
 /// TypeError
 ///     `position` does not have two items.
 ///
@@ -47,11 +50,12 @@ pub(crate) struct Limits(pub(crate) Inner);
 #[pymethods]
 impl Limits {
     #[new]
-    #[pyo3(signature = (position=None, velocity=None, acceleration=None))]
+    #[pyo3(signature = (position=None, velocity=None, acceleration=None, jerk=None))]
     fn new(
         position: Option<&Bound<'_, PyAny>>,
         velocity: Option<&Bound<'_, PyAny>>,
         acceleration: Option<&Bound<'_, PyAny>>,
+        jerk: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let limit = |name: &str, value: Option<&Bound<'_, PyAny>>| {
             value.filter(|value| !value.is_none()).map(|value| numbers(name, Some(value))).transpose()
@@ -63,8 +67,9 @@ impl Limits {
             upper: limit("upper", upper.as_ref())?,
             velocity: limit("velocity", velocity)?,
             acceleration: limit("acceleration", acceleration)?,
+            jerk: limit("jerk", jerk)?,
         };
-        let vectors = [&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration];
+        let vectors = [&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.jerk];
         let n_dofs = vectors.into_iter().flatten().map(Vec::len).fold(1, usize::max);
         limits.check(n_dofs).map_err(raise)?;
         Ok(Self(limits))
@@ -94,20 +99,26 @@ impl Limits {
         self.0.acceleration.as_ref().map(|limits| read_only(py, limits))
     }
 
+    /// Limit of the jerk's magnitude (1,) or (D,) per s³, or None.
+    #[getter]
+    fn jerk<'py>(&self, py: Python<'py>) -> Option<Vector<'py>> {
+        self.0.jerk.as_ref().map(|limits| read_only(py, limits))
+    }
+
     fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        let Inner { lower, upper, velocity, acceleration } = &self.0;
+        let Inner { lower, upper, velocity, acceleration, jerk } = &self.0;
         let position = (lower.is_some() || upper.is_some()).then_some((lower, upper));
-        (position, velocity, acceleration).into_pyobject(py)
+        (position, velocity, acceleration, jerk).into_pyobject(py)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let Inner { lower, upper, velocity, acceleration } = &self.0;
+        let Inner { lower, upper, velocity, acceleration, jerk } = &self.0;
         let text = |limits: &Option<Vec<f64>>| Ok::<_, PyErr>(limits.into_pyobject(py)?.repr()?.to_string());
         let mut parts = Vec::new();
         if lower.is_some() || upper.is_some() {
             parts.push(format!("position=({}, {})", text(lower)?, text(upper)?));
         }
-        for (name, limits) in [("velocity", velocity), ("acceleration", acceleration)] {
+        for (name, limits) in [("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk)] {
             if limits.is_some() {
                 parts.push(format!("{name}={}", text(limits)?));
             }
@@ -124,6 +135,8 @@ impl Controller {
     /// |ẏ| ≤ V, |ÿ| ≤ A and a change of ẏ by at most A·dt, and between its ends lower ≤ y ≤ upper on the cubic through
     /// position and velocity at both, by which a robot interpolates. A tick longer than V / 2A is limited in parts of
     /// constant acceleration, and is no single cubic. A movement inside the limits is not changed.
+    /// With a limit of the jerk, ÿ changes by at most J·dt, the degree of freedom can always stop inside, and a movement
+    /// begins with ÿ = 0; where one comes to rest within a tick, the cubic may pass the limit by J·dt³/150.
     /// A goal or anchor outside is moved to the limit: `goal` and `anchor` return it, and a movement finishes there. A
     /// movement outside, after limits that shrink or at a start outside, brakes with A and returns. They stay in force
     /// after `reset`; None removes them.
@@ -142,7 +155,7 @@ impl Controller {
     }
 
     /// Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
-    /// "acceleration", or None for a free one.
+    /// "acceleration", "jerk", or None for a free one.
     ///
     /// A limit of the position counts from where the degree of freedom brakes in front of it.
     #[getter]
@@ -151,6 +164,7 @@ impl Controller {
             Limit::Position => "position",
             Limit::Velocity => "velocity",
             Limit::Acceleration => "acceleration",
+            Limit::Jerk => "jerk",
         };
         self.inner.limited().iter().map(|limit| limit.as_ref().map(name)).collect()
     }
@@ -165,6 +179,7 @@ impl Limits {
             upper: finite(limits.upper),
             velocity: finite(limits.velocity),
             acceleration: finite(limits.acceleration),
+            jerk: finite(limits.jerk),
         };
         (limits != Inner::default()).then_some(Self(limits))
     }

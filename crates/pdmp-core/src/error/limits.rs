@@ -34,6 +34,17 @@ pub enum LimitError {
         /// Fraction of the clock.
         phase: f64,
     },
+    /// A limit of the jerk without one of the acceleration.
+    #[error(
+        "limits of DoF {dof}: a jerk of {} needs a limit of the acceleration, which bounds the time of a reversal; give both",
+        Number(*jerk)
+    )]
+    JerkAlone {
+        /// Index of the DoF.
+        dof: usize,
+        /// Its limit of the jerk.
+        jerk: f64,
+    },
     /// Limits that no tick of the control loop can keep.
     #[error(
         "limits of DoF {dof}: too tight for a tick of {} s: with an acceleration of {}, a velocity of {} and a distance of {} \

@@ -4,7 +4,7 @@ use crate::error::{Error, LimitError, Result};
 use crate::motion::trajectory::Trajectory;
 use crate::validate::MAX_MAGNITUDE;
 
-/// Limits of position, velocity and acceleration: one number for all DoFs, or one for each. `None` or infinity is no limit.
+/// Limits of position, velocity, acceleration and jerk: one number for all DoFs, or one for each. `None` or infinity is no limit.
 ///
 /// ```
 /// use pdmp_core::motion::Limits;
@@ -23,6 +23,8 @@ pub struct Limits {
     pub velocity: Option<Vec<f64>>,
     /// Limits of |ÿ| (1,) or (D,), per second squared.
     pub acceleration: Option<Vec<f64>>,
+    /// Limits of |dÿ/dt| (1,) or (D,), per second cubed, of DoFs whose acceleration has a limit.
+    pub jerk: Option<Vec<f64>>,
 }
 
 /// Limit that determines the acceleration of a DoF.
@@ -34,20 +36,23 @@ pub enum Limit {
     Velocity,
     /// The limit of the acceleration.
     Acceleration,
+    /// The limit of the jerk.
+    Jerk,
 }
 
 impl Limits {
     /// Checks shapes and values for `n_dofs` DoFs.
     ///
     /// # Errors
-    /// A wrong length, a finite limit above 1e150 in magnitude, a lower limit that is not below the upper one, or a velocity or
-    /// acceleration that is not positive.
+    /// A wrong length, a finite limit above 1e150 in magnitude, a lower limit that is not below the upper one, a velocity,
+    /// acceleration or jerk that is not positive, or a limit of the jerk without one of the acceleration.
     pub fn check(&self, n_dofs: usize) -> Result<()> {
         let vectors = [
             ("lower", &self.lower),
             ("upper", &self.upper),
             ("velocity", &self.velocity),
             ("acceleration", &self.acceleration),
+            ("jerk", &self.jerk),
         ];
         for (name, vector) in vectors {
             let Some(vector) = vector else { continue };
@@ -61,7 +66,7 @@ impl Limits {
             if let Some(index) = vector.iter().position(too_large) {
                 return Err(Error::TooLarge { name, index, value: vector[index], limit: MAX_MAGNITUDE });
             }
-            let positive = name == "velocity" || name == "acceleration";
+            let positive = name != "lower" && name != "upper";
             if let Some(&value) = vector.iter().find(|limit| positive && **limit <= 0.0) {
                 return Err(Error::Range { name, value, allowed: "every limit must be positive; infinity is none" });
             }
@@ -69,6 +74,11 @@ impl Limits {
         (0..n_dofs).try_for_each(|dof| {
             let lower = limit_of_dof(&self.lower, dof, f64::NEG_INFINITY);
             let upper = limit_of_dof(&self.upper, dof, f64::INFINITY);
+            let [acceleration, jerk] =
+                [&self.acceleration, &self.jerk].map(|limits| limit_of_dof(limits, dof, f64::INFINITY));
+            if jerk.is_finite() && !acceleration.is_finite() {
+                return Err(Error::Limits(LimitError::JerkAlone { dof, jerk }));
+            }
             if lower < upper { Ok(()) } else { Err(Error::Limits(LimitError::Order { dof, lower, upper })) }
         })
     }

@@ -9,6 +9,7 @@ pub(crate) mod limits;
 pub(crate) mod perturbation;
 pub(crate) mod prediction_band;
 pub(crate) mod rollout;
+pub(crate) mod stopping;
 pub(crate) mod superposition;
 pub(crate) mod time_law;
 pub(crate) mod trajectory;

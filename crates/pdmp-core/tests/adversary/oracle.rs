@@ -154,7 +154,7 @@ impl Dof {
     }
 
     fn is_outside(&self) -> bool {
-        self.excess.iter().any(|excess| *excess > 1e-12 * self.range.min(self.velocity))
+        self.excess[0] > 1e-9 * self.velocity || self.excess[1].max(self.excess[2]) > 1e-9 * self.range
     }
 
     /// Returns the scale of the excess of a point of rest.
@@ -296,7 +296,7 @@ impl Oracle {
             let dof = &mut self.dofs[index];
             dof.time[0] += dt;
             let [time, allowed] = dof.time;
-            if dof.acceleration.is_finite() && time > allowed + 10.0 * dt {
+            if dof.acceleration.is_finite() && allowed > 0.0 && time > allowed + 10.0 * dt {
                 self.note(Property::Return, index, dt, time / allowed - 1.0);
             }
         }

@@ -21,6 +21,9 @@ pub(super) struct Limiter {
     /// True if no DoF was limited in the last tick.
     pub(super) is_free: bool,
     pub(super) bounds: Vec<Bounds>,
+    /// Limits of the jerk (D,), infinite where there are none.
+    pub(super) jerk: Vec<f64>,
+    has_jerk: bool,
     /// Position, velocity and acceleration at the start of the tick.
     pub(super) before: Vec<[F64x4; 3]>,
     /// Limit that determined the acceleration of each DoF in the last tick.
@@ -35,7 +38,19 @@ pub(super) struct Limiter {
     pub(super) substep_rate: f64,
 }
 
-clone_in_place!(Limiter { active, is_free, bounds, before, limited, excess, ranges, centre, substep_rate });
+clone_in_place!(Limiter {
+    active,
+    is_free,
+    bounds,
+    jerk,
+    has_jerk,
+    before,
+    limited,
+    excess,
+    ranges,
+    centre,
+    substep_rate
+});
 
 impl Limiter {
     /// Returns no limits for DoFs with the given ranges.
@@ -49,6 +64,8 @@ impl Limiter {
             active: false,
             is_free: true,
             bounds: vec![none; groups(n_dofs)],
+            jerk: vec![f64::INFINITY; n_dofs],
+            has_jerk: false,
             before: vec![[F64x4::ZERO; 3]; groups(n_dofs)],
             limited: vec![None; n_dofs],
             excess: vec![F64x4::ZERO; groups(n_dofs)],
@@ -104,9 +121,13 @@ impl Limiter {
                 braking: lanes(&braking, infinity),
             };
         }
-        let Limits { lower, upper, velocity, acceleration } = limits;
+        let Limits { lower, upper, velocity, acceleration, jerk: _ } = limits;
         let is_finite = |vector: &Option<Vec<f64>>| vector.iter().flatten().any(|limit| limit.is_finite());
         self.active = [lower, upper, velocity, acceleration].into_iter().any(is_finite);
+        for (dof, jerk) in self.jerk.iter_mut().enumerate() {
+            *jerk = limit_of_dof(&limits.jerk, dof, infinity);
+        }
+        self.has_jerk = self.jerk.iter().any(|jerk| jerk.is_finite());
         self.substep_rate = substep_rate;
         Ok(())
     }
@@ -115,6 +136,26 @@ impl Limiter {
     #[inline(always)]
     pub(super) fn is_active(&self) -> bool {
         self.active
+    }
+
+    /// Returns whether a jerk is limited.
+    #[inline(always)]
+    pub(super) fn has_jerk(&self) -> bool {
+        self.has_jerk
+    }
+
+    /// Returns the DoFs of a group whose jerk is limited.
+    pub(super) fn jerk_limited(&self, group: usize) -> F64x4 {
+        if self.has_jerk { self.mask(group, |dof| self.jerk[dof].is_finite()) } else { F64x4::ZERO }
+    }
+
+    /// Returns the DoFs of a group that `test` holds for.
+    pub(super) fn mask(&self, group: usize, test: impl Fn(usize) -> bool) -> F64x4 {
+        let lanes = std::array::from_fn(|lane| {
+            let dof = group * WIDTH + lane;
+            f64::from(u8::from(dof < self.jerk.len() && test(dof)))
+        });
+        F64x4::new(lanes).simd_gt(F64x4::ZERO)
     }
 
     /// Returns the limit that determined the acceleration of each DoF in the last tick.
@@ -156,6 +197,7 @@ impl Limiter {
             upper: vector(|bounds| bounds.upper),
             velocity: vector(|bounds| bounds.velocity),
             acceleration: vector(|bounds| bounds.acceleration),
+            jerk: Some(self.jerk.clone()),
         }
     }
 
@@ -163,8 +205,8 @@ impl Limiter {
     /// seconds.
     pub(super) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2], duration: f64, dt: f64) -> Result<()> {
         let mut limits = self.limits();
-        let Limits { lower, upper, velocity, acceleration } = &mut limits;
-        for vector in [lower, upper, velocity, acceleration].into_iter().flatten() {
+        let Limits { lower, upper, velocity, acceleration, jerk } = &mut limits;
+        for vector in [lower, upper, velocity, acceleration, jerk].into_iter().flatten() {
             visit(vector, [f64::NEG_INFINITY, f64::INFINITY])?;
         }
         self.set(&limits, duration, dt)?;
@@ -172,10 +214,10 @@ impl Limiter {
         for lanes in self.before.iter_mut().flatten() {
             visit(lanes.as_mut_array(), quantity)?;
         }
-        let kinds = [None, Some(Limit::Position), Some(Limit::Velocity), Some(Limit::Acceleration)];
+        let kinds = [None, Some(Limit::Position), Some(Limit::Velocity), Some(Limit::Acceleration), Some(Limit::Jerk)];
         for limited in &mut self.limited {
             let mut index = kinds.iter().position(|kind| kind == limited).map_or(0.0, |index| index as f64);
-            visit_number(visit, &mut index, [0.0, 3.0])?;
+            visit_number(visit, &mut index, [0.0, 4.0])?;
             *limited = kinds[index as usize];
         }
         Ok(())

@@ -7,6 +7,8 @@
 //! displacement of the goal, its rate is divided by 1 + k_s‖δ/range‖², as for a tracking error, through a filter with the
 //! natural frequency of the attractor: unfiltered, κ alternates between its bounds, and with it the acceleration. A limit of
 //! the position does not slow the phase, which would stop for good on a path beyond it.
+//!
+//! A DoF whose jerk is limited follows its stopping motions instead (`jerk`).
 
 use super::limiter::MAX_SUBSTEPS;
 use super::step::first_element;
@@ -21,13 +23,16 @@ use crate::numerics::simd::{F64x4, WIDTH};
 const MIN_RATE: f64 = 0.01;
 
 impl Controller {
-    /// Sets the limits of position, velocity and acceleration; those of [`Limits::default`] are none.
+    /// Sets the limits of position, velocity, acceleration and jerk; those of [`Limits::default`] are none.
     ///
     /// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: at its end lower ≤ y
     /// ≤ upper, |ẏ| ≤ V, |Δẏ|/Δt ≤ A, |ÿ| ≤ A, and the state can brake to rest inside; between its ends lower ≤ y ≤ upper on the
     /// cubic through position and velocity at both, by which a robot interpolates. A tick longer than V/2A or √((upper −
     /// lower)/A) is limited in parts of constant acceleration, each of which keeps the limits, and is no single cubic. Commands
     /// between ticks change neither position nor velocity at once. A motion inside the limits is not changed.
+    ///
+    /// With a limit J of the jerk, |Δÿ|/Δt ≤ J, ẏ changes as it can with that jerk, and the state can stop inside with it. A
+    /// movement then begins with ÿ = 0. Where a DoF comes to rest within a tick, the cubic may pass the limit by J·Δt³/150.
     ///
     /// A goal or anchor outside is moved to the limit, where a movement is finished as at any goal; [`Controller::centre`] returns
     /// it. A state outside, after limits that shrink or at a start outside, brakes with A and returns. [`Controller::limited`]
@@ -93,7 +98,7 @@ impl Controller {
             *velocity = kept.select(*velocity, v);
             let acceleration = &mut self.acceleration[index];
             let kept = kept & acceleration.abs().simd_le(bounds.acceleration);
-            *acceleration = kept.select(*acceleration, a);
+            *acceleration = self.limiter.jerk_limited(index).select(a, kept.select(*acceleration, a));
         }
     }
 
@@ -105,6 +110,9 @@ impl Controller {
             let (bounds, [y, v, _]) = (&self.limiter.bounds[index], self.limiter.before[index]);
             let motion = [self.position[index], self.velocity[index]];
             kept_by_all &= bounds.admits([y, v], motion, self.acceleration[index], dt).all();
+            if self.limiter.has_jerk() {
+                kept_by_all &= !self.breaks_jerk(index, dt).any();
+            }
         }
         if !(kept_by_all && self.limiter.is_free && self.perturbation.limited_rate() == 1.0) {
             self.limit(dt, h);
@@ -120,11 +128,22 @@ impl Controller {
         for index in 0..self.groups.len() {
             let (bounds, [y, v, _]) = (self.limiter.bounds[index], self.limiter.before[index]);
             let wanted = [self.position[index], self.velocity[index]];
-            let kept = bounds.admits([y, v], wanted, self.acceleration[index], dt);
+            let mut kept = bounds.admits([y, v], wanted, self.acceleration[index], dt);
+            let mut passed = kept;
+            if self.limiter.has_jerk() {
+                kept = self.breaks_jerk(index, dt).select(F64x4::ZERO, kept);
+                passed = kept | self.limiter.jerk_limited(index);
+            }
             self.limiter.excess[index] = F64x4::ZERO;
             if !kept.all() {
                 self.limiter.is_free = false;
-                self.limiter.excess[index] = self.limit_group(index, kept, dt);
+                if !passed.all() {
+                    self.limiter.excess[index] = self.limit_group(index, passed, dt);
+                }
+                if self.limiter.has_jerk() {
+                    let excess = self.limit_jerk(index, kept, dt);
+                    self.limiter.excess[index] += excess;
+                }
             }
         }
         let Attractor { alpha_z, beta_z } = self.primitive.attractor();
@@ -152,16 +171,13 @@ impl Controller {
             y = inside.select(next.max(bounds.lower).min(bounds.upper), next);
             v += a * h;
         }
-        let rate = first_element(self.rate.value()).max(MIN_RATE / self.primitive.tau());
-        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
+        let rate = self.finite_rate();
         let group = &mut self.groups[index];
         group.z = kept.select(group.z, group.z + (v - self.velocity[index]) * (1.0 / rate));
         self.position[index] = kept.select(self.position[index], y);
         self.velocity[index] = kept.select(self.velocity[index], v);
         self.acceleration[index] = kept.select(self.acceleration[index], a);
-        let largest = F64x4::splat(f64::MAX);
-        let excess = (wanted - a) * (1.0 / (rate * rate * alpha_z * beta_z));
-        let mut excess = excess.max(-largest).min(largest).to_array();
+        let mut excess = self.excess_of(wanted - a).to_array();
         let limited = self.limiter.limited.iter_mut().skip(index * WIDTH).zip(&mut excess).enumerate();
         for (lane, (limited, excess)) in limited {
             if kept.to_bitmask() & (1 << lane) == 0 {
@@ -172,5 +188,17 @@ impl Controller {
             }
         }
         F64x4::new(excess)
+    }
+
+    /// Returns the rate ρ, or a small one in a pause.
+    pub(super) fn finite_rate(&self) -> f64 {
+        first_element(self.rate.value()).max(MIN_RATE / self.primitive.tau())
+    }
+
+    /// Returns the displacement δ of the goal that is equivalent to an excess of the acceleration.
+    pub(super) fn excess_of(&self, acceleration: F64x4) -> F64x4 {
+        let (rate, largest) = (self.finite_rate(), F64x4::splat(f64::MAX));
+        let Attractor { alpha_z, beta_z } = self.primitive.attractor();
+        (acceleration * (1.0 / (rate * rate * alpha_z * beta_z))).max(-largest).min(largest)
     }
 }

@@ -17,6 +17,7 @@ mod forecast;
 mod getters;
 mod goal;
 mod group;
+mod jerk;
 mod limiter;
 mod limiting;
 mod phase;

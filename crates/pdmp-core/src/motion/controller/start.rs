@@ -66,6 +66,10 @@ impl Controller {
         }
         self.update_lengths();
         self.read_out();
+        // A robot that begins a movement does not accelerate yet.
+        for (index, acceleration) in self.acceleration.iter_mut().enumerate() {
+            *acceleration = self.limiter.jerk_limited(index).select(F64x4::ZERO, *acceleration);
+        }
         self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
     }
 
