@@ -43,12 +43,24 @@ pub(crate) enum CommandLoad {
     Commanded,
     /// As settled, within limits that do not bind.
     Limited,
-    /// As settled, within limits of velocity and acceleration that bind in most ticks.
+    /// As settled, along a path that limits slow down.
+    Slowed,
+    /// As settled, within limits of single DoFs that bind in most ticks.
     Bound,
+    /// As commanded, by a governor within limits.
+    Governed,
 }
 
 impl CommandLoad {
-    pub(crate) const ALL: [Self; 5] = [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited, Self::Bound];
+    pub(crate) const ALL: [Self; 7] = [
+        Self::Settled,
+        Self::InTransition,
+        Self::Commanded,
+        Self::Limited,
+        Self::Slowed,
+        Self::Bound,
+        Self::Governed,
+    ];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -56,7 +68,18 @@ impl CommandLoad {
             Self::InTransition => "in transition",
             Self::Commanded => "commanded",
             Self::Limited => "within limits",
+            Self::Slowed => "slowed",
             Self::Bound => "at limits",
+            Self::Governed => "governed",
+        }
+    }
+
+    /// Returns the limit of the velocity, if there are limits. Without it, the velocity of a DoF reaches twenty.
+    fn max_velocity(self) -> Option<f64> {
+        match self {
+            Self::Settled | Self::InTransition | Self::Commanded => None,
+            Self::Limited | Self::Governed => Some(1e3),
+            Self::Slowed | Self::Bound => Some(2.0),
         }
     }
 }
@@ -84,7 +107,15 @@ impl ControlLoop {
     pub(crate) fn new(model: &Arc<Model>, load: CommandLoad) -> Self {
         let mut controller =
             Controller::new(model.primitive(), DT, &Conditions::default(), None).expect("a controller");
-        if let Some(limits) = limits(model, load) {
+        if let Some(velocity) = load.max_velocity() {
+            let limits = Limits {
+                lower: Some(vec![-1e3]),
+                upper: Some(vec![1e3]),
+                velocity: Some(vec![velocity]),
+                acceleration: Some(vec![1e3]),
+                synchronous: load != CommandLoad::Bound,
+                ..Limits::default()
+            };
             controller.set_limits(&limits).expect("limits");
         }
         // τ is at least that of the model, so that the measured second ends before the movement does.
@@ -109,7 +140,7 @@ impl ControlLoop {
 
     /// Executes the measured tick.
     pub(crate) fn tick(&mut self) {
-        if self.load == CommandLoad::Commanded {
+        if matches!(self.load, CommandLoad::Commanded | CommandLoad::Governed) {
             self.command();
         } else {
             black_box(self.controller.step().expect("a tick"));
@@ -140,19 +171,6 @@ impl ControlLoop {
         let mut motion = Motion { position, velocity, acceleration };
         black_box(self.controller.update(&command, &mut motion).expect("a tick"));
     }
-}
-
-/// Returns the limits of a load.
-fn limits(model: &Model, load: CommandLoad) -> Option<Limits> {
-    let of_ranges = |factor: f64| Some(model.ranges().iter().map(|range| factor * range).collect());
-    // The nominal movement takes up to twice its range per second, and ten times its range per second squared.
-    let [velocity, acceleration] = match load {
-        CommandLoad::Limited => [of_ranges(1e3), of_ranges(1e6)],
-        CommandLoad::Bound => [of_ranges(1.0), of_ranges(5.0)],
-        _ => return None,
-    };
-    let limits = Limits { lower: Some(vec![-1e3]), upper: Some(vec![1e3]), velocity, ..Limits::default() };
-    Some(Limits { acceleration, ..limits })
 }
 
 /// Fits a model with J styles to ten movements of one second, whose forcing terms have full rank.

@@ -249,7 +249,8 @@ impl Caller<'_> {
             Numbers::new(n, input)
         });
         let [lower, upper, velocity, acceleration, jerk] = vectors.each_ref().map(Numbers::vector);
-        let limits = pdmp_limits { lower, upper, velocity, acceleration, jerk };
+        let independent = i32::from(input.byte() % 2);
+        let limits = pdmp_limits { lower, upper, velocity, acceleration, jerk, independent };
         let given = !input.byte().is_multiple_of(8);
         // SAFETY: every pointer is valid over its stated length, or NULL.
         let status = unsafe { pdmp_controller_set_limits(self.handle(slot), given.then_some(&limits)) };

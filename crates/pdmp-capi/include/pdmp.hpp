@@ -50,6 +50,7 @@ struct Conditions {
 /// empty member is no limit.
 struct Limits {
     std::vector<double> lower{}, upper{}, velocity{}, acceleration{}, jerk{};
+    bool synchronous = true;
 };
 
 /// Motion with n_dofs elements in each vector, see pdmp_motion.
@@ -84,7 +85,7 @@ inline pdmp_conditions to_c(const Conditions &c) noexcept {
 
 inline pdmp_limits to_c(const Limits &limits) noexcept {
     return {to_c(limits.lower), to_c(limits.upper), to_c(limits.velocity), to_c(limits.acceleration),
-            to_c(limits.jerk)};
+            to_c(limits.jerk), !limits.synchronous};
 }
 
 inline std::vector<double> copy(pdmp_vector numbers) { return {numbers.data, numbers.data + numbers.length}; }

@@ -24,6 +24,9 @@ pub struct pdmp_limits {
     /// Limits of |y'''| (1) or (n_dofs), in the unit of each DoF per second cubed; positive, for DoFs with a limit of the
     /// acceleration.
     pub jerk: pdmp_vector,
+    /// 0, the default: what one DoF cannot follow slows all of them along the path, and only then single ones are limited.
+    /// Otherwise every DoF is limited on its own.
+    pub independent: i32,
 }
 
 /// Limit that determines the acceleration of a DoF.
@@ -60,7 +63,7 @@ impl pdmp_limits {
     /// No limits.
     const NONE: Self = {
         let none = pdmp_vector { data: std::ptr::null(), length: 0 };
-        Self { lower: none, upper: none, velocity: none, acceleration: none, jerk: none }
+        Self { lower: none, upper: none, velocity: none, acceleration: none, jerk: none, independent: 0 }
     };
 
     /// Writes the limits to those that the core takes, without allocation.
@@ -76,6 +79,7 @@ impl pdmp_limits {
             ("acceleration", self.acceleration, &mut limits.acceleration, infinity),
             ("jerk", self.jerk, &mut limits.jerk, infinity),
         ];
+        limits.synchronous = self.independent == 0;
         for (name, vector, written, none) in members {
             let expected = if vector.length == 1 { 1 } else { n_dofs };
             // SAFETY: this function has the same contract.

@@ -45,8 +45,14 @@ const NO_CONDITIONS: pdmp_conditions = pdmp_conditions {
 const SETTINGS: pdmp_settings =
     pdmp_settings { dt: 1e-3, transition: ptr::null(), memory: pdmp_memory { data: ptr::null_mut(), size: 0 } };
 
-const NO_LIMITS: pdmp_limits =
-    pdmp_limits { lower: NO_VECTOR, upper: NO_VECTOR, velocity: NO_VECTOR, acceleration: NO_VECTOR, jerk: NO_VECTOR };
+const NO_LIMITS: pdmp_limits = pdmp_limits {
+    lower: NO_VECTOR,
+    upper: NO_VECTOR,
+    velocity: NO_VECTOR,
+    acceleration: NO_VECTOR,
+    jerk: NO_VECTOR,
+    independent: 0,
+};
 
 fn vector(numbers: &[f64]) -> pdmp_vector {
     pdmp_vector { data: numbers.as_ptr(), length: numbers.len() }
@@ -247,7 +253,7 @@ fn an_invalid_command_changes_nothing_and_leaves_a_message() {
     let (three, two, nan) = ([0.5; 3], [0.5; 2], [0.5, f64::NAN, 0.5]);
     let (huge, negative) = (usize::MAX, -1e-3);
     let none = NO_COMMAND;
-    let half = pdmp_coupling { velocity: vector(&three), acceleration: NO_VECTOR };
+    let half = pdmp_coupling { velocity: vector(&three), acceleration: NO_VECTOR, independent: 0 };
     for (command, status, text) in [
         (pdmp_command { goal: vector(&two), ..none }, PDMP_LENGTH, "goal has length 2, expected 3: one value per DoF"),
         (

@@ -67,6 +67,7 @@ fn limits_around(controller: &Controller, ranges: &[f64], random: &mut Random) -
         jerk: Some(acceleration.iter().map(|acceleration| acceleration * scale(random, 1.0, 1e4)).collect()),
         velocity: Some(velocity),
         acceleration: Some(acceleration),
+        ..Limits::default()
     }
 }
 

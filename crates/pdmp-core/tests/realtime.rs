@@ -43,6 +43,7 @@ impl Loop {
         tight.jerk = share(200.0);
         let mut other = Limits { upper: share(5.0), ..Limits::default() };
         other.acceleration = share(100.0);
+        other.synchronous = false;
         Self {
             limits: [Limits::default(), tight, other],
             limits_set: 0,

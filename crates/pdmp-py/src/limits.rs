@@ -2,7 +2,7 @@
 
 use pdmp_core::motion::{Limit, Limits as Inner};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{IntoPyDict, PyTuple};
 
 use crate::controller::Controller;
 use crate::convert::{Vector, numbers, read_only};
@@ -26,6 +26,9 @@ use crate::instance::{self, pair};
 /// jerk : float or array_like, (D,), optional
 ///     Limit of the jerk's magnitude per s³, positive; it needs a limit of the acceleration. Controllers keep it,
 ///     `Model.fastest` does not.
+/// synchronous : bool
+///     True: a controller slows all degrees of freedom along the path if one cannot follow it, and only then limits single
+///     ones. False: it limits every degree of freedom on its own.
 ///
 /// Raises
 /// ------
@@ -50,12 +53,13 @@ pub(crate) struct Limits(pub(crate) Inner);
 #[pymethods]
 impl Limits {
     #[new]
-    #[pyo3(signature = (position=None, velocity=None, acceleration=None, jerk=None))]
+    #[pyo3(signature = (position=None, velocity=None, acceleration=None, jerk=None, *, synchronous=true))]
     fn new(
         position: Option<&Bound<'_, PyAny>>,
         velocity: Option<&Bound<'_, PyAny>>,
         acceleration: Option<&Bound<'_, PyAny>>,
         jerk: Option<&Bound<'_, PyAny>>,
+        synchronous: bool,
     ) -> PyResult<Self> {
         let limit = |name: &str, value: Option<&Bound<'_, PyAny>>| {
             value.filter(|value| !value.is_none()).map(|value| numbers(name, Some(value))).transpose()
@@ -68,6 +72,7 @@ impl Limits {
             velocity: limit("velocity", velocity)?,
             acceleration: limit("acceleration", acceleration)?,
             jerk: limit("jerk", jerk)?,
+            synchronous,
         };
         let vectors = [&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.jerk];
         let n_dofs = vectors.into_iter().flatten().map(Vec::len).fold(1, usize::max);
@@ -105,14 +110,21 @@ impl Limits {
         self.0.jerk.as_ref().map(|limits| read_only(py, limits))
     }
 
-    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        let Inner { lower, upper, velocity, acceleration, jerk } = &self.0;
+    /// True if a controller slows all degrees of freedom along the path before it limits single ones.
+    #[getter]
+    fn synchronous(&self) -> bool {
+        self.0.synchronous
+    }
+
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let Inner { lower, upper, velocity, acceleration, jerk, synchronous } = &self.0;
         let position = (lower.is_some() || upper.is_some()).then_some((lower, upper));
-        (position, velocity, acceleration, jerk).into_pyobject(py)
+        let options = [("synchronous", synchronous)].into_py_dict(py)?;
+        ((position, velocity, acceleration, jerk), options).into_pyobject(py)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let Inner { lower, upper, velocity, acceleration, jerk } = &self.0;
+        let Inner { lower, upper, velocity, acceleration, jerk, synchronous } = &self.0;
         let text = |limits: &Option<Vec<f64>>| Ok::<_, PyErr>(limits.into_pyobject(py)?.repr()?.to_string());
         let mut parts = Vec::new();
         if lower.is_some() || upper.is_some() {
@@ -122,6 +134,9 @@ impl Limits {
             if limits.is_some() {
                 parts.push(format!("{name}={}", text(limits)?));
             }
+        }
+        if !synchronous {
+            parts.push("synchronous=False".to_owned());
         }
         Ok(format!("pdmp.Limits({})", parts.join(", ")))
     }
@@ -154,6 +169,13 @@ impl Controller {
         self.command(result)
     }
 
+    /// True while a part of a commanded style, goal, anchor or amplitude is not yet accepted, as the movement ahead would leave
+    /// its limits with it.
+    #[getter]
+    fn pending(&self) -> bool {
+        self.inner.is_pending()
+    }
+
     /// Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
     /// "acceleration", "jerk", or None for a free one.
     ///
@@ -180,7 +202,8 @@ impl Limits {
             velocity: finite(limits.velocity),
             acceleration: finite(limits.acceleration),
             jerk: finite(limits.jerk),
+            synchronous: limits.synchronous,
         };
-        (limits != Inner::default()).then_some(Self(limits))
+        (limits != Inner { synchronous: limits.synchronous, ..Inner::default() }).then_some(Self(limits))
     }
 }

@@ -10,7 +10,7 @@
 
 use crate::dynamics::output_system::INVERSE_FACTORIAL;
 use crate::error::Result;
-use crate::numerics::simd::{F64x4, Register, pack, repack};
+use crate::numerics::simd::{F64x4, Register, pack, padded, repack};
 use crate::numerics::state::{Visitor, clone_in_place, visit_number};
 
 /// ωt at which 99 % of a step are done: the root of (1 + s)exp(−s) = 0.01.
@@ -72,7 +72,7 @@ impl FilterGains {
     ///
     /// The number is bounded: a transition that ends within one of many substeps needs no accurate description.
     pub(crate) fn substeps(&self, dt: f64) -> f64 {
-        (self.omega * dt / MAX_SUBSTEP).min(MAX_SUBSTEPS)
+        if self.is_immediate() { 0.0 } else { (self.omega * dt / MAX_SUBSTEP).min(MAX_SUBSTEPS) }
     }
 
     /// Returns an upper bound of the remaining displacement |x(t) − target| of a group: |x − target| + |ẋ|/ω.
@@ -85,8 +85,7 @@ impl FilterGains {
     pub(crate) fn step(&self, dt: f64) -> FilterStep {
         let s = (self.omega * dt).min(MAX_EXPONENT);
         let decay = decay(s);
-        let (value, rate) = ([(1.0 + s) * decay, dt * decay], [-self.omega * (s * decay), (1.0 - s) * decay]);
-        FilterStep { dt, value, rate, integral: [0.0; 2] }
+        FilterStep { dt, value: [(1.0 + s) * decay, dt * decay], rate: self.rate_weights(s, decay), integral: [0.0; 2] }
     }
 
     /// Returns the solution over a time `dt` with its integral.
@@ -100,9 +99,16 @@ impl FilterGains {
         FilterStep {
             dt,
             value: [(1.0 + s) * decay, dt * decay],
-            rate: [-omega * (s * decay), (1.0 - s) * decay],
+            rate: self.rate_weights(s, decay),
             integral: [(first + second) / omega, second / (omega * omega)],
         }
+    }
+
+    /// Returns the weights of displacement and rate in the rate, for s = ωt and exp(−s).
+    fn rate_weights(&self, s: f64, decay: f64) -> [f64; 2] {
+        // An immediate switch leaves no rate; ∞·0 is none.
+        let stiffness = if self.is_immediate() { 0.0 } else { -self.omega * (s * decay) };
+        [stiffness, (1.0 - s) * decay]
     }
 
     /// Returns the solution of q̇ = m(x − q) after a time `dt`, from `q`: the response of the amplitude r of Eq. (4) to the
@@ -197,16 +203,27 @@ impl CommandFilter {
 
     /// Sets the targets and starts a transition.
     pub(crate) fn set_target(&mut self, target: &[f64], gains: &FilterGains) {
-        if gains.is_immediate() {
-            return self.reset(target);
-        }
-        repack(&mut self.target, target);
-        self.remaining = gains.decay_time;
+        self.move_target(target, 1.0, gains);
     }
 
-    /// Sets the targets and leaves the values, which do not move.
-    pub(crate) fn set_target_only(&mut self, target: &[f64]) {
-        repack(&mut self.target, target);
+    /// Moves the targets by a share of the distance to others and starts a transition.
+    pub(crate) fn move_target(&mut self, target: &[f64], share: f64, gains: &FilterGains) {
+        self.move_target_only(target, share);
+        if gains.is_immediate() {
+            self.settle();
+        } else {
+            self.remaining = gains.decay_time;
+        }
+    }
+
+    /// Moves the targets by a share of the distance to others and leaves the values, which do not move.
+    pub(crate) fn move_target_only(&mut self, target: &[f64], share: f64) {
+        if share >= 1.0 {
+            return repack(&mut self.target, target);
+        }
+        for (present, target) in bytemuck::cast_slice_mut::<F64x4, f64>(&mut self.target).iter_mut().zip(target) {
+            *present += share * (target - *present);
+        }
     }
 
     /// Sets the value of a group without a transition and leaves its target.
@@ -217,6 +234,11 @@ impl CommandFilter {
     /// Sets targets and values.
     pub(crate) fn reset(&mut self, target: &[f64]) {
         repack(&mut self.target, target);
+        self.settle();
+    }
+
+    /// Sets the values to their targets, at rest.
+    fn settle(&mut self) {
         self.value.copy_from_slice(&self.target);
         self.rate.fill(F64x4::ZERO);
         self.remaining = 0.0;
@@ -265,6 +287,29 @@ impl CommandFilter {
         };
         (*value, *rate) = (x.store(), v.store());
         [x, v]
+    }
+
+    /// Returns the first value and its rate after a tick.
+    pub(crate) fn preview(&self, step: &FilterStep) -> [f64; 2] {
+        let [x, v, target] = [&self.value, &self.rate, &self.target].map(|lanes| lanes[0].as_array()[0]);
+        let d = x - target;
+        [target + (d * step.value[0] + v * step.value[1]), d * step.rate[0] + v * step.rate[1]]
+    }
+
+    /// Sets the first value, at rest, and starts a transition to its target.
+    pub(crate) fn start(&mut self, value: f64, gains: &FilterGains) {
+        self.value[0] = padded(&[value]);
+        self.remaining = gains.decay_time.max(f64::MIN_POSITIVE);
+    }
+
+    /// Advances the first value, which is not negative, by `dt` at a constant rate. The filter continues from there, at a rate
+    /// from which it passes neither zero nor the target.
+    pub(crate) fn move_on(&mut self, rate: f64, dt: f64, gains: &FilterGains) {
+        let value = (self.value[0].as_array()[0] + rate * dt).max(0.0);
+        let rest = (self.target[0].as_array()[0] - value).max(0.0);
+        let omega = if gains.is_immediate() { 0.0 } else { gains.omega };
+        (self.value[0], self.rate[0]) = (padded(&[value]), padded(&[rate.max(-omega * value).min(omega * rest)]));
+        self.remaining = gains.decay_time.max(f64::MIN_POSITIVE);
     }
 
     /// Returns ∫x dt of the first value over a tick.

@@ -34,6 +34,15 @@ pub enum LimitError {
         /// Fraction of the clock.
         phase: f64,
     },
+    /// A start from which the limits cannot be kept.
+    #[error(
+        "velocity: the movement starts {ratio:.3} times too fast to keep its limits on the path; start slower, or let a \
+         controller with these limits bend the path"
+    )]
+    StartTooFast {
+        /// Rate at the start, relative to the largest admissible one.
+        ratio: f64,
+    },
     /// A limit of the jerk without one of the acceleration.
     #[error(
         "limits of DoF {dof}: a jerk of {} needs a limit of the acceleration, which bounds the time of a reversal; give both",

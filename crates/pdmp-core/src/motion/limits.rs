@@ -1,7 +1,8 @@
 //! Kinematic limits of a robot.
 
 use crate::error::{Error, LimitError, Result};
-use crate::motion::trajectory::Trajectory;
+use crate::motion::time_law::RateLimits;
+use crate::numerics::simd::{F64x4, WIDTH, groups};
 use crate::validate::MAX_MAGNITUDE;
 
 /// Limits of position, velocity, acceleration and jerk: one number for all DoFs, or one for each. `None` or infinity is no limit.
@@ -13,7 +14,7 @@ use crate::validate::MAX_MAGNITUDE;
 /// assert!(limits.check(2).is_ok());
 /// assert!(limits.check(3).is_err());
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
     /// Lower limits of the position (1,) or (D,), in the unit of each DoF.
     pub lower: Option<Vec<f64>>,
@@ -25,6 +26,14 @@ pub struct Limits {
     pub acceleration: Option<Vec<f64>>,
     /// Limits of |dÿ/dt| (1,) or (D,), per second cubed, of DoFs whose acceleration has a limit.
     pub jerk: Option<Vec<f64>>,
+    /// True, the default: what one DoF cannot follow slows all of them along the path. False: every DoF is limited on its own.
+    pub synchronous: bool,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { lower: None, upper: None, velocity: None, acceleration: None, jerk: None, synchronous: true }
+    }
 }
 
 /// Limit that determines the acceleration of a DoF.
@@ -88,25 +97,25 @@ impl Limits {
         [of_dofs(&self.lower, f64::NEG_INFINITY, n_dofs), of_dofs(&self.upper, f64::INFINITY, n_dofs)]
     }
 
-    /// Returns the limits of velocity and acceleration, infinite where there is none.
-    pub(crate) fn rates(&self, n_dofs: usize) -> [Vec<f64>; 2] {
-        [&self.velocity, &self.acceleration].map(|limits| of_dofs(limits, f64::INFINITY, n_dofs))
+    /// Returns the limits of velocity and acceleration by groups, infinite where there is none.
+    pub(crate) fn rates(&self, n_dofs: usize) -> Vec<RateLimits> {
+        let lanes = |limits: &Option<Vec<f64>>, group: usize| {
+            F64x4::new(std::array::from_fn(|lane| {
+                let dof = group * WIDTH + lane;
+                if dof < n_dofs { limit_of_dof(limits, dof, f64::INFINITY) } else { f64::INFINITY }
+            }))
+        };
+        let of_group = |group| RateLimits {
+            velocity: lanes(&self.velocity, group),
+            acceleration: lanes(&self.acceleration, group),
+        };
+        (0..groups(n_dofs)).map(of_group).collect()
     }
 
-    /// Checks that every position keeps the limits.
-    ///
-    /// # Errors
-    /// The first position outside.
-    pub(crate) fn check_positions(&self, trajectory: &Trajectory) -> Result<()> {
-        let [lower, upper] = self.position(trajectory.position.ncols());
-        for ((sample, dof), &value) in trajectory.position.indexed_iter() {
-            if value < lower[dof] || value > upper[dof] {
-                let phase = trajectory.time[sample] / trajectory.time[trajectory.time.len() - 1];
-                let (lower, upper) = (lower[dof], upper[dof]);
-                return Err(Error::Limits(LimitError::LeftByPath { dof, value, lower, upper, phase }));
-            }
-        }
-        Ok(())
+    /// Returns whether a velocity or an acceleration is limited.
+    pub(crate) fn bound_rates(&self, n_dofs: usize) -> bool {
+        let finite = |limits| (0..n_dofs).any(|dof| limit_of_dof(limits, dof, f64::INFINITY).is_finite());
+        finite(&self.velocity) || finite(&self.acceleration)
     }
 }
 

@@ -18,8 +18,12 @@ const FREE_VELOCITY: f64 = 10.0;
 #[derive(Debug)]
 pub(super) struct Limiter {
     active: bool,
+    /// True if the rate of the clock is limited before single DoFs are.
+    synchronous: bool,
     /// True if no DoF was limited in the last tick.
     pub(super) is_free: bool,
+    /// True if `limited` names limits that slowed the clock.
+    pub(super) slows: bool,
     pub(super) bounds: Vec<Bounds>,
     /// Limits of the jerk (D,), infinite where there are none.
     pub(super) jerk: Vec<f64>,
@@ -40,7 +44,9 @@ pub(super) struct Limiter {
 
 clone_in_place!(Limiter {
     active,
+    synchronous,
     is_free,
+    slows,
     bounds,
     jerk,
     has_jerk,
@@ -62,7 +68,9 @@ impl Limiter {
             Bounds { lower: -infinite, upper: infinite, velocity: infinite, acceleration: infinite, braking: infinite };
         Self {
             active: false,
+            synchronous: true,
             is_free: true,
+            slows: false,
             bounds: vec![none; groups(n_dofs)],
             jerk: vec![f64::INFINITY; n_dofs],
             has_jerk: false,
@@ -121,13 +129,14 @@ impl Limiter {
                 braking: lanes(&braking, infinity),
             };
         }
-        let Limits { lower, upper, velocity, acceleration, jerk: _ } = limits;
+        let Limits { lower, upper, velocity, acceleration, jerk, synchronous } = limits;
         let is_finite = |vector: &Option<Vec<f64>>| vector.iter().flatten().any(|limit| limit.is_finite());
         self.active = [lower, upper, velocity, acceleration].into_iter().any(is_finite);
-        for (dof, jerk) in self.jerk.iter_mut().enumerate() {
-            *jerk = limit_of_dof(&limits.jerk, dof, infinity);
+        self.synchronous = *synchronous;
+        for (dof, limit) in self.jerk.iter_mut().enumerate() {
+            *limit = limit_of_dof(jerk, dof, infinity);
         }
-        self.has_jerk = self.jerk.iter().any(|jerk| jerk.is_finite());
+        self.has_jerk = is_finite(jerk);
         self.substep_rate = substep_rate;
         Ok(())
     }
@@ -136,6 +145,12 @@ impl Limiter {
     #[inline(always)]
     pub(super) fn is_active(&self) -> bool {
         self.active
+    }
+
+    /// Returns whether limits of velocity or acceleration bound the rate of the clock.
+    pub(super) fn limits_rate(&self) -> bool {
+        let finite = |limit: F64x4| limit.to_array().iter().any(|limit| limit.is_finite());
+        self.synchronous && self.bounds.iter().any(|bounds| finite(bounds.velocity) || finite(bounds.acceleration))
     }
 
     /// Returns whether a jerk is limited.
@@ -198,6 +213,7 @@ impl Limiter {
             velocity: vector(|bounds| bounds.velocity),
             acceleration: vector(|bounds| bounds.acceleration),
             jerk: Some(self.jerk.clone()),
+            synchronous: self.synchronous,
         }
     }
 
@@ -205,12 +221,14 @@ impl Limiter {
     /// seconds.
     pub(super) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2], duration: f64, dt: f64) -> Result<()> {
         let mut limits = self.limits();
-        let Limits { lower, upper, velocity, acceleration, jerk } = &mut limits;
+        let Limits { lower, upper, velocity, acceleration, jerk, synchronous } = &mut limits;
+        visit_flag(visit, synchronous)?;
         for vector in [lower, upper, velocity, acceleration, jerk].into_iter().flatten() {
             visit(vector, [f64::NEG_INFINITY, f64::INFINITY])?;
         }
         self.set(&limits, duration, dt)?;
         visit_flag(visit, &mut self.is_free)?;
+        visit_flag(visit, &mut self.slows)?;
         for lanes in self.before.iter_mut().flatten() {
             visit(lanes.as_mut_array(), quantity)?;
         }

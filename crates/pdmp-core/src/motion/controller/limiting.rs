@@ -22,6 +22,9 @@ use crate::numerics::simd::{F64x4, WIDTH};
 /// Rate ρ, relative to the nominal one, below which the change of z is that of this rate: it would be unbounded in a pause.
 const MIN_RATE: f64 = 0.01;
 
+/// Share of a limit from which a DoF slows the clock; the margins of the path ahead are smaller.
+const NEAR_LIMIT: f64 = 0.95;
+
 impl Controller {
     /// Sets the limits of position, velocity, acceleration and jerk; those of [`Limits::default`] are none.
     ///
@@ -59,16 +62,22 @@ impl Controller {
     /// limits too tight for a tick of [`Controller::dt`]. The limits then remain unchanged.
     pub fn set_limits(&mut self, limits: &Limits) -> Result<()> {
         self.limiter.set(limits, self.primitive.duration(), self.dt)?;
+        self.limit_path();
         if !self.started {
             self.begin();
             return Ok(());
         }
+        // An acceleration beyond its limit would be reduced by the jerk for so long that the DoF could not stop.
+        for (acceleration, bounds) in self.acceleration.iter_mut().zip(&self.limiter.bounds) {
+            *acceleration = acceleration.max(-bounds.acceleration).min(bounds.acceleration);
+        }
         self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
-        self.command_centre();
+        self.move_centre(1.0);
         self.status = Status::Working;
         if self.has_frame() {
             self.start_goal_transition();
         }
+        self.look_ahead();
         self.publish();
         Ok(())
     }
@@ -109,6 +118,8 @@ impl Controller {
         for index in 0..self.groups.len() {
             let (bounds, [y, v, _]) = (&self.limiter.bounds[index], self.limiter.before[index]);
             let motion = [self.position[index], self.velocity[index]];
+            // The acceleration at the end of the tick, of which little belongs to this tick, is published within its limit.
+            self.acceleration[index] = self.acceleration[index].max(-bounds.acceleration).min(bounds.acceleration);
             kept_by_all &= bounds.admits([y, v], motion, self.acceleration[index], dt).all();
             if self.limiter.has_jerk() {
                 kept_by_all &= !self.breaks_jerk(index, dt).any();
@@ -117,7 +128,43 @@ impl Controller {
         if !(kept_by_all && self.limiter.is_free && self.perturbation.limited_rate() == 1.0) {
             self.limit(dt, h);
         }
+        if self.perturbation.terms().is_some() {
+            self.leave_path();
+        }
+        let slows = self.governor.as_mut().is_some_and(|governor| std::mem::take(&mut governor.slows));
+        if slows || self.limiter.slows {
+            self.name_limits(dt, slows);
+        }
         self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
+    }
+
+    /// Names the DoFs that are near a limit which slows the clock.
+    #[inline(never)]
+    fn name_limits(&mut self, dt: f64, slows: bool) {
+        if self.limiter.is_free {
+            self.limiter.limited.fill(None);
+        }
+        self.limiter.slows = slows;
+        let before = self.limiter.before.iter().flat_map(|[_, v, _]| v.to_array());
+        let after = self.velocity.iter().flat_map(|v| v.to_array());
+        let bounds = self
+            .limiter
+            .bounds
+            .iter()
+            .flat_map(|bounds| bounds.velocity.to_array().into_iter().zip(bounds.acceleration.to_array()));
+        for (limited, ((v, next), (velocity, acceleration))) in self
+            .limiter
+            .limited
+            .iter_mut()
+            .zip(before.zip(after).zip(bounds))
+            .filter(|(limited, _)| slows && limited.is_none())
+        {
+            if next.abs() > NEAR_LIMIT * velocity {
+                *limited = Some(Limit::Velocity);
+            } else if (next - v).abs() > NEAR_LIMIT * acceleration * dt {
+                *limited = Some(Limit::Acceleration);
+            }
+        }
     }
 
     /// Limits the DoFs that do not keep their limits over a tick of `dt` seconds and `h` on the clock.
@@ -125,6 +172,7 @@ impl Controller {
     fn limit(&mut self, dt: f64, h: f64) {
         self.limiter.is_free = true;
         self.limiter.limited.fill(None);
+        self.leave_path();
         for index in 0..self.groups.len() {
             let (bounds, [y, v, _]) = (self.limiter.bounds[index], self.limiter.before[index]);
             let wanted = [self.position[index], self.velocity[index]];

@@ -16,16 +16,19 @@ mod avx;
 mod forecast;
 mod getters;
 mod goal;
+mod governor;
 mod group;
 mod jerk;
 mod limiter;
 mod limiting;
+mod path_ahead;
 mod phase;
 mod setters;
 mod settling;
 mod snapshot;
 mod start;
 mod step;
+mod synchronous;
 
 use std::sync::Arc;
 
@@ -44,6 +47,7 @@ use crate::motion::perturbation::{Perturbation, largest_range};
 use crate::numerics::simd::{F64x4, copy};
 use crate::numerics::state::clone_in_place;
 use crate::validate::check_positive;
+use governor::Governor;
 use group::Group;
 use limiter::Limiter;
 
@@ -52,6 +56,8 @@ const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
 /// Default tolerance of a settled movement, relative to the range of each DoF. On the recordings of `docs/transport.md`,
 /// movements settle to it within 1.0 to 1.3 durations (median of a set), to 1e-3 within up to 1.5.
 const DEFAULT_TOLERANCE: f64 = 5e-3;
+/// Rate of an unlimited speed, relative to the nominal one.
+const MAX_SPEED: f64 = 100.0;
 /// Flush level, relative to the largest range: values 1e-16 of it become zero. It lies far below the last digit of every
 /// movement, and its square is a normal number.
 const FLUSH_RATIO: f64 = 1e-150;
@@ -132,6 +138,10 @@ pub struct Controller {
     flush_level: f64,
     perturbation: Perturbation,
     limiter: Limiter,
+    /// Governor of the commands, if limits bound the rate of the path.
+    governor: Option<Box<Governor>>,
+    /// ρ̇ of the next substep where the limits determine it.
+    rate_slope: Option<f64>,
     /// k_φ.
     phase_gain: f64,
     /// Maximum clock step of a substep.
@@ -181,6 +191,8 @@ clone_in_place!(Controller {
     flush_level,
     perturbation,
     limiter,
+    governor,
+    rate_slope,
     phase_gain,
     max_clock_step,
     rate_step,
@@ -249,6 +261,8 @@ impl Controller {
             flush_level: FLUSH_RATIO * largest_range(primitive.ranges()),
             perturbation: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
             limiter: Limiter::none(primitive.ranges()),
+            governor: None,
+            rate_slope: None,
             phase_gain: phase::PHASE_GAIN,
             max_clock_step,
             rate_step: rate_gains.step_with_integral(dt),
@@ -274,6 +288,7 @@ impl Controller {
     /// A tick longer than 1000 τ. The state then remains unchanged.
     pub fn step(&mut self) -> Result<Status> {
         self.check_tick_length(self.dt, None)?;
+        self.refresh_path();
         let h = self.clock_step(self.dt);
         if self.perturbation.has_measurement() {
             self.perturb(&Command::default(), self.dt, h);
@@ -357,6 +372,7 @@ impl Controller {
         if dt == 0.0 {
             return Ok(self.status);
         }
+        self.refresh_path();
         let h = self.clock_step(dt);
         self.perturb(command, dt, h);
         if let Some(phase) = command.phase {

@@ -88,6 +88,7 @@ impl Controller {
         self.clock = CompensatedSum::at(phase);
         self.read_forcing();
         self.groups.iter_mut().for_each(|group| group.z -= group.forcing.value * r);
+        self.leave_path();
         self.publish();
         Ok(())
     }

@@ -1,6 +1,8 @@
 //! Commands between ticks. A rejected command leaves the last valid one in force.
 
-use super::{Controller, Status};
+use std::ops::BitOr;
+
+use super::{Controller, MAX_SPEED, Status};
 use crate::error::{Error, Result};
 use crate::motion::command::Command;
 use crate::motion::perturbation::Compliance;
@@ -143,7 +145,7 @@ impl Controller {
     }
 
     /// Sets the speed, a factor of the rate 1/τ: 1 by default, 0 for a pause on the path. The change is filtered as that of
-    /// τ. The speed remains in force after [`Controller::reset`].
+    /// τ. Infinity is as fast as limits of velocity and acceleration allow ([`Controller::set_limits`]). The speed remains in force after [`Controller::reset`].
     ///
     /// ```
     /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
@@ -162,17 +164,20 @@ impl Controller {
     /// # Errors
     /// A speed outside [0, 1e6]. It then remains unchanged.
     pub fn set_speed(&mut self, speed: f64) -> Result<()> {
-        if !(0.0..=1e6).contains(&speed) {
-            return Err(Error::Range { name: "speed", value: speed, allowed: "must lie between 0, a pause, and 1e6" });
+        let unlimited = speed == f64::INFINITY && self.governor.is_some();
+        if !((0.0..=1e6).contains(&speed) || unlimited) {
+            let allowed = "must lie between 0, a pause, and 1e6, or be infinite within synchronous limits of velocity or \
+                           acceleration";
+            return Err(Error::Range { name: "speed", value: speed, allowed });
         }
         self.speed = speed;
-        let rate = [speed / self.conditions.tau];
+        let rate = [self.commanded_rate()];
         if self.started {
             self.rate.set_target(&rate, &self.rate_gains);
+            self.publish();
         } else {
-            self.rate.reset(&rate);
+            self.begin();
         }
-        self.publish();
         Ok(())
     }
 
@@ -244,7 +249,13 @@ impl Controller {
         }
         self.perturbation.release();
         self.change_phase_rate();
+        self.leave_path();
         self.publish();
+    }
+
+    /// Returns the commanded rate: speed/τ, or that of an unlimited speed.
+    pub(super) fn commanded_rate(&self) -> f64 {
+        if self.speed.is_infinite() { MAX_SPEED / self.primitive.tau() } else { self.speed / self.conditions.tau }
     }
 
     /// Checks and applies a command.
@@ -258,44 +269,51 @@ impl Controller {
     ///
     /// Commands before the first tick apply from the start; later ones resume a settled movement.
     pub(super) fn apply(&mut self, command: &Command) {
-        let gains = self.command_gains;
-        let mut changed = false;
-        if let Some(style) = command.style.filter(|style| *style != self.conditions.style) {
-            self.conditions.style.copy_from_slice(style);
-            self.style.set_target(style, &gains);
-            changed = true;
+        let mut changes = Changes::default();
+        let conditions = &mut self.conditions;
+        if let Some(style) = command.style.filter(|style| *style != conditions.style) {
+            conditions.style.copy_from_slice(style);
+            changes.style = true;
         }
-        let [mut goal_changed, mut velocity_changed] = [false; 2];
-        if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre) {
-            self.conditions.centre.copy_from_slice(centre);
-            goal_changed = self.has_frame();
-            self.command_centre();
-            changed = true;
+        if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != conditions.centre) {
+            conditions.centre.copy_from_slice(centre);
+            changes.centre = true;
         }
         if let Some(velocity) = command.goal_velocity
-            && !(self.conditions.has_goal_velocity && velocity == self.conditions.goal_velocity)
+            && !(conditions.has_goal_velocity && velocity == conditions.goal_velocity)
         {
-            self.conditions.goal_velocity.copy_from_slice(velocity);
-            self.conditions.has_goal_velocity = true;
-            (changed, velocity_changed) = (true, true);
+            conditions.goal_velocity.copy_from_slice(velocity);
+            conditions.has_goal_velocity = true;
+            changes.goal_velocity = true;
         }
-        if let Some(tau) = command.tau.filter(|tau| *tau != self.conditions.tau) {
-            self.conditions.tau = tau;
+        if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != conditions.amplitude) {
+            conditions.amplitude = amplitude;
+            changes.amplitude = true;
+        }
+        if let Some(tau) = command.tau.filter(|tau| *tau != conditions.tau) {
+            conditions.tau = tau;
             self.max_tau = self.max_tau.max(tau);
-            self.rate.set_target(&[self.speed / tau], &self.rate_gains);
-            changed = true;
+            self.rate.set_target(&[self.commanded_rate()], &self.rate_gains);
+            changes.tau = true;
         }
-        if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != self.conditions.amplitude) {
-            self.conditions.amplitude = amplitude;
-            self.amplitude.set_target(&[amplitude], &gains);
-            changed = true;
-        }
-        if !changed {
+        if changes == Changes::default() {
             return;
         }
         self.status = Status::Working;
-        if !self.started {
-            return self.begin();
+        if self.started { self.govern(changes) } else { self.begin() }
+    }
+
+    /// Moves the targets of changed commands by a share of the distance to the commanded ones.
+    pub(super) fn take_up(&mut self, changes: Changes, share: f64) {
+        let gains = self.command_gains;
+        if changes.style {
+            self.style.move_target(&self.conditions.style, share, &gains);
+        }
+        if changes.centre {
+            self.move_centre(share);
+        }
+        if changes.amplitude {
+            self.amplitude.move_target(&[self.conditions.amplitude], share, &gains);
         }
         // Without transition, style and τ change the motion at once.
         if gains.is_immediate() {
@@ -303,19 +321,49 @@ impl Controller {
             self.publish();
         }
         // The velocity at the end depends on style and τ.
-        if goal_changed || self.approaching || velocity_changed {
+        if (changes.centre && self.has_frame()) || self.approaching || changes.goal_velocity {
             self.start_goal_transition();
         }
     }
 
-    /// Commands the goal or anchor, moved inside the limits.
-    pub(super) fn command_centre(&mut self) {
+    /// Moves the target of the goal or anchor by a share of the distance to the commanded one, moved inside the limits.
+    pub(super) fn move_centre(&mut self, share: f64) {
         let accepted = self.limiter.accept(&self.conditions.centre);
         if self.primitive.transport.is_immediate() {
-            self.centre.set_target(accepted, &self.command_gains);
+            self.centre.move_target(accepted, share, &self.command_gains);
         } else {
-            self.centre.set_target_only(accepted);
+            self.centre.move_target_only(accepted, share);
         }
         self.update_lengths();
     }
+}
+
+impl BitOr for Changes {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        Self {
+            style: self.style | other.style,
+            centre: self.centre | other.centre,
+            goal_velocity: self.goal_velocity | other.goal_velocity,
+            amplitude: self.amplitude | other.amplitude,
+            tau: self.tau | other.tau,
+        }
+    }
+}
+
+/// Commands that have changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Changes {
+    style: bool,
+    /// Goal or anchor.
+    centre: bool,
+    goal_velocity: bool,
+    amplitude: bool,
+    tau: bool,
+}
+
+impl Changes {
+    /// Commands that a governor may accept in part.
+    pub(super) const PATH: Self = Self { style: true, centre: true, amplitude: true, goal_velocity: false, tau: false };
 }

@@ -25,7 +25,7 @@ impl Controller {
     /// deviates by about |Δw|/β_z. With immediate transport, and while the phase is slowed, the forcing counts as a whole.
     pub(super) fn settled(&self) -> Status {
         let (forcing_table, clock) = (self.primitive.forcing_table(), self.clock.value());
-        let Some(fade) = forcing_table.fade(clock) else { return Status::Working };
+        let Some(fade) = forcing_table.fade(clock).filter(|_| !self.is_pending()) else { return Status::Working };
         let attractor = self.primitive.attractor();
         let (by_flow, by_forcing) = (attractor.impulse_peak(), 1.0 / attractor.beta_z);
         let target = unpack(self.style.target(), self.primitive.n_styles());

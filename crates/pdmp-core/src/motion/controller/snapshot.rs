@@ -75,14 +75,8 @@ impl Controller {
         }
         let mut controller = Self::new(primitive, head[HEADER - 2], &Conditions::default(), Some(head[HEADER - 1]))?;
         let mut expected = HEADER;
-        controller.clone().walk(&mut |quantity, _| {
-            expected += quantity.len();
-            Ok(())
-        })?;
-        if snapshot.len() != expected {
-            return Err(length(expected));
-        }
         controller.walk(&mut |quantity, [least, greatest]| {
+            expected += quantity.len();
             let (saved, remaining) = rest.split_at_checked(quantity.len()).ok_or_else(|| length(expected))?;
             if let Some(index) = saved.iter().position(|number| !(least..=greatest).contains(number)) {
                 let (value, index) = (saved[index], snapshot.len() - rest.len() + index);
@@ -97,12 +91,21 @@ impl Controller {
             rest = remaining;
             Ok(())
         })?;
+        if !rest.is_empty() {
+            return Err(length(expected));
+        }
         controller.check_restored()?;
         Ok(controller)
     }
 
     /// Visits every number of the state, in the order of the snapshot.
     fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+        self.walk_motion(visit)?;
+        self.walk_governor(visit)
+    }
+
+    /// Visits every number of the state without the governor.
+    pub(super) fn walk_motion(&mut self, visit: &mut Visitor) -> Result<()> {
         // The pattern names every field, so that a new one is saved or listed as derived.
         let Self {
             primitive,
@@ -133,6 +136,8 @@ impl Controller {
             acceleration,
             perturbation,
             limiter,
+            governor: _,
+            rate_slope: _,
             phase_gain,
             command_step,
             min_durations: _,
@@ -178,7 +183,7 @@ impl Controller {
         time.walk(visit, TIME)?;
         clock.walk(visit, clocks)?;
         visit_number(visit, r, [0.0, MAX_MAGNITUDE])?;
-        visit_number(visit, speed, [0.0, 1e6])?;
+        visit_number(visit, speed, [0.0, f64::INFINITY])?;
         visit_number(visit, tolerance, [f64::MIN_POSITIVE, 1.0])?;
         visit_number(visit, phase_gain, [0.0, super::phase::MAX_PHASE_GAIN])?;
 

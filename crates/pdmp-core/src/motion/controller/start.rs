@@ -39,11 +39,12 @@ impl Controller {
         self.perturbation.clear();
         self.limiter.clear();
         (self.time, self.clock) = (CompensatedSum::default(), CompensatedSum::default());
+        let rate = self.commanded_rate();
         let conditions = &self.conditions;
         self.max_tau = conditions.tau;
         self.r = conditions.amplitude;
         self.style.reset(&conditions.style);
-        self.rate.reset(&[self.speed / conditions.tau]);
+        self.rate.reset(&[rate]);
         self.amplitude.reset(&[conditions.amplitude]);
         // A rhythmic movement starts where its commanded anchor places it, and moves to the anchor within the limits.
         let rhythmic = self.primitive.kind() == Kind::Rhythmic;
@@ -59,13 +60,14 @@ impl Controller {
         self.read_forcing();
         self.set_initial_state();
         if rhythmic && self.limiter.is_active() {
-            self.command_centre();
+            self.move_centre(1.0);
         }
         if self.conditions.has_goal_velocity {
             self.start_goal_transition();
         }
         self.update_lengths();
         self.read_out();
+        self.start_rate();
         // A robot that begins a movement does not accelerate yet.
         for (index, acceleration) in self.acceleration.iter_mut().enumerate() {
             *acceleration = self.limiter.jerk_limited(index).select(F64x4::ZERO, *acceleration);
@@ -92,13 +94,19 @@ impl Controller {
             self.clock = CompensatedSum::at(phase);
             self.read_forcing();
         }
+        // The rate at the start is that of the speed; a movement at an unlimited speed starts at that of τ, as one in a pause.
+        let tau = if self.speed > 0.0 && self.speed.is_finite() {
+            self.conditions.tau / self.speed
+        } else {
+            self.conditions.tau
+        };
         let Self { conditions, r, .. } = self;
         if let Some(start) = &conditions.start {
             repack(&mut self.position, start);
         }
         if let Some(velocity) = &conditions.velocity {
             for (group, velocity) in self.groups.iter_mut().zip(velocity.chunks(WIDTH)) {
-                group.z = padded(velocity) * conditions.tau - group.forcing.value * *r;
+                group.z = padded(velocity) * tau - group.forcing.value * *r;
             }
         }
     }

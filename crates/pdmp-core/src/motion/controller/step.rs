@@ -20,7 +20,9 @@ const ROUNDING: f64 = 1e-9;
 impl Controller {
     /// Checks that a tick is not too long for the present rate and the commanded one.
     pub(super) fn check_tick_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
-        let commanded = tau.map_or(first_element(self.rate.target()), |tau| self.speed / tau);
+        let commanded = tau.map_or(first_element(self.rate.target()), |tau| {
+            if self.speed.is_infinite() { self.commanded_rate() } else { self.speed / tau }
+        });
         let at_once = !self.started || self.command_gains.is_immediate();
         let max_rate = if at_once { commanded } else { commanded.max(first_element(self.rate.value())) };
         if dt * max_rate > MAX_TICK {
@@ -67,6 +69,12 @@ impl Controller {
     /// Returns the clock interval of the next `dt` seconds, ∫ρ dt.
     #[inline(always)]
     pub(super) fn clock_step(&mut self, dt: f64) -> f64 {
+        self.rate_slope = None;
+        if !self.admits_rate()
+            && let Some(h) = self.limit_rate(dt)
+        {
+            return h;
+        }
         if self.rate.is_settled() {
             return first_element(self.rate.value()) * dt;
         }
@@ -76,7 +84,7 @@ impl Controller {
     }
 
     /// Computes the filter step of the rate for `dt` seconds, unless the last one had that length.
-    fn update_rate_step(&mut self, dt: f64) {
+    pub(super) fn update_rate_step(&mut self, dt: f64) {
         if dt != self.rate_step.dt() {
             self.rate_step = self.rate_gains.step_with_integral(dt);
         }
@@ -92,13 +100,22 @@ impl Controller {
 
     /// Returns whether style, centre and amplitude rest on their targets.
     #[inline(always)]
-    fn are_commands_settled(&self) -> bool {
+    pub(super) fn are_commands_settled(&self) -> bool {
         self.style.is_settled() && self.centre.is_settled() && self.amplitude.is_settled()
+    }
+
+    /// Advances by `dt` seconds and `h` on the clock.
+    #[inline(always)]
+    pub(super) fn substep(&mut self, dt: f64, h: f64) {
+        if self.rate_slope.is_some() {
+            return self.limited_substep(dt, h);
+        }
+        self.free_substep(dt, h);
     }
 
     /// Advances by `dt` seconds and `h` on the clock, split at u_end, where the forcing has a kink.
     #[inline(always)]
-    fn substep(&mut self, dt: f64, h: f64) {
+    pub(super) fn free_substep(&mut self, dt: f64, h: f64) {
         let Canonical::Discrete { u_end, .. } = self.primitive.canonical() else {
             return self.advance(dt, h);
         };
@@ -108,7 +125,7 @@ impl Controller {
             self.advance(dt, h);
             return self.end_goal_transition();
         }
-        let before = self.rate.integral_time(remaining / self.perturbation.phase_rate(), dt, &self.rate_gains);
+        let before = self.time_to(remaining / self.perturbation.phase_rate(), dt);
         // A remainder of rounding, where the last substep ended at u_end, is skipped.
         if remaining > ROUNDING * advance {
             let h = self.clock_step(before);
@@ -137,8 +154,7 @@ impl Controller {
 
     /// Advances the rate alone, in a pause.
     fn pause(&mut self, dt: f64) {
-        self.update_rate_step(dt);
-        self.rate.advance::<F64x4>(&self.rate_step);
+        self.advance_rate::<F64x4>(dt);
         self.perturbation.clear_terms();
         self.read_out();
     }
@@ -152,7 +168,6 @@ impl Controller {
     /// Advances by `dt` seconds and `h` > 0 on the clock, in registers of type `T`.
     #[inline(always)]
     pub(super) fn advance_with<T: Register>(&mut self, dt: f64, h: f64) {
-        self.update_rate_step(dt);
         self.update_command_steps(h);
         if h != self.propagator.step() {
             self.propagator = self.series.propagator::<T>(h);
@@ -163,9 +178,13 @@ impl Controller {
             self.change_phase_rate();
         }
         self.style.advance::<T>(&self.command_step);
-        self.rate.advance::<T>(&self.rate_step);
+        self.advance_rate::<T>(dt);
         let moving = self.centre.begin_step(&self.command_step);
-        self.clock.add(self.perturbation.phase_rate() * h);
+        let phase_step = self.perturbation.phase_rate() * h;
+        self.clock.add(phase_step);
+        if let Some(governor) = &mut self.governor {
+            governor.ahead.advance(phase_step);
+        }
         if let Canonical::Rhythmic { mu } = self.primitive.canonical() {
             self.clock.wrap();
             self.r = if self.amplitude.is_settled() {

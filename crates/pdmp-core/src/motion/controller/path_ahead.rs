@@ -1,0 +1,327 @@
+//! Path of the movement ahead, and the rates at which the limits of velocity and acceleration admit to follow it.
+//!
+//! The path under the present commands does not depend on the rate ρ of the clock. A copy of the controller samples it at
+//! knots, and a backward pass (`time_law`) computes the largest ρ at each of them from which the rest can be followed. Between
+//! knots ρ² is linear. The limits of the path are slightly tighter than those of the DoFs, so that what lies between knots, and
+//! the last digits of the tick, keep the latter.
+
+use super::Controller;
+use super::governor::MARGINS;
+use super::group::Group;
+use super::step::first_element;
+use crate::dynamics::canonical::Canonical;
+use crate::error::Result;
+use crate::kind::Kind;
+use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, max_constant};
+use crate::motion::viability::Bounds;
+use crate::numerics::simd::F64x4;
+use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
+
+/// Number of intervals of the path. Learnt from recordings, y″ between the knots is within 1 % of its maximum.
+const N_INTERVALS: usize = 640;
+/// Number of intervals of a whole movement or period; past the end of a discrete movement are the others.
+const N_MOVEMENT: usize = 512;
+/// Number of intervals after which a path that was left is sampled again.
+const REFRESH: f64 = 8.0;
+/// Clock between the knots on both sides of the end, where y″ is not continuous, relative to the clock until then.
+const KINK: f64 = 1e-6;
+/// Margins of the acceleration at a tick: smaller than that of the path, so that the path can be followed.
+const TICK_MARGINS: [f64; 2] = [0.022, 0.008];
+/// Error of the position at which a DoF turns round between knots, relative to the range.
+const TURNING: f64 = 1e-5;
+/// Clock past the end of a discrete movement, relative to its extent.
+const TAIL: f64 = 0.3;
+/// Number of periods of a rhythmic movement. The rate at the last knot is that of the slowest part; a period later it has no
+/// effect.
+const N_PERIODS: f64 = N_INTERVALS as f64 / N_MOVEMENT as f64;
+/// Part of an interval by which rounding may miss a knot.
+const ROUNDING: f64 = 1e-9;
+/// Last position in an interval, past which there is still a distance to its end.
+const LAST: f64 = 1.0 - 1e-6;
+/// Maximum ωh of a substep of the path during a transition of commands; the path then deviates by 1e-5 of the change.
+const MAX_TRANSITION_STEP: f64 = 14.0;
+
+/// Path ahead, with the largest ρ² at its knots.
+#[derive(Debug)]
+pub(super) struct PathAhead {
+    path: SampledPath,
+    curve: RateCurve,
+    /// Largest ρ² that can be kept constant from each interval on for the longest substep.
+    constant: Vec<f64>,
+    pieces: [Piece; 2],
+    /// Clock of the phase since the path was sampled.
+    progress: f64,
+    /// False once a perturbation or a limit has moved the movement off the path.
+    is_current: bool,
+}
+
+clone_in_place!(PathAhead { path, curve, constant, pieces, progress, is_current });
+
+/// Position of a movement on its path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PathPosition {
+    progress: f64,
+    is_current: bool,
+}
+
+impl PathPosition {
+    /// Visits the state.
+    pub(super) fn walk(&mut self, visit: &mut Visitor) -> Result<()> {
+        visit_number(visit, &mut self.progress, [0.0, 1e300])?;
+        visit_flag(visit, &mut self.is_current)
+    }
+}
+
+impl PathAhead {
+    /// Returns memory for a path of groups of DoFs.
+    pub(super) fn new(n_groups: usize) -> Self {
+        Self {
+            path: SampledPath::at(vec![0.0; N_INTERVALS + 1], n_groups),
+            curve: RateCurve::new(N_INTERVALS + 1, n_groups),
+            constant: vec![0.0; N_INTERVALS + 1],
+            pieces: [Piece::default(); 2],
+            progress: 0.0,
+            is_current: false,
+        }
+    }
+
+    /// Samples the path of a controller by a copy of it.
+    pub(super) fn compute(&mut self, controller: &Controller, sampler: &mut Controller, limits: &[RateLimits]) {
+        sampler.clone_from(controller);
+        self.pieces = controller.pieces();
+        for Piece { first, start, interval } in self.pieces {
+            for (i, knot) in self.path.clock[first..].iter_mut().enumerate() {
+                *knot = start + interval * i as f64;
+            }
+        }
+        let longest = self.pieces[0].interval.max(self.pieces[1].interval);
+        sampler.max_clock_step = longest * (1.0 + 1e-9);
+        sampler.sample_path(&mut self.path);
+        for (i, constant) in self.constant.iter_mut().enumerate() {
+            let interval = i.min(N_INTERVALS - 1);
+            let here = max_constant(self.path.within(interval, (i - interval) as f64), limits);
+            *constant = here.min(max_constant(self.path.within(interval, 0.5), limits));
+        }
+        let rhythmic = controller.primitive.kind() == Kind::Rhythmic;
+        let end = if rhythmic { self.constant.iter().copied().fold(f64::INFINITY, f64::min) } else { f64::INFINITY };
+        self.curve.compute(&self.path, limits, end, controller.max_rate().powi(2));
+        self.constant.iter_mut().zip(&self.curve.max).for_each(|(constant, max)| *constant = constant.min(*max));
+        for i in 0..self.constant.len() {
+            let end = self.path.clock[i] + controller.max_clock_step;
+            let within =
+                (i + 1..self.constant.len()).take_while(|k| self.path.clock[k - 1] <= end + self.path.interval(i));
+            self.constant[i] = within.fold(self.constant[i], |least, k| least.min(self.constant[k]));
+        }
+        (self.progress, self.is_current) = (0.0, true);
+    }
+
+    /// Returns the largest distance of the rest of the path beyond the limits of the position, relative to the ranges.
+    pub(super) fn distance_outside(&self, bounds: &[Bounds], groups: &[Group]) -> f64 {
+        let (first, _) = self.locate(self.progress);
+        let mut farthest = F64x4::ZERO;
+        for knot in first..N_INTERVALS {
+            let interval = self.path.interval(knot);
+            let samples = self.path.knot(knot).iter().zip(self.path.knot(knot + 1));
+            for ((([y, slope, _], [next, next_slope, _]), bounds), group) in samples.zip(bounds).zip(groups) {
+                let outside = |y: F64x4| (y - bounds.upper).max(bounds.lower - y) / group.range;
+                farthest = farthest.max(outside(*next));
+                let turns = (*slope * *next_slope).simd_lt(F64x4::ZERO);
+                if turns.any() {
+                    let turning = *y + *slope * *slope / (*slope - *next_slope) * (0.5 * interval);
+                    farthest = farthest.max(turns.select(outside(turning) + TURNING, F64x4::ZERO));
+                }
+            }
+        }
+        farthest.to_array().into_iter().fold(0.0, f64::max)
+    }
+
+    /// Returns the interval that contains a progress, and the position in it from 0 to 1, past the end that at its end.
+    #[inline(always)]
+    fn locate(&self, progress: f64) -> (usize, f64) {
+        let piece = &self.pieces[usize::from(progress >= self.pieces[1].start * (1.0 - ROUNDING))];
+        let position = (progress - piece.start) / piece.interval + ROUNDING;
+        let index = (position as usize).min(N_INTERVALS - 1 - piece.first);
+        (piece.first + index, (position - index as f64).min(LAST))
+    }
+
+    /// Returns whether the rate of square `x` can be kept constant from the present clock on.
+    #[inline(always)]
+    pub(super) fn admits_constant(&self, x: f64) -> bool {
+        x <= self.constant[self.locate(self.progress).0]
+    }
+
+    /// Returns the largest ρ² at the present clock.
+    pub(super) fn max(&self) -> f64 {
+        let (index, t) = self.locate(self.progress);
+        self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t
+    }
+
+    /// Returns the clock until the next knot, infinity past the last one.
+    #[inline(always)]
+    pub(super) fn rest(&self) -> f64 {
+        let (index, _) = self.locate(self.progress);
+        let rest = self.path.clock[index + 1] - self.progress;
+        if rest > 0.0 { rest } else { f64::INFINITY }
+    }
+
+    /// Returns the smallest and the largest constant ρ̇ to the end of the interval, for ρ² = `x` now, that keep the limits in the
+    /// quarters of the interval and arrive below the curve.
+    pub(super) fn slopes(&self, x: f64, limits: &[RateLimits]) -> [f64; 2] {
+        let (index, t) = self.locate(self.progress);
+        self.slopes_within(index, t, x, limits)
+    }
+
+    /// Returns the slopes as [`PathAhead::slopes`] at the next knot, for ρ² = `x` there.
+    pub(super) fn next_slopes(&self, x: f64, limits: &[RateLimits]) -> [f64; 2] {
+        let (index, _) = self.locate(self.progress);
+        self.slopes_within((index + 1).min(N_INTERVALS - 1), 0.0, x, limits)
+    }
+
+    fn slopes_within(&self, index: usize, t: f64, x: f64, limits: &[RateLimits]) -> [f64; 2] {
+        let infinity = F64x4::splat(f64::INFINITY);
+        let (mut least, mut most) = (-infinity, infinity);
+        let interval = self.path.interval(index);
+        let mut limit_at = |position: f64| {
+            let since = (position - t) * interval;
+            for ([slope, bend], limits) in self.path.within(index, position).zip(limits) {
+                // Near a reversal, where y″ρ² alone reaches the tighter limit, ρ̇ has no effect and must not be driven by it.
+                let [tight, wide] =
+                    TICK_MARGINS.map(|margin| limits.acceleration * ((1.0 - margin) / (1.0 - MARGINS[1])));
+                let (acceleration, inverse) =
+                    ((bend * x).abs().max(tight).min(wide), F64x4::ONE / (slope + bend * (2.0 * since)));
+                let (centre, half) = (-bend * x * inverse, acceleration * inverse.abs());
+                least = least.max(centre - half);
+                most = most.min(centre + half);
+                // At the present clock the velocity does not depend on ρ̇.
+                if since > 0.0 {
+                    let rate = limits.velocity / slope.abs();
+                    let rest = (rate * rate - x) * 0.5;
+                    most = most.min((rest * since.recip()).max(rest * interval.recip()));
+                }
+            }
+        };
+        limit_at(t);
+        [0.25, 0.5, 0.75, 1.0].into_iter().filter(|position| *position > t + ROUNDING).for_each(&mut limit_at);
+        // A rate above the curve, by what the margins allow, returns over an interval even shortly before a knot.
+        let change = self.curve.max[index + 1] - self.curve.max[index];
+        let gap = self.curve.max[index] + change * t - x;
+        let arrival = 0.5 * (change + gap / if gap < 0.0 { 1.0 } else { 1.0 - t }) / interval;
+        [
+            least.to_array().into_iter().fold(f64::NEG_INFINITY, f64::max),
+            most.to_array().into_iter().fold(arrival, f64::min),
+        ]
+    }
+
+    /// Adds a clock interval of the phase.
+    #[inline(always)]
+    pub(super) fn advance(&mut self, h: f64) {
+        self.progress += h;
+    }
+
+    /// Marks the path as left.
+    pub(super) fn leave(&mut self) {
+        self.is_current = false;
+    }
+
+    /// Returns whether the path has to be sampled again: when it was left, or at a third of a rhythmic one.
+    pub(super) fn is_due(&self, rhythmic: bool) -> bool {
+        self.has_progressed() && (!self.is_current || (rhythmic && 3.0 * self.intervals() >= N_INTERVALS as f64))
+    }
+
+    /// Returns whether enough of the path has passed for a new attempt.
+    pub(super) fn has_progressed(&self) -> bool {
+        self.intervals() >= REFRESH
+    }
+
+    fn intervals(&self) -> f64 {
+        self.progress / self.pieces[0].interval
+    }
+
+    /// Returns the position of the movement.
+    pub(super) fn position(&self) -> PathPosition {
+        PathPosition { progress: self.progress, is_current: self.is_current }
+    }
+
+    /// Sets the position of the movement.
+    pub(super) fn set_position(&mut self, PathPosition { progress, is_current }: PathPosition) {
+        (self.progress, self.is_current) = (progress, is_current);
+    }
+}
+
+/// Equidistant knots of a piece of the path.
+#[derive(Clone, Copy, Debug, Default)]
+struct Piece {
+    first: usize,
+    /// Clock of the first knot.
+    start: f64,
+    interval: f64,
+}
+
+impl Piece {
+    /// Piece without knots.
+    const NONE: Self = Self { first: N_INTERVALS + 1, start: f64::INFINITY, interval: 0.0 };
+}
+
+impl Controller {
+    /// Returns the pieces of the path ahead: up to the end of a discrete movement and past it.
+    fn pieces(&self) -> [Piece; 2] {
+        let extent = self.primitive.canonical().extent();
+        let Canonical::Discrete { u_end, .. } = self.primitive.canonical() else {
+            let interval = N_PERIODS * extent / N_INTERVALS as f64;
+            return [Piece { first: 0, start: 0.0, interval }, Piece::NONE];
+        };
+        let (rest, end) = (u_end - self.clock.value(), self.goal_transition.end() - self.clock.value());
+        let end = if self.goal_transition.is_active() { end } else { 0.0 };
+        let tail = end.max(rest).max(0.0) - rest.max(0.0) + TAIL * extent;
+        if rest <= KINK * extent {
+            let interval = tail / N_INTERVALS as f64;
+            return [Piece { first: 0, start: 0.0, interval }, Piece::NONE];
+        }
+        let n = (rest / extent * N_MOVEMENT as f64).ceil().clamp(1.0, N_MOVEMENT as f64) as usize;
+        let n_tail = N_INTERVALS - n - 1;
+        [
+            Piece { first: 0, start: 0.0, interval: rest * (1.0 - KINK) / n as f64 },
+            Piece { first: n + 1, start: rest, interval: tail / n_tail as f64 },
+        ]
+    }
+
+    /// Samples y, y′ and y″ under the present commands at the knots of a path, which begins at the present clock.
+    pub(crate) fn sample_path(&mut self, path: &mut SampledPath) {
+        self.release();
+        // At the rate 1 the derivatives with respect to the clock are those with respect to time.
+        self.rate.reset(&[1.0]);
+        self.read_out();
+        let n_groups = self.groups.len();
+        let mut u = path.clock[0];
+        for (knot, samples) in path.clock.iter().zip(path.samples.chunks_exact_mut(n_groups)) {
+            let h = knot - u;
+            if h > 0.0 {
+                self.follow_path(h);
+            }
+            for (group, sample) in samples.iter_mut().enumerate() {
+                *sample = [self.position[group], self.velocity[group], self.acceleration[group]];
+            }
+            u = *knot;
+        }
+    }
+
+    /// Advances by `h` on the clock at the rate 1.
+    fn follow_path(&mut self, h: f64) {
+        let mut n_substeps = h / self.max_clock_step;
+        if !self.are_commands_settled() {
+            n_substeps = n_substeps.max(self.command_gains.substeps(h) / MAX_TRANSITION_STEP);
+        }
+        let n_substeps = n_substeps.ceil().max(1.0);
+        for _ in 0..n_substeps as u32 {
+            self.substep(h / n_substeps, h / n_substeps);
+            if self.approaching && !self.style.is_settled() {
+                self.correct_arrival();
+            }
+        }
+    }
+
+    /// Returns the rate above which none is needed: the commanded one, or that of an unlimited speed.
+    pub(super) fn max_rate(&self) -> f64 {
+        first_element(self.rate.target()).max(super::MAX_SPEED / self.primitive.tau())
+    }
+}
