@@ -52,15 +52,8 @@ pub(crate) enum CommandLoad {
 }
 
 impl CommandLoad {
-    pub(crate) const ALL: [Self; 7] = [
-        Self::Settled,
-        Self::InTransition,
-        Self::Commanded,
-        Self::Limited,
-        Self::Slowed,
-        Self::Bound,
-        Self::Governed,
-    ];
+    pub(crate) const ALL: [Self; 7] =
+        [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited, Self::Slowed, Self::Bound, Self::Governed];
 
     pub(crate) fn name(self) -> &'static str {
         match self {

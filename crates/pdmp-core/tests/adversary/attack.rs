@@ -63,6 +63,7 @@ impl Attack {
             let mut limits = self.settings.limits(controller, &mut self.random);
             if attempt > 10 {
                 limits.acceleration = None;
+                limits.jerk = None;
             }
             if self.random.chance(0.05) {
                 limits = Limits::default();

@@ -1,8 +1,8 @@
 //! Judgement of the published motion.
 //!
-//! For each DoF with limits l ≤ y ≤ u, |ẏ| ≤ V, |ÿ| ≤ A the oracle follows quantities that no permitted motion increases
+//! For each DoF with limits l ≤ y ≤ u, |ẏ| ≤ V, |ÿ| ≤ A, |y⃛| ≤ J the oracle follows quantities that no permitted motion increases
 //! above zero, and that a motion which starts above may only decrease: the speed in excess of V, and the distances beyond u and
-//! l at which the DoF would come to rest under A. The violation of a tick is the rise above the smallest value since the limits
+//! l at which the DoF would come to rest under A and J. The violation of a tick is the rise above the smallest value since the limits
 //! changed, or above zero.
 
 use pdmp_core::Controller;
@@ -29,6 +29,8 @@ pub(crate) enum Property {
     Consistency,
     /// |ÿ| as published, relative to A.
     Published,
+    /// |Δÿ|/Δt, beyond the last digits of ÿ, relative to J.
+    Jerk,
     /// Time until a DoF outside has come back, beyond four times that of braking and returning, relative to it.
     Return,
     /// Goal or anchor in force, relative to u − l.
@@ -40,7 +42,7 @@ pub(crate) enum Property {
 }
 
 impl Property {
-    pub(crate) const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 13] = [
         Self::Position,
         Self::Between,
         Self::Stop,
@@ -49,6 +51,7 @@ impl Property {
         Self::MeanVelocity,
         Self::Consistency,
         Self::Published,
+        Self::Jerk,
         Self::Return,
         Self::Goal,
         Self::Call,
@@ -65,6 +68,7 @@ impl Property {
             Self::MeanVelocity => "mean velocity of a tick",
             Self::Consistency => "position beside velocity",
             Self::Published => "published acceleration",
+            Self::Jerk => "jerk",
             Self::Return => "time of return",
             Self::Goal => "goal in force",
             Self::Call => "position after a command",
@@ -89,8 +93,8 @@ pub(crate) struct Findings {
     pub(crate) joint_ticks: usize,
     /// Joint-ticks outside the limits.
     pub(crate) outside: usize,
-    /// Joint-ticks limited by position, velocity and acceleration.
-    pub(crate) limited: [usize; 3],
+    /// Joint-ticks limited by position, velocity, acceleration and jerk.
+    pub(crate) limited: [usize; 4],
     pub(crate) not_finite: usize,
 }
 
@@ -101,6 +105,7 @@ struct Dof {
     upper: f64,
     velocity: f64,
     acceleration: f64,
+    jerk: f64,
     /// Deceleration with which a DoF can stop inside in ticks of the default length: min(A, V/2Δt, (u − l)/Δt²).
     braking: f64,
     /// Default length of a tick.
@@ -110,10 +115,49 @@ struct Dof {
     demonstrated_range: f64,
     y: f64,
     v: f64,
+    a: f64,
     /// Smallest excesses since the limits changed: of the speed, and beyond the upper and the lower limit.
     excess: [f64; 3],
     /// Time outside, and the time allowed for it.
     time: [f64; 2],
+}
+
+/// Fastest motion to rest within limits of acceleration and jerk.
+struct Stop {
+    /// Least and greatest displacement.
+    least: f64,
+    greatest: f64,
+    /// Largest speed.
+    peak: f64,
+}
+
+impl Stop {
+    /// Returns the motion from a velocity and an acceleration whose magnitude is `most` at most.
+    fn new(v: f64, a: f64, most: f64, jerk: f64) -> Self {
+        // The velocity at which the acceleration would vanish gives the direction of the motion.
+        let sign = if v + a * a.abs() / (2.0 * jerk) < 0.0 { -1.0 } else { 1.0 };
+        let (start, rise) = (sign * v, sign * a);
+        let deepest = (jerk * start + 0.5 * rise * rise).max(0.0).sqrt().min(most);
+        let hold = (start + (0.5 * rise * rise - deepest * deepest) / jerk) / deepest;
+        let phases =
+            [((rise + deepest) / jerk, -jerk), (if deepest > 0.0 { hold } else { 0.0 }, 0.0), (deepest / jerk, jerk)];
+        let (mut y, mut speed, mut change) = (0.0, start, rise);
+        for (t, jerk) in phases.map(|(t, jerk)| (t.max(0.0), jerk)) {
+            y += t * (speed + t * (0.5 * change + t * jerk / 6.0));
+            speed += t * (change + 0.5 * t * jerk);
+            change += t * jerk;
+        }
+        // A DoF that accelerates against its velocity turns round first.
+        let back = if start < 0.0 {
+            let t = -2.0 * start / (rise + (rise * rise + 2.0 * jerk * start).max(0.0).sqrt());
+            t * (start + t * (0.5 * rise - t * jerk / 6.0))
+        } else {
+            0.0
+        };
+        let ends = [sign * back, sign * y.max(0.0)];
+        let coasting = if rise > 0.0 { start + rise * rise / (2.0 * jerk) } else { start };
+        Self { least: ends[0].min(ends[1]), greatest: ends[0].max(ends[1]), peak: v.abs().max(coasting.abs()) }
+    }
 }
 
 /// Judge of one case.
@@ -131,18 +175,28 @@ pub(crate) struct Oracle {
 
 impl Dof {
     /// Returns the excesses of a state: of the speed, and of the point of rest beyond the upper and the lower limit.
-    fn excess(&self, y: f64, v: f64) -> [f64; 3] {
+    fn excess(&self, y: f64, v: f64, a: f64) -> [f64; 3] {
+        if self.has_jerk() {
+            let Stop { least, greatest, peak } = Stop::new(v, a, self.acceleration, self.jerk);
+            return [peak - self.velocity, y + greatest - self.upper, self.lower - (y + least)].map(|x| x.max(0.0));
+        }
         let way = v * v / (2.0 * self.braking);
         let above = if v > 0.0 { y - self.upper + way } else { y - self.upper };
         let below = if v < 0.0 { self.lower - y + way } else { self.lower - y };
         [v.abs() - self.velocity, above, below].map(|excess| excess.max(0.0))
     }
 
+    fn has_jerk(&self) -> bool {
+        self.jerk.is_finite()
+    }
+
     /// Sets the state without judging it.
-    fn set(&mut self, y: f64, v: f64) {
-        (self.y, self.v) = (y, v);
-        self.excess = self.excess(y, v);
-        if self.braking < self.acceleration || self.acceleration.is_infinite() {
+    fn set(&mut self, y: f64, v: f64, a: f64) {
+        (self.y, self.v, self.a) = (y, v, a);
+        self.excess = self.excess(y, v, a);
+        if self.has_jerk() {
+            // It does not brake less in long ticks.
+        } else if self.braking < self.acceleration || self.acceleration.is_infinite() {
             let way = 0.5 * v.abs() * self.dt;
             let [above, below] = [y + way - self.upper, self.lower - (y - way)];
             self.excess[1] = if v > 0.0 { self.excess[1].max(above) } else { self.excess[1] };
@@ -150,7 +204,8 @@ impl Dof {
         }
         let beyond = self.excess[1].max(self.excess[2]);
         let (a, speed) = (self.braking, self.velocity);
-        self.time = [0.0, 4.0 * (v.abs() / a + 2.0 * (2.0 * beyond / a).sqrt() + beyond / speed)];
+        let reversal = if self.has_jerk() { 2.0 * self.acceleration / self.jerk } else { 0.0 };
+        self.time = [0.0, 4.0 * (v.abs() / a + 2.0 * (2.0 * beyond / a).sqrt() + beyond / speed + reversal)];
     }
 
     fn is_outside(&self) -> bool {
@@ -181,12 +236,14 @@ impl Oracle {
             upper: infinity,
             velocity: infinity,
             acceleration: infinity,
+            jerk: infinity,
             braking: infinity,
             dt: 0.0,
             range: *range,
             demonstrated_range: if *range > 0.0 { *range } else { 1.0 },
             y: 0.0,
             v: 0.0,
+            a: 0.0,
             excess: [0.0; 3],
             time: [0.0; 2],
         };
@@ -248,13 +305,14 @@ impl Oracle {
         // Inside, the position has no roundings to spare.
         let inside = 1e-9 * dof.range;
         let beyond = |excess: f64, k: usize| if dof.excess[k] > inside { rise(excess, k) } else { excess };
-        let excess = dof.excess(y, v);
+        let excess = dof.excess(y, v, a);
         // Where the point of rest was outside, the position may go as far.
         let [above, below] = [(y - dof.upper).max(0.0), (dof.lower - y).max(0.0)];
         // From outside, a DoF whose limits of velocity and position allow less than A in a tick stops within one, and one that
         // turns round brakes less than with A, as it then returns.
         let is_outside = dof.excess[1].max(dof.excess[2]) > inside;
-        let is_unbraked = dof.braking < dof.acceleration || dof.acceleration.is_infinite() || dof.v * v < 0.0;
+        let is_unbraked =
+            !dof.has_jerk() && (dof.braking < dof.acceleration || dof.acceleration.is_infinite() || dof.v * v < 0.0);
         let grace = if is_outside && is_unbraked { 0.5 * dof.v.abs() * dt } else { 0.0 };
         // Roundings of the position add up while a DoF brakes; those of one tick are allowed for.
         let digits = 16.0 * f64::EPSILON * (y.abs() + dt * dof.v.abs());
@@ -269,7 +327,9 @@ impl Oracle {
         for turning in turning_points(y - dof.y, dof.v, v, dt) {
             let above = turning - (dof.upper - dof.y) - dof.excess[1];
             let below = (dof.lower - dof.y) - turning - dof.excess[2];
-            self.note(Property::Between, index, dt, (above.max(below) - digits - grace) / dof.scale());
+            // A limited jerk may end within a tick, and the cubic then differs from the motion.
+            let deviation = if dof.has_jerk() { dof.jerk * dt * dt * dt / 150.0 } else { 0.0 };
+            self.note(Property::Between, index, dt, (above.max(below) - digits - grace - deviation) / dof.scale());
         }
         let digit = f64::EPSILON * v.abs().max(dof.v.abs());
         let step = dof.acceleration * dt;
@@ -285,8 +345,12 @@ impl Oracle {
         let digit = 2.0 * f64::EPSILON * (y.abs() + dt * v.abs());
         self.note(Property::Consistency, index, dt, (way.abs() - free - digit) / dof.scale());
         self.note(Property::Published, index, dt, a.abs() / dof.acceleration - 1.0);
+        if dof.has_jerk() {
+            let (step, digits) = (dof.jerk * dt, 2.0 * f64::EPSILON * a.abs().max(dof.a.abs()));
+            self.note(Property::Jerk, index, dt, ((a - dof.a).abs() - step - digits) / step);
+        }
         let dof = &mut self.dofs[index];
-        (dof.y, dof.v) = (y, v);
+        (dof.y, dof.v, dof.a) = (y, v, a);
         dof.excess[0] = dof.excess[0].min(excess[0]);
         for (least, excess) in dof.excess.iter_mut().zip(excess).skip(1) {
             *least = if grace > 0.0 { excess } else { least.min(excess).max(excess.min(*least + digits)) };
@@ -310,28 +374,36 @@ impl Observer for Oracle {
             let of = |vector: &Option<Vec<f64>>, none: f64| vector.as_ref().map_or(none, |vector| vector[index]);
             (dof.lower, dof.upper) = (of(&limits.lower, -infinity), of(&limits.upper, infinity));
             (dof.velocity, dof.acceleration) = (of(&limits.velocity, infinity), of(&limits.acceleration, infinity));
+            dof.jerk = of(&limits.jerk, infinity);
             dof.range = dof.upper - dof.lower;
             dof.dt = controller.dt();
-            let within_tick = (0.5 * dof.velocity / dof.dt).min(dof.range / (dof.dt * dof.dt));
+            let within_tick = if dof.has_jerk() {
+                infinity
+            } else {
+                (0.5 * dof.velocity / dof.dt).min(dof.range / (dof.dt * dof.dt))
+            };
             dof.braking = dof.acceleration.min(within_tick);
             if dof.range.is_infinite() {
                 dof.range = dof.demonstrated_range;
             }
             // The state of the last tick, which limits do not change.
-            dof.set(dof.y, dof.v);
+            let a = if dof.has_jerk() { controller.acceleration()[index] } else { dof.a };
+            dof.set(dof.y, dof.v, a);
         }
         self.judge_goal(controller);
     }
 
     fn restarted(&mut self, controller: &Controller) {
-        for (dof, (y, v)) in self.dofs.iter_mut().zip(controller.position().iter().zip(controller.velocity())) {
-            dof.set(*y, *v);
+        let motion = controller.position().iter().zip(controller.velocity()).zip(controller.acceleration());
+        for (dof, ((&y, &v), &a)) in self.dofs.iter_mut().zip(motion) {
+            dof.set(y, v, a);
         }
     }
 
     fn called(&mut self, controller: &Controller, command: &'static str) {
         self.command = command;
-        for (index, (&y, &v)) in controller.position().iter().zip(controller.velocity()).enumerate() {
+        let motion = controller.position().iter().zip(controller.velocity()).zip(controller.acceleration());
+        for (index, ((&y, &v), &a)) in motion.enumerate() {
             let dof = self.dofs[index];
             if !(y.is_finite() && v.is_finite()) {
                 if self.trace && self.findings.not_finite == 0 {
@@ -341,7 +413,7 @@ impl Observer for Oracle {
                 return;
             }
             self.note(Property::Call, index, 0.0, (y - dof.y).abs() / dof.range);
-            let [speed, above, below] = dof.excess(y, v);
+            let [speed, above, below] = dof.excess(y, v, a);
             self.note(Property::CallVelocity, index, 0.0, (speed - dof.excess[0]) / dof.velocity.max(dof.excess[0]));
             let digits = 16.0 * f64::EPSILON * y.abs();
             let rise = (above - dof.excess[1]).max(below - dof.excess[2]) - digits;
@@ -362,7 +434,8 @@ impl Observer for Oracle {
             self.findings.limited[match limit {
                 Limit::Position => 0,
                 Limit::Velocity => 1,
-                _ => 2,
+                Limit::Acceleration => 2,
+                Limit::Jerk => 3,
             }] += 1;
         }
     }

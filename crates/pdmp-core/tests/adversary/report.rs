@@ -97,10 +97,10 @@ impl Report {
     pub(crate) fn print(&self) {
         let Self { cases, findings, tally, .. } = self;
         let Findings { joint_ticks, outside, limited, not_finite, .. } = findings;
-        let [position, velocity, acceleration] = limited;
+        let [position, velocity, acceleration, jerk] = limited;
         println!("{joint_ticks} joint-ticks in {cases} cases");
         println!(
-            "{} limited: {position} by position, {velocity} by velocity, {acceleration} by acceleration",
+            "{} limited: {position} by position, {velocity} by velocity, {acceleration} by acceleration, {jerk} by jerk",
             limited.iter().sum::<usize>()
         );
         println!("{outside} outside, braking or returning; {not_finite} not finite {:?}", self.not_finite);

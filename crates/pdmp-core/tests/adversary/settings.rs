@@ -35,6 +35,9 @@ const LIMITED: [[bool; 3]; 8] = [
     [false, true, false],
 ];
 
+/// Share of synchronous cases, which look ahead along the path at every command.
+const SYNCHRONOUS: f64 = 0.1;
+
 /// Disturbance of every tick of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Push {
@@ -65,6 +68,10 @@ pub(crate) struct Settings {
     /// Size of goals and perturbations, relative to the range.
     pub(crate) size: f64,
     pub(crate) push: Push,
+    /// True if a limit of the acceleration comes with one of the jerk.
+    jerk: bool,
+    /// True if limits slow all DoFs along the path.
+    synchronous: bool,
 }
 
 impl Settings {
@@ -86,6 +93,8 @@ impl Settings {
             online: if random.chance(0.5) { random.scale(1e-3, 0.1) } else { 0.0 },
             size: random.scale(0.03, 1000.0),
             push,
+            jerk: random.chance(0.3),
+            synchronous: random.chance(SYNCHRONOUS),
         }
     }
 
@@ -189,7 +198,7 @@ impl Settings {
         };
         let outside = random.chance(0.15);
         let (mut lower, mut upper) = (vec![0.0; n_dofs], vec![0.0; n_dofs]);
-        let (mut velocity, mut acceleration) = (vec![0.0; n_dofs], vec![0.0; n_dofs]);
+        let [mut velocity, mut acceleration, mut jerk] = [(); 3].map(|()| vec![0.0; n_dofs]);
         for dof in 0..n_dofs {
             let range = self.range(dof);
             // Positions have at least twelve digits within the limits.
@@ -209,15 +218,18 @@ impl Settings {
             none(&mut upper[dof], f64::INFINITY);
             none(&mut velocity[dof], f64::INFINITY);
             none(&mut acceleration[dof], f64::INFINITY);
+            jerk[dof] = acceleration[dof] / (self.model.duration() * random.scale(1e-4, 1.0));
         }
         let [position, has_velocity, has_acceleration] = self.limited;
         let mut limits = Limits {
             lower: position.then_some(lower),
             upper: position.then_some(upper),
             velocity: has_velocity.then_some(velocity),
+            synchronous: self.synchronous,
             ..Limits::default()
         };
         limits.acceleration = has_acceleration.then_some(acceleration);
+        limits.jerk = (has_acceleration && self.jerk).then_some(jerk);
         limits
     }
 }

@@ -84,6 +84,8 @@ impl Recorder {
             lower: Some((0..velocity.len()).map(|dof| self.lower[dof] - way(dof)).collect()),
             upper: Some((0..velocity.len()).map(|dof| self.upper[dof] + way(dof)).collect()),
             velocity: Some(velocity),
+            // Margins of the path ahead slow the clock before a limit binds.
+            synchronous: false,
             ..Limits::default()
         };
         limits.acceleration = Some(acceleration);
