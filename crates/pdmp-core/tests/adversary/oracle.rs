@@ -303,7 +303,8 @@ impl Oracle {
         }
         let rise = |excess: f64, k: usize| excess - dof.excess[k];
         // Inside, the position has no roundings to spare.
-        let inside = 1e-9 * dof.range;
+        // A DoF with a limited jerk approaches the limit from outside ever closer.
+        let inside = if dof.has_jerk() { 0.0 } else { 1e-9 * dof.range };
         let beyond = |excess: f64, k: usize| if dof.excess[k] > inside { rise(excess, k) } else { excess };
         let excess = dof.excess(y, v, a);
         // Where the point of rest was outside, the position may go as far.

@@ -224,9 +224,11 @@ impl Controller {
         }
         // The next tick may have any phase rate.
         let gate = Gate { phase_rate: MAX_PHASE_RATE, ..self.gate() };
+        // Limits along the path slow the clock at once.
+        let rate = self.governor.is_none().then_some(&self.rate);
         let at_once = !self.started || self.command_gains.is_immediate();
         if at_once
-            && [&self.style, &self.rate, &self.amplitude].iter().any(|command| command.value() != command.target())
+            && [&self.style, &self.amplitude].into_iter().chain(rate).any(|command| command.value() != command.target())
         {
             return Err(unsuitable("describes no state: a command that takes effect at once is in transition"));
         }
