@@ -209,7 +209,8 @@ impl Dof {
     }
 
     fn is_outside(&self) -> bool {
-        self.excess[0] > 1e-9 * self.velocity || self.excess[1].max(self.excess[2]) > 1e-9 * self.range
+        let tolerance = if self.has_jerk() { 1e-6 } else { 1e-9 };
+        self.excess[0] > tolerance * self.velocity || self.excess[1].max(self.excess[2]) > tolerance * self.range
     }
 
     /// Returns the scale of the excess of a point of rest.
@@ -335,7 +336,7 @@ impl Oracle {
         let digit = f64::EPSILON * v.abs().max(dof.v.abs());
         let step = dof.acceleration * dt;
         self.note(Property::Acceleration, index, dt, ((v - dof.v).abs() - step - digit) / step);
-        let mean = ((y - dof.y).abs() - 2.0 * f64::EPSILON * y.abs()) / dt;
+        let mean = ((y - dof.y).abs() - 6.0 * f64::EPSILON * y.abs()) / dt;
         self.note(
             Property::MeanVelocity,
             index,
