@@ -127,9 +127,9 @@ impl Controller {
         }
     }
 
-    /// Applies the limits to the tick of `dt` seconds and `h` on the clock that has just been computed.
+    /// Applies the limits to the tick of `dt` seconds and `h` on the clock that has just been computed, from ρ = `rate`.
     #[inline(always)]
-    pub(super) fn enforce_limits(&mut self, dt: f64, h: f64) {
+    pub(super) fn enforce_limits(&mut self, dt: f64, h: f64, rate: f64) {
         let mut kept_by_all = true;
         for index in 0..self.groups.len() {
             let (bounds, [y, v, _]) = (&self.limiter.bounds[index], self.limiter.before[index]);
@@ -142,7 +142,7 @@ impl Controller {
             }
         }
         if !(kept_by_all && self.limiter.is_free && self.perturbation.limited_rate() == 1.0) {
-            self.limit(dt, h);
+            self.limit(dt, h, rate);
         }
         if self.perturbation.terms().is_some() {
             self.leave_path();
@@ -185,7 +185,8 @@ impl Controller {
 
     /// Limits the DoFs that do not keep their limits over a tick of `dt` seconds and `h` on the clock.
     #[inline(never)]
-    fn limit(&mut self, dt: f64, h: f64) {
+    fn limit(&mut self, dt: f64, h: f64, rate: f64) {
+        let mut squares = [F64x4::ZERO; 2];
         self.limiter.is_free = true;
         self.limiter.limited.fill(None);
         self.leave_path();
@@ -199,6 +200,9 @@ impl Controller {
                 passed = kept | self.limiter.jerk_limited(index);
             }
             self.limiter.excess[index] = F64x4::ZERO;
+            let scale = F64x4::ONE / self.groups[index].range;
+            let wanted_rate = wanted[1] * scale;
+            squares[0] += wanted_rate * wanted_rate;
             if !kept.all() {
                 self.limiter.is_free = false;
                 if !passed.all() {
@@ -209,9 +213,28 @@ impl Controller {
                     self.limiter.excess[index] += excess;
                 }
             }
+            let limited_rate = self.velocity[index] * scale;
+            squares[1] += limited_rate * limited_rate;
         }
+        self.hold_rate(rate, squares.map(F64x4::reduce_add));
         let Attractor { alpha_z, beta_z } = self.primitive.attractor();
         self.perturbation.set_excess(self.limiter.excess.iter().copied(), h * (alpha_z * beta_z).sqrt());
+    }
+
+    /// Raises a rate that has fallen over a tick from `start`, with the same velocities, for the squares of the wanted velocities
+    /// and the limited ones: it falls no faster than these.
+    ///
+    /// Otherwise y′ = ẏ/ρ would grow, and the velocity as soon as the rate rises again.
+    fn hold_rate(&mut self, start: f64, [wanted, limited]: [f64; 2]) {
+        let rate = first_element(self.rate.value()).max(MIN_RATE / self.primitive.tau());
+        let held = start.min(rate * (limited / wanted).sqrt());
+        if !(held > rate) {
+            return;
+        }
+        for (group, velocity) in self.groups.iter_mut().zip(&self.velocity) {
+            group.z += *velocity * (held.recip() - rate.recip());
+        }
+        self.rate.start(held, &self.rate_gains);
     }
 
     /// Limits the DoFs of a group that are not `kept`, and returns the excess δ of those whose velocity or acceleration is

@@ -34,6 +34,7 @@ impl Controller {
     /// Performs one tick of `dt` seconds and `h` on the clock, in substeps that cubics describe.
     pub(super) fn tick(&mut self, dt: f64, h: f64) -> Status {
         self.started = true;
+        let rate = first_element(self.rate.value());
         let mut substeps = h / self.max_clock_step;
         if !self.are_commands_settled() {
             substeps = substeps.max(self.command_gains.substeps(h));
@@ -52,7 +53,7 @@ impl Controller {
         }
         self.time.add(dt);
         if self.limiter.is_active() {
-            self.enforce_limits(dt, h);
+            self.enforce_limits(dt, h, rate);
         }
         // The style's transition and perturbations change the arrival that the final velocity compensates for.
         if self.approaching && !(self.style.is_settled() && self.perturbation.terms().is_none()) {
