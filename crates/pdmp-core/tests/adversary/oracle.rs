@@ -362,7 +362,9 @@ impl Oracle {
             let dof = &mut self.dofs[index];
             dof.time[0] += dt;
             let [time, allowed] = dof.time;
-            if dof.acceleration.is_finite() && allowed > 0.0 && time > allowed + 10.0 * dt {
+            // A limited jerk returns in ticks of the default length.
+            let tick = if dof.has_jerk() { dof.dt } else { dt };
+            if dof.acceleration.is_finite() && allowed > 0.0 && time > allowed + 10.0 * tick {
                 self.note(Property::Return, index, dt, time / allowed - 1.0);
             }
         }

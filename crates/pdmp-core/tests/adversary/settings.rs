@@ -36,7 +36,7 @@ const LIMITED: [[bool; 3]; 8] = [
 ];
 
 /// Share of synchronous cases, which look ahead along the path at every command.
-const SYNCHRONOUS: f64 = 1.0;
+const SYNCHRONOUS: f64 = 0.02;
 
 /// Disturbance of every tick of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
