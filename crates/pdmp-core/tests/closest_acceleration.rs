@@ -129,6 +129,7 @@ fn limited_tick_takes_the_closest_acceleration() {
             lower: vector(&|d| -joint(d).range),
             upper: Some(vec![0.0]),
             velocity: vector(&|d| joint(d).velocity),
+            synchronous: false,
             ..Limits::default()
         };
         limits.acceleration = vector(&|d| joint(d).acceleration);

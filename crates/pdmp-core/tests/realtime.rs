@@ -41,6 +41,7 @@ impl Loop {
         let mut tight = Limits { lower: share(-0.3), upper: share(0.6), velocity: share(1.0), ..Limits::default() };
         tight.acceleration = share(5.0);
         tight.jerk = share(200.0);
+        tight.synchronous = false;
         let mut other = Limits { upper: share(5.0), ..Limits::default() };
         other.acceleration = share(100.0);
         other.synchronous = false;
