@@ -228,7 +228,7 @@ impl Controller {
     fn hold_rate(&mut self, start: f64, [wanted, limited]: [f64; 2]) {
         let rate = first_element(self.rate.value()).max(MIN_RATE / self.primitive.tau());
         let held = start.min(rate * (limited / wanted).sqrt());
-        if !(held > rate) {
+        if held <= rate {
             return;
         }
         for (group, velocity) in self.groups.iter_mut().zip(&self.velocity) {
