@@ -25,7 +25,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport report rtsan fuzz asan licences capi header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots report rtsan fuzz asan licences capi header stubs \
 	clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -67,6 +67,9 @@ bench-bases: .venv/with-demo  ## How well each basis reproduces and predicts the
 
 bench-transport: .venv/with-demo  ## Transport to other goals and the end of movements, on the recordings in PDMP_DATA
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m transport
+
+bench-robots: .venv/with-reproduction  ## Simulated robots under random commands within their limits, on the recordings in PDMP_DATA
+	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m robots
 
 report: .venv/with-test  ## Errors of predictions from contexts, on the recordings in PDMP_DATA; figures into out/report/
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report

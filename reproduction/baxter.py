@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import pdmp
+
 Array = NDArray[np.float64]
 
 JOINTS = ("s0", "s1", "e0", "e1")
@@ -27,12 +29,14 @@ Baxter's signs of the shoulder pitch and the elbow flexion are opposite to those
 these signs the printed goal places the hand on a table in front of the body, with a swivel angle
 within 15° of that of people; no other combination of signs does so within the joint limits.
 """
+ACCELERATION = 5.0
+"""Limit of the acceleration of each joint [rad/s²]; the maker publishes none."""
 MOUTH = np.array([0.20, 0.0, 0.55])
 """Position of a mouth, below Baxter's screen [m]."""
 
 
-def mjcf() -> Path:
-    """Returns the path of the model file.
+def mjcf(robot: str = "baxter") -> Path:
+    """Returns the path of the model file of a robot.
 
     Raises
     ------
@@ -44,7 +48,7 @@ def mjcf() -> Path:
         raise ImportError(
             "the model of the robot is not installed: pip install --no-deps robosuite==1.5.2"
         )
-    return Path(package.origin).parent / "models" / "assets" / "robots" / "baxter" / "robot.xml"
+    return Path(package.origin).parent / "models" / "assets" / "robots" / robot / "robot.xml"
 
 
 def engine() -> Any:
@@ -73,15 +77,27 @@ def engine() -> Any:
     return mujoco
 
 
-def specification() -> Any:
-    """Returns the model as a `mujoco.MjSpec`, to which bodies can be added.
+def specification(robot: str = "baxter") -> Any:
+    """Returns the model of a robot as a `mujoco.MjSpec`, to which bodies can be added.
 
     Raises
     ------
     ImportError
         MuJoCo or the model is not installed.
     """
-    return engine().MjSpec.from_file(str(mjcf()))
+    return engine().MjSpec.from_file(str(mjcf(robot)))
+
+
+def limits(*sides: str) -> pdmp.Limits:
+    """Returns the limits of the joints of some arms, (4,) for each, with the signs of `DIRECTIONS`.
+
+    Those of position and velocity are published, that of the acceleration is `ACCELERATION`.
+    """
+    published = pdmp.robots.REGISTRY["baxter"].limits(JOINTS)
+    assert published.position is not None and published.velocity is not None
+    ends = np.concatenate([DIRECTIONS[side] * published.position for side in sides], axis=1)
+    velocity = np.tile(published.velocity, len(sides))
+    return pdmp.Limits((ends.min(axis=0), ends.max(axis=0)), velocity, ACCELERATION)
 
 
 class UnreachableError(ValueError):

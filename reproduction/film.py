@@ -11,8 +11,9 @@ import numpy as np
 
 from pdmp.plot.canvas import ensure_figure
 from reproduction.baxter import engine
-from reproduction.robot import DT, Robot
+from reproduction.robot import Robot
 from reproduction.section import Section
+from reproduction.torques import DT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

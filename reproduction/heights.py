@@ -12,7 +12,7 @@ import pdmp
 from pdmp._markdown import markdown_table
 from pdmp.plot.canvas import BLUE, GREY, ORANGE, PALETTE, ensure_figure, label_axes, legend
 from pdmp.preprocessing import resample
-from reproduction import paths
+from reproduction import bounded, paths
 from reproduction.loop import TAU, NewGoal, reach_over
 from reproduction.reaching import (
     CONSTANTS,
@@ -23,8 +23,9 @@ from reproduction.reaching import (
     duration_of,
     height_of,
 )
-from reproduction.robot import DT, Robot, pile
+from reproduction.robot import Robot, pile
 from reproduction.section import SEED, Section
+from reproduction.torques import DT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -131,8 +132,15 @@ def figure_4(seed: int = SEED) -> Section:
     reaching = demonstrate(seed)
     test_errors = errors(reaching)
     models = {n_styles: learn(reaching, n_styles) for n_styles in range(1, 5)}
+    styles = {
+        n_styles: {height: predicted_style(model, height) for height in TESTED}
+        for n_styles, model in models.items()
+    }
     robots_by_styles = {
-        n_styles: {height: reach_predicted(model, reaching, height) for height in TESTED}
+        n_styles: {
+            height: reach_over(model, reaching, height, style)
+            for height, style in styles[n_styles].items()
+        }
         for n_styles, model in models.items()
     }
     command = new_goal(models[3], reaching)
@@ -167,6 +175,7 @@ def figure_4(seed: int = SEED) -> Section:
             ],
             by_styles,
         ),
+        *bounded.table(models, styles, robots_by_styles, reaching),
         "Final distance to the goal with J = 3, as printed or moved during the movement:",
         markdown_table(
             ["", "as printed", "moved"],

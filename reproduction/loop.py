@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 import pdmp
 from reproduction.reaching import Reaching
-from reproduction.robot import DT, Robot, boxes
+from reproduction.robot import Robot, boxes
+from reproduction.torques import DT
 
 Array = NDArray[np.float64]
 
@@ -106,18 +107,24 @@ def reach_over(
     style: Array,
     *events: NewGoal | JointLock,
     tau: float = TAU,
+    limits: pdmp.Limits | None = None,
 ) -> Robot:
     """Drives the robot from rest over an obstacle of this height [m] with a style."""
     robot = Robot(reaching.start, reaching.task, boxes(height))
-    return drive(robot, from_rest(model, reaching, style, tau), events)
+    return drive(robot, from_rest(model, reaching, style, tau, limits), events)
 
 
 def from_rest(
-    model: pdmp.Model, reaching: Reaching, style: Array, tau: float = TAU
+    model: pdmp.Model,
+    reaching: Reaching,
+    style: Array,
+    tau: float = TAU,
+    limits: pdmp.Limits | None = None,
 ) -> pdmp.Controller:
     """Returns a controller that starts with the robot at rest and moves to the printed goal."""
     controller = model.controller(
         dt=DT,
+        limits=limits,
         style=style,
         start=reaching.start,
         velocity=np.zeros(model.n_dofs),

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from pdmp.plot.canvas import GREY, PALETTE, ensure_figure, label_axes, legend
 from reproduction.human import BOX
 from reproduction.reaching import NAMES, Reaching
-from reproduction.robot import DT, SHADES, Robot, boxes
+from reproduction.robot import SHADES, Robot, boxes
+from reproduction.torques import DT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

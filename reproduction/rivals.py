@@ -40,8 +40,9 @@ from reproduction.reaching import (
     duration_of,
     height_of,
 )
-from reproduction.robot import DT, Robot, boxes, pile
+from reproduction.robot import Robot, boxes, pile
 from reproduction.section import SEED, Section
+from reproduction.torques import DT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

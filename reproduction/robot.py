@@ -1,4 +1,4 @@
-"""Simulation of Baxter in MuJoCo with a table and movable boxes; torque control at 1 kHz."""
+"""Simulation of Baxter in MuJoCo with a table and movable boxes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from reproduction.baxter import DIRECTIONS, JOINTS, engine, specification
 from reproduction.human import BOX, HAND_HEIGHT, Task
+from reproduction.torques import DT, TorqueControlled
 
 Array = NDArray[np.float64]
 
-DT = 0.001  # s
-STIFFNESS, DAMPING = 900.0, 60.0  # per s², per s: errors vanish in 0.2 s, critically damped
-LOCK_STIFFNESS, LOCK_DAMPING = 4000.0, 100.0  # N m/rad, N m s/rad, of a locked joint
 BOX_MASS = 0.5  # kg
 TABLE = np.array([0.80, 1.10, 0.04])  # m
 RESTING_ARM = {"s0": 0.0, "s1": 0.9, "e0": 0.0, "e1": 0.6}  # rad, with Baxter's signs
@@ -47,14 +45,8 @@ class Log:
         return DT * sum(self.touching)
 
 
-class Robot:
+class Robot(TorqueControlled):
     """Baxter with one or two moving arms; the others are fixed.
-
-    The torques are those of computed torque control::
-
-        τ = M (q̈_d + 60 (q̇_d − q̇) + 900 (q_d − q)) + h(q, q̇)
-
-    within the limits of the motors.
 
     Parameters
     ----------
@@ -67,71 +59,31 @@ class Robot:
     """
 
     def __init__(self, start: ArrayLike, task: Task | None = None, n_boxes: int = 0) -> None:
-        mujoco = engine()
-        q = np.array(start, dtype=float)
-        sides = ("right", "left")[: len(q) // len(JOINTS)]
-        names = [f"{side}_{joint}" for side in sides for joint in JOINTS]
+        sides = ("right", "left")[: np.size(start) // len(JOINTS)]
         specified = specification()
-        specified.option.timestep = DT
         _add_lights(specified)
         _disable_torso_contacts(specified)
         if task is not None:
             _add_table_and_boxes(specified, task, n_boxes)
-        self._mujoco = mujoco
-        self.model = model = specified.compile()
-        self.data: Any = mujoco.MjData(model)
-        moved = [model.joint(name) for name in names]
-        self._moved = np.array([joint.qposadr[0] for joint in moved])
-        self._motors = model.actuator_trnid[:, 0]
-        # The actuated joints precede the boxes and are in the order of the motors, with one degree
-        # of freedom and one coordinate each: a single index addresses all of them.
-        self._driven = model.jnt_dofadr[self._motors]
-        self._signs = np.concatenate([DIRECTIONS[side] for side in sides])
+        resting = {
+            f"{side}_{name}": RESTING_ARM[name] for side in ("right", "left") for name in JOINTS
+        }
+        super().__init__(
+            specified,
+            [f"{side}_{joint}" for side in sides for joint in JOINTS],
+            start,
+            resting,
+            np.concatenate([DIRECTIONS[side] for side in sides]),
+        )
+        model = self.model
         self._is_box = np.array([_root(model, g).startswith("box") for g in range(model.ngeom)])
         self._is_robot = np.array([_root(model, g) == "base" for g in range(model.ngeom)])
         self._hand = model.body("right_hand").id
-        self._lock: tuple[int, float] | None = None
-        for side, joint in product(("right", "left"), JOINTS):
-            self.data.joint(f"{side}_{joint}").qpos = RESTING_ARM[joint]
-        self.data.qpos[self._moved] = self._signs * q
-        self._target = self.data.qpos[self._driven].copy()
         self.log = Log()
-        mujoco.mj_step1(model, self.data)
-
-    @property
-    def position(self) -> Array:
-        """Joint angles (D,) [rad]."""
-        return np.array(self._signs * self.data.qpos[self._moved])
-
-    def hold(self, joint: int | None) -> None:
-        """Locks the joint of this index at its position, or releases it."""
-        if joint is None:
-            self._lock = None
-            self.data.qfrc_applied[:] = 0
-        else:
-            index = int(self._moved[joint])
-            self._lock = (index, float(self.data.qpos[index]))
 
     def move(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> None:
         """Controls the arms towards a state (D,) [rad, rad/s, rad/s²] for one tick."""
-        model, data, mujoco = self.model, self.data, self._mujoco
-        target, rate, acceleration_command = self._target, np.zeros(model.nv), np.zeros(model.nv)
-        target[self._moved] = self._signs * position
-        rate[self._moved] = self._signs * velocity
-        acceleration_command[self._moved] = self._signs * acceleration
-        driven = self._driven
-        acceleration_command[driven] += STIFFNESS * (target - data.qpos[driven])
-        acceleration_command[driven] += DAMPING * (rate[driven] - data.qvel[driven])
-        torque = np.zeros(model.nv)
-        mujoco.mj_mulM(model, data, torque, acceleration_command)
-        data.ctrl[:] = np.clip((torque + data.qfrc_bias)[driven], *model.actuator_ctrlrange.T)
-        if self._lock is not None:
-            index, angle = self._lock
-            spring = LOCK_STIFFNESS * (angle - data.qpos[index])
-            data.qfrc_applied[index] = spring - LOCK_DAMPING * data.qvel[index]
-        mujoco.mj_step2(model, data)
-        # Updates kinematics and dynamics, from which the next torques are computed.
-        mujoco.mj_step1(model, data)
+        super().move(position, velocity, acceleration)
         self._write(position)
 
     def _write(self, position: ArrayLike) -> None:

@@ -17,9 +17,10 @@ from pdmp.io import read_csv
 from pdmp.plot.canvas import BLUE, ORANGE, ensure_figure, label_axes
 from pdmp.preprocessing import cycles
 from reproduction import film
-from reproduction.robot import DT, Robot
+from reproduction.robot import Robot
 from reproduction.section import SEED, Section
 from reproduction.swing import NAMES, STYLES, demonstrate
+from reproduction.torques import DT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

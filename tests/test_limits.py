@@ -370,13 +370,17 @@ SETTERS: list[tuple[str, Any]] = [
 
 @pytest.mark.parametrize(("name", "value"), SETTERS, ids=[name for name, _ in SETTERS])
 def test_a_command_between_ticks_leaves_the_limited_motion(
-    model: pdmp.Model, name: str, value: Any
+    reach: pdmp.Model, cycle: pdmp.Model, name: str, value: Any
 ) -> None:
     """Position and velocity are those of the last tick, and the next tick changes them within A."""
-    only = {"goal": "discrete", "goal_velocity": "discrete"}
-    only |= dict.fromkeys(("anchor", "amplitude", "phase"), "rhythmic")
-    if only.get(name, model.kind) != model.kind:
-        pytest.skip(f"a {model.kind} movement has no {name}")
+    only = {"goal": [reach], "goal_velocity": [reach]}
+    only |= dict.fromkeys(("anchor", "amplitude", "phase"), [cycle])
+    for model in only.get(name, [reach, cycle]):
+        check_that_no_motion_changes(model, name, value)
+
+
+def check_that_no_motion_changes(model: pdmp.Model, name: str, value: Any) -> None:
+    """Sets a property between many ticks at which limits bind."""
     controller = inside(model, BOX)
     for k, _ in enumerate(attack(controller, model, 8, 600)):
         if k % 3:
@@ -464,7 +468,6 @@ def test_a_fastest_movement_starts_and_ends_with_given_velocities(reach: pdmp.Mo
     assert use(fastest, limits) <= 1 + EXCESS
 
 
-@pytest.mark.xfail(strict=True, raises=pdmp.FitError, reason="it is reported as a failed fit")
 def test_a_start_too_fast_for_a_fastest_movement_is_refused(reach: pdmp.Model) -> None:
     """The error is that of a bad argument, and names it."""
     velocity = 0.5 * reach.rollout(dt=0.01).velocity[10]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pdmp
-from reproduction import film, heights, one_dof, rivals, styles, walking
+from reproduction import bounded, film, heights, one_dof, rivals, styles, walking
 from reproduction import swing as arms
 from reproduction.__main__ import main
 from reproduction.baxter import mjcf
@@ -17,8 +17,9 @@ from reproduction.demo import main as demo_main
 from reproduction.human import BOX, HAND_HEIGHT, minimum_jerk
 from reproduction.loop import NewGoal, from_rest, reach_over
 from reproduction.reaching import GOAL, Reaching, demonstrate, height_of
-from reproduction.robot import DT, Robot, boxes
+from reproduction.robot import Robot, boxes
 from reproduction.run import reproduce
+from reproduction.torques import DT
 
 CLOSE = 1.0  # mm
 
@@ -145,6 +146,32 @@ def test_four_boxes_are_touched_briefly(reaching: Reaching) -> None:
     assert np.min(robot.log.measured, axis=0)[3] == pytest.approx(reaching.arm.lowest[3], abs=0.01)
     assert np.min(robot.log.commanded, axis=0)[3] < reaching.arm.lowest[3] - 0.1
     assert reaching.miss(robot.log.hands[-1]) < CLOSE
+
+
+def test_limits_keep_the_command_over_four_boxes(reaching: Reaching) -> None:
+    """A controller with limits stops the elbow at its limit; the path beyond it is refused."""
+    ends = reaching.arm.lowest, reaching.arm.highest
+    np.testing.assert_allclose(bounded.ARM.position, ends, atol=5e-6)
+    model = heights.learn(reaching, 2)
+    style = heights.predicted_style(model, 0.60)
+    free = heights.reach_predicted(model, reaching, 0.60)
+    inside = bounded.reach_inside(model, reaching, 0.60, style)
+    assert bounded.beyond(free) > 0.2
+    assert bounded.beyond(inside) == 0
+    assert inside.log.tracking_error() < 0.5 * free.log.tracking_error()
+    assert reaching.miss(inside.log.hands[-1]) < CLOSE
+    assert bounded.reach_fastest(model, reaching, 0.60, style) is None
+
+
+def test_the_path_over_one_box_is_followed_as_fast_as_limits_allow(reaching: Reaching) -> None:
+    """It is faster than with any constant time constant, and clears the box like before."""
+    model = heights.learn(reaching, 3)
+    reached = bounded.reach_fastest(model, reaching, 0.15, heights.predicted_style(model, 0.15))
+    assert reached is not None
+    robot, constant = reached
+    assert len(robot.log.commanded) * DT < 0.9 * constant
+    assert bounded.beyond(robot) == 0 and robot.log.contact() == 0
+    assert robot.log.tracking_error() < 5e-3
 
 
 def test_every_style_reaches_every_goal(reaching: Reaching, learnt: pdmp.Model) -> None:
@@ -365,9 +392,13 @@ def test_commands_report_errors_in_one_line(
 
 
 def test_package_has_no_part_of_the_reproduction() -> None:
-    """No module of the package names the robot, its physics engine or the reproduction."""
+    """No module of the package names the reproduction, and only readers of limits its robot."""
     root = Path(pdmp.__file__).parent
     modules = list(root.rglob("*.py"))
     assert len(modules) > 30
-    named = re.compile("mujoco|robosuite|baxter|reproduction[./]", re.IGNORECASE)
+    readers = {root / "_limits.py", *(root / "robots").glob("*.py")}
+    named = re.compile("robosuite|reproduction[./]", re.IGNORECASE)
     assert not [path for path in modules if named.search(path.read_text(encoding="utf-8"))]
+    named = re.compile("mujoco|baxter", re.IGNORECASE)
+    others = [path for path in modules if path not in readers]
+    assert not [path for path in others if named.search(path.read_text(encoding="utf-8"))]

@@ -8,14 +8,15 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pdmp
-from pdmp.robots import REGISTRY, limits_from_mujoco, limits_from_urdf
+from pdmp import Limits
+from pdmp.robots import REGISTRY
+from reproduction.baxter import engine
 
 ARM = """<?xml version="1.0"?>
 <robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -52,6 +53,8 @@ MJCF = """<mujoco><compiler angle="{angle}"/><worldbody>
   </body></worldbody>
   <equality><joint joint1="twin" joint2="knee"/></equality>
 </mujoco>"""
+# Imported with a renderer for the tests that need one: the first import chooses it.
+mujoco = engine()
 ROBOSUITE = find_spec("robosuite")
 needs_models = pytest.mark.skipif(ROBOSUITE is None, reason="models of robosuite not installed")
 
@@ -108,6 +111,7 @@ def test_published_limits_become_limits(name: str) -> None:
     for column, limit in (
         (robot.velocity, limits.velocity),
         (robot.acceleration, limits.acceleration),
+        (robot.jerk, limits.jerk),
     ):
         if column is None:
             assert limit is None
@@ -156,12 +160,12 @@ def test_braking_inside_the_limits_of_fr3_respects_its_velocity_near_the_ends() 
 def test_published_limits_are_those_of_other_descriptions() -> None:
     """Independent descriptions of the robots have the same numbers."""
     panda = model_file("bullet_data", "panda_description", "urdf", "panda_arm.urdf")
-    limits = limits_from_urdf(panda)
+    limits = Limits.from_urdf(panda)
     np.testing.assert_array_equal(limits.position, REGISTRY["panda"].limits().position)
     np.testing.assert_array_equal(limits.velocity, REGISTRY["panda"].limits().velocity)
     baxter = model_file("bullet_data", "baxter_description", "urdf", "baxter_arm.urdf")
     for side in ("left", "right"):
-        limits = limits_from_urdf(baxter, [f"{side}_{name}" for name in REGISTRY["baxter"].joints])
+        limits = Limits.from_urdf(baxter, [f"{side}_{name}" for name in REGISTRY["baxter"].joints])
         np.testing.assert_array_equal(limits.position, REGISTRY["baxter"].limits().position)
         np.testing.assert_array_equal(limits.velocity, REGISTRY["baxter"].limits().velocity)
     for name, joints in (
@@ -169,7 +173,7 @@ def test_published_limits_are_those_of_other_descriptions() -> None:
         ("ur5e", REGISTRY["ur5e"].joints),
         ("baxter", [f"right_{name}" for name in REGISTRY["baxter"].joints]),
     ):
-        limits = limits_from_mujoco(model_file("robots", name, "robot.xml"), joints)
+        limits = Limits.from_mujoco(model_file("robots", name, "robot.xml"), joints)
         np.testing.assert_allclose(limits.position, REGISTRY[name].limits().position, atol=5e-6)
         assert limits.velocity is None and limits.acceleration is None
 
@@ -177,7 +181,8 @@ def test_published_limits_are_those_of_other_descriptions() -> None:
 def test_robots_are_imported_at_their_first_use() -> None:
     """A control loop does not pay for the tables; they need no package but numpy."""
     code = (
-        "import sys, pdmp; assert 'pdmp.robots' not in sys.modules; pdmp.robots.REGISTRY; "
+        "import sys, pdmp; pdmp.Limits.from_urdf, pdmp.Limits.from_mujoco; "
+        "assert 'pdmp.robots' not in sys.modules; pdmp.robots.REGISTRY; "
         "assert not {'mujoco', 'scipy', 'matplotlib'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -188,7 +193,7 @@ def test_robots_are_imported_at_their_first_use() -> None:
 
 def test_urdf_has_the_movable_joints_in_the_order_of_the_file(arm: Path) -> None:
     """Fixed, mimicking and floating joints are left out; a continuous joint has no range."""
-    limits = limits_from_urdf(arm)
+    limits = Limits.from_urdf(arm)
     np.testing.assert_array_equal(limits.position, [[-0.2, -math.inf, 0], [0.5, math.inf, 2.5]])
     np.testing.assert_array_equal(limits.velocity, [0.3, 3, 2])
     np.testing.assert_array_equal(limits.acceleration, [math.inf, math.inf, 7])
@@ -196,11 +201,11 @@ def test_urdf_has_the_movable_joints_in_the_order_of_the_file(arm: Path) -> None
 
 def test_joints_select_and_order_those_of_urdf(arm: Path) -> None:
     """Limits follow the names, and bounds follow the limits."""
-    limits = limits_from_urdf(str(arm), ("bend", "slide"), velocity=[0.5, 4], acceleration=6)
+    limits = Limits.from_urdf(str(arm), ("bend", "slide"), velocity=[0.5, 4], acceleration=6)
     np.testing.assert_array_equal(limits.position, [[0, -0.2], [2.5, 0.5]])
     np.testing.assert_array_equal(limits.velocity, [0.5, 0.3])
     np.testing.assert_array_equal(limits.acceleration, [6, 6])
-    free = limits_from_urdf(arm, ["turn"])
+    free = Limits.from_urdf(arm, ["turn"])
     assert free.position is None and free.acceleration is None
 
 
@@ -208,8 +213,8 @@ def test_velocity_of_zero_is_unknown_and_asked_for(tmp_path: Path) -> None:
     """Exporters write 0 for an unknown velocity; a given one takes its place."""
     path = written(tmp_path, one_joint("<limit lower='-1' upper='1' velocity='0' effort='0'/>"))
     with pytest.raises(ValueError, match=r"joint 'elbow': velocity = 0: pass velocity=, as"):
-        limits_from_urdf(path)
-    np.testing.assert_array_equal(limits_from_urdf(path, velocity=2).velocity, [2])
+        Limits.from_urdf(path)
+    np.testing.assert_array_equal(Limits.from_urdf(path, velocity=2).velocity, [2])
 
 
 @pytest.mark.parametrize(
@@ -218,7 +223,7 @@ def test_velocity_of_zero_is_unknown_and_asked_for(tmp_path: Path) -> None:
         ("", "not URDF, or damaged: no element found"),
         ("<robot><joint name='a' type='fixed'>", "not URDF, or damaged"),
         ("<?xml version='1.0' encoding='klingon'?><robot/>", "not URDF, or damaged"),
-        ("<mujoco/>", "starts with <mujoco> instead of <robot>: use limits_from_mujoco"),
+        ("<mujoco/>", "starts with <mujoco> instead of <robot>: use Limits.from_mujoco"),
         ("<sdf/>", "starts with <sdf> instead of <robot>"),
         ("<robot/>", "has no joint that can be moved"),
         ("<robot><joint type='fixed'/></robot>", "joint 1 has no name: add one"),
@@ -251,7 +256,7 @@ def test_bad_urdf_is_refused_with_the_file_the_joint_and_the_fix(
     """Each fault has an error that names file, joint and fix."""
     path = written(tmp_path, text)
     with pytest.raises(ValueError) as caught:
-        limits_from_urdf(path)
+        Limits.from_urdf(path)
     assert str(caught.value).startswith(str(path))
     assert message in str(caught.value)
 
@@ -274,7 +279,7 @@ def test_joints_that_cannot_be_moved_are_refused(
 ) -> None:
     """The error says why and lists the joints to choose from."""
     with pytest.raises(error, match=message):
-        limits_from_urdf(arm, joints)
+        Limits.from_urdf(arm, joints)
 
 
 @pytest.mark.parametrize(
@@ -287,13 +292,13 @@ def test_joints_that_cannot_be_moved_are_refused(
         ("fast", "= 'fast': expected one number or 3"),
     ],
 )
-@pytest.mark.parametrize("argument", ["velocity", "acceleration"])
+@pytest.mark.parametrize("argument", ["velocity", "acceleration", "jerk"])
 def test_bounds_that_bound_nothing_are_refused(
     argument: str, bound: Any, message: str, arm: Path
 ) -> None:
     """The error names argument, joint and number."""
     with pytest.raises(ValueError, match=f"^{argument} {message}"):
-        limits_from_urdf(arm, **{argument: bound})
+        Limits.from_urdf(arm, **{argument: bound})
 
 
 def test_entities_are_refused_before_they_grow(tmp_path: Path) -> None:
@@ -303,7 +308,7 @@ def test_entities_are_refused_before_they_grow(tmp_path: Path) -> None:
     for declarations in (nested, outside):
         path = written(tmp_path, f"<!DOCTYPE robot [{declarations}]><robot>&e29;</robot>")
         with pytest.raises(ValueError, match="has a document type declaration, .*: remove it"):
-            limits_from_urdf(path)
+            Limits.from_urdf(path)
 
 
 def test_files_too_large_for_a_robot_are_refused(
@@ -313,25 +318,25 @@ def test_files_too_large_for_a_robot_are_refused(
     monkeypatch.setattr("pdmp.robots._urdf.MAX_BYTES", 1000)
     path = written(tmp_path, "<robot>" + " " * 1000 + "</robot>")
     with pytest.raises(ValueError, match="more than 1000 bytes, too many for a robot"):
-        limits_from_urdf(path)
+        Limits.from_urdf(path)
 
 
 def test_nesting_too_deep_for_a_robot_is_refused(tmp_path: Path) -> None:
     """Nested elements are refused before they fill the memory."""
     path = written(tmp_path, "<robot>" + "<gazebo>" * 100_000)
     with pytest.raises(ValueError, match="nested more than 100 deep"):
-        limits_from_urdf(path)
+        Limits.from_urdf(path)
 
 
 def test_joints_may_come_from_an_iterator(arm: Path) -> None:
     """Names are read once."""
     names = iter(["bend", "turn"])
-    np.testing.assert_array_equal(limits_from_urdf(arm, names).velocity, [2, 3])  # type: ignore[arg-type]
+    np.testing.assert_array_equal(Limits.from_urdf(arm, names).velocity, [2, 3])  # type: ignore[arg-type]
 
 
 def test_absent_files_are_errors_of_the_system(tmp_path: Path) -> None:
     """A file that cannot be opened has the system's error."""
-    for read in (limits_from_urdf, limits_from_mujoco):
+    for read in (Limits.from_urdf, Limits.from_mujoco):
         with pytest.raises(FileNotFoundError, match="absent"):
             read(tmp_path / "absent.xml")
 
@@ -360,7 +365,7 @@ def test_numbers_of_urdf_are_read_exactly_in_any_order(
     order = data.draw(st.permutations(range(len(rows))))[: data.draw(st.integers(1, len(rows)))]
     with tempfile.TemporaryDirectory() as folder:
         path = written(Path(folder), f"<robot name='r'>{joints}</robot>")
-        limits = limits_from_urdf(path, [f"j{k}" for k in order])
+        limits = Limits.from_urdf(path, [f"j{k}" for k in order])
     expected = np.array([rows[k] for k in order]).T
     if np.isfinite(expected[:2]).any():
         np.testing.assert_array_equal(limits.position, expected[:2])
@@ -381,7 +386,7 @@ def test_damaged_urdf_is_read_or_refused(tmp_path: Path) -> None:
             damaged[at : at + n_lost] = rng.bytes(rng.integers(3))
         path.write_bytes(damaged)
         try:
-            limits = limits_from_urdf(path)
+            limits = Limits.from_urdf(path)
         except ValueError as error:
             assert str(error).startswith(str(path)) and str(error).isprintable()
             n_refused += 1
@@ -404,7 +409,7 @@ def test_mujoco_models_have_rad_whatever_the_unit_of_the_file(
     """Ranges of hinges are in rad and of slides in m; unlimited joints have no range."""
     text = MJCF.format(angle=angle, lower=-1.5 / unit, upper=0.75 / unit)
     path = written(tmp_path, text, "robot.xml")
-    limits = limits_from_mujoco(path, acceleration=[3, 4, 5])
+    limits = Limits.from_mujoco(path, acceleration=[3, 4, 5])
     lower, upper = [-1.5, -0.5, -math.inf], [0.75, 0.25, math.inf]
     np.testing.assert_allclose(limits.position, [lower, upper], rtol=1e-12)
     assert limits.velocity is None
@@ -415,7 +420,7 @@ def test_compiled_models_are_read_like_files(tmp_path: Path) -> None:
     """A model and its file give the same limits, in the order asked for."""
     path = written(tmp_path, MJCF.format(angle="radian", lower=-1, upper=1), "robot.xml")
     model = mujoco.MjModel.from_xml_path(str(path))
-    limits = [limits_from_mujoco(source, ["toe", "knee"], velocity=2) for source in (path, model)]
+    limits = [Limits.from_mujoco(source, ["toe", "knee"], velocity=2) for source in (path, model)]
     assert limits[0] == limits[1]
     np.testing.assert_array_equal(limits[0].position, [[-0.5, -1], [0.25, 1]])
 
@@ -433,7 +438,7 @@ def test_joints_of_a_model_that_cannot_be_moved_are_refused(joint: str, message:
     """The error says why and lists the joints to choose from."""
     text = MJCF.format(angle="radian", lower=-1, upper=1)
     with pytest.raises(ValueError, match=f"^model: {message}"):
-        limits_from_mujoco(mujoco.MjModel.from_xml_string(text), [joint])
+        Limits.from_mujoco(mujoco.MjModel.from_xml_string(text), [joint])
 
 
 @pytest.mark.parametrize(
@@ -448,21 +453,21 @@ def test_bad_models_are_refused(text: str, message: str, tmp_path: Path) -> None
     """The error names file and fault; a range in the wrong order is not taken for none."""
     path = written(tmp_path, text, "robot.xml")
     with pytest.raises(ValueError) as caught:
-        limits_from_mujoco(path)
+        Limits.from_mujoco(path)
     assert str(caught.value).startswith(str(path)) and message in str(caught.value)
 
 
 def test_other_types_of_models_are_refused() -> None:
     """A model is a path or compiled."""
     with pytest.raises(TypeError, match=r"model = 3: expected a path or a mujoco\.MjModel"):
-        limits_from_mujoco(3)  # type: ignore[arg-type]
+        Limits.from_mujoco(3)  # type: ignore[arg-type]
 
 
 def test_missing_mujoco_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the package, the error names it."""
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(ImportError, match="pip install mujoco"):
-        limits_from_mujoco("robot.xml")
+        Limits.from_mujoco("robot.xml")
 
 
 def test_limits_of_a_robot_bound_a_controller(reach: pdmp.Model) -> None:

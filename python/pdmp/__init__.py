@@ -14,6 +14,7 @@ from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from pdmp import io, plot, preprocessing
+from pdmp._limits import Limits
 from pdmp._native import (
     GP,
     Conditions,
@@ -23,7 +24,6 @@ from pdmp._native import (
     Factors,
     FitError,
     GPRegression,
-    Limits,
     Model,
     ModelFileError,
     NGnet,

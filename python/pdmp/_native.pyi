@@ -1465,6 +1465,9 @@ class Limits:
     jerk : float or array_like, (D,), optional
         Limit of the jerk's magnitude per s³, positive; it needs a limit of the acceleration. Controllers keep it,
         `Model.fastest` does not.
+    synchronous : bool
+        True: a controller slows all degrees of freedom along the path if one cannot follow it, and only then limits single
+        ones. False: it limits every degree of freedom on its own.
 
     Raises
     ------
@@ -1490,6 +1493,89 @@ class Limits:
         acceleration: ArrayLike | None = None,  # one, or (D,)
         jerk: ArrayLike | None = None,  # one, or (D,)
     ) -> Limits: ...
+    @staticmethod
+    def from_urdf(
+        path: str | PathLike[str],
+        joints: Sequence[str] | None = None,
+        *,
+        velocity: ArrayLike | None = None,  # one, or (D,)
+        acceleration: ArrayLike | None = None,  # one, or (D,)
+        jerk: ArrayLike | None = None,  # one, or (D,)
+    ) -> Limits:
+        """Reads the joint limits of a robot from a URDF file.
+
+        Positions are in rad or m. Continuous joints have no limits of position. Joints that are fixed,
+        that mimic another one or that have several degrees of freedom, floating and planar, are left
+        out. The soft limits of a safety controller are not used.
+
+        Parameters
+        ----------
+        path : path
+            A URDF file; one in xacro must be expanded first.
+        joints : sequence of str, optional
+            Joints in the order of the degrees of freedom, such as those of a fitted model;
+            by default all that can be moved, in the order of the file.
+        velocity, acceleration, jerk : float or array_like, (D,), optional
+            Bounds per s, s² and s³, where the file has none or where the task needs smaller ones: of
+            two bounds of a joint the smaller holds. Most files have no acceleration and jerk, which
+            URDF has since version 1.2; of acceleration and deceleration the smaller holds.
+
+        Raises
+        ------
+        ValueError
+            A file that is not URDF, incomplete or has a document type declaration; a joint that is
+            missing or cannot be moved; a limit that is missing, not a number or, as some exporters
+            write it, 0 for unknown, unless the argument replaces it.
+        OSError
+            A file that cannot be read.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> path = pathlib.Path(tempfile.mkdtemp(), "arm.urdf")
+        >>> _ = path.write_text(
+        ...     "<robot name='arm'><joint name='elbow' type='revolute'>"
+        ...     "<limit lower='-1.5' upper='2' velocity='3' effort='10'/></joint></robot>"
+        ... )
+        >>> pdmp.Limits.from_urdf(path, acceleration=8.0)
+        pdmp.Limits(position=([-1.5], [2.0]), velocity=[3.0], acceleration=[8.0])
+        """
+    @staticmethod
+    def from_mujoco(
+        model: Any,  # path or mujoco.MjModel
+        joints: Sequence[str] | None = None,
+        *,
+        velocity: ArrayLike | None = None,  # one, or (D,)
+        acceleration: ArrayLike | None = None,  # one, or (D,)
+        jerk: ArrayLike | None = None,  # one, or (D,)
+    ) -> Limits:
+        """Reads the joint limits of a robot from a MuJoCo model; needs the package mujoco.
+
+        Positions are in rad or m, for files in degrees too. A joint that is not limited has no limits
+        of position. Joints that follow another one through an active equality constraint, free
+        joints and ball joints are left out. MuJoCo has limits of the position alone.
+
+        Parameters
+        ----------
+        model : path or mujoco.MjModel
+            A file in MJCF, with its meshes, or a compiled model.
+        joints : sequence of str, optional
+            Joints in the order of the degrees of freedom, such as those of a fitted model;
+            by default all that can be moved, in the order of the MuJoCo model.
+        velocity, acceleration, jerk : float or array_like, (D,), optional
+            Bounds per s, s² and s³.
+
+        Raises
+        ------
+        ImportError
+            The package mujoco is not installed.
+        ValueError
+            A file that MuJoCo does not compile, or a joint that is missing or cannot be moved.
+        TypeError
+            A model that is neither a path nor a compiled model.
+        OSError
+            A file that cannot be read.
+        """
     @property
     def position(self) -> tuple[_Array, _Array] | None:
         """Lower and upper limits of the position, each (1,) or (D,) and infinite where there is none, or None."""

@@ -40,14 +40,14 @@ fn clock(controller: &Controller, before: f64) -> f64 {
     }
 }
 
-/// What is used of the limits of velocity and acceleration over a tick.
+/// Returns the largest shares of the limits of velocity and acceleration that a tick uses.
 fn used(limits: &Limits, before: &[f64], after: &[f64], dt: f64) -> [f64; 2] {
     let of = |share: &dyn Fn(usize) -> f64| (0..before.len()).map(share).fold(0.0, f64::max);
     let [velocity, acceleration] = [limits.velocity.as_ref().unwrap(), limits.acceleration.as_ref().unwrap()];
     [of(&|d| after[d].abs() / velocity[d]), of(&|d| (after[d] - before[d]).abs() / (acceleration[d] * dt))]
 }
 
-/// What one DoF cannot follow slows all of them: the movement stays on its path, and no DoF is limited on its own.
+/// A DoF that cannot follow slows all of them: the movement stays on its path, and no DoF is limited on its own.
 #[test]
 fn movement_within_limits_stays_on_its_path() {
     for model in [&*REACH, &*CYCLE] {

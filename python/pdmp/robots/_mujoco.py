@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from pdmp._labels import name_list
 from pdmp._messages import quoted, value_error
@@ -15,42 +15,22 @@ from pdmp.robots._robot import Bound, Joint, check_range, chosen, combined
 if TYPE_CHECKING:
     from mujoco import MjModel
 
-    Model: TypeAlias = str | os.PathLike[str] | MjModel
 
-
-def limits_from_mujoco(
-    model: Model,
-    joints: Sequence[str] | None = None,
-    *,
-    velocity: Bound = None,
-    acceleration: Bound = None,
+def read(
+    model: str | os.PathLike[str] | MjModel,
+    joints: Sequence[str] | None,
+    given: Mapping[str, Bound],
 ) -> Limits:
-    """Reads the joint limits of a robot from a MuJoCo model; needs the package mujoco.
-
-    Positions are in rad or m, for files in degrees too. A joint that is not limited has no limits
-    of position. Joints that follow another one through an active equality constraint, free
-    joints and ball joints are left out. MuJoCo has no limits of velocity and acceleration.
+    """Reads the joint limits of a model, see `Limits.from_mujoco`.
 
     Parameters
     ----------
     model : path or mujoco.MjModel
-        A file in MJCF, with its meshes, or a compiled model.
-    joints : sequence of str, optional
-        Joints in the order of the degrees of freedom, such as those of a fitted model;
-        by default all that can be moved, in the order of the MuJoCo model.
-    velocity, acceleration : float or array_like, (D,), optional
-        Bounds per s and per s².
-
-    Raises
-    ------
-    ImportError
-        The package mujoco is not installed.
-    ValueError
-        A file that MuJoCo does not compile, or a joint that is missing or cannot be moved.
-    TypeError
-        A model that is neither a path nor a compiled model.
-    OSError
-        A file that cannot be read.
+        File or compiled model.
+    joints : sequence of str or None
+        Requested joints.
+    given : mapping of str to float or array_like
+        Bounds of magnitude, by the name of their argument; None for none.
     """
     try:
         import mujoco
@@ -97,4 +77,4 @@ def limits_from_mujoco(
         if limited or lower > upper:
             check_range(f"{place}, joint {quoted(name)}", lower, upper)
         described.append(Joint(lower, upper) if limited else Joint())
-    return combined(chosen_names, described, velocity, acceleration)
+    return combined(chosen_names, described, given)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -14,9 +14,9 @@ from pdmp._messages import quoted, value_error
 from pdmp._native import Limits
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-Bound: TypeAlias = "float | Sequence[float] | NDArray[np.float64] | None"
+Bound: TypeAlias = "ArrayLike | None"
 """One number for all joints, one for each, or none."""
 MAX_LISTED = 12  # joints in a message
 
@@ -29,14 +29,15 @@ class Joint:
     ----------
     lower, upper : float
         Limits of the position; infinite without any.
-    velocity, acceleration : float
-        Limits of the magnitude, per s and per s²; infinite without any.
+    velocity, acceleration, jerk : float
+        Limits of the magnitude, per s, s² and s³; infinite without any.
     """
 
     lower: float = -math.inf
     upper: float = math.inf
     velocity: float = math.inf
     acceleration: float = math.inf
+    jerk: float = math.inf
 
 
 def chosen(
@@ -111,22 +112,17 @@ def bounds(argument: str, bound: Bound, joints: Sequence[str]) -> NDArray[np.flo
 
 
 def combined(
-    joints: Sequence[str],
-    described: Sequence[Joint],
-    velocity: Bound = None,
-    acceleration: Bound = None,
+    joints: Sequence[str], described: Sequence[Joint], given: Mapping[str, Bound]
 ) -> Limits:
     """Returns the limits of joints, in each the smaller of a described and a given bound."""
-    speed = np.minimum([each.velocity for each in described], bounds("velocity", velocity, joints))
-    rate = np.minimum(
-        [each.acceleration for each in described], bounds("acceleration", acceleration, joints)
-    )
     lower, upper = (np.array([getattr(each, k) for each in described]) for k in ("lower", "upper"))
-    limited = bool(np.isfinite([lower, upper]).any())
+    magnitudes = {
+        name: np.minimum([getattr(each, name) for each in described], bounds(name, bound, joints))
+        for name, bound in given.items()
+    }
     return Limits(
-        position=(lower, upper) if limited else None,
-        velocity=speed if np.isfinite(speed).any() else None,
-        acceleration=rate if np.isfinite(rate).any() else None,
+        position=(lower, upper) if np.isfinite([lower, upper]).any() else None,
+        **{name: limit for name, limit in magnitudes.items() if np.isfinite(limit).any()},
     )
 
 
@@ -187,6 +183,7 @@ class Robot:
         *,
         velocity: Bound = None,
         acceleration: Bound = None,
+        jerk: Bound = None,
     ) -> Limits:
         """Returns the limits, for a controller or a planner.
 
@@ -194,8 +191,8 @@ class Robot:
         ----------
         joints : sequence of str, optional
             Joints in the order of the degrees of freedom; all by default.
-        velocity, acceleration : float or array_like, (D,), optional
-            Bounds per s and per s², where the maker publishes none or where the task needs smaller
+        velocity, acceleration, jerk : float or array_like, (D,), optional
+            Bounds per s, s² and s³, where the maker publishes none or where the task needs smaller
             ones: of two bounds of a joint the smaller holds.
 
         Raises
@@ -210,15 +207,10 @@ class Robot:
         (np.float64(3.141592653589793), np.float64(4.0))
         """
         names = chosen(self.name, self.joints, joints, lambda _: "")
-        columns = {
-            "lower": self.lower,
-            "upper": self.upper,
-            "velocity": self.velocity,
-            "acceleration": self.acceleration,
-        }
-        known = {key: column for key, column in columns.items() if column is not None}
+        given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+        columns = {key: getattr(self, key) for key in ("lower", "upper", *given)}
         described = [
-            Joint(**{key: column[k] for key, column in known.items()})
+            Joint(**{key: column[k] for key, column in columns.items() if column is not None})
             for k in map(self.joints.index, names)
         ]
-        return combined(names, described, velocity, acceleration)
+        return combined(names, described, given)

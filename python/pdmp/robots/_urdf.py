@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 from xml.etree import ElementTree
@@ -23,53 +23,27 @@ RANGED = {"revolute", "prismatic"}
 SINGLE = RANGED | {"continuous"}
 """Types of joints with one degree of freedom."""
 OTHERS = {"fixed", "floating", "planar"}
+KEYS = {
+    "velocity": ("velocity",),
+    "acceleration": ("acceleration", "deceleration"),
+    "jerk": ("jerk",),
+}
+"""Attributes of a limit of magnitude, of which the smallest holds."""
 
 
-def limits_from_urdf(
-    path: str | os.PathLike[str],
-    joints: Sequence[str] | None = None,
-    *,
-    velocity: Bound = None,
-    acceleration: Bound = None,
+def read(
+    path: str | os.PathLike[str], joints: Sequence[str] | None, given: Mapping[str, Bound]
 ) -> Limits:
-    """Reads the joint limits of a robot from a URDF file.
-
-    Positions are in rad or m. Continuous joints have no limits of position. Joints that are fixed,
-    that mimic another one or that have several degrees of freedom, floating and planar, are left
-    out. The soft limits of a safety controller are not used.
+    """Reads the joint limits of a file, see `Limits.from_urdf`.
 
     Parameters
     ----------
     path : path
-        A URDF file; one in xacro must be expanded first.
-    joints : sequence of str, optional
-        Joints in the order of the degrees of freedom, such as those of a fitted model;
-        by default all that can be moved, in the order of the file.
-    velocity, acceleration : float or array_like, (D,), optional
-        Bounds per s and per s², where the file has none or where the task needs smaller ones: of
-        two bounds of a joint the smaller holds. Most files have no acceleration, which URDF has
-        since version 1.2; of acceleration and deceleration the smaller holds.
-
-    Raises
-    ------
-    ValueError
-        A file that is not URDF, incomplete or has a document type declaration; a joint that is
-        missing or cannot be moved; a limit that is missing, not a number or, as some exporters
-        write it, 0 for unknown, unless the argument replaces it.
-    OSError
-        A file that cannot be read.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> path = pathlib.Path(tempfile.mkdtemp(), "arm.urdf")
-    >>> _ = path.write_text(
-    ...     "<robot name='arm'><joint name='elbow' type='revolute'>"
-    ...     "<limit lower='-1.5' upper='2' velocity='3' effort='10'/></joint></robot>"
-    ... )
-    >>> limits = pdmp.robots.limits_from_urdf(path, acceleration=8.0)
-    >>> limits.position, limits.velocity, limits.acceleration
-    ((array([-1.5]), array([2.])), array([3.]), array([8.]))
+        File.
+    joints : sequence of str or None
+        Requested joints.
+    given : mapping of str to float or array_like
+        Further bounds of magnitude, by the name of their argument; None for none.
     """
     path = Path(path)
     if joints is not None:
@@ -86,10 +60,8 @@ def limits_from_urdf(
         return f"joint {quoted(name)} is {joint.kind}"
 
     names = chosen(str(path), movable, joints, why_not)
-    # The value of an argument replaces one of 0 in the file.
-    given = {"velocity": velocity is not None, "acceleration": acceleration is not None}
     described = [found[name].limits(f"{path}, joint {quoted(name)}", given) for name in names]
-    return combined(names, described, velocity, acceleration)
+    return combined(names, described, given)
 
 
 class _Described:
@@ -101,8 +73,8 @@ class _Described:
         """Joint that this one mimics; "" if it does not."""
         self.limit: dict[str, str] | None = None
 
-    def limits(self, where: str, given: dict[str, bool]) -> Joint:
-        """Returns the limits as numbers; `given` are the bounds that arguments replace."""
+    def limits(self, where: str, given: Mapping[str, Bound]) -> Joint:
+        """Returns the limits as numbers; a bound in `given` replaces one of 0."""
         written = self.limit or {}
         lower, upper = -math.inf, math.inf
         if self.kind in RANGED:
@@ -114,14 +86,13 @@ class _Described:
             # A limit that is left out is 0 in the format.
             lower, upper = (_number(where, written, key, 0.0) for key in ("lower", "upper"))
             check_range(where, lower, upper)
-        rates = [
-            min(_bound(where, written, key, given[argument]) for key in keys)
-            for argument, keys in (
-                ("velocity", ("velocity",)),
-                ("acceleration", ("acceleration", "deceleration")),
+        rates = {
+            argument: min(
+                _bound(where, written, key, given[argument] is not None) for key in KEYS[argument]
             )
-        ]
-        return Joint(lower, upper, *rates)
+            for argument in KEYS
+        }
+        return Joint(lower, upper, **rates)
 
 
 def _number(where: str, written: dict[str, str], key: str, default: float) -> float:
@@ -145,7 +116,7 @@ def _bound(where: str, written: dict[str, str], key: str, given: bool) -> float:
         return number
     if number == 0 and given:
         return math.inf
-    argument = "velocity" if key == "velocity" else "acceleration"
+    argument = "acceleration" if key == "deceleration" else key
     raise value_error(
         f"{where}: {key} = {written[key]}: "
         + (f"pass {argument}=, as exporters write 0 for unknown" if number == 0 else "correct it")
@@ -179,7 +150,7 @@ class _Reader:
                 f"{self.path}: a xacro file: expand it first, xacro robot.urdf.xacro > robot.urdf"
             )
         if self._depth == 1 and tag != "robot":
-            fix = ": use limits_from_mujoco" if tag == "mujoco" else ""
+            fix = ": use Limits.from_mujoco" if tag == "mujoco" else ""
             raise value_error(f"{self.path}: not URDF: starts with <{tag}> instead of <robot>{fix}")
         # Transmissions and extensions of simulators have elements of the same name, further down.
         if self._depth == 2 and tag == "joint":

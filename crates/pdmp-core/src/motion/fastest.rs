@@ -13,7 +13,7 @@ use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, TimeLaw, max_c
 use crate::motion::trajectory::Trajectory;
 use crate::numerics::simd::groups;
 
-/// Number of intervals of the path. Durations then are within 1e-3 of those of ten times as many.
+/// Number of intervals of the path. Durations then are within 1e-3 of those of ten times this number.
 const N_INTERVALS: usize = 1000;
 /// Number of halvings of the first and the last interval.
 const N_HALVINGS: i32 = 12;

@@ -76,7 +76,7 @@ impl Governor {
         self.trial.take_up(changes, self.share);
         self.candidate.compute(&self.trial, &mut self.sampler, &self.limits);
         let rate = first_element(controller.rate.value());
-        let excess = |ahead: &PathAhead| (rate * rate / ahead.max()).max(1.0);
+        let excess = |ahead: &PathAhead| (rate * rate / ahead.largest_square()).max(1.0);
         let outside = |ahead: &PathAhead| ahead.distance_outside(&controller.limiter.bounds, &controller.groups);
         excess(&self.candidate) <= excess(&self.ahead)
             && outside(&self.candidate) <= outside(&self.ahead).max(TOLERANCE)
@@ -115,7 +115,7 @@ impl Controller {
         governor.pending = false;
         let rate = first_element(self.rate.value());
         let admitted = match self.conditions.velocity {
-            None => rate.min(governor.ahead.max().sqrt()),
+            None => rate.min(governor.ahead.largest_square().sqrt()),
             Some(_) if self.speed.is_infinite() => self.conditions.tau.recip(),
             Some(_) => rate,
         };

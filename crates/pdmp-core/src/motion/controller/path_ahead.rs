@@ -151,7 +151,7 @@ impl PathAhead {
     }
 
     /// Returns the largest ρ² at the present clock.
-    pub(super) fn max(&self) -> f64 {
+    pub(super) fn largest_square(&self) -> f64 {
         let (index, t) = self.locate(self.progress);
         self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t
     }

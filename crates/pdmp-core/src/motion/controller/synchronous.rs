@@ -53,7 +53,7 @@ impl Controller {
         if keeps([least, most]) && (!crosses || keeps(ahead.next_slopes(next * next, limits))) {
             return None;
         }
-        let slope = if least <= most && rate * rate <= ahead.max() * (1.0 + TOLERANCE) {
+        let slope = if least <= most && rate * rate <= ahead.largest_square() * (1.0 + TOLERANCE) {
             wanted.max(least).min(most)
         } else {
             // Off the path, at a rate from which it cannot be followed, the clock is slowed and the DoFs are limited on their own.

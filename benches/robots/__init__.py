@@ -1,0 +1,1 @@
+"""Joint limits on two simulated robots; see `__main__`."""
