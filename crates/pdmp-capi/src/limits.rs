@@ -95,7 +95,14 @@ impl pdmp_limits {
 /// Returns memory for the limits of each DoF.
 pub(crate) fn memory_of_limits(n_dofs: usize) -> Limits {
     let memory = || Some(Vec::with_capacity(n_dofs.max(1)));
-    Limits { lower: memory(), upper: memory(), velocity: memory(), acceleration: memory(), jerk: memory() }
+    Limits {
+        lower: memory(),
+        upper: memory(),
+        velocity: memory(),
+        acceleration: memory(),
+        jerk: memory(),
+        ..Limits::default()
+    }
 }
 
 /// Sets the limits of the robot; NULL removes them.

@@ -253,7 +253,7 @@ fn an_invalid_command_changes_nothing_and_leaves_a_message() {
     let (three, two, nan) = ([0.5; 3], [0.5; 2], [0.5, f64::NAN, 0.5]);
     let (huge, negative) = (usize::MAX, -1e-3);
     let none = NO_COMMAND;
-    let half = pdmp_coupling { velocity: vector(&three), acceleration: NO_VECTOR, independent: 0 };
+    let half = pdmp_coupling { velocity: vector(&three), acceleration: NO_VECTOR };
     for (command, status, text) in [
         (pdmp_command { goal: vector(&two), ..none }, PDMP_LENGTH, "goal has length 2, expected 3: one value per DoF"),
         (
