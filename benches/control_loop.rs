@@ -45,13 +45,15 @@ pub(crate) enum CommandLoad {
     Limited,
     /// As settled, along a path that limits slow down.
     Slowed,
+    /// As settled, within limits of single DoFs that bind in most ticks.
+    Bound,
     /// As commanded, by a governor within limits.
     Governed,
 }
 
 impl CommandLoad {
-    pub(crate) const ALL: [Self; 6] =
-        [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited, Self::Slowed, Self::Governed];
+    pub(crate) const ALL: [Self; 7] =
+        [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited, Self::Slowed, Self::Bound, Self::Governed];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -60,6 +62,7 @@ impl CommandLoad {
             Self::Commanded => "commanded",
             Self::Limited => "within limits",
             Self::Slowed => "slowed",
+            Self::Bound => "at limits",
             Self::Governed => "governed",
         }
     }
@@ -69,7 +72,7 @@ impl CommandLoad {
         match self {
             Self::Settled | Self::InTransition | Self::Commanded => None,
             Self::Limited | Self::Governed => Some(1e3),
-            Self::Slowed => Some(2.0),
+            Self::Slowed | Self::Bound => Some(2.0),
         }
     }
 }
@@ -103,6 +106,7 @@ impl ControlLoop {
                 upper: Some(vec![1e3]),
                 velocity: Some(vec![velocity]),
                 acceleration: Some(vec![1e3]),
+                synchronous: load != CommandLoad::Bound,
                 ..Limits::default()
             };
             controller.set_limits(&limits).expect("limits");

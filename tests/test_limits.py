@@ -530,10 +530,6 @@ WRONG: list[tuple[Callable[[pdmp.Model], Any], str]] = [
     (lambda m: m.controller(limits=Limits(velocity=[1] * 3)), "velocity has length 3, expected 2"),
     (lambda m: m.fastest(Limits(velocity=[1] * 3)), "velocity has length 3, expected 2"),
     (lambda m: m.fastest_tau(Limits(velocity=[1] * 3)), "velocity has length 3, expected 2"),
-    (
-        lambda m: m.controller(limits=Limits(velocity=[1e-6] * 2, acceleration=[1e9] * 2)),
-        r"limits of DoF 0: too tight for a tick of 0.001 s: .* must not exceed 5.0e-13 s",
-    ),
     (lambda m: m.fastest(Limits((-1, 1))), "limits bound neither velocity nor acceleration"),
     (lambda m: m.fastest_tau(Limits()), "limits bound neither velocity nor acceleration"),
     (
@@ -615,8 +611,8 @@ def test_rejected_limits_leave_the_present_ones_in_force(model: pdmp.Model) -> N
     """The motion continues to the bit as if nothing had been set."""
     controller = inside(model, BOX)
     twin = copy.copy(controller)
-    for wrong in (Limits(velocity=[1.0] * 3), Limits(velocity=[1e-6] * 2, acceleration=[1e9] * 2)):
-        with pytest.raises(ValueError, match="velocity has length|too tight"):
+    for wrong in (Limits(velocity=[1.0] * 3), Limits(acceleration=[1e9] * 3)):
+        with pytest.raises(ValueError, match="has length 3, expected 2"):
             controller.limits = wrong
         assert controller.limits == BOX
     for _ in range(200):

@@ -5,7 +5,7 @@ import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-from peers import factors, imitation, regression, rollouts, steps
+from peers import factors, imitation, limits, regression, rollouts, steps
 from peers.timing import Task, machine, ratio, run, written
 
 PACKAGES = [
@@ -13,6 +13,8 @@ PACKAGES = [
     "movement_primitives",
     "pydmps",
     "ruckig",
+    "klimits",
+    "toppra",
     "mp_pytorch",
     "torch",
     "scikit-learn",
@@ -50,6 +52,7 @@ def main() -> None:
     results = []
     for task in [
         *steps.TASKS,
+        *limits.TASKS,
         *rollouts.TASKS,
         *imitation.TASKS,
         *regression.TASKS,

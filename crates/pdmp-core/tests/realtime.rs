@@ -14,15 +14,16 @@ use std::hint::black_box;
 
 use common::*;
 use counting::{Random, allocations};
-use pdmp_core::motion::Compliance;
-use pdmp_core::motion::{Coupling, Limits};
+use pdmp_core::motion::{Compliance, Coupling, Limits};
 use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
 /// A controller with the memory of its caller.
 struct Loop {
     controller: Controller,
-    /// No limits, and limits that bind.
-    limits: [Limits; 2],
+    /// Limits that are set in turn: none, tight ones, and others that are loose or absent.
+    limits: [Limits; 3],
+    limits_set: usize,
+    limited: usize,
     random: Random,
     values: Vec<f64>,
     position: Vec<f64>,
@@ -35,16 +36,19 @@ impl Loop {
         let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
         let model = learn(&demos, &options(kind));
         let n_dofs = model.n_dofs();
-        let limits = Limits {
-            lower: Some(vec![-0.5]),
-            upper: Some(vec![0.5; n_dofs]),
-            velocity: Some(vec![1.0]),
-            acceleration: Some(vec![20.0; n_dofs]),
-            jerk: Some(vec![500.0]),
-            ..Limits::default()
-        };
+        let ranges = model.ranges();
+        let share = |share: f64| Some(ranges.iter().map(|range| share * range).collect::<Vec<f64>>());
+        let mut tight = Limits { lower: share(-0.3), upper: share(0.6), velocity: share(1.0), ..Limits::default() };
+        tight.acceleration = share(5.0);
+        tight.jerk = share(200.0);
+        tight.synchronous = false;
+        let mut other = Limits { upper: share(5.0), ..Limits::default() };
+        other.acceleration = share(100.0);
+        other.synchronous = false;
         Self {
-            limits: [Limits::default(), limits],
+            limits: [Limits::default(), tight, other],
+            limits_set: 0,
+            limited: 0,
             random: Random(1),
             values: vec![0.0; n_dofs.max(model.n_styles())],
             position: vec![0.0; n_dofs],
@@ -57,7 +61,7 @@ impl Loop {
     /// Sends one valid or invalid command by a setter, and performs one tick under another.
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     fn tick(&mut self) {
-        let Self { controller, limits, random, values, position, velocity, acceleration } = self;
+        let Self { controller, limits, limits_set, limited, random, values, position, velocity, acceleration } = self;
         let (n_dofs, n_styles) = (controller.primitive().n_dofs(), controller.primitive().n_styles());
         let (kind, nominal_tau) = (controller.primitive().kind(), controller.primitive().tau());
         values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
@@ -79,9 +83,16 @@ impl Loop {
             7 => controller.set_phase(10.0 * size),
             8 => controller.set_phase_gain(10.0 * size),
             9 => controller.set_goal_velocity((size < 0.5).then_some(vector)),
-            10 => controller.set_limits(&limits[usize::from(size < 0.5)]),
+            10 => {
+                *limits_set += 1;
+                controller.set_limits(&limits[*limits_set % limits.len()])
+            }
             _ => Ok(()),
         });
+        if random.rarely() {
+            controller.release();
+            let _ = black_box(controller.set_speed(size));
+        }
         let command = Command {
             dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
             style: random.rarely().then_some(style),
@@ -100,10 +111,11 @@ impl Loop {
             || command.coupling.is_some();
         let mut motion = Motion { position, velocity, acceleration };
         assert_eq!(black_box(controller.update(&command, &mut motion)).is_err(), uses_values && invalid);
+        *limited += controller.limited().iter().flatten().count();
     }
 }
 
-/// A million ticks of random commands allocate nothing, and the motion stays finite.
+/// A million ticks of random commands, with and without limits, allocate nothing, and the motion stays finite.
 #[test]
 fn a_million_ticks_of_random_commands_allocate_nothing() {
     for kind in [Kind::Discrete, Kind::Rhythmic] {
@@ -113,6 +125,7 @@ fn a_million_ticks_of_random_commands_allocate_nothing() {
             control.tick();
         }
         assert_eq!(allocations() - before, 0);
+        assert!(control.limited > 100_000, "limits bind in {} joint-ticks alone", control.limited);
         assert!([control.position, control.velocity, control.acceleration].iter().flatten().all(|x| x.is_finite()));
     }
 }
@@ -159,6 +172,49 @@ fn extreme_numbers_are_rejected_or_bounded() {
             assert!(motion.into_iter().flatten().all(|x| x.is_finite()), "{kind} {field} {value:e}: {motion:?}");
             assert!(field > 8 || value.is_finite() || controller.time() == before.time());
         }
+    }
+}
+
+/// Extreme limits are rejected, or the motion within them stays finite, also under extreme commands.
+#[test]
+fn extreme_limits_are_rejected_or_obeyed() {
+    const EXTREMES: [f64; 10] =
+        [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e300, -1e200, 1e150, 1e-150, 1e-300, 5e-324, 0.0];
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let Loop { controller: fresh, limits: [_, tight, _], .. } = Loop::new(kind);
+        let n_dofs = fresh.primitive().n_dofs();
+        let mut accepted = 0;
+        let cases = (0..4).flat_map(|field| EXTREMES.iter().map(move |value| (field, value)));
+        for ((field, &value), started) in cases.flat_map(|case| [(case, false), (case, true)]) {
+            let mut controller = fresh.clone();
+            let mut limits = tight.clone();
+            let changed = match field {
+                0 => &mut limits.lower,
+                1 => &mut limits.upper,
+                2 => &mut limits.velocity,
+                _ => &mut limits.acceleration,
+            };
+            *changed = Some(vec![value; n_dofs]);
+            if started {
+                controller.step().unwrap();
+            }
+            if controller.set_limits(&limits).is_err() {
+                continue;
+            }
+            accepted += 1;
+            let large = vec![if value.abs() < 1e100 { value } else { 1e100 }; n_dofs];
+            for dt in [1e-3, 1e-6, 0.1, 1e-300, 5e-324, 1.0] {
+                for _ in 0..20 {
+                    let coupling = Coupling { velocity: &large, acceleration: &large };
+                    let command = Command { dt: Some(dt), coupling: Some(coupling), ..Command::default() };
+                    tick(&mut controller, &command).unwrap();
+                    let motion = [controller.position(), controller.velocity(), controller.acceleration()];
+                    let finite = motion.into_iter().flatten().all(|x| x.is_finite());
+                    assert!(finite, "{kind} {limits:?} {dt:e}: {motion:?}");
+                }
+            }
+        }
+        assert!(accepted > 20, "{accepted} accepted");
     }
 }
 

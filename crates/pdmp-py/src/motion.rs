@@ -104,8 +104,7 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length or are
-    ///     too tight for a tick of `dt`.
+    ///     `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length.
     /// TypeError
     ///     A keyword is unknown, or `conditions` or `limits` has another type.
     ///

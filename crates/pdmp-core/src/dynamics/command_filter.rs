@@ -252,7 +252,7 @@ impl CommandFilter {
         for (lanes, bounds) in [(value, [2.0 * least, 2.0 * limit]), (target, [least, limit]), (slope, [-rate, rate])] {
             visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), bounds)?;
         }
-        visit_number(visit, &mut self.remaining, [-1e300, gains.decay_time])
+        visit_number(visit, &mut self.remaining, [-1e300, gains.decay_time.max(f64::MIN_POSITIVE)])
     }
 
     /// Advances all groups by a tick.

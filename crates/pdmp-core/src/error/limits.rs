@@ -54,28 +54,4 @@ pub enum LimitError {
         /// Its limit of the jerk.
         jerk: f64,
     },
-    /// Limits that no tick of the control loop can keep.
-    #[error(
-        "limits of DoF {dof}: too tight for a tick of {} s: with an acceleration of {}, a velocity of {} and a distance of {} \
-         between the limits of the position a tick must not exceed {max_dt:.1e} s; lower the acceleration, raise the others or \
-         shorten dt",
-        Number(*dt),
-        Number(*acceleration),
-        Number(*velocity),
-        Number(*distance)
-    )]
-    TooTight {
-        /// Index of the DoF.
-        dof: usize,
-        /// Length of the tick, in seconds.
-        dt: f64,
-        /// Limit of the acceleration, or the deceleration in front of a limit of the position.
-        acceleration: f64,
-        /// Limit of the velocity.
-        velocity: f64,
-        /// Distance between the limits of the position.
-        distance: f64,
-        /// Longest possible tick, in seconds.
-        max_dt: f64,
-    },
 }

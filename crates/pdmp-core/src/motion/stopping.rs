@@ -199,10 +199,14 @@ impl JerkBounds {
         };
         let broken = |bounds: &Self, state: State| {
             let [least, greatest] = from.extremes(state, h);
+            let way = (state.y - from.y).abs() - 4.0 * f64::EPSILON * state.y.abs();
             if least < bounds.lower || greatest > bounds.upper {
                 Some(Limit::Position)
             } else if state.v.abs().max((state.v + h * state.a).abs()) > bounds.velocity {
                 // The next tick can then end the acceleration at the limit of the velocity; an end beyond it would alternate.
+                Some(Limit::Velocity)
+            } else if way > bounds.velocity * h {
+                // An acceleration that changes its sign within a long tick raises the velocity in between.
                 Some(Limit::Velocity)
             } else {
                 bounds.broken(state)

@@ -1,29 +1,32 @@
 //! Viability of a DoF inside its limits: the states from which it can still brake.
 //!
-//! With limits l ≤ y ≤ u, |ẏ| ≤ V and |ÿ| ≤ A, a state can be braked to rest inside the limits if and only if
+//! With limits l ≤ y ≤ u and |ẏ| ≤ V and a deceleration B, a state can be braked to rest inside the limits if and only if
 //!
 //! ```text
-//! |ẏ| ≤ V,    max(ẏ, 0)² ≤ 2A(u − y),    max(−ẏ, 0)² ≤ 2A(y − l).
+//! |ẏ| ≤ V,    max(ẏ, 0)² ≤ 2B(u − y),    max(−ẏ, 0)² ≤ 2B(y − l).
 //! ```
 //!
-//! The set is viable in continuous time, and hence for any sequence of tick lengths. [`Bounds::interval`] are the constant
-//! accelerations over a tick of length h that end inside it and do not leave the limits on the way. At a distance d from
-//! the upper limit, the largest is
+//! B is the limit A of |ÿ|, or less where A would turn a DoF round within a tick: V/2Δt or (u − l)/Δt². The set is viable in
+//! continuous time, and hence for any sequence of tick lengths up to Δt. [`Bounds::interval`] are the constant accelerations
+//! over a tick of length h that end inside it and do not leave the limits on the way. At a distance d from the upper limit, the
+//! largest is
 //!
 //! ```text
-//! d ≥ hẏ/2:  [−ẏ − Ah/2 + ½√(A²h² + 8Ad − 4Ahẏ)]/h     the end lies on the boundary of the set
+//! d ≥ hẏ/2:  [−ẏ − Bh/2 + ½√(B²h² + 8Bd − 4Bhẏ)]/h     the end lies on the boundary of the set
 //! d < hẏ/2:  −ẏ²/(2d)                                    the DoF turns round at the limit within the tick
 //! ```
 //!
 //! and at most (V − ẏ)/h and A. It follows A. Del Prete, *Joint position and velocity bounds in discrete-time acceleration
 //! or torque control of robot manipulators*, IEEE RA-L 3(1), 2018. A DoF beyond the limit returns to it: its velocity is at
-//! most −√(A|d|), which half of A brakes to rest at the limit.
+//! most −√(B|d|), which half of B brakes to rest at the limit, and at most V in magnitude.
 
 use crate::motion::limits::Limit;
 use crate::numerics::simd::F64x4;
 
 /// Shortest length of a tick in seconds whose accelerations are finite. What a longer tick may do, a shorter one may too.
 pub(crate) const MIN_TICK: f64 = 1e-100;
+/// Share of ẏ² that is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Limits of a group of DoFs, infinite where there are none.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +35,7 @@ pub(crate) struct Bounds {
     pub(crate) upper: F64x4,
     pub(crate) velocity: F64x4,
     pub(crate) acceleration: F64x4,
-    /// Deceleration in front of the limits of the position: the limit of the acceleration where there is one.
+    /// Deceleration B in front of the limits of the position.
     pub(crate) braking: F64x4,
 }
 
@@ -52,7 +55,8 @@ impl Bounds {
             & (ahead * ahead).simd_le(braking * above)
             & (behind * behind).simd_le(braking * below)
             & above.simd_ge(F64x4::ZERO)
-            & below.simd_ge(F64x4::ZERO);
+            & below.simd_ge(F64x4::ZERO)
+            & self.admits_way(y_end - y, v + v_end, y_end, h);
         // The cubic lies between the least and the greatest of its Bézier points.
         let (first, last) = (y + v * (h / 3.0), y_end - v_end * (h / 3.0));
         let (least, greatest) = (first.min(last), first.max(last));
@@ -61,6 +65,16 @@ impl Bounds {
         }
         let [least, greatest] = extremes([y, v], [y_end, v_end], h);
         kept & greatest.simd_le(self.upper) & least.simd_ge(self.lower)
+    }
+
+    /// Returns the lanes in which a motion within the limits of velocity and acceleration can move by `dy` to `y_end` over a tick
+    /// of length `h`, where `sum` is that of the velocities at its ends.
+    #[inline(always)]
+    fn admits_way(&self, dy: F64x4, sum: F64x4, y_end: F64x4, h: f64) -> F64x4 {
+        let rounding = y_end.abs() * (4.0 * f64::EPSILON);
+        let detour = (dy - sum * (0.5 * h)).abs();
+        (dy.abs() - rounding).simd_le(self.velocity * h)
+            & (detour - rounding).simd_le(self.acceleration * h * (0.25 * h))
     }
 
     /// Returns the lanes in which the velocity may change to `to` at once: those where it does not change, or where its change
@@ -77,12 +91,32 @@ impl Bounds {
     /// Returns the constant accelerations over a tick of length `h` that keep the limits and end in a viable state.
     pub(crate) fn interval(&self, y: F64x4, v: F64x4, h: f64) -> Interval {
         let h = h.max(MIN_TICK);
-        let position = [
-            -max_acceleration(y - self.lower, -v, self.braking, h),
-            max_acceleration(self.upper - y, v, self.braking, h),
-        ];
+        let distances = [y - self.lower, self.upper - y];
+        let position = [-self.max_acceleration(distances[0], -v, h), self.max_acceleration(distances[1], v, h)];
+        let broken = [self.cannot_brake(distances[0], -v), self.cannot_brake(distances[1], v)];
         let velocity = [(-self.velocity - v) * (1.0 / h), (self.velocity - v) * (1.0 / h)];
-        Interval { position, velocity, acceleration: self.acceleration }
+        Interval { position, broken, velocity, acceleration: self.acceleration, to_rest: v * (-1.0 / h) }
+    }
+
+    /// Returns the lanes that at a distance `d` and a velocity `v` towards a limit are beyond it, or cannot brake in front of it.
+    fn cannot_brake(&self, d: F64x4, v: F64x4) -> F64x4 {
+        let ahead = v.max(F64x4::ZERO);
+        (ahead * ahead * (1.0 - ROUNDING)).simd_gt(self.braking * d * 2.0)
+    }
+
+    /// Returns the largest acceleration over `h` at a distance `d` from the upper limit and a velocity `v` towards it.
+    fn max_acceleration(&self, d: F64x4, v: F64x4, h: f64) -> F64x4 {
+        let (braking, infinity) = (self.braking, F64x4::splat(f64::INFINITY));
+        let ah = braking * h;
+        let root = (ah * ah + braking * d * 8.0 - ah * v * 4.0).max(F64x4::ZERO).sqrt();
+        let arriving = (root * 0.5 - v - ah * 0.5) * (1.0 / h);
+        // A state that cannot brake, at the start or after limits that shrink, would turn round ever harder close to the limit.
+        let hardest = self.acceleration.simd_lt(infinity).select(self.acceleration, braking);
+        let turning = (-(v * v) / (d * 2.0)).max(-v * (1.0 / h) - hardest);
+        let returning = (-(-braking * d).max(F64x4::ZERO).sqrt() - v) * (1.0 / h);
+        let inside = (d * 2.0).simd_ge(v * h).select(arriving, turning);
+        let finite = d.simd_lt(infinity).select(inside, infinity);
+        d.simd_ge(F64x4::ZERO).select(finite, returning)
     }
 }
 
@@ -91,17 +125,30 @@ impl Bounds {
 pub(crate) struct Interval {
     /// Ends due to the limits of the position.
     position: [F64x4; 2],
+    /// Lanes in which the lower and the upper limit of the position cannot be kept.
+    broken: [F64x4; 2],
     /// Ends due to the limit of the velocity.
     velocity: [F64x4; 2],
     /// Limit of the acceleration.
     acceleration: F64x4,
+    /// Acceleration that ends in rest.
+    to_rest: F64x4,
 }
 
 impl Interval {
     /// Returns the smallest and the largest acceleration.
     fn ends(&self) -> [F64x4; 2] {
         let within = |bound: F64x4| bound.max(-self.acceleration).min(self.acceleration);
-        [within(self.position[0].max(self.velocity[0])), within(self.position[1].min(self.velocity[1]))]
+        let [slowest, fastest] = self.velocity.map(within);
+        let [least, most] = self.position.map(|bound| bound.max(slowest).min(fastest));
+        // A limit of the position that cannot be kept gives way to the other one. Between two of them a DoF stops.
+        let (lesser, greater) = (least.min(most), least.max(most));
+        let rest = self.to_rest.max(lesser).min(greater);
+        let neither = self.broken[0] & self.broken[1] & most.simd_lt(least);
+        [
+            neither.select(rest, self.broken[0].select(lesser, least)),
+            neither.select(rest, self.broken[1].select(greater, most)),
+        ]
     }
 
     /// Returns the acceleration closest to the wanted one.
@@ -134,19 +181,6 @@ impl Interval {
             Limit::Acceleration
         }
     }
-}
-
-/// Returns the largest acceleration over `h` at a distance `d` from the upper limit and a velocity `v` towards it.
-fn max_acceleration(d: F64x4, v: F64x4, braking: F64x4, h: f64) -> F64x4 {
-    let ah = braking * h;
-    let root = (ah * ah + braking * d * 8.0 - ah * v * 4.0).max(F64x4::ZERO).sqrt();
-    let arriving = (root * 0.5 - v - ah * 0.5) * (1.0 / h);
-    // A state that cannot brake, at the start or after limits that shrink, would turn round ever harder close to the limit.
-    let turning = (-(v * v) / (d * 2.0)).max(-v * (1.0 / h) - braking);
-    let returning = (-(-braking * d).max(F64x4::ZERO).sqrt() - v) * (1.0 / h);
-    let inside = (d * 2.0).simd_ge(v * h).select(arriving, turning);
-    let finite = d.simd_lt(F64x4::splat(f64::INFINITY)).select(inside, F64x4::splat(f64::INFINITY));
-    d.simd_ge(F64x4::ZERO).select(finite, returning)
 }
 
 /// Returns the least and the greatest position on the cubic between two states.

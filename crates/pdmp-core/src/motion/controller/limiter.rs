@@ -1,13 +1,13 @@
 //! Limits of all groups of DoFs in the control loop.
 
-use crate::error::{Error, LimitError, Result};
+use crate::error::Result;
 use crate::motion::limits::{Limit, Limits, limit_of_dof};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
 use crate::motion::viability::Bounds;
 use crate::numerics::simd::{F64x4, WIDTH, groups, padded, unpad};
 use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
-/// Maximum number of substeps in which a tick is limited, each so short that it changes ẏ by half of V at most.
+/// Maximum number of parts in which a tick that is longer than the default one is limited.
 pub(super) const MAX_SUBSTEPS: f64 = 1000.0;
 /// Without a limit of the acceleration, a DoF brakes over this share of the range between its limits.
 const BRAKING_SHARE: f64 = 0.01;
@@ -38,7 +38,7 @@ pub(super) struct Limiter {
     ranges: Vec<f64>,
     /// Commanded goal or anchor (D,), moved inside the limits.
     centre: Vec<f64>,
-    /// max 2A/V and max √(A/(u − l)), in 1/s: with n substeps of a tick of length h, n ≥ h·max.
+    /// max 2B/V and max √(B/(u − l)) with the braking B, in 1/s: a tick of length h needs h·max parts, of up to dt one.
     pub(super) substep_rate: f64,
 }
 
@@ -86,7 +86,7 @@ impl Limiter {
     /// Sets the limits, for movements of a `duration` and ticks of `dt` seconds.
     ///
     /// # Errors
-    /// Limits that [`Limits::check`] rejects, or that are too tight for the tick. They then remain unchanged.
+    /// Limits that [`Limits::check`] rejects. They then remain unchanged.
     pub(super) fn set(&mut self, limits: &Limits, duration: f64, dt: f64) -> Result<()> {
         let n_dofs = self.centre.len();
         limits.check(n_dofs)?;
@@ -96,24 +96,17 @@ impl Limiter {
         let velocity = |dof: usize| limit_of_dof(&limits.velocity, dof, infinity);
         let acceleration = |dof: usize| limit_of_dof(&limits.acceleration, dof, infinity);
         let braking = |dof: usize| {
-            if acceleration(dof) < infinity {
-                return acceleration(dof);
-            }
-            let velocity = velocity(dof).min(FREE_VELOCITY * self.ranges[dof] / duration);
-            velocity * velocity / (2.0 * BRAKING_SHARE * distance(dof).min(self.ranges[dof]))
+            let possible = if acceleration(dof) < infinity {
+                acceleration(dof)
+            } else {
+                let velocity = velocity(dof).min(FREE_VELOCITY * self.ranges[dof] / duration);
+                velocity * velocity / (2.0 * BRAKING_SHARE * distance(dof).min(self.ranges[dof]))
+            };
+            // Harder braking would turn a DoF round within a tick.
+            possible.min(0.5 * velocity(dof) / dt).min(distance(dof) / (dt * dt))
         };
         let rate = |dof: usize| (2.0 * braking(dof) / velocity(dof)).max((braking(dof) / distance(dof)).sqrt());
         let substep_rate = (0..n_dofs).map(rate).fold(0.0, f64::max);
-        if let Some(dof) = (0..n_dofs).find(|&dof| dt * rate(dof) > MAX_SUBSTEPS) {
-            return Err(Error::Limits(LimitError::TooTight {
-                dof,
-                dt,
-                acceleration: braking(dof),
-                velocity: velocity(dof),
-                distance: distance(dof),
-                max_dt: MAX_SUBSTEPS / rate(dof),
-            }));
-        }
         for (group, bounds) in self.bounds.iter_mut().enumerate() {
             let lanes = |number: &dyn Fn(usize) -> f64, none: f64| {
                 F64x4::new(std::array::from_fn(|lane| {
@@ -191,6 +184,14 @@ impl Limiter {
     pub(super) fn begin(&mut self, position: &[F64x4], velocity: &[F64x4], acceleration: &[F64x4]) {
         for (group, before) in self.before.iter_mut().enumerate() {
             *before = [position[group], velocity[group], acceleration[group]];
+        }
+    }
+
+    /// Reduces accelerations at the start of a tick to their limits. A limited jerk would reduce them for so long that the DoF
+    /// could not stop.
+    pub(super) fn reduce_accelerations(&mut self) {
+        for ([_, _, acceleration], bounds) in self.before.iter_mut().zip(&self.bounds) {
+            *acceleration = acceleration.max(-bounds.acceleration).min(bounds.acceleration);
         }
     }
 

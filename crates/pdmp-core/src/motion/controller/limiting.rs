@@ -17,10 +17,14 @@ use crate::dynamics::output_system::Attractor;
 use crate::error::Result;
 use crate::motion::limits::{Limit, Limits};
 use crate::motion::viability::MIN_TICK;
-use crate::numerics::simd::{F64x4, WIDTH};
+use crate::numerics::simd::{F64x4, WIDTH, unpack};
 
 /// Rate ρ, relative to the nominal one, below which the change of z is that of this rate: it would be unbounded in a pause.
 const MIN_RATE: f64 = 0.01;
+/// Rounding error of a position, relative to its terms.
+const ROUNDING: f64 = 1e-13;
+/// Rounding error of the number of parts of a tick, relative to it.
+const ROUNDING_OF_RATE: f64 = 1e-9;
 
 /// Share of a limit from which a DoF slows the clock; the margins of the path ahead are smaller.
 const NEAR_LIMIT: f64 = 0.95;
@@ -30,15 +34,17 @@ impl Controller {
     ///
     /// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: at its end lower ≤ y
     /// ≤ upper, |ẏ| ≤ V, |Δẏ|/Δt ≤ A, |ÿ| ≤ A, and the state can brake to rest inside; between its ends lower ≤ y ≤ upper on the
-    /// cubic through position and velocity at both, by which a robot interpolates. A tick longer than V/2A or √((upper −
-    /// lower)/A) is limited in parts of constant acceleration, each of which keeps the limits, and is no single cubic. Commands
-    /// between ticks change neither position nor velocity at once. A motion inside the limits is not changed.
+    /// cubic through position and velocity at both, by which a robot interpolates, and |Δy|/Δt ≤ V. A DoF brakes with A, or
+    /// with V/2Δt or (upper − lower)/Δt² for the tick Δt = [`Controller::dt`] if that is less. A longer tick is limited in parts
+    /// of constant acceleration, each of which keeps the limits, and is no single cubic. Commands between ticks change neither
+    /// position nor velocity at once. A motion inside the limits is not changed.
     ///
     /// With a limit J of the jerk, |Δÿ|/Δt ≤ J, ẏ changes as it can with that jerk, and the state can stop inside with it. A
     /// movement then begins with ÿ = 0. Where a DoF comes to rest within a tick, the cubic may pass the limit by J·Δt³/150.
     ///
     /// A goal or anchor outside is moved to the limit, where a movement is finished as at any goal; [`Controller::centre`] returns
-    /// it. A state outside, after limits that shrink or at a start outside, brakes with A and returns. [`Controller::limited`]
+    /// it. A state outside, after limits that shrink or at a start outside, brakes with A and returns at V or below: until then the
+    /// limit of the position gives way to the others. [`Controller::limited`]
     /// names the limits that bind. The limits remain in force after [`Controller::reset`]. This function does not allocate.
     ///
     /// ```
@@ -58,28 +64,35 @@ impl Controller {
     /// ```
     ///
     /// # Errors
-    /// A wrong length, a lower limit that is not below the upper one, a velocity or acceleration that is not positive, or
-    /// limits too tight for a tick of [`Controller::dt`]. The limits then remain unchanged.
+    /// As for [`Limits::check`]. The limits then remain unchanged.
     pub fn set_limits(&mut self, limits: &Limits) -> Result<()> {
+        let was_active = self.limiter.is_active();
         self.limiter.set(limits, self.primitive.duration(), self.dt)?;
         self.limit_path();
         if !self.started {
             self.begin();
             return Ok(());
         }
-        // An acceleration beyond its limit would be reduced by the jerk for so long that the DoF could not stop.
-        for (acceleration, bounds) in self.acceleration.iter_mut().zip(&self.limiter.bounds) {
-            *acceleration = acceleration.max(-bounds.acceleration).min(bounds.acceleration);
+        // Within limits, the next tick continues the last one.
+        if !was_active {
+            self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
         }
-        self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
-        self.move_centre(1.0);
-        self.status = Status::Working;
-        if self.has_frame() {
-            self.start_goal_transition();
+        self.limiter.reduce_accelerations();
+        if self.changes_centre() {
+            self.move_centre(1.0);
+            self.status = Status::Working;
+            if self.has_frame() {
+                self.start_goal_transition();
+            }
         }
         self.look_ahead();
         self.publish();
         Ok(())
+    }
+
+    /// Returns whether the commanded goal or anchor inside the limits differs from the present target.
+    pub(super) fn changes_centre(&mut self) -> bool {
+        self.limiter.accept(&self.conditions.centre) != unpack(self.centre.target(), self.primitive.n_dofs())
     }
 
     /// Returns the limits; infinite elements are none.
@@ -98,7 +111,10 @@ impl Controller {
     /// passed for a change of the velocity. The next tick begins the change.
     pub(super) fn publish(&mut self) {
         self.read_out();
-        if !(self.started && self.limiter.is_active()) {
+        if !self.started {
+            return self.begin_first_tick();
+        }
+        if !self.limiter.is_active() {
             return;
         }
         for (index, &[y, v, a]) in self.limiter.before.iter().enumerate() {
@@ -212,7 +228,7 @@ impl Controller {
     fn hold_rate(&mut self, start: f64, [wanted, limited]: [f64; 2]) {
         let rate = first_element(self.rate.value()).max(MIN_RATE / self.primitive.tau());
         let held = start.min(rate * (limited / wanted).sqrt());
-        if !(held > rate) {
+        if held <= rate {
             return;
         }
         for (group, velocity) in self.groups.iter_mut().zip(&self.velocity) {
@@ -227,7 +243,7 @@ impl Controller {
         let bounds = self.limiter.bounds[index];
         let [mut y, mut v, _] = self.limiter.before[index];
         let (wanted, at_end) = ((self.velocity[index] - v) * (1.0 / dt.max(MIN_TICK)), self.acceleration[index]);
-        let n_substeps = (dt * self.limiter.substep_rate).ceil().clamp(1.0, MAX_SUBSTEPS);
+        let n_substeps = (dt * self.limiter.substep_rate * (1.0 - ROUNDING_OF_RATE)).ceil().clamp(1.0, MAX_SUBSTEPS);
         let h = dt / n_substeps;
         let mut interval = bounds.interval(y, v, h);
         let mut a = wanted;
@@ -238,8 +254,10 @@ impl Controller {
             a = interval.nearest(wanted);
             let inside = y.simd_ge(bounds.lower) & y.simd_le(bounds.upper);
             let next = y + v * h + a * (0.5 * h * h);
-            // From inside, a position past the limit is one of rounding.
-            y = inside.select(next.max(bounds.lower).min(bounds.upper), next);
+            // From inside, a position just past the limit is one of rounding.
+            let inner = next.max(bounds.lower).min(bounds.upper);
+            let rounding = (y.abs() + next.abs() + (v * h).abs()) * ROUNDING;
+            y = (inside & (next - inner).abs().simd_le(rounding)).select(inner, next);
             v += a * h;
         }
         let rate = self.finite_rate();

@@ -225,9 +225,8 @@ impl Controller {
         // The next tick may have any phase rate.
         let gate = Gate { phase_rate: MAX_PHASE_RATE, ..self.gate() };
         let at_once = !self.started || self.command_gains.is_immediate();
-        if at_once
-            && [&self.style, &self.rate, &self.amplitude].iter().any(|command| command.value() != command.target())
-        {
+        // The rate is in transition then, too, after limits along the path.
+        if at_once && [&self.style, &self.amplitude].iter().any(|command| command.value() != command.target()) {
             return Err(unsuitable("describes no state: a command that takes effect at once is in transition"));
         }
         let forcing = self.groups.iter().map(|group| gate.forcing::<F64x4>(&group.forcing));

@@ -59,7 +59,7 @@ impl Controller {
         self.read_frame();
         self.read_forcing();
         self.set_initial_state();
-        if rhythmic && self.limiter.is_active() {
+        if rhythmic && self.changes_centre() {
             self.move_centre(1.0);
         }
         if self.conditions.has_goal_velocity {
@@ -68,6 +68,11 @@ impl Controller {
         self.update_lengths();
         self.read_out();
         self.start_rate();
+        self.begin_first_tick();
+    }
+
+    /// Sets the motion from which the first tick begins to the present one.
+    pub(super) fn begin_first_tick(&mut self) {
         // A robot that begins a movement does not accelerate yet.
         for (index, acceleration) in self.acceleration.iter_mut().enumerate() {
             *acceleration = self.limiter.jerk_limited(index).select(F64x4::ZERO, *acceleration);
