@@ -1270,8 +1270,7 @@ class Model:
         Raises
         ------
         ValueError
-            `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length or are
-            too tight for a tick of `dt`.
+            `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length.
         TypeError
             A keyword is unknown, or `conditions` or `limits` has another type.
 
@@ -2065,12 +2064,13 @@ class Controller:
 
         Every tick keeps them, for any commands, measurements, coupling terms and tick lengths: at its end lower ≤ y ≤ upper,
         |ẏ| ≤ V, |ÿ| ≤ A and a change of ẏ by at most A·dt, and between its ends lower ≤ y ≤ upper on the cubic through
-        position and velocity at both, by which a robot interpolates. A tick longer than V / 2A is limited in parts of
-        constant acceleration, and is no single cubic. A movement inside the limits is not changed.
+        position and velocity at both, by which a robot interpolates; the mean velocity of a tick is at most V, too. A degree
+        of freedom brakes with A, or with V / (2 dt) or (upper - lower) / dt² for the default tick if that is less. A longer
+        tick is limited in parts of constant acceleration, and is no single cubic. A movement inside the limits is not changed.
         With a limit of the jerk, ÿ changes by at most J·dt, the degree of freedom can always stop inside, and a movement
         begins with ÿ = 0; where one comes to rest within a tick, the cubic may pass the limit by J·dt³/150.
         A goal or anchor outside is moved to the limit: `goal` and `anchor` return it, and a movement finishes there. A
-        movement outside, after limits that shrink or at a start outside, brakes with A and returns. They stay in force
+        movement outside, after limits that shrink or at a start outside, brakes with A and returns at V or below. They stay in force
         after `reset`; None removes them.
         """
     @limits.setter
