@@ -1491,6 +1491,8 @@ class Limits:
         velocity: ArrayLike | None = None,  # one, or (D,)
         acceleration: ArrayLike | None = None,  # one, or (D,)
         jerk: ArrayLike | None = None,  # one, or (D,)
+        *,
+        synchronous: bool = True,
     ) -> Limits: ...
     @staticmethod
     def from_urdf(
@@ -1587,15 +1589,21 @@ class Limits:
     @property
     def jerk(self) -> _Array | None:
         """Limit of the jerk's magnitude (1,) or (D,) per s³, or None."""
+    @property
+    def synchronous(self) -> bool:
+        """True if a controller slows all degrees of freedom along the path before it limits single ones."""
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
-    def __getnewargs__(
+    def __getnewargs_ex__(
         self,
     ) -> tuple[
-        tuple[list[float] | None, list[float] | None] | None,
-        list[float] | None,
-        list[float] | None,
-        list[float] | None,
+        tuple[
+            tuple[list[float] | None, list[float] | None] | None,
+            list[float] | None,
+            list[float] | None,
+            list[float] | None,
+        ],
+        dict[str, bool],
     ]: ...
 
 def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
@@ -2075,6 +2083,11 @@ class Controller:
         """
     @limits.setter
     def limits(self, limits: Limits | None, /) -> None: ...
+    @property
+    def pending(self) -> bool:
+        """True while a part of a commanded style, goal, anchor or amplitude is not yet accepted, as the movement ahead would leave
+        its limits with it.
+        """
     @property
     def limited(self) -> list[Literal["position", "velocity", "acceleration", "jerk"] | None]:  # D
         """Limit that determined the acceleration of each degree of freedom in the last tick: "position", "velocity",
