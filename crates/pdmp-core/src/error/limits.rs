@@ -78,4 +78,26 @@ pub enum LimitError {
         /// Longest possible tick, in seconds.
         max_dt: f64,
     },
+    /// Limits that no movement of the varied conditions keeps.
+    #[error(
+        "limits of DoF {dof}: no {varied} keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {remedy}",
+        Number(*value),
+        Number(*limit)
+    )]
+    Infeasible {
+        /// Index of the DoF.
+        dof: usize,
+        /// Conditions that were varied.
+        varied: &'static str,
+        /// Position, velocity or acceleration.
+        quantity: &'static str,
+        /// Its value where the movement with the smallest excess exceeds the limit most.
+        value: f64,
+        /// The limit.
+        limit: f64,
+        /// Time of that value, in seconds.
+        time: f64,
+        /// The remedy, as the end of the sentence.
+        remedy: &'static str,
+    },
 }
