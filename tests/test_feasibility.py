@@ -9,9 +9,14 @@ import pdmp
 from pdmp import Limits
 
 
+def duration(model: pdmp.Model) -> float:
+    """Returns the duration or period of the nominal movement in s."""
+    return float(model.durations[model.nominal])
+
+
 def share(model: pdmp.Model, part: float) -> Limits:
     """Returns limits at a part of the extremes of the nominal movement."""
-    movement = model.rollout(dt=model.duration / 2000)
+    movement = model.rollout(dt=duration(model) / 2000)
     return Limits(
         velocity=part * abs(movement.velocity).max(0),
         acceleration=part * abs(movement.acceleration).max(0),
@@ -20,7 +25,7 @@ def share(model: pdmp.Model, part: float) -> Limits:
 
 def test_margins_are_the_extremes_of_the_rollout(model: pdmp.Model) -> None:
     """Ratio, degree of freedom and time are those of the extreme samples."""
-    movement = model.rollout(dt=model.duration / 2000)
+    movement = model.rollout(dt=duration(model) / 2000)
     top = movement.position.max(0)
     limits = Limits(position=(-10.0, top - 0.1), velocity=2.0, acceleration=3.0)
     margins = model.feasible(limits)
@@ -61,7 +66,7 @@ def test_nearest_conditions_keep_the_limits(model: pdmp.Model, part: float) -> N
     assert limits.acceleration is not None
     near = model.nearest_feasible(limits)
     assert model.feasible(limits, near).feasible
-    movement = model.rollout(near, dt=model.duration / 20000)
+    movement = model.rollout(near, dt=duration(model) / 20000)
     assert (abs(movement.velocity) / limits.velocity).max() < 1 + 1e-4
     assert (abs(movement.acceleration) / limits.acceleration).max() < 1 + 1e-4
     rest = near.replace(style=None, goal=None, anchor=None)
