@@ -1,6 +1,6 @@
 //! Errors about limits of a robot.
 
-use super::format::Number;
+use super::format::{Number, Rounded};
 
 /// Error about the limits of one DoF.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -80,9 +80,9 @@ pub enum LimitError {
     },
     /// Limits that no movement of the varied conditions keeps.
     #[error(
-        "limits of DoF {dof}: no {varied} keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {remedy}",
-        Number(*value),
-        Number(*limit)
+        "limits of DoF {dof}: no change of {varied} keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {remedy}",
+        Rounded(*value),
+        Rounded(*limit)
     )]
     Infeasible {
         /// Index of the DoF.

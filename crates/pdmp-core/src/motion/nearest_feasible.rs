@@ -1,13 +1,13 @@
 //! Conditions nearest to requested ones whose movement keeps limits.
 //!
-//! With a fixed start and τ, a movement is affine in style s and goal g, so that limits of y, ẏ and ÿ at a sample are half-spaces.
+//! With a fixed start and τ, a movement is affine in style s and goal g, so that limits of y, ẏ and ÿ at one time are half-spaces.
 //! In the units of the demonstrations, x = L⁻¹(Δs, Δg) with LLᵀ = diag(Σ_s, Σ_g), the nearest point within them solves
 //!
 //! ```text
 //! min ½|x|²   subject to   aᵢᵀx ≤ bᵢ.
 //! ```
 //!
-//! Of all samples only the worst one of each limit joins the program per round, until the movement keeps every limit.
+//! Of all times only the worst one of each limit joins the program per round, until the movement keeps every limit.
 //!
 //! J. E. Kelley, *The cutting-plane method for solving convex programs*, Journal of the Society for Industrial and Applied
 //! Mathematics 8(4), 1960. P. J. Goulart, Y. Chen, *Clarabel: an interior-point solver for conic programs with quadratic
@@ -26,7 +26,7 @@ use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::model::responses::Derivative;
 use crate::model::{DemonstrationParameters, Model};
-use crate::motion::feasibility::{Bound, TOLERANCE, bounds, of, ranges, sampled};
+use crate::motion::feasibility::{Bound, Place, TOLERANCE, bounds, ranges, sampled};
 use crate::motion::limits::Limits;
 use crate::motion::trajectory::Trajectory;
 
@@ -91,8 +91,8 @@ pub fn nearest_feasible(model: &Model, limits: &Limits, conditions: &Conditions,
     let mut x = vec![0.0; search.n_variables()];
     for _ in 0..MAX_ROUNDS {
         for bound in &bounds {
-            let (sample, excess) = bound.worst(&movement);
-            if excess > TOLERANCE && !program.add(search.row(bound, sample), excess, &x) {
+            let (place, excess) = bound.worst(&movement);
+            if excess > TOLERANCE && !program.add(search.row(bound, place), excess, &x) {
                 return Err(search.infeasible(bound, &movement));
             }
         }
@@ -220,12 +220,9 @@ impl Search {
         self.changed(&change(&self.factors[0], style), &change(&self.factors[1], centre))
     }
 
-    /// Returns the change of the excess over a limit at a sample per unit of x.
-    fn row(&self, bound: &Bound, sample: usize) -> Vec<f64> {
-        let at = |unit: &Trajectory| {
-            let change = of(unit, bound.derivative)[[sample, bound.dof]];
-            bound.side * change / bound.scale
-        };
+    /// Returns the change of the excess over a limit at a place per unit of x.
+    fn row(&self, bound: &Bound, place: Place) -> Vec<f64> {
+        let at = |unit: &Trajectory| bound.side * place.value(unit, bound.derivative, bound.dof) / bound.scale;
         let mut row = Vec::with_capacity(self.n_variables());
         if self.vary != Vary::Goal {
             let by_style: Vec<f64> = self.styles.iter().map(at).collect();
@@ -243,7 +240,7 @@ impl Search {
 
     /// Returns the error of a movement that exceeds a limit.
     fn infeasible(&self, bound: &Bound, movement: &Trajectory) -> Error {
-        let (sample, _) = bound.worst(movement);
+        let (place, _) = bound.worst(movement);
         let centre = if self.kind == Kind::Discrete { "goal" } else { "anchor" };
         let varied = match (self.vary, self.kind) {
             (Vary::Both, Kind::Discrete) => "style and goal",
@@ -269,9 +266,9 @@ impl Search {
             dof: bound.dof,
             varied,
             quantity,
-            value: of(movement, bound.derivative)[[sample, bound.dof]],
+            value: place.value(movement, bound.derivative, bound.dof),
             limit: bound.value,
-            time: movement.time[sample],
+            time: place.time(movement),
             remedy,
         })
     }
