@@ -35,6 +35,7 @@ __all__ = [
     "GP",
     "GPRegression",
     "Limits",
+    "Margins",
     "Model",
     "ModelFileError",
     "NGnet",
@@ -895,6 +896,104 @@ class Model:
         >>> len(cost) == model.n_demos
         True
         """
+    def feasible(
+        self,
+        limits: Limits,
+        conditions: Conditions | None = None,
+        *,
+        context: _Context | None = None,
+        **changes: Unpack[_Changes],
+    ) -> Margins:
+        """Compares the movement under constant conditions with limits.
+
+        The comparison covers the demonstrated duration scaled by `tau`, the sum of `segment_durations`, or one period of a
+        rhythmic movement.
+
+        Parameters
+        ----------
+        limits : Limits
+            Limits of position, velocity and acceleration; those of the jerk do not count.
+        conditions : Conditions, optional
+            Conditions at the start.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name, as in `rollout`.
+
+        Returns
+        -------
+        Margins
+            Largest ratios of the movement to its limits.
+
+        Raises
+        ------
+        ValueError
+            `rollout` rejects the conditions, or a limit has a wrong length.
+        TypeError
+            A keyword is unknown, or `conditions` or `limits` has another type.
+
+        Examples
+        --------
+        >>> margins = model.feasible(pdmp.Limits(velocity=0.5))
+        >>> margins.feasible
+        False
+        >>> ratio, dof, time = margins.velocity
+        >>> bool(np.isclose(ratio * 0.5, abs(model.rollout(dt=0.001).velocity).max(), rtol=1e-3))
+        True
+        """
+    def nearest_feasible(
+        self,
+        limits: Limits,
+        conditions: Conditions | None = None,
+        *,
+        vary: Literal["both", "style", "goal"] = "both",
+        context: _Context | None = None,
+        **changes: Unpack[_Changes],
+    ) -> Conditions:
+        """Computes the conditions nearest to the requested ones whose movement keeps limits.
+
+        Start, tau and the other conditions remain, so that the movement is affine in style s and goal g, or anchor of a
+        rhythmic movement. The change (Δs, Δg) minimises Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg, with the covariances of the
+        demonstrations plus squares of a thousandth of the range of styles and positions, subject to the limits at 2001
+        samples of the demonstrated duration, or one period, scaled by `tau`: a quadratic program.
+
+        Parameters
+        ----------
+        limits : Limits
+            Limits of position, velocity and acceleration; those of the jerk do not count.
+        conditions : Conditions, optional
+            Requested conditions.
+        vary : {"both", "style", "goal"}
+            Conditions that change; "goal" is the anchor of a rhythmic movement.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name, as in `rollout`.
+
+        Returns
+        -------
+        Conditions
+            Requested conditions with another style, goal or anchor; unchanged if they keep the limits.
+
+        Raises
+        ------
+        ValueError
+            `rollout` rejects the conditions, a limit has a wrong length, or no change of the varied conditions keeps the
+            limits.
+        TypeError
+            A keyword is unknown, or `conditions` or `limits` has another type.
+
+        Examples
+        --------
+        >>> limits = pdmp.Limits(velocity=1.8)
+        >>> near = model.nearest_feasible(limits)
+        >>> model.feasible(limits).feasible, model.feasible(limits, near).feasible
+        (False, True)
+
+        References
+        ----------
+        Kelley, Journal of the Society for Industrial and Applied Mathematics 8(4), 1960, doi:10.1137/0108053.
+        """
     def jacobian(
         self,
         wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
@@ -1631,6 +1730,31 @@ def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
     >>> np.allclose(between.goal, 0.75 * model.goals[0] + 0.25 * model.goals[1])
     True
     """
+
+@final
+class Margins:
+    """Largest ratios of a movement to its limits, returned by `Model.feasible`."""
+    @property
+    def position(self) -> tuple[float, int, float] | None:
+        """Largest distance of the position outside its limits, relative to the range between them, or to that of the nominal
+        movement if a side has none, at most 0 inside; with the index of its degree of freedom and the time in s. None
+        without limits of the position.
+        """
+    @property
+    def velocity(self) -> tuple[float, int, float] | None:
+        """Largest ratio |ẏ| / V, at most 1 inside, with the index of its degree of freedom and the time in s. None without
+        limits of the velocity.
+        """
+    @property
+    def acceleration(self) -> tuple[float, int, float] | None:
+        """Largest ratio |ÿ| / A, at most 1 inside, with the index of its degree of freedom and the time in s. None without
+        limits of the acceleration.
+        """
+    @property
+    def feasible(self) -> bool:
+        """True if the movement keeps all limits, within 1e-6 of them."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
 
 @final
 class Prediction:

@@ -118,7 +118,7 @@ pub(crate) fn memory_of_limits(n_dofs: usize) -> Limits {
 /// returns at the limit of the velocity or below. The
 /// limits stay in force after pdmp_controller_reset.
 ///
-/// This function does not allocate. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE. The
+/// This function allocates the first time, unless every DoF is limited on its own. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE. The
 /// present limits then stay in force.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_set_limits(

@@ -13,6 +13,7 @@ mod demonstration;
 mod display;
 mod error;
 mod factorization;
+mod feasibility;
 mod fit;
 mod inspection;
 mod instance;
@@ -52,6 +53,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<context::ContextMap>()?;
     module.add_class::<conditions::Conditions>()?;
     module.add_class::<limits::Limits>()?;
+    module.add_class::<feasibility::Margins>()?;
     module.add_class::<prediction::Prediction>()?;
     module.add_class::<status::Status>()?;
     module.add_class::<controller::Controller>()?;

@@ -1,6 +1,6 @@
 //! Errors about limits of a robot.
 
-use super::format::Number;
+use super::format::{Number, Rounded};
 
 /// Error about the limits of one DoF.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -53,5 +53,27 @@ pub enum LimitError {
         dof: usize,
         /// Its limit of the jerk.
         jerk: f64,
+    },
+    /// Limits that no movement of the varied conditions keeps.
+    #[error(
+        "limits of DoF {dof}: no change of {varied} keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {remedy}",
+        Rounded(*value),
+        Rounded(*limit)
+    )]
+    Infeasible {
+        /// Index of the DoF.
+        dof: usize,
+        /// Conditions that were varied.
+        varied: &'static str,
+        /// Position, velocity or acceleration.
+        quantity: &'static str,
+        /// Its value where the movement with the smallest excess exceeds the limit most.
+        value: f64,
+        /// The limit.
+        limit: f64,
+        /// Time of that value, in seconds.
+        time: f64,
+        /// The remedy, as the end of the sentence.
+        remedy: &'static str,
     },
 }

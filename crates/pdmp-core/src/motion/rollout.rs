@@ -98,6 +98,26 @@ pub(crate) fn follow(primitive: &Arc<Primitive>, conditions: &Conditions, law: T
     sample(primitive, conditions, clock, dt, steps, &mut |_| Ok(()))
 }
 
+/// Computes the movement under constant conditions at the given times in seconds, which increase from 0.
+///
+/// # Errors
+/// As for [`rollout`].
+pub(crate) fn rollout_at(primitive: &Arc<Primitive>, conditions: &Conditions, time: Vec<f64>) -> Result<Trajectory> {
+    let mut clock = Clock::of(primitive, conditions)?;
+    let conditions = clock.conditions(conditions);
+    let mut controller = Controller::new(primitive, time[1], &conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
+    let mut before = 0.0;
+    Trajectory::record_at("rollout", primitive.n_dofs(), time, &mut |_| Ok(()), |k, time, motion| {
+        if k > 0 {
+            clock.step_from(&mut controller, before, time)?;
+        }
+        before = time;
+        controller.read(motion);
+        clock.rescale(motion);
+        Ok(())
+    })
+}
+
 /// Samples the movement on a clock.
 fn sample(
     primitive: &Arc<Primitive>,
@@ -187,6 +207,14 @@ impl Clock {
             }
         }
         .map(drop)
+    }
+
+    /// Advances the controller from one time to another, in seconds.
+    fn step_from(&mut self, controller: &mut Controller, from: f64, to: f64) -> Result<()> {
+        match self {
+            Self::Linear => controller.step_with(&Command { dt: Some(to - from), ..Command::default() }).map(drop),
+            Self::Warped { .. } => self.step(controller, to),
+        }
     }
 
     /// Converts velocity and acceleration from the time of the controller to warped time.

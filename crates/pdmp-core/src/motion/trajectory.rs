@@ -33,11 +33,24 @@ impl Trajectory {
         steps: usize,
         dt: f64,
         progress: &mut dyn FnMut(f64) -> Result<()>,
+        sample: impl FnMut(usize, f64, &mut Motion) -> Result<()>,
+    ) -> Result<Self> {
+        let time = (0..=steps).map(|k| k as f64 * dt).collect();
+        Self::record_at(name, n_dofs, time, progress, sample)
+    }
+
+    /// Records samples at the given times, as [`Self::record`] does.
+    pub(crate) fn record_at(
+        name: &'static str,
+        n_dofs: usize,
+        time: Vec<f64>,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
         mut sample: impl FnMut(usize, f64, &mut Motion) -> Result<()>,
     ) -> Result<Self> {
-        let shape = (steps + 1, n_dofs);
+        let n_samples = time.len();
+        let shape = (n_samples, n_dofs);
         let mut trajectory = Self {
-            time: (0..=steps).map(|k| k as f64 * dt).collect(),
+            time,
             position: zeros(name, shape)?,
             velocity: zeros(name, shape)?,
             acceleration: zeros(name, shape)?,
@@ -47,7 +60,7 @@ impl Trajectory {
         let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
         for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
             if k % PROGRESS_INTERVAL == 0 {
-                progress(k as f64 / (steps + 1) as f64)?;
+                progress(k as f64 / n_samples as f64)?;
             }
             sample(k, *time, &mut Motion { position, velocity, acceleration })?;
         }

@@ -45,7 +45,8 @@ impl Controller {
     /// A goal or anchor outside is moved to the limit, where a movement is finished as at any goal; [`Controller::centre`] returns
     /// it. A state outside, after limits that shrink or at a start outside, brakes with A and returns at V or below: until then the
     /// limit of the position gives way to the others. [`Controller::limited`]
-    /// names the limits that bind. The limits remain in force after [`Controller::reset`]. This function does not allocate.
+    /// names the limits that bind. The limits remain in force after [`Controller::reset`]. The first time, this
+    /// function allocates memory for the path ahead, unless every DoF is limited on its own.
     ///
     /// ```
     /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Status, fit};

@@ -1,0 +1,232 @@
+//! Comparison with limits, and the nearest conditions that keep them.
+#![cfg(feature = "learning")]
+#![allow(missing_docs, clippy::needless_range_loop)]
+
+mod common;
+
+use std::sync::LazyLock;
+
+use common::*;
+use pdmp_core::motion::{Limits, TimeGrid, Trajectory, Vary, fastest_tau, feasible, nearest_feasible};
+use pdmp_core::{Conditions, Error, FitOptions, Kind, LimitError, Model, fit, rollout};
+
+static REACH: LazyLock<Model> = LazyLock::new(|| fit(&reaches(), &FitOptions::new(Kind::Discrete)).unwrap());
+static CYCLE: LazyLock<Model> = LazyLock::new(|| fit(&cycles(), &FitOptions::new(Kind::Rhythmic)).unwrap());
+
+fn movement(model: &Model, conditions: &Conditions, n: usize) -> Trajectory {
+    let duration = model.duration() * conditions.time_constant(model.primitive()).unwrap() / model.tau();
+    rollout(model.primitive(), conditions, TimeGrid { dt: duration / n as f64, duration: None }).unwrap()
+}
+
+fn extreme(values: ndarray::ArrayView1<f64>) -> f64 {
+    values.iter().fold(0.0f64, |most, value| most.max(value.abs()))
+}
+
+/// Returns limits at a share of the extremes of a movement.
+fn share_of(movement: &Trajectory, share: f64) -> Limits {
+    let of = |curve: &ndarray::Array2<f64>| Some(curve.columns().into_iter().map(|c| share * extreme(c)).collect());
+    Limits { velocity: of(&movement.velocity), acceleration: of(&movement.acceleration), ..Limits::default() }
+}
+
+/// Returns the largest excess over the limits at the samples of a movement, relative to the limits.
+fn excess(limits: &Limits, movement: &Trajectory) -> f64 {
+    let mut most = f64::NEG_INFINITY;
+    for d in 0..movement.position.ncols() {
+        for (limit, curve) in [(&limits.velocity, &movement.velocity), (&limits.acceleration, &movement.acceleration)] {
+            if let Some(limit) = limit {
+                most = most.max(extreme(curve.column(d)) / limit[d] - 1.0);
+            }
+        }
+        if let (Some(lower), Some(upper)) = (&limits.lower, &limits.upper) {
+            let range = upper[d] - lower[d];
+            movement.position.column(d).iter().for_each(|y| most = most.max((y - upper[d]).max(lower[d] - y) / range));
+        }
+    }
+    most
+}
+
+/// Returns the distance of two conditions in the units of the demonstrations, by elimination on the covariances.
+fn distance(model: &Model, from: &Conditions, to: &Conditions) -> f64 {
+    let demonstrated = model.demonstrated();
+    let (centres, [a, b]) = match model.kind() {
+        Kind::Discrete => (&demonstrated.goals, [from, to].map(|c| c.goal.clone().unwrap())),
+        Kind::Rhythmic => (&demonstrated.anchors, [from, to].map(|c| c.anchor.clone().unwrap())),
+    };
+    let nominal = movement(model, &Conditions::default(), 2000).position;
+    let spans: Vec<f64> = nominal
+        .columns()
+        .into_iter()
+        .map(|c| c.iter().fold(f64::MIN, |m, v| m.max(*v)) - c.iter().fold(f64::MAX, |m, v| m.min(*v)))
+        .collect();
+    let widest = spans.iter().fold(0.0f64, |m, s| m.max(*s));
+    let spans: Vec<f64> = spans.iter().map(|span| span.max(1e-3 * widest)).collect();
+    let largest = demonstrated.styles.iter().fold(0.0f64, |m, s| m.max(s.abs()));
+    let style = quadratic(
+        &demonstrated.styles,
+        &vec![largest; model.n_styles()],
+        &difference(from.style.as_ref(), to.style.as_ref()),
+    );
+    style + quadratic(centres, &spans, &difference(Some(&a), Some(&b)))
+}
+
+fn difference(a: Option<&Vec<f64>>, b: Option<&Vec<f64>>) -> Vec<f64> {
+    a.unwrap().iter().zip(b.unwrap()).map(|(a, b)| b - a).collect()
+}
+
+/// Returns vᵀΣ⁻¹v with the covariance of the rows and a thousandth of the ranges.
+fn quadratic(rows: &ndarray::Array2<f64>, ranges: &[f64], v: &[f64]) -> f64 {
+    let (m, n) = rows.dim();
+    let mean = rows.mean_axis(ndarray::Axis(0)).unwrap();
+    let mut a: Vec<Vec<f64>> = (0..n)
+        .map(|i| {
+            let entry = |j: usize| {
+                (0..m).map(|k| (rows[[k, i]] - mean[i]) * (rows[[k, j]] - mean[j])).sum::<f64>() / (m - 1) as f64
+            };
+            let floor = |j: usize| if i == j { (1e-3 * ranges[i]).powi(2) } else { 0.0 };
+            (0..n).map(|j| entry(j) + floor(j)).chain([v[i]]).collect()
+        })
+        .collect();
+    for i in 0..n {
+        for k in 0..n {
+            if k != i {
+                let factor = a[k][i] / a[i][i];
+                for j in i..=n {
+                    a[k][j] -= factor * a[i][j];
+                }
+            }
+        }
+    }
+    (0..n).map(|i| v[i] * a[i][n] / a[i][i]).sum()
+}
+
+/// Requests that leave their limits: a movement of each kind, its limits, and its conditions in full.
+fn requests() -> Vec<(&'static Model, Limits, Conditions)> {
+    let mut requests = Vec::new();
+    for model in [&*REACH, &*CYCLE] {
+        let mut conditions = model.conditions(&[model.n_demos() - 1]).unwrap();
+        if model.kind() == Kind::Rhythmic {
+            conditions.start = None;
+        }
+        let curves = movement(model, &conditions, 2000);
+        requests.push((model, share_of(&curves, 0.95), conditions.clone()));
+        let edges = |share: f64| {
+            let of = |c: ndarray::ArrayView1<f64>| {
+                let [least, most] = [f64::min, f64::max].map(|f| c.iter().copied().fold(c[0], f));
+                least + share * (most - least)
+            };
+            Some(curves.position.columns().into_iter().map(of).collect())
+        };
+        let lower = if model.kind() == Kind::Discrete { edges(-0.1) } else { edges(0.05) };
+        requests.push((model, Limits { lower, upper: edges(0.93), ..Limits::default() }, conditions));
+    }
+    requests
+}
+
+#[test]
+fn nearest_conditions_keep_the_limits_on_a_ten_times_finer_grid() {
+    for (model, limits, request) in requests() {
+        assert!(!feasible(model.primitive(), &limits, &request).unwrap().is_feasible());
+        let near = nearest_feasible(model, &limits, &request, Vary::Both).unwrap();
+        assert!(feasible(model.primitive(), &limits, &near).unwrap().is_feasible());
+        let found = excess(&limits, &movement(model, &near, 20_000));
+        assert!(found < 1e-4, "{:?}: {found:e}", model.kind());
+    }
+}
+
+#[test]
+fn no_random_feasible_conditions_are_nearer() {
+    let mut state = 1u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
+    };
+    for (model, limits, request) in requests() {
+        let near = nearest_feasible(model, &limits, &request, Vary::Both).unwrap();
+        let nearest = distance(model, &request, &near);
+        let mut n_feasible = 0;
+        for trial in 0..600 {
+            // Near the result, where nearer feasible conditions would be if there were any.
+            let size = 0.3 * 0.5f64.powi(trial % 12);
+            let mut moved = near.clone();
+            for vector in [&mut moved.style, &mut moved.goal, &mut moved.anchor] {
+                vector.iter_mut().flatten().for_each(|value| *value += size * uniform());
+            }
+            if excess(&limits, &movement(model, &moved, 2000)) <= 0.0 {
+                n_feasible += 1;
+                let other = distance(model, &request, &moved);
+                assert!(other >= nearest * (1.0 - 1e-4), "{:?}: {other} < {nearest}", model.kind());
+            }
+        }
+        assert!(n_feasible > 5, "{:?}: {n_feasible}", model.kind());
+    }
+}
+
+#[test]
+fn a_feasible_request_is_returned_unchanged() {
+    for (model, _, request) in requests() {
+        let limits = share_of(&movement(model, &request, 2000), 1.01);
+        for conditions in [request, Conditions::default()] {
+            let limits = if conditions.style.is_some() { limits.clone() } else { Limits::default() };
+            assert_eq!(nearest_feasible(model, &limits, &conditions, Vary::Both).unwrap(), conditions);
+        }
+    }
+}
+
+#[test]
+fn only_the_varied_conditions_change() {
+    let model = &*REACH;
+    let request = model.conditions(&[4]).unwrap();
+    let height = extreme(movement(model, &request, 2000).position.column(1));
+    let limits = Limits { upper: Some(vec![5.0, 0.95 * height, 5.0]), ..Limits::default() };
+    let [both, style, goal] =
+        [Vary::Both, Vary::Style, Vary::Goal].map(|vary| nearest_feasible(model, &limits, &request, vary).unwrap());
+    assert_eq!(Conditions { style: request.style.clone(), ..style.clone() }, request);
+    assert_eq!(Conditions { goal: request.goal.clone(), ..goal.clone() }, request);
+    let [nearest, by_style, by_goal] = [both, style, goal].map(|found| distance(model, &request, &found));
+    assert!(nearest <= by_style.min(by_goal) * (1.0 + 1e-5), "{nearest}, {by_style}, {by_goal}");
+}
+
+#[test]
+fn margins_are_the_extremes_of_a_rollout() {
+    let (model, limits, request) = requests().remove(0);
+    let margins = feasible(model.primitive(), &limits, &request).unwrap();
+    assert_eq!(margins.position, None);
+    let [velocity, acceleration] = [margins.velocity, margins.acceleration].map(|extreme| extreme.unwrap().ratio);
+    assert!((velocity - 1.0 / 0.95).abs() < 1e-9 && (acceleration - 1.0 / 0.95).abs() < 1e-9);
+}
+
+#[test]
+fn impossible_limits_name_the_limit_and_a_remedy() {
+    let model = &*REACH;
+    let request = model.conditions(&[0]).unwrap();
+    let start = request.start.clone().unwrap();
+    // The start lies below the lower limit.
+    let lower = Some(start.iter().map(|y| y + 0.01).collect());
+    let error = nearest_feasible(model, &Limits { lower, ..Limits::default() }, &request, Vary::Both).unwrap_err();
+    assert!(matches!(error, Error::Limits(LimitError::Infeasible { quantity: "position", .. })), "{error}");
+    assert!(error.to_string().contains("move the start"), "{error}");
+    // The goal alone is far away for the limit of the acceleration.
+    let limits = share_of(&movement(model, &request, 2000), 0.3);
+    let error = nearest_feasible(model, &limits, &request, Vary::Style).unwrap_err();
+    assert!(error.to_string().contains("vary both, enlarge tau"), "{error}");
+}
+
+#[test]
+fn a_movement_may_start_on_a_limit_of_the_position() {
+    let model = &*REACH;
+    let request = model.conditions(&[4]).unwrap();
+    let start = request.start.clone().unwrap();
+    let height = extreme(movement(model, &request, 2000).position.column(1));
+    let lower = Some(vec![start[0], start[1], -5.0]);
+    let limits = Limits { lower, upper: Some(vec![5.0, 0.9 * height, 5.0]), ..Limits::default() };
+    let near = nearest_feasible(model, &limits, &request, Vary::Both).unwrap();
+    assert!(near != request && feasible(model.primitive(), &limits, &near).unwrap().is_feasible());
+}
+
+#[test]
+fn the_fastest_tau_is_feasible() {
+    let (model, limits, request) = requests().remove(0);
+    let slower = fastest_tau(model.primitive(), &limits, &request).unwrap() * (1.0 + 1e-5);
+    let slower = Conditions { tau: Some(slower), segment_durations: None, ..request };
+    assert!(feasible(model.primitive(), &limits, &slower).unwrap().is_feasible());
+}
