@@ -12,7 +12,7 @@ use crate::motion::limits::{Limits, limit_of_dof};
 use crate::motion::rollout::rollout_at;
 use crate::motion::trajectory::Trajectory;
 
-/// Number of intervals between the samples of a movement. On 153 recorded movements of four skills, those of ten times as many
+/// Number of intervals between the samples of a movement. On 153 recorded movements of four skills, those of ten times this number
 /// exceed the limits by less than 4e-5 of them.
 const N_INTERVALS: usize = 2000;
 /// Distance of the samples on both sides of the end, where the acceleration is not continuous, relative to the duration.
