@@ -237,6 +237,9 @@ typedef struct {
     /// Limits of |y'''| (1) or (n_dofs), in the unit of each DoF per second cubed; positive, for DoFs with a limit of the
     /// acceleration.
     pdmp_vector jerk;
+    /// 0, the default: what one DoF cannot follow slows all of them along the path, and only then single ones are limited.
+    /// Otherwise every DoF is limited on its own.
+    int independent;
 } pdmp_limits;
 
 #ifdef __cplusplus
@@ -431,14 +434,16 @@ size_t pdmp_controller_error(const pdmp_controller *controller, pdmp_text text);
 ///
 /// From then on every tick keeps them, for any commands, measurements, coupling terms and tick lengths: at its end
 /// lower <= y <= upper, |y'| <= velocity, |y''| <= acceleration, and |change of y'| <= dt acceleration; between its ends
-/// lower <= y <= upper on the cubic through position and velocity at both, by which a robot interpolates. A tick longer than
-/// half of velocity / acceleration is limited in parts of constant acceleration, and is no single cubic. A motion inside the
-/// limits is not changed. With a limit of the jerk, the change of y'' is at most dt jerk, the DoF can always stop inside, and the
+/// lower <= y <= upper on the cubic through position and velocity at both, by which a robot interpolates. The mean
+/// velocity of a tick is within its limit, too. A DoF brakes with the limit of the acceleration, or with velocity / (2 dt) or
+/// (upper - lower) / dt^2 for the default tick if that is less. A longer tick is limited in parts of constant acceleration, and
+/// is no single cubic. A motion inside the limits is not changed. With a limit of the jerk, the change of y'' is at most dt jerk, the DoF can always stop inside, and the
 /// cubic may pass the limit by dt^3 jerk / 150 where it comes to rest within a tick. A goal or anchor outside is moved to the limit, where a movement is finished as at any goal. A
-/// movement outside, after limits that shrink or at a start outside, brakes with the limit of the acceleration and returns. The
+/// movement outside, after limits that shrink or at a start outside, brakes with the limit of the acceleration and
+/// returns at the limit of the velocity or below. The
 /// limits stay in force after pdmp_controller_reset.
 ///
-/// This function does not allocate. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE also if the limits are too tight for a tick. The
+/// This function does not allocate. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE. The
 /// present limits then stay in force.
 pdmp_status pdmp_controller_set_limits(pdmp_controller *controller,
                                        const pdmp_limits *limits);

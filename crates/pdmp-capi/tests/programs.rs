@@ -210,8 +210,14 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
     let mut controller = Controller::new(model.primitive(), 2e-3, &conditions, Some(0.0)).unwrap();
     let (goal, measured) = ([0.75, 0.5, 0.25], [0.5, 0.25, 0.0]);
     let each = |limit| Some(vec![limit; 3]);
-    let limits =
-        Limits { lower: None, upper: each(1.0), velocity: each(0.25), acceleration: each(5.0), jerk: each(100.0) };
+    let limits = Limits {
+        lower: None,
+        upper: each(1.0),
+        velocity: each(0.25),
+        acceleration: each(5.0),
+        jerk: each(100.0),
+        ..Limits::default()
+    };
     let expected: Vec<_> = (0..500)
         .map(|tick| {
             match tick {
