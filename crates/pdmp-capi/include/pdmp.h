@@ -239,7 +239,7 @@ typedef struct {
     pdmp_vector jerk;
     /// 0, the default: what one DoF cannot follow slows all of them along the path, and only then single ones are limited.
     /// Otherwise every DoF is limited on its own.
-    int32_t independent;
+    int independent;
 } pdmp_limits;
 
 #ifdef __cplusplus

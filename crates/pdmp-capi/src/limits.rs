@@ -26,7 +26,7 @@ pub struct pdmp_limits {
     pub jerk: pdmp_vector,
     /// 0, the default: what one DoF cannot follow slows all of them along the path, and only then single ones are limited.
     /// Otherwise every DoF is limited on its own.
-    pub independent: i32,
+    pub independent: std::ffi::c_int,
 }
 
 /// Limit that determines the acceleration of a DoF.

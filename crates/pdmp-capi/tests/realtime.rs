@@ -78,12 +78,12 @@ fn random_commands_match_rust_to_the_bit_and_allocate_nothing() {
             velocity: each(1.5),
             acceleration: each(20.0),
             jerk: each(500.0),
-            ..Limits::default()
+            synchronous: false,
         };
-        let Limits { lower, upper, velocity, acceleration, jerk, .. } = &limits;
+        let Limits { lower, upper, velocity, acceleration, jerk, synchronous: _ } = &limits;
         let [lower, upper, velocity, acceleration, jerk] =
             [lower, upper, velocity, acceleration, jerk].map(|limits| vector(limits.as_deref()));
-        let c_limits = pdmp_limits { lower, upper, velocity, acceleration, jerk, independent: 0 };
+        let c_limits = pdmp_limits { lower, upper, velocity, acceleration, jerk, independent: 1 };
         rust.set_limits(&limits).unwrap();
         // SAFETY: the controller is alive, and the vectors are valid.
         assert_eq!(unsafe { pdmp_controller_set_limits(c.as_mut(), Some(&c_limits)) }, pdmp_status::PDMP_OK);
