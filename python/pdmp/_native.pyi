@@ -954,8 +954,9 @@ class Model:
 
         Start, tau and the other conditions remain, so that the movement is affine in style s and goal g, or anchor of a
         rhythmic movement. The change (Δs, Δg) minimises Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg, with the covariances of the
-        demonstrations plus squares of a thousandth of the range of styles and positions, subject to the limits at 2001
-        samples of the demonstrated duration, or one period, scaled by `tau`: a quadratic program.
+        demonstrations plus squares of a thousandth of the range of styles and positions, subject to the limits
+        over the demonstrated duration, or one period, scaled by `tau`: a quadratic program. The limits are kept within 1e-6
+        of them at 2001 samples and the extremes of the parabolas through them.
 
         Parameters
         ----------
@@ -985,7 +986,7 @@ class Model:
 
         Examples
         --------
-        >>> limits = pdmp.Limits(velocity=1.8)
+        >>> limits = pdmp.Limits(velocity=1.5)
         >>> near = model.nearest_feasible(limits)
         >>> model.feasible(limits).feasible, model.feasible(limits, near).feasible
         (False, True)
