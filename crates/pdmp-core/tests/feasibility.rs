@@ -87,13 +87,10 @@ fn quadratic(rows: &ndarray::Array2<f64>, ranges: &[f64], v: &[f64]) -> f64 {
         })
         .collect();
     for i in 0..n {
-        for k in 0..n {
-            if k != i {
-                let factor = a[k][i] / a[i][i];
-                for j in i..=n {
-                    a[k][j] -= factor * a[i][j];
-                }
-            }
+        let pivot = a[i].clone();
+        for row in a.iter_mut().enumerate().filter(|(k, _)| *k != i).map(|(_, row)| row) {
+            let factor = row[i] / pivot[i];
+            row.iter_mut().zip(&pivot).for_each(|(value, pivot)| *value -= factor * pivot);
         }
     }
     (0..n).map(|i| v[i] * a[i][n] / a[i][i]).sum()
