@@ -23,9 +23,9 @@ def share(model: pdmp.Model, part: float) -> Limits:
     )
 
 
-def test_margins_are_the_extremes_of_the_rollout(model: pdmp.Model) -> None:
-    """Ratio, degree of freedom and time are those of the extreme samples."""
-    movement = model.rollout(dt=duration(model) / 2000)
+def test_margins_are_the_extremes_of_a_finer_rollout(model: pdmp.Model) -> None:
+    """Ratio, degree of freedom and time are those of the extremes."""
+    movement = model.rollout(dt=duration(model) / 20000)
     top = movement.position.max(0)
     limits = Limits(position=(-10.0, top - 0.1), velocity=2.0, acceleration=3.0)
     margins = model.feasible(limits)
@@ -36,11 +36,11 @@ def test_margins_are_the_extremes_of_the_rollout(model: pdmp.Model) -> None:
     ):
         assert place is not None
         ratio, dof, time = place
-        assert ratio == pytest.approx(abs(values).max() / limit, rel=1e-9)
+        assert ratio == pytest.approx(abs(values).max() / limit, rel=1e-4)
         sample = int(np.argmin(abs(movement.time - time)))
-        assert abs(values[sample, dof]) == pytest.approx(abs(values).max(), rel=1e-9)
+        assert abs(values[sample, dof]) == pytest.approx(abs(values).max(), rel=1e-4)
     assert margins.position is not None
-    assert margins.position[0] == pytest.approx((0.1 / (top + 9.9)).max(), rel=1e-6)
+    assert margins.position[0] == pytest.approx((0.1 / (top + 9.9)).max(), rel=1e-4)
 
 
 def test_margins_of_absent_limits_are_none(model: pdmp.Model) -> None:

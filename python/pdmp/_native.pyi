@@ -986,7 +986,7 @@ class Model:
 
         Examples
         --------
-        >>> limits = pdmp.Limits(velocity=1.8)
+        >>> limits = pdmp.Limits(velocity=1.5)
         >>> near = model.nearest_feasible(limits)
         >>> model.feasible(limits).feasible, model.feasible(limits, near).feasible
         (False, True)

@@ -156,7 +156,7 @@ impl Model {
     ///
     /// Examples
     /// --------
-    /// >>> limits = pdmp.Limits(velocity=1.8)
+    /// >>> limits = pdmp.Limits(velocity=1.5)
     /// >>> near = model.nearest_feasible(limits)
     /// >>> model.feasible(limits).feasible, model.feasible(limits, near).feasible
     /// (False, True)

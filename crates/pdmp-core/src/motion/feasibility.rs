@@ -12,8 +12,13 @@ use crate::motion::limits::{Limits, limit_of_dof};
 use crate::motion::rollout::rollout_at;
 use crate::motion::trajectory::Trajectory;
 
+<<<<<<< HEAD
 /// Number of intervals between the samples of a movement. On 153 recorded movements of four skills, those of ten times this number
 /// exceed the limits by less than 4e-5 of them.
+=======
+/// Number of intervals between the samples of a movement. Movements found on recordings of four skills exceed their limits at ten
+/// times this number by less than 4e-5 of them.
+>>>>>>> feasible
 const N_INTERVALS: usize = 2000;
 /// Distance of the samples on both sides of the end, where the acceleration is not continuous, relative to the duration.
 const KINK: f64 = 1e-9;
@@ -67,6 +72,7 @@ pub(crate) struct Bound {
 
 impl Bound {
     /// Returns whether a movement keeps the limit.
+    #[cfg(feature = "learning")]
     pub(crate) fn is_kept(&self, movement: &Trajectory) -> bool {
         self.worst(movement).1 <= TOLERANCE
     }
@@ -105,6 +111,7 @@ pub(crate) struct Place {
 
 impl Place {
     /// Returns the value of a DoF, linear in the samples.
+    #[cfg(feature = "learning")]
     pub(crate) fn value(&self, movement: &Trajectory, derivative: Derivative, dof: usize) -> f64 {
         let (samples, Self { sample, share }) = (of(movement, derivative).column(dof), *self);
         if share == 0.0 {

@@ -32,7 +32,8 @@ use crate::motion::trajectory::Trajectory;
 
 /// Maximum number of rounds; three to twenty suffice on recordings.
 const MAX_ROUNDS: usize = 50;
-/// Distance that conditions keep from each half-space, in units of the demonstrations: above the accuracy of the solver.
+/// Distance that conditions keep from each half-space, in units of the demonstrations or, if larger, its distance from the request:
+/// above the accuracy of the solver.
 const MARGIN: f64 = 1e-6;
 /// Standard deviation that conditions have at least, relative to the range of the demonstrated styles or the positions.
 const MIN_DEVIATION: f64 = 1e-3;
@@ -98,7 +99,7 @@ pub fn nearest_feasible(model: &Model, limits: &Limits, conditions: &Conditions,
         }
         x = match program.nearest() {
             Some(x) => x,
-            None => break,
+            None => return Err(search.least_excess(primitive, program, &bounds)?),
         };
         let found = search.conditions(&x);
         movement = sampled(primitive, &found)?;
@@ -106,12 +107,9 @@ pub fn nearest_feasible(model: &Model, limits: &Limits, conditions: &Conditions,
             return Ok(found);
         }
     }
-    if let Some(x) = program.least_excess() {
-        movement = sampled(primitive, &search.conditions(&x))?;
-    }
-    let excess = |bound: &&Bound| bound.worst(&movement).1;
-    let worst = bounds.iter().max_by(|a, b| excess(a).total_cmp(&excess(b)));
-    Err(search.infeasible(worst.expect("a movement outside its limits has limits"), &movement))
+    Err(Error::Fit(
+        "no conditions within the limits were found in 50 rounds; widen the limits or enlarge tau".to_string(),
+    ))
 }
 
 /// Affine map from changes x of the conditions to movements.
@@ -238,6 +236,31 @@ impl Search {
         row
     }
 
+    /// Returns the error of the movement whose largest excess is smallest.
+    ///
+    /// # Errors
+    /// Conditions that do not fit the primitive.
+    fn least_excess(&self, primitive: &Arc<Primitive>, mut program: Program, bounds: &[Bound]) -> Result<Error> {
+        let mut movement = sampled(primitive, &self.request)?;
+        for _ in 0..MAX_ROUNDS {
+            let Some((x, least)) = program.least_excess() else { break };
+            movement = sampled(primitive, &self.conditions(&x))?;
+            let mut is_least = true;
+            for bound in bounds {
+                let (place, excess) = bound.worst(&movement);
+                if excess > 1.01 * least + TOLERANCE && program.add(self.row(bound, place), excess, &x) {
+                    is_least = false;
+                }
+            }
+            if is_least {
+                break;
+            }
+        }
+        let excess = |bound: &&Bound| bound.worst(&movement).1;
+        let worst = bounds.iter().max_by(|a, b| excess(a).total_cmp(&excess(b)));
+        Ok(self.infeasible(worst.expect("a movement outside its limits has limits"), &movement))
+    }
+
     /// Returns the error of a movement that exceeds a limit.
     fn infeasible(&self, bound: &Bound, movement: &Trajectory) -> Error {
         let (place, _) = bound.worst(movement);
@@ -254,7 +277,10 @@ impl Search {
             Derivative::Velocity => "velocity",
             Derivative::Acceleration => "acceleration",
         };
+        let time = place.time(movement);
+        let is_given = !is_position && time == 0.0 && self.request.velocity.is_some();
         let remedy = match (is_position, self.kind, self.vary == Vary::Both) {
+            _ if is_given => "give a lower start velocity or widen the limits",
             (true, _, true) => "move the start or widen the limits",
             (true, _, false) => "vary both, move the start or widen the limits",
             (false, Kind::Discrete, true) => "enlarge tau, see fastest_tau, or widen the limits",
@@ -268,7 +294,7 @@ impl Search {
             quantity,
             value: place.value(movement, bound.derivative, bound.dof),
             limit: bound.value,
-            time: place.time(movement),
+            time,
             remedy,
         })
     }
@@ -311,7 +337,8 @@ impl Program {
         }
         row.iter_mut().for_each(|r| *r /= length);
         let here: f64 = row.iter().zip(x).map(|(r, x)| r * x).sum();
-        self.rows.push((row, here - excess / length - MARGIN));
+        let bound = here - excess / length;
+        self.rows.push((row, bound - MARGIN * bound.abs().max(1.0)));
         self.lengths.push(length);
         true
     }
@@ -320,11 +347,15 @@ impl Program {
     fn nearest(&self) -> Option<Vec<f64>> {
         let n = self.rows.first()?.0.len();
         let columns = (0..n).map(|j| self.rows.iter().map(|(row, _)| row[j]).collect()).collect();
-        solve(vec![1.0; n], vec![0.0; n], columns, self.rows.iter().map(|(_, bound)| *bound).collect())
+        // The point is proportional to the bounds, which are scaled for the solver's tolerances.
+        let scale = self.rows.iter().fold(1.0f64, |scale, (_, bound)| scale.max(bound.abs()));
+        let bounds = self.rows.iter().map(|(_, bound)| bound / scale).collect();
+        let x = solve(vec![1.0; n], vec![0.0; n], columns, bounds)?;
+        Some(x.into_iter().map(|x| x * scale).collect())
     }
 
-    /// Returns a point with the smallest maximum excess.
-    fn least_excess(&self) -> Option<Vec<f64>> {
+    /// Returns a point with the smallest maximum excess, and that excess.
+    fn least_excess(&self) -> Option<(Vec<f64>, f64)> {
         let n = self.rows.first()?.0.len();
         let scaled = |j: usize| self.rows.iter().zip(&self.lengths).map(|((row, _), length)| row[j] * length).collect();
         let mut columns: Vec<Vec<f64>> = (0..n).map(scaled).collect();
@@ -334,8 +365,8 @@ impl Program {
         costs.push(1.0);
         let bounds = self.rows.iter().zip(&self.lengths).map(|((_, bound), length)| bound * length).collect();
         let mut x = solve(weights, costs, columns, bounds)?;
-        x.truncate(n);
-        Some(x)
+        let least = x.pop()?;
+        Some((x, least))
     }
 }
 
