@@ -12,13 +12,8 @@ use crate::motion::limits::{Limits, limit_of_dof};
 use crate::motion::rollout::rollout_at;
 use crate::motion::trajectory::Trajectory;
 
-<<<<<<< HEAD
-/// Number of intervals between the samples of a movement. On 153 recorded movements of four skills, those of ten times this number
-/// exceed the limits by less than 4e-5 of them.
-=======
 /// Number of intervals between the samples of a movement. Movements found on recordings of four skills exceed their limits at ten
 /// times this number by less than 4e-5 of them.
->>>>>>> feasible
 const N_INTERVALS: usize = 2000;
 /// Distance of the samples on both sides of the end, where the acceleration is not continuous, relative to the duration.
 const KINK: f64 = 1e-9;
