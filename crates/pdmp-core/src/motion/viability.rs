@@ -159,7 +159,7 @@ impl Interval {
 
     /// Returns the limit that determines the acceleration of one DoF. Inside the interval it is that of the acceleration if
     /// the acceleration at the end of the tick exceeds it, and otherwise that of the position, beyond which the DoF turns round
-    /// within the tick.
+    /// within the tick, or without one that of the velocity, which the mean over the tick exceeds.
     pub(crate) fn limit(&self, wanted: F64x4, at_end: F64x4, lane: usize) -> Limit {
         let [least, most] = self.ends();
         let (side, sign) = if (wanted.as_array()[lane]) > most.as_array()[lane] {
@@ -168,8 +168,10 @@ impl Interval {
             (0, -1.0)
         } else if at_end.as_array()[lane].abs() > self.acceleration.as_array()[lane] {
             return Limit::Acceleration;
-        } else {
+        } else if self.position.iter().any(|end| end.as_array()[lane].is_finite()) {
             return Limit::Position;
+        } else {
+            return Limit::Velocity;
         };
         let [position, velocity] = [self.position, self.velocity].map(|ends| sign * ends[side].as_array()[lane]);
         let acceleration = self.acceleration.as_array()[lane];
