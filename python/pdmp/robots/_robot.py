@@ -120,9 +120,12 @@ def combined(
         name: np.minimum([getattr(each, name) for each in described], bounds(name, bound, joints))
         for name, bound in given.items()
     }
+    finite = {name: limit for name, limit in magnitudes.items() if np.isfinite(limit).any()}
     return Limits(
         position=(lower, upper) if np.isfinite([lower, upper]).any() else None,
-        **{name: limit for name, limit in magnitudes.items() if np.isfinite(limit).any()},
+        velocity=finite.get("velocity"),
+        acceleration=finite.get("acceleration"),
+        jerk=finite.get("jerk"),
     )
 
 
