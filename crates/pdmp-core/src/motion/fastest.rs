@@ -20,7 +20,7 @@ const N_HALVINGS: i32 = 12;
 /// Distance of the last knot from the end, where y″ is not continuous, relative to the path.
 const KINK: f64 = 1e-9;
 /// Maximum rate relative to the nominal one, where no limit bounds it.
-pub(crate) const MAX_RATE: f64 = 1e4;
+const MAX_RATE: f64 = 1e4;
 
 /// Returns the limits of velocity and acceleration, infinite where there is none.
 ///

@@ -190,10 +190,10 @@ impl Controller {
         self.limit_path();
         let Some(governor) = &mut self.governor else { return Ok(()) };
         governor.origin.walk_motion(visit)?;
-        let mut position = governor.ahead.position();
+        let mut position = governor.ahead.position;
         position.walk(visit)?;
         governor.ahead.compute(&governor.origin, &mut governor.sampler, &governor.limits);
-        governor.ahead.set_position(position);
+        governor.ahead.position = position;
         visit_flag(visit, &mut governor.pending)?;
         visit_number(visit, &mut governor.share, [MIN_SHARE, 1.0])
     }

@@ -227,7 +227,7 @@ impl Controller {
     ///
     /// Otherwise y′ = ẏ/ρ would grow, and the velocity as soon as the rate rises again.
     fn hold_rate(&mut self, start: f64, [wanted, limited]: [f64; 2]) {
-        let rate = first_element(self.rate.value()).max(MIN_RATE / self.primitive.tau());
+        let rate = self.finite_rate();
         let held = start.min(rate * (limited / wanted).sqrt());
         if held <= rate {
             return;

@@ -49,18 +49,17 @@ pub(super) struct PathAhead {
     /// Largest ρ² that can be kept constant from each interval on for the longest substep.
     constant: Vec<f64>,
     pieces: [Piece; 2],
+    pub(super) position: PathPosition,
+}
+
+clone_in_place!(PathAhead { path, curve, constant, pieces, position });
+
+/// Position of a movement on its path.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PathPosition {
     /// Clock of the phase since the path was sampled.
     progress: f64,
     /// False once a perturbation or a limit has moved the movement off the path.
-    is_current: bool,
-}
-
-clone_in_place!(PathAhead { path, curve, constant, pieces, progress, is_current });
-
-/// Position of a movement on its path.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PathPosition {
-    progress: f64,
     is_current: bool,
 }
 
@@ -80,8 +79,7 @@ impl PathAhead {
             curve: RateCurve::new(N_INTERVALS + 1, n_groups),
             constant: vec![0.0; N_INTERVALS + 1],
             pieces: [Piece::default(); 2],
-            progress: 0.0,
-            is_current: false,
+            position: PathPosition::default(),
         }
     }
 
@@ -112,12 +110,12 @@ impl PathAhead {
                 (i + 1..self.constant.len()).take_while(|k| self.path.clock[k - 1] <= end + self.path.interval(i));
             self.constant[i] = within.fold(self.constant[i], |least, k| least.min(self.constant[k]));
         }
-        (self.progress, self.is_current) = (0.0, true);
+        self.position = PathPosition { progress: 0.0, is_current: true };
     }
 
     /// Returns the largest distance of the rest of the path beyond the limits of the position, relative to the ranges.
     pub(super) fn distance_outside(&self, bounds: &[Bounds], groups: &[Group]) -> f64 {
-        let (first, _) = self.locate(self.progress);
+        let (first, _) = self.locate(self.position.progress);
         let mut farthest = F64x4::ZERO;
         for knot in first..N_INTERVALS {
             let interval = self.path.interval(knot);
@@ -147,33 +145,38 @@ impl PathAhead {
     /// Returns whether the rate of square `x` can be kept constant from the present clock on.
     #[inline(always)]
     pub(super) fn admits_constant(&self, x: f64) -> bool {
-        x <= self.constant[self.locate(self.progress).0]
+        x <= self.constant[self.locate(self.position.progress).0]
     }
 
     /// Returns the largest ρ² at the present clock.
     pub(super) fn largest_square(&self) -> f64 {
-        let (index, t) = self.locate(self.progress);
-        self.curve.max[index] + (self.curve.max[index + 1] - self.curve.max[index]) * t
+        let (index, t) = self.locate(self.position.progress);
+        self.curve.max[index] + self.change(index) * t
+    }
+
+    /// Returns the change of the largest ρ² over an interval.
+    fn change(&self, index: usize) -> f64 {
+        self.curve.max[index + 1] - self.curve.max[index]
     }
 
     /// Returns the clock until the next knot, infinity past the last one.
     #[inline(always)]
     pub(super) fn rest(&self) -> f64 {
-        let (index, _) = self.locate(self.progress);
-        let rest = self.path.clock[index + 1] - self.progress;
+        let (index, _) = self.locate(self.position.progress);
+        let rest = self.path.clock[index + 1] - self.position.progress;
         if rest > 0.0 { rest } else { f64::INFINITY }
     }
 
     /// Returns the smallest and the largest constant ρ̇ to the end of the interval, for ρ² = `x` now, that keep the limits in the
     /// quarters of the interval and arrive below the curve.
     pub(super) fn slopes(&self, x: f64, limits: &[RateLimits]) -> [f64; 2] {
-        let (index, t) = self.locate(self.progress);
+        let (index, t) = self.locate(self.position.progress);
         self.slopes_within(index, t, x, limits)
     }
 
     /// Returns the slopes as [`PathAhead::slopes`] at the next knot, for ρ² = `x` there.
     pub(super) fn next_slopes(&self, x: f64, limits: &[RateLimits]) -> [f64; 2] {
-        let (index, _) = self.locate(self.progress);
+        let (index, _) = self.locate(self.position.progress);
         self.slopes_within((index + 1).min(N_INTERVALS - 1), 0.0, x, limits)
     }
 
@@ -203,7 +206,7 @@ impl PathAhead {
         limit_at(t);
         [0.25, 0.5, 0.75, 1.0].into_iter().filter(|position| *position > t + ROUNDING).for_each(&mut limit_at);
         // A rate above the curve, by what the margins allow, returns over an interval even shortly before a knot.
-        let change = self.curve.max[index + 1] - self.curve.max[index];
+        let change = self.change(index);
         let gap = self.curve.max[index] + change * t - x;
         let arrival = 0.5 * (change + gap / if gap < 0.0 { 1.0 } else { 1.0 - t }) / interval;
         [
@@ -215,17 +218,18 @@ impl PathAhead {
     /// Adds a clock interval of the phase.
     #[inline(always)]
     pub(super) fn advance(&mut self, h: f64) {
-        self.progress += h;
+        self.position.progress += h;
     }
 
     /// Marks the path as left.
     pub(super) fn leave(&mut self) {
-        self.is_current = false;
+        self.position.is_current = false;
     }
 
     /// Returns whether the path has to be sampled again: when it was left, or at a third of a rhythmic one.
     pub(super) fn is_due(&self, rhythmic: bool) -> bool {
-        self.has_progressed() && (!self.is_current || (rhythmic && 3.0 * self.intervals() >= N_INTERVALS as f64))
+        self.has_progressed()
+            && (!self.position.is_current || (rhythmic && 3.0 * self.intervals() >= N_INTERVALS as f64))
     }
 
     /// Returns whether enough of the path has passed for a new attempt.
@@ -234,17 +238,7 @@ impl PathAhead {
     }
 
     fn intervals(&self) -> f64 {
-        self.progress / self.pieces[0].interval
-    }
-
-    /// Returns the position of the movement.
-    pub(super) fn position(&self) -> PathPosition {
-        PathPosition { progress: self.progress, is_current: self.is_current }
-    }
-
-    /// Sets the position of the movement.
-    pub(super) fn set_position(&mut self, PathPosition { progress, is_current }: PathPosition) {
-        (self.progress, self.is_current) = (progress, is_current);
+        self.position.progress / self.pieces[0].interval
     }
 }
 
