@@ -9,7 +9,7 @@ use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::controller::Controller;
 use crate::motion::time_law::TimeLaw;
-use crate::motion::trajectory::{Trajectory, step_count};
+use crate::motion::trajectory::{Trajectory, sampling_times, step_count};
 use crate::validate::check_positive;
 
 /// Number of ticks by which the forcing table is prefetched: about the latency of main memory.
@@ -86,7 +86,7 @@ pub fn rollout_with(
         return Err(Error::Conflict { names: ["phase", "segment_durations"], reason: "warped time starts at phase 0" });
     }
     let conditions = clock.conditions(conditions);
-    sample(primitive, &conditions, clock, grid.dt, steps, progress)
+    sample(primitive, &conditions, clock, grid.dt, sampling_times(steps, grid.dt), progress)
 }
 
 /// Computes the movement that follows a time law: samples at t = 0, dt, … up to the first one at its end or past it.
@@ -95,7 +95,7 @@ pub(crate) fn follow(primitive: &Arc<Primitive>, conditions: &Conditions, law: T
     let steps = step_count("duration", (law.duration() / dt).ceil() * dt, dt)?;
     let phase = law.at(0.0);
     let clock = Clock::Warped { function: ClockFunction::Law(law), extent: primitive.tau(), phase };
-    sample(primitive, conditions, clock, dt, steps, &mut |_| Ok(()))
+    sample(primitive, conditions, clock, dt, sampling_times(steps, dt), &mut |_| Ok(()))
 }
 
 /// Computes the movement under constant conditions at the given times in seconds, which increase from 0.
@@ -103,32 +103,23 @@ pub(crate) fn follow(primitive: &Arc<Primitive>, conditions: &Conditions, law: T
 /// # Errors
 /// As for [`rollout`].
 pub(crate) fn rollout_at(primitive: &Arc<Primitive>, conditions: &Conditions, time: Vec<f64>) -> Result<Trajectory> {
-    let mut clock = Clock::of(primitive, conditions)?;
+    let clock = Clock::of(primitive, conditions)?;
     let conditions = clock.conditions(conditions);
-    let mut controller = Controller::new(primitive, time[1], &conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
-    let mut before = 0.0;
-    Trajectory::record_at("rollout", primitive.n_dofs(), time, &mut |_| Ok(()), |k, time, motion| {
-        if k > 0 {
-            clock.step_from(&mut controller, before, time)?;
-        }
-        before = time;
-        controller.read(motion);
-        clock.rescale(motion);
-        Ok(())
-    })
+    let clock = if matches!(clock, Clock::Linear) { Clock::Unequal { time: 0.0 } } else { clock };
+    sample(primitive, &conditions, clock, time[1], time, &mut |_| Ok(()))
 }
 
-/// Samples the movement on a clock.
+/// Samples the movement on a clock at the given times; `dt` is the tick of the controller.
 fn sample(
     primitive: &Arc<Primitive>,
     conditions: &Conditions,
     mut clock: Clock,
     dt: f64,
-    steps: usize,
+    time: Vec<f64>,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Trajectory> {
     let mut controller = Controller::new(primitive, dt, conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
-    Trajectory::record("rollout", primitive.n_dofs(), steps, dt, progress, |k, time, motion| {
+    Trajectory::record_at("rollout", primitive.n_dofs(), time, progress, |k, time, motion| {
         if k > 0 {
             clock.step(&mut controller, time)?;
         }
@@ -142,8 +133,10 @@ fn sample(
 ///
 /// In warped time u(t) replaces t/τ: the movement is the same function of u, with ẏ = y′u̇ and ÿ = y″u̇² + y′ü.
 enum Clock {
-    /// Time of the controller.
+    /// Time of the controller, in its ticks.
     Linear,
+    /// Time of the controller, in ticks of any length; the time after the last one, in seconds.
+    Unequal { time: f64 },
     /// Time warped by segment durations or a time law.
     Warped {
         function: ClockFunction,
@@ -199,6 +192,10 @@ impl Clock {
     fn step(&mut self, controller: &mut Controller, time: f64) -> Result<()> {
         match self {
             Self::Linear => controller.step(),
+            Self::Unequal { time: before } => {
+                let dt = Some(time - std::mem::replace(before, time));
+                controller.step_with(&Command { dt, ..Command::default() })
+            }
             Self::Warped { function, extent, phase } => {
                 let before = phase[0];
                 *phase = function.phase(time);
@@ -207,14 +204,6 @@ impl Clock {
             }
         }
         .map(drop)
-    }
-
-    /// Advances the controller from one time to another, in seconds.
-    fn step_from(&mut self, controller: &mut Controller, from: f64, to: f64) -> Result<()> {
-        match self {
-            Self::Linear => controller.step_with(&Command { dt: Some(to - from), ..Command::default() }).map(drop),
-            Self::Warped { .. } => self.step(controller, to),
-        }
     }
 
     /// Converts velocity and acceleration from the time of the controller to warped time.

@@ -35,8 +35,7 @@ impl Trajectory {
         progress: &mut dyn FnMut(f64) -> Result<()>,
         sample: impl FnMut(usize, f64, &mut Motion) -> Result<()>,
     ) -> Result<Self> {
-        let time = (0..=steps).map(|k| k as f64 * dt).collect();
-        Self::record_at(name, n_dofs, time, progress, sample)
+        Self::record_at(name, n_dofs, sampling_times(steps, dt), progress, sample)
     }
 
     /// Records samples at the given times, as [`Self::record`] does.
@@ -66,6 +65,11 @@ impl Trajectory {
         }
         Ok(trajectory)
     }
+}
+
+/// Returns the times 0, dt, …, n·dt of n steps.
+pub(crate) fn sampling_times(steps: usize, dt: f64) -> Vec<f64> {
+    (0..=steps).map(|k| k as f64 * dt).collect()
 }
 
 /// Returns the number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋ of a duration with the given name; the margins keep the
