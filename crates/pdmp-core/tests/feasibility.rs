@@ -3,12 +3,15 @@
 #![allow(missing_docs, clippy::needless_range_loop)]
 
 mod common;
+#[path = "common/random.rs"]
+mod random;
 
 use std::sync::LazyLock;
 
 use common::*;
 use pdmp_core::motion::{Limits, TimeGrid, Trajectory, Vary, fastest_tau, feasible, nearest_feasible};
 use pdmp_core::{Conditions, Error, FitOptions, Kind, LimitError, Model, fit, rollout};
+use random::Random;
 
 static REACH: LazyLock<Model> = LazyLock::new(|| fit(&reaches(), &FitOptions::new(Kind::Discrete)).unwrap());
 static CYCLE: LazyLock<Model> = LazyLock::new(|| fit(&cycles(), &FitOptions::new(Kind::Rhythmic)).unwrap());
@@ -132,11 +135,8 @@ fn nearest_conditions_keep_the_limits_on_a_ten_times_finer_grid() {
 
 #[test]
 fn no_random_feasible_conditions_are_nearer() {
-    let mut state = 1u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-    };
+    let mut random = Random(1);
+    let mut uniform = || random.next() * 2.0 - 1.0;
     for (model, limits, request) in requests() {
         let near = nearest_feasible(model, &limits, &request, Vary::Both).unwrap();
         let nearest = distance(model, &request, &near);

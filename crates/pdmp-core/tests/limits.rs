@@ -3,31 +3,15 @@
 #![allow(missing_docs)]
 
 mod common;
+#[path = "common/random.rs"]
+mod random;
 
 use std::sync::Arc;
 
 use common::*;
 use pdmp_core::motion::{Coupling, Limit, Limits, TimeGrid, fastest, fastest_tau};
 use pdmp_core::{Command, Conditions, Controller, Error, Kind, LimitError, Model, Status, rollout};
-
-/// Generator of uniform numbers in [0, 1) (Knuth's MMIX).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.next()
-    }
-
-    /// Returns a number between `a` and `b`, uniform in its logarithm.
-    fn scale(&mut self, a: f64, b: f64) -> f64 {
-        a * (b / a).powf(self.next())
-    }
-}
+use random::Random;
 
 fn controller(model: &Arc<Model>) -> Controller {
     Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap()

@@ -46,25 +46,17 @@ fn violation(limits: &Limits, before: &[State], after: &[State], h: f64) -> f64 
     before.iter().zip(after).enumerate().map(of_dof).fold(0.0, f64::max)
 }
 
-fn between(random: &mut Random, a: f64, b: f64) -> f64 {
-    a + (b - a) * random.next()
-}
-
-fn scale(random: &mut Random, a: f64, b: f64) -> f64 {
-    a * (b / a).powf(random.next())
-}
-
 fn limits_around(controller: &Controller, ranges: &[f64], random: &mut Random) -> Limits {
     let side = |sign: f64, random: &mut Random| {
         let sides = controller.position().iter().zip(ranges);
-        Some(sides.map(|(y, range)| y + sign * range * scale(random, 0.03, 3.0)).collect())
+        Some(sides.map(|(y, range)| y + sign * range * random.scale(0.03, 3.0)).collect())
     };
-    let velocity: Vec<f64> = ranges.iter().map(|range| range * scale(random, 0.1, 10.0)).collect();
-    let acceleration: Vec<f64> = velocity.iter().map(|velocity| velocity * scale(random, 1.0, 100.0)).collect();
+    let velocity: Vec<f64> = ranges.iter().map(|range| range * random.scale(0.1, 10.0)).collect();
+    let acceleration: Vec<f64> = velocity.iter().map(|velocity| velocity * random.scale(1.0, 100.0)).collect();
     Limits {
         lower: side(-1.0, random),
         upper: side(1.0, random),
-        jerk: Some(acceleration.iter().map(|acceleration| acceleration * scale(random, 1.0, 1e4)).collect()),
+        jerk: Some(acceleration.iter().map(|acceleration| acceleration * random.scale(1.0, 1e4)).collect()),
         velocity: Some(velocity),
         acceleration: Some(acceleration),
         ..Limits::default()
@@ -95,14 +87,14 @@ fn no_command_breaks_a_limit() {
         let (mut goal, mut measured, mut terms) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let mut style = vec![0.0; model.n_styles()];
         for tick in 0..3000 {
-            let h = if case % 3 == 0 { 1e-3 } else { scale(&mut random, 1e-6, 0.1) };
-            let size = scale(&mut random, 0.1, 100.0);
+            let h = if case % 3 == 0 { 1e-3 } else { random.scale(1e-6, 0.1) };
+            let size = random.scale(0.1, 100.0);
             for (vector, size) in [(&mut goal, size), (&mut measured, 1.0), (&mut terms, size)] {
                 for (d, number) in vector.iter_mut().enumerate() {
-                    *number = controller.centre()[d] + model.ranges()[d] * size * between(&mut random, -1.0, 1.0);
+                    *number = controller.centre()[d] + model.ranges()[d] * size * random.between(-1.0, 1.0);
                 }
             }
-            style.iter_mut().for_each(|number| *number = between(&mut random, -2.0, 2.0));
+            style.iter_mut().for_each(|number| *number = random.between(-2.0, 2.0));
             let allocated = allocations();
             let rare = |random: &mut Random| random.next() < 0.01;
             let command = Command {
@@ -110,14 +102,14 @@ fn no_command_breaks_a_limit() {
                 goal: (discrete && rare(&mut random)).then_some(&goal),
                 anchor: (!discrete && rare(&mut random)).then_some(&goal),
                 style: rare(&mut random).then_some(&style),
-                tau: rare(&mut random).then(|| model.tau() * scale(&mut random, 0.1, 10.0)),
+                tau: rare(&mut random).then(|| model.tau() * random.scale(0.1, 10.0)),
                 measured: rare(&mut random).then_some(&measured),
                 coupling: rare(&mut random).then_some(Coupling { velocity: &terms, acceleration: &terms }),
                 ..Command::default()
             };
             controller.step_with(&command).unwrap();
             if rare(&mut random) {
-                controller.set_speed(between(&mut random, 0.0, 2.0).floor()).unwrap();
+                controller.set_speed(random.between(0.0, 2.0).floor()).unwrap();
             }
             if rare(&mut random) {
                 controller.release();

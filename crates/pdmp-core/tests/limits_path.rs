@@ -3,6 +3,8 @@
 #![allow(missing_docs)]
 
 mod common;
+#[path = "common/random.rs"]
+mod random;
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -10,6 +12,7 @@ use std::sync::Arc;
 use common::*;
 use pdmp_core::motion::{Limits, TimeGrid, fastest};
 use pdmp_core::{Command, Conditions, Controller, Kind, Model, Status, rollout};
+use random::Random;
 
 /// Largest share of a limit of the acceleration that a movement along its path uses; a DoF that is limited on its own uses all.
 const ALONG_PATH: f64 = 0.995;
@@ -140,11 +143,8 @@ fn pause_keeps_the_limits_on_the_path() {
 /// are accepted.
 #[test]
 fn governed_commands_never_make_a_dof_leave_the_path() {
-    let mut random = 7u64;
-    let mut uniform = || {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (random >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = Random(7);
+    let mut uniform = || random.next();
     let (mut n_commands, mut n_pending) = (0, 0);
     for case in 0..20 {
         let model = [&*REACH, &*CYCLE][case % 2];

@@ -1,8 +1,12 @@
 //! Allocation counter and allocation-free random numbers for tests of the control loop.
 #![allow(dead_code, missing_docs, unsafe_code)]
 
+mod random;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+
+pub(crate) use random::Random;
 
 /// Allocator of the system that counts the allocations of each thread.
 struct Counting;
@@ -33,18 +37,4 @@ static ALLOCATOR: Counting = Counting;
 /// Returns the number of allocations of this thread.
 pub(crate) fn allocations() -> usize {
     ALLOCATIONS.get()
-}
-
-/// Linear congruential generator of numbers in [0, 1).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub(crate) fn rarely(&mut self) -> bool {
-        self.next() < 0.2
-    }
 }
