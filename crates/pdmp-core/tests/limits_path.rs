@@ -251,6 +251,25 @@ fn other_commands_do_not_discard_a_pending_goal() {
     assert_eq!(controller.centre(), upper);
 }
 
+/// Without limits, a pending goal is taken up as a whole, and new limits have nothing pending.
+#[test]
+fn pending_goal_is_taken_up_when_limits_are_removed() {
+    let mut controller = controller(&REACH, 1e-3);
+    let mut limits = limits(&REACH, [2.0, 2.0]);
+    let upper: Vec<f64> = controller.centre().iter().zip(REACH.ranges()).map(|(g, range)| g + 0.35 * range).collect();
+    limits.upper = Some(upper.clone());
+    controller.set_limits(&limits).unwrap();
+    for _ in 0..200 {
+        controller.step().unwrap();
+    }
+    controller.set_goal(&upper).unwrap();
+    assert!(controller.is_pending() && controller.centre() != upper);
+    controller.set_limits(&Limits::default()).unwrap();
+    assert_eq!(controller.centre(), upper);
+    controller.set_limits(&limits).unwrap();
+    assert!(!controller.is_pending());
+}
+
 /// A movement starts with its given velocity at any speed.
 #[test]
 fn given_velocity_does_not_depend_on_the_speed() {

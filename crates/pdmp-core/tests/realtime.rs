@@ -130,6 +130,27 @@ fn a_million_ticks_of_random_commands_allocate_nothing() {
     }
 }
 
+/// Random commands within limits along the path allocate nothing once the first limits have been set, even while limits are
+/// removed and set again.
+#[test]
+fn commands_within_limits_along_the_path_allocate_nothing() {
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let mut control = Loop::new(kind);
+        for limits in &mut control.limits {
+            (limits.synchronous, limits.jerk) = (true, None);
+        }
+        control.controller.set_limits(&control.limits[1]).unwrap();
+        let before = allocations();
+        let mut n_pending = 0;
+        for _ in 0..4000 {
+            control.tick();
+            n_pending += usize::from(control.controller.is_pending());
+        }
+        assert_eq!(allocations() - before, 0);
+        assert!(n_pending > 400 && control.limits_set > 100, "{n_pending} {}", control.limits_set);
+    }
+}
+
 /// Extreme numbers in any field of a command are rejected without effect, or the motion stays finite.
 #[test]
 fn extreme_numbers_are_rejected_or_bounded() {

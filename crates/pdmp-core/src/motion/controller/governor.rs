@@ -84,21 +84,25 @@ impl Governor {
 }
 
 impl Controller {
-    /// Looks ahead along the path if the limits bound its rate. The first time it takes memory for the path.
+    /// Puts a governor in force if the limits bound the rate of the path, and takes up what it did not accept if they no longer
+    /// do. The first time it allocates memory for the path, which is kept.
     pub(super) fn limit_path(&mut self) {
         if !self.limiter.limits_rate() {
-            self.governor = None;
+            let Some(mut governor) = self.governor.take() else { return };
+            if std::mem::take(&mut governor.pending) {
+                self.take_up(Changes::PATH, 1.0);
+            }
+            self.idle_governor = Some(governor);
             return;
         }
-        if self.governor.is_none() {
-            self.governor = Some(Box::new(Governor::new(self)));
-        }
-        let Some(governor) = &mut self.governor else { return };
+        let governor = self.governor.take().or_else(|| self.idle_governor.take());
+        let mut governor = governor.unwrap_or_else(|| Box::new(Governor::new(self)));
         governor.limits.clear();
         governor.limits.extend(self.limiter.bounds.iter().map(|bounds| RateLimits {
             velocity: bounds.velocity * (1.0 - MARGINS[0]),
             acceleration: bounds.acceleration * (1.0 - MARGINS[1]),
         }));
+        self.governor = Some(governor);
     }
 
     /// Samples the path ahead under the present commands.

@@ -140,6 +140,8 @@ pub struct Controller {
     limiter: Limiter,
     /// Governor of the commands, if limits bound the rate of the path.
     governor: Option<Box<Governor>>,
+    /// Memory of a governor that is no longer in force.
+    idle_governor: Option<Box<Governor>>,
     /// ρ̇ of the next substep where the limits determine it.
     rate_slope: Option<f64>,
     /// k_φ.
@@ -157,7 +159,7 @@ pub struct Controller {
 }
 
 // A copy moves as the original does, to the bit. `clone_from` allocates nothing if the destination is an earlier copy, unless
-// a later reset added a start or a start velocity.
+// a later reset added a start or a start velocity, or later limits a governor.
 clone_in_place!(Controller {
     primitive,
     dt,
@@ -192,6 +194,7 @@ clone_in_place!(Controller {
     perturbation,
     limiter,
     governor,
+    idle_governor,
     rate_slope,
     phase_gain,
     max_clock_step,
@@ -262,6 +265,7 @@ impl Controller {
             perturbation: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
             limiter: Limiter::none(primitive.ranges()),
             governor: None,
+            idle_governor: None,
             rate_slope: None,
             phase_gain: phase::PHASE_GAIN,
             max_clock_step,

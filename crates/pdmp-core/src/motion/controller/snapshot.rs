@@ -137,6 +137,7 @@ impl Controller {
             perturbation,
             limiter,
             governor: _,
+            idle_governor: _,
             rate_slope: _,
             phase_gain,
             command_step,
