@@ -2201,7 +2201,8 @@ class Controller:
         of freedom brakes with A, or with V / (2 dt) or (upper - lower) / dt² for the default tick if that is less. A longer
         tick is limited in parts of constant acceleration, and is no single cubic. A movement inside the limits is not changed.
         With a limit of the jerk, ÿ changes by at most J·dt, the degree of freedom can always stop inside, and a movement
-        begins with ÿ = 0; where one comes to rest within a tick, the cubic may pass the limit by J·dt³/150.
+        begins with ÿ = 0, or with the present ÿ if it goes on from the present position and velocity. Where a degree of freedom
+        comes to rest within a tick, the cubic may pass the limit by J·dt³/150.
         A goal or anchor outside is moved to the limit: `goal` and `anchor` return it, and a movement finishes there. A
         movement outside, after limits that shrink or at a start outside, brakes with A and returns at V or below. They stay in force
         after `reset`; None removes them.

@@ -40,13 +40,14 @@ impl Controller {
     /// position nor velocity at once. A motion inside the limits is not changed.
     ///
     /// With a limit J of the jerk, |Δÿ|/Δt ≤ J, ẏ changes as it can with that jerk, and the state can stop inside with it. A
-    /// movement then begins with ÿ = 0. Where a DoF comes to rest within a tick, the cubic may pass the limit by J·Δt³/150.
+    /// movement then begins with ÿ = 0, or where it goes on from the present position and velocity, with the present ÿ. Where a
+    /// DoF comes to rest within a tick, the cubic may pass the limit by J·Δt³/150.
     ///
     /// A goal or anchor outside is moved to the limit, where a movement is finished as at any goal; [`Controller::centre`] returns
     /// it. A state outside, after limits that shrink or at a start outside, brakes with A and returns at V or below: until then the
     /// limit of the position gives way to the others. [`Controller::limited`]
     /// names the limits that bind. The limits remain in force after [`Controller::reset`]. The first time, this
-    /// function allocates memory for the path ahead, unless every DoF is limited on its own.
+    /// function allocates memory for the path ahead, unless every DoF is limited on its own; later calls do not.
     ///
     /// ```
     /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Status, fit};

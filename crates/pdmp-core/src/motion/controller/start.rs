@@ -1,5 +1,6 @@
 //! Start of a movement.
 
+use super::step::first_element;
 use super::{Controller, Status};
 use crate::dynamics::canonical::CompensatedSum;
 use crate::dynamics::output_system::State;
@@ -7,6 +8,9 @@ use crate::error::Result;
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::numerics::simd::{F64x4, WIDTH, padded, repack};
+
+/// Rounding error of a velocity at the start, relative to it and to that of one range per τ.
+const ROUNDING: f64 = 1e-9;
 
 impl Controller {
     /// Restarts the movement under other conditions.
@@ -72,12 +76,21 @@ impl Controller {
     }
 
     /// Sets the motion from which the first tick begins to the present one.
+    ///
+    /// A DoF with a limit of the jerk begins without acceleration, or with the present one if it goes on from the present
+    /// position and velocity.
     pub(super) fn begin_first_tick(&mut self) {
-        // A robot that begins a movement does not accelerate yet.
-        for (index, acceleration) in self.acceleration.iter_mut().enumerate() {
-            *acceleration = self.limiter.jerk_limited(index).select(F64x4::ZERO, *acceleration);
+        let rate = first_element(self.rate.value());
+        for index in 0..self.groups.len() {
+            let (position, velocity) = (self.position[index], self.velocity[index]);
+            let [y, v, present] = self.limiter.before[index];
+            let rounding = (v.abs() + self.groups[index].range * rate) * ROUNDING;
+            let goes_on = position.simd_eq(y) & (velocity - v).abs().simd_le(rounding);
+            let first = goes_on.select(present, F64x4::ZERO);
+            let limited = self.limiter.jerk_limited(index);
+            self.acceleration[index] = limited.select(first, self.acceleration[index]);
+            self.limiter.before[index] = [position, velocity, limited.select(first, F64x4::ZERO)];
         }
-        self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
     }
 
     /// Sets position and z at the start: z = 0 for a discrete movement, the limit cycle of the style for a rhythmic one.
