@@ -2200,12 +2200,17 @@ class Controller:
         position and velocity at both, by which a robot interpolates; the mean velocity of a tick is at most V, too. A degree
         of freedom brakes with A, or with V / (2 dt) or (upper - lower) / dt² for the default tick if that is less. A longer
         tick is limited in parts of constant acceleration, and is no single cubic. A movement inside the limits is not changed.
+
         With a limit of the jerk, ÿ changes by at most J·dt, the degree of freedom can always stop inside, and a movement
         begins with ÿ = 0, or with the present ÿ if it goes on from the present position and velocity. Where a degree of freedom
         comes to rest within a tick, the cubic may pass the limit by J·dt³/150.
+
         A goal or anchor outside is moved to the limit: `goal` and `anchor` return it, and a movement finishes there. A
-        movement outside, after limits that shrink or at a start outside, brakes with A and returns at V or below. They stay in force
-        after `reset`; None removes them.
+        movement outside, after limits that shrink or at a start outside, brakes with A and returns at V or below. Along a path that
+        leaves the limits of the position from its start on, a degree of freedom is held at its limit and continues from there
+        when the path returns; `Model.nearest_feasible` finds conditions that stay inside. A command during the movement is
+        accepted in part instead, see `pending`. Where the acceleration along the path steps, a limit of the jerk binds single
+        degrees of freedom. The limits stay in force after `reset`; None removes them.
         """
     @limits.setter
     def limits(self, limits: Limits | None, /) -> None: ...

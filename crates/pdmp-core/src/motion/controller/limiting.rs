@@ -45,9 +45,13 @@ impl Controller {
     ///
     /// A goal or anchor outside is moved to the limit, where a movement is finished as at any goal; [`Controller::centre`] returns
     /// it. A state outside, after limits that shrink or at a start outside, brakes with A and returns at V or below: until then the
-    /// limit of the position gives way to the others. [`Controller::limited`]
-    /// names the limits that bind. The limits remain in force after [`Controller::reset`]. The first time, this
-    /// function allocates memory for the path ahead, unless every DoF is limited on its own; later calls do not.
+    /// limit of the position gives way to the others. Along a path that leaves the limits of the position from its start on, a
+    /// DoF is held at its limit and continues from there when the path returns; `nearest_feasible` finds conditions that stay
+    /// inside. A command during the movement is accepted in part instead ([`Controller::is_pending`]). Where the acceleration
+    /// along the path steps, a limit of the jerk binds single DoFs. [`Controller::limited`] names the limits that bind.
+    ///
+    /// The limits remain in force after [`Controller::reset`]. The first time, this function allocates memory for the path ahead,
+    /// unless every DoF is limited on its own; later calls do not.
     ///
     /// ```
     /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, Status, fit};
