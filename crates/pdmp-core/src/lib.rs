@@ -78,6 +78,9 @@ pub mod motion;
 pub mod numerics;
 #[cfg(feature = "learning")]
 pub mod preprocessing;
+#[cfg(test)]
+#[path = "../tests/common/random.rs"]
+mod random;
 mod validate;
 
 pub use demonstration::{Demonstration, Sampling};

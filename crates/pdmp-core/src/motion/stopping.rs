@@ -251,30 +251,17 @@ impl JerkBounds {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
-    /// Generator of uniform numbers in [0, 1) (Knuth's MMIX).
-    struct Random(u64);
-
-    impl Random {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64
-        }
-
-        fn scale(&mut self, a: f64, b: f64) -> f64 {
-            a * (b / a).powf(self.next())
-        }
-
-        fn bounds(&mut self) -> JerkBounds {
-            let acceleration = self.scale(0.1, 1e3);
-            let lower = -self.next();
-            JerkBounds {
-                lower,
-                upper: lower + self.scale(0.01, 10.0),
-                velocity: self.scale(0.1, 10.0),
-                acceleration,
-                jerk: acceleration * self.scale(0.1, 1e4),
-            }
+    fn random_bounds(random: &mut Random) -> JerkBounds {
+        let acceleration = random.scale(0.1, 1e3);
+        let lower = -random.next();
+        JerkBounds {
+            lower,
+            upper: lower + random.scale(0.01, 10.0),
+            velocity: random.scale(0.1, 10.0),
+            acceleration,
+            jerk: acceleration * random.scale(0.1, 1e4),
         }
     }
 
@@ -285,7 +272,7 @@ mod tests {
         let mut worst = [0.0f64; 5];
         let mut limits = [0usize; 4];
         for case in 0..1000 {
-            let bounds = random.bounds();
+            let bounds = random_bounds(&mut random);
             let JerkBounds { lower, upper, velocity, acceleration, jerk } = bounds;
             let range = upper - lower;
             let mut state = State { y: lower + range * random.next(), v: 0.0, a: 0.0 };
@@ -341,7 +328,7 @@ mod tests {
     fn stopping_motion_is_that_of_its_phases() {
         let mut random = Random(2);
         for _ in 0..2000 {
-            let bounds = random.bounds();
+            let bounds = random_bounds(&mut random);
             let v = bounds.velocity * (2.0 * random.next() - 1.0);
             let from = State { y: 0.0, v, a: bounds.acceleration * 1.5 * (2.0 * random.next() - 1.0) };
             let stop = bounds.stop(from);
@@ -368,7 +355,7 @@ mod tests {
     fn motion_outside_returns() {
         let mut random = Random(3);
         for case in 0..200 {
-            let bounds = random.bounds();
+            let bounds = random_bounds(&mut random);
             // The excursion before the return grows with the square of the time that a reversal takes.
             let jerk = bounds.jerk.max(bounds.acceleration * (10.0 * bounds.acceleration / bounds.velocity).max(10.0));
             let bounds = JerkBounds { jerk, ..bounds };

@@ -208,19 +208,10 @@ pub(crate) fn extremes(from: [F64x4; 2], to: [F64x4; 2], h: f64) -> [F64x4; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
-    /// Generator of uniform numbers in [0, 1) (Knuth's MMIX).
-    struct Random(u64);
-
-    impl Random {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64
-        }
-
-        fn lanes(&mut self, number: impl Fn(f64) -> f64) -> F64x4 {
-            F64x4::new([(); 4].map(|()| number(self.next())))
-        }
+    fn lanes(random: &mut Random, number: impl Fn(f64) -> f64) -> F64x4 {
+        F64x4::new([(); 4].map(|()| number(random.next())))
     }
 
     /// Any sequence of wanted accelerations and tick lengths keeps every limit, between ticks too, and leaves an interval.
@@ -229,17 +220,18 @@ mod tests {
         let mut random = Random(1);
         let mut ticks = 0;
         for case in 0..400 {
-            let acceleration = random.lanes(|x| 10f64.powf(4.0 * x - 1.0));
-            let velocity = random.lanes(|x| 10f64.powf(2.0 * x - 1.0));
+            let acceleration = lanes(&mut random, |x| 10f64.powf(4.0 * x - 1.0));
+            let velocity = lanes(&mut random, |x| 10f64.powf(2.0 * x - 1.0));
             // The longest tick takes half of the velocity's limit.
             let shortest = (velocity * 0.5 / acceleration).to_array().into_iter().fold(0.1, f64::min);
             let free = case % 4 == 3;
-            let lower = random.lanes(|x| -x);
-            let range = random.lanes(|x| 10f64.powf(3.0 * x - 2.0)).max(acceleration * (2.0 * shortest * shortest));
+            let lower = lanes(&mut random, |x| -x);
+            let range =
+                lanes(&mut random, |x| 10f64.powf(3.0 * x - 2.0)).max(acceleration * (2.0 * shortest * shortest));
             let braking = acceleration;
             let acceleration = if free { F64x4::splat(f64::INFINITY) } else { acceleration };
             let bounds = Bounds { lower, upper: lower + range, velocity, acceleration, braking };
-            let (mut y, mut v) = (lower + range * random.lanes(|x| x), F64x4::ZERO);
+            let (mut y, mut v) = (lower + range * lanes(&mut random, |x| x), F64x4::ZERO);
             for _ in 0..2000 {
                 let h = shortest * 10f64.powf(-4.0 * random.next() * f64::from(case % 2));
                 let interval = bounds.interval(y, v, h);
@@ -247,7 +239,7 @@ mod tests {
                 assert!(least.simd_le(most).all(), "{bounds:?} {y} {v} {h}");
                 let size = if free { 1.0 } else { 10f64.powf(6.0 * random.next() - 3.0) };
                 let scale = if free { velocity * (1.0 / h) } else { bounds.acceleration };
-                let wanted = (random.lanes(|x| 2.0 * x - 1.0) + F64x4::splat(random.next() - 0.5)) * scale * size;
+                let wanted = (lanes(&mut random, |x| 2.0 * x - 1.0) + F64x4::splat(random.next() - 0.5)) * scale * size;
                 let a = interval.nearest(wanted);
                 let next = [y + v * h + a * (0.5 * h * h), v + a * h];
                 let tolerance = range * 1e-12;
