@@ -283,6 +283,16 @@ def test_a_controller_runs_in_one_loop_at_a_time(reach: pdmp.Model, clock: Clock
         realtime.perf_counter = monkeypatched
 
 
+def test_each_kind_has_its_centre_alone(model: pdmp.Model) -> None:
+    """A discrete movement has a goal, a rhythmic one an anchor, and a description of the other."""
+    controller = model.controller(dt=0.01)
+    own, other = ("goal", "anchor") if model.kind == "discrete" else ("anchor", "goal")
+    assert hasattr(controller, own)
+    assert not hasattr(controller, other)
+    with pytest.raises(AttributeError, match=f"has no {other}; it has an? {own}"):
+        getattr(controller, other)
+
+
 def test_status_is_true_while_the_movement_continues(reach: pdmp.Model) -> None:
     """`while controller.step()` runs to the end; the values are those of the C interface."""
     controller = reach.controller()

@@ -179,10 +179,15 @@ def test_onsets_replace_the_search() -> None:
         pdmp.preprocessing.cycles([recording(), recording()], onsets=[[0.5, 1.5]])
 
 
-@given(st.floats(-3, 3), st.floats(-0.9, 0.9), st.integers(5, 60), st.sampled_from(["rad", "deg"]))
+@given(
+    st.floats(-3, 3),
+    st.floats(-0.9, 0.9),
+    st.integers(5, 60),
+    st.sampled_from(["rad", "deg", "degrees"]),
+)
 def test_unwrapping_undoes_wrapping(start: float, step: float, n: int, unit: str) -> None:
     """An angle with less than half a turn per sample is restored up to full turns."""
-    turn = {"rad": 2 * np.pi, "deg": 360.0}[unit]
+    turn = {"rad": 2 * np.pi, "deg": 360.0, "degrees": 360.0}[unit]
     angle = start + step * np.pi * np.arange(n)
     wrapped = ((angle + np.pi) % (2 * np.pi) - np.pi) * turn / (2 * np.pi)
     position = np.column_stack([wrapped, wrapped])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,8 +13,6 @@ if TYPE_CHECKING:
 
 DERIVATIVES = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
 """Suffixes of name and unit in the columns of position, velocity and acceleration."""
-FULL_TURN = {"rad": math.tau, "deg": 360.0, "°": 360.0}
-"""Full turn in each unit of angle."""
 
 
 def split_label(field: str) -> tuple[str, str]:

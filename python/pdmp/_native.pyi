@@ -60,6 +60,7 @@ __all__ = [
     "resample",
     "residuals",
     "trim",
+    "turn_of",
 ]
 __version__: str
 
@@ -504,6 +505,15 @@ def residuals(demo: Demonstration, cut_offs: ArrayLike) -> _Array:  # (K, D)
     ------
     ValueError
         A cut-off that `lowpass` rejects, or a recording without times.
+    """
+
+def turn_of(unit: str) -> float | None:
+    """Returns a full turn in a unit of angles, "rad", "deg", "°" or their names, and None for other units.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of a degree of freedom.
     """
 
 def period(demo: Demonstration) -> float:

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::{Command, Kind};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -383,7 +383,7 @@ impl Controller {
 impl Controller {
     fn centre<'py>(&self, py: Python<'py>, kind: Kind, other: &'static str) -> PyResult<Vector<'py>> {
         if self.model.kind() != kind {
-            return Err(PyValueError::new_err(other));
+            return Err(PyAttributeError::new_err(other));
         }
         Ok(read_only(py, self.inner.centre()))
     }

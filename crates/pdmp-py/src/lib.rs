@@ -67,6 +67,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(preprocessing::split_at, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::lowpass, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::residuals, module)?)?;
+    module.add_function(wrap_pyfunction!(preprocessing::turn_of, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::period, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::fill_gaps, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::cycles, module)?)?;

@@ -170,6 +170,17 @@ pub(crate) fn residuals<'py>(
     Ok(residuals.into_pyarray(py))
 }
 
+/// Returns a full turn in a unit of angles, "rad", "deg", "°" or their names, and None for other units.
+///
+/// Parameters
+/// ----------
+/// unit : str
+///     Unit of a degree of freedom.
+#[pyfunction]
+pub(crate) fn turn_of(unit: &str) -> Option<f64> {
+    pdmp_core::demonstration::turn_of(unit)
+}
+
 /// Estimates the period of a cyclic recording by autocorrelation.
 ///
 /// A(k) is the mean autocorrelation at lag k of the positions and velocities of all degrees of freedom, after removal

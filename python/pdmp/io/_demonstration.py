@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._labels import FULL_TURN
 from pdmp._messages import check_number, check_type, value_error
-from pdmp._native import Demonstration, fill_gaps
+from pdmp._native import Demonstration, fill_gaps, turn_of
 
 
 def check_options(dt: float | None, max_gap: float, time: str = "t") -> None:
@@ -34,7 +33,7 @@ def make_demonstration(
     """Returns a demonstration with its gaps filled; `source` precedes the texts of errors."""
     n_samples, n_dofs = position.shape
     columns = [f"y{d}" for d in range(n_dofs)] if names is None else names
-    turns = [FULL_TURN.get(unit, 0.0) if unit else np.nan for unit in units or [""] * n_dofs]
+    turns = [(turn_of(unit) or 0.0) if unit else np.nan for unit in units or [""] * n_dofs]
     clock = np.arange(n_samples) * (dt or 1.0) if time is None else time
     try:
         filled = fill_gaps(position, clock, columns, turns, max_gap)

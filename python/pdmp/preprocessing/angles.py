@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from pdmp._labels import FULL_TURN
 from pdmp._messages import check_type
-from pdmp._native import Demonstration
+from pdmp._native import Demonstration, turn_of
 
 
 def unwrap(demo: Demonstration) -> Demonstration:
@@ -29,8 +28,8 @@ def unwrap(demo: Demonstration) -> Demonstration:
     units = demo.units or ["rad"] * demo.n_dofs
     unwrapped = position.copy()
     for d, unit in enumerate(units):
-        if unit in FULL_TURN:
-            unwrapped[:, d] = np.unwrap(position[:, d], period=FULL_TURN[unit])
+        if turn := turn_of(unit):
+            unwrapped[:, d] = np.unwrap(position[:, d], period=turn)
     if demo.goal is not None:
         rest["goal"] = demo.goal + unwrapped[-1] - position[-1]
     return Demonstration(unwrapped, **rest)
