@@ -1,5 +1,7 @@
 //! Errors about limits of a robot.
 
+use std::fmt;
+
 use super::format::{Number, Rounded};
 
 /// Error about the limits of one DoF.
@@ -56,9 +58,10 @@ pub enum LimitError {
     },
     /// Limits that no movement of the varied conditions keeps.
     #[error(
-        "limits of DoF {dof}: no change of {varied} keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {remedy}",
+        "limits of DoF {dof}: no change of {varied} keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {}",
         Rounded(*value),
-        Rounded(*limit)
+        Rounded(*limit),
+        Remedy { at_start: *time == 0.0, quantity, varies_all: *varies_all, slower: *slower }
     )]
     Infeasible {
         /// Index of the DoF.
@@ -73,7 +76,36 @@ pub enum LimitError {
         limit: f64,
         /// Time of that value, in seconds.
         time: f64,
-        /// The remedy, as the end of the sentence.
-        remedy: &'static str,
+        /// True if both style and goal, or anchor, were varied.
+        varies_all: bool,
+        /// Factor of its duration with which the unchanged movement keeps the limits, if it can.
+        slower: Option<f64>,
     },
+}
+
+/// Remedy for limits that no change of conditions keeps.
+struct Remedy<'a> {
+    at_start: bool,
+    quantity: &'a str,
+    varies_all: bool,
+    slower: Option<f64>,
+}
+
+impl fmt::Display for Remedy<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if !self.varies_all {
+            f.write_str("vary both, ")?;
+        }
+        match (self.quantity, self.at_start, self.slower) {
+            // Rounded up, so that the printed factor suffices.
+            (_, _, Some(slower)) => {
+                write!(f, "let the movement last {:.3} times as long by tau or segment_durations", slower + 5e-4)?;
+            }
+            ("position", true, _) => f.write_str("start inside the limits")?,
+            ("position", false, _) => f.write_str("start farther from the limit")?,
+            (_, true, _) => f.write_str("start with a lower velocity")?,
+            _ => f.write_str("enlarge tau")?,
+        }
+        f.write_str(", or widen the limits")
+    }
 }
