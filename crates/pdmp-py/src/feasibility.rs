@@ -129,9 +129,9 @@ impl Model {
     ///
     /// Start, tau and the other conditions remain, so that the movement is affine in style s and goal g, or anchor of a
     /// rhythmic movement. The change (Δs, Δg) minimises Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg, with the covariances of the
-    /// demonstrations plus squares of a thousandth of the range of styles and positions, subject to the limits over the
-    /// whole movement: a quadratic program. With `context`, the covariance is that of style and goal together in the
-    /// prediction, plus a hundredth of the standard deviations above: what the context determines changes least.
+    /// demonstrations plus squares of a tenth of the range of styles and positions, subject to the limits over the whole
+    /// movement: a quadratic program. With `context`, the covariance is that of style and goal together in the prediction,
+    /// plus squares of a hundredth of the standard deviations above: what the context determines changes least.
     ///
     /// Parameters
     /// ----------

@@ -56,9 +56,9 @@ pub enum LimitError {
         /// Its limit of the jerk.
         jerk: f64,
     },
-    /// Limits that no movement of the varied conditions keeps.
+    /// Limits that no change of the varied conditions was found to keep.
     #[error(
-        "limits of DoF {dof}: no change of {varied} keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {}",
+        "limits of DoF {dof}: no change of {varied} was found that keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {}",
         Rounded(*value),
         Rounded(*limit),
         Remedy { at_start: *time == 0.0, quantity, varies_all: *varies_all, slower: *slower }
@@ -78,7 +78,7 @@ pub enum LimitError {
         time: f64,
         /// True if both style and goal, or anchor, were varied.
         varies_all: bool,
-        /// Factor of its duration with which the unchanged movement keeps the limits, if it can.
+        /// Factor of its duration with which the unchanged movement keeps the limits, if that is known.
         slower: Option<f64>,
     },
 }
@@ -93,19 +93,19 @@ struct Remedy<'a> {
 
 impl fmt::Display for Remedy<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("widen the limits")?;
         if !self.varies_all {
-            f.write_str("vary both, ")?;
+            f.write_str(", or vary both")?;
         }
         match (self.quantity, self.at_start, self.slower) {
             // Rounded up, so that the printed factor suffices.
             (_, _, Some(slower)) => {
-                write!(f, "let the movement last {:.3} times as long by tau or segment_durations", slower + 5e-4)?;
+                write!(f, ", or let the movement last {:.3} times as long (tau or segment_durations)", slower + 5e-4)
             }
-            ("position", true, _) => f.write_str("start inside the limits")?,
-            ("position", false, _) => f.write_str("start farther from the limit")?,
-            (_, true, _) => f.write_str("start with a lower velocity")?,
-            _ => f.write_str("enlarge tau")?,
+            ("position", true, _) => f.write_str(", or start inside them"),
+            ("position", false, _) => Ok(()),
+            (_, true, _) => f.write_str(", or start with a lower velocity"),
+            (_, false, _) => f.write_str(", or enlarge tau"),
         }
-        f.write_str(", or widen the limits")
     }
 }

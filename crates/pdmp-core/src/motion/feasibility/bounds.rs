@@ -23,7 +23,7 @@ pub(super) struct Bound {
     pub(super) scale: f64,
 }
 
-/// Largest excess of a movement over a limit.
+/// Excess of a movement over a limit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Excess {
     /// ±(y − value)/scale, at most 0 inside.
@@ -32,6 +32,12 @@ pub(super) struct Excess {
 }
 
 impl Bound {
+    /// Returns the excess of a movement at its start.
+    pub(super) fn start_excess(&self, movement: &Movement) -> Excess {
+        let excess = self.outward(movement, Place::START) - self.side * self.value / self.scale;
+        Excess { excess, place: Place::START }
+    }
+
     /// Returns the largest excess of a movement.
     pub(super) fn excess(&self, movement: &Movement) -> Excess {
         let (most, place) = movement.largest(self.derivative, self.dof, self.side);

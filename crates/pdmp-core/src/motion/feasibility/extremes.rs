@@ -32,6 +32,11 @@ pub(super) struct Place {
     share: f64,
 }
 
+impl Place {
+    /// Place of the first sample.
+    pub(super) const START: Self = Self { cell: 0, share: 0.0 };
+}
+
 impl From<Trajectory> for Movement {
     fn from(Trajectory { time, position, velocity, acceleration }: Trajectory) -> Self {
         let by_dofs = |curve: Array2<f64>| curve.t().as_standard_layout().into_owned();
@@ -72,7 +77,7 @@ impl Movement {
 
     /// Returns the largest value of ±y, ±ẏ or ±ÿ of a DoF, and its place.
     pub(super) fn largest(&self, derivative: Derivative, dof: usize, sign: f64) -> (f64, Place) {
-        let mut largest = (f64::NEG_INFINITY, Place { cell: 0, share: 0.0 });
+        let mut largest = (f64::NEG_INFINITY, Place::START);
         self.visit(derivative, dof, sign, |value, place| {
             if value > largest.0 {
                 largest = (value, place);

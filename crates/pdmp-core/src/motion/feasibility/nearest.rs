@@ -18,8 +18,8 @@ use ndarray::Array2;
 
 use super::Margins;
 use super::bounds::{Bound, Excess, TOLERANCE, bounds};
-use super::extremes::Movement;
-use super::quadratic_program::HalfSpaces;
+use super::extremes::{Movement, Place};
+use super::quadratic_program::{HalfSpaces, is_zero};
 use super::sampling::sampled;
 use super::variables::{Variables, Vary};
 use crate::error::{Error, LimitError, Result};
@@ -39,7 +39,7 @@ const EXCESS_TOLERANCE: f64 = 1e-3;
 /// acceleration; see [`feasible`](super::feasible).
 ///
 /// The distance of a change Δs of the style and Δg of the goal, or anchor, is Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg with the covariances of
-/// the demonstrations, to which squares of a thousandth of the range of styles and positions are added. Start, τ and the other
+/// the demonstrations, to which squares of a tenth of the range of styles and positions are added. Start, τ and the other
 /// conditions remain. Conditions that keep the limits are returned unchanged. A limit of the jerk does not count.
 ///
 /// ```
@@ -67,9 +67,9 @@ pub fn nearest_feasible(model: &Model, limits: &Limits, conditions: &Conditions,
 /// Computes the prediction whose conditions are the most probable ones with which the whole movement keeps limits of position,
 /// velocity and acceleration.
 ///
-/// The distance of a change Δ of style and goal, or anchor, is Δᵀ Σ⁻¹ Δ with their covariance in the prediction, to which a
-/// hundredth of the standard deviations of [`nearest_feasible`] is added; without a covariance it is the distance of
-/// [`nearest_feasible`]. What the context determines thus remains as far as the limits allow. Start, durations and the other
+/// The distance of a change Δ of style and goal, or anchor, is Δᵀ Σ⁻¹ Δ with their covariance in the prediction, to which
+/// squares of a hundredth of the standard deviations of [`nearest_feasible`] are added; without a covariance it is the distance
+/// of [`nearest_feasible`]. What the context determines thus remains as far as the limits allow. Start, durations and the other
 /// conditions remain, too, and so do the covariance and its degrees of freedom: they describe demonstrators without these
 /// limits.
 ///
@@ -108,22 +108,31 @@ fn nearest(
         return Ok(request.clone());
     }
     let variables = Variables::new(model, request, vary, predicted, &movement)?;
-    let mut search =
-        Search { primitive, bounds: &bounds, requested: &movement, variables, half_spaces: HalfSpaces::default() };
-    let (bound, at_best) = match search.nearest()? {
-        Outcome::Found(conditions) => return Ok(conditions),
-        Outcome::Fixed(bound) => (bound, movement.clone()),
-        Outcome::Infeasible => search.least_excess()?,
-    };
-    Err(infeasible(&bound, &at_best, vary, model.kind(), slower(&margins, request)))
+    let half_spaces = HalfSpaces::default();
+    let outcome = Search { primitive, bounds: &bounds, requested: &movement, variables, half_spaces }.run()?;
+    match outcome {
+        Outcome::Feasible(conditions) => Ok(conditions),
+        Outcome::Infeasible(obstacle) => Err(obstacle.error(vary, model.kind(), slower(&margins, request))),
+    }
 }
 
-/// Outcome of a search.
+/// Limit that the movement with the smallest excess exceeds most.
+struct Obstacle {
+    bound: Bound,
+    value: f64,
+    time: f64,
+}
+
+/// Conditions with the smallest excess, or the limit that they exceed.
 enum Outcome {
-    Found(Conditions),
-    /// A limit is exceeded where the varied conditions do not change the movement.
-    Fixed(Bound),
-    Infeasible,
+    Feasible(Conditions),
+    Infeasible(Obstacle),
+}
+
+/// Numbers of stretches outside limits: of those that became half-spaces, and of those that do not depend on x.
+struct Cuts {
+    n_added: usize,
+    n_fixed: usize,
 }
 
 /// Search by cutting planes.
@@ -136,74 +145,96 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Adds the half-spaces of the stretches in which a movement at x exceeds limits by more than `tolerance`; returns their
-    /// number.
+    /// Searches the nearest feasible conditions, or else those with the smallest excess.
     ///
     /// # Errors
-    /// A limit whose excess does not depend on x.
-    fn cut(&mut self, movement: &Movement, x: &[f64], tolerance: f64) -> std::result::Result<usize, Bound> {
-        let mut n_cuts = 0;
-        for bound in self.bounds {
-            for Excess { excess, place } in bound.excesses(movement, tolerance) {
-                if !self.half_spaces.add(self.variables.gradient(bound, place), excess, x) {
-                    return Err(*bound);
-                }
-                n_cuts += 1;
-            }
+    /// A movement that overflows.
+    fn run(mut self) -> Result<Outcome> {
+        if let Some(obstacle) = self.fixed() {
+            return Ok(Outcome::Infeasible(obstacle));
         }
-        Ok(n_cuts)
+        match self.nearest()? {
+            Some(nearest) => Ok(Outcome::Feasible(nearest)),
+            None => self.least_excess(),
+        }
     }
 
-    /// Searches the nearest feasible conditions.
+    /// Returns a limit that the start exceeds for all x.
+    fn fixed(&self) -> Option<Obstacle> {
+        let exceeds = |bound: &&Bound| bound.start_excess(self.requested).excess > TOLERANCE;
+        let is_fixed = |bound: &&Bound| is_zero(&self.variables.gradient(bound, Place::START));
+        let bound = self.bounds.iter().filter(exceeds).find(is_fixed)?;
+        Some(Obstacle::at(bound, self.requested, Place::START))
+    }
+
+    /// Adds the half-spaces of the stretches in which a movement at x exceeds limits by more than `tolerance`.
+    fn cut(&mut self, movement: &Movement, x: &[f64], tolerance: f64) -> Cuts {
+        let mut cuts = Cuts { n_added: 0, n_fixed: 0 };
+        for bound in self.bounds {
+            for Excess { excess, place } in bound.excesses(movement, tolerance) {
+                let is_added = self.half_spaces.add(self.variables.gradient(bound, place), excess, x);
+                *(if is_added { &mut cuts.n_added } else { &mut cuts.n_fixed }) += 1;
+            }
+        }
+        cuts
+    }
+
+    /// Searches the nearest feasible conditions; returns `None` if the half-spaces have no point in common, if an excess does
+    /// not depend on x, or after too many rounds.
     ///
     /// # Errors
-    /// A movement that overflows, or too many rounds.
-    fn nearest(&mut self) -> Result<Outcome> {
+    /// A movement that overflows.
+    fn nearest(&mut self) -> Result<Option<Conditions>> {
         let mut x = vec![0.0; self.variables.len()];
         let mut cuts = self.cut(self.requested, &x, TOLERANCE);
         for _ in 0..MAX_ROUNDS {
-            if let Err(bound) = cuts {
-                return Ok(Outcome::Fixed(bound));
+            if cuts.n_fixed > 0 {
+                break;
             }
-            let Some(nearest) = self.half_spaces.nearest() else { return Ok(Outcome::Infeasible) };
+            let Some(nearest) = self.half_spaces.nearest() else { break };
             x = nearest;
             cuts = self.cut(&self.variables.movement(self.requested, &x), &x, TOLERANCE);
-            if cuts == Ok(0) {
-                // The sum has rounding errors: the movement itself decides.
-                let conditions = self.variables.conditions(&x);
-                cuts = self.cut(&sampled(self.primitive, &conditions)?, &x, TOLERANCE);
-                if cuts == Ok(0) {
-                    return Ok(Outcome::Found(conditions));
-                }
-            }
-        }
-        Err(unsolved())
-    }
-
-    /// Returns the limit that the movement with the smallest excess exceeds most, and this movement.
-    ///
-    /// # Errors
-    /// A movement that overflows, or too many rounds.
-    fn least_excess(&mut self) -> Result<(Bound, Movement)> {
-        for _ in 0..MAX_ROUNDS {
-            let (x, least) = self.half_spaces.least_excess().ok_or_else(unsolved)?;
-            let movement = self.variables.movement(self.requested, &x);
-            if self.cut(&movement, &x, least.max(0.0) + EXCESS_TOLERANCE).is_ok_and(|n_cuts| n_cuts > 0) {
+            if cuts.n_added + cuts.n_fixed > 0 {
                 continue;
             }
-            let excesses = self.bounds.iter().map(|bound| (bound.excess(&movement).excess, bound));
-            let largest = excesses.max_by(|(a, _), (b, _)| a.total_cmp(b)).filter(|(excess, _)| *excess > TOLERANCE);
-            let (_, bound) = largest.ok_or_else(unsolved)?;
-            return Ok((*bound, movement));
+            // The sum of responses has rounding errors: the movement itself decides.
+            let conditions = self.variables.conditions(&x);
+            cuts = self.cut(&sampled(self.primitive, &conditions)?, &x, TOLERANCE);
+            if cuts.n_added + cuts.n_fixed == 0 {
+                return Ok(Some(conditions));
+            }
         }
-        Err(unsolved())
+        Ok(None)
     }
-}
 
-fn unsolved() -> Error {
-    Error::Fit(format!(
-        "no conditions within the limits were found in {MAX_ROUNDS} rounds; widen the limits, or enlarge tau"
-    ))
+    /// Searches the conditions whose largest excess is smallest. They are feasible if the feasible ones form a set that is
+    /// thinner than the margins of the half-spaces.
+    ///
+    /// # Errors
+    /// A movement that overflows.
+    fn least_excess(&mut self) -> Result<Outcome> {
+        let mut best = vec![0.0; self.variables.len()];
+        let mut least = f64::INFINITY;
+        for _ in 0..MAX_ROUNDS {
+            let Some((x, expected)) = self.half_spaces.least_excess() else { break };
+            let movement = self.variables.movement(self.requested, &x);
+            let excess = self.bounds.iter().map(|bound| bound.excess(&movement).excess).fold(f64::MIN, f64::max);
+            if excess < least {
+                (best, least) = (x.clone(), excess);
+            }
+            if self.cut(&movement, &x, expected.max(0.0) + EXCESS_TOLERANCE).n_added == 0 {
+                break;
+            }
+        }
+        let conditions = self.variables.conditions(&best);
+        let movement = sampled(self.primitive, &conditions)?;
+        let excesses = self.bounds.iter().map(|bound| (bound, bound.excess(&movement)));
+        let worst = excesses.max_by(|(_, a), (_, b)| a.excess.total_cmp(&b.excess));
+        Ok(match worst.filter(|(_, worst)| worst.excess > TOLERANCE) {
+            None => Outcome::Feasible(conditions),
+            Some((bound, worst)) => Outcome::Infeasible(Obstacle::at(bound, &movement, worst.place)),
+        })
+    }
 }
 
 /// Returns the factor of its duration with which the requested movement keeps the limits; `None` if it leaves those of the
@@ -214,22 +245,20 @@ fn slower(margins: &Margins, request: &Conditions) -> Option<f64> {
     (keeps_positions && is_on_path).then(|| margins.slowdown())
 }
 
-/// Returns the error of a movement that exceeds a limit.
-fn infeasible(bound: &Bound, movement: &Movement, vary: Vary, kind: Kind, slower: Option<f64>) -> Error {
-    let place = bound.excess(movement).place;
-    let quantity = match bound.derivative {
-        Derivative::Position => "position",
-        Derivative::Velocity => "velocity",
-        Derivative::Acceleration => "acceleration",
-    };
-    Error::Limits(LimitError::Infeasible {
-        dof: bound.dof,
-        varied: vary.name(kind),
-        quantity,
-        value: movement.value(bound.derivative, bound.dof, place),
-        limit: bound.value,
-        time: movement.time(place),
-        varies_all: vary == Vary::Both,
-        slower,
-    })
+impl Obstacle {
+    fn at(bound: &Bound, movement: &Movement, place: Place) -> Self {
+        let value = movement.value(bound.derivative, bound.dof, place);
+        Self { bound: *bound, value, time: movement.time(place) }
+    }
+
+    fn error(self, vary: Vary, kind: Kind, slower: Option<f64>) -> Error {
+        let Self { bound: Bound { derivative, dof, value: limit, .. }, value, time } = self;
+        let quantity = match derivative {
+            Derivative::Position => "position",
+            Derivative::Velocity => "velocity",
+            Derivative::Acceleration => "acceleration",
+        };
+        let (varied, varies_all) = (vary.name(kind), vary == Vary::Both);
+        Error::Limits(LimitError::Infeasible { dof, varied, quantity, value, limit, time, varies_all, slower })
+    }
 }

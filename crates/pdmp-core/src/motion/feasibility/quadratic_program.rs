@@ -11,7 +11,7 @@ const TOLERANCE: f64 = 1e-10;
 /// Distance that points keep from each half-space, relative to its distance from the origin, or to 1 if larger: above the
 /// tolerance of the solver.
 const MARGIN: f64 = 1e-7;
-/// Minimum length of a gradient: points that differ by less than 1e9 cannot change the excess.
+/// Length of a gradient up to which an excess does not depend on x.
 const MIN_LENGTH: f64 = 1e-9;
 /// Weight of ½|x|² against the excess in the search for the smallest excess: it selects one of several points.
 const MIN_WEIGHT: f64 = 1e-6;
@@ -28,13 +28,12 @@ pub(super) struct HalfSpaces {
 }
 
 impl HalfSpaces {
-    /// Adds the half-space in which an excess at `x` with a given gradient is not positive; returns whether the gradient is
-    /// not zero.
+    /// Adds the half-space in which an excess at `x` with a given gradient is not positive; returns false if this is zero.
     pub(super) fn add(&mut self, mut gradient: Vec<f64>, excess: f64, x: &[f64]) -> bool {
-        let length = gradient.iter().map(|slope| slope * slope).sum::<f64>().sqrt();
-        if length <= MIN_LENGTH {
+        if is_zero(&gradient) {
             return false;
         }
+        let length = length(&gradient);
         gradient.iter_mut().for_each(|slope| *slope /= length);
         let here: f64 = gradient.iter().zip(x).map(|(slope, x)| slope * x).sum();
         let distance = here - excess / length;
@@ -58,21 +57,34 @@ impl HalfSpaces {
     /// Returns the point with the smallest maximum excess, and that excess.
     pub(super) fn least_excess(&self) -> Option<(Vec<f64>, f64)> {
         let n = self.normals.first()?.len();
-        let scaled = |j: usize| self.column(j).zip(&self.lengths).map(|(slope, length)| slope * length).collect();
-        let mut columns: Vec<Vec<f64>> = (0..n).map(scaled).collect();
+        let offsets = self.distances.iter().zip(&self.lengths).map(|(distance, length)| distance * length);
+        // Limits far tighter than the movement are exceeded by many times, which the tolerance of the solver does not suit.
+        let scale =
+            offsets.clone().chain(self.lengths.iter().copied()).fold(1.0f64, |scale, size| scale.max(size.abs()));
+        let slopes =
+            |j: usize| self.column(j).zip(&self.lengths).map(|(slope, length)| slope * length / scale).collect();
+        let mut columns: Vec<Vec<f64>> = (0..n).map(slopes).collect();
         columns.push(vec![-1.0; self.normals.len()]);
         let (mut weights, mut costs) = (vec![MIN_WEIGHT; n], vec![0.0; n]);
         weights.push(0.0);
         costs.push(1.0);
-        let offsets = self.distances.iter().zip(&self.lengths).map(|(distance, length)| distance * length).collect();
-        let mut x = solve(weights, costs, columns, offsets)?;
-        let excess = x.pop()?;
+        let mut x = solve(weights, costs, columns, offsets.map(|offset| offset / scale).collect())?;
+        let excess = x.pop()? * scale;
         Some((x, excess))
     }
 
     fn column(&self, j: usize) -> impl Iterator<Item = f64> {
         self.normals.iter().map(move |normal| normal[j])
     }
+}
+
+fn length(gradient: &[f64]) -> f64 {
+    gradient.iter().map(|slope| slope * slope).sum::<f64>().sqrt()
+}
+
+/// Returns whether an excess with a given gradient does not depend on x.
+pub(super) fn is_zero(gradient: &[f64]) -> bool {
+    length(gradient) <= MIN_LENGTH
 }
 
 /// Minimises ½Σ weightⱼxⱼ² + Σ costⱼxⱼ subject to Ax ≤ b, with A by columns; returns `None` without a solution.

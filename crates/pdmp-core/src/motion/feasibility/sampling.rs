@@ -37,12 +37,12 @@ fn times(primitive: &Primitive, conditions: &Conditions) -> Result<Vec<f64>> {
     let duration = primitive.duration() * conditions.time_constant(primitive)? / primitive.tau();
     let segments = conditions.segment_durations.as_ref().filter(|segments| segments.len() > 1);
     let warp = segments.map(|segments| primitive.warping_function(segments)).transpose()?;
-    let start = match conditions.phase {
-        None => 0.0,
-        Some(phase) => {
-            check_phase(primitive.kind(), phase)?;
-            primitive.canonical().clock_at(phase) / primitive.canonical().extent() * duration
+    let start = match (primitive.kind(), conditions.phase) {
+        (Kind::Rhythmic, Some(phase)) => {
+            check_phase(Kind::Rhythmic, phase)?;
+            phase / primitive.canonical().extent() * duration
         }
+        _ => 0.0,
     };
     let is_jump = |phase: f64| phase == 1.0 || warp.is_some() && primitive.breaks().contains(&phase);
     // The slowest rate per unit of the clock at which the output system forgets its state.
@@ -52,8 +52,8 @@ fn times(primitive: &Primitive, conditions: &Conditions) -> Result<Vec<f64>> {
     let approaches =
         primitive.kind() == Kind::Rhythmic && (conditions.start.is_some() || conditions.velocity.is_some());
     let n_approaching = if approaches { settling(slowest).ceil() as usize } else { 0 };
-    // A period from the given phase on extends into the next one.
-    let n_cycles = 1 + n_approaching + usize::from(conditions.phase.is_some());
+    // A period from a phase on extends into the next one.
+    let n_cycles = 1 + n_approaching + usize::from(start > 0.0);
     let phases = phases(primitive);
     let gap = GAP * duration;
     let mut times = Vec::with_capacity(n_cycles * phases.len() + SETTLING_CELLS);
@@ -63,9 +63,6 @@ fn times(primitive: &Primitive, conditions: &Conditions) -> Result<Vec<f64>> {
             let time = (cycle as f64 + share) * duration;
             if is_jump(*phase) { times.extend([time - gap, time + gap]) } else { times.push(time) }
         }
-        if primitive.kind() == Kind::Discrete {
-            break;
-        }
     }
     if let Canonical::Discrete { alpha_x, .. } = primitive.canonical() {
         // The end brakes at half the rate κ, or fades with the phase.
@@ -73,7 +70,7 @@ fn times(primitive: &Primitive, conditions: &Conditions) -> Result<Vec<f64>> {
         let length = duration * settling(slowest.min(fading));
         // Braking may be much faster than the attractor: cells grow with the time past the end.
         let share = |k: usize| (k as f64 / SETTLING_CELLS as f64).powi(2);
-        times.extend((1..=SETTLING_CELLS).map(|k| start.max(duration) + gap + length * share(k)));
+        times.extend((1..=SETTLING_CELLS).map(|k| duration + gap + length * share(k)));
     }
     let from_start = times.into_iter().map(|time| time - start).filter(|time| *time > gap);
     Ok(std::iter::once(0.0).chain(from_start).collect())

@@ -15,12 +15,14 @@ use crate::model::Model;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 
-/// Standard deviation that conditions have at least, relative to the range of the demonstrated styles or positions: conditions
-/// which the demonstrations share hardly change.
-static MIN_DEVIATION_: std::sync::LazyLock<f64> =
-    std::sync::LazyLock::new(|| std::env::var("MD").map_or(1e-3, |v| v.parse().unwrap()));
-/// Share of the demonstrated standard deviation that is added to that of a prediction, whose covariance may be singular.
+/// Standard deviation whose square is added to the variances of the demonstrations, relative to the range of their styles or
+/// positions: conditions that they share can change, too. On recordings of fourteen sets, a tenth changes paths less than a
+/// hundredth or a thousandth.
+const DEVIATION: f64 = 0.1;
+/// Share of these standard deviations whose square is added to a predicted covariance, which may be singular.
 const PREDICTED_SHARE: f64 = 1e-2;
+/// Share of each variance that is added to it: more than the rounding errors of a singular covariance.
+const ROUNDING: f64 = 1e-9;
 
 /// Conditions that the search changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,8 +112,8 @@ impl Variables {
             varied,
             responses: Vec::new(),
         };
-        let styles = (0..n_styles).map(|j| j..j + 1);
-        for values in styles.chain([n_styles..n]).filter(|values| variables.varied.contains(&values.start)) {
+        let each_style = (0..n_styles).map(|j| j..j + 1);
+        for values in each_style.chain(std::iter::once(n_styles..n)).filter(|values| variables.varied.contains(&values.start)) {
             let response = variables.response(primitive, movement, values, &steps)?;
             variables.responses.push(response);
         }
@@ -188,7 +190,7 @@ impl Variables {
     }
 }
 
-/// Returns the covariance (J + D, J + D) of the demonstrated styles and goals, or anchors, with [`MIN_DEVIATION`].
+/// Returns the covariance (J + D, J + D) of the demonstrated styles and goals, or anchors, with [`DEVIATION`].
 fn demonstrated_covariance(model: &Model) -> Array2<f64> {
     let demonstrated = model.demonstrated();
     let (styles, centres) = match model.kind() {
@@ -206,7 +208,7 @@ fn demonstrated_covariance(model: &Model) -> Array2<f64> {
     let largest = styles.iter().fold(0.0f64, |largest, style| largest.max(style.abs()));
     let style_range = if largest > 0.0 { largest } else { 1.0 };
     let sizes = std::iter::repeat_n(style_range, j).chain(ranges(model.primitive()));
-    both.diag_mut().iter_mut().zip(sizes).for_each(|(variance, size)| *variance += (*MIN_DEVIATION_ * size).powi(2));
+    both.diag_mut().iter_mut().zip(sizes).for_each(|(variance, size)| *variance += (DEVIATION * size).powi(2));
     both
 }
 
@@ -218,8 +220,10 @@ fn demonstrated_covariance(model: &Model) -> Array2<f64> {
 fn conditional_factor(covariance: &Array2<f64>, varied: &Range<usize>) -> Result<DMatrix<f64>> {
     let n = covariance.nrows();
     let order: Vec<usize> = (0..n).filter(|i| !varied.contains(i)).chain(varied.clone()).collect();
-    let ordered = DMatrix::from_fn(n, n, |i, j| covariance[[order[i], order[j]]]);
-    let problem = "cannot be compared: the covariance of styles and goals is not positive definite";
+    let ordered =
+        DMatrix::from_fn(n, n, |i, j| covariance[[order[i], order[j]]] * if i == j { 1.0 + ROUNDING } else { 1.0 });
+    let problem = "cannot be compared: the covariance of styles and goals overflows; pass demonstrations, or a context, of \
+                   moderate numbers";
     let cholesky = ordered.cholesky().ok_or(Error::Argument { name: "conditions", problem })?;
     let n_fixed = n - varied.len();
     Ok(cholesky.l().view((n_fixed, n_fixed), (varied.len(), varied.len())).into_owned())
