@@ -10,6 +10,7 @@ from scipy.optimize import nnls
 import pdmp
 from pdmp import Limits
 from synthetic import loops, reaches
+from test_real_data import raised_hands
 
 
 def duration(model: pdmp.Model) -> float:
@@ -203,3 +204,27 @@ def test_impossible_limits_raise_one_error_with_a_remedy(model: pdmp.Model) -> N
         model.nearest_feasible(Limits(), vary="pace")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="velocity has length 3"):
         model.feasible(Limits(velocity=[1.0, 2.0, 3.0]))
+
+
+@pytest.mark.parametrize("part", [0.95, 0.7])
+def test_raised_hands_keep_limits_between_samples(part: float) -> None:
+    """Joint movements of people, learnt by a process, keep tighter limits until they rest."""
+    model = pdmp.fit(raised_hands())
+    request = model.conditions(1).replace(segment_durations=None)
+    movement = until_rest(model, request)
+    limits = Limits(
+        position=(movement.position.min(0) - 0.02, movement.position.max(0) + 0.02),
+        velocity=part * abs(movement.velocity).max(0),
+        acceleration=part * abs(movement.acceleration).max(0),
+    )
+    near = model.nearest_feasible(limits, request)
+    moved = until_rest(model, near)
+    assert use(limits, moved).max() < 1 + 2e-9
+    assert limits.position is not None
+    lower, upper = limits.position
+    assert (
+        np.maximum(moved.position - upper, lower - moved.position) <= 2e-9 * (upper - lower)
+    ).all()
+    assert (
+        np.ptp(moved.position - movement.position, axis=0) < np.ptp(movement.position, axis=0)
+    ).all()

@@ -19,7 +19,7 @@ use ndarray::Array2;
 use super::Margins;
 use super::bounds::{Bound, Excess, TOLERANCE, bounds};
 use super::extremes::{Movement, Place};
-use super::quadratic_program::{HalfSpaces, is_zero};
+use super::quadratic_program::HalfSpaces;
 use super::sampling::sampled;
 use super::variables::{Variables, Vary};
 use crate::error::{Error, LimitError, Result};
@@ -109,8 +109,8 @@ fn nearest(
     }
     let variables = Variables::new(model, request, vary, predicted, &movement)?;
     let half_spaces = HalfSpaces::default();
-    let outcome = Search { primitive, bounds: &bounds, requested: &movement, variables, half_spaces }.run()?;
-    match outcome {
+    let search = Search { primitive, bounds: &bounds, request, requested: &movement, variables, half_spaces };
+    match search.run()? {
         Outcome::Feasible(conditions) => Ok(conditions),
         Outcome::Infeasible(obstacle) => Err(obstacle.error(vary, model.kind(), slower(&margins, request))),
     }
@@ -139,6 +139,7 @@ struct Cuts {
 struct Search<'a> {
     primitive: &'a Arc<Primitive>,
     bounds: &'a [Bound],
+    request: &'a Conditions,
     requested: &'a Movement,
     variables: Variables,
     half_spaces: HalfSpaces,
@@ -150,7 +151,7 @@ impl Search<'_> {
     /// # Errors
     /// A movement that overflows.
     fn run(mut self) -> Result<Outcome> {
-        if let Some(obstacle) = self.fixed() {
+        if let Some(obstacle) = self.exceeded_by_start() {
             return Ok(Outcome::Infeasible(obstacle));
         }
         match self.nearest()? {
@@ -159,11 +160,16 @@ impl Search<'_> {
         }
     }
 
-    /// Returns a limit that the start exceeds for all x.
-    fn fixed(&self) -> Option<Obstacle> {
+    /// Returns a limit that a given start exceeds, which remains for all x.
+    fn exceeded_by_start(&self) -> Option<Obstacle> {
+        let Conditions { start, velocity, .. } = self.request;
+        let is_given = |bound: &&Bound| match bound.derivative {
+            Derivative::Position => start.is_some() || self.primitive.kind() == Kind::Discrete,
+            Derivative::Velocity => velocity.is_some(),
+            Derivative::Acceleration => false,
+        };
         let exceeds = |bound: &&Bound| bound.start_excess(self.requested).excess > TOLERANCE;
-        let is_fixed = |bound: &&Bound| is_zero(&self.variables.gradient(bound, Place::START));
-        let bound = self.bounds.iter().filter(exceeds).find(is_fixed)?;
+        let bound = self.bounds.iter().filter(is_given).find(exceeds)?;
         Some(Obstacle::at(bound, self.requested, Place::START))
     }
 

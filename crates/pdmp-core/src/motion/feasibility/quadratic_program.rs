@@ -30,10 +30,10 @@ pub(super) struct HalfSpaces {
 impl HalfSpaces {
     /// Adds the half-space in which an excess at `x` with a given gradient is not positive; returns false if this is zero.
     pub(super) fn add(&mut self, mut gradient: Vec<f64>, excess: f64, x: &[f64]) -> bool {
-        if is_zero(&gradient) {
+        let length = gradient.iter().map(|slope| slope * slope).sum::<f64>().sqrt();
+        if length <= MIN_LENGTH {
             return false;
         }
-        let length = length(&gradient);
         gradient.iter_mut().for_each(|slope| *slope /= length);
         let here: f64 = gradient.iter().zip(x).map(|(slope, x)| slope * x).sum();
         let distance = here - excess / length;
@@ -76,15 +76,6 @@ impl HalfSpaces {
     fn column(&self, j: usize) -> impl Iterator<Item = f64> {
         self.normals.iter().map(move |normal| normal[j])
     }
-}
-
-fn length(gradient: &[f64]) -> f64 {
-    gradient.iter().map(|slope| slope * slope).sum::<f64>().sqrt()
-}
-
-/// Returns whether an excess with a given gradient does not depend on x.
-pub(super) fn is_zero(gradient: &[f64]) -> bool {
-    length(gradient) <= MIN_LENGTH
 }
 
 /// Minimises ½Σ weightⱼxⱼ² + Σ costⱼxⱼ subject to Ax ≤ b, with A by columns; returns `None` without a solution.

@@ -113,7 +113,9 @@ impl Variables {
             responses: Vec::new(),
         };
         let each_style = (0..n_styles).map(|j| j..j + 1);
-        for values in each_style.chain(std::iter::once(n_styles..n)).filter(|values| variables.varied.contains(&values.start)) {
+        for values in
+            each_style.chain(std::iter::once(n_styles..n)).filter(|values| variables.varied.contains(&values.start))
+        {
             let response = variables.response(primitive, movement, values, &steps)?;
             variables.responses.push(response);
         }
