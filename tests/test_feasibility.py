@@ -150,6 +150,18 @@ def test_no_other_program_finds_nearer_conditions(model: pdmp.Model, part: float
     assert found == pytest.approx(nearest_by_nnls(model, limits, request, root), rel=1e-4)
 
 
+@pytest.mark.parametrize("part", [0.5, 0.05, 0.005])
+@pytest.mark.parametrize("scale", [[1.0, 1.0], [1e-3, 1e3], [1e5, 1.0]])
+def test_movements_from_rest_can_keep_any_limits_in_any_units(
+    part: float, scale: list[float]
+) -> None:
+    """Resting at the start is feasible, so that no request is refused."""
+    demos = [pdmp.Demonstration(scale * demo.position, dt=0.02) for demo in reaches()]
+    model = pdmp.fit(demos, n_styles=2, basis="ngnet")
+    limits = share(model, part)
+    assert model.feasible(limits, model.nearest_feasible(limits))
+
+
 def test_feasible_requests_are_unchanged(model: pdmp.Model) -> None:
     """Conditions inside the limits are returned bit for bit, absent ones absent."""
     limits = share(model, 1.01)

@@ -68,7 +68,7 @@ fn distance(model: &Model, from: &Conditions, to: &Conditions) -> f64 {
         Kind::Rhythmic => (&demonstrated.anchors, [from, to].map(|c| c.anchor.clone().unwrap())),
     };
     let widest = model.ranges().iter().fold(0.0f64, |widest, range| widest.max(*range));
-    let ranges: Vec<f64> = model.ranges().iter().map(|range| range.max(1e-3 * widest)).collect();
+    let ranges: Vec<f64> = model.ranges().iter().map(|range| range.max(1e-6 * widest)).collect();
     let largest = demonstrated.styles.iter().fold(0.0f64, |m, s| m.max(s.abs()));
     let style = quadratic(
         &demonstrated.styles,

@@ -5,12 +5,10 @@ use crate::error::Result;
 use crate::model::primitive::Primitive;
 use crate::model::responses::Derivative;
 use crate::motion::limits::{Limits, limit_of_dof};
+use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
 
 /// Largest excess that counts as rounding, relative to the limits.
 pub(super) const TOLERANCE: f64 = 1e-9;
-/// Minimum range of a DoF, relative to the largest one: that of a DoF at rest is zero.
-const MIN_RANGE: f64 = 1e-3;
-
 /// Limit of one side of a DoF: ±y ≤ ±value, or that of a derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bound {
@@ -100,7 +98,7 @@ pub(super) fn bounds(primitive: &Primitive, limits: &Limits) -> Result<Vec<Bound
 
 /// Returns the demonstrated ranges of the positions (D,), positive.
 pub(super) fn ranges(primitive: &Primitive) -> Vec<f64> {
-    let largest = primitive.ranges().iter().copied().fold(0.0, f64::max);
-    let least = if largest > 0.0 { MIN_RANGE * largest } else { 1.0 };
+    let largest = largest_range(primitive.ranges());
+    let least = if largest > 0.0 { MIN_RANGE_RATIO * largest } else { 1.0 };
     primitive.ranges().iter().map(|range| range.max(least)).collect()
 }
