@@ -18,9 +18,9 @@ def duration(model: pdmp.Model) -> float:
     return float(model.durations[model.nominal])
 
 
-def share(model: pdmp.Model, part: float) -> Limits:
-    """Returns limits at a part of the extremes of the nominal movement."""
-    movement = model.rollout(dt=duration(model) / 2000)
+def share(model: pdmp.Model, part: float, conditions: pdmp.Conditions | None = None) -> Limits:
+    """Returns limits at a part of the extremes of a movement, by default the nominal one."""
+    movement = model.rollout(conditions, dt=duration(model) / 2000)
     return Limits(
         velocity=part * abs(movement.velocity).max(0),
         acceleration=part * abs(movement.acceleration).max(0),
@@ -158,8 +158,10 @@ def test_movements_from_rest_can_keep_any_limits_in_any_units(
     """Resting at the start is feasible, so that no request is refused."""
     demos = [pdmp.Demonstration(scale * demo.position, dt=0.02) for demo in reaches()]
     model = pdmp.fit(demos, n_styles=2, basis="ngnet")
-    limits = share(model, part)
-    assert model.feasible(limits, model.nearest_feasible(limits))
+    # The nominal movement hardly moves the second DoF, this one does.
+    request = model.conditions(1)
+    limits = share(model, part, request)
+    assert model.feasible(limits, model.nearest_feasible(limits, request))
 
 
 def test_feasible_requests_are_unchanged(model: pdmp.Model) -> None:
