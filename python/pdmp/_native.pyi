@@ -1200,7 +1200,8 @@ class Model:
 
         y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
         conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
-        band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
+        band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these. It
+        describes demonstrators, whom limits of a robot do not bind.
 
         Parameters
         ----------
