@@ -12,7 +12,7 @@ import pytest
 import pdmp
 from pdmp import Limits
 from synthetic import loops, reaches
-from test_forecast import motion, pickled
+from test_forecast import motion, pickled, refuse_forged_states
 
 NAN, INF = float("nan"), float("inf")
 BOX = Limits(position=([-0.5, -0.3], [0.6, 0.4]), velocity=[3.0, 2.0], acceleration=[12.0, 9.0])
@@ -88,6 +88,21 @@ def attack(controller: pdmp.Controller, model: pdmp.Model, seed: int, ticks: int
         yield motion(controller), dt
 
 
+def n_limited_in_attack(
+    controller: pdmp.Controller, model: pdmp.Model, seed: int, ticks: int
+) -> int:
+    """Asserts that hostile commands exceed no limit; returns the number of limited ticks."""
+    assert controller.limits is not None
+    judge, before, n_limited = Judge.of(controller.limits), motion(controller), 0
+    for after, dt in attack(controller, model, seed, ticks):
+        assert np.isfinite(after).all()
+        judge.tick(before, after, dt)
+        before = after
+        n_limited += any(controller.limited)
+    assert judge.excess <= 1e-12
+    return n_limited
+
+
 def inside(model: pdmp.Model, limits: Limits, dt: float = 0.001) -> pdmp.Controller:
     """Returns a controller that rests inside the box after its first tick."""
     centre = "anchor" if model.kind == "rhythmic" else "goal"
@@ -101,15 +116,7 @@ def inside(model: pdmp.Model, limits: Limits, dt: float = 0.001) -> pdmp.Control
 @pytest.mark.parametrize("seed", range(4))
 def test_hostile_commands_keep_every_limit_at_ticks_and_turns(model: pdmp.Model, seed: int) -> None:
     """The excess is one of rounding for ticks from 1e-6 to 0.1 s; the motion stays finite."""
-    controller, judge = inside(model, BOX), Judge.of(BOX)
-    before, limited = motion(controller), 0
-    for after, dt in attack(controller, model, seed, 4000):
-        assert np.isfinite(after).all()
-        judge.tick(before, after, dt)
-        before = after
-        limited += any(controller.limited)
-    assert judge.excess <= 1e-12
-    assert limited > 400
+    assert n_limited_in_attack(inside(model, BOX), model, seed, 4000) > 400
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -158,16 +165,9 @@ def test_random_limits_of_any_number_of_dofs_are_kept(kind: str, n_dofs: int) ->
         # In a tick of 0.1 s, A changes the velocity by V / 2 and moves by range / 8 at most.
         most = np.minimum(velocity / 0.2, sides.sum(axis=0) / 0.04)
         limits = Limits(position, velocity, most * 10 ** random.uniform(-1, 0, size=n_dofs))
-        controller, judge = model.controller(limits=limits, **at_rest), Judge.of(limits)
+        controller = model.controller(limits=limits, **at_rest)
         controller.step(1e-6)
-        before, limited = motion(controller), 0
-        for after, dt in attack(controller, model, n_dofs, 500):
-            assert np.isfinite(after).all()
-            judge.tick(before, after, dt)
-            before = after
-            limited += any(controller.limited)
-        assert judge.excess <= 1e-12
-        assert limited > 100
+        assert n_limited_in_attack(controller, model, n_dofs, 500) > 100
 
 
 @pytest.mark.parametrize("scale", [2.0**-10, 2.0**10])
@@ -590,21 +590,7 @@ def test_forged_states_with_limits_are_rejected_or_keep_finite(reach: pdmp.Model
     controller = inside(reach, BOX)
     for _ in attack(controller, reach, 5, 100):
         pass
-    restore, (model, state) = controller.__reduce__()
-    numbers = np.frombuffer(state)
-    refused = 0
-    for index in range(len(numbers)):
-        for value in (NAN, INF, -INF, -1e300, 1e300, 0.0, -1.0):
-            forged = numbers.copy()
-            forged[index] = value
-            try:
-                moved = restore(model, forged.tobytes())
-                moved.step()
-            except ValueError:
-                refused += 1
-            else:
-                assert np.isfinite(motion(moved)).all(), (index, value)
-    assert refused > 3 * len(numbers)
+    refuse_forged_states(controller, [NAN, INF, -INF, -1e300, 1e300, 0.0, -1.0])
 
 
 def test_rejected_limits_leave_the_present_ones_in_force(model: pdmp.Model) -> None:

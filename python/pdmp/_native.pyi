@@ -914,10 +914,10 @@ class Model:
         context: _Context | None = None,
         **changes: Unpack[_Changes],
     ) -> Margins:
-        """Compares the movement under constant conditions with limits.
+        """Compares the whole movement under constant conditions with limits.
 
-        The comparison covers the demonstrated duration scaled by `tau`, the sum of `segment_durations`, or one period of a
-        rhythmic movement.
+        A discrete movement counts from its start until it rests past its end, a rhythmic one over a period, and from a given
+        start until it has reached its cycle.
 
         Parameters
         ----------
@@ -964,9 +964,9 @@ class Model:
 
         Start, tau and the other conditions remain, so that the movement is affine in style s and goal g, or anchor of a
         rhythmic movement. The change (Δs, Δg) minimises Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg, with the covariances of the
-        demonstrations plus squares of a thousandth of the range of styles and positions, subject to the limits
-        over the demonstrated duration, or one period, scaled by `tau`: a quadratic program. The limits are kept within 1e-6
-        of them at 2001 samples and the extremes of the parabolas through them.
+        demonstrations plus squares of a tenth of the range of styles and positions, subject to the limits over the whole
+        movement: a quadratic program. With `context`, the covariance is that of style and goal together in the prediction,
+        plus squares of a hundredth of the standard deviations above: what the context determines changes least.
 
         Parameters
         ----------
@@ -977,7 +977,7 @@ class Model:
         vary : {"both", "style", "goal"}
             Conditions that change; "goal" is the anchor of a rhythmic movement.
         context : array_like or list, (Q,), optional
-            Context whose prediction supplies absent conditions.
+            Context whose prediction supplies absent conditions, and the covariance.
         **changes
             Single conditions by name, as in `rollout`.
 
@@ -1164,13 +1164,18 @@ class Model:
         ValueError
             `segment_durations` has a wrong length or is not positive, or `phase` is out of range.
         """
-    def predict(self, context: _Context) -> Prediction:
+    def predict(self, context: _Context, *, limits: Limits | None = None) -> Prediction:
         """Predicts the movement for a context (Section 4.1.2).
 
         Parameters
         ----------
         context : array_like, list or mapping, (Q,)
             Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
+        limits : Limits, optional
+            Limits of position, velocity and acceleration that the whole movement keeps; see `feasible`. Style and goal, or
+            anchor, of `conditions` are then the most probable ones of the prediction that keep them, as
+            `nearest_feasible(limits, context=context)` returns. The other attributes, and `band`, describe demonstrators
+            without these limits.
 
         Returns
         -------
@@ -1179,14 +1184,19 @@ class Model:
         Raises
         ------
         ValueError
-            The model was fitted without contexts, or `context` has a wrong length, an unknown label, or a number that
-            is not finite.
+            The model was fitted without contexts, `context` has a wrong length, an unknown label, or a number that
+            is not finite, or no style and goal keep the limits.
+        TypeError
+            `limits` has another type.
 
         Examples
         --------
         >>> prediction = model.predict([0.05])
         >>> trajectory = model.rollout(prediction.conditions)
         >>> np.allclose(trajectory.position, model.rollout(context=[0.05]).position)
+        True
+        >>> limits = pdmp.Limits(velocity=0.9 * abs(trajectory.velocity).max())
+        >>> model.feasible(limits, model.predict([0.05], limits=limits).conditions).feasible
         True
         """
     def band(
@@ -1200,7 +1210,8 @@ class Model:
 
         y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
         conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
-        band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
+        band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these. It
+        describes demonstrators, whom limits of a robot do not bind.
 
         Parameters
         ----------
@@ -1256,7 +1267,7 @@ class Model:
         """Computes the smallest constant tau with which a discrete movement keeps limits of velocity and acceleration.
 
         The path y(u) over the clock u = t / tau does not depend on tau. With ẏ = y′ / tau and ÿ = y″ / tau², the smallest
-        tau is max(max |y′| / V, √(max |y″| / A)) over time and degrees of freedom.
+        tau is max(max |y′| / V, √(max |y″| / A)) over degrees of freedom and time, until the movement rests past its end.
 
         Parameters
         ----------
@@ -1744,12 +1755,12 @@ def blend(a: Conditions, b: Conditions, share: float) -> Conditions:
 
 @final
 class Margins:
-    """Largest ratios of a movement to its limits, returned by `Model.feasible`."""
+    """Largest ratios of a movement to its limits, returned by `Model.feasible`. Their truth value is `feasible`."""
     @property
     def position(self) -> tuple[float, int, float] | None:
-        """Largest distance of the position outside its limits, relative to the range between them, or to that of the nominal
-        movement if a side has none, at most 0 inside; with the index of its degree of freedom and the time in s. None
-        without limits of the position.
+        """Largest distance of the position outside its limits, relative to the range between them, or to the demonstrated one
+        if a side has none, at most 0 inside; with the index of its degree of freedom and the time in s. None without limits
+        of the position.
         """
     @property
     def velocity(self) -> tuple[float, int, float] | None:
@@ -1763,7 +1774,8 @@ class Margins:
         """
     @property
     def feasible(self) -> bool:
-        """True if the movement keeps all limits, within 1e-6 of them."""
+        """True if the movement keeps all limits, within 1e-9 of them."""
+    def __bool__(self) -> bool: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
 

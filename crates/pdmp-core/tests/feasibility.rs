@@ -9,16 +9,28 @@ mod random;
 use std::sync::LazyLock;
 
 use common::*;
-use pdmp_core::motion::{Limits, TimeGrid, Trajectory, Vary, fastest_tau, feasible, nearest_feasible};
+use pdmp_core::model::Prediction;
+use pdmp_core::motion::{
+    Limits, TimeGrid, Trajectory, Vary, fastest_tau, feasible, feasible_prediction, nearest_feasible,
+};
 use pdmp_core::{Conditions, Error, FitOptions, Kind, LimitError, Model, fit, rollout};
 use random::Random;
 
 static REACH: LazyLock<Model> = LazyLock::new(|| fit(&reaches(), &FitOptions::new(Kind::Discrete)).unwrap());
 static CYCLE: LazyLock<Model> = LazyLock::new(|| fit(&cycles(), &FitOptions::new(Kind::Rhythmic)).unwrap());
 
+/// Returns the movement over its demonstrated duration or period in n steps.
 fn movement(model: &Model, conditions: &Conditions, n: usize) -> Trajectory {
     let duration = model.duration() * conditions.time_constant(model.primitive()).unwrap() / model.tau();
     rollout(model.primitive(), conditions, TimeGrid { dt: duration / n as f64, duration: None }).unwrap()
+}
+
+/// Returns the movement until it rests, or over a period, in steps ten times finer than those of the search.
+fn fine(model: &Model, conditions: &Conditions) -> Trajectory {
+    let duration = model.duration() * conditions.time_constant(model.primitive()).unwrap() / model.tau();
+    let n_durations = if model.kind() == Kind::Discrete { 3.0 } else { 1.0 };
+    let grid = TimeGrid { dt: duration / 20_000.0, duration: Some(n_durations * duration) };
+    rollout(model.primitive(), conditions, grid).unwrap()
 }
 
 fn extreme(values: ndarray::ArrayView1<f64>) -> f64 {
@@ -55,28 +67,22 @@ fn distance(model: &Model, from: &Conditions, to: &Conditions) -> f64 {
         Kind::Discrete => (&demonstrated.goals, [from, to].map(|c| c.goal.clone().unwrap())),
         Kind::Rhythmic => (&demonstrated.anchors, [from, to].map(|c| c.anchor.clone().unwrap())),
     };
-    let nominal = movement(model, &Conditions::default(), 2000).position;
-    let spans: Vec<f64> = nominal
-        .columns()
-        .into_iter()
-        .map(|c| c.iter().fold(f64::MIN, |m, v| m.max(*v)) - c.iter().fold(f64::MAX, |m, v| m.min(*v)))
-        .collect();
-    let widest = spans.iter().fold(0.0f64, |m, s| m.max(*s));
-    let spans: Vec<f64> = spans.iter().map(|span| span.max(1e-3 * widest)).collect();
+    let widest = model.ranges().iter().fold(0.0f64, |widest, range| widest.max(*range));
+    let ranges: Vec<f64> = model.ranges().iter().map(|range| range.max(1e-6 * widest)).collect();
     let largest = demonstrated.styles.iter().fold(0.0f64, |m, s| m.max(s.abs()));
     let style = quadratic(
         &demonstrated.styles,
         &vec![largest; model.n_styles()],
         &difference(from.style.as_ref(), to.style.as_ref()),
     );
-    style + quadratic(centres, &spans, &difference(Some(&a), Some(&b)))
+    style + quadratic(centres, &ranges, &difference(Some(&a), Some(&b)))
 }
 
 fn difference(a: Option<&Vec<f64>>, b: Option<&Vec<f64>>) -> Vec<f64> {
     a.unwrap().iter().zip(b.unwrap()).map(|(a, b)| b - a).collect()
 }
 
-/// Returns vᵀΣ⁻¹v with the covariance of the rows and a thousandth of the ranges.
+/// Returns vᵀΣ⁻¹v with the covariance of the rows and a tenth of the ranges.
 fn quadratic(rows: &ndarray::Array2<f64>, ranges: &[f64], v: &[f64]) -> f64 {
     let (m, n) = rows.dim();
     let mean = rows.mean_axis(ndarray::Axis(0)).unwrap();
@@ -85,7 +91,7 @@ fn quadratic(rows: &ndarray::Array2<f64>, ranges: &[f64], v: &[f64]) -> f64 {
             let entry = |j: usize| {
                 (0..m).map(|k| (rows[[k, i]] - mean[i]) * (rows[[k, j]] - mean[j])).sum::<f64>() / (m - 1) as f64
             };
-            let floor = |j: usize| if i == j { (1e-3 * ranges[i]).powi(2) } else { 0.0 };
+            let floor = |j: usize| if i == j { (0.1 * ranges[i]).powi(2) } else { 0.0 };
             (0..n).map(|j| entry(j) + floor(j)).chain([v[i]]).collect()
         })
         .collect();
@@ -123,13 +129,14 @@ fn requests() -> Vec<(&'static Model, Limits, Conditions)> {
 }
 
 #[test]
-fn nearest_conditions_keep_the_limits_on_a_ten_times_finer_grid() {
+fn nearest_conditions_keep_the_limits_on_a_ten_times_finer_grid_until_rest() {
     for (model, limits, request) in requests() {
         assert!(!feasible(model.primitive(), &limits, &request).unwrap().is_feasible());
         let near = nearest_feasible(model, &limits, &request, Vary::Both).unwrap();
         assert!(feasible(model.primitive(), &limits, &near).unwrap().is_feasible());
-        let found = excess(&limits, &movement(model, &near, 20_000));
-        assert!(found < 1e-4, "{:?}: {found:e}", model.kind());
+        let found = excess(&limits, &fine(model, &near));
+        assert!(found < 2e-9, "{:?}: {found:e}", model.kind());
+        assert_eq!(nearest_feasible(model, &limits, &near, Vary::Both).unwrap(), near);
     }
 }
 
@@ -188,7 +195,7 @@ fn margins_are_the_extremes_of_a_finer_rollout() {
     let (model, limits, request) = requests().remove(0);
     let margins = feasible(model.primitive(), &limits, &request).unwrap();
     assert_eq!(margins.position, None);
-    let fine = movement(model, &request, 20_000);
+    let fine = fine(model, &request);
     let most = |limit: &Option<Vec<f64>>, curve: &ndarray::Array2<f64>| {
         let ratios = limit.iter().flatten().zip(curve.columns()).map(|(limit, curve)| extreme(curve) / limit);
         ratios.fold(0.0, f64::max)
@@ -196,24 +203,92 @@ fn margins_are_the_extremes_of_a_finer_rollout() {
     let expected = [most(&limits.velocity, &fine.velocity), most(&limits.acceleration, &fine.acceleration)];
     for (found, expected) in [margins.velocity, margins.acceleration].into_iter().zip(expected) {
         let found = found.unwrap().ratio;
-        assert!((found - expected).abs() < 1e-5, "{found} != {expected}");
+        assert!((found - expected).abs() < 1e-7, "{found} != {expected}");
     }
 }
 
 #[test]
-fn impossible_limits_name_the_limit_and_a_remedy() {
+fn impossible_limits_name_dof_limit_value_and_remedy() {
     let model = &*REACH;
     let request = model.conditions(&[0]).unwrap();
+    let rejected = |limits: &Limits, request: &Conditions, vary: Vary| {
+        let error = nearest_feasible(model, limits, request, vary).unwrap_err();
+        let Error::Limits(LimitError::Infeasible { dof, quantity, value, limit, slower, .. }) = error else {
+            panic!("{error}")
+        };
+        (error.to_string(), dof, quantity, value, limit, slower)
+    };
+    // The start lies below the lower limit of the second DoF.
     let start = request.start.clone().unwrap();
-    // The start lies below the lower limit.
-    let lower = Some(start.iter().map(|y| y + 0.01).collect());
-    let error = nearest_feasible(model, &Limits { lower, ..Limits::default() }, &request, Vary::Both).unwrap_err();
-    assert!(matches!(error, Error::Limits(LimitError::Infeasible { quantity: "position", .. })), "{error}");
-    assert!(error.to_string().contains("move the start"), "{error}");
-    // The goal alone is far away for the limit of the acceleration.
+    let above = Limits { lower: Some(vec![start[0], start[1] + 0.01, start[2] - 9.0]), ..Limits::default() };
+    let (text, dof, quantity, value, limit, slower) = rejected(&above, &request, Vary::Both);
+    assert_eq!((dof, quantity, value, limit, slower), (1, "position", start[1], start[1] + 0.01, None), "{text}");
+    assert!(text.ends_with("widen the limits, or start inside them"), "{text}");
+    // So does a given velocity.
+    let fast = Conditions { velocity: Some(vec![0.0, 0.0, -2.0]), ..request.clone() };
+    let (text, dof, quantity, value, limit, slower) =
+        rejected(&Limits { velocity: Some(vec![1.5]), ..Limits::default() }, &fast, Vary::Both);
+    assert_eq!((dof, quantity, value, limit, slower), (2, "velocity", -2.0, -1.5, None), "{text}");
+    assert!(text.ends_with("or start with a lower velocity"), "{text}");
+    // The way to the goal remains; the factor is that of the smallest constant τ.
     let limits = share_of(&movement(model, &request, 2000), 0.3);
-    let error = nearest_feasible(model, &limits, &request, Vary::Style).unwrap_err();
-    assert!(error.to_string().contains("vary both, enlarge tau"), "{error}");
+    let (text, _, quantity, value, limit, slower) = rejected(&limits, &request, Vary::Style);
+    assert!(quantity != "position" && value.abs() > limit.abs(), "{text}");
+    assert!(text.contains("or vary both, or let the movement last 3.33"), "{text}");
+    let tau = request.time_constant(model.primitive()).unwrap();
+    let expected = fastest_tau(model.primitive(), &limits, &request).unwrap() / tau;
+    assert!((slower.unwrap() / expected - 1.0).abs() < 1e-9, "{slower:?} != {expected}");
+    // No limit is too tight for a clear error or an answer.
+    for tight in [1e-3, 1e-9, 1e-100] {
+        let limits = Limits { acceleration: Some(vec![tight]), ..Limits::default() };
+        rejected(&limits, &request, Vary::Goal);
+        if let Ok(near) = nearest_feasible(model, &limits, &request, Vary::Both) {
+            assert!(feasible(model.primitive(), &limits, &near).unwrap().is_feasible());
+        }
+    }
+}
+
+#[test]
+fn a_request_far_from_the_demonstrations_is_met() {
+    for (model, limits, request) in requests() {
+        let deviation = |style: &f64| 300.0 * style;
+        let far = Conditions { style: request.style.as_ref().map(|s| s.iter().map(deviation).collect()), ..request };
+        let near = nearest_feasible(model, &limits, &far, Vary::Both).unwrap();
+        assert!(excess(&limits, &fine(model, &near)) < 2e-9);
+    }
+}
+
+#[test]
+fn predictions_within_limits_keep_what_the_context_determines() {
+    let prediction = REACH.predict(&[0.7]).unwrap();
+    let limits = share_of(&fine(&REACH, &prediction.conditions), 0.95);
+    let inside = feasible_prediction(&REACH, &limits, prediction.clone(), Vary::Both).unwrap();
+    assert!(excess(&limits, &fine(&REACH, &inside.conditions)) < 2e-9);
+    assert_eq!(Prediction { conditions: prediction.conditions.clone(), ..inside.clone() }, prediction);
+    let by_demonstrations = nearest_feasible(&REACH, &limits, &prediction.conditions, Vary::Both).unwrap();
+    let n = REACH.n_styles() + REACH.n_dofs();
+    let covariance = prediction.covariance.as_ref().unwrap();
+    let precision = nalgebra::DMatrix::from_fn(n, n, |i, j| covariance[[i, j]] + if i == j { 1e-9 } else { 0.0 });
+    let values = |conditions: &Conditions| {
+        nalgebra::DVector::from_iterator(n, conditions.style.iter().chain(&conditions.goal).flatten().copied())
+    };
+    let surprise = |conditions: &Conditions| {
+        let change = values(conditions) - values(&prediction.conditions);
+        change.dot(&precision.clone().lu().solve(&change).unwrap())
+    };
+    assert!(surprise(&inside.conditions) < surprise(&by_demonstrations));
+    let wide = share_of(&fine(&REACH, &prediction.conditions), 1.01);
+    assert_eq!(feasible_prediction(&REACH, &wide, prediction.clone(), Vary::Both).unwrap(), prediction);
+}
+
+#[test]
+fn a_movement_counts_until_it_rests_past_its_end() {
+    let passing = Conditions { goal_velocity: Some(vec![1.0, 0.0, 0.0]), ..REACH.conditions(&[1]).unwrap() };
+    let goal = passing.goal.clone().unwrap();
+    let limits = Limits { upper: Some(vec![goal[0] + 1e-3, 9.0, 9.0]), ..Limits::default() };
+    let duration = REACH.duration() * passing.time_constant(REACH.primitive()).unwrap() / REACH.tau();
+    let beyond = feasible(REACH.primitive(), &limits, &passing).unwrap().position.unwrap();
+    assert!(beyond.ratio > 0.0 && beyond.time > duration, "{beyond:?}");
 }
 
 #[test]
@@ -229,9 +304,11 @@ fn a_movement_may_start_on_a_limit_of_the_position() {
 }
 
 #[test]
-fn the_fastest_tau_is_feasible() {
+fn the_fastest_tau_is_at_the_border_of_feasibility() {
     let (model, limits, request) = requests().remove(0);
-    let slower = fastest_tau(model.primitive(), &limits, &request).unwrap() * (1.0 + 1e-5);
-    let slower = Conditions { tau: Some(slower), segment_durations: None, ..request };
-    assert!(feasible(model.primitive(), &limits, &slower).unwrap().is_feasible());
+    let tau = fastest_tau(model.primitive(), &limits, &request).unwrap();
+    for (factor, expected) in [(1.0, true), (1.0 - 1e-8, false)] {
+        let conditions = Conditions { tau: Some(factor * tau), segment_durations: None, ..request.clone() };
+        assert_eq!(feasible(model.primitive(), &limits, &conditions).unwrap().is_feasible(), expected, "{factor}");
+    }
 }

@@ -2,7 +2,7 @@
 
 use numpy::PyArray1;
 use pdmp_core::Error;
-use pdmp_core::model::Conditions as Inner;
+use pdmp_core::model::{Conditions as Inner, Prediction};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -212,15 +212,25 @@ pub(crate) fn conditions_of(
     context: Option<&Bound<'_, PyAny>>,
     changes: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Inner> {
+    Ok(predicted_conditions_of(model, conditions, context, changes)?.0)
+}
+
+/// Returns the conditions of a call and the prediction for its context, if there is one.
+pub(crate) fn predicted_conditions_of(
+    model: &pdmp_core::Model,
+    conditions: Option<&Bound<'_, PyAny>>,
+    context: Option<&Bound<'_, PyAny>>,
+    changes: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(Inner, Option<Prediction>)> {
     let base = match conditions {
         None => Inner::default(),
         Some(object) => instance::conditions("conditions", object)?.clone(),
     };
     let own = changed(base, changes)?;
-    let Some(context) = context else { return Ok(own) };
+    let Some(context) = context else { return Ok((own, None)) };
     reject_style(own.style.is_some())?;
     let prediction = model.predict(&crate::named_contexts::context_for(model, context)?).map_err(raise)?;
-    Ok(own.or(prediction.conditions))
+    Ok((own.or(prediction.conditions.clone()), Some(prediction)))
 }
 
 /// Rejects a style beside a context.

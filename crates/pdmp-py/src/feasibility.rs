@@ -1,11 +1,12 @@
 //! Comparison of movements with limits, and the nearest conditions that keep them.
 
-use pdmp_core::motion::{Extreme, Margins as Inner, Vary, feasible, nearest_feasible};
+use pdmp_core::model::Prediction;
+use pdmp_core::motion::{Extreme, Margins as Inner, Vary, feasible, feasible_prediction, nearest_feasible};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::choice::Choice;
-use crate::conditions::{Conditions, conditions_of};
+use crate::conditions::{Conditions, conditions_of, predicted_conditions_of};
 use crate::convert::Reduced;
 use crate::error::raise;
 use crate::instance;
@@ -14,13 +15,13 @@ use crate::model::Model;
 /// Ratio, degree of freedom and time in s.
 type Place = (f64, usize, f64);
 
-/// Largest ratios of a movement to its limits, returned by `Model.feasible`.
+/// Largest ratios of a movement to its limits, returned by `Model.feasible`. Their truth value is `feasible`.
 #[pyclass(frozen, eq, get_all, module = "pdmp")]
 #[derive(PartialEq)]
 pub(crate) struct Margins {
-    /// Largest distance of the position outside its limits, relative to the range between them, or to that of the nominal
-    /// movement if a side has none, at most 0 inside; with the index of its degree of freedom and the time in s. None
-    /// without limits of the position.
+    /// Largest distance of the position outside its limits, relative to the range between them, or to the demonstrated one
+    /// if a side has none, at most 0 inside; with the index of its degree of freedom and the time in s. None without limits
+    /// of the position.
     position: Option<Place>,
     /// Largest ratio |ẏ| / V, at most 1 inside, with the index of its degree of freedom and the time in s. None without
     /// limits of the velocity.
@@ -28,7 +29,7 @@ pub(crate) struct Margins {
     /// Largest ratio |ÿ| / A, at most 1 inside, with the index of its degree of freedom and the time in s. None without
     /// limits of the acceleration.
     acceleration: Option<Place>,
-    /// True if the movement keeps all limits, within 1e-6 of them.
+    /// True if the movement keeps all limits, within 1e-9 of them.
     feasible: bool,
 }
 
@@ -54,6 +55,10 @@ impl Margins {
         Ok((py.get_type::<Self>().getattr("_of")?, parts.into_pyobject(py)?))
     }
 
+    fn __bool__(&self) -> bool {
+        self.feasible
+    }
+
     fn __repr__(&self) -> String {
         let state = if self.feasible { "feasible" } else { "not feasible" };
         let quantities =
@@ -68,10 +73,10 @@ impl Margins {
 
 #[pymethods]
 impl Model {
-    /// Compares the movement under constant conditions with limits.
+    /// Compares the whole movement under constant conditions with limits.
     ///
-    /// The comparison covers the demonstrated duration scaled by `tau`, the sum of `segment_durations`, or one period of a
-    /// rhythmic movement.
+    /// A discrete movement counts from its start until it rests past its end, a rhythmic one over a period, and from a given
+    /// start until it has reached its cycle.
     ///
     /// Parameters
     /// ----------
@@ -124,9 +129,9 @@ impl Model {
     ///
     /// Start, tau and the other conditions remain, so that the movement is affine in style s and goal g, or anchor of a
     /// rhythmic movement. The change (Δs, Δg) minimises Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg, with the covariances of the
-    /// demonstrations plus squares of a thousandth of the range of styles and positions, subject to the limits
-    /// over the demonstrated duration, or one period, scaled by `tau`: a quadratic program. The limits are kept within 1e-6
-    /// of them at 2001 samples and the extremes of the parabolas through them.
+    /// demonstrations plus squares of a tenth of the range of styles and positions, subject to the limits over the whole
+    /// movement: a quadratic program. With `context`, the covariance is that of style and goal together in the prediction,
+    /// plus squares of a hundredth of the standard deviations above: what the context determines changes least.
     ///
     /// Parameters
     /// ----------
@@ -137,7 +142,7 @@ impl Model {
     /// vary : {"both", "style", "goal"}
     ///     Conditions that change; "goal" is the anchor of a rhythmic movement.
     /// context : array_like or list, (Q,), optional
-    ///     Context whose prediction supplies absent conditions.
+    ///     Context whose prediction supplies absent conditions, and the covariance.
     /// **changes
     ///     Single conditions by name, as in `rollout`.
     ///
@@ -178,7 +183,15 @@ impl Model {
         changes: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Conditions> {
         let vary = vary.of("vary", &[("both", Vary::Both), ("style", Vary::Style), ("goal", Vary::Goal)])?;
-        let (limits, conditions) = (instance::limits(limits)?, conditions_of(&self.0, conditions, context, changes)?);
-        py.detach(|| nearest_feasible(&self.0, limits, &conditions, vary)).map(Conditions).map_err(raise)
+        let limits = instance::limits(limits)?;
+        let (conditions, prediction) = predicted_conditions_of(&self.0, conditions, context, changes)?;
+        let nearest = py.detach(|| match prediction {
+            None => nearest_feasible(&self.0, limits, &conditions, vary),
+            Some(prediction) => {
+                let prediction = Prediction { conditions, ..prediction };
+                feasible_prediction(&self.0, limits, prediction, vary).map(|prediction| prediction.conditions)
+            }
+        });
+        nearest.map(Conditions).map_err(raise)
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ndarray::Array3;
 use numpy::IntoPyArray;
 use pdmp_core::learning::{StyleOptions, style_of};
-use pdmp_core::motion::{PredictionBand, TimeGrid, prediction_band};
+use pdmp_core::motion::{PredictionBand, TimeGrid, Vary, feasible_prediction, prediction_band};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyString};
@@ -250,6 +250,11 @@ impl Model {
     /// ----------
     /// context : array_like, list or mapping, (Q,)
     ///     Numbers and labels, in the units of the demonstrations' contexts; by name where these had names.
+    /// limits : Limits, optional
+    ///     Limits of position, velocity and acceleration that the whole movement keeps; see `feasible`. Style and goal, or
+    ///     anchor, of `conditions` are then the most probable ones of the prediction that keep them, as
+    ///     `nearest_feasible(limits, context=context)` returns. The other attributes, and `band`, describe demonstrators
+    ///     without these limits.
     ///
     /// Returns
     /// -------
@@ -258,8 +263,10 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     The model was fitted without contexts, or `context` has a wrong length, an unknown label, or a number that
-    ///     is not finite.
+    ///     The model was fitted without contexts, `context` has a wrong length, an unknown label, or a number that
+    ///     is not finite, or no style and goal keep the limits.
+    /// TypeError
+    ///     `limits` has another type.
     ///
     /// Examples
     /// --------
@@ -267,8 +274,21 @@ impl Model {
     /// >>> trajectory = model.rollout(prediction.conditions)
     /// >>> np.allclose(trajectory.position, model.rollout(context=[0.05]).position)
     /// True
-    fn predict(&self, py: Python<'_>, context: &Bound<'_, PyAny>) -> PyResult<Prediction> {
-        let prediction = self.0.predict(&crate::named_contexts::context_for(&self.0, context)?).map_err(raise)?;
+    /// >>> limits = pdmp.Limits(velocity=0.9 * abs(trajectory.velocity).max())
+    /// >>> model.feasible(limits, model.predict([0.05], limits=limits).conditions).feasible
+    /// True
+    #[pyo3(signature = (context, *, limits=None))]
+    fn predict(
+        &self,
+        py: Python<'_>,
+        context: &Bound<'_, PyAny>,
+        limits: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Prediction> {
+        let limits = limits.map(instance::limits).transpose()?;
+        let mut prediction = self.0.predict(&crate::named_contexts::context_for(&self.0, context)?).map_err(raise)?;
+        if let Some(limits) = limits {
+            prediction = py.detach(|| feasible_prediction(&self.0, limits, prediction, Vary::Both)).map_err(raise)?;
+        }
         Prediction::new(py, prediction)
     }
 
@@ -276,7 +296,8 @@ impl Model {
     ///
     /// y ± t·√(aᵀΣa + v), with the covariance Σ of the prediction, the derivatives a of y with respect to the predicted
     /// conditions, the residual variance v of the demonstrations, and the quantile t of Student's distribution. The
-    /// band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these.
+    /// band compares movements at equal shares of their durations; `Prediction.covariance` has the variance of these. It
+    /// describes demonstrators, whom limits of a robot do not bind.
     ///
     /// Parameters
     /// ----------

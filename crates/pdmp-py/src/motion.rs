@@ -146,7 +146,7 @@ impl Model {
     /// Computes the smallest constant tau with which a discrete movement keeps limits of velocity and acceleration.
     ///
     /// The path y(u) over the clock u = t / tau does not depend on tau. With ẏ = y′ / tau and ÿ = y″ / tau², the smallest
-    /// tau is max(max |y′| / V, √(max |y″| / A)) over time and degrees of freedom.
+    /// tau is max(max |y′| / V, √(max |y″| / A)) over degrees of freedom and time, until the movement rests past its end.
     ///
     /// Parameters
     /// ----------

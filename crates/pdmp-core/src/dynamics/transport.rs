@@ -104,6 +104,11 @@ impl Transport {
         &self.coefficients
     }
 
+    /// Returns the number of cells; 0 if m ≡ 1.
+    pub(crate) fn n_cells(&self) -> usize {
+        self.cubics.len()
+    }
+
     /// Returns whether m ≡ 1.
     pub(crate) fn is_immediate(&self) -> bool {
         self.coefficients.is_empty()

@@ -1,5 +1,7 @@
 //! Errors about limits of a robot.
 
+use std::fmt;
+
 use super::format::{Number, Rounded};
 
 /// Error about the limits of one DoF.
@@ -54,11 +56,12 @@ pub enum LimitError {
         /// Its limit of the jerk.
         jerk: f64,
     },
-    /// Limits that no movement of the varied conditions keeps.
+    /// Limits that no change of the varied conditions was found to keep.
     #[error(
-        "limits of DoF {dof}: no change of {varied} keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {remedy}",
+        "limits of DoF {dof}: no change of {varied} was found that keeps them; at best the {quantity} reaches {} at {time:.3} s, beyond {}; {}",
         Rounded(*value),
-        Rounded(*limit)
+        Rounded(*limit),
+        Remedy { at_start: *time == 0.0, quantity, varies_all: *varies_all, slower: *slower }
     )]
     Infeasible {
         /// Index of the DoF.
@@ -73,7 +76,36 @@ pub enum LimitError {
         limit: f64,
         /// Time of that value, in seconds.
         time: f64,
-        /// The remedy, as the end of the sentence.
-        remedy: &'static str,
+        /// True if both style and goal, or anchor, were varied.
+        varies_all: bool,
+        /// Factor of its duration with which the unchanged movement keeps the limits, if that is known.
+        slower: Option<f64>,
     },
+}
+
+/// Remedy for limits that no change of conditions keeps.
+struct Remedy<'a> {
+    at_start: bool,
+    quantity: &'a str,
+    varies_all: bool,
+    slower: Option<f64>,
+}
+
+impl fmt::Display for Remedy<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("widen the limits")?;
+        if !self.varies_all {
+            f.write_str(", or vary both")?;
+        }
+        match (self.quantity, self.at_start, self.slower) {
+            // Rounded up, so that the printed factor suffices.
+            (_, _, Some(slower)) => {
+                write!(f, ", or let the movement last {:.3} times as long (tau or segment_durations)", slower + 5e-4)
+            }
+            ("position", true, _) => f.write_str(", or start inside them"),
+            ("position", false, _) => Ok(()),
+            (_, true, _) => f.write_str(", or start with a lower velocity"),
+            (_, false, _) => f.write_str(", or enlarge tau"),
+        }
+    }
 }

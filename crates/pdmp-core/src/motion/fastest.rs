@@ -7,9 +7,10 @@ use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::motion::controller::Controller;
+use crate::motion::feasibility::slowdown;
 use crate::motion::limits::Limits;
 use crate::motion::rollout::follow;
-use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, TimeLaw, max_constant};
+use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, TimeLaw};
 use crate::motion::trajectory::Trajectory;
 use crate::numerics::simd::groups;
 
@@ -71,7 +72,7 @@ fn path(primitive: &Arc<Primitive>, conditions: &Conditions) -> Result<SampledPa
 }
 
 /// Returns the smallest constant τ with which the movement keeps its limits of velocity and acceleration, in seconds:
-/// max(max|y′|/V, √(max|y″|/A)) over samples and DoFs.
+/// max(max|y′|/V, √(max|y″|/A)) over DoFs and the whole movement, until it rests past its end.
 ///
 /// ```
 /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit, rollout};
@@ -92,12 +93,8 @@ fn path(primitive: &Arc<Primitive>, conditions: &Conditions) -> Result<SampledPa
 /// # Errors
 /// Conditions or limits that do not fit the primitive, or no limit of velocity or acceleration.
 pub fn fastest_tau(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditions) -> Result<f64> {
-    let bounds = rate_limits(limits, primitive.n_dofs())?;
-    let path = path(primitive, &on_path(primitive, conditions)?)?;
-    let knots =
-        (0..path.clock.len() - 1).flat_map(|i| [0.0, 0.5, 1.0].map(|t| max_constant(path.within(i, t), &bounds)));
-    let most = knots.fold(f64::INFINITY, f64::min);
-    Ok(most.sqrt().recip())
+    rate_limits(limits, primitive.n_dofs())?;
+    Ok(primitive.tau() * slowdown(primitive, limits, &on_path(primitive, conditions)?)?)
 }
 
 /// Computes the movement that follows the path of the conditions as fast as the limits allow, sampled every `dt` seconds.

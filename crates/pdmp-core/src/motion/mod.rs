@@ -8,8 +8,6 @@ pub(crate) mod fastest;
 pub(crate) mod feasibility;
 pub(crate) mod jacobian;
 pub(crate) mod limits;
-#[cfg(feature = "learning")]
-pub(crate) mod nearest_feasible;
 pub(crate) mod perturbation;
 pub(crate) mod prediction_band;
 pub(crate) mod rollout;
@@ -26,10 +24,10 @@ pub use command::{Command, Coupling, Motion};
 pub use controller::{Controller, Status};
 pub use fastest::{fastest, fastest_tau};
 pub use feasibility::{Extreme, Margins, feasible};
+#[cfg(feature = "learning")]
+pub use feasibility::{Vary, feasible_prediction, nearest_feasible};
 pub use jacobian::{WithRespectTo, jacobian};
 pub use limits::{Limit, Limits};
-#[cfg(feature = "learning")]
-pub use nearest_feasible::{Vary, nearest_feasible};
 pub use perturbation::Compliance;
 pub use prediction_band::{PredictionBand, prediction_band};
 pub use rollout::{TimeGrid, rollout, rollout_with};

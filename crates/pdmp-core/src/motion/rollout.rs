@@ -82,9 +82,6 @@ pub fn rollout_with(
 ) -> Result<Trajectory> {
     let steps = grid.steps(primitive, conditions.time_constant(primitive)?)?;
     let clock = Clock::of(primitive, conditions)?;
-    if conditions.phase.is_some() && matches!(clock, Clock::Warped { .. }) {
-        return Err(Error::Conflict { names: ["phase", "segment_durations"], reason: "warped time starts at phase 0" });
-    }
     let conditions = clock.conditions(conditions);
     sample(primitive, &conditions, clock, grid.dt, sampling_times(steps, grid.dt), progress)
 }
@@ -170,6 +167,12 @@ impl Clock {
         else {
             return Ok(Self::Linear);
         };
+        if conditions.phase.is_some() {
+            return Err(Error::Conflict {
+                names: ["phase", "segment_durations"],
+                reason: "warped time starts at phase 0",
+            });
+        }
         let warp = primitive.warping_function(segment_durations)?;
         let phase = warp.phase(0.0);
         let extent = primitive.tau * primitive.canonical().extent();
