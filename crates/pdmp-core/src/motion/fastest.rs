@@ -9,7 +9,7 @@ use crate::model::primitive::Primitive;
 use crate::motion::controller::Controller;
 use crate::motion::limits::Limits;
 use crate::motion::rollout::follow;
-use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, TimeLaw, max_constant};
+use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, TimeLaw};
 use crate::motion::trajectory::Trajectory;
 use crate::numerics::simd::groups;
 
@@ -94,9 +94,9 @@ fn path(primitive: &Arc<Primitive>, conditions: &Conditions) -> Result<SampledPa
 pub fn fastest_tau(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditions) -> Result<f64> {
     let bounds = rate_limits(limits, primitive.n_dofs())?;
     let path = path(primitive, &on_path(primitive, conditions)?)?;
-    let knots =
-        (0..path.clock.len() - 1).flat_map(|i| [0.0, 0.5, 1.0].map(|t| max_constant(path.within(i, t), &bounds)));
-    let most = knots.fold(f64::INFINITY, f64::min);
+    let mut curve = RateCurve::new(path.clock.len(), bounds.len());
+    curve.compute_constant(&path, &bounds);
+    let most = curve.constant.into_iter().fold(f64::INFINITY, f64::min);
     Ok(most.sqrt().recip())
 }
 
@@ -131,6 +131,7 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
     let path = path(primitive, &conditions)?;
     check_positions(&path, limits, primitive)?;
     let mut curve = RateCurve::new(path.clock.len(), bounds.len());
+    curve.compute_constant(&path, &bounds);
     curve.compute(&path, &bounds, end, (MAX_RATE / primitive.tau()).powi(2));
     if start > curve.max[0] * (1.0 + 1e-9) {
         return Err(Error::Limits(LimitError::StartTooFast { ratio: (start / curve.max[0]).sqrt() }));

@@ -13,7 +13,7 @@
 //! H. Pham, Q.-C. Pham, *A new approach to time-optimal path parameterization based on reachability analysis*, IEEE
 //! Transactions on Robotics 34(3), 2018.
 
-use crate::numerics::simd::F64x4;
+use crate::numerics::simd::{F64x4, Kernel, Register, compute};
 use crate::numerics::state::clone_in_place;
 
 /// Maximum number of Newton steps to a vertex; each removes a limit, and two to five suffice on recordings.
@@ -47,39 +47,78 @@ impl SampledPath {
     }
 
     /// Returns the length of interval `index`, between this knot and the next.
+    #[inline(always)]
     pub(crate) fn interval(&self, index: usize) -> f64 {
         self.clock[index + 1] - self.clock[index]
     }
 
-    /// Returns y′ and y″ of all groups within interval `index`, at a position `t` from 0 to 1.
+    /// Returns the derivatives of all groups at both ends of interval `index`, with their limits.
     #[inline(always)]
-    pub(crate) fn within(&self, index: usize, t: f64) -> impl Iterator<Item = [F64x4; 2]> {
-        let interval = self.interval(index);
-        self.knot(index).iter().zip(self.knot(index + 1)).map(move |(here, next)| between(here, next, interval, t))
+    pub(crate) fn ends<'a>(
+        &'a self,
+        index: usize,
+        limits: &'a [RateLimits],
+    ) -> impl Iterator<Item = (&'a [F64x4; 3], &'a [F64x4; 3], &'a RateLimits)> {
+        let ends = self.knot(index).iter().zip(self.knot(index + 1));
+        ends.zip(limits).map(|((here, next), limits)| (here, next, limits))
     }
 }
 
-/// Returns y′ and y″ at a position `t` from 0 to 1 between two samples: the cubic Hermite interpolation of y′, and its
-/// derivative.
-#[inline(always)]
-fn between(
-    [_, slope, bend]: &[F64x4; 3],
-    [_, next_slope, next_bend]: &[F64x4; 3],
-    interval: f64,
-    t: f64,
-) -> [F64x4; 2] {
-    let (change, bends) = (*next_slope - *slope, [*bend * interval, *next_bend * interval]);
-    // p(t) = y′ + t(b₀ + t(c + td)) with p(1) and p′(1) of the next sample.
-    let c = change * 3.0 - bends[0] * 2.0 - bends[1];
-    let d = bends[0] + bends[1] - change * 2.0;
-    [*slope + (bends[0] + (c + d * t) * t) * t, (bends[0] + (c * 2.0 + d * (3.0 * t)) * t) * interval.recip()]
+/// y′ and y″ of a group.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Derivatives<T> {
+    pub(crate) slope: T,
+    pub(crate) bend: T,
+}
+
+impl<T: Register> Derivatives<T> {
+    /// Returns those of a sample.
+    #[inline(always)]
+    pub(crate) fn load([_, slope, bend]: &[F64x4; 3]) -> Self {
+        Self { slope: T::load(slope), bend: T::load(bend) }
+    }
+
+    /// Returns those at a position `t` from 0 to 1 in an interval: the cubic Hermite interpolation of y′, and its derivative.
+    #[inline(always)]
+    pub(crate) fn between(self, next: Self, interval: f64, t: f64) -> Self {
+        let (change, bends) = (next.slope - self.slope, [self.bend * interval, next.bend * interval]);
+        // p(t) = y′ + t(b₀ + t(c + td)) with p(1) and p′(1) of the next sample.
+        let c = change * 3.0 - bends[0] * 2.0 - bends[1];
+        let d = bends[0] + bends[1] - change * 2.0;
+        Self {
+            slope: self.slope + (bends[0] + (c + d * t) * t) * t,
+            bend: (bends[0] + (c * 2.0 + d * (3.0 * t)) * t) * interval.recip(),
+        }
+    }
 }
 
 /// Limits of velocity and acceleration of a group, infinite where there are none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RateLimits {
-    pub(crate) velocity: F64x4,
     pub(crate) acceleration: F64x4,
+    /// Inverses of the limits of velocity and acceleration.
+    inverse: [F64x4; 2],
+}
+
+impl RateLimits {
+    pub(crate) fn new(velocity: F64x4, acceleration: F64x4) -> Self {
+        // The inverse of the smallest numbers is infinite, and no factor of zero.
+        let inverse = |limit: F64x4| (F64x4::ONE / limit).fast_min(F64x4::splat(f64::MAX));
+        Self { acceleration, inverse: [velocity, acceleration].map(inverse) }
+    }
+
+    /// Returns the inverse of the largest x = ρ² that the limit of the velocity admits.
+    #[inline(always)]
+    pub(crate) fn of_velocity<T: Register>(&self, slope: T) -> T {
+        let ratio = slope * T::load(&self.inverse[0]);
+        ratio * ratio
+    }
+
+    /// Returns the inverse of the largest x with a = 0 that the limit of the acceleration admits.
+    #[inline(always)]
+    fn of_acceleration<T: Register>(&self, bend: T) -> T {
+        (bend * T::load(&self.inverse[1])).abs()
+    }
 }
 
 /// Limits |αx + βa| ≤ A of a group, as −α/β and A/|β|: a lies between slope·x − half and slope·x + half.
@@ -92,10 +131,10 @@ struct Row {
 impl Row {
     /// Returns the limits for α = y″ and β = y′ + `twice`·y″.
     #[inline(always)]
-    fn new([slope, bend]: [F64x4; 2], limits: &RateLimits, twice: f64) -> Self {
+    fn new<T: Register>(Derivatives { slope, bend }: Derivatives<T>, limits: &RateLimits, twice: f64) -> Self {
         // For β = 0 the ends become steep lines instead of a bound of x.
-        let inverse = F64x4::ONE / (slope + bend * twice + F64x4::splat(MIN_BETA));
-        Self { slope: -bend * inverse, half: limits.acceleration * inverse.abs() }
+        let inverse = T::splat(1.0) / (slope + bend * twice + T::splat(MIN_BETA));
+        Self { slope: (-bend * inverse).store(), half: (T::load(&limits.acceleration) * inverse.abs()).store() }
     }
 }
 
@@ -107,6 +146,8 @@ type Line = [f64; 2];
 pub(crate) struct RateCurve {
     /// Largest x from which the rest of the path can be followed.
     pub(crate) max: Vec<f64>,
+    /// Largest x with a = 0 at each knot and in the middle of the interval that follows.
+    pub(crate) constant: Vec<f64>,
     rows: Vec<Row>,
     /// Largest a at the start of the interval due to the limit of the velocity in its middle.
     middle: Line,
@@ -114,131 +155,213 @@ pub(crate) struct RateCurve {
 
 impl Clone for RateCurve {
     fn clone(&self) -> Self {
-        Self { max: self.max.clone(), rows: Vec::with_capacity(self.rows.capacity()), middle: self.middle }
+        let Self { max, constant, rows, middle } = self;
+        let rows = Vec::with_capacity(rows.capacity());
+        Self { max: max.clone(), constant: constant.clone(), rows, middle: *middle }
     }
 
     fn clone_from(&mut self, source: &Self) {
         self.max.clone_from(&source.max);
+        self.constant.clone_from(&source.constant);
     }
 }
 
 impl RateCurve {
     /// Returns a curve of `n_knots` knots for a path of `n_groups` groups, to be computed by [`RateCurve::compute`].
     pub(crate) fn new(n_knots: usize, n_groups: usize) -> Self {
-        Self { max: vec![0.0; n_knots], rows: Vec::with_capacity(5 * n_groups), middle: [0.0; 2] }
+        let zeros = vec![0.0; n_knots];
+        Self { max: zeros.clone(), constant: zeros, rows: Vec::with_capacity(5 * n_groups), middle: [0.0; 2] }
     }
 
-    /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x.
+    /// Computes the largest constant rates.
+    pub(crate) fn compute_constant(&mut self, path: &SampledPath, limits: &[RateLimits]) {
+        compute(Constant { curve: self, path, limits });
+    }
+
+    /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x. The largest
+    /// constant rates have been computed.
     pub(crate) fn compute(&mut self, path: &SampledPath, limits: &[RateLimits], end: f64, max: f64) {
-        let last = path.clock.len() - 1;
-        self.max[last] = end.min(max_constant(path.within(last - 1, 1.0), limits)).min(max);
-        for i in (0..last).rev() {
-            let twice = 2.0 * path.interval(i);
-            let most = self.write_rows(path, limits, i).min(max);
-            self.max[i] = self.vertex(most, [[0.0, -1.0 / twice], [self.max[i + 1] / twice, -1.0 / twice]]);
-        }
+        compute(Backward { curve: self, path, limits, end, max });
     }
 
     /// Limits the curve to what can be reached from `start` ≤ max[0]: the time-optimal law.
     pub(crate) fn reach(&mut self, path: &SampledPath, limits: &[RateLimits], start: f64) {
-        self.max[0] = start;
-        for i in 0..path.clock.len() - 1 {
-            let twice = 2.0 * path.interval(i);
-            self.write_rows(path, limits, i);
-            let x = self.max[i];
-            let [_, upper] = self.ends(x);
-            let most = upper.min(self.middle[0] + self.middle[1] * x);
-            self.max[i + 1] = self.max[i + 1].min(x + twice * most).max(0.0);
-        }
+        compute(Forward { curve: self, path, limits, start });
     }
 
     /// Writes the limits of interval `i`; returns the largest x at its start that the limits of the velocity admit.
-    fn write_rows(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) -> f64 {
+    #[inline(always)]
+    fn write_rows<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) -> f64 {
         let interval = path.interval(i);
-        let [mut most, mut in_middle] = [F64x4::splat(f64::INFINITY); 2];
+        let [mut at_start, mut in_middle] = [T::default(); 2];
         self.rows.clear();
-        for ((here, next), limits) in path.knot(i).iter().zip(path.knot(i + 1)).zip(limits) {
-            let middle = between(here, next, interval, 0.5);
-            let [rate, middle_rate] = [here[1], middle[0]].map(|slope| limits.velocity / slope.abs());
-            (most, in_middle) = (most.fast_min(rate * rate), in_middle.fast_min(middle_rate * middle_rate));
-            self.rows.push(Row::new([here[1], here[2]], limits, 0.0));
+        for (here, next, limits) in path.ends(i, limits) {
+            let [here, next] = [here, next].map(Derivatives::<T>::load);
+            let middle = here.between(next, interval, 0.5);
+            at_start = at_start.fast_max(limits.of_velocity(here.slope));
+            in_middle = in_middle.fast_max(limits.of_velocity(middle.slope));
+            self.rows.push(Row::new(here, limits, 0.0));
             self.rows.push(Row::new(middle, limits, interval));
-            self.rows.push(Row::new([next[1], next[2]], limits, 2.0 * interval));
+            self.rows.push(Row::new(next, limits, 2.0 * interval));
             // Near a reversal of a DoF its acceleration hardly depends on a, and varies most within the interval.
-            let (slowest, bend) = (here[1].abs().fast_min(next[1].abs()), here[2].abs().fast_max(next[2].abs()));
-            if slowest.simd_lt(bend * (REVERSAL * interval)).any() {
+            let (slowest, bend) = (here.slope.abs().fast_min(next.slope.abs()), here.bend.abs().fast_max(next.bend.abs()));
+            if !(bend * (REVERSAL * interval)).simd_le(slowest).all() {
                 for t in [0.25, 0.75] {
-                    self.rows.push(Row::new(between(here, next, interval, t), limits, 2.0 * t * interval));
+                    self.rows.push(Row::new(here.between(next, interval, t), limits, 2.0 * t * interval));
                 }
             }
         }
-        self.middle = [smallest(in_middle) / interval, -interval.recip()];
-        smallest(most)
+        self.middle = [largest(in_middle).recip() / interval, -interval.recip()];
+        largest(at_start).recip()
     }
 
     /// Returns the largest lower and the smallest upper end of a for a given x.
     #[inline(always)]
-    fn ends(&self, x: f64) -> [f64; 2] {
-        let mut upper = F64x4::splat(f64::INFINITY);
-        let mut lower = -upper;
+    fn ends<T: Register>(&self, x: f64) -> [f64; 2] {
+        let [mut lower, mut upper] = [T::splat(f64::INFINITY); 2];
         for row in &self.rows {
-            let centre = row.slope * x;
-            (lower, upper) = (lower.fast_max(centre - row.half), upper.fast_min(centre + row.half));
+            let (centre, half) = (T::load(&row.slope) * x, T::load(&row.half));
+            (lower, upper) = (lower.fast_min(half - centre), upper.fast_min(centre + half));
         }
-        [-smallest(-lower), smallest(upper)]
+        [-lower.smallest(), upper.smallest()]
     }
 
-    /// Returns the slope of the row whose lower (`side` −1) or upper (1) end has a given value at x.
-    fn slope_of(&self, value: f64, x: f64, side: f64) -> f64 {
-        let ends = self.rows.iter().flat_map(|row| {
-            let end = row.slope * x + row.half * side;
-            end.to_array().into_iter().zip(row.slope.to_array())
-        });
-        ends.into_iter().find(|(end, _)| *end == value).map_or(0.0, |(_, slope)| slope)
+    /// Returns the slope of the row whose upper end at x is `upper`, the smallest one. The lower ends at x are minus the upper
+    /// ones at −x.
+    #[inline(always)]
+    fn slope_of<T: Register>(&self, upper: f64, x: f64) -> f64 {
+        for row in &self.rows {
+            let is_smallest = (T::load(&row.slope) * x + T::load(&row.half)).simd_le(T::splat(upper)).to_bitmask();
+            if is_smallest != 0 {
+                return row.slope.as_array()[is_smallest.trailing_zeros() as usize];
+            }
+        }
+        0.0
     }
 
-    /// Returns the largest x up to `most` for which some a lies within all rows and between the lines `next`.
+    /// Returns the largest x up to `most` for which some a lies within all rows and between the lines `next`, by Newton's method
+    /// from `start` ≤ `most`.
     ///
-    /// The gap between the smallest upper and the largest lower end is concave in x and not negative at 0, so that Newton's
-    /// method from above reaches its zero in finitely many steps.
-    fn vertex(&self, most: f64, next: [Line; 2]) -> f64 {
-        let mut x = most;
-        for _ in 0..MAX_NEWTON_STEPS {
-            let [lower, upper] = self.ends(x);
+    /// The gap between the smallest upper and the largest lower end is concave in x and not negative at 0: the first step leads
+    /// to its zero or past it, and from there finitely many steps lead back.
+    #[inline(always)]
+    fn vertex<T: Register>(&self, start: f64, most: f64, next: [Line; 2]) -> f64 {
+        let mut x = start;
+        for step in 0..MAX_NEWTON_STEPS {
+            let [lower, upper] = self.ends::<T>(x);
             let [least, arrival, middle] =
                 [next[0], next[1], self.middle].map(|[value, slope]| [value + slope * x, slope]);
             let line = if middle[0] < arrival[0] { middle } else { arrival };
             let gap = upper.min(line[0]) - lower.max(least[0]);
+            if gap >= 0.0 && (step > 0 || x >= most) {
+                break;
+            }
+            let upper_slope = if line[0] <= upper { line[1] } else { self.slope_of::<T>(upper, x) };
+            let lower_slope = if least[0] >= lower { least[1] } else { self.slope_of::<T>(-lower, -x) };
+            let (crossing, closes) = (x + gap / (lower_slope - upper_slope), lower_slope > upper_slope);
             if gap >= 0.0 {
+                x = if closes { crossing.min(most) } else { most };
+            } else if closes && crossing < x {
+                x = crossing.max(0.0);
+            } else {
                 break;
             }
-            let upper_slope = if line[0] <= upper { line[1] } else { self.slope_of(upper, x, 1.0) };
-            let lower_slope = if least[0] >= lower { least[1] } else { self.slope_of(lower, x, -1.0) };
-            let crossing = x + gap / (lower_slope - upper_slope);
-            if crossing >= x || crossing.is_nan() {
-                break;
-            }
-            x = crossing.max(0.0);
         }
         x
     }
 }
 
-/// Returns the largest x with a = 0 that the limits admit at y′ and y″ of all groups.
+/// Returns the largest lane.
 #[inline(always)]
-pub(crate) fn max_constant(derivatives: impl Iterator<Item = [F64x4; 2]>, limits: &[RateLimits]) -> f64 {
-    let most = derivatives.zip(limits).fold(F64x4::splat(f64::INFINITY), |most, ([slope, bend], limits)| {
-        let rate = limits.velocity / slope.abs();
-        most.fast_min(rate * rate).fast_min(limits.acceleration / bend.abs())
-    });
-    smallest(most)
+pub(crate) fn largest<T: Register>(lanes: T) -> f64 {
+    -(-lanes).smallest()
 }
 
-/// Returns the smallest lane.
-#[inline(always)]
-fn smallest(lanes: F64x4) -> f64 {
-    let [a, b, c, d] = lanes.to_array();
-    a.min(b).min(c.min(d))
+/// Kernel of [`RateCurve::compute_constant`].
+struct Constant<'a> {
+    curve: &'a mut RateCurve,
+    path: &'a SampledPath,
+    limits: &'a [RateLimits],
+}
+
+impl Kernel for Constant<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { curve, path, limits } = self;
+        let last = curve.constant.len() - 1;
+        for (i, constant) in curve.constant.iter_mut().enumerate() {
+            let interval = if i < last { path.interval(i) } else { 0.0 };
+            let mut inverse = T::default();
+            for (here, next, limits) in path.ends(i.min(last - 1), limits) {
+                let [here, next] = [here, next].map(Derivatives::<T>::load);
+                let points = if i < last { [here, here.between(next, interval, 0.5)] } else { [next; 2] };
+                for Derivatives { slope, bend } in points {
+                    inverse = inverse.fast_max(limits.of_velocity(slope)).fast_max(limits.of_acceleration(bend));
+                }
+            }
+            *constant = largest(inverse).recip();
+        }
+    }
+}
+
+/// Kernel of [`RateCurve::compute`].
+struct Backward<'a> {
+    curve: &'a mut RateCurve,
+    path: &'a SampledPath,
+    limits: &'a [RateLimits],
+    end: f64,
+    max: f64,
+}
+
+impl Kernel for Backward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { curve, path, limits, end, max } = self;
+        let last = curve.max.len() - 1;
+        curve.max[last] = end.min(curve.constant[last]).min(max);
+        for i in (0..last).rev() {
+            let next = curve.max[i + 1];
+            // The largest rate can be kept.
+            if next >= max && curve.constant[i] >= max && curve.constant[i + 1] >= max {
+                curve.max[i] = max;
+                continue;
+            }
+            let twice = 2.0 * path.interval(i);
+            let most = curve.write_rows::<T>(path, limits, i).min(max);
+            let lines = [[0.0, -1.0 / twice], [next / twice, -1.0 / twice]];
+            curve.max[i] = curve.vertex::<T>(next.min(most), most, lines);
+        }
+    }
+}
+
+/// Kernel of [`RateCurve::reach`].
+struct Forward<'a> {
+    curve: &'a mut RateCurve,
+    path: &'a SampledPath,
+    limits: &'a [RateLimits],
+    start: f64,
+}
+
+impl Kernel for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { curve, path, limits, start } = self;
+        curve.max[0] = start;
+        for i in 0..curve.max.len() - 1 {
+            let twice = 2.0 * path.interval(i);
+            curve.write_rows::<T>(path, limits, i);
+            let x = curve.max[i];
+            let [_, upper] = curve.ends::<T>(x);
+            let most = upper.min(curve.middle[0] + curve.middle[1] * x);
+            curve.max[i + 1] = curve.max[i + 1].min(x + twice * most).max(0.0);
+        }
+    }
 }
 
 /// Time law u(t): pieces of constant ü.

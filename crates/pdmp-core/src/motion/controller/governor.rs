@@ -95,9 +95,8 @@ impl Controller {
         }
         let Some(governor) = &mut self.governor else { return };
         governor.limits.clear();
-        governor.limits.extend(self.limiter.bounds.iter().map(|bounds| RateLimits {
-            velocity: bounds.velocity * (1.0 - MARGINS[0]),
-            acceleration: bounds.acceleration * (1.0 - MARGINS[1]),
+        governor.limits.extend(self.limiter.bounds.iter().map(|bounds| {
+            RateLimits::new(bounds.velocity * (1.0 - MARGINS[0]), bounds.acceleration * (1.0 - MARGINS[1]))
         }));
     }
 
@@ -137,7 +136,7 @@ impl Controller {
     pub(super) fn refresh_path(&mut self) {
         let rhythmic = self.primitive.kind() == Kind::Rhythmic;
         let Some(governor) = &self.governor else { return };
-        let is_due = governor.ahead.is_due(rhythmic);
+        let is_due = governor.ahead.is_due(first_element(self.rate.target()), rhythmic);
         let tries = governor.pending && (governor.share < 1.0 || governor.ahead.has_progressed());
         if tries && self.accept(Changes::PATH) {
             return;

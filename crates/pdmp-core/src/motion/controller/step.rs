@@ -8,7 +8,7 @@ use crate::dynamics::output_system::{Attractor, CubicSample, State};
 use crate::dynamics::transport::TransportSample;
 use crate::error::{Error, Result};
 use crate::motion::perturbation::PerturbationTerms;
-use crate::numerics::simd::{F64x4, Register, flush, unpack};
+use crate::numerics::simd::{F64x4, Kernel, Register, compute, flush, unpack};
 
 /// Maximum number of substeps of a tick. A tick that needs more is still stable, but less accurate.
 const MAX_SUBSTEPS: f64 = 1000.0;
@@ -146,11 +146,7 @@ impl Controller {
         if h <= 0.0 {
             return self.pause(dt);
         }
-        #[cfg(target_arch = "x86_64")]
-        if super::avx::advance(self, dt, h) {
-            return;
-        }
-        self.advance_portable(dt, h);
+        compute(Advance { controller: self, dt, h });
     }
 
     /// Advances the rate alone, in a pause.
@@ -158,12 +154,6 @@ impl Controller {
         self.advance_rate::<F64x4>(dt);
         self.perturbation.clear_terms();
         self.read_out();
-    }
-
-    /// Advances with the instructions of every processor. It stays a call, so that [`Controller::advance`] stays small.
-    #[inline(never)]
-    fn advance_portable(&mut self, dt: f64, h: f64) {
-        self.advance_with::<F64x4>(dt, h);
     }
 
     /// Advances by `dt` seconds and `h` > 0 on the clock, in registers of type `T`.
@@ -385,6 +375,22 @@ impl Controller {
                 self.acceleration[group] += acceleration[group] * (fade * fade) + velocity[group] * change;
             }
         }
+    }
+}
+
+/// Kernel of [`Controller::advance`].
+struct Advance<'a> {
+    controller: &'a mut Controller,
+    dt: f64,
+    h: f64,
+}
+
+impl Kernel for Advance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        self.controller.advance_with::<T>(self.dt, self.h);
     }
 }
 
