@@ -8,10 +8,10 @@ use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::motion::controller::Controller;
 use crate::motion::limits::Limits;
-use crate::motion::rollout::follow;
-use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, TimeLaw};
-use crate::motion::trajectory::Trajectory;
-use crate::numerics::simd::groups;
+use crate::motion::time_law::{Derivatives, RateCurve, RateLimits, SampledPath, TimeLaw};
+use crate::motion::trajectory::{Trajectory, step_count};
+use crate::numerics::simd::{F64x4, WIDTH, groups, pack, unpad};
+use crate::validate::check_positive;
 
 /// Number of intervals of the path. Durations then are within 1e-3 of those of ten times this number.
 const N_INTERVALS: usize = 1000;
@@ -138,7 +138,32 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
     }
     let start = start.min(curve.max[0]);
     curve.reach(&path, &bounds, start);
-    follow(primitive, &conditions, TimeLaw::new(path.clock, &curve.max), dt)
+    follow(&path, &TimeLaw::new(&path.clock, &curve.max), primitive.n_dofs(), dt)
+}
+
+/// Samples the movement that follows a path by a time law, every `dt` seconds up to the first sample at its end or past it.
+///
+/// Between knots the path is that for which the law keeps the limits.
+fn follow(path: &SampledPath, law: &TimeLaw, n_dofs: usize, dt: f64) -> Result<Trajectory> {
+    check_positive("dt", dt)?;
+    let steps = step_count("duration", (law.duration() / dt).ceil() * dt, dt)?;
+    let mut i = 0;
+    Trajectory::record("fastest", n_dofs, steps, dt, &mut |_| Ok(()), |_, time, motion| {
+        let [u, rate, change];
+        (i, [u, rate, change]) = law.at(time, i);
+        let (interval, since) = (path.interval(i), u - path.clock[i]);
+        let rows = motion.position.chunks_mut(WIDTH).zip(motion.velocity.chunks_mut(WIDTH));
+        let rows = rows.zip(motion.acceleration.chunks_mut(WIDTH));
+        for ((here, next), ((position, velocity), acceleration)) in path.knot(i).iter().zip(path.knot(i + 1)).zip(rows)
+        {
+            let (start, [from, to]) = (here[0], [here, next].map(Derivatives::<F64x4>::load));
+            let Derivatives { slope, bend } = from.between(to, interval, since / interval);
+            unpad(start + from.way(to, interval, since / interval), position);
+            unpad(slope * rate, velocity);
+            unpad(bend * (rate * rate) + slope * change, acceleration);
+        }
+        Ok(())
+    })
 }
 
 /// Checks that the path keeps the limits of the position.
@@ -147,10 +172,13 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
 /// The first position outside.
 fn check_positions(path: &SampledPath, limits: &Limits, primitive: &Primitive) -> Result<()> {
     let [lower, upper] = limits.position(primitive.n_dofs());
+    let [lowest, highest] = [&lower, &upper].map(|limits| pack(limits));
     for (i, u) in path.clock.iter().enumerate() {
-        let positions = path.knot(i).iter().flat_map(|[position, ..]| position.to_array());
-        for (dof, value) in positions.take(primitive.n_dofs()).enumerate() {
-            if value < lower[dof] || value > upper[dof] {
+        for (group, [position, ..]) in path.knot(i).iter().enumerate() {
+            let outside = position.simd_lt(lowest[group]) | position.simd_gt(highest[group]);
+            if outside.any() {
+                let lane = outside.to_bitmask().trailing_zeros() as usize;
+                let (dof, value) = (group * WIDTH + lane, position.as_array()[lane]);
                 let phase = u / primitive.canonical().extent();
                 let (lower, upper) = (lower[dof], upper[dof]);
                 return Err(Error::Limits(LimitError::LeftByPath { dof, value, lower, upper, phase }));

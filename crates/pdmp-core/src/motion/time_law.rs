@@ -28,22 +28,27 @@ const REVERSAL: f64 = 4.0;
 pub(crate) struct SampledPath {
     /// u at the knots, increasing.
     pub(crate) clock: Vec<f64>,
+    n_groups: usize,
     /// y, y′ and y″ (N + 1, groups of DoFs) by rows.
-    pub(crate) samples: Vec<[F64x4; 3]>,
+    samples: Vec<[F64x4; 3]>,
 }
 
-clone_in_place!(SampledPath { clock, samples });
+clone_in_place!(SampledPath { clock, n_groups, samples });
 
 impl SampledPath {
     /// Returns a path at knots that has not been sampled yet.
     pub(crate) fn at(clock: Vec<f64>, n_groups: usize) -> Self {
-        Self { samples: vec![[F64x4::ZERO; 3]; clock.len() * n_groups], clock }
+        Self { samples: vec![[F64x4::ZERO; 3]; clock.len() * n_groups], n_groups, clock }
     }
 
     /// Returns the samples of all groups at a knot.
     pub(crate) fn knot(&self, index: usize) -> &[[F64x4; 3]] {
-        let n_groups = self.samples.len() / self.clock.len();
-        &self.samples[index * n_groups..(index + 1) * n_groups]
+        &self.samples[index * self.n_groups..(index + 1) * self.n_groups]
+    }
+
+    /// Returns the clock and the samples of each knot.
+    pub(crate) fn knots_mut(&mut self) -> impl Iterator<Item = (f64, &mut [[F64x4; 3]])> {
+        self.clock.iter().copied().zip(self.samples.chunks_exact_mut(self.n_groups))
     }
 
     /// Returns the length of interval `index`, between this knot and the next.
@@ -52,15 +57,17 @@ impl SampledPath {
         self.clock[index + 1] - self.clock[index]
     }
 
-    /// Returns the derivatives of all groups at both ends of interval `index`, with their limits.
+    /// Returns the samples of all groups at both ends of interval `index`, with their limits.
     #[inline(always)]
     pub(crate) fn ends<'a>(
         &'a self,
         index: usize,
         limits: &'a [RateLimits],
-    ) -> impl Iterator<Item = (&'a [F64x4; 3], &'a [F64x4; 3], &'a RateLimits)> {
-        let ends = self.knot(index).iter().zip(self.knot(index + 1));
-        ends.zip(limits).map(|((here, next), limits)| (here, next, limits))
+    ) -> impl Iterator<Item = ([&'a [F64x4; 3]; 2], &'a RateLimits)> {
+        let n_groups = self.n_groups;
+        let samples = &self.samples[index * n_groups..(index + 2) * n_groups];
+        let limits = &limits[..n_groups];
+        (0..n_groups).map(move |group| ([&samples[group], &samples[group + n_groups]], &limits[group]))
     }
 }
 
@@ -81,14 +88,25 @@ impl<T: Register> Derivatives<T> {
     /// Returns those at a position `t` from 0 to 1 in an interval: the cubic Hermite interpolation of y′, and its derivative.
     #[inline(always)]
     pub(crate) fn between(self, next: Self, interval: f64, t: f64) -> Self {
-        let (change, bends) = (next.slope - self.slope, [self.bend * interval, next.bend * interval]);
-        // p(t) = y′ + t(b₀ + t(c + td)) with p(1) and p′(1) of the next sample.
-        let c = change * 3.0 - bends[0] * 2.0 - bends[1];
-        let d = bends[0] + bends[1] - change * 2.0;
+        let [bend, c, d] = self.cubic(next, interval);
         Self {
-            slope: self.slope + (bends[0] + (c + d * t) * t) * t,
-            bend: (bends[0] + (c * 2.0 + d * (3.0 * t)) * t) * interval.recip(),
+            slope: self.slope + (bend + (c + d * t) * t) * t,
+            bend: (bend + (c * 2.0 + d * (3.0 * t)) * t) * interval.recip(),
         }
+    }
+
+    /// Returns the change of y up to a position `t` in an interval: the integral of that interpolation.
+    #[inline(always)]
+    pub(crate) fn way(self, next: Self, interval: f64, t: f64) -> T {
+        let [bend, c, d] = self.cubic(next, interval);
+        (self.slope + (bend * 0.5 + (c * (1.0 / 3.0) + d * (0.25 * t)) * t) * t) * (interval * t)
+    }
+
+    /// Returns b, c and d of p(t) = y′ + t(b + t(c + td)) with p(1) and p′(1) of the next sample.
+    #[inline(always)]
+    fn cubic(self, next: Self, interval: f64) -> [T; 3] {
+        let (change, bends) = (next.slope - self.slope, [self.bend * interval, next.bend * interval]);
+        [bends[0], change * 3.0 - bends[0] * 2.0 - bends[1], bends[0] + bends[1] - change * 2.0]
     }
 }
 
@@ -195,8 +213,8 @@ impl RateCurve {
         let interval = path.interval(i);
         let [mut at_start, mut in_middle] = [T::default(); 2];
         self.rows.clear();
-        for (here, next, limits) in path.ends(i, limits) {
-            let [here, next] = [here, next].map(Derivatives::<T>::load);
+        for (ends, limits) in path.ends(i, limits) {
+            let [here, next] = ends.map(Derivatives::<T>::load);
             let middle = here.between(next, interval, 0.5);
             at_start = at_start.fast_max(limits.of_velocity(here.slope));
             in_middle = in_middle.fast_max(limits.of_velocity(middle.slope));
@@ -204,7 +222,8 @@ impl RateCurve {
             self.rows.push(Row::new(middle, limits, interval));
             self.rows.push(Row::new(next, limits, 2.0 * interval));
             // Near a reversal of a DoF its acceleration hardly depends on a, and varies most within the interval.
-            let (slowest, bend) = (here.slope.abs().fast_min(next.slope.abs()), here.bend.abs().fast_max(next.bend.abs()));
+            let (slowest, bend) =
+                (here.slope.abs().fast_min(next.slope.abs()), here.bend.abs().fast_max(next.bend.abs()));
             if !(bend * (REVERSAL * interval)).simd_le(slowest).all() {
                 for t in [0.25, 0.75] {
                     self.rows.push(Row::new(here.between(next, interval, t), limits, 2.0 * t * interval));
@@ -294,8 +313,8 @@ impl Kernel for Constant<'_> {
         for (i, constant) in curve.constant.iter_mut().enumerate() {
             let interval = if i < last { path.interval(i) } else { 0.0 };
             let mut inverse = T::default();
-            for (here, next, limits) in path.ends(i.min(last - 1), limits) {
-                let [here, next] = [here, next].map(Derivatives::<T>::load);
+            for (ends, limits) in path.ends(i.min(last - 1), limits) {
+                let [here, next] = ends.map(Derivatives::<T>::load);
                 let points = if i < last { [here, here.between(next, interval, 0.5)] } else { [next; 2] };
                 for Derivatives { slope, bend } in points {
                     inverse = inverse.fast_max(limits.of_velocity(slope)).fast_max(limits.of_acceleration(bend));
@@ -376,8 +395,8 @@ pub(crate) struct TimeLaw {
 
 impl TimeLaw {
     /// Returns the time law from x = ρ² at knots of the clock.
-    pub(crate) fn new(clock: Vec<f64>, x: &[f64]) -> Self {
-        let rate: Vec<f64> = x.iter().map(|x| x.sqrt()).collect();
+    pub(crate) fn new(clock: &[f64], x: &[f64]) -> Self {
+        let (clock, rate): (_, Vec<f64>) = (clock.to_vec(), x.iter().map(|x| x.sqrt()).collect());
         let mut time = Vec::with_capacity(rate.len());
         time.push(0.0);
         for (ends, knots) in rate.windows(2).zip(clock.windows(2)) {
@@ -391,14 +410,14 @@ impl TimeLaw {
         self.time[self.time.len() - 1]
     }
 
-    /// Returns u, u̇ and ü at time `t`; past the end, those of the end.
-    pub(crate) fn at(&self, t: f64) -> [f64; 3] {
+    /// Returns the interval that contains time `t`, from interval `first` on, and u, u̇ and ü; past the end, those of the end.
+    pub(crate) fn at(&self, t: f64, first: usize) -> (usize, [f64; 3]) {
         let last = self.time.len() - 2;
-        let i = self.time.partition_point(|knot| *knot <= t).saturating_sub(1).min(last);
+        let i = (first..last).find(|i| self.time[i + 1] > t).unwrap_or(last);
         let length = self.time[i + 1] - self.time[i];
         let a = (self.rate[i + 1] - self.rate[i]) / length;
         let since = (t - self.time[i]).clamp(0.0, length);
         let u = self.clock[i] + (self.rate[i] + 0.5 * a * since) * since;
-        [u, self.rate[i] + a * since, if t <= self.duration() { a } else { 0.0 }]
+        (i, [u, self.rate[i] + a * since, if t <= self.duration() { a } else { 0.0 }])
     }
 }

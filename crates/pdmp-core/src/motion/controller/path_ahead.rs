@@ -100,7 +100,8 @@ impl PathAhead {
         sampler.sample_path(&mut self.path);
         self.curve.compute_constant(&self.path, limits);
         let rhythmic = controller.primitive.kind() == Kind::Rhythmic;
-        let end = if rhythmic { self.curve.constant.iter().copied().fold(f64::INFINITY, f64::min) } else { f64::INFINITY };
+        let end =
+            if rhythmic { self.curve.constant.iter().copied().fold(f64::INFINITY, f64::min) } else { f64::INFINITY };
         self.max_rate = controller.max_rate();
         self.curve.compute(&self.path, limits, end, self.max_rate.powi(2));
         let (clock, RateCurve { constant, max, .. }) = (&self.path.clock, &mut self.curve);
@@ -227,12 +228,12 @@ impl Kernel for Slopes<'_> {
                 continue;
             }
             let mut inverse = T::default();
-            for (here, next, limits) in path.ends(index, limits) {
+            for ([here, next], limits) in path.ends(index, limits) {
                 let Derivatives { slope, bend } =
                     Derivatives::<T>::load(here).between(Derivatives::load(next), interval, position);
                 // Near a reversal, where y″ρ² alone reaches the tighter limit, ρ̇ has no effect and must not be driven by it.
-                let [tight, wide] = TICK_MARGINS
-                    .map(|margin| T::load(&limits.acceleration) * ((1.0 - margin) / (1.0 - MARGINS[1])));
+                let [tight, wide] =
+                    TICK_MARGINS.map(|margin| T::load(&limits.acceleration) * ((1.0 - margin) / (1.0 - MARGINS[1])));
                 let by_bend = bend * x;
                 let acceleration = by_bend.abs().fast_max(tight).fast_min(wide);
                 let share = T::splat(1.0) / (slope + bend * (2.0 * since));
@@ -329,20 +330,22 @@ impl Controller {
         // At the rate 1 the derivatives with respect to the clock are those with respect to time.
         self.rate.reset(&[1.0]);
         self.read_out();
-        let n_groups = self.groups.len();
         let (mut u, mut h) = (path.clock[0], 0.0);
-        for (knot, samples) in path.clock.iter().zip(path.samples.chunks_exact_mut(n_groups)) {
+        for (knot, samples) in path.knots_mut() {
             // An interval that is equal up to rounding has the same propagator.
             if (knot - u - h).abs() > SAME_INTERVAL * h {
                 h = knot - u;
             }
-            if *knot > u {
+            if knot > u {
                 self.follow_path(h);
             }
+            let n = samples.len();
+            let (position, velocity, acceleration) =
+                (&self.position[..n], &self.velocity[..n], &self.acceleration[..n]);
             for (group, sample) in samples.iter_mut().enumerate() {
-                *sample = [self.position[group], self.velocity[group], self.acceleration[group]];
+                *sample = [position[group], velocity[group], acceleration[group]];
             }
-            u = *knot;
+            u = knot;
         }
     }
 
