@@ -6,11 +6,12 @@ use crate::error::{Error, LimitError, Result};
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
+use crate::motion::command::Motion;
 use crate::motion::controller::Controller;
 use crate::motion::limits::Limits;
 use crate::motion::time_law::{Derivatives, RateCurve, RateLimits, SampledPath, TimeLaw};
 use crate::motion::trajectory::{Trajectory, step_count};
-use crate::numerics::simd::{F64x4, WIDTH, groups, pack, unpad};
+use crate::numerics::simd::{Kernel, Register, WIDTH, compute, groups, pack, unpad};
 use crate::validate::check_positive;
 
 /// Number of intervals of the path. Durations then are within 1e-3 of those of ten times this number.
@@ -131,7 +132,6 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
     let path = path(primitive, &conditions)?;
     check_positions(&path, limits, primitive)?;
     let mut curve = RateCurve::new(path.clock.len(), bounds.len());
-    curve.compute_constant(&path, &bounds);
     curve.compute(&path, &bounds, end, (MAX_RATE / primitive.tau()).powi(2));
     if start > curve.max[0] * (1.0 + 1e-9) {
         return Err(Error::Limits(LimitError::StartTooFast { ratio: (start / curve.max[0]).sqrt() }));
@@ -147,23 +147,39 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
 fn follow(path: &SampledPath, law: &TimeLaw, n_dofs: usize, dt: f64) -> Result<Trajectory> {
     check_positive("dt", dt)?;
     let steps = step_count("duration", (law.duration() / dt).ceil() * dt, dt)?;
-    let mut i = 0;
+    let mut interval = 0;
     Trajectory::record("fastest", n_dofs, steps, dt, &mut |_| Ok(()), |_, time, motion| {
-        let [u, rate, change];
-        (i, [u, rate, change]) = law.at(time, i);
-        let (interval, since) = (path.interval(i), u - path.clock[i]);
-        let rows = motion.position.chunks_mut(WIDTH).zip(motion.velocity.chunks_mut(WIDTH));
-        let rows = rows.zip(motion.acceleration.chunks_mut(WIDTH));
-        for ((here, next), ((position, velocity), acceleration)) in path.knot(i).iter().zip(path.knot(i + 1)).zip(rows)
-        {
-            let (start, [from, to]) = (here[0], [here, next].map(Derivatives::<F64x4>::load));
-            let Derivatives { slope, bend } = from.between(to, interval, since / interval);
-            unpad(start + from.way(to, interval, since / interval), position);
-            unpad(slope * rate, velocity);
-            unpad(bend * (rate * rate) + slope * change, acceleration);
-        }
+        let at = law.at(time, interval);
+        interval = at.0;
+        compute(Sample { path, at, motion });
         Ok(())
     })
+}
+
+/// Kernel of [`follow`]: the motion in an interval for u, u̇ and ü.
+struct Sample<'a, 'b> {
+    path: &'a SampledPath,
+    at: (usize, [f64; 3]),
+    motion: &'a mut Motion<'b>,
+}
+
+impl Kernel for Sample<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { path, at: (i, [u, rate, change]), motion: Motion { position, velocity, acceleration } } = self;
+        let (interval, since) = (path.interval(i), u - path.clock[i]);
+        let (t, samples) = (since / interval, path.knot(i).iter().zip(path.knot(i + 1)));
+        let rows = position.chunks_mut(WIDTH).zip(velocity.chunks_mut(WIDTH)).zip(acceleration.chunks_mut(WIDTH));
+        for ((here, next), ((position, velocity), acceleration)) in samples.zip(rows) {
+            let [from, to] = [here, next].map(Derivatives::<T>::load);
+            let Derivatives { slope, bend } = from.between(to, interval, t);
+            unpad((T::load(&here[0]) + from.way(to, interval, t)).store(), position);
+            unpad((slope * rate).store(), velocity);
+            unpad((bend * (rate * rate) + slope * change).store(), acceleration);
+        }
+    }
 }
 
 /// Checks that the path keeps the limits of the position.
@@ -171,6 +187,9 @@ fn follow(path: &SampledPath, law: &TimeLaw, n_dofs: usize, dt: f64) -> Result<T
 /// # Errors
 /// The first position outside.
 fn check_positions(path: &SampledPath, limits: &Limits, primitive: &Primitive) -> Result<()> {
+    if limits.lower.is_none() && limits.upper.is_none() {
+        return Ok(());
+    }
     let [lower, upper] = limits.position(primitive.n_dofs());
     let [lowest, highest] = [&lower, &upper].map(|limits| pack(limits));
     for (i, u) in path.clock.iter().enumerate() {

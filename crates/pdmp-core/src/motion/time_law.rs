@@ -20,6 +20,8 @@ use crate::numerics::state::clone_in_place;
 const MAX_NEWTON_STEPS: usize = 64;
 /// Number added to β, far below any other: its inverse is finite.
 const MIN_BETA: f64 = 1e-200;
+/// Maximum number of rows of an interval for each group.
+const MAX_ROWS: usize = 5;
 /// Number of intervals from a reversal of a DoF within which its limits also hold in the quarters of an interval.
 const REVERSAL: f64 = 4.0;
 
@@ -159,86 +161,53 @@ impl Row {
 /// Line value + slope·x.
 type Line = [f64; 2];
 
-/// Largest x = ρ² at each knot of a path.
-#[derive(Debug, Default)]
-pub(crate) struct RateCurve {
-    /// Largest x from which the rest of the path can be followed.
-    pub(crate) max: Vec<f64>,
-    /// Largest x with a = 0 at each knot and in the middle of the interval that follows.
-    pub(crate) constant: Vec<f64>,
+/// Limits of one interval.
+#[derive(Clone, Debug, Default)]
+struct IntervalLimits {
+    /// Memory of five rows for each group.
     rows: Vec<Row>,
-    /// Largest a at the start of the interval due to the limit of the velocity in its middle.
+    n_rows: usize,
+    /// Largest x at the start due to the limits of the velocity there.
+    most: f64,
+    /// Largest a at the start due to the limits of the velocity in the middle.
     middle: Line,
 }
 
-impl Clone for RateCurve {
-    fn clone(&self) -> Self {
-        let Self { max, constant, rows, middle } = self;
-        let rows = Vec::with_capacity(rows.capacity());
-        Self { max: max.clone(), constant: constant.clone(), rows, middle: *middle }
-    }
-
-    fn clone_from(&mut self, source: &Self) {
-        self.max.clone_from(&source.max);
-        self.constant.clone_from(&source.constant);
-    }
-}
-
-impl RateCurve {
-    /// Returns a curve of `n_knots` knots for a path of `n_groups` groups, to be computed by [`RateCurve::compute`].
-    pub(crate) fn new(n_knots: usize, n_groups: usize) -> Self {
-        let zeros = vec![0.0; n_knots];
-        Self { max: zeros.clone(), constant: zeros, rows: Vec::with_capacity(5 * n_groups), middle: [0.0; 2] }
-    }
-
-    /// Computes the largest constant rates.
-    pub(crate) fn compute_constant(&mut self, path: &SampledPath, limits: &[RateLimits]) {
-        compute(Constant { curve: self, path, limits });
-    }
-
-    /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x. The largest
-    /// constant rates have been computed.
-    pub(crate) fn compute(&mut self, path: &SampledPath, limits: &[RateLimits], end: f64, max: f64) {
-        compute(Backward { curve: self, path, limits, end, max });
-    }
-
-    /// Limits the curve to what can be reached from `start` ≤ max[0]: the time-optimal law.
-    pub(crate) fn reach(&mut self, path: &SampledPath, limits: &[RateLimits], start: f64) {
-        compute(Forward { curve: self, path, limits, start });
-    }
-
-    /// Writes the limits of interval `i`; returns the largest x at its start that the limits of the velocity admit.
+impl IntervalLimits {
+    /// Computes the limits of interval `i`.
     #[inline(always)]
-    fn write_rows<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) -> f64 {
+    fn compute<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) {
         let interval = path.interval(i);
-        let [mut at_start, mut in_middle] = [T::default(); 2];
-        self.rows.clear();
+        let ([mut at_start, mut in_middle], mut n_rows) = ([T::default(); 2], 0);
         for (ends, limits) in path.ends(i, limits) {
             let [here, next] = ends.map(Derivatives::<T>::load);
             let middle = here.between(next, interval, 0.5);
             at_start = at_start.fast_max(limits.of_velocity(here.slope));
             in_middle = in_middle.fast_max(limits.of_velocity(middle.slope));
-            self.rows.push(Row::new(here, limits, 0.0));
-            self.rows.push(Row::new(middle, limits, interval));
-            self.rows.push(Row::new(next, limits, 2.0 * interval));
+            let rows = &mut self.rows[n_rows..n_rows + MAX_ROWS];
+            rows[0] = Row::new(here, limits, 0.0);
+            rows[1] = Row::new(middle, limits, interval);
+            rows[2] = Row::new(next, limits, 2.0 * interval);
+            n_rows += 3;
             // Near a reversal of a DoF its acceleration hardly depends on a, and varies most within the interval.
             let (slowest, bend) =
                 (here.slope.abs().fast_min(next.slope.abs()), here.bend.abs().fast_max(next.bend.abs()));
             if !(bend * (REVERSAL * interval)).simd_le(slowest).all() {
-                for t in [0.25, 0.75] {
-                    self.rows.push(Row::new(here.between(next, interval, t), limits, 2.0 * t * interval));
-                }
+                rows[3] = Row::new(here.between(next, interval, 0.25), limits, 0.5 * interval);
+                rows[4] = Row::new(here.between(next, interval, 0.75), limits, 1.5 * interval);
+                n_rows += 2;
             }
         }
-        self.middle = [largest(in_middle).recip() / interval, -interval.recip()];
-        largest(at_start).recip()
+        self.n_rows = n_rows;
+        self.most = largest(at_start).recip();
+        self.middle = [(largest(in_middle) * interval).recip(), -interval.recip()];
     }
 
     /// Returns the largest lower and the smallest upper end of a for a given x.
     #[inline(always)]
     fn ends<T: Register>(&self, x: f64) -> [f64; 2] {
         let [mut lower, mut upper] = [T::splat(f64::INFINITY); 2];
-        for row in &self.rows {
+        for row in &self.rows[..self.n_rows] {
             let (centre, half) = (T::load(&row.slope) * x, T::load(&row.half));
             (lower, upper) = (lower.fast_min(half - centre), upper.fast_min(centre + half));
         }
@@ -249,7 +218,7 @@ impl RateCurve {
     /// ones at −x.
     #[inline(always)]
     fn slope_of<T: Register>(&self, upper: f64, x: f64) -> f64 {
-        for row in &self.rows {
+        for row in &self.rows[..self.n_rows] {
             let is_smallest = (T::load(&row.slope) * x + T::load(&row.half)).simd_le(T::splat(upper)).to_bitmask();
             if is_smallest != 0 {
                 return row.slope.as_array()[is_smallest.trailing_zeros() as usize];
@@ -258,25 +227,28 @@ impl RateCurve {
         0.0
     }
 
-    /// Returns the largest x up to `most` for which some a lies within all rows and between the lines `next`, by Newton's method
-    /// from `start` ≤ `most`.
+    /// Returns the largest x up to `max` from which some a within the limits leads to at most `next` at the end of an interval of
+    /// half the length `twice`, and whether one leads to `next`.
     ///
-    /// The gap between the smallest upper and the largest lower end is concave in x and not negative at 0: the first step leads
-    /// to its zero or past it, and from there finitely many steps lead back.
+    /// The gap between the smallest upper and the largest lower end is concave in x and not negative at 0. Newton's method begins
+    /// at `next`: the first step leads to its zero or past it, and from there finitely many steps lead back.
     #[inline(always)]
-    fn vertex<T: Register>(&self, start: f64, most: f64, next: [Line; 2]) -> f64 {
-        let mut x = start;
+    fn largest_from<T: Register>(&self, next: f64, twice: f64, max: f64) -> (f64, bool) {
+        let per_twice = twice.recip();
+        let most = self.most.min(max);
+        let (mut x, mut leads) = (next.min(most), false);
         for step in 0..MAX_NEWTON_STEPS {
             let [lower, upper] = self.ends::<T>(x);
-            let [least, arrival, middle] =
-                [next[0], next[1], self.middle].map(|[value, slope]| [value + slope * x, slope]);
-            let line = if middle[0] < arrival[0] { middle } else { arrival };
-            let gap = upper.min(line[0]) - lower.max(least[0]);
+            let (least, arrival) = (-x * per_twice, (next - x) * per_twice);
+            let middle = self.middle[0] + self.middle[1] * x;
+            leads = arrival <= middle.min(upper);
+            let line = if arrival <= middle { [arrival, -per_twice] } else { [middle, self.middle[1]] };
+            let gap = upper.min(line[0]) - lower.max(least);
             if gap >= 0.0 && (step > 0 || x >= most) {
                 break;
             }
             let upper_slope = if line[0] <= upper { line[1] } else { self.slope_of::<T>(upper, x) };
-            let lower_slope = if least[0] >= lower { least[1] } else { self.slope_of::<T>(-lower, -x) };
+            let lower_slope = if least >= lower { -per_twice } else { self.slope_of::<T>(-lower, -x) };
             let (crossing, closes) = (x + gap / (lower_slope - upper_slope), lower_slope > upper_slope);
             if gap >= 0.0 {
                 x = if closes { crossing.min(most) } else { most };
@@ -286,8 +258,60 @@ impl RateCurve {
                 break;
             }
         }
-        x
+        (x, leads)
     }
+}
+
+/// Largest x = ρ² at each knot of a path.
+#[derive(Debug)]
+pub(crate) struct RateCurve {
+    /// Largest x from which the rest of the path can be followed.
+    pub(crate) max: Vec<f64>,
+    /// Largest x with a = 0 at each knot and in the middle of the interval that follows, 0 where it is not known.
+    pub(crate) constant: Vec<f64>,
+    /// True where some a leads from the largest x to the next one.
+    leads: Vec<bool>,
+    interval: IntervalLimits,
+}
+
+clone_in_place!(RateCurve { max, constant, leads, interval });
+
+impl RateCurve {
+    /// Returns a curve of `n_knots` knots for a path of `n_groups` groups, to be computed by [`RateCurve::compute`].
+    pub(crate) fn new(n_knots: usize, n_groups: usize) -> Self {
+        let none = Row { slope: F64x4::ZERO, half: F64x4::ZERO };
+        let interval = IntervalLimits { rows: vec![none; MAX_ROWS * n_groups], ..IntervalLimits::default() };
+        Self { max: vec![0.0; n_knots], constant: vec![0.0; n_knots], leads: vec![false; n_knots], interval }
+    }
+
+    /// Computes the largest constant rates, with which [`RateCurve::compute`] is faster where they suffice.
+    pub(crate) fn compute_constant(&mut self, path: &SampledPath, limits: &[RateLimits]) {
+        compute(Constant { curve: self, path, limits });
+    }
+
+    /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x.
+    pub(crate) fn compute(&mut self, path: &SampledPath, limits: &[RateLimits], end: f64, max: f64) {
+        compute(Backward { curve: self, path, limits, end, max });
+    }
+
+    /// Limits the curve to what can be reached from `start` ≤ max[0]: the time-optimal law.
+    pub(crate) fn reach(&mut self, path: &SampledPath, limits: &[RateLimits], start: f64) {
+        compute(Forward { curve: self, path, limits, start });
+    }
+}
+
+/// Returns the largest x with a = 0 at a position in interval `i`.
+#[inline(always)]
+fn largest_constant<T: Register>(path: &SampledPath, limits: &[RateLimits], i: usize, positions: [f64; 2]) -> f64 {
+    let (interval, mut inverse) = (path.interval(i), T::default());
+    for (ends, limits) in path.ends(i, limits) {
+        let [here, next] = ends.map(Derivatives::<T>::load);
+        for t in positions {
+            let Derivatives { slope, bend } = here.between(next, interval, t);
+            inverse = inverse.fast_max(limits.of_velocity(slope)).fast_max(limits.of_acceleration(bend));
+        }
+    }
+    largest(inverse).recip()
 }
 
 /// Returns the largest lane.
@@ -310,18 +334,10 @@ impl Kernel for Constant<'_> {
     fn run<T: Register>(self) {
         let Self { curve, path, limits } = self;
         let last = curve.constant.len() - 1;
-        for (i, constant) in curve.constant.iter_mut().enumerate() {
-            let interval = if i < last { path.interval(i) } else { 0.0 };
-            let mut inverse = T::default();
-            for (ends, limits) in path.ends(i.min(last - 1), limits) {
-                let [here, next] = ends.map(Derivatives::<T>::load);
-                let points = if i < last { [here, here.between(next, interval, 0.5)] } else { [next; 2] };
-                for Derivatives { slope, bend } in points {
-                    inverse = inverse.fast_max(limits.of_velocity(slope)).fast_max(limits.of_acceleration(bend));
-                }
-            }
-            *constant = largest(inverse).recip();
+        for (i, constant) in curve.constant[..last].iter_mut().enumerate() {
+            *constant = largest_constant::<T>(path, limits, i, [0.0, 0.5]);
         }
+        curve.constant[last] = largest_constant::<T>(path, limits, last - 1, [1.0; 2]);
     }
 }
 
@@ -340,19 +356,21 @@ impl Kernel for Backward<'_> {
     #[inline(always)]
     fn run<T: Register>(self) {
         let Self { curve, path, limits, end, max } = self;
-        let last = curve.max.len() - 1;
-        curve.max[last] = end.min(curve.constant[last]).min(max);
+        let RateCurve { max: largest, constant, leads, interval } = curve;
+        let last = path.clock.len() - 1;
+        let (largest, constant, leads) = (&mut largest[..=last], &constant[..=last], &mut leads[..=last]);
+        let mut next = end.min(largest_constant::<T>(path, limits, last - 1, [1.0; 2])).min(max);
+        largest[last] = next;
         for i in (0..last).rev() {
-            let next = curve.max[i + 1];
-            // The largest rate can be kept.
-            if next >= max && curve.constant[i] >= max && curve.constant[i + 1] >= max {
-                curve.max[i] = max;
-                continue;
+            // Where the largest rate can be kept, nothing else needs to be computed.
+            let keeps = next >= max && constant[i] >= max && constant[i + 1] >= max;
+            if keeps {
+                (next, leads[i]) = (max, true);
+            } else {
+                interval.compute::<T>(path, limits, i);
+                (next, leads[i]) = interval.largest_from::<T>(next, 2.0 * path.interval(i), max);
             }
-            let twice = 2.0 * path.interval(i);
-            let most = curve.write_rows::<T>(path, limits, i).min(max);
-            let lines = [[0.0, -1.0 / twice], [next / twice, -1.0 / twice]];
-            curve.max[i] = curve.vertex::<T>(next.min(most), most, lines);
+            largest[i] = next;
         }
     }
 }
@@ -371,14 +389,19 @@ impl Kernel for Forward<'_> {
     #[inline(always)]
     fn run<T: Register>(self) {
         let Self { curve, path, limits, start } = self;
-        curve.max[0] = start;
-        for i in 0..curve.max.len() - 1 {
-            let twice = 2.0 * path.interval(i);
-            curve.write_rows::<T>(path, limits, i);
-            let x = curve.max[i];
-            let [_, upper] = curve.ends::<T>(x);
-            let most = upper.min(curve.middle[0] + curve.middle[1] * x);
-            curve.max[i + 1] = curve.max[i + 1].min(x + twice * most).max(0.0);
+        let RateCurve { max: largest, leads, interval, .. } = curve;
+        let mut on_curve = start >= largest[0];
+        largest[0] = start;
+        for i in 0..path.clock.len() - 1 {
+            if on_curve && leads[i] {
+                continue;
+            }
+            interval.compute::<T>(path, limits, i);
+            let (x, [_, upper]) = (largest[i], interval.ends::<T>(largest[i]));
+            let most = upper.min(interval.middle[0] + interval.middle[1] * x);
+            let reached = (x + 2.0 * path.interval(i) * most).max(0.0);
+            on_curve = reached >= largest[i + 1];
+            largest[i + 1] = largest[i + 1].min(reached);
         }
     }
 }
