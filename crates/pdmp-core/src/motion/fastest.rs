@@ -170,14 +170,14 @@ impl Kernel for Sample<'_, '_> {
     fn run<T: Register>(self) {
         let Self { path, at: (i, [u, rate, change]), motion: Motion { position, velocity, acceleration } } = self;
         let (interval, since) = (path.interval(i), u - path.clock[i]);
-        let (t, samples) = (since / interval, path.knot(i).iter().zip(path.knot(i + 1)));
-        let rows = position.chunks_mut(WIDTH).zip(velocity.chunks_mut(WIDTH)).zip(acceleration.chunks_mut(WIDTH));
-        for ((here, next), ((position, velocity), acceleration)) in samples.zip(rows) {
+        let (t, n_dofs) = (since / interval, position.len());
+        for (group, (here, next)) in path.knot(i).iter().zip(path.knot(i + 1)).enumerate() {
+            let dofs = group * WIDTH..n_dofs.min((group + 1) * WIDTH);
             let [from, to] = [here, next].map(Derivatives::<T>::load);
             let Derivatives { slope, bend } = from.between(to, interval, t);
-            unpad((T::load(&here[0]) + from.way(to, interval, t)).store(), position);
-            unpad((slope * rate).store(), velocity);
-            unpad((bend * (rate * rate) + slope * change).store(), acceleration);
+            unpad((T::load(&here[0]) + from.way(to, interval, t)).store(), &mut position[dofs.clone()]);
+            unpad((slope * rate).store(), &mut velocity[dofs.clone()]);
+            unpad((bend * (rate * rate) + slope * change).store(), &mut acceleration[dofs]);
         }
     }
 }

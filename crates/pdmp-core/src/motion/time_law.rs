@@ -134,27 +134,38 @@ impl RateLimits {
         ratio * ratio
     }
 
-    /// Returns the inverse of the largest x with a = 0 that the limit of the acceleration admits.
+    /// Returns the inverse of the largest x with a = 0 that both limits admit.
     #[inline(always)]
-    fn of_acceleration<T: Register>(&self, bend: T) -> T {
-        (bend * T::load(&self.inverse[1])).abs()
+    fn of_constant<T: Register>(&self, Derivatives { slope, bend }: Derivatives<T>) -> T {
+        self.of_velocity(slope).fast_max((bend * T::load(&self.inverse[1])).abs())
     }
 }
 
 /// Limits |αx + βa| ≤ A of a group, as −α/β and A/|β|: a lies between slope·x − half and slope·x + half.
 #[derive(Clone, Copy, Debug)]
-struct Row {
-    slope: F64x4,
-    half: F64x4,
+struct Row<T> {
+    slope: T,
+    half: T,
 }
 
-impl Row {
+impl<T: Register> Row<T> {
     /// Returns the limits for α = y″ and β = y′ + `twice`·y″.
     #[inline(always)]
-    fn new<T: Register>(Derivatives { slope, bend }: Derivatives<T>, limits: &RateLimits, twice: f64) -> Self {
+    fn new(Derivatives { slope, bend }: Derivatives<T>, acceleration: T, twice: f64) -> Self {
         // For β = 0 the ends become steep lines instead of a bound of x.
         let inverse = T::splat(1.0) / (slope + bend * twice + T::splat(MIN_BETA));
-        Self { slope: (-bend * inverse).store(), half: (T::load(&limits.acceleration) * inverse.abs()).store() }
+        Self { slope: -bend * inverse, half: acceleration * inverse.abs() }
+    }
+
+    #[inline(always)]
+    fn load(row: &Row<F64x4>) -> Self {
+        Self { slope: T::load(&row.slope), half: T::load(&row.half) }
+    }
+
+    /// Returns the upper ends of a for a given x. The lower ends at x are minus the upper ones at −x.
+    #[inline(always)]
+    fn upper(&self, x: f64) -> T {
+        self.slope * x + self.half
     }
 }
 
@@ -165,7 +176,7 @@ type Line = [f64; 2];
 #[derive(Clone, Debug, Default)]
 struct IntervalLimits {
     /// Memory of five rows for each group.
-    rows: Vec<Row>,
+    rows: Vec<Row<F64x4>>,
     n_rows: usize,
     /// Largest x at the start due to the limits of the velocity there.
     most: f64,
@@ -174,33 +185,54 @@ struct IntervalLimits {
 }
 
 impl IntervalLimits {
-    /// Computes the limits of interval `i`.
+    /// Visits the rows of interval `i`, and computes the limits of the velocity.
     #[inline(always)]
-    fn compute<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) {
+    fn visit<T: Register>(
+        &mut self,
+        path: &SampledPath,
+        limits: &[RateLimits],
+        i: usize,
+        mut visit: impl FnMut(Row<T>),
+    ) {
         let interval = path.interval(i);
-        let ([mut at_start, mut in_middle], mut n_rows) = ([T::default(); 2], 0);
+        let [mut at_start, mut in_middle] = [T::default(); 2];
         for (ends, limits) in path.ends(i, limits) {
-            let [here, next] = ends.map(Derivatives::<T>::load);
+            let ([here, next], acceleration) = (ends.map(Derivatives::<T>::load), T::load(&limits.acceleration));
             let middle = here.between(next, interval, 0.5);
             at_start = at_start.fast_max(limits.of_velocity(here.slope));
             in_middle = in_middle.fast_max(limits.of_velocity(middle.slope));
-            let rows = &mut self.rows[n_rows..n_rows + MAX_ROWS];
-            rows[0] = Row::new(here, limits, 0.0);
-            rows[1] = Row::new(middle, limits, interval);
-            rows[2] = Row::new(next, limits, 2.0 * interval);
-            n_rows += 3;
+            visit(Row::new(here, acceleration, 0.0));
+            visit(Row::new(middle, acceleration, interval));
+            visit(Row::new(next, acceleration, 2.0 * interval));
             // Near a reversal of a DoF its acceleration hardly depends on a, and varies most within the interval.
             let (slowest, bend) =
                 (here.slope.abs().fast_min(next.slope.abs()), here.bend.abs().fast_max(next.bend.abs()));
             if !(bend * (REVERSAL * interval)).simd_le(slowest).all() {
-                rows[3] = Row::new(here.between(next, interval, 0.25), limits, 0.5 * interval);
-                rows[4] = Row::new(here.between(next, interval, 0.75), limits, 1.5 * interval);
-                n_rows += 2;
+                visit(Row::new(here.between(next, interval, 0.25), acceleration, 0.5 * interval));
+                visit(Row::new(here.between(next, interval, 0.75), acceleration, 1.5 * interval));
             }
         }
-        self.n_rows = n_rows;
         self.most = largest(at_start).recip();
         self.middle = [(largest(in_middle) * interval).recip(), -interval.recip()];
+    }
+
+    /// Computes the limits of interval `i`.
+    #[inline(always)]
+    fn compute<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) {
+        let (mut rows, mut n_rows) = (std::mem::take(&mut self.rows), 0);
+        self.visit(path, limits, i, |Row::<T> { slope, half }| {
+            rows[n_rows] = Row { slope: slope.store(), half: half.store() };
+            n_rows += 1;
+        });
+        (self.rows, self.n_rows) = (rows, n_rows);
+    }
+
+    /// Returns the largest a of interval `i` for a given x at its start.
+    #[inline(always)]
+    fn largest_slope<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize, x: f64) -> f64 {
+        let mut upper = T::splat(f64::INFINITY);
+        self.visit(path, limits, i, |row| upper = upper.fast_min(row.upper(x)));
+        upper.smallest().min(self.middle[0] + self.middle[1] * x)
     }
 
     /// Returns the largest lower and the smallest upper end of a for a given x.
@@ -208,18 +240,17 @@ impl IntervalLimits {
     fn ends<T: Register>(&self, x: f64) -> [f64; 2] {
         let [mut lower, mut upper] = [T::splat(f64::INFINITY); 2];
         for row in &self.rows[..self.n_rows] {
-            let (centre, half) = (T::load(&row.slope) * x, T::load(&row.half));
-            (lower, upper) = (lower.fast_min(half - centre), upper.fast_min(centre + half));
+            let row = Row::<T>::load(row);
+            (lower, upper) = (lower.fast_min(row.upper(-x)), upper.fast_min(row.upper(x)));
         }
         [-lower.smallest(), upper.smallest()]
     }
 
-    /// Returns the slope of the row whose upper end at x is `upper`, the smallest one. The lower ends at x are minus the upper
-    /// ones at −x.
+    /// Returns the slope of the row whose upper end at x is `upper`, the smallest one.
     #[inline(always)]
     fn slope_of<T: Register>(&self, upper: f64, x: f64) -> f64 {
         for row in &self.rows[..self.n_rows] {
-            let is_smallest = (T::load(&row.slope) * x + T::load(&row.half)).simd_le(T::splat(upper)).to_bitmask();
+            let is_smallest = Row::<T>::load(row).upper(x).simd_le(T::splat(upper)).to_bitmask();
             if is_smallest != 0 {
                 return row.slope.as_array()[is_smallest.trailing_zeros() as usize];
             }
@@ -300,24 +331,20 @@ impl RateCurve {
     }
 }
 
-/// Returns the largest x with a = 0 at a position in interval `i`.
-#[inline(always)]
-fn largest_constant<T: Register>(path: &SampledPath, limits: &[RateLimits], i: usize, positions: [f64; 2]) -> f64 {
-    let (interval, mut inverse) = (path.interval(i), T::default());
-    for (ends, limits) in path.ends(i, limits) {
-        let [here, next] = ends.map(Derivatives::<T>::load);
-        for t in positions {
-            let Derivatives { slope, bend } = here.between(next, interval, t);
-            inverse = inverse.fast_max(limits.of_velocity(slope)).fast_max(limits.of_acceleration(bend));
-        }
-    }
-    largest(inverse).recip()
-}
-
 /// Returns the largest lane.
 #[inline(always)]
 pub(crate) fn largest<T: Register>(lanes: T) -> f64 {
     -(-lanes).smallest()
+}
+
+/// Returns the largest x with a = 0 at the last knot.
+#[inline(always)]
+fn last_constant<T: Register>(path: &SampledPath, limits: &[RateLimits]) -> f64 {
+    let mut inverse = T::default();
+    for ([_, here], limits) in path.ends(path.clock.len() - 2, limits) {
+        inverse = inverse.fast_max(limits.of_constant(Derivatives::load(here)));
+    }
+    largest::<T>(inverse).recip()
 }
 
 /// Kernel of [`RateCurve::compute_constant`].
@@ -335,9 +362,15 @@ impl Kernel for Constant<'_> {
         let Self { curve, path, limits } = self;
         let last = curve.constant.len() - 1;
         for (i, constant) in curve.constant[..last].iter_mut().enumerate() {
-            *constant = largest_constant::<T>(path, limits, i, [0.0, 0.5]);
+            let (interval, mut inverse) = (path.interval(i), T::default());
+            for (ends, limits) in path.ends(i, limits) {
+                let [here, next] = ends.map(Derivatives::<T>::load);
+                inverse = inverse.fast_max(limits.of_constant(here));
+                inverse = inverse.fast_max(limits.of_constant(here.between(next, interval, 0.5)));
+            }
+            *constant = largest(inverse).recip();
         }
-        curve.constant[last] = largest_constant::<T>(path, limits, last - 1, [1.0; 2]);
+        curve.constant[last] = last_constant::<T>(path, limits);
     }
 }
 
@@ -359,7 +392,7 @@ impl Kernel for Backward<'_> {
         let RateCurve { max: largest, constant, leads, interval } = curve;
         let last = path.clock.len() - 1;
         let (largest, constant, leads) = (&mut largest[..=last], &constant[..=last], &mut leads[..=last]);
-        let mut next = end.min(largest_constant::<T>(path, limits, last - 1, [1.0; 2])).min(max);
+        let mut next = end.min(last_constant::<T>(path, limits)).min(max);
         largest[last] = next;
         for i in (0..last).rev() {
             // Where the largest rate can be kept, nothing else needs to be computed.
@@ -396,10 +429,8 @@ impl Kernel for Forward<'_> {
             if on_curve && leads[i] {
                 continue;
             }
-            interval.compute::<T>(path, limits, i);
-            let (x, [_, upper]) = (largest[i], interval.ends::<T>(largest[i]));
-            let most = upper.min(interval.middle[0] + interval.middle[1] * x);
-            let reached = (x + 2.0 * path.interval(i) * most).max(0.0);
+            let (x, twice) = (largest[i], 2.0 * path.interval(i));
+            let reached = (x + twice * interval.largest_slope::<T>(path, limits, i, x)).max(0.0);
             on_curve = reached >= largest[i + 1];
             largest[i + 1] = largest[i + 1].min(reached);
         }

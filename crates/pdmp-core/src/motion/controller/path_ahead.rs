@@ -18,7 +18,7 @@ use crate::numerics::simd::{Kernel, Register, compute};
 use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Number of intervals of the path. Learnt from recordings, y″ between the knots is within 1 % of its maximum.
-const N_INTERVALS: usize = 640;
+const N_INTERVALS: usize = 576;
 /// Number of intervals of a whole movement or period; past the end of a discrete movement are the others.
 const N_MOVEMENT: usize = 512;
 /// Number of intervals after which a path that was left is sampled again.
@@ -355,7 +355,7 @@ impl Controller {
         if !self.are_commands_settled() {
             n_substeps = n_substeps.max(self.command_gains.substeps(h) / MAX_TRANSITION_STEP);
         }
-        let n_substeps = n_substeps.ceil().max(1.0);
+        let n_substeps = if n_substeps > 1.0 { n_substeps.ceil() } else { 1.0 };
         for _ in 0..n_substeps as u32 {
             self.substep(h / n_substeps, h / n_substeps);
             if self.approaching && !self.style.is_settled() {

@@ -193,12 +193,12 @@ impl Controller {
         let lags = [std::mem::replace(&mut self.frame_lag, value), value];
         let frame_slopes = self.frame_slopes(slope, bend);
         // At u_end the substep that reaches it takes the slopes from the demonstrated side.
-        let gate = if demonstrated { self.demonstrated_gate() } else { self.gate() };
+        let fade = if demonstrated { None } else { self.primitive.forcing_table().fade(self.clock.value()) };
+        let gate = self.faded_gate(fade);
 
         let (primitive, propagator) = (&*self.primitive, &self.propagator);
         let (forcing_table, attractor, clock) = (primitive.forcing_table(), primitive.attractor(), self.clock.value());
-        let table_index =
-            if demonstrated { forcing_table.demonstrated_index(clock) } else { forcing_table.index(clock) };
+        let table_index = forcing_table.faded_index(clock, fade);
         let style = unpack(self.style.value(), primitive.n_styles());
         let style_rate = (!self.style.is_settled()).then(|| unpack(self.style.rate(), primitive.n_styles()));
         let (transition, gate_phase_rate) = (self.goal_transition.is_active(), self.perturbation.phase_rate());
@@ -283,8 +283,14 @@ impl Controller {
     /// Returns the gate at the clock, at u_end with the slope past the end.
     #[inline(always)]
     pub(super) fn gate(&self) -> Gate {
+        self.faded_gate(self.primitive.forcing_table().fade(self.clock.value()))
+    }
+
+    /// Returns the gate past the end, or that of the demonstrated interval.
+    #[inline(always)]
+    fn faded_gate(&self, fade: Option<Fade>) -> Gate {
         let demonstrated = self.demonstrated_gate();
-        match self.primitive.forcing_table().fade(self.clock.value()) {
+        match fade {
             Some(Fade { r, r_slope, p_slope, .. }) => {
                 let phase_rate = self.perturbation.phase_rate();
                 Gate { r, r_slope: phase_rate * r_slope, phase_rate: phase_rate * p_slope, ..demonstrated }
