@@ -173,7 +173,7 @@ impl<T: Register> Row<T> {
 type Line = [f64; 2];
 
 /// Limits of one interval.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 struct IntervalLimits {
     /// Memory of five rows for each group.
     rows: Vec<Row<F64x4>>,
@@ -183,6 +183,8 @@ struct IntervalLimits {
     /// Largest a at the start due to the limits of the velocity in the middle.
     middle: Line,
 }
+
+clone_in_place!(IntervalLimits { rows, n_rows, most, middle });
 
 impl IntervalLimits {
     /// Visits the rows of interval `i`, and computes the limits of the velocity.

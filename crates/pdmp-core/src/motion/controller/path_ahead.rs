@@ -36,6 +36,9 @@ const TAIL: f64 = 0.3;
 const N_PERIODS: f64 = N_INTERVALS as f64 / N_MOVEMENT as f64;
 /// Part of an interval by which rounding may miss a knot.
 const ROUNDING: f64 = 1e-9;
+/// Rate up to which the curve is computed, relative to the largest that is needed: the line from there to a slower knot leaves the
+/// latter free.
+const RESERVE: f64 = 1.5;
 /// Relative difference of intervals that is rounding.
 const SAME_INTERVAL: f64 = 1e-12;
 /// Last position in an interval, past which there is still a distance to its end.
@@ -169,9 +172,12 @@ impl PathAhead {
 
     fn slopes_within(&self, index: usize, t: f64, x: f64, limits: &[RateLimits]) -> [f64; 2] {
         let [least, most] = compute(Slopes { path: &self.path, limits, index, t, x });
+        let (change, gap) = (self.change(index), self.curve.max[index] + self.change(index) * t - x);
+        // Below the curve, the filter of the rate does not exceed the rate that the curve was computed for.
+        if gap >= 0.0 && self.curve.max[index + 1] >= self.max_rate.powi(2) {
+            return [least, most];
+        }
         // A rate above the curve, by what the margins allow, returns over an interval even shortly before a knot.
-        let change = self.change(index);
-        let gap = self.curve.max[index] + change * t - x;
         let arrival = 0.5 * (change + gap / if gap < 0.0 { 1.0 } else { 1.0 - t }) / self.path.interval(index);
         [least, most.min(arrival)]
     }
@@ -367,6 +373,6 @@ impl Controller {
     /// Returns the largest rate on the way to any command up to it, at least the present one.
     fn max_rate(&self) -> f64 {
         let rest = self.rate_gains.max_displacement(&self.rate, 0).as_array()[0];
-        (first_element(self.rate.target()) + rest) * (1.0 + ROUNDING)
+        (first_element(self.rate.target()) + rest) * RESERVE
     }
 }

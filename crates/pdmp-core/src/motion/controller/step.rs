@@ -70,11 +70,13 @@ impl Controller {
     /// Returns the clock interval of the next `dt` seconds, ∫ρ dt.
     #[inline(always)]
     pub(super) fn clock_step(&mut self, dt: f64) -> f64 {
-        self.rate_slope = None;
-        if !self.admits_rate()
-            && let Some(h) = self.limit_rate(dt)
-        {
-            return h;
+        if let Some(governor) = &self.governor {
+            self.rate_slope = None;
+            if !self.admits_rate(governor)
+                && let Some(h) = self.limit_rate(dt)
+            {
+                return h;
+            }
         }
         if self.rate.is_settled() {
             return first_element(self.rate.value()) * dt;
