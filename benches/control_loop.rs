@@ -49,11 +49,21 @@ pub(crate) enum CommandLoad {
     Bound,
     /// As commanded, by a governor within limits.
     Governed,
+    /// As governed, along paths that limits slow down.
+    GovernedSlowed,
 }
 
 impl CommandLoad {
-    pub(crate) const ALL: [Self; 7] =
-        [Self::Settled, Self::InTransition, Self::Commanded, Self::Limited, Self::Slowed, Self::Bound, Self::Governed];
+    pub(crate) const ALL: [Self; 8] = [
+        Self::Settled,
+        Self::InTransition,
+        Self::Commanded,
+        Self::Limited,
+        Self::Slowed,
+        Self::Bound,
+        Self::Governed,
+        Self::GovernedSlowed,
+    ];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -64,6 +74,7 @@ impl CommandLoad {
             Self::Slowed => "slowed",
             Self::Bound => "at limits",
             Self::Governed => "governed",
+            Self::GovernedSlowed => "governed, slowed",
         }
     }
 
@@ -72,7 +83,7 @@ impl CommandLoad {
         match self {
             Self::Settled | Self::InTransition | Self::Commanded => None,
             Self::Limited | Self::Governed => Some(1e3),
-            Self::Slowed | Self::Bound => Some(2.0),
+            Self::Slowed | Self::Bound | Self::GovernedSlowed => Some(2.0),
         }
     }
 }
@@ -133,7 +144,7 @@ impl ControlLoop {
 
     /// Executes the measured tick.
     pub(crate) fn tick(&mut self) {
-        if matches!(self.load, CommandLoad::Commanded | CommandLoad::Governed) {
+        if matches!(self.load, CommandLoad::Commanded | CommandLoad::Governed | CommandLoad::GovernedSlowed) {
             self.command();
         } else {
             black_box(self.controller.step().expect("a tick"));

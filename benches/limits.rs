@@ -1,4 +1,5 @@
-//! Times of one tick within limits beside rsruckig, in one run: medians, tails and ratios.
+//! Times of one tick within limits beside rsruckig, in one run: medians, tails and ratios. Times of the fastest movement along a
+//! path.
 //!
 //! The loops alternate, so that a machine that slows down slows all of them. rsruckig differs in kind: it follows no learnt
 //! movement, but computes a trajectory within limits of position, velocity, acceleration and jerk when its target changes,
@@ -15,7 +16,7 @@ use std::time::Instant;
 
 use control_loop::{is_benchmark, model};
 use hdrhistogram::Histogram;
-use pdmp_core::motion::Limits;
+use pdmp_core::motion::{Limits, fastest};
 use pdmp_core::{Command, Conditions, Controller, Model};
 use rsruckig::prelude::*;
 
@@ -175,4 +176,22 @@ fn main() {
         let (often, worst, ratio) = (times[0].value_at_quantile(0.999), times[0].max(), tick / first);
         println!("| {name:<39} | {tick:>6.0} | {joint:>9.1} | {often:>6} | {worst:>8} | {ratio:>5.2} |");
     }
+    print_fastest(&model, n_rounds);
+}
+
+/// Prints the time of the fastest movement within limits that bind, of a thousand samples.
+fn print_fastest(model: &Model, n_rounds: usize) {
+    let (limits, conditions) = (limits(true), Conditions::default());
+    let limits = Limits { lower: None, upper: None, ..limits };
+    let movement = |dt: f64| fastest(model.primitive(), &limits, &conditions, dt).expect("a movement");
+    let dt = movement(DT).time.last().expect("a sample") / 1000.0;
+    let mut times: Vec<u128> = (0..n_rounds)
+        .map(|_| {
+            let begin = Instant::now();
+            black_box(movement(dt));
+            begin.elapsed().as_micros()
+        })
+        .collect();
+    times.sort_unstable();
+    println!("\nFastest movement of 1000 samples: median {} µs, minimum {} µs", times[n_rounds / 2], times[0]);
 }

@@ -318,7 +318,13 @@ impl ForcingTable {
 
     /// Returns the position of clock `u`. Past the end of a discrete movement the caller applies the [`Fade`].
     pub(crate) fn index(&self, u: f64) -> TableIndex {
-        match self.fade(u) {
+        self.faded_index(u, self.fade(u))
+    }
+
+    /// Returns the position of clock `u` with its [`ForcingTable::fade`].
+    #[inline(always)]
+    pub(crate) fn faded_index(&self, u: f64, fade: Option<Fade>) -> TableIndex {
+        match fade {
             Some(Fade { p, .. }) => TableIndex { first: (self.cells + 1) * self.knot_stride, t: p },
             None => self.demonstrated_index(u),
         }

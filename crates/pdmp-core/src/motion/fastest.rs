@@ -6,13 +6,14 @@ use crate::error::{Error, LimitError, Result};
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
+use crate::motion::command::Motion;
 use crate::motion::controller::Controller;
 use crate::motion::feasibility::slowdown;
 use crate::motion::limits::Limits;
-use crate::motion::rollout::follow;
-use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, TimeLaw};
-use crate::motion::trajectory::Trajectory;
-use crate::numerics::simd::groups;
+use crate::motion::time_law::{Derivatives, RateCurve, RateLimits, SampledPath, TimeLaw};
+use crate::motion::trajectory::{Trajectory, step_count};
+use crate::numerics::simd::{Kernel, Register, WIDTH, compute, groups, pack, unpad};
+use crate::validate::check_positive;
 
 /// Number of intervals of the path. Durations then are within 1e-3 of those of ten times this number.
 const N_INTERVALS: usize = 1000;
@@ -134,7 +135,48 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
     }
     let start = start.min(curve.max[0]);
     curve.reach(&path, &bounds, start);
-    follow(primitive, &conditions, TimeLaw::new(path.clock, &curve.max), dt)
+    follow(&path, &TimeLaw::new(&path.clock, &curve.max), primitive.n_dofs(), dt)
+}
+
+/// Samples the movement that follows a path by a time law, every `dt` seconds up to the first sample at its end or past it.
+///
+/// Between knots the path is that for which the law keeps the limits.
+fn follow(path: &SampledPath, law: &TimeLaw, n_dofs: usize, dt: f64) -> Result<Trajectory> {
+    check_positive("dt", dt)?;
+    let steps = step_count("duration", (law.duration() / dt).ceil() * dt, dt)?;
+    let mut interval = 0;
+    Trajectory::record("fastest", n_dofs, steps, dt, &mut |_| Ok(()), |_, time, motion| {
+        let at = law.at(time, interval);
+        interval = at.0;
+        compute(Sample { path, at, motion });
+        Ok(())
+    })
+}
+
+/// Kernel of [`follow`]: the motion in an interval for u, u̇ and ü.
+struct Sample<'a, 'b> {
+    path: &'a SampledPath,
+    at: (usize, [f64; 3]),
+    motion: &'a mut Motion<'b>,
+}
+
+impl Kernel for Sample<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { path, at: (i, [u, rate, change]), motion: Motion { position, velocity, acceleration } } = self;
+        let (interval, since) = (path.interval(i), u - path.clock[i]);
+        let (t, n_dofs) = (since / interval, position.len());
+        for (group, (here, next)) in path.knot(i).iter().zip(path.knot(i + 1)).enumerate() {
+            let dofs = group * WIDTH..n_dofs.min((group + 1) * WIDTH);
+            let [from, to] = [here, next].map(Derivatives::<T>::load);
+            let Derivatives { slope, bend } = from.between(to, interval, t);
+            unpad((T::load(&here[0]) + from.way(to, interval, t)).store(), &mut position[dofs.clone()]);
+            unpad((slope * rate).store(), &mut velocity[dofs.clone()]);
+            unpad((bend * (rate * rate) + slope * change).store(), &mut acceleration[dofs]);
+        }
+    }
 }
 
 /// Checks that the path keeps the limits of the position.
@@ -142,11 +184,17 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
 /// # Errors
 /// The first position outside.
 fn check_positions(path: &SampledPath, limits: &Limits, primitive: &Primitive) -> Result<()> {
+    if limits.lower.is_none() && limits.upper.is_none() {
+        return Ok(());
+    }
     let [lower, upper] = limits.position(primitive.n_dofs());
+    let [lowest, highest] = [&lower, &upper].map(|limits| pack(limits));
     for (i, u) in path.clock.iter().enumerate() {
-        let positions = path.knot(i).iter().flat_map(|[position, ..]| position.to_array());
-        for (dof, value) in positions.take(primitive.n_dofs()).enumerate() {
-            if value < lower[dof] || value > upper[dof] {
+        for (group, [position, ..]) in path.knot(i).iter().enumerate() {
+            let outside = position.simd_lt(lowest[group]) | position.simd_gt(highest[group]);
+            if outside.any() {
+                let lane = outside.to_bitmask().trailing_zeros() as usize;
+                let (dof, value) = (group * WIDTH + lane, position.as_array()[lane]);
                 let phase = u / primitive.canonical().extent();
                 let (lower, upper) = (lower[dof], upper[dof]);
                 return Err(Error::Limits(LimitError::LeftByPath { dof, value, lower, upper, phase }));

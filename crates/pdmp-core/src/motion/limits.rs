@@ -105,10 +105,7 @@ impl Limits {
                 if dof < n_dofs { limit_of_dof(limits, dof, f64::INFINITY) } else { f64::INFINITY }
             }))
         };
-        let of_group = |group| RateLimits {
-            velocity: lanes(&self.velocity, group),
-            acceleration: lanes(&self.acceleration, group),
-        };
+        let of_group = |group| RateLimits::new(lanes(&self.velocity, group), lanes(&self.acceleration, group));
         (0..groups(n_dofs)).map(of_group).collect()
     }
 

@@ -8,9 +8,7 @@ use crate::model::conditions::{Conditions, check_tau};
 use crate::model::primitive::Primitive;
 use crate::motion::command::{Command, Motion};
 use crate::motion::controller::Controller;
-use crate::motion::time_law::TimeLaw;
 use crate::motion::trajectory::{Trajectory, sampling_times, step_count};
-use crate::validate::check_positive;
 
 /// Number of ticks by which the forcing table is prefetched: about the latency of main memory.
 const PREFETCH_TICKS: f64 = 16.0;
@@ -86,15 +84,6 @@ pub fn rollout_with(
     sample(primitive, &conditions, clock, grid.dt, sampling_times(steps, grid.dt), progress)
 }
 
-/// Computes the movement that follows a time law: samples at t = 0, dt, … up to the first one at its end or past it.
-pub(crate) fn follow(primitive: &Arc<Primitive>, conditions: &Conditions, law: TimeLaw, dt: f64) -> Result<Trajectory> {
-    check_positive("dt", dt)?;
-    let steps = step_count("duration", (law.duration() / dt).ceil() * dt, dt)?;
-    let phase = law.at(0.0);
-    let clock = Clock::Warped { function: ClockFunction::Law(law), extent: primitive.tau(), phase };
-    sample(primitive, conditions, clock, dt, sampling_times(steps, dt), &mut |_| Ok(()))
-}
-
 /// Computes the movement under constant conditions at the given times in seconds, which increase from 0.
 ///
 /// # Errors
@@ -134,30 +123,14 @@ enum Clock {
     Linear,
     /// Time of the controller, in ticks of any length; the time after the last one, in seconds.
     Unequal { time: f64 },
-    /// Time warped by segment durations or a time law.
+    /// Time warped by segment durations.
     Warped {
-        function: ClockFunction,
+        function: WarpingFunction,
         /// Nominal time per unit of phase, in seconds.
         extent: f64,
         /// Phase p, ṗ and p̈.
         phase: [f64; 3],
     },
-}
-
-/// Phase p, ṗ and p̈ as a function of time.
-enum ClockFunction {
-    Warp(WarpingFunction),
-    /// Its phase is the clock u.
-    Law(TimeLaw),
-}
-
-impl ClockFunction {
-    fn phase(&self, time: f64) -> [f64; 3] {
-        match self {
-            Self::Warp(warp) => warp.phase(time),
-            Self::Law(law) => law.at(time),
-        }
-    }
 }
 
 impl Clock {
@@ -176,13 +149,13 @@ impl Clock {
         let warp = primitive.warping_function(segment_durations)?;
         let phase = warp.phase(0.0);
         let extent = primitive.tau * primitive.canonical().extent();
-        Ok(Self::Warped { function: ClockFunction::Warp(warp), extent, phase })
+        Ok(Self::Warped { function: warp, extent, phase })
     }
 
     /// Converts conditions to the time of the controller.
     fn conditions(&self, conditions: &Conditions) -> Conditions {
         let mut conditions = conditions.clone();
-        if let Self::Warped { function: ClockFunction::Warp(warp), extent, phase: [_, rate, _] } = self {
+        if let Self::Warped { function: warp, extent, phase: [_, rate, _] } = self {
             conditions.segment_durations = None;
             conditions.velocity.iter_mut().flatten().for_each(|v| *v /= extent * rate);
             let end_rate = warp.slope(1.0).recip();

@@ -13,13 +13,15 @@
 //! H. Pham, Q.-C. Pham, *A new approach to time-optimal path parameterization based on reachability analysis*, IEEE
 //! Transactions on Robotics 34(3), 2018.
 
-use crate::numerics::simd::F64x4;
+use crate::numerics::simd::{F64x4, Kernel, Register, compute};
 use crate::numerics::state::clone_in_place;
 
 /// Maximum number of Newton steps to a vertex; each removes a limit, and two to five suffice on recordings.
 const MAX_NEWTON_STEPS: usize = 64;
 /// Number added to β, far below any other: its inverse is finite.
 const MIN_BETA: f64 = 1e-200;
+/// Maximum number of rows of an interval for each group.
+const MAX_ROWS: usize = 5;
 /// Number of intervals from a reversal of a DoF within which its limits also hold in the quarters of an interval.
 const REVERSAL: f64 = 4.0;
 
@@ -28,217 +30,413 @@ const REVERSAL: f64 = 4.0;
 pub(crate) struct SampledPath {
     /// u at the knots, increasing.
     pub(crate) clock: Vec<f64>,
+    n_groups: usize,
     /// y, y′ and y″ (N + 1, groups of DoFs) by rows.
-    pub(crate) samples: Vec<[F64x4; 3]>,
+    samples: Vec<[F64x4; 3]>,
 }
 
-clone_in_place!(SampledPath { clock, samples });
+clone_in_place!(SampledPath { clock, n_groups, samples });
 
 impl SampledPath {
     /// Returns a path at knots that has not been sampled yet.
     pub(crate) fn at(clock: Vec<f64>, n_groups: usize) -> Self {
-        Self { samples: vec![[F64x4::ZERO; 3]; clock.len() * n_groups], clock }
+        Self { samples: vec![[F64x4::ZERO; 3]; clock.len() * n_groups], n_groups, clock }
     }
 
     /// Returns the samples of all groups at a knot.
     pub(crate) fn knot(&self, index: usize) -> &[[F64x4; 3]] {
-        let n_groups = self.samples.len() / self.clock.len();
-        &self.samples[index * n_groups..(index + 1) * n_groups]
+        &self.samples[index * self.n_groups..(index + 1) * self.n_groups]
+    }
+
+    /// Returns the clock and the samples of each knot.
+    pub(crate) fn knots_mut(&mut self) -> impl Iterator<Item = (f64, &mut [[F64x4; 3]])> {
+        self.clock.iter().copied().zip(self.samples.chunks_exact_mut(self.n_groups))
     }
 
     /// Returns the length of interval `index`, between this knot and the next.
+    #[inline(always)]
     pub(crate) fn interval(&self, index: usize) -> f64 {
         self.clock[index + 1] - self.clock[index]
     }
 
-    /// Returns y′ and y″ of all groups within interval `index`, at a position `t` from 0 to 1.
+    /// Returns the samples of all groups at both ends of interval `index`, with their limits.
     #[inline(always)]
-    pub(crate) fn within(&self, index: usize, t: f64) -> impl Iterator<Item = [F64x4; 2]> {
-        let interval = self.interval(index);
-        self.knot(index).iter().zip(self.knot(index + 1)).map(move |(here, next)| between(here, next, interval, t))
+    pub(crate) fn ends<'a>(
+        &'a self,
+        index: usize,
+        limits: &'a [RateLimits],
+    ) -> impl Iterator<Item = ([&'a [F64x4; 3]; 2], &'a RateLimits)> {
+        let n_groups = self.n_groups;
+        let samples = &self.samples[index * n_groups..(index + 2) * n_groups];
+        let limits = &limits[..n_groups];
+        (0..n_groups).map(move |group| ([&samples[group], &samples[group + n_groups]], &limits[group]))
     }
 }
 
-/// Returns y′ and y″ at a position `t` from 0 to 1 between two samples: the cubic Hermite interpolation of y′, and its
-/// derivative.
-#[inline(always)]
-fn between(
-    [_, slope, bend]: &[F64x4; 3],
-    [_, next_slope, next_bend]: &[F64x4; 3],
-    interval: f64,
-    t: f64,
-) -> [F64x4; 2] {
-    let (change, bends) = (*next_slope - *slope, [*bend * interval, *next_bend * interval]);
-    // p(t) = y′ + t(b₀ + t(c + td)) with p(1) and p′(1) of the next sample.
-    let c = change * 3.0 - bends[0] * 2.0 - bends[1];
-    let d = bends[0] + bends[1] - change * 2.0;
-    [*slope + (bends[0] + (c + d * t) * t) * t, (bends[0] + (c * 2.0 + d * (3.0 * t)) * t) * interval.recip()]
+/// y′ and y″ of a group.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Derivatives<T> {
+    pub(crate) slope: T,
+    pub(crate) bend: T,
+}
+
+impl<T: Register> Derivatives<T> {
+    /// Returns those of a sample.
+    #[inline(always)]
+    pub(crate) fn load([_, slope, bend]: &[F64x4; 3]) -> Self {
+        Self { slope: T::load(slope), bend: T::load(bend) }
+    }
+
+    /// Returns those at a position `t` from 0 to 1 in an interval: the cubic Hermite interpolation of y′, and its derivative.
+    #[inline(always)]
+    pub(crate) fn between(self, next: Self, interval: f64, t: f64) -> Self {
+        let [bend, c, d] = self.cubic(next, interval);
+        Self {
+            slope: self.slope + (bend + (c + d * t) * t) * t,
+            bend: (bend + (c * 2.0 + d * (3.0 * t)) * t) * interval.recip(),
+        }
+    }
+
+    /// Returns the change of y up to a position `t` in an interval: the integral of that interpolation.
+    #[inline(always)]
+    pub(crate) fn way(self, next: Self, interval: f64, t: f64) -> T {
+        let [bend, c, d] = self.cubic(next, interval);
+        (self.slope + (bend * 0.5 + (c * (1.0 / 3.0) + d * (0.25 * t)) * t) * t) * (interval * t)
+    }
+
+    /// Returns b, c and d of p(t) = y′ + t(b + t(c + td)) with p(1) and p′(1) of the next sample.
+    #[inline(always)]
+    fn cubic(self, next: Self, interval: f64) -> [T; 3] {
+        let (change, bends) = (next.slope - self.slope, [self.bend * interval, next.bend * interval]);
+        [bends[0], change * 3.0 - bends[0] * 2.0 - bends[1], bends[0] + bends[1] - change * 2.0]
+    }
 }
 
 /// Limits of velocity and acceleration of a group, infinite where there are none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RateLimits {
-    pub(crate) velocity: F64x4,
     pub(crate) acceleration: F64x4,
+    /// Inverses of the limits of velocity and acceleration.
+    inverse: [F64x4; 2],
+}
+
+impl RateLimits {
+    pub(crate) fn new(velocity: F64x4, acceleration: F64x4) -> Self {
+        // The inverse of the smallest numbers is infinite, and no factor of zero.
+        let inverse = |limit: F64x4| (F64x4::ONE / limit).fast_min(F64x4::splat(f64::MAX));
+        Self { acceleration, inverse: [velocity, acceleration].map(inverse) }
+    }
+
+    /// Returns the inverse of the largest x = ρ² that the limit of the velocity admits.
+    #[inline(always)]
+    pub(crate) fn of_velocity<T: Register>(&self, slope: T) -> T {
+        let ratio = slope * T::load(&self.inverse[0]);
+        ratio * ratio
+    }
+
+    /// Returns the inverse of the largest x with a = 0 that both limits admit.
+    #[inline(always)]
+    fn of_constant<T: Register>(&self, Derivatives { slope, bend }: Derivatives<T>) -> T {
+        self.of_velocity(slope).fast_max((bend * T::load(&self.inverse[1])).abs())
+    }
 }
 
 /// Limits |αx + βa| ≤ A of a group, as −α/β and A/|β|: a lies between slope·x − half and slope·x + half.
 #[derive(Clone, Copy, Debug)]
-struct Row {
-    slope: F64x4,
-    half: F64x4,
+struct Row<T> {
+    slope: T,
+    half: T,
 }
 
-impl Row {
+impl<T: Register> Row<T> {
     /// Returns the limits for α = y″ and β = y′ + `twice`·y″.
     #[inline(always)]
-    fn new([slope, bend]: [F64x4; 2], limits: &RateLimits, twice: f64) -> Self {
+    fn new(Derivatives { slope, bend }: Derivatives<T>, acceleration: T, twice: f64) -> Self {
         // For β = 0 the ends become steep lines instead of a bound of x.
-        let inverse = F64x4::ONE / (slope + bend * twice + F64x4::splat(MIN_BETA));
-        Self { slope: -bend * inverse, half: limits.acceleration * inverse.abs() }
+        let inverse = T::splat(1.0) / (slope + bend * twice + T::splat(MIN_BETA));
+        Self { slope: -bend * inverse, half: acceleration * inverse.abs() }
+    }
+
+    #[inline(always)]
+    fn load(row: &Row<F64x4>) -> Self {
+        Self { slope: T::load(&row.slope), half: T::load(&row.half) }
+    }
+
+    /// Returns the upper ends of a for a given x. The lower ends at x are minus the upper ones at −x.
+    #[inline(always)]
+    fn upper(&self, x: f64) -> T {
+        self.slope * x + self.half
     }
 }
 
 /// Line value + slope·x.
 type Line = [f64; 2];
 
-/// Largest x = ρ² at each knot of a path.
+/// Limits of one interval.
 #[derive(Debug, Default)]
-pub(crate) struct RateCurve {
-    /// Largest x from which the rest of the path can be followed.
-    pub(crate) max: Vec<f64>,
-    rows: Vec<Row>,
-    /// Largest a at the start of the interval due to the limit of the velocity in its middle.
+struct IntervalLimits {
+    /// Memory of five rows for each group.
+    rows: Vec<Row<F64x4>>,
+    n_rows: usize,
+    /// Largest x at the start due to the limits of the velocity there.
+    most: f64,
+    /// Largest a at the start due to the limits of the velocity in the middle.
     middle: Line,
 }
 
-impl Clone for RateCurve {
-    fn clone(&self) -> Self {
-        Self { max: self.max.clone(), rows: Vec::with_capacity(self.rows.capacity()), middle: self.middle }
-    }
+clone_in_place!(IntervalLimits { rows, n_rows, most, middle });
 
-    fn clone_from(&mut self, source: &Self) {
-        self.max.clone_from(&source.max);
-    }
-}
-
-impl RateCurve {
-    /// Returns a curve of `n_knots` knots for a path of `n_groups` groups, to be computed by [`RateCurve::compute`].
-    pub(crate) fn new(n_knots: usize, n_groups: usize) -> Self {
-        Self { max: vec![0.0; n_knots], rows: Vec::with_capacity(5 * n_groups), middle: [0.0; 2] }
-    }
-
-    /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x.
-    pub(crate) fn compute(&mut self, path: &SampledPath, limits: &[RateLimits], end: f64, max: f64) {
-        let last = path.clock.len() - 1;
-        self.max[last] = end.min(max_constant(path.within(last - 1, 1.0), limits)).min(max);
-        for i in (0..last).rev() {
-            let twice = 2.0 * path.interval(i);
-            let most = self.write_rows(path, limits, i).min(max);
-            self.max[i] = self.vertex(most, [[0.0, -1.0 / twice], [self.max[i + 1] / twice, -1.0 / twice]]);
-        }
-    }
-
-    /// Limits the curve to what can be reached from `start` ≤ max[0]: the time-optimal law.
-    pub(crate) fn reach(&mut self, path: &SampledPath, limits: &[RateLimits], start: f64) {
-        self.max[0] = start;
-        for i in 0..path.clock.len() - 1 {
-            let twice = 2.0 * path.interval(i);
-            self.write_rows(path, limits, i);
-            let x = self.max[i];
-            let [_, upper] = self.ends(x);
-            let most = upper.min(self.middle[0] + self.middle[1] * x);
-            self.max[i + 1] = self.max[i + 1].min(x + twice * most).max(0.0);
-        }
-    }
-
-    /// Writes the limits of interval `i`; returns the largest x at its start that the limits of the velocity admit.
-    fn write_rows(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) -> f64 {
+impl IntervalLimits {
+    /// Visits the rows of interval `i`, and computes the limits of the velocity.
+    #[inline(always)]
+    fn visit<T: Register>(
+        &mut self,
+        path: &SampledPath,
+        limits: &[RateLimits],
+        i: usize,
+        mut visit: impl FnMut(Row<T>),
+    ) {
         let interval = path.interval(i);
-        let [mut most, mut in_middle] = [F64x4::splat(f64::INFINITY); 2];
-        self.rows.clear();
-        for ((here, next), limits) in path.knot(i).iter().zip(path.knot(i + 1)).zip(limits) {
-            let middle = between(here, next, interval, 0.5);
-            let [rate, middle_rate] = [here[1], middle[0]].map(|slope| limits.velocity / slope.abs());
-            (most, in_middle) = (most.fast_min(rate * rate), in_middle.fast_min(middle_rate * middle_rate));
-            self.rows.push(Row::new([here[1], here[2]], limits, 0.0));
-            self.rows.push(Row::new(middle, limits, interval));
-            self.rows.push(Row::new([next[1], next[2]], limits, 2.0 * interval));
+        let [mut at_start, mut in_middle] = [T::default(); 2];
+        for (ends, limits) in path.ends(i, limits) {
+            let ([here, next], acceleration) = (ends.map(Derivatives::<T>::load), T::load(&limits.acceleration));
+            let middle = here.between(next, interval, 0.5);
+            at_start = at_start.fast_max(limits.of_velocity(here.slope));
+            in_middle = in_middle.fast_max(limits.of_velocity(middle.slope));
+            visit(Row::new(here, acceleration, 0.0));
+            visit(Row::new(middle, acceleration, interval));
+            visit(Row::new(next, acceleration, 2.0 * interval));
             // Near a reversal of a DoF its acceleration hardly depends on a, and varies most within the interval.
-            let (slowest, bend) = (here[1].abs().fast_min(next[1].abs()), here[2].abs().fast_max(next[2].abs()));
-            if slowest.simd_lt(bend * (REVERSAL * interval)).any() {
-                for t in [0.25, 0.75] {
-                    self.rows.push(Row::new(between(here, next, interval, t), limits, 2.0 * t * interval));
-                }
+            let (slowest, bend) =
+                (here.slope.abs().fast_min(next.slope.abs()), here.bend.abs().fast_max(next.bend.abs()));
+            if !(bend * (REVERSAL * interval)).simd_le(slowest).all() {
+                visit(Row::new(here.between(next, interval, 0.25), acceleration, 0.5 * interval));
+                visit(Row::new(here.between(next, interval, 0.75), acceleration, 1.5 * interval));
             }
         }
-        self.middle = [smallest(in_middle) / interval, -interval.recip()];
-        smallest(most)
+        self.most = largest(at_start).recip();
+        self.middle = [(largest(in_middle) * interval).recip(), -interval.recip()];
+    }
+
+    /// Computes the limits of interval `i`.
+    #[inline(always)]
+    fn compute<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) {
+        let (mut rows, mut n_rows) = (std::mem::take(&mut self.rows), 0);
+        self.visit(path, limits, i, |Row::<T> { slope, half }| {
+            rows[n_rows] = Row { slope: slope.store(), half: half.store() };
+            n_rows += 1;
+        });
+        (self.rows, self.n_rows) = (rows, n_rows);
+    }
+
+    /// Returns the largest a of interval `i` for a given x at its start.
+    #[inline(always)]
+    fn largest_slope<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize, x: f64) -> f64 {
+        let mut upper = T::splat(f64::INFINITY);
+        self.visit(path, limits, i, |row| upper = upper.fast_min(row.upper(x)));
+        upper.smallest().min(self.middle[0] + self.middle[1] * x)
     }
 
     /// Returns the largest lower and the smallest upper end of a for a given x.
     #[inline(always)]
-    fn ends(&self, x: f64) -> [f64; 2] {
-        let mut upper = F64x4::splat(f64::INFINITY);
-        let mut lower = -upper;
-        for row in &self.rows {
-            let centre = row.slope * x;
-            (lower, upper) = (lower.fast_max(centre - row.half), upper.fast_min(centre + row.half));
+    fn ends<T: Register>(&self, x: f64) -> [f64; 2] {
+        let [mut lower, mut upper] = [T::splat(f64::INFINITY); 2];
+        for row in &self.rows[..self.n_rows] {
+            let row = Row::<T>::load(row);
+            (lower, upper) = (lower.fast_min(row.upper(-x)), upper.fast_min(row.upper(x)));
         }
-        [-smallest(-lower), smallest(upper)]
+        [-lower.smallest(), upper.smallest()]
     }
 
-    /// Returns the slope of the row whose lower (`side` −1) or upper (1) end has a given value at x.
-    fn slope_of(&self, value: f64, x: f64, side: f64) -> f64 {
-        let ends = self.rows.iter().flat_map(|row| {
-            let end = row.slope * x + row.half * side;
-            end.to_array().into_iter().zip(row.slope.to_array())
-        });
-        ends.into_iter().find(|(end, _)| *end == value).map_or(0.0, |(_, slope)| slope)
+    /// Returns the slope of the row whose upper end at x is `upper`, the smallest one.
+    #[inline(always)]
+    fn slope_of<T: Register>(&self, upper: f64, x: f64) -> f64 {
+        for row in &self.rows[..self.n_rows] {
+            let is_smallest = Row::<T>::load(row).upper(x).simd_le(T::splat(upper)).to_bitmask();
+            if is_smallest != 0 {
+                return row.slope.as_array()[is_smallest.trailing_zeros() as usize];
+            }
+        }
+        0.0
     }
 
-    /// Returns the largest x up to `most` for which some a lies within all rows and between the lines `next`.
+    /// Returns the largest x up to `max` from which some a within the limits leads to at most `next` at the end of an interval of
+    /// half the length `twice`, and whether one leads to `next`.
     ///
-    /// The gap between the smallest upper and the largest lower end is concave in x and not negative at 0, so that Newton's
-    /// method from above reaches its zero in finitely many steps.
-    fn vertex(&self, most: f64, next: [Line; 2]) -> f64 {
-        let mut x = most;
-        for _ in 0..MAX_NEWTON_STEPS {
-            let [lower, upper] = self.ends(x);
-            let [least, arrival, middle] =
-                [next[0], next[1], self.middle].map(|[value, slope]| [value + slope * x, slope]);
-            let line = if middle[0] < arrival[0] { middle } else { arrival };
-            let gap = upper.min(line[0]) - lower.max(least[0]);
+    /// The gap between the smallest upper and the largest lower end is concave in x and not negative at 0. Newton's method begins
+    /// at `next`: the first step leads to its zero or past it, and from there finitely many steps lead back.
+    #[inline(always)]
+    fn largest_from<T: Register>(&self, next: f64, twice: f64, max: f64) -> (f64, bool) {
+        let per_twice = twice.recip();
+        let most = self.most.min(max);
+        let (mut x, mut leads) = (next.min(most), false);
+        for step in 0..MAX_NEWTON_STEPS {
+            let [lower, upper] = self.ends::<T>(x);
+            let (least, arrival) = (-x * per_twice, (next - x) * per_twice);
+            let middle = self.middle[0] + self.middle[1] * x;
+            leads = arrival <= middle.min(upper);
+            let line = if arrival <= middle { [arrival, -per_twice] } else { [middle, self.middle[1]] };
+            let gap = upper.min(line[0]) - lower.max(least);
+            if gap >= 0.0 && (step > 0 || x >= most) {
+                break;
+            }
+            let upper_slope = if line[0] <= upper { line[1] } else { self.slope_of::<T>(upper, x) };
+            let lower_slope = if least >= lower { -per_twice } else { self.slope_of::<T>(-lower, -x) };
+            let (crossing, closes) = (x + gap / (lower_slope - upper_slope), lower_slope > upper_slope);
             if gap >= 0.0 {
+                x = if closes { crossing.min(most) } else { most };
+            } else if closes && crossing < x {
+                x = crossing.max(0.0);
+            } else {
                 break;
             }
-            let upper_slope = if line[0] <= upper { line[1] } else { self.slope_of(upper, x, 1.0) };
-            let lower_slope = if least[0] >= lower { least[1] } else { self.slope_of(lower, x, -1.0) };
-            let crossing = x + gap / (lower_slope - upper_slope);
-            if crossing >= x || crossing.is_nan() {
-                break;
-            }
-            x = crossing.max(0.0);
         }
-        x
+        (x, leads)
     }
 }
 
-/// Returns the largest x with a = 0 that the limits admit at y′ and y″ of all groups.
-#[inline(always)]
-pub(crate) fn max_constant(derivatives: impl Iterator<Item = [F64x4; 2]>, limits: &[RateLimits]) -> f64 {
-    let most = derivatives.zip(limits).fold(F64x4::splat(f64::INFINITY), |most, ([slope, bend], limits)| {
-        let rate = limits.velocity / slope.abs();
-        most.fast_min(rate * rate).fast_min(limits.acceleration / bend.abs())
-    });
-    smallest(most)
+/// Largest x = ρ² at each knot of a path.
+#[derive(Debug)]
+pub(crate) struct RateCurve {
+    /// Largest x from which the rest of the path can be followed.
+    pub(crate) max: Vec<f64>,
+    /// Largest x with a = 0 at each knot and in the middle of the interval that follows, 0 where it is not known.
+    pub(crate) constant: Vec<f64>,
+    /// True where some a leads from the largest x to the next one.
+    leads: Vec<bool>,
+    interval: IntervalLimits,
 }
 
-/// Returns the smallest lane.
+clone_in_place!(RateCurve { max, constant, leads, interval });
+
+impl RateCurve {
+    /// Returns a curve of `n_knots` knots for a path of `n_groups` groups, to be computed by [`RateCurve::compute`].
+    pub(crate) fn new(n_knots: usize, n_groups: usize) -> Self {
+        let none = Row { slope: F64x4::ZERO, half: F64x4::ZERO };
+        let interval = IntervalLimits { rows: vec![none; MAX_ROWS * n_groups], ..IntervalLimits::default() };
+        Self { max: vec![0.0; n_knots], constant: vec![0.0; n_knots], leads: vec![false; n_knots], interval }
+    }
+
+    /// Computes the largest constant rates, with which [`RateCurve::compute`] is faster where they suffice.
+    pub(crate) fn compute_constant(&mut self, path: &SampledPath, limits: &[RateLimits]) {
+        compute(Constant { curve: self, path, limits });
+    }
+
+    /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x.
+    pub(crate) fn compute(&mut self, path: &SampledPath, limits: &[RateLimits], end: f64, max: f64) {
+        compute(Backward { curve: self, path, limits, end, max });
+    }
+
+    /// Limits the curve to what can be reached from `start` ≤ max[0]: the time-optimal law.
+    pub(crate) fn reach(&mut self, path: &SampledPath, limits: &[RateLimits], start: f64) {
+        compute(Forward { curve: self, path, limits, start });
+    }
+}
+
+/// Returns the largest lane.
 #[inline(always)]
-fn smallest(lanes: F64x4) -> f64 {
-    let [a, b, c, d] = lanes.to_array();
-    a.min(b).min(c.min(d))
+pub(crate) fn largest<T: Register>(lanes: T) -> f64 {
+    -(-lanes).smallest()
+}
+
+/// Returns the largest x with a = 0 at the last knot.
+#[inline(always)]
+fn last_constant<T: Register>(path: &SampledPath, limits: &[RateLimits]) -> f64 {
+    let mut inverse = T::default();
+    for ([_, here], limits) in path.ends(path.clock.len() - 2, limits) {
+        inverse = inverse.fast_max(limits.of_constant(Derivatives::load(here)));
+    }
+    largest::<T>(inverse).recip()
+}
+
+/// Kernel of [`RateCurve::compute_constant`].
+struct Constant<'a> {
+    curve: &'a mut RateCurve,
+    path: &'a SampledPath,
+    limits: &'a [RateLimits],
+}
+
+impl Kernel for Constant<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { curve, path, limits } = self;
+        let last = curve.constant.len() - 1;
+        for (i, constant) in curve.constant[..last].iter_mut().enumerate() {
+            let (interval, mut inverse) = (path.interval(i), T::default());
+            for (ends, limits) in path.ends(i, limits) {
+                let [here, next] = ends.map(Derivatives::<T>::load);
+                inverse = inverse.fast_max(limits.of_constant(here));
+                inverse = inverse.fast_max(limits.of_constant(here.between(next, interval, 0.5)));
+            }
+            *constant = largest(inverse).recip();
+        }
+        curve.constant[last] = last_constant::<T>(path, limits);
+    }
+}
+
+/// Kernel of [`RateCurve::compute`].
+struct Backward<'a> {
+    curve: &'a mut RateCurve,
+    path: &'a SampledPath,
+    limits: &'a [RateLimits],
+    end: f64,
+    max: f64,
+}
+
+impl Kernel for Backward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { curve, path, limits, end, max } = self;
+        let RateCurve { max: largest, constant, leads, interval } = curve;
+        let last = path.clock.len() - 1;
+        let (largest, constant, leads) = (&mut largest[..=last], &constant[..=last], &mut leads[..=last]);
+        let mut next = end.min(last_constant::<T>(path, limits)).min(max);
+        largest[last] = next;
+        for i in (0..last).rev() {
+            // Where the largest rate can be kept, nothing else needs to be computed.
+            let keeps = next >= max && constant[i] >= max && constant[i + 1] >= max;
+            if keeps {
+                (next, leads[i]) = (max, true);
+            } else {
+                interval.compute::<T>(path, limits, i);
+                (next, leads[i]) = interval.largest_from::<T>(next, 2.0 * path.interval(i), max);
+            }
+            largest[i] = next;
+        }
+    }
+}
+
+/// Kernel of [`RateCurve::reach`].
+struct Forward<'a> {
+    curve: &'a mut RateCurve,
+    path: &'a SampledPath,
+    limits: &'a [RateLimits],
+    start: f64,
+}
+
+impl Kernel for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { curve, path, limits, start } = self;
+        let RateCurve { max: largest, leads, interval, .. } = curve;
+        let mut on_curve = start >= largest[0];
+        largest[0] = start;
+        for i in 0..path.clock.len() - 1 {
+            if on_curve && leads[i] {
+                continue;
+            }
+            let (x, twice) = (largest[i], 2.0 * path.interval(i));
+            let reached = (x + twice * interval.largest_slope::<T>(path, limits, i, x)).max(0.0);
+            on_curve = reached >= largest[i + 1];
+            largest[i + 1] = largest[i + 1].min(reached);
+        }
+    }
 }
 
 /// Time law u(t): pieces of constant ü.
@@ -253,8 +451,8 @@ pub(crate) struct TimeLaw {
 
 impl TimeLaw {
     /// Returns the time law from x = ρ² at knots of the clock.
-    pub(crate) fn new(clock: Vec<f64>, x: &[f64]) -> Self {
-        let rate: Vec<f64> = x.iter().map(|x| x.sqrt()).collect();
+    pub(crate) fn new(clock: &[f64], x: &[f64]) -> Self {
+        let (clock, rate): (_, Vec<f64>) = (clock.to_vec(), x.iter().map(|x| x.sqrt()).collect());
         let mut time = Vec::with_capacity(rate.len());
         time.push(0.0);
         for (ends, knots) in rate.windows(2).zip(clock.windows(2)) {
@@ -268,14 +466,14 @@ impl TimeLaw {
         self.time[self.time.len() - 1]
     }
 
-    /// Returns u, u̇ and ü at time `t`; past the end, those of the end.
-    pub(crate) fn at(&self, t: f64) -> [f64; 3] {
+    /// Returns the interval that contains time `t`, from interval `first` on, and u, u̇ and ü; past the end, those of the end.
+    pub(crate) fn at(&self, t: f64, first: usize) -> (usize, [f64; 3]) {
         let last = self.time.len() - 2;
-        let i = self.time.partition_point(|knot| *knot <= t).saturating_sub(1).min(last);
+        let i = (first..last).find(|i| self.time[i + 1] > t).unwrap_or(last);
         let length = self.time[i + 1] - self.time[i];
         let a = (self.rate[i + 1] - self.rate[i]) / length;
         let since = (t - self.time[i]).clamp(0.0, length);
         let u = self.clock[i] + (self.rate[i] + 0.5 * a * since) * since;
-        [u, self.rate[i] + a * since, if t <= self.duration() { a } else { 0.0 }]
+        (i, [u, self.rate[i] + a * since, if t <= self.duration() { a } else { 0.0 }])
     }
 }

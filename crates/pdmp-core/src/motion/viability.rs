@@ -21,7 +21,7 @@
 //! most −√(B|d|), which half of B brakes to rest at the limit, and at most V in magnitude.
 
 use crate::motion::limits::Limit;
-use crate::numerics::simd::F64x4;
+use crate::numerics::simd::{F64x4, Register};
 
 /// Shortest length of a tick in seconds whose accelerations are finite. What a longer tick may do, a shorter one may too.
 pub(crate) const MIN_TICK: f64 = 1e-100;
@@ -44,37 +44,33 @@ impl Bounds {
     /// position and velocity at its ends, and `acceleration` that at the end. Between them the cubic through both, by which a
     /// robot interpolates, keeps the limits of the position.
     #[inline(always)]
-    pub(crate) fn admits(&self, from: [F64x4; 2], to: [F64x4; 2], acceleration: F64x4, h: f64) -> F64x4 {
-        let [[y, v], [y_end, v_end]] = [from, to];
-        let (above, below) = (self.upper - y_end, y_end - self.lower);
-        let (ahead, braking) = (v_end.max(F64x4::ZERO), self.braking * 2.0);
-        let behind = (-v_end).max(F64x4::ZERO);
-        let kept = (v_end - v).abs().simd_le(self.acceleration * h)
-            & acceleration.abs().simd_le(self.acceleration)
-            & v_end.abs().simd_le(self.velocity)
-            & (ahead * ahead).simd_le(braking * above)
-            & (behind * behind).simd_le(braking * below)
-            & above.simd_ge(F64x4::ZERO)
-            & below.simd_ge(F64x4::ZERO)
-            & self.admits_way(y_end - y, v + v_end, y_end, h);
+    pub(crate) fn admits<T: Register>(&self, from: [T; 2], to: [T; 2], acceleration: T, h: f64) -> T {
+        let ([[y, v], [y_end, v_end]], zero) = ([from, to], T::default());
+        let [lower, upper, max_velocity, max_acceleration, braking] =
+            [&self.lower, &self.upper, &self.velocity, &self.acceleration, &self.braking].map(T::load);
+        let (above, below) = (upper - y_end, y_end - lower);
+        let (square, twice) = (v_end * v_end.abs(), braking * 2.0);
+        let kept = (v_end - v).abs().simd_le(max_acceleration * h)
+            & acceleration.abs().simd_le(max_acceleration)
+            & v_end.abs().simd_le(max_velocity)
+            & square.simd_le(twice * above)
+            & (-square).simd_le(twice * below)
+            & zero.simd_le(above)
+            & zero.simd_le(below);
+        // Within both limits, the DoF can move by this distance.
+        let rounding = y_end.abs() * (4.0 * f64::EPSILON);
+        let way = y_end - y;
+        let detour = (way - (v + v_end) * (0.5 * h)).abs();
+        let kept = kept
+            & (way.abs() - rounding).simd_le(max_velocity * h)
+            & (detour - rounding).simd_le(max_acceleration * h * (0.25 * h));
         // The cubic lies between the least and the greatest of its Bézier points.
         let (first, last) = (y + v * (h / 3.0), y_end - v_end * (h / 3.0));
-        let (least, greatest) = (first.min(last), first.max(last));
-        if (greatest.simd_le(self.upper) & least.simd_ge(self.lower)).all() {
+        if (first.fast_max(last).simd_le(upper) & lower.simd_le(first.fast_min(last))).all() {
             return kept;
         }
-        let [least, greatest] = extremes([y, v], [y_end, v_end], h);
-        kept & greatest.simd_le(self.upper) & least.simd_ge(self.lower)
-    }
-
-    /// Returns the lanes in which a motion within the limits of velocity and acceleration can move by `dy` to `y_end` over a tick
-    /// of length `h`, where `sum` is that of the velocities at its ends.
-    #[inline(always)]
-    fn admits_way(&self, dy: F64x4, sum: F64x4, y_end: F64x4, h: f64) -> F64x4 {
-        let rounding = y_end.abs() * (4.0 * f64::EPSILON);
-        let detour = (dy - sum * (0.5 * h)).abs();
-        (dy.abs() - rounding).simd_le(self.velocity * h)
-            & (detour - rounding).simd_le(self.acceleration * h * (0.25 * h))
+        let [least, greatest] = extremes([y, v].map(T::store), [y_end, v_end].map(T::store), h);
+        kept & T::load(&greatest).simd_le(upper) & lower.simd_le(T::load(&least))
     }
 
     /// Returns the lanes in which the velocity may change to `to` at once: those where it does not change, or where its change

@@ -1,5 +1,7 @@
 //! Numerical methods that are independent of movements.
 
+#[cfg(target_arch = "x86_64")]
+mod avx;
 pub(crate) mod linear_algebra;
 pub(crate) mod orthonormal_span;
 #[cfg(test)]

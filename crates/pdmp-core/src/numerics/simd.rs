@@ -4,7 +4,7 @@
 //! full registers for every D. An operation rounds each lane as it rounds a scalar, so that results do not depend on the
 //! register width of the machine.
 
-use std::ops::{Add, Mul, Range, Sub};
+use std::ops::{Add, BitAnd, Div, Mul, Neg, Range, Sub};
 
 /// Group of four DoFs in memory, and the portable register type.
 pub(crate) type F64x4 = wide::f64x4;
@@ -21,17 +21,39 @@ pub(crate) trait Real:
 impl Real for f64 {}
 impl Real for F64x4 {}
 
-/// Register of four DoFs.
-pub(crate) trait Register: Real {
+/// Register of four DoFs. Comparisons return masks, lanes of ones or zeros in all bits.
+pub(crate) trait Register:
+    Real + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self> + BitAnd<Output = Self>
+{
     /// Loads a group from memory.
     fn load(lanes: &F64x4) -> Self;
     /// Returns the lanes as a group.
     fn store(self) -> F64x4;
+    /// Returns the magnitudes.
+    fn abs(self) -> Self;
+    /// Returns the smaller lanes, those of `other` where one is no number.
+    fn fast_min(self, other: Self) -> Self;
+    /// Returns the larger lanes, those of `other` where one is no number.
+    fn fast_max(self, other: Self) -> Self;
+    /// Returns the lanes that are at most those of `limit`.
+    fn simd_le(self, limit: Self) -> Self;
+    /// Returns the lanes that are less than those of `limit`.
+    fn simd_lt(self, limit: Self) -> Self;
+    /// Returns a mask as bits, the first lane as the lowest one.
+    fn to_bitmask(self) -> u32;
+    /// Returns the smallest lane.
+    fn smallest(self) -> f64;
 
     /// Returns a register with the same value in all lanes.
     #[inline(always)]
     fn splat(value: f64) -> Self {
         Self::load(&F64x4::splat(value))
+    }
+
+    /// Returns whether a mask holds in every lane.
+    #[inline(always)]
+    fn all(self) -> bool {
+        self.to_bitmask() == (1 << WIDTH) - 1
     }
 }
 
@@ -45,6 +67,69 @@ impl Register for F64x4 {
     fn store(self) -> F64x4 {
         self
     }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self::abs(self)
+    }
+
+    #[inline(always)]
+    fn fast_min(self, other: Self) -> Self {
+        Self::fast_min(self, other)
+    }
+
+    #[inline(always)]
+    fn fast_max(self, other: Self) -> Self {
+        Self::fast_max(self, other)
+    }
+
+    #[inline(always)]
+    fn simd_le(self, limit: Self) -> Self {
+        Self::simd_le(self, limit)
+    }
+
+    #[inline(always)]
+    fn simd_lt(self, limit: Self) -> Self {
+        Self::simd_lt(self, limit)
+    }
+
+    #[inline(always)]
+    fn to_bitmask(self) -> u32 {
+        Self::to_bitmask(self)
+    }
+
+    #[inline(always)]
+    fn smallest(self) -> f64 {
+        let lesser = |a: f64, b: f64| if a < b { a } else { b };
+        let [a, b, c, d] = self.to_array();
+        lesser(lesser(a, c), lesser(b, d))
+    }
+}
+
+/// Formula in registers of any type.
+pub(crate) trait Kernel {
+    type Output;
+
+    /// Computes the formula. Implementations are `inline(always)`, as is all that they call with registers.
+    fn run<T: Register>(self) -> Self::Output;
+}
+
+/// Computes a formula in the largest registers of the processor.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(crate) fn compute<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { super::avx::compute(kernel) };
+    }
+    compute_portable(kernel)
+}
+
+/// Computes a formula with the instructions of every processor. It stays a call, so that its callers stay small.
+#[inline(never)]
+fn compute_portable<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<F64x4>()
 }
 
 /// Flushes values far below `rest` to zero.

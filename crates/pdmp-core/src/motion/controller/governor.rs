@@ -98,9 +98,8 @@ impl Controller {
         let governor = self.governor.take().or_else(|| self.idle_governor.take());
         let mut governor = governor.unwrap_or_else(|| Box::new(Governor::new(self)));
         governor.limits.clear();
-        governor.limits.extend(self.limiter.bounds.iter().map(|bounds| RateLimits {
-            velocity: bounds.velocity * (1.0 - MARGINS[0]),
-            acceleration: bounds.acceleration * (1.0 - MARGINS[1]),
+        governor.limits.extend(self.limiter.bounds.iter().map(|bounds| {
+            RateLimits::new(bounds.velocity * (1.0 - MARGINS[0]), bounds.acceleration * (1.0 - MARGINS[1]))
         }));
         self.governor = Some(governor);
     }
@@ -139,9 +138,18 @@ impl Controller {
     /// Samples the path ahead again if necessary, and tries again to accept a command.
     #[inline(always)]
     pub(super) fn refresh_path(&mut self) {
-        let rhythmic = self.primitive.kind() == Kind::Rhythmic;
+        if self.governor.is_some() {
+            self.refresh_governed_path();
+        }
+    }
+
+    /// Samples the path ahead again as [`Controller::refresh_path`]. It stays a call, so that the tick of a free movement stays
+    /// small.
+    #[inline(never)]
+    fn refresh_governed_path(&mut self) {
         let Some(governor) = &self.governor else { return };
-        let is_due = governor.ahead.is_due(rhythmic);
+        let rhythmic = self.primitive.kind() == Kind::Rhythmic;
+        let is_due = governor.ahead.is_due(first_element(self.rate.target()), rhythmic);
         let tries = governor.pending && (governor.share < 1.0 || governor.ahead.has_progressed());
         if tries && self.accept(Changes::PATH) {
             return;

@@ -172,7 +172,10 @@ impl Limiter {
     }
 
     /// Returns the goal or anchor closest to the commanded one inside the limits.
-    pub(super) fn accept(&mut self, commanded: &[f64]) -> &[f64] {
+    pub(super) fn accept<'a>(&'a mut self, commanded: &'a [f64]) -> &'a [f64] {
+        if !self.active {
+            return commanded;
+        }
         for (group, (accepted, commanded)) in self.centre.chunks_mut(WIDTH).zip(commanded.chunks(WIDTH)).enumerate() {
             let Bounds { lower, upper, .. } = self.bounds[group];
             unpad(padded(commanded).max(lower).min(upper), accepted);

@@ -17,7 +17,7 @@ use crate::dynamics::output_system::Attractor;
 use crate::error::Result;
 use crate::motion::limits::{Limit, Limits};
 use crate::motion::viability::MIN_TICK;
-use crate::numerics::simd::{F64x4, WIDTH, unpack};
+use crate::numerics::simd::{F64x4, Kernel, Register, WIDTH, compute, unpack};
 
 /// Rate ρ, relative to the nominal one, below which the change of z is that of this rate: it would be unbounded in a pause.
 const MIN_RATE: f64 = 0.01;
@@ -136,17 +136,8 @@ impl Controller {
     /// Applies the limits to the tick of `dt` seconds and `h` on the clock that has just been computed, from ρ = `rate`.
     #[inline(always)]
     pub(super) fn enforce_limits(&mut self, dt: f64, h: f64, rate: f64) {
-        let mut kept_by_all = true;
-        for index in 0..self.groups.len() {
-            let (bounds, [y, v, _]) = (&self.limiter.bounds[index], self.limiter.before[index]);
-            let motion = [self.position[index], self.velocity[index]];
-            // The acceleration at the end of the tick, of which little belongs to this tick, is published within its limit.
-            self.acceleration[index] = self.acceleration[index].max(-bounds.acceleration).min(bounds.acceleration);
-            kept_by_all &= bounds.admits([y, v], motion, self.acceleration[index], dt).all();
-            if self.limiter.has_jerk() {
-                kept_by_all &= !self.breaks_jerk(index, dt).any();
-            }
-        }
+        let kept_by_all = compute(Admission { controller: self, dt })
+            && !(self.limiter.has_jerk() && (0..self.groups.len()).any(|index| self.breaks_jerk(index, dt).any()));
         if !(kept_by_all && self.limiter.is_free && self.perturbation.limited_rate() == 1.0) {
             self.limit(dt, h, rate);
         }
@@ -158,6 +149,22 @@ impl Controller {
             self.name_limits(dt, slows);
         }
         self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
+    }
+
+    /// Reduces the accelerations at the end of a tick of `dt` seconds, of which little belongs to this tick, to their limits.
+    /// Returns whether all DoFs kept the other limits.
+    #[inline(always)]
+    fn admits_tick<T: Register>(&mut self, dt: f64) -> bool {
+        let Self { limiter, position, velocity, acceleration, .. } = self;
+        let mut kept_by_all = true;
+        for (index, (bounds, [y, v, _])) in limiter.bounds.iter().zip(&limiter.before).enumerate() {
+            let largest = T::load(&bounds.acceleration);
+            let reduced = T::load(&acceleration[index]).fast_max(-largest).fast_min(largest);
+            acceleration[index] = reduced.store();
+            let [from, to] = [[y, v], [&position[index], &velocity[index]]].map(|state| state.map(T::load));
+            kept_by_all &= bounds.admits(from, to, reduced, dt).all();
+        }
+        kept_by_all
     }
 
     /// Names the DoFs that are near a limit which slows the clock.
@@ -295,5 +302,20 @@ impl Controller {
         let (rate, largest) = (self.finite_rate(), F64x4::splat(f64::MAX));
         let Attractor { alpha_z, beta_z } = self.primitive.attractor();
         (acceleration * (1.0 / (rate * rate * alpha_z * beta_z))).max(-largest).min(largest)
+    }
+}
+
+/// Kernel of [`Controller::admits_tick`].
+struct Admission<'a> {
+    controller: &'a mut Controller,
+    dt: f64,
+}
+
+impl Kernel for Admission<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<T: Register>(self) -> bool {
+        self.controller.admits_tick::<T>(self.dt)
     }
 }

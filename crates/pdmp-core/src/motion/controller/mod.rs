@@ -11,8 +11,6 @@
 //! training data, in one step if it is shorter than 1/500 of the movement and 1/95 of each transition in progress, and in
 //! proportionally many substeps otherwise, at most 1000.
 
-#[cfg(target_arch = "x86_64")]
-mod avx;
 mod forecast;
 mod getters;
 mod goal;

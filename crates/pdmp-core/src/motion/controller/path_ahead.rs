@@ -12,13 +12,13 @@ use super::step::first_element;
 use crate::dynamics::canonical::Canonical;
 use crate::error::Result;
 use crate::kind::Kind;
-use crate::motion::time_law::{RateCurve, RateLimits, SampledPath, max_constant};
+use crate::motion::time_law::{Derivatives, RateCurve, RateLimits, SampledPath, largest};
 use crate::motion::viability::Bounds;
-use crate::numerics::simd::F64x4;
+use crate::numerics::simd::{Kernel, Register, compute};
 use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Number of intervals of the path. Learnt from recordings, y″ between the knots is within 1 % of its maximum.
-const N_INTERVALS: usize = 640;
+const N_INTERVALS: usize = 576;
 /// Number of intervals of a whole movement or period; past the end of a discrete movement are the others.
 const N_MOVEMENT: usize = 512;
 /// Number of intervals after which a path that was left is sampled again.
@@ -36,6 +36,11 @@ const TAIL: f64 = 0.3;
 const N_PERIODS: f64 = N_INTERVALS as f64 / N_MOVEMENT as f64;
 /// Part of an interval by which rounding may miss a knot.
 const ROUNDING: f64 = 1e-9;
+/// Rate up to which the curve is computed, relative to the largest that is needed: the line from there to a slower knot leaves the
+/// latter free.
+const RESERVE: f64 = 1.5;
+/// Relative difference of intervals that is rounding.
+const SAME_INTERVAL: f64 = 1e-12;
 /// Last position in an interval, past which there is still a distance to its end.
 const LAST: f64 = 1.0 - 1e-6;
 /// Maximum ωh of a substep of the path during a transition of commands; the path then deviates by 1e-5 of the change.
@@ -45,14 +50,15 @@ const MAX_TRANSITION_STEP: f64 = 14.0;
 #[derive(Debug)]
 pub(super) struct PathAhead {
     path: SampledPath,
+    /// Largest ρ² at the knots, and the largest that can be kept constant from each interval on for the longest substep.
     curve: RateCurve,
-    /// Largest ρ² that can be kept constant from each interval on for the longest substep.
-    constant: Vec<f64>,
+    /// Rate up to which the curve was computed.
+    max_rate: f64,
     pieces: [Piece; 2],
     pub(super) position: PathPosition,
 }
 
-clone_in_place!(PathAhead { path, curve, constant, pieces, position });
+clone_in_place!(PathAhead { path, curve, max_rate, pieces, position });
 
 /// Position of a movement on its path.
 #[derive(Clone, Copy, Debug, Default)]
@@ -77,7 +83,7 @@ impl PathAhead {
         Self {
             path: SampledPath::at(vec![0.0; N_INTERVALS + 1], n_groups),
             curve: RateCurve::new(N_INTERVALS + 1, n_groups),
-            constant: vec![0.0; N_INTERVALS + 1],
+            max_rate: 0.0,
             pieces: [Piece::default(); 2],
             position: PathPosition::default(),
         }
@@ -95,20 +101,18 @@ impl PathAhead {
         let longest = self.pieces[0].interval.max(self.pieces[1].interval);
         sampler.max_clock_step = longest * (1.0 + 1e-9);
         sampler.sample_path(&mut self.path);
-        for (i, constant) in self.constant.iter_mut().enumerate() {
-            let interval = i.min(N_INTERVALS - 1);
-            let here = max_constant(self.path.within(interval, (i - interval) as f64), limits);
-            *constant = here.min(max_constant(self.path.within(interval, 0.5), limits));
-        }
+        self.curve.compute_constant(&self.path, limits);
         let rhythmic = controller.primitive.kind() == Kind::Rhythmic;
-        let end = if rhythmic { self.constant.iter().copied().fold(f64::INFINITY, f64::min) } else { f64::INFINITY };
-        self.curve.compute(&self.path, limits, end, controller.max_rate().powi(2));
-        self.constant.iter_mut().zip(&self.curve.max).for_each(|(constant, max)| *constant = constant.min(*max));
-        for i in 0..self.constant.len() {
-            let end = self.path.clock[i] + controller.max_clock_step;
-            let within =
-                (i + 1..self.constant.len()).take_while(|k| self.path.clock[k - 1] <= end + self.path.interval(i));
-            self.constant[i] = within.fold(self.constant[i], |least, k| least.min(self.constant[k]));
+        let end =
+            if rhythmic { self.curve.constant.iter().copied().fold(f64::INFINITY, f64::min) } else { f64::INFINITY };
+        self.max_rate = controller.max_rate();
+        self.curve.compute(&self.path, limits, end, self.max_rate.powi(2));
+        let (clock, RateCurve { constant, max, .. }) = (&self.path.clock, &mut self.curve);
+        constant.iter_mut().zip(max).for_each(|(constant, max)| *constant = constant.min(*max));
+        for i in 0..constant.len() - 1 {
+            let end = clock[i + 1] + controller.max_clock_step;
+            let within = (i + 1..constant.len()).take_while(|k| clock[k - 1] <= end);
+            constant[i] = within.fold(constant[i], |least, k| least.min(constant[k]));
         }
         self.position = PathPosition { progress: 0.0, is_current: true };
     }
@@ -116,21 +120,7 @@ impl PathAhead {
     /// Returns the largest distance of the rest of the path beyond the limits of the position, relative to the ranges.
     pub(super) fn distance_outside(&self, bounds: &[Bounds], groups: &[Group]) -> f64 {
         let (first, _) = self.locate(self.position.progress);
-        let mut farthest = F64x4::ZERO;
-        for knot in first..N_INTERVALS {
-            let interval = self.path.interval(knot);
-            let samples = self.path.knot(knot).iter().zip(self.path.knot(knot + 1));
-            for ((([y, slope, _], [next, next_slope, _]), bounds), group) in samples.zip(bounds).zip(groups) {
-                let outside = |y: F64x4| (y - bounds.upper).max(bounds.lower - y) / group.range;
-                farthest = farthest.max(outside(*next));
-                let turns = (*slope * *next_slope).simd_lt(F64x4::ZERO);
-                if turns.any() {
-                    let turning = *y + *slope * *slope / (*slope - *next_slope) * (0.5 * interval);
-                    farthest = farthest.max(turns.select(outside(turning) + TURNING, F64x4::ZERO));
-                }
-            }
-        }
-        farthest.to_array().into_iter().fold(0.0, f64::max)
+        compute(Outside { path: &self.path, first, bounds, groups })
     }
 
     /// Returns the interval that contains a progress, and the position in it from 0 to 1, past the end that at its end.
@@ -145,7 +135,7 @@ impl PathAhead {
     /// Returns whether the rate of square `x` can be kept constant from the present clock on.
     #[inline(always)]
     pub(super) fn admits_constant(&self, x: f64) -> bool {
-        x <= self.constant[self.locate(self.position.progress).0]
+        x <= self.curve.constant[self.locate(self.position.progress).0]
     }
 
     /// Returns the largest ρ² at the present clock.
@@ -181,38 +171,15 @@ impl PathAhead {
     }
 
     fn slopes_within(&self, index: usize, t: f64, x: f64, limits: &[RateLimits]) -> [f64; 2] {
-        let infinity = F64x4::splat(f64::INFINITY);
-        let (mut least, mut most) = (-infinity, infinity);
-        let interval = self.path.interval(index);
-        let mut limit_at = |position: f64| {
-            let since = (position - t) * interval;
-            for ([slope, bend], limits) in self.path.within(index, position).zip(limits) {
-                // Near a reversal, where y″ρ² alone reaches the tighter limit, ρ̇ has no effect and must not be driven by it.
-                let [tight, wide] =
-                    TICK_MARGINS.map(|margin| limits.acceleration * ((1.0 - margin) / (1.0 - MARGINS[1])));
-                let (acceleration, inverse) =
-                    ((bend * x).abs().max(tight).min(wide), F64x4::ONE / (slope + bend * (2.0 * since)));
-                let (centre, half) = (-bend * x * inverse, acceleration * inverse.abs());
-                least = least.max(centre - half);
-                most = most.min(centre + half);
-                // At the present clock the velocity does not depend on ρ̇.
-                if since > 0.0 {
-                    let rate = limits.velocity / slope.abs();
-                    let rest = (rate * rate - x) * 0.5;
-                    most = most.min((rest * since.recip()).max(rest * interval.recip()));
-                }
-            }
-        };
-        limit_at(t);
-        [0.25, 0.5, 0.75, 1.0].into_iter().filter(|position| *position > t + ROUNDING).for_each(&mut limit_at);
+        let [least, most] = compute(Slopes { path: &self.path, limits, index, t, x });
+        let (change, gap) = (self.change(index), self.curve.max[index] + self.change(index) * t - x);
+        // Below the curve, the filter of the rate does not exceed the rate that the curve was computed for.
+        if gap >= 0.0 && self.curve.max[index + 1] >= self.max_rate.powi(2) {
+            return [least, most];
+        }
         // A rate above the curve, by what the margins allow, returns over an interval even shortly before a knot.
-        let change = self.change(index);
-        let gap = self.curve.max[index] + change * t - x;
-        let arrival = 0.5 * (change + gap / if gap < 0.0 { 1.0 } else { 1.0 - t }) / interval;
-        [
-            least.to_array().into_iter().fold(f64::NEG_INFINITY, f64::max),
-            most.to_array().into_iter().fold(arrival, f64::min),
-        ]
+        let arrival = 0.5 * (change + gap / if gap < 0.0 { 1.0 } else { 1.0 - t }) / self.path.interval(index);
+        [least, most.min(arrival)]
     }
 
     /// Adds a clock interval of the phase.
@@ -226,10 +193,11 @@ impl PathAhead {
         self.position.is_current = false;
     }
 
-    /// Returns whether the path has to be sampled again: when it was left, or at a third of a rhythmic one.
-    pub(super) fn is_due(&self, rhythmic: bool) -> bool {
-        self.has_progressed()
-            && (!self.position.is_current || (rhythmic && 3.0 * self.intervals() >= N_INTERVALS as f64))
+    /// Returns whether the path has to be sampled again: for a higher commanded `rate`, when it was left, or at a third of a
+    /// rhythmic one.
+    pub(super) fn is_due(&self, rate: f64, rhythmic: bool) -> bool {
+        let ends = rhythmic && 3.0 * self.intervals() >= N_INTERVALS as f64;
+        rate > self.max_rate || ((ends || !self.position.is_current) && self.has_progressed())
     }
 
     /// Returns whether enough of the path has passed for a new attempt.
@@ -239,6 +207,89 @@ impl PathAhead {
 
     fn intervals(&self) -> f64 {
         self.position.progress / self.pieces[0].interval
+    }
+}
+
+/// Kernel of [`PathAhead::slopes`]: the smallest and the largest ρ̇ from position `t` in interval `index`, for ρ² = `x` there.
+struct Slopes<'a> {
+    path: &'a SampledPath,
+    limits: &'a [RateLimits],
+    index: usize,
+    t: f64,
+    x: f64,
+}
+
+impl Kernel for Slopes<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn run<T: Register>(self) -> [f64; 2] {
+        let Self { path, limits, index, t, x } = self;
+        let interval = path.interval(index);
+        // −ρ̇ and ρ̇.
+        let (mut ends, mut by_velocity) = ([T::splat(f64::INFINITY); 2], f64::INFINITY);
+        for position in [t, 0.25, 0.5, 0.75, 1.0] {
+            let since = (position - t) * interval;
+            if position <= t + ROUNDING && position != t {
+                continue;
+            }
+            let mut inverse = T::default();
+            for ([here, next], limits) in path.ends(index, limits) {
+                let Derivatives { slope, bend } =
+                    Derivatives::<T>::load(here).between(Derivatives::load(next), interval, position);
+                // Near a reversal, where y″ρ² alone reaches the tighter limit, ρ̇ has no effect and must not be driven by it.
+                let [tight, wide] =
+                    TICK_MARGINS.map(|margin| T::load(&limits.acceleration) * ((1.0 - margin) / (1.0 - MARGINS[1])));
+                let by_bend = bend * x;
+                let acceleration = by_bend.abs().fast_max(tight).fast_min(wide);
+                let share = T::splat(1.0) / (slope + bend * (2.0 * since));
+                let (centre, half) = (by_bend * share, acceleration * share.abs());
+                // No number, where a DoF rests, leaves the ends.
+                ends = [(centre + half).fast_min(ends[0]), (half - centre).fast_min(ends[1])];
+                inverse = inverse.fast_max(limits.of_velocity(slope));
+            }
+            // At the present clock the velocity does not depend on ρ̇.
+            if since > 0.0 {
+                let rest = (largest(inverse).recip() - x) * 0.5;
+                by_velocity = by_velocity.min((rest / since).max(rest / interval));
+            }
+        }
+        [-ends[0].smallest(), ends[1].smallest().min(by_velocity)]
+    }
+}
+
+/// Kernel of [`PathAhead::distance_outside`], from knot `first` on.
+struct Outside<'a> {
+    path: &'a SampledPath,
+    first: usize,
+    bounds: &'a [Bounds],
+    groups: &'a [Group],
+}
+
+impl Kernel for Outside<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<T: Register>(self) -> f64 {
+        let Self { path, first, bounds, groups } = self;
+        let (zero, mut farthest) = (T::default(), 0.0f64);
+        for (index, (bounds, group)) in bounds.iter().zip(groups).enumerate() {
+            let [lower, upper, range] = [&bounds.lower, &bounds.upper, &group.range].map(T::load);
+            let mut outside = zero;
+            for knot in first..N_INTERVALS {
+                let [[y, slope, _], [next, next_slope, _]] =
+                    [knot, knot + 1].map(|knot| path.knot(knot)[index].each_ref().map(T::load));
+                outside = outside.fast_max(next - upper).fast_max(lower - next);
+                let turns = (slope * next_slope).simd_lt(zero);
+                if turns.to_bitmask() != 0 {
+                    let turning = y + slope * slope / (slope - next_slope) * (0.5 * path.interval(knot));
+                    let beyond = (turning - upper).fast_max(lower - turning) + range * TURNING;
+                    outside = outside.fast_max(turns & beyond);
+                }
+            }
+            farthest = farthest.max(largest(outside / range));
+        }
+        farthest
     }
 }
 
@@ -285,17 +336,22 @@ impl Controller {
         // At the rate 1 the derivatives with respect to the clock are those with respect to time.
         self.rate.reset(&[1.0]);
         self.read_out();
-        let n_groups = self.groups.len();
-        let mut u = path.clock[0];
-        for (knot, samples) in path.clock.iter().zip(path.samples.chunks_exact_mut(n_groups)) {
-            let h = knot - u;
-            if h > 0.0 {
+        let (mut u, mut h) = (path.clock[0], 0.0);
+        for (knot, samples) in path.knots_mut() {
+            // An interval that is equal up to rounding has the same propagator.
+            if (knot - u - h).abs() > SAME_INTERVAL * h {
+                h = knot - u;
+            }
+            if knot > u {
                 self.follow_path(h);
             }
+            let n = samples.len();
+            let (position, velocity, acceleration) =
+                (&self.position[..n], &self.velocity[..n], &self.acceleration[..n]);
             for (group, sample) in samples.iter_mut().enumerate() {
-                *sample = [self.position[group], self.velocity[group], self.acceleration[group]];
+                *sample = [position[group], velocity[group], acceleration[group]];
             }
-            u = *knot;
+            u = knot;
         }
     }
 
@@ -305,7 +361,7 @@ impl Controller {
         if !self.are_commands_settled() {
             n_substeps = n_substeps.max(self.command_gains.substeps(h) / MAX_TRANSITION_STEP);
         }
-        let n_substeps = n_substeps.ceil().max(1.0);
+        let n_substeps = if n_substeps > 1.0 { n_substeps.ceil() } else { 1.0 };
         for _ in 0..n_substeps as u32 {
             self.substep(h / n_substeps, h / n_substeps);
             if self.approaching && !self.style.is_settled() {
@@ -314,8 +370,9 @@ impl Controller {
         }
     }
 
-    /// Returns the rate above which none is needed: the commanded one, or that of an unlimited speed.
-    pub(super) fn max_rate(&self) -> f64 {
-        first_element(self.rate.target()).max(super::MAX_SPEED / self.primitive.tau())
+    /// Returns the largest rate on the way to any command up to it, at least the present one.
+    fn max_rate(&self) -> f64 {
+        let rest = self.rate_gains.max_displacement(&self.rate, 0).as_array()[0];
+        (first_element(self.rate.target()) + rest) * RESERVE
     }
 }

@@ -8,7 +8,7 @@ use crate::dynamics::output_system::{Attractor, CubicSample, State};
 use crate::dynamics::transport::TransportSample;
 use crate::error::{Error, Result};
 use crate::motion::perturbation::PerturbationTerms;
-use crate::numerics::simd::{F64x4, Register, flush, unpack};
+use crate::numerics::simd::{F64x4, Kernel, Register, compute, flush, unpack};
 
 /// Maximum number of substeps of a tick. A tick that needs more is still stable, but less accurate.
 const MAX_SUBSTEPS: f64 = 1000.0;
@@ -70,11 +70,13 @@ impl Controller {
     /// Returns the clock interval of the next `dt` seconds, ∫ρ dt.
     #[inline(always)]
     pub(super) fn clock_step(&mut self, dt: f64) -> f64 {
-        self.rate_slope = None;
-        if !self.admits_rate()
-            && let Some(h) = self.limit_rate(dt)
-        {
-            return h;
+        if let Some(governor) = &self.governor {
+            self.rate_slope = None;
+            if !self.admits_rate(governor)
+                && let Some(h) = self.limit_rate(dt)
+            {
+                return h;
+            }
         }
         if self.rate.is_settled() {
             return first_element(self.rate.value()) * dt;
@@ -146,11 +148,7 @@ impl Controller {
         if h <= 0.0 {
             return self.pause(dt);
         }
-        #[cfg(target_arch = "x86_64")]
-        if super::avx::advance(self, dt, h) {
-            return;
-        }
-        self.advance_portable(dt, h);
+        compute(Advance { controller: self, dt, h });
     }
 
     /// Advances the rate alone, in a pause.
@@ -158,12 +156,6 @@ impl Controller {
         self.advance_rate::<F64x4>(dt);
         self.perturbation.clear_terms();
         self.read_out();
-    }
-
-    /// Advances with the instructions of every processor. It stays a call, so that [`Controller::advance`] stays small.
-    #[inline(never)]
-    fn advance_portable(&mut self, dt: f64, h: f64) {
-        self.advance_with::<F64x4>(dt, h);
     }
 
     /// Advances by `dt` seconds and `h` > 0 on the clock, in registers of type `T`.
@@ -203,12 +195,12 @@ impl Controller {
         let lags = [std::mem::replace(&mut self.frame_lag, value), value];
         let frame_slopes = self.frame_slopes(slope, bend);
         // At u_end the substep that reaches it takes the slopes from the demonstrated side.
-        let gate = if demonstrated { self.demonstrated_gate() } else { self.gate() };
+        let fade = if demonstrated { None } else { self.primitive.forcing_table().fade(self.clock.value()) };
+        let gate = self.faded_gate(fade);
 
         let (primitive, propagator) = (&*self.primitive, &self.propagator);
         let (forcing_table, attractor, clock) = (primitive.forcing_table(), primitive.attractor(), self.clock.value());
-        let table_index =
-            if demonstrated { forcing_table.demonstrated_index(clock) } else { forcing_table.index(clock) };
+        let table_index = forcing_table.faded_index(clock, fade);
         let style = unpack(self.style.value(), primitive.n_styles());
         let style_rate = (!self.style.is_settled()).then(|| unpack(self.style.rate(), primitive.n_styles()));
         let (transition, gate_phase_rate) = (self.goal_transition.is_active(), self.perturbation.phase_rate());
@@ -293,8 +285,14 @@ impl Controller {
     /// Returns the gate at the clock, at u_end with the slope past the end.
     #[inline(always)]
     pub(super) fn gate(&self) -> Gate {
+        self.faded_gate(self.primitive.forcing_table().fade(self.clock.value()))
+    }
+
+    /// Returns the gate past the end, or that of the demonstrated interval.
+    #[inline(always)]
+    fn faded_gate(&self, fade: Option<Fade>) -> Gate {
         let demonstrated = self.demonstrated_gate();
-        match self.primitive.forcing_table().fade(self.clock.value()) {
+        match fade {
             Some(Fade { r, r_slope, p_slope, .. }) => {
                 let phase_rate = self.perturbation.phase_rate();
                 Gate { r, r_slope: phase_rate * r_slope, phase_rate: phase_rate * p_slope, ..demonstrated }
@@ -385,6 +383,22 @@ impl Controller {
                 self.acceleration[group] += acceleration[group] * (fade * fade) + velocity[group] * change;
             }
         }
+    }
+}
+
+/// Kernel of [`Controller::advance`].
+struct Advance<'a> {
+    controller: &'a mut Controller,
+    dt: f64,
+    h: f64,
+}
+
+impl Kernel for Advance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        self.controller.advance_with::<T>(self.dt, self.h);
     }
 }
 

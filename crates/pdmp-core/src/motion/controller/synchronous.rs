@@ -25,14 +25,9 @@ const TOLERANCE: f64 = 0.01;
 impl Controller {
     /// Returns whether the rate of the next substep needs no limit, at a settled rate.
     #[inline(always)]
-    pub(super) fn admits_rate(&self) -> bool {
-        match &self.governor {
-            None => true,
-            Some(governor) => {
-                let rate = first_element(self.rate.value());
-                self.rate.is_settled() && governor.ahead.admits_constant(rate * rate)
-            }
-        }
+    pub(super) fn admits_rate(&self, governor: &Governor) -> bool {
+        let rate = first_element(self.rate.value());
+        self.rate.is_settled() && governor.ahead.admits_constant(rate * rate)
     }
 
     /// Determines the rate over the next `dt` seconds. Returns the clock interval if it deviates from the filter of the
