@@ -113,8 +113,10 @@ impl Margins {
 /// # Errors
 /// Conditions or limits that do not fit the primitive.
 pub fn feasible(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditions) -> Result<Margins> {
+    limits.check_rotations(primitive)?;
+    let (primitive, conditions) = primitive.inside_with(conditions)?;
     let bounds = bounds(primitive, limits)?;
-    Ok(Margins::of(&sampled(primitive, conditions)?, &bounds))
+    Ok(Margins::of(&sampled(primitive, &conditions)?, &bounds))
 }
 
 /// Returns the factor by which a movement must be slowed down to keep the limits of velocity and acceleration.

@@ -100,6 +100,13 @@ fn nearest(
     vary: Vary,
     predicted: Option<&Array2<f64>>,
 ) -> Result<Conditions> {
+    if let Some(coordinates) = model.primitive().coordinates() {
+        limits.check_rotations(model.primitive())?;
+        let inside = Model { primitive: Arc::clone(coordinates.dofs()), ..model.clone() };
+        let found = nearest(&inside, limits, &coordinates.constant_in_dofs(request)?, vary, predicted)?;
+        let (velocity, goal_velocity) = (request.velocity.clone(), request.goal_velocity.clone());
+        return Ok(Conditions { velocity, goal_velocity, ..coordinates.of_dofs(found) });
+    }
     let primitive = model.primitive();
     let bounds = bounds(primitive, limits)?;
     let movement = sampled(primitive, request)?;

@@ -30,7 +30,7 @@ fn irregular(n: usize, step: f64) -> Vec<f64> {
 
 fn smooth_column(smoothing: Smoothing, time: &[f64], period: Option<f64>, y: &[f64]) -> Vec<f64> {
     let values = Array2::from_shape_fn((y.len(), 1), |(i, _)| y[i]);
-    smooth(smoothing, time, period, values.view()).unwrap().into_raw_vec_and_offset().0
+    smooth(smoothing, time, period, values.view(), &[]).unwrap().into_raw_vec_and_offset().0
 }
 
 /// Computes the root mean square difference.
@@ -97,7 +97,7 @@ fn dense(knots: &[f64], y: &[f64], lambda: f64) -> (DVector<f64>, f64) {
 
 /// Computes the scores of one recording with all samples.
 fn scores(samples: &Samples, cut_offs: &[f64]) -> Scores {
-    Scores::compute(&[Decimated::new(samples, usize::MAX)], &[0], cut_offs, Threads::ONE).unwrap()
+    Scores::compute(&[Decimated::new(samples, usize::MAX)], &[0], &[], cut_offs, Threads::ONE).unwrap()
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn values_and_scores_are_those_of_the_dense_formulas() {
     }
     let of = |hz: f64| dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval())).1;
     let least = (0..400).map(|k| of(0.5 * 10f64.powf(k as f64 / 160.0))).fold(f64::MAX, f64::min);
-    let noise = Noise::estimate(Smoothing::Auto, &[samples], MIN_DECIMATED, Threads::ONE).unwrap();
+    let noise = Noise::estimate(Smoothing::Auto, &[samples], &[], MIN_DECIMATED, Threads::ONE).unwrap();
     assert_relative_eq!(of(noise.cut_offs()[0].unwrap()), least, max_relative = 1e-2);
 }
 
@@ -174,7 +174,7 @@ fn the_level_of_white_noise_is_estimated() {
                 .collect();
             let samples: Vec<Samples> =
                 recordings.iter().map(|y| Samples { time: &time, period, values: y.view() }).collect();
-            let estimate = Noise::estimate(Smoothing::Auto, &samples, MIN_DECIMATED, Threads::ONE).unwrap();
+            let estimate = Noise::estimate(Smoothing::Auto, &samples, &[], MIN_DECIMATED, Threads::ONE).unwrap();
             let case = format!("{n} samples, {n_recordings} recordings, periodic {periodic}: {estimate:?}");
             // Four standard errors, for the 64 samples that decimated recordings have at least.
             let accuracy = 4.0 / (2.0 * (n.min(64) * n_recordings.min(24)) as f64).sqrt();
@@ -252,7 +252,7 @@ fn columns_are_independent_and_constant_ones_unchanged() {
     let noisy: Vec<f64> = time.iter().map(|t| t * t + 0.01 * normal()).collect();
     let both = Array2::from_shape_fn((n, 2), |(i, d)| [1e-150 / 3.0, noisy[i]][d]);
     for smoothing in [Smoothing::Auto, Smoothing::CutOff { hz: 5.0 }, Smoothing::Interpolate] {
-        let smoothed = smooth(smoothing, &time, None, both.view()).unwrap();
+        let smoothed = smooth(smoothing, &time, None, both.view(), &[]).unwrap();
         assert_eq!(smoothed.column(0), both.column(0));
         assert_eq!(smoothed.column(1).to_vec(), smooth_column(smoothing, &time, None, &noisy));
     }
@@ -291,7 +291,7 @@ fn invalid_cut_offs_are_rejected() {
     let time = uniform(100, 0.01);
     let values = Array2::zeros((100, 1));
     let message =
-        |hz: f64, period| smooth(Smoothing::CutOff { hz }, &time, period, values.view()).unwrap_err().to_string();
+        |hz: f64, period| smooth(Smoothing::CutOff { hz }, &time, period, values.view(), &[]).unwrap_err().to_string();
     for hz in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(message(hz, None).contains("must be positive and finite"));
     }
