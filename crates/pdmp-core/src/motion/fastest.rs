@@ -136,20 +136,36 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
     }
     let start = start.min(curve.max[0]);
     curve.reach(&path, &bounds, start);
-    follow(&path, &TimeLaw::new(&path.clock, &curve.max), primitive.n_dofs(), dt)
+    follow(primitive, &path, &TimeLaw::new(&path.clock, &curve.max), dt)
 }
 
 /// Samples the movement that follows a path by a time law, every `dt` seconds up to the first sample at its end or past it.
 ///
 /// Between knots the path is that for which the law keeps the limits.
-fn follow(path: &SampledPath, law: &TimeLaw, n_dofs: usize, dt: f64) -> Result<Trajectory> {
+fn follow(primitive: &Primitive, path: &SampledPath, law: &TimeLaw, dt: f64) -> Result<Trajectory> {
     check_positive("dt", dt)?;
     let steps = step_count("duration", (law.duration() / dt).ceil() * dt, dt)?;
     let mut interval = 0;
-    Trajectory::record("fastest", n_dofs, steps, dt, &mut |_| Ok(()), |_, time, motion| {
+    let [mut y, mut dy, mut ddy] = [(); 3].map(|()| vec![0.0; primitive.n_dofs()]);
+    let mut before = vec![0.0; primitive.n_coordinates()];
+    Trajectory::record("fastest", primitive, steps, dt, &mut |_| Ok(()), |_, time, motion| {
         let at = law.at(time, interval);
         interval = at.0;
-        compute(Sample { path, at, motion });
+        let Some(coordinates) = primitive.coordinates() else {
+            compute(Sample { path, at, motion });
+            return Ok(());
+        };
+        compute(Sample {
+            path,
+            at,
+            motion: &mut Motion { position: &mut y, velocity: &mut dy, acceleration: &mut ddy },
+        });
+        let [u, rate, change] = at.1;
+        let Motion { position, velocity, acceleration } = motion;
+        // A quaternion keeps its sign from sample to sample.
+        position.copy_from_slice(&before);
+        coordinates.motion(u, [rate, change], [&y, &dy, &ddy], position, velocity, acceleration);
+        before.copy_from_slice(position);
         Ok(())
     })
 }
