@@ -477,3 +477,44 @@ impl TimeLaw {
         (i, [u, self.rate[i] + a * since, if t <= self.duration() { a } else { 0.0 }])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The registers of the processor and portable ones yield the same curve and the same law to the last bit, with a DoF that
+    /// rests, one that reverses, and lanes without limits.
+    #[test]
+    fn curve_does_not_depend_on_the_register_width() {
+        let knots: Vec<f64> = (0..=200).map(|i| i as f64 / 200.0).collect();
+        let mut path = SampledPath::at(knots, 2);
+        for (u, samples) in path.knots_mut() {
+            for (group, sample) in samples.iter_mut().enumerate() {
+                let frequency = F64x4::new([0.0, 3.0, 7.0, 11.0]) * (1.0 + group as f64);
+                let phase = frequency * u;
+                *sample = [phase.sin(), frequency * phase.cos(), -frequency * frequency * phase.sin()];
+            }
+        }
+        let infinity = f64::INFINITY;
+        let velocity = F64x4::new([1.0, 2.0, infinity, 3.0]);
+        let limits =
+            [4.0, 9.0].map(|size| RateLimits::new(velocity * size, F64x4::new([5.0, 6.0, 7.0, infinity]) * size));
+        let (path, limits) = (&path, &limits[..]);
+        let (end, max) = (infinity, 0.5);
+        let [mut any, mut four] = [(); 2].map(|()| RateCurve::new(201, 2));
+        any.compute_constant(path, limits);
+        Constant { curve: &mut four, path, limits }.run::<F64x4>();
+        assert_eq!(any.constant, four.constant);
+        any.compute(path, limits, end, max);
+        Backward { curve: &mut four, path, limits, end, max }.run::<F64x4>();
+        assert_eq!(any.max, four.max);
+        let start = 0.5 * any.max[0];
+        any.reach(path, limits, start);
+        Forward { curve: &mut four, path, limits, start }.run::<F64x4>();
+        assert_eq!(any.max, four.max);
+        // Some of the curve is limited, some of it is not.
+        let n_free = any.max.iter().filter(|x| **x == max).count();
+        assert!((10..190).contains(&n_free), "{n_free}");
+        assert!(any.max.iter().all(|x| (0.0..=max).contains(x)));
+    }
+}
