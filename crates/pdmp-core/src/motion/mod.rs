@@ -13,6 +13,7 @@ pub(crate) mod nearest_feasible;
 pub(crate) mod perturbation;
 pub(crate) mod prediction_band;
 pub(crate) mod rollout;
+pub(crate) mod sampled_path;
 pub(crate) mod stopping;
 pub(crate) mod superposition;
 pub(crate) mod time_law;
