@@ -10,12 +10,14 @@ use crate::motion::command::Motion;
 use crate::motion::controller::Controller;
 use crate::motion::feasibility::slowdown;
 use crate::motion::limits::Limits;
-use crate::motion::time_law::{Derivatives, RateCurve, RateLimits, SampledPath, TimeLaw};
+use crate::motion::sampled_path::{Derivatives, SampledPath};
+use crate::motion::time_law::{RateCurve, RateLimits, TimeLaw};
 use crate::motion::trajectory::{Trajectory, step_count};
 use crate::numerics::simd::{Kernel, Register, WIDTH, compute, groups, pack, unpad};
 use crate::validate::check_positive;
 
-/// Number of intervals of the path. Durations then are within 1e-3 of those of ten times this number.
+/// Number of intervals of the path. On recordings, durations then are 0.1 to 1.6 % above those of eight times this number, the
+/// more the slower the movement.
 const N_INTERVALS: usize = 1000;
 /// Number of halvings of the first and the last interval.
 const N_HALVINGS: i32 = 12;

@@ -11,6 +11,7 @@ pub(crate) mod limits;
 pub(crate) mod perturbation;
 pub(crate) mod prediction_band;
 pub(crate) mod rollout;
+pub(crate) mod sampled_path;
 pub(crate) mod stopping;
 pub(crate) mod superposition;
 pub(crate) mod time_law;
