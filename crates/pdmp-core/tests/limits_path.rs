@@ -230,6 +230,32 @@ fn pending_goal_is_reached_at_last() {
     assert_eq!(controller.centre(), upper);
 }
 
+/// A style that can be accepted in part alone does not keep a movement from its end.
+#[test]
+fn pending_style_lets_the_movement_finish() {
+    let mut n_pending = 0;
+    for command_at in (50..900).step_by(50) {
+        let mut controller = controller(&REACH, 1e-3);
+        let path = controller.forecast(1.0, Some(1e-3)).unwrap();
+        let highest = (0..REACH.n_dofs()).map(|d| path.position.column(d).fold(f64::MIN, |max, y| max.max(*y)));
+        let mut limits = limits(&REACH, [2.0, 2.0]);
+        limits.upper = Some(highest.zip(REACH.ranges()).map(|(y, range)| y + 0.1 * range).collect());
+        controller.set_limits(&limits).unwrap();
+        let far: Vec<f64> = controller.style().iter().map(|s| s + 3.0).collect();
+        let mut ticks = 0;
+        while controller.step().unwrap() == Status::Working {
+            ticks += 1;
+            if ticks == command_at {
+                controller.set_style(&far).unwrap();
+            }
+            n_pending += usize::from(controller.is_pending());
+            assert!(ticks < 5000, "{command_at}: pending {}", controller.is_pending());
+        }
+        assert!(!controller.is_pending());
+    }
+    assert!(n_pending > 2000, "{n_pending}");
+}
+
 /// A command of τ leaves a pending goal pending: it is accepted at last.
 #[test]
 fn other_commands_do_not_discard_a_pending_goal() {

@@ -172,6 +172,9 @@ impl Controller {
     }
 
     /// Accepts a share of changed commands if the path ahead can then be followed. Returns whether it does.
+    ///
+    /// Otherwise half of it is tried at the next tick, down to the smallest share, and from an accepted one on twice as much of
+    /// the rest. The rest as a whole is tried when the movement has gone on.
     #[inline(never)]
     fn accept(&mut self, changes: Changes) -> bool {
         let Some(mut governor) = self.governor.take() else { return false };
@@ -181,11 +184,13 @@ impl Controller {
             std::mem::swap(&mut governor.ahead, &mut governor.candidate);
             std::mem::swap(&mut governor.origin, &mut governor.trial);
             governor.pending = governor.share < 1.0;
+            governor.share = (2.0 * governor.share).min(1.0);
         } else {
             governor.share *= 0.5;
-        }
-        if governor.share < MIN_SHARE {
-            governor.share = 1.0;
+            if governor.share < MIN_SHARE {
+                governor.share = 1.0;
+                governor.look_ahead(self);
+            }
         }
         self.governor = Some(governor);
         accepted
