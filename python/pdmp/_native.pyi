@@ -514,6 +514,11 @@ def turn_of(unit: str) -> float | None:
     ----------
     unit : str
         Unit of a degree of freedom.
+
+    Raises
+    ------
+    TypeError
+        `unit` is not a string.
     """
 
 def period(demo: Demonstration) -> float:
