@@ -534,6 +534,11 @@ def turn_of(unit: str) -> float | None:
     ----------
     unit : str
         Unit of a degree of freedom.
+
+    Raises
+    ------
+    TypeError
+        `unit` is not a string.
     """
 
 def period(demo: Demonstration) -> float:
@@ -1368,6 +1373,9 @@ class Model:
         rate is the largest with |ẏ| ≤ V and |ÿ| ≤ A for every degree of freedom, found by a pass from the end to the
         start and one back. The movement starts and ends at rest; with `velocity` or `goal_velocity` among the
         conditions, it starts or ends with that.
+
+        Limits hold at the ends and in the middle of each thousandth of the path. In between, recordings exceed them by up to
+        0.5 %, paths with corners by 2 %; a controller with the limits keeps them at every tick.
 
         Parameters
         ----------

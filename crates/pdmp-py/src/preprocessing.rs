@@ -176,6 +176,11 @@ pub(crate) fn residuals<'py>(
 /// ----------
 /// unit : str
 ///     Unit of a degree of freedom.
+///
+/// Raises
+/// ------
+/// TypeError
+///     `unit` is not a string.
 #[pyfunction]
 pub(crate) fn turn_of(unit: &str) -> Option<f64> {
     pdmp_core::demonstration::turn_of(unit)

@@ -103,7 +103,9 @@ pub fn fastest_tau(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Con
 
 /// Computes the movement that follows the path of the conditions as fast as the limits allow, sampled every `dt` seconds.
 ///
-/// It begins and ends at rest; with a `velocity` or `goal_velocity` in the conditions it begins or ends with that.
+/// It begins and ends at rest; with a `velocity` or `goal_velocity` in the conditions it begins or ends with that. Limits hold
+/// at the ends and in the middle of each thousandth of the path. In between, recordings exceed them by up to 0.5 %, paths with
+/// corners by 2 %; a controller with the limits keeps them at every tick.
 ///
 /// ```
 /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
