@@ -11,8 +11,8 @@ import pdmp
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
-# Its snippets issue the warnings that it explains.
-WARNING = {"troubleshooting.md"}
+# Their snippets issue the warnings that they explain.
+WARNING = {"troubleshooting.md", "howto/styles-and-smoothing.md"}
 FENCE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 MODULES = ("io", "preprocessing", "evaluation", "plot", "datasets", "robots")
 
