@@ -71,7 +71,9 @@ def test_every_example_has_a_page() -> None:
 def test_every_page_is_reached() -> None:
     """Every page is in a table of contents."""
     contents = re.findall(r"```\{toctree\}\n(.*?)```", "\n".join(map(text, PAGES)), re.DOTALL)
-    entries = {line.split("/")[-1].split("<")[-1].rstrip(">") for line in "\n".join(contents).split()}
+    entries = {
+        line.split("/")[-1].split("<")[-1].rstrip(">") for line in "\n".join(contents).split()
+    }
     for page in set(PAGES) - {"index.md"}:
         stem = page.removesuffix(".md")
         assert stem.split("/")[-1] in entries, page

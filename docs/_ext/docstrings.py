@@ -7,8 +7,9 @@ of the package becomes a link, any other text in backticks a literal, and bars a
 import re
 from typing import Any
 
-import pdmp
 from sphinx.application import Sphinx
+
+import pdmp
 
 TICKS = re.compile(r"(?<![:`\w])`([^`\n]+)`(?![`_])")
 
@@ -16,12 +17,15 @@ TICKS = re.compile(r"(?<![:`\w])`([^`\n]+)`(?![`_])")
 def target(text: str, owner: str) -> str | None:
     """Returns the full name of a public object that a docstring mentions."""
     name = text.removeprefix("pdmp.").partition("(")[0]
+    holder: Any
+    found: Any
     home = owner.split(".")[1] if owner.count(".") else ""
     for path in (name, f"{home}.{name}"):
-        found: Any = pdmp
+        holder, found = None, pdmp
         for part in path.split("."):
-            found = getattr(found, part, None) if part and not part.startswith("_") else None
-        if found is not None and (callable(found) or path.count(".")):
+            public = part and not part.startswith("_")
+            holder, found = found, getattr(found, part, None) if public else None
+        if callable(found) or (found is not None and isinstance(holder, type)):
             return f"pdmp.{path}"
     return None
 

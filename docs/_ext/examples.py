@@ -1,4 +1,4 @@
-"""Directive `example`: an example script with the text that it prints and the figure that it saves."""
+"""Directive `example`: an example script with its figure and the text that it prints."""
 
 import os
 import subprocess

@@ -2,7 +2,7 @@
 
 The fences ```` ```python ```` of a page are executed in order in one namespace, in an empty folder.
 Text that a snippet prints, with its warnings, and the figure that it assigns to `figure` follow the
-snippet. A snippet whose first line is `# Figure` is folded. Fences ```` ```py ```` are not executed.
+snippet. A snippet whose first line is `# Figure` is folded. Fences ```` ```py ```` are not run.
 """
 
 import contextlib
