@@ -14,14 +14,15 @@ extensions = [
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "docstrings",
     "examples",
+    "mathml",
     "snippets",
 ]
 exclude_patterns = ["_ext", "_generated", "paper/*.md"]
 html_theme = "furo"
+html_math_renderer = "mathml"
 html_title = f"PDMP {release}"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
@@ -29,19 +30,18 @@ html_show_sphinx = False
 html_copy_source = False
 html_show_copyright = False
 
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 suppress_warnings = [
     # The reports are read on code hosts too, where a page begins with any heading.
     "myst.header",
 ]
 
-autodoc_member_order = "bysource"
+autodoc_member_order = "groupwise"  # compiled classes have no order of source
 autodoc_typehints = "none"  # the docstrings have types and shapes
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 copybutton_exclude = ".linenos, .gp, .go"
-copybutton_selector = "div:not(.output) > div.highlight > pre"
 
 nitpicky = True
 nitpick_ignore: list[tuple[str, str]] = []

@@ -61,11 +61,9 @@ def test_the_reference_has_every_public_name() -> None:
 
 
 def test_every_example_has_a_page() -> None:
-    """Every example in Python is in the gallery, and the overview refers to it."""
-    overview = text("gallery/index.md")
+    """Every example in Python has a page in the gallery that shows it."""
     for example in (ROOT / "examples").glob("*.py"):
         assert f"```{{example}} {example.stem}\n" in text(f"gallery/{example.stem}.md")
-        assert f"({example.stem}.md)" in overview
 
 
 def test_every_page_is_reached() -> None:

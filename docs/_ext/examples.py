@@ -7,7 +7,8 @@ import tempfile
 from pathlib import Path
 
 from docutils import nodes
-from snippets import FOLDER, image, printed
+from docutils.statemachine import StringList
+from snippets import FOLDER, figure_image, printed
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
@@ -46,13 +47,37 @@ class Example(SphinxDirective):
         text = f"Figure of the example {name}, described above"
         code = script.read_text(encoding="utf-8")
         return [
-            image(path, source, text, WIDTH),
+            figure_image(path, source, text, WIDTH),
             printed(done.stdout),
             nodes.literal_block(code, code, language="py"),
         ]
 
 
+class Thumbnails(SphinxDirective):
+    """Table of the pages of this folder that have an example, with figure, title and text."""
+
+    def run(self) -> list[nodes.Node]:
+        """Returns the table; the pages and their figures come first, in the order of names."""
+        source = Path(self.env.srcdir)
+        folder = Path(self.env.docname).parent
+        rows = []
+        for page in sorted((source / folder).glob("[0-9]*.md")):
+            self.env.note_dependency(str(page))
+            title, text = page.read_text(encoding="utf-8").split("\n\n")[:2]
+            figure = f"/{FOLDER}/{page.stem}.png"
+            rows.append(
+                f"| ![]({figure}){{width=260px}} | **[{title[2:]}]({page.name})**<br>{text} |"
+            )
+        lines = ["| | |", "|---|---|", *rows]
+        table = nodes.container(classes=["thumbnails"])
+        self.state.nested_parse(StringList(lines, source=self.env.docname), 0, table)
+        for image in table.findall(nodes.image):
+            image["classes"].append("result")
+        return [table]
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Registers the directive."""
+    """Registers the directives."""
     app.add_directive("example", Example)
-    return {"parallel_read_safe": True}
+    app.add_directive("thumbnails", Thumbnails)
+    return {"parallel_read_safe": False}

@@ -89,10 +89,10 @@ def saved(figure: Any, path: Path, source: Path) -> nodes.image:
     figure.savefig(path)
     width = round(WIDTH * figure.get_figwidth())
     close(figure)
-    return image(path, source, description(figure), width)
+    return figure_image(path, source, description(figure), width)
 
 
-def image(path: Path, source: Path, text: str, width: int) -> nodes.image:
+def figure_image(path: Path, source: Path, text: str, width: int) -> nodes.image:
     """Returns an image in the source folder."""
     uri = f"/{path.relative_to(source).as_posix()}"
     return nodes.image(uri=uri, alt=text, width=f"{width}px", classes=["result"])
