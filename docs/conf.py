@@ -32,11 +32,6 @@ html_show_copyright = False
 
 myst_enable_extensions = ["attrs_inline", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-suppress_warnings = [
-    # The reports are read on code hosts too, where a page begins with any heading.
-    "myst.header",
-]
-
 autodoc_member_order = "groupwise"  # compiled classes have no order of source
 autodoc_typehints = "none"  # the docstrings have types and shapes
 numpydoc_show_class_members = False
@@ -44,4 +39,3 @@ numpydoc_xref_param_type = False
 copybutton_exclude = ".linenos, .gp, .go"
 
 nitpicky = True
-nitpick_ignore: list[tuple[str, str]] = []
