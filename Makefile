@@ -116,7 +116,7 @@ stubs: .venv/with-dev  ## Copies the docstrings of the compiled module into its 
 	$(BIN)/python .ci/stubs.py --write
 
 docs: .venv/with-docs  ## The documentation site, with its snippets and examples executed, into out/docs/index.html
-	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --nitpicky -b html docs out/docs
+	$(BIN)/sphinx-build --fresh-env --fail-on-warning --keep-going --quiet --nitpicky -b html docs out/docs
 
 clean:  ## Removes what the targets above made
 	cargo clean
