@@ -64,15 +64,14 @@ class Thumbnails(SphinxDirective):
         for page in sorted((source / folder).glob("[0-9]*.md")):
             self.env.note_dependency(str(page))
             title, text = page.read_text(encoding="utf-8").split("\n\n")[:2]
-            figure = f"/{FOLDER}/{page.stem}.png"
-            rows.append(
-                f"| ![]({figure}){{width=260px}} | **[{title[2:]}]({page.name})**<br>{text} |"
-            )
+            title = title.removeprefix("# ")
+            image = f"![{title}](/{FOLDER}/{page.stem}.png){{width=260px}}"
+            rows.append(f"| {image} | **[{title}]({page.name})**<br>{text} |")
         lines = ["| | |", "|---|---|", *rows]
         table = nodes.container(classes=["thumbnails"])
         self.state.nested_parse(StringList(lines, source=self.env.docname), 0, table)
-        for image in table.findall(nodes.image):
-            image["classes"].append("result")
+        for node in table.findall(nodes.image):
+            node["classes"].append("result")
         return [table]
 
 
