@@ -26,7 +26,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
 .PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots report rtsan fuzz asan licences capi header stubs \
-	clean needs
+	docs clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
 	$(BIN)/python -m reproduction.demo -o out/demo
@@ -115,9 +115,12 @@ header: | needs  ## Writes pdmp.h from the sources of the C ABI
 stubs: .venv/with-dev  ## Copies the docstrings of the compiled module into its stub
 	$(BIN)/python .ci/stubs.py --write
 
+docs: .venv/with-docs  ## The documentation site, with its snippets and examples executed, into out/docs/index.html
+	$(BIN)/sphinx-build --fresh-env --fail-on-warning --keep-going --quiet --nitpicky -b html docs out/docs
+
 clean:  ## Removes what the targets above made
 	cargo clean
-	rm -rf .venv out dist fuzz/found python/pdmp/_native*.so
+	rm -rf .venv out dist docs/_generated fuzz/found python/pdmp/_native*.so
 
 .venv/with-%: .venv/extension
 	@$(BIN)/python .ci/requirements.py $* > .venv/requirements-$*.txt

@@ -1,5 +1,6 @@
 """Fits one primitive to five reaches over obstacles of different heights, and computes rollouts."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import pdmp
@@ -24,10 +25,19 @@ print(model)
 
 # Styles are points in a vector space; this is the mean of two of them.
 style = (model.styles[0] + model.styles[4]) / 2
-trajectory = model.rollout(style=style, dt=DT)
-peak = trajectory.position[:, 1].max()
-print(f"style {np.round(style, 3)}: {len(trajectory.time)} samples, peak {peak:.3f} m")
+between = model.rollout(style=style, dt=DT)
+peak = between.position[:, 1].max()
+print(f"style {np.round(style, 3)}: {len(between.time)} samples, peak {peak:.3f} m")
 
 # The nominal style with another goal and half the duration.
-trajectory = model.rollout(goal=[0.5, 0.1], tau=model.tau / 2)
-print(f"at {trajectory.time[-1]:.2f} s: {np.round(trajectory.position[-1], 3)} m")
+moved = model.rollout(goal=[0.5, 0.1], tau=model.tau / 2)
+print(f"at {moved.time[-1]:.2f} s: {np.round(moved.position[-1], 3)} m")
+
+figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
+for demo in demos:
+    axes.plot(*demo.position.T, color="0.7")
+axes.plot(*between.position.T, label="mean of two styles")
+axes.plot(*moved.position.T, label="another goal")
+axes.set(xlabel="x [m]", ylabel="z [m]", title="Five demonstrations (grey) and two rollouts")
+axes.legend()
+figure.savefig("01_fit_and_rollout.png", dpi=150)

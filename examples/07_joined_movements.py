@@ -4,6 +4,7 @@ A swing at a ball is learnt from rest to rest, the follow-through from recording
 motion, when the ball is hit. The swing also hits a ball that moves on the way, and harder.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import pdmp
@@ -46,11 +47,19 @@ def joined(hit: np.ndarray) -> np.ndarray:
 
 
 n_swing = round(swing.durations[1] / DT)
+figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
 for name, hit in (("with a stop", np.zeros(2)), ("joined", velocity)):
     velocities = joined(hit)
     hardest = np.linalg.norm(np.diff(velocities, axis=0), axis=1).max() / DT
     speed = np.linalg.norm(velocities[n_swing - 1])
+    norm = np.linalg.norm(velocities, axis=1)
+    axes.plot(DT * np.arange(1, len(norm) + 1), norm, label=name)
     print(f"{name}: hits the ball at {speed:.3f} m/s, accelerates by at most {hardest:.1f} m/s²")
+
+axes.axvline(DT * n_swing, color="0.5", linestyle=":")
+axes.set(xlabel="time [s]", ylabel="speed [m/s]", title="Swing and follow-through; the ball dotted")
+axes.legend()
+figure.savefig("07_joined_movements.png", dpi=150)
 
 controller = swing.controller(DT, swing.conditions(1).replace(goal=ball, goal_velocity=velocity))
 for tick in range(n_swing):

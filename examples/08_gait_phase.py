@@ -1,5 +1,6 @@
 """Synchronises a learnt gait with a walking person, by a measured phase or at heel strikes."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import pdmp
@@ -17,6 +18,7 @@ gait = pdmp.fit([demo], kind="rhythmic")
 # The person is elsewhere in the cycle at first, and walks 8 % faster than the demonstration.
 cycles = 0.3 + 1.08 / STRIDE * DT * np.arange(10_001)
 noise = 0.05 * np.random.default_rng(0).standard_normal(len(cycles))  # rad
+figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
 
 
 def run(name: str, pull: bool = False, reset: bool = False) -> None:
@@ -43,8 +45,12 @@ def run(name: str, pull: bool = False, reset: bool = False) -> None:
         speed = max(speed, np.abs(controller.velocity).max())
     print(f"{name}: {apart[0]:.2f}, later at most {max(apart[-5000:]):.3f} cycles apart; ", end="")
     print(f"fastest joint {speed:.1f} rad/s")
+    axes.plot(DT * np.arange(1, len(apart) + 1), apart, label=name)
 
 
 run("alone")
 run("pulled by the measured phase", pull=True)
 run("reset at heel strikes", reset=True)
+axes.set(xlabel="time [s]", ylabel="phase difference [cycles]", title="A gait follows a person")
+axes.legend()
+figure.savefig("08_gait_phase.png", dpi=150)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import pdmp
@@ -24,6 +25,7 @@ model = pdmp.fit(demos)
 # Limits that the maker publishes. pdmp.Limits.from_urdf("robot.urdf", model.names) and
 # pdmp.Limits.from_mujoco read them from the robot's own description.
 limits = pdmp.robots.REGISTRY["panda"].limits(model.names)
+figure, panels = plt.subplots(2, 1, figsize=(6, 4.4), sharex=True, layout="constrained")
 
 
 def run(name: str, kept: pdmp.Limits | None, push: float = 0.0) -> None:
@@ -40,6 +42,8 @@ def run(name: str, kept: pdmp.Limits | None, push: float = 0.0) -> None:
         motion.append([controller.position.copy(), controller.velocity.copy()])
     position, velocity = np.swapaxes(motion, 0, 1)
     acceleration = np.diff(velocity, axis=0) / DT
+    for axes, values in zip(panels, (position, velocity), strict=True):
+        axes.plot(DT * np.arange(1, len(motion) + 1), values[:, 0], label=name)
     print(f"{name}: {len(motion) * DT:.2f} s, ends at {position[-1].round(3)} rad;", end=" ")
     print(f"largest velocity {np.abs(velocity).max():.2f} rad/s,", end=" ")
     print(f"acceleration {np.abs(acceleration).max():.1f} rad/s²")
@@ -50,6 +54,12 @@ def run(name: str, kept: pdmp.Limits | None, push: float = 0.0) -> None:
 run("without limits", None)
 run("with limits", limits)  # slows down on the path
 run("pushed, with limits", limits, push=500.0)  # leaves the path
+panels[0].axhline(limits.position[1][0], color="black", linewidth=0.6)
+panels[1].axhline(limits.velocity[0], color="black", linewidth=0.6)
+panels[0].set(ylabel="joint 2 [rad]", title="The first joint with its limits (black)")
+panels[1].set(xlabel="time [s]", ylabel="velocity [rad/s]")
+panels[0].legend()
+figure.savefig("09_limits.png", dpi=150)
 
 # The learnt path in the shortest time, and with the best constant tau.
 fastest = model.fastest(limits, style=model.styles[1], dt=DT)
