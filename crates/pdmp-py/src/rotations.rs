@@ -1,11 +1,17 @@
 //! Rotations among the coordinates: columns that are unit quaternions.
 
+use std::sync::Arc;
+
 use pdmp_core::demonstration::{QuaternionOrder, RotationColumns};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::choice::Choice;
 use crate::convert::quoted;
+use crate::error::raise;
+use crate::fit::FRAMES;
+use crate::model::Model;
 use crate::scalar::Scalar;
 
 /// Returns the rotations of a mapping from the first column of a quaternion, its index or name, to its order.
@@ -44,4 +50,27 @@ pub(crate) fn rotations_to_python<'py>(py: Python<'py>, rotations: &[RotationCol
         mapping.set_item(rotation.column, order)?;
     }
     Ok(mapping)
+}
+
+#[pymethods]
+impl Model {
+    /// Returns the model with angular velocities and accelerations in another frame; it moves alike.
+    ///
+    /// Parameters
+    /// ----------
+    /// frame : {"body", "world"}
+    ///     Frame that rotates, or the frame in which orientations are measured.
+    ///
+    /// Returns
+    /// -------
+    /// Model
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The model has no rotations.
+    fn in_frame(&self, frame: Choice<'_>) -> PyResult<Self> {
+        let frame = frame.of("frame", &FRAMES)?;
+        self.0.in_frame(frame).map(|model| Self(Arc::new(model))).map_err(raise)
+    }
 }

@@ -11,6 +11,7 @@
 //! training data, in one step if it is shorter than 1/500 of the movement and 1/95 of each transition in progress, and in
 //! proportionally many substeps otherwise, at most 1000.
 
+mod coupling;
 mod forecast;
 mod getters;
 mod goal;
