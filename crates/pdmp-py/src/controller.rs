@@ -49,12 +49,12 @@ pub(crate) struct Controller {
 
 impl Controller {
     pub(crate) fn new(py: Python<'_>, model: Arc<pdmp_core::Model>, inner: pdmp_core::Controller) -> PyResult<Self> {
-        let length = inner.position().len();
+        let (length, n_dofs) = (inner.position().len(), inner.velocity().len());
         let status = py.get_type::<Status>();
         let controller = Self {
             position: Output::new(py, length)?,
-            velocity: Output::new(py, length)?,
-            acceleration: Output::new(py, length)?,
+            velocity: Output::new(py, n_dofs)?,
+            acceleration: Output::new(py, n_dofs)?,
             working: status.getattr("WORKING")?.unbind(),
             finished: status.getattr("FINISHED")?.unbind(),
             arguments: Arguments::default(),

@@ -109,7 +109,7 @@ impl Controller {
         // A copy, so that a loop in another thread may step the controller meanwhile.
         let (inner, model) = (slf.borrow().inner.clone(), Arc::clone(&slf.borrow().model));
         let trajectory = interruptible(slf.py(), |progress| inner.forecast_with(horizon, dt, progress))?;
-        Ok(Trajectory::new(slf.py(), trajectory, model.names(), model.units()))
+        Trajectory::new(slf.py(), trajectory, model.primitive())
     }
 
     /// Returns an independent controller in the same state, with the same model.

@@ -3,6 +3,8 @@
 use ndarray::{Array2, ArrayD};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, ToPyArray};
 use pdmp_core::Sampling;
+use pdmp_core::demonstration::{QuaternionOrder, RotationColumns};
+use pdmp_core::model::Coordinates;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -33,6 +35,11 @@ use crate::scalar::{Scalar, optional_number};
 ///     Names of the degrees of freedom, all different.
 /// units : sequence of str, (D,), optional
 ///     Units of the degrees of freedom, such as "rad" or "m"; "" if unknown.
+/// rotations : mapping, optional
+///     First column of each unit quaternion, as an index or a name, and the order of its components: {3: "wxyz"} or
+///     {3: "xyzw"}. A quaternion rotates from the body frame to the world frame; the other convention cannot be told from
+///     the data. Norms become 1, and signs continuous along time. `position`, `goal`, `names` and `units` have one element
+///     per column; a rotation has four columns and three degrees of freedom.
 ///
 /// Raises
 /// ------
@@ -52,7 +59,8 @@ pub(crate) struct Demonstration(pub(crate) pdmp_core::Demonstration);
 #[pymethods]
 impl Demonstration {
     #[new]
-    #[pyo3(signature = (position, *, dt=None, time=None, goal=None, context=None, names=None, units=None))]
+    #[pyo3(signature = (position, *, dt=None, time=None, goal=None, context=None, names=None, units=None, rotations=None))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         position: &Bound<'_, PyAny>,
         dt: Option<Scalar<'_>>,
@@ -61,6 +69,7 @@ impl Demonstration {
         context: Option<&Bound<'_, PyAny>>,
         names: Option<&Bound<'_, PyAny>>,
         units: Option<&Bound<'_, PyAny>>,
+        rotations: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let dt = optional_number("dt", dt)?;
         let stamps = time.map(time_stamps).transpose()?;
@@ -74,15 +83,23 @@ impl Demonstration {
         };
         let mut demo =
             pdmp_core::Demonstration::new(two_axes("position", "(T, D)", source.position)?, sampling).map_err(raise)?;
-        if let Some(goal) = optional("goal", goal)? {
-            demo = demo.with_goal(goal).map_err(raise)?;
-        }
         if let Some(values) = context {
             demo = demo.with_context(crate::convert::context("context", values)?).map_err(raise)?;
         }
         let labels = |name, value: Option<&Bound<'_, PyAny>>| value.map(|value| texts(name, value)).transpose();
         let (names, units) = (labels("names", names)?.or(source.names), labels("units", units)?.or(source.units));
-        labelled(demo, names, units).map(Self).map_err(raise)
+        demo = labelled(demo, names, units).map_err(raise)?;
+        let rotations = match rotations {
+            Some(rotations) => Some(rotations_of(rotations, demo.names())?),
+            None => source.rotations,
+        };
+        if let Some(rotations) = rotations {
+            demo = demo.with_rotations(rotations).map_err(raise)?;
+        }
+        if let Some(goal) = optional("goal", goal)? {
+            demo = demo.with_goal(goal).map_err(raise)?;
+        }
+        Ok(Self(demo))
     }
 
     /// Positions (T, D) in the unit of each degree of freedom.
@@ -149,11 +166,23 @@ impl Demonstration {
         self.0.n_dofs()
     }
 
+    /// Number of coordinates, the columns of `position`: one more than the degrees of freedom for each rotation.
+    #[getter]
+    fn n_coordinates(&self) -> usize {
+        self.0.n_coordinates()
+    }
+
+    /// First column of each unit quaternion, and the order of its components, "wxyz" or "xyzw".
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        rotations_to_python(py, self.0.rotations())
+    }
+
     /// Returns the arguments that rebuild the demonstration.
     fn __getnewargs_ex__<'py>(slf: &Bound<'py, Self>) -> PyResult<((Bound<'py, PyAny>,), Bound<'py, PyDict>)> {
         let stamped = matches!(slf.get().0.sampling(), Sampling::Stamped { .. });
         let options = PyDict::new(slf.py());
-        for name in [if stamped { "time" } else { "dt" }, "goal", "context", "names", "units"] {
+        for name in [if stamped { "time" } else { "dt" }, "goal", "context", "names", "units", "rotations"] {
             options.set_item(name, slf.getattr(name)?)?;
         }
         Ok(((slf.getattr("position")?,), options))
@@ -205,6 +234,7 @@ pub(crate) struct Source {
     time: Option<Vec<f64>>,
     names: Option<Vec<String>>,
     units: Option<Vec<String>>,
+    rotations: Option<Vec<RotationColumns>>,
 }
 
 impl Source {
@@ -219,6 +249,7 @@ impl Source {
                 time: Some(vector("time", time)?),
                 names: Some(trajectory.names.clone()),
                 units: trajectory.units.iter().any(|unit| !unit.is_empty()).then(|| trajectory.units.clone()),
+                rotations: Some(rotations_of(trajectory.rotations.bind(py), None)?).filter(|rotations| !rotations.is_empty()),
             });
         }
         let bare = value.is_instance_of::<PyUntypedArray>() || value.is_instance_of::<PyList>();
@@ -226,7 +257,7 @@ impl Source {
             true => (None, None),
             false => py.import("pdmp._labels")?.call_method1("names_and_units", (value,))?.extract()?,
         };
-        Ok(Self { position: array(name, value)?, time: None, names, units })
+        Ok(Self { position: array(name, value)?, time: None, names, units, rotations: None })
     }
 
     /// Returns demonstration `m` of a fit.
@@ -234,7 +265,9 @@ impl Source {
         let sampling = self.time.map_or(Sampling::Unknown, |time| Sampling::Stamped { time });
         let position = two_axes(&format!("demo {m}: position"), "(T, D)", self.position)?;
         let demo = pdmp_core::Demonstration::new(position, sampling);
-        demo.and_then(|demo| labelled(demo, self.names, self.units)).map_err(|error| raise(error.in_demo(m)))
+        demo.and_then(|demo| labelled(demo, self.names, self.units))
+            .and_then(|demo| demo.with_rotations(self.rotations.unwrap_or_default()))
+            .map_err(|error| raise(error.in_demo(m)))
     }
 }
 
@@ -266,28 +299,37 @@ pub(crate) struct Trajectory {
     velocity: Py<PyArray2<f64>>,
     /// Accelerations (T, D) per s².
     acceleration: Py<PyArray2<f64>>,
-    /// Names of the degrees of freedom (D,).
+    /// Names of the columns of `position`.
     pub(crate) names: Vec<String>,
-    /// Units of the degrees of freedom (D,); "" if unknown.
+    /// Units of the columns of `position`; "" if unknown.
     pub(crate) units: Vec<String>,
+    /// Names of the columns of `velocity` and `acceleration`; those of `position` without rotations.
+    dof_names: Vec<String>,
+    /// Units of the columns of `velocity` and `acceleration`, without "per second".
+    dof_units: Vec<String>,
+    /// First column of each unit quaternion in `position`, and the order of its components, "wxyz" or "xyzw".
+    rotations: Py<PyDict>,
 }
 
 impl Trajectory {
     pub(crate) fn new(
         py: Python<'_>,
         trajectory: pdmp_core::motion::Trajectory,
-        names: &[String],
-        units: &[String],
-    ) -> Self {
+        primitive: &pdmp_core::Primitive,
+    ) -> PyResult<Self> {
         let convert = |matrix: Array2<f64>| matrix.into_pyarray(py).unbind();
-        Self {
+        let rotations = primitive.coordinates().map(Coordinates::columns).unwrap_or_default();
+        Ok(Self {
             time: to_numpy(py, &trajectory.time).unbind(),
             position: convert(trajectory.position),
             velocity: convert(trajectory.velocity),
             acceleration: convert(trajectory.acceleration),
-            names: names.to_vec(),
-            units: units.to_vec(),
-        }
+            names: primitive.coordinate_names().to_vec(),
+            units: primitive.coordinate_units().to_vec(),
+            dof_names: primitive.names().to_vec(),
+            dof_units: primitive.units().to_vec(),
+            rotations: rotations_to_python(py, &rotations)?.unbind(),
+        })
     }
 }
 
@@ -300,15 +342,17 @@ impl Trajectory {
         position: Py<PyArray2<f64>>,
         velocity: Py<PyArray2<f64>>,
         acceleration: Py<PyArray2<f64>>,
-        names: Vec<String>,
-        units: Vec<String>,
+        labels: [Vec<String>; 4],
+        rotations: Py<PyDict>,
     ) -> Self {
-        Self { time, position, velocity, acceleration, names, units }
+        let [names, units, dof_names, dof_units] = labels;
+        Self { time, position, velocity, acceleration, names, units, dof_names, dof_units, rotations }
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        let Self { time, position, velocity, acceleration, names, units } = self;
-        let arguments = (time, position, velocity, acceleration, names.clone(), units.clone()).into_pyobject(py)?;
+        let Self { time, position, velocity, acceleration, names, units, dof_names, dof_units, rotations } = self;
+        let labels = [names, units, dof_names, dof_units].map(Clone::clone);
+        let arguments = (time, position, velocity, acceleration, labels, rotations).into_pyobject(py)?;
         Ok((py.get_type::<Self>().getattr("_of")?, arguments))
     }
 
@@ -322,7 +366,7 @@ impl Trajectory {
     ///     Keys are the names of the attributes.
     fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(slf.py());
-        for name in ["time", "position", "velocity", "acceleration", "names", "units"] {
+        for name in ["time", "position", "velocity", "acceleration", "names", "units", "dof_names", "dof_units", "rotations"] {
             values.set_item(name, slf.getattr(name)?)?;
         }
         Ok(values)
@@ -362,4 +406,45 @@ impl Trajectory {
     fn to_csv(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         slf.py().import("pdmp.io")?.call_method1("write_csv", (path, slf)).map(drop)
     }
+}
+
+/// Returns the rotations of a mapping from the first column of a quaternion, its index or name, to its order.
+fn rotations_of(rotations: &Bound<'_, PyAny>, names: Option<&[String]>) -> PyResult<Vec<RotationColumns>> {
+    let wrong = |problem: String| PyValueError::new_err(format!("rotations = {}: {problem}", quoted(rotations)));
+    let form = "must map the first column of each quaternion to its order, such as {3: \"wxyz\"}";
+    let items = rotations.call_method0("items").map_err(|_| wrong(form.to_string()))?;
+    items
+        .try_iter()?
+        .map(|item| {
+            let (column, order) = item?.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
+            let column = match column.extract::<String>() {
+                Ok(name) => names
+                    .and_then(|names| names.iter().position(|other| *other == name))
+                    .ok_or_else(|| wrong(format!("there is no column named {name:?}; pass names=, or an index")))?,
+                Err(_) => Scalar::Object(column).count("rotations")?,
+            };
+            let order = match order.extract::<String>().as_deref() {
+                Ok("wxyz") => QuaternionOrder::Wxyz,
+                Ok("xyzw") => QuaternionOrder::Xyzw,
+                _ => return Err(wrong("the order must be \"wxyz\" or \"xyzw\"".to_string())),
+            };
+            Ok(RotationColumns { column, order })
+        })
+        .collect()
+}
+
+/// Returns rotations as a mapping from the first column of a quaternion to its order.
+pub(crate) fn rotations_to_python<'py>(
+    py: Python<'py>,
+    rotations: &[RotationColumns],
+) -> PyResult<Bound<'py, PyDict>> {
+    let mapping = PyDict::new(py);
+    for rotation in rotations {
+        let order = match rotation.order {
+            QuaternionOrder::Wxyz => "wxyz",
+            QuaternionOrder::Xyzw => "xyzw",
+        };
+        mapping.set_item(rotation.column, order)?;
+    }
+    Ok(mapping)
 }

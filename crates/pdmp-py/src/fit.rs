@@ -9,6 +9,7 @@ use pdmp_core::learning::regression::Basis;
 use pdmp_core::learning::{
     CanonicalOptions, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
 };
+use pdmp_core::model::Frame;
 use pdmp_core::numerics::Smoothing;
 use pdmp_core::{FitOptions, Kind};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -80,6 +81,11 @@ use crate::warp::TimeWarp;
 ///     units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
 ///     them. "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and
 ///     also apply to a time warp.
+/// rotation_length : float, optional
+///     Length that weighs as much as 1 rad where positions and rotations are factorised together, in the unit of the
+///     positions; by default the ratio of the deviations from the mean of the demonstrations, by root mean square.
+/// rotation_frame : {"body", "world"}
+///     Frame of the angular velocities and accelerations of a model with rotations.
 /// alignment : {"linear", "warp"} or TimeWarp
 ///     Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the
 ///     demonstrations closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a
@@ -144,12 +150,14 @@ use crate::warp::TimeWarp;
     signature = (
         demos, *, kind=Choice::FIRST, dt=None, period=None, contexts=None, map=Choice::FIRST, n_styles=None,
         singular_value_share=None, basis=None, smoothing=SmoothingArgument(Smoothing::Auto), nominal=None,
-        n_samples=None, transport=None, dof_scale=None, alignment=None, landmarks=None, tau=None,
+        n_samples=None, transport=None, dof_scale=None, rotation_length=None, rotation_frame=Choice::FIRST,
+        alignment=None, landmarks=None, tau=None,
         alpha_z=Scalar::Number(25.0), beta_z=None, alpha_x=None, mu=None, threads=None, progress=None
     ),
     text_signature = "(demos, *, kind='discrete', dt=None, period=None, contexts=None, map='auto', n_styles=None, \
                       singular_value_share=None, basis='gp', smoothing='auto', nominal=None, n_samples=None, \
-                      transport=None, dof_scale=None, alignment='linear', landmarks=None, tau=None, alpha_z=25.0, \
+                      transport=None, dof_scale=None, rotation_length=None, rotation_frame='body', alignment='linear', \
+                      landmarks=None, tau=None, alpha_z=25.0, \
                       beta_z=None, alpha_x=None, mu=None, threads=None, progress=None)"
 )]
 #[allow(clippy::too_many_arguments)]
@@ -169,6 +177,8 @@ pub(crate) fn fit(
     n_samples: Option<Scalar<'_>>,
     transport: Option<Choice<'_>>,
     dof_scale: Option<&Bound<'_, PyAny>>,
+    rotation_length: Option<Scalar<'_>>,
+    rotation_frame: Choice<'_>,
     alignment: Option<&Bound<'_, PyAny>>,
     landmarks: Option<&Bound<'_, PyAny>>,
     tau: Option<Scalar<'_>>,
@@ -196,6 +206,8 @@ pub(crate) fn fit(
     options.n_styles = n_styles_of(n_styles, optional_number("singular_value_share", singular_value_share)?)?;
     options.basis = basis_of(basis)?;
     options.dof_scale = dof_scale_of(dof_scale)?;
+    options.rotation_length = optional_number("rotation_length", rotation_length)?;
+    options.frame = rotation_frame.of("rotation_frame", &FRAMES)?;
     options.alpha_z = alpha_z.number("alpha_z")?;
     options.beta_z = optional_number("beta_z", beta_z)?;
     options.threads = crate::convert::threads(threads)?;
@@ -234,6 +246,9 @@ fn canonical_of(
         }
     }
 }
+
+/// Frames of angular velocities.
+pub(crate) const FRAMES: [(&str, Frame); 2] = [("body", Frame::Body), ("world", Frame::World)];
 
 fn n_styles_of(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {
     let Some(n_styles) = n_styles else {

@@ -11,9 +11,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyString};
 
+use crate::choice::Choice;
 use crate::conditions::Conditions;
 use crate::convert::{Cube, Matrix, Reduced, Vector, optional, quoted, to_numpy, vector};
 use crate::error::raise;
+use crate::fit::FRAMES;
 use crate::instance;
 use crate::prediction::Prediction;
 use crate::scalar::{Scalar, optional_number};
@@ -314,6 +316,27 @@ impl Model {
             py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
     }
+
+    /// Returns the model with angular velocities and accelerations in another frame; it moves alike.
+    ///
+    /// Parameters
+    /// ----------
+    /// frame : {"body", "world"}
+    ///     Frame that rotates, or the frame in which orientations are measured.
+    ///
+    /// Returns
+    /// -------
+    /// Model
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The model has no rotations.
+    fn in_frame(&self, frame: Choice<'_>) -> PyResult<Self> {
+        let frame = frame.of("frame", &FRAMES)?;
+        self.0.in_frame(frame).map(|model| Self(Arc::new(model))).map_err(raise)
+    }
+
 
     /// Writes a model file.
     ///

@@ -3,11 +3,13 @@
 use numpy::ToPyArray;
 use pdmp_core::context::ContextColumn;
 use pdmp_core::dynamics::Canonical;
+use pdmp_core::model::{Coordinates, Frame};
 use pyo3::prelude::*;
-use pyo3::types::PyList;
+use pyo3::types::{PyDict, PyList};
 
 use crate::context::ContextMap;
 use crate::convert::{Matrix, Vector, context_to_python, locked, read_only};
+use crate::demonstration::rotations_to_python;
 use crate::error::{ascii, raise};
 use crate::model::Model;
 
@@ -29,6 +31,40 @@ impl Model {
     #[getter]
     fn n_dofs(&self) -> usize {
         self.0.n_dofs()
+    }
+
+    /// Number of coordinates, the length of positions, goals and starts: one more than the degrees of freedom for each
+    /// rotation.
+    #[getter]
+    fn n_coordinates(&self) -> usize {
+        self.0.n_coordinates()
+    }
+
+    /// Names of the coordinates.
+    #[getter]
+    fn coordinate_names(&self) -> Vec<String> {
+        self.0.coordinate_names().to_vec()
+    }
+
+    /// Units of the coordinates; an unknown unit is "".
+    #[getter]
+    fn coordinate_units(&self) -> Vec<String> {
+        self.0.coordinate_units().to_vec()
+    }
+
+    /// First column of each unit quaternion in positions, and the order of its components, "wxyz" or "xyzw".
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        rotations_to_python(py, &self.0.coordinates().map(Coordinates::columns).unwrap_or_default())
+    }
+
+    /// Frame of angular velocities and accelerations, "body" or "world"; None without rotations.
+    #[getter]
+    fn rotation_frame(&self) -> Option<&'static str> {
+        self.0.coordinates().map(|coordinates| match coordinates.frame() {
+            Frame::Body => "body",
+            Frame::World => "world",
+        })
     }
 
     /// Style dimension J.
@@ -145,19 +181,19 @@ impl Model {
     /// Goals (M, D) of the demonstrations in the unit of each degree of freedom.
     #[getter]
     fn goals<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        locked(self.0.demonstrated().goals.to_pyarray(py))
+        locked(self.0.goals().to_pyarray(py))
     }
 
     /// First positions (M, D) of the demonstrations in the unit of each degree of freedom.
     #[getter]
     fn starts<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        locked(self.0.demonstrated().starts.to_pyarray(py))
+        locked(self.0.starts().to_pyarray(py))
     }
 
     /// Mean positions (M, D) of the demonstrations, the anchors of cycles, in the unit of each degree of freedom.
     #[getter]
     fn anchors<'py>(&self, py: Python<'py>) -> Matrix<'py> {
-        locked(self.0.demonstrated().anchors.to_pyarray(py))
+        locked(self.0.anchors().to_pyarray(py))
     }
 
     /// Bounds (K+1,) of the segments as shares of the movement, from 0 to 1; K = 1 with linear scaling of time.

@@ -74,7 +74,7 @@ impl Model {
         let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
         let conditions = conditions_of(&self.0, conditions, context, changes)?;
         let trajectory = interruptible(py, |progress| rollout_with(self.0.primitive(), &conditions, grid, progress))?;
-        Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
+        Trajectory::new(py, trajectory, self.0.primitive())
     }
 
     /// Starts a movement that is computed tick by tick in a control loop.
@@ -254,7 +254,7 @@ impl Model {
         let (limits, dt) = (instance::limits(limits)?, dt.number("dt")?);
         let conditions = conditions_of(&self.0, conditions, context, changes)?;
         let trajectory = py.detach(|| fastest(self.0.primitive(), limits, &conditions, dt)).map_err(raise)?;
-        Ok(Trajectory::new(py, trajectory, self.0.names(), self.0.units()))
+        Trajectory::new(py, trajectory, self.0.primitive())
     }
 
     /// Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.

@@ -7,6 +7,7 @@ pub(crate) mod command_filter;
 pub(crate) mod forcing_table;
 pub(crate) mod goal_transition;
 pub(crate) mod hermite_table;
+pub(crate) mod mean_rotation;
 pub(crate) mod output_system;
 pub(crate) mod propagator_series;
 pub(crate) mod time_warp;

@@ -38,6 +38,8 @@ impl Error {
             | Self::WrapInGap { .. }
             | Self::Aperiodic { .. }
             | Self::Still { .. }
+            | Self::Quaternion { row: Some(_), .. }
+            | Self::HalfTurn { .. }
             | Self::Samples { .. }
             | Self::Dofs { .. }
             | Self::Mixed { .. }
@@ -46,6 +48,7 @@ impl Error {
             Self::NotFinite { .. }
             | Self::Length { .. }
             | Self::Name { .. }
+            | Self::Quaternion { row: None, .. }
             | Self::Rows { .. }
             | Self::Single { .. }
             | Self::Range { .. }
@@ -80,6 +83,7 @@ impl Error {
             Self::NotFinite { name, .. }
             | Self::NotFiniteAt { name, .. }
             | Self::Length { name, .. }
+            | Self::Quaternion { name, .. }
             | Self::Name { name, .. }
             | Self::Rows { name, .. }
             | Self::Single { name }
@@ -93,7 +97,7 @@ impl Error {
             Self::Time { .. } => Some("time"),
             Self::Landmark { .. } => Some("landmarks"),
             Self::Segments { .. } => Some("n_segments"),
-            Self::Samples { .. } | Self::Dofs { .. } => Some("position"),
+            Self::Samples { .. } | Self::Dofs { .. } | Self::HalfTurn { .. } => Some("position"),
             Self::NoDemonstrations => Some("demos"),
             Self::Styles { .. } => Some("n_styles"),
             Self::Label { .. } | Self::NoNumber { .. } | Self::ContextNames { .. } => Some("context"),

@@ -70,3 +70,13 @@ impl fmt::Display for Column<'_> {
         }
     }
 }
+
+/// The four columns of a rotation, with the row of a matrix.
+pub(super) struct Columns(pub(super) Option<usize>, pub(super) usize);
+
+impl fmt::Display for Columns {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        self.0.map_or(Ok(()), |row| write!(f, "{row}, "))?;
+        write!(f, "{}:{}", self.1, self.1 + 4)
+    }
+}

@@ -43,6 +43,15 @@ pub enum LimitError {
         /// Rate at the start, relative to the largest admissible one.
         ratio: f64,
     },
+    /// A limit of a rotation.
+    #[error(
+        "limits of DoF {dof}: a rotation has no limits; give infinity for its three DoFs, and limit angular velocities in the \
+         driver of the robot"
+    )]
+    OfRotation {
+        /// Index of the DoF.
+        dof: usize,
+    },
     /// A limit of the jerk without one of the acceleration.
     #[error(
         "limits of DoF {dof}: a jerk of {} needs a limit of the acceleration, which bounds the time of a reversal; give both",

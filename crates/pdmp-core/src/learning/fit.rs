@@ -9,7 +9,7 @@ use crate::demonstration::{ContextValue, Demonstration};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::learning::alignment::{Aligned, TimeScaling};
+use crate::learning::alignment::{Aligned, Alignment, TimeScaling};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::options::TransportSelection;
 use crate::learning::style_selection::cross_validation::StyleSelection;
@@ -20,11 +20,12 @@ use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{cycle_ends, inspect, unwound};
 use crate::validate::{check_length, check_names};
 
-use super::braking_rate::braking_rate;
+use super::braking_rate::{braking_rate, share_accelerations};
 use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
 use super::noise_findings;
 use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
+use super::rotations::Residuals;
 use super::stiffness::stiffness;
 use super::style_selection::singular_values;
 use super::tabulation::compile;
@@ -84,8 +85,11 @@ pub fn fit_with(
         findings.extend(cycle_ends(demos));
     }
     let whole = unwound(demos);
-    let demos = &*whole;
-    let mut aligned = options.alignment().align(demos, threads)?;
+    let residuals = Residuals::of(&whole, options)?;
+    let demos = residuals.as_ref().map_or(&*whole, |residuals| &residuals.demos);
+    let vectors = residuals.as_ref().map(Residuals::vectors).unwrap_or_default();
+    let alignment = Alignment { vectors: vectors.clone(), ..options.alignment() };
+    let mut aligned = alignment.align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
     if !options.context_names.is_empty() {
         let n_columns = contexts.as_ref().map_or(0, |(columns, _)| columns.len());
@@ -97,15 +101,22 @@ pub fn fit_with(
     let template = scale_time(&mut aligned, options, &constants, &units, contexts.as_ref(), &mut aligning)?;
     let mut targeting = |share| progress(Stage::Targets, share);
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
-    let ranges = targets.ranges();
-    let dof_scale = options.dof_scale.of(&ranges, &units);
+    let mut ranges = targets.ranges();
+    let dof_scale = match &residuals {
+        Some(residuals) => {
+            residuals.set_ranges(&mut ranges);
+            residuals.dof_scale(options, &ranges, &units)?
+        }
+        None => options.dof_scale.of(&ranges, &units),
+    };
     let transport = match options.canonical {
         CanonicalOptions::Discrete { transport: TransportSelection::Learnt, .. } => {
             targets.transport(constants.canonical, &dof_scale)?
         }
         _ => Transport::immediate(),
     };
-    let accelerations = targets.largest_accelerations();
+    let mut accelerations = targets.largest_accelerations();
+    share_accelerations(&mut accelerations, &vectors, &aligned, &constants);
     targets.carry(&transport, constants.attractor, constants.canonical);
     targets.scale(&dof_scale);
 
@@ -149,11 +160,12 @@ pub fn fit_with(
     let nominal = demonstrated.nominal_conditions(canonical.kind());
     let braking = (!transport.is_immediate()).then(|| {
         let end_velocities = end_velocities(attractor, &forcing_table, names.len());
-        braking_rate(attractor, &accelerations, demonstrated.styles.view(), &end_velocities)
+        braking_rate(attractor, &accelerations, demonstrated.styles.view(), &end_velocities, &vectors)
     });
     let parts = Parts { attractor, forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal };
     let primitive = Arc::new(Primitive::new(parts));
     findings.extend(stiffness(&primitive, &aligned)?);
+    findings.extend(residuals.iter().flat_map(|residuals| residuals.findings.iter().cloned()));
     let noise = aligned.noise.clone();
     let contexts = columns.zip(demonstrated.contexts.as_ref());
     let learn = |contexts| learn_map(contexts, &primitive, &demonstrated, aligned, options);
@@ -169,6 +181,10 @@ pub fn fit_with(
         residual_variance,
         regression,
         findings,
+    };
+    let primitive = match residuals {
+        Some(residuals) => residuals.outside(primitive, options.frame),
+        None => primitive,
     };
     Ok(Model { primitive, demonstrated, learnt, map })
 }
@@ -293,8 +309,8 @@ fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> 
 }
 
 /// Returns names and units of the DoFs; defaults where no demonstration carries any.
-fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
-    let n_dofs = demos.first().map_or(0, Demonstration::n_dofs);
+pub(super) fn labels_of(demos: &[Demonstration]) -> Result<(Vec<String>, Vec<String>)> {
+    let n_dofs = demos.first().map_or(0, Demonstration::n_coordinates);
     let names = common_labels(demos, Demonstration::names, "names")?;
     let units = common_labels(demos, Demonstration::units, "units")?;
     Ok((

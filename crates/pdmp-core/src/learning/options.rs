@@ -7,6 +7,7 @@ use crate::kind::Kind;
 use crate::learning::alignment::{Alignment, TimeScaling};
 use crate::learning::factorization::Truncation;
 use crate::learning::regression::{Basis, Gp};
+use crate::model::Frame;
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
 use crate::validate::{check_range, check_vector};
@@ -139,6 +140,11 @@ pub struct FitOptions {
     pub basis: Basis,
     /// Scale of each DoF in the factorisation.
     pub dof_scale: DofScaling,
+    /// Length that weighs positions against rotations: as much of the other DoFs, in their scale, as weighs 1 rad, from 1e-6
+    /// to 1e6. The default is the ratio of their deviations from the mean of the demonstrations, by root mean square.
+    pub rotation_length: Option<f64>,
+    /// Frame of the angular velocities and accelerations of a model with rotations.
+    pub frame: Frame,
     /// Gain α_z of the output system, from 1e-6 to 1e6.
     pub alpha_z: f64,
     /// Gain β_z of the output system, from 1e-6 to 1e6; otherwise α_z/4, critical damping.
@@ -164,6 +170,8 @@ impl FitOptions {
             n_styles: NStyles::AboveNoise,
             basis: Basis::Gp(Gp::default()),
             dof_scale: DofScaling::Auto,
+            rotation_length: None,
+            frame: Frame::Body,
             alpha_z: 25.0,
             beta_z: None,
             threads: Threads::available(),
@@ -225,6 +233,16 @@ impl FitOptions {
         Self { dof_scale, ..self }
     }
 
+    /// Sets the length that weighs as much as 1 rad.
+    pub fn rotation_length(self, rotation_length: f64) -> Self {
+        Self { rotation_length: Some(rotation_length), ..self }
+    }
+
+    /// Sets the frame of angular velocities and accelerations.
+    pub fn frame(self, frame: Frame) -> Self {
+        Self { frame, ..self }
+    }
+
     /// Sets the gain α_z of the output system.
     pub fn alpha_z(self, alpha_z: f64) -> Self {
         Self { alpha_z, ..self }
@@ -248,6 +266,7 @@ impl FitOptions {
             smoothing: self.smoothing,
             nominal: self.nominal,
             n_samples: self.n_samples,
+            vectors: Vec::new(),
         }
     }
 }

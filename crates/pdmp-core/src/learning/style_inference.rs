@@ -91,6 +91,7 @@ impl StyleOptions {
 /// # Ok::<(), pdmp_core::Error>(())
 /// ```
 pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> Result<Vec<f64>> {
+    model.primitive().refuse_rotations("has rotations, for which styles cannot be inferred")?;
     let n_dofs = model.n_dofs();
     check_length("demonstration", demo.n_dofs(), n_dofs, "DoF")?;
     for (name, labels, own) in [("names", demo.names(), model.names()), ("units", demo.units(), model.units())] {
@@ -105,6 +106,7 @@ pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> 
         smoothing: Smoothing::Interpolate,
         nominal: None,
         n_samples: Some(model.learnt.n_samples),
+        vectors: Vec::new(),
     };
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();

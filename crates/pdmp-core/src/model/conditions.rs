@@ -115,6 +115,9 @@ impl Conditions {
     /// # Errors
     /// A wrong length, a number that is not finite, τ that is not positive, or a condition of the other kind.
     pub(crate) fn complete(&self, primitive: &Primitive) -> Result<ResolvedConditions> {
+        if let Some(coordinates) = primitive.coordinates() {
+            return coordinates.complete(self);
+        }
         let nominal = &primitive.nominal;
         let centre = |name, given: &Option<Vec<f64>>| match given {
             Some(value) => check_vector(name, value, nominal.centre.len(), "DoF").map(|()| value.clone()),
@@ -156,6 +159,7 @@ impl Conditions {
             centre,
             start,
             velocity: self.velocity.clone(),
+            drift: None,
             goal_velocity: self.goal_velocity.clone().unwrap_or_else(|| vec![0.0; primitive.n_dofs()]),
             has_goal_velocity: self.goal_velocity.is_some(),
             amplitude,
@@ -205,6 +209,9 @@ pub(crate) struct ResolvedConditions {
     pub(crate) centre: Vec<f64>,
     pub(crate) start: Option<Vec<f64>>,
     pub(crate) velocity: Option<Vec<f64>>,
+    /// Velocity of the DoFs per unit of the clock that offsets the motion of the mean rotations at the start; only with a
+    /// start velocity.
+    pub(crate) drift: Option<Vec<f64>>,
     /// Final velocity; zero if none is in force.
     pub(crate) goal_velocity: Vec<f64>,
     pub(crate) has_goal_velocity: bool,
@@ -219,6 +226,7 @@ clone_in_place!(ResolvedConditions {
     centre,
     start,
     velocity,
+    drift,
     goal_velocity,
     has_goal_velocity,
     amplitude,

@@ -97,6 +97,22 @@ pub enum Finding {
         /// Index of the demonstration.
         demo: usize,
     },
+    /// Columns that have the norm of a quaternion, and are not declared as a rotation.
+    Quaternion {
+        /// First of the four columns.
+        column: usize,
+        /// Name of the first of the four columns.
+        name: String,
+    },
+    /// A rotation far from the mean of the demonstrations.
+    FarRotation {
+        /// Index of the demonstration.
+        demo: usize,
+        /// Name of the first of the four columns.
+        column: String,
+        /// Largest angle from the mean rotation, in degrees.
+        degrees: f64,
+    },
     /// Gains so high that the accelerations of the reproduction far exceed those of the demonstration.
     Stiff {
         /// Gain α_z, per unit of the clock.
@@ -233,6 +249,18 @@ impl fmt::Display for Finding {
                 f,
                 "demo {demo}: the last sample repeats the first: a rhythmic demonstration ends one sampling interval before \
                  the next cycle starts; drop the last sample"
+            ),
+            Self::Quaternion { column, name } => write!(
+                f,
+                "columns {column} to {} ({name:?} to the third after it) have unit norm: a quaternion? Declare it, as in \
+                 rotations={{{column}: \"wxyz\"}}, with its order of components; as ordinary columns its norm is not kept",
+                column + 3
+            ),
+            Self::FarRotation { demo, column, degrees } => write!(
+                f,
+                "demo {demo}: the rotation from column {column:?} on is up to {degrees:.0} degrees from the mean of the \
+                 demonstrations: beyond 90 its styles are distorted, and half a turn is refused; check the columns and their \
+                 order, or fit the demonstrations in groups"
             ),
             Self::Stiff { alpha_z, dof, demo, reproduced, shown, n_samples } => write!(
                 f,

@@ -1,6 +1,7 @@
 //! Models: a learnt primitive with the parameters of its demonstrations, the summary of the fit and the context map.
 
 pub(crate) mod conditions;
+pub(crate) mod coordinates;
 pub(crate) mod file;
 pub(crate) mod finding;
 pub(crate) mod prediction;
@@ -20,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::numerics::smoothing_spline::Noise;
 pub use conditions::Conditions;
+pub use coordinates::{Coordinates, Frame};
 pub use finding::Finding;
 pub use prediction::Prediction;
 use primitive::Nominal;
@@ -171,7 +173,59 @@ impl Model {
             Kind::Rhythmic => (None, None, mean(anchors)),
         };
         let (style, segment_durations) = (mean(styles), mean(segment_durations));
-        Ok(Conditions { style, goal, start, anchor, segment_durations, ..Conditions::default() })
+        Ok(self.outside(Conditions { style, goal, start, anchor, segment_durations, ..Conditions::default() }))
+    }
+
+    /// Converts conditions of the degrees of freedom to those of the coordinates.
+    fn outside(&self, conditions: Conditions) -> Conditions {
+        match self.primitive.coordinates() {
+            Some(coordinates) => coordinates.of_dofs(conditions),
+            None => conditions,
+        }
+    }
+
+    /// Returns the goals (M, nq) of the demonstrations, in coordinates.
+    pub fn goals(&self) -> Array2<f64> {
+        self.positions(&self.demonstrated.goals, self.canonical().extent())
+    }
+
+    /// Returns the starts (M, nq) of the demonstrations, in coordinates.
+    pub fn starts(&self) -> Array2<f64> {
+        self.positions(&self.demonstrated.starts, 0.0)
+    }
+
+    /// Returns the anchors (M, nq) of the demonstrations, in coordinates: a rotation is relative to the mean at phase 0.
+    pub fn anchors(&self) -> Array2<f64> {
+        self.positions(&self.demonstrated.anchors, 0.0)
+    }
+
+    fn positions(&self, dofs: &Array2<f64>, u: f64) -> Array2<f64> {
+        self.primitive.coordinates().map_or_else(|| dofs.clone(), |coordinates| coordinates.positions(u, dofs))
+    }
+
+    /// Returns the model with angular velocities and accelerations in another frame; it moves alike.
+    ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # use pdmp_core::model::Frame;
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// // Without rotations there is nothing to express.
+    /// assert!(model.in_frame(Frame::World).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A model without rotations.
+    pub fn in_frame(&self, frame: Frame) -> Result<Self> {
+        let coordinates = self
+            .primitive
+            .coordinates()
+            .ok_or(Error::Argument { name: "frame", problem: "does not apply: the model has no rotations" })?;
+        let primitive = Primitive::clone(&self.primitive).with_coordinates(coordinates.in_frame(frame));
+        Ok(Self { primitive: Arc::new(primitive), ..self.clone() })
     }
 
     /// Returns the map from contexts to style, goal and start or anchor, and logarithm of the duration; `None` if the
@@ -203,14 +257,15 @@ impl Model {
         let [shortest, longest] =
             [f64::min, f64::max].map(|extreme| demonstrated.clone().copied().reduce(extreme).unwrap_or(1.0));
         let durations = shortest / MAX_DURATION_RATIO..=longest * MAX_DURATION_RATIO;
-        Prediction::of(
+        let prediction = Prediction::of(
             map.predict(context)?,
             map.degrees_of_freedom(),
             self.kind(),
             self.n_styles(),
             self.n_dofs(),
             durations,
-        )
+        )?;
+        Ok(Prediction { conditions: self.outside(prediction.conditions), ..prediction })
     }
 }
 

@@ -71,6 +71,7 @@ pub fn batch(
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Batch> {
+    primitive.refuse_rotations("has rotations, for which batches do not exist: compute rollouts one by one")?;
     let n_movements = conditions.check(primitive)?;
     let BatchConditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau } = conditions;
     let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(primitive)?;

@@ -106,13 +106,14 @@ impl Command<'_> {
             reject_for_kind(kind, "amplitude", kind == Kind::Discrete)?;
             check_amplitude(amplitude)?;
         }
+        let position = |name, vector: Option<&[f64]>| vector.map_or(Ok(()), |vector| model.check_position(name, vector));
         reject_for_kind(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
-        vector("goal", self.goal)?;
+        position("goal", self.goal)?;
         reject_goal_velocity(model, self.goal_velocity.is_some())?;
         vector("goal_velocity", self.goal_velocity)?;
         reject_for_kind(kind, "anchor", kind == Kind::Discrete && self.anchor.is_some())?;
-        vector("anchor", self.anchor)?;
-        vector("measured", self.measured)?;
+        position("anchor", self.anchor)?;
+        position("measured", self.measured)?;
         if let Some(Coupling { velocity, acceleration }) = self.coupling {
             vector("coupling velocity", Some(velocity))?;
             vector("coupling acceleration", Some(acceleration))?;
@@ -122,9 +123,10 @@ impl Command<'_> {
 }
 
 impl Motion<'_> {
-    /// Checks that each vector has one element per DoF.
-    pub(crate) fn check(&self, n_dofs: usize) -> Result<()> {
-        check_length("position", self.position.len(), n_dofs, "DoF")?;
+    /// Checks that the position has one element per coordinate, and the other vectors one per DoF.
+    pub(crate) fn check(&self, primitive: &Primitive) -> Result<()> {
+        let (n_coordinates, n_dofs) = (primitive.n_coordinates(), primitive.n_dofs());
+        check_length("position", self.position.len(), n_coordinates, primitive.per_coordinate())?;
         check_length("velocity", self.velocity.len(), n_dofs, "DoF")?;
         check_length("acceleration", self.acceleration.len(), n_dofs, "DoF")
     }

@@ -26,8 +26,9 @@ const MAX_RATE: f64 = 1e4;
 ///
 /// # Errors
 /// Limits that do not fit, or neither of both.
-fn rate_limits(limits: &Limits, n_dofs: usize) -> Result<Vec<RateLimits>> {
-    limits.check(n_dofs)?;
+fn rate_limits(limits: &Limits, primitive: &Primitive) -> Result<Vec<RateLimits>> {
+    limits.check_rotations(primitive)?;
+    let n_dofs = primitive.n_dofs();
     if !limits.bound_rates(n_dofs) {
         let problem = "bound neither velocity nor acceleration: give one of them, or the movement takes no time";
         return Err(Error::Argument { name: "limits", problem });
@@ -92,7 +93,7 @@ fn path(primitive: &Arc<Primitive>, conditions: &Conditions) -> Result<SampledPa
 /// # Errors
 /// Conditions or limits that do not fit the primitive, or no limit of velocity or acceleration.
 pub fn fastest_tau(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditions) -> Result<f64> {
-    let bounds = rate_limits(limits, primitive.n_dofs())?;
+    let bounds = rate_limits(limits, primitive)?;
     let path = path(primitive, &on_path(primitive, conditions)?)?;
     let knots =
         (0..path.clock.len() - 1).flat_map(|i| [0.0, 0.5, 1.0].map(|t| max_constant(path.within(i, t), &bounds)));
@@ -121,7 +122,7 @@ pub fn fastest_tau(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Con
 /// Conditions or limits that do not fit the primitive, no limit of velocity or acceleration, a path that leaves the limits
 /// of the position, or a velocity at the start from which the limits cannot be kept.
 pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditions, dt: f64) -> Result<Trajectory> {
-    let bounds = rate_limits(limits, primitive.n_dofs())?;
+    let bounds = rate_limits(limits, primitive)?;
     let given =
         |velocity: &Option<Vec<f64>>| velocity.as_ref().is_some_and(|velocity| velocity.iter().any(|v| *v != 0.0));
     let commanded = conditions.time_constant(primitive)?.powi(-2);

@@ -209,8 +209,10 @@ pub(crate) fn bounds(limits: &Limits, ranges: &[f64]) -> Result<Vec<Bound>> {
 /// # Errors
 /// Conditions or limits that do not fit the primitive.
 pub fn feasible(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditions) -> Result<Margins> {
+    limits.check_rotations(primitive)?;
+    let (primitive, conditions) = primitive.inside_with(conditions)?;
     let bounds = bounds(limits, &ranges(primitive)?)?;
-    let movement = sampled(primitive, conditions)?;
+    let movement = sampled(primitive, &conditions)?;
     let mut margins = Margins::default();
     for bound in bounds {
         let (place, excess) = bound.worst(&movement);

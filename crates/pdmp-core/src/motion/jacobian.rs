@@ -71,6 +71,7 @@ pub fn jacobian(
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Array3<f64>> {
+    primitive.refuse_rotations("has rotations, for which Jacobians do not exist")?;
     let kind = primitive.kind();
     reject_for_kind(kind, "goal", variable == WithRespectTo::Goal && kind == Kind::Rhythmic)?;
     reject_for_kind(kind, "anchor", variable == WithRespectTo::Anchor && kind == Kind::Discrete)?;

@@ -1,6 +1,7 @@
 //! Kinematic limits of a robot.
 
 use crate::error::{Error, LimitError, Result};
+use crate::model::Primitive;
 use crate::motion::time_law::RateLimits;
 use crate::numerics::simd::{F64x4, WIDTH, groups};
 use crate::validate::MAX_MAGNITUDE;
@@ -90,6 +91,20 @@ impl Limits {
             }
             if lower < upper { Ok(()) } else { Err(Error::Limits(LimitError::Order { dof, lower, upper })) }
         })
+    }
+
+    /// Refuses limits of rotations: their angular velocity is not that of a degree of freedom.
+    pub(crate) fn check_rotations(&self, primitive: &Primitive) -> Result<()> {
+        self.check(primitive.n_dofs())?;
+        let finite = |dof: usize| {
+            let limits = [(&self.lower, f64::NEG_INFINITY)];
+            let others = [&self.upper, &self.velocity, &self.acceleration, &self.jerk].map(|limits| (limits, f64::INFINITY));
+            limits.into_iter().chain(others).any(|(limits, none)| limit_of_dof(limits, dof, none).is_finite())
+        };
+        match primitive.rotation_dofs().flat_map(|first| first..first + 3).find(|&dof| finite(dof)) {
+            Some(dof) => Err(Error::Limits(LimitError::OfRotation { dof })),
+            None => Ok(()),
+        }
     }
 
     /// Returns the lower and upper limits of the position, infinite where there is none.

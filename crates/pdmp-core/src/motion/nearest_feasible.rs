@@ -80,6 +80,7 @@ pub enum Vary {
 /// # Errors
 /// Conditions or limits that do not fit the primitive, or limits that no change of the varied conditions keeps.
 pub fn nearest_feasible(model: &Model, limits: &Limits, conditions: &Conditions, vary: Vary) -> Result<Conditions> {
+    model.primitive().refuse_rotations("has rotations, for which the nearest conditions do not exist")?;
     let primitive = model.primitive();
     let ranges = ranges(primitive)?;
     let bounds = bounds(limits, &ranges)?;

@@ -29,6 +29,7 @@
 
 use crate::demonstration::turn_of;
 use crate::error::{Error, Result};
+use crate::model::Primitive;
 use crate::motion::command::{Command, Coupling};
 use crate::numerics::simd::{F64x4, groups, pack, repack};
 use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
@@ -100,6 +101,8 @@ pub(crate) struct Perturbation {
     inverse_turn: Vec<F64x4>,
     /// Inverse of the range; zero for a stationary DoF, whose error does not stop the phase.
     inverse_range: Vec<F64x4>,
+    /// First DoF of each rotation.
+    rotations: Vec<usize>,
 }
 
 clone_in_place!(Perturbation {
@@ -117,6 +120,7 @@ clone_in_place!(Perturbation {
     turn,
     inverse_turn,
     inverse_range,
+    rotations,
 });
 
 /// Returns the largest range of a DoF.
@@ -125,14 +129,18 @@ pub(crate) fn largest_range(ranges: &[f64]) -> f64 {
 }
 
 impl Perturbation {
-    /// Returns no perturbation, with default gains for the ranges and units of the DoFs and the extent of the clock.
-    pub(crate) fn new(ranges: &[f64], units: &[String], extent: f64) -> Self {
+    /// Returns no perturbation, with default gains for a primitive.
+    pub(crate) fn new(primitive: &Primitive) -> Self {
+        let (ranges, units, extent) = (primitive.ranges(), primitive.units(), primitive.canonical().extent());
+        let rotations: Vec<usize> = primitive.rotation_dofs().collect();
         let min_range = (MIN_RANGE_RATIO * largest_range(ranges)).max(MIN_RANGE);
         let inverse = |&range: &f64| if range > min_range { 1.0 / range } else { 0.0 };
         let zeros = vec![F64x4::ZERO; groups(ranges.len())];
         let inverse_range: Vec<f64> = ranges.iter().map(inverse).collect();
-        let turn: Vec<f64> =
-            (0..ranges.len()).map(|d| units.get(d).and_then(|unit| turn_of(unit)).unwrap_or(0.0)).collect();
+        // The error of a rotation is already by the shorter way.
+        let turns = |d: &usize| !rotations.iter().any(|&first| (first..first + 3).contains(d));
+        let turn_of_dof = |d| Some(d).filter(turns).and_then(|d| units.get(d)).and_then(|unit| turn_of(unit));
+        let turn: Vec<f64> = (0..ranges.len()).map(|d| turn_of_dof(d).unwrap_or(0.0)).collect();
         let inverse_turn: Vec<f64> = turn.iter().map(|&turn| if turn > 0.0 { 1.0 / turn } else { 0.0 }).collect();
         Self {
             terms: PerturbationTerms { velocity: zeros.clone(), acceleration: zeros.clone() },
@@ -149,6 +157,7 @@ impl Perturbation {
             turn: pack(&turn),
             inverse_turn: pack(&inverse_turn),
             inverse_range: pack(&inverse_range),
+            rotations,
         }
     }
 
@@ -222,10 +231,13 @@ impl Perturbation {
         let share = -(-tracking * h).exp_m1();
         let pull = if dt > 0.0 { self.remaining_pull * share / dt } else { 0.0 };
         self.remaining_pull *= 1.0 - share;
+        for ((unexpected, &error), expected) in self.pull.iter_mut().zip(&self.error).zip(&self.expected_error) {
+            *unexpected = error - expected.max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
+        }
+        self.expect_rotations();
         let mut squares = F64x4::ZERO;
         for (group, velocity) in self.terms.velocity.iter_mut().enumerate() {
-            let error = self.error[group];
-            let unexpected = error - self.expected_error[group].max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
+            let unexpected = self.pull[group];
             self.pull[group] = unexpected * pull;
             *velocity += self.pull[group];
             let scaled = unexpected * self.inverse_range[group];
@@ -235,6 +247,20 @@ impl Perturbation {
         let adapted = -(-self.adaptation_rate * self.phase_rate * h).exp_m1();
         for (expected_error, &error) in self.expected_error.iter_mut().zip(&self.error) {
             *expected_error += (error - *expected_error) * adapted;
+        }
+    }
+
+    /// Sets the unexpected error of each rotation: of its expected error, the part along its error counts.
+    fn expect_rotations(&mut self) {
+        let Self { pull, error, expected_error, rotations, .. } = self;
+        let unexpected = bytemuck::cast_slice_mut::<F64x4, f64>(pull);
+        let [error, expected] = [error, expected_error].map(|lanes| bytemuck::cast_slice::<F64x4, f64>(lanes));
+        for dof in rotations.iter().map(|&first| first..first + 3) {
+            let products = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let (error, expected) = (&error[dof.clone()], &expected[dof.clone()]);
+            let square = products(error, error);
+            let share = if square > 0.0 { (products(expected, error) / square).clamp(0.0, 1.0) } else { 0.0 };
+            unexpected[dof].iter_mut().zip(error).for_each(|(unexpected, error)| *unexpected = error * (1.0 - share));
         }
     }
 
@@ -289,6 +315,7 @@ impl Perturbation {
             turn: _,
             inverse_turn: _,
             inverse_range: _,
+            rotations: _,
         } = self;
         for lanes in [velocity, acceleration, error, expected_error, pull] {
             visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), quantity)?;

@@ -87,6 +87,7 @@ pub struct PredictionBand {
 /// # Errors
 /// A prediction without covariance, a `level` outside (0, 1), a band that overflows, or an error of the rollout.
 pub fn prediction_band(model: &Model, prediction: &Prediction, level: f64, grid: TimeGrid) -> Result<PredictionBand> {
+    model.primitive().refuse_rotations("has rotations, for which bands do not exist")?;
     check_range("level", level, level > 0.0 && level < 1.0, "must lie between 0 and 1")?;
     let covariance = prediction.covariance.as_ref().ok_or(Error::Argument {
         name: "prediction",

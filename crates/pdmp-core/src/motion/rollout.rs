@@ -119,7 +119,7 @@ fn sample(
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Trajectory> {
     let mut controller = Controller::new(primitive, dt, conditions, Some(0.0))?.with_prefetch(PREFETCH_TICKS);
-    Trajectory::record_at("rollout", primitive.n_dofs(), time, progress, |k, time, motion| {
+    Trajectory::record_at("rollout", primitive, time, progress, |k, time, motion| {
         if k > 0 {
             clock.step(&mut controller, time)?;
         }

@@ -3,6 +3,7 @@
 use ndarray::{Array2, Array3, Ix2};
 
 use crate::error::Result;
+use crate::model::Primitive;
 use crate::motion::command::Motion;
 use crate::validate::{check_positive, check_range, row_major_mut, zeros};
 
@@ -16,7 +17,7 @@ const MAX_STEPS: f64 = 1e7;
 pub struct Trajectory {
     /// Times (T,), in seconds from the start, or from the present for a forecast.
     pub time: Vec<f64>,
-    /// Positions (T, D), in the unit of each DoF.
+    /// Positions (T, D), in the unit of each DoF, or (T, nq) in coordinates.
     pub position: Array2<f64>,
     /// Velocities (T, D), per second.
     pub velocity: Array2<f64>,
@@ -29,34 +30,35 @@ impl Trajectory {
     /// is called periodically with the completed fraction.
     pub(crate) fn record(
         name: &'static str,
-        n_dofs: usize,
+        primitive: &Primitive,
         steps: usize,
         dt: f64,
         progress: &mut dyn FnMut(f64) -> Result<()>,
         sample: impl FnMut(usize, f64, &mut Motion) -> Result<()>,
     ) -> Result<Self> {
-        Self::record_at(name, n_dofs, sampling_times(steps, dt), progress, sample)
+        Self::record_at(name, primitive, sampling_times(steps, dt), progress, sample)
     }
 
     /// Records samples at the given times, as [`Self::record`] does.
     pub(crate) fn record_at(
         name: &'static str,
-        n_dofs: usize,
+        primitive: &Primitive,
         time: Vec<f64>,
         progress: &mut dyn FnMut(f64) -> Result<()>,
         mut sample: impl FnMut(usize, f64, &mut Motion) -> Result<()>,
     ) -> Result<Self> {
         let n_samples = time.len();
+        let (n_coordinates, n_dofs) = (primitive.n_coordinates(), primitive.n_dofs());
         let shape = (n_samples, n_dofs);
         let mut trajectory = Self {
             time,
-            position: zeros(name, shape)?,
+            position: zeros(name, (n_samples, n_coordinates))?,
             velocity: zeros(name, shape)?,
             acceleration: zeros(name, shape)?,
         };
         let Self { time, position, velocity, acceleration } = &mut trajectory;
-        let rows = |array| row_major_mut::<_, Ix2>(array).chunks_exact_mut(n_dofs);
-        let rows = rows(position).zip(rows(velocity)).zip(rows(acceleration));
+        let rows = |array, n| row_major_mut::<_, Ix2>(array).chunks_exact_mut(n);
+        let rows = rows(position, n_coordinates).zip(rows(velocity, n_dofs)).zip(rows(acceleration, n_dofs));
         for (k, (time, ((position, velocity), acceleration))) in time.iter().zip(rows).enumerate() {
             if k % PROGRESS_INTERVAL == 0 {
                 progress(k as f64 / n_samples as f64)?;

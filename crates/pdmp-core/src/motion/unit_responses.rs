@@ -35,6 +35,7 @@ pub(crate) fn responses(
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Arc<Responses>> {
+    let primitive = primitive.inside();
     let key = Key { dt: grid.dt, tau, steps: grid.steps(primitive, tau)?, has_goal_velocity };
     if let Some(responses) = primitive.responses.find(key) {
         return Ok(responses);

@@ -2,6 +2,7 @@
 
 pub(crate) mod linear_algebra;
 pub(crate) mod orthonormal_span;
+pub(crate) mod rotation;
 #[cfg(test)]
 pub(crate) mod runge_kutta;
 pub(crate) mod simd;

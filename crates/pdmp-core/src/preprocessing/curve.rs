@@ -42,7 +42,7 @@ impl Curve {
         let time = clock(demo)?;
         let smoothed = smooth(Smoothing::Auto, &time, None, demo.position())?;
         let values: Vec<f64> = smoothed.iter().copied().collect();
-        let splines = Splines::through(Knots::not_a_knot(time.clone()), &values, demo.n_dofs());
+        let splines = Splines::through(Knots::not_a_knot(time.clone()), &values, demo.n_coordinates());
         Ok(Self { time, splines, noise: &demo.position() - &smoothed })
     }
 

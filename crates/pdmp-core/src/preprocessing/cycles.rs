@@ -99,7 +99,7 @@ pub struct Rejected {
 /// No recording, no recording with a period, a recording without times, onsets that do not increase or lie outside their
 /// recording.
 pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: CycleOutput) -> Result<Cycles> {
-    let n_dofs = recordings.first().ok_or(Error::NoDemonstrations)?.n_dofs();
+    let n_dofs = recordings.first().ok_or(Error::NoDemonstrations)?.n_coordinates();
     if let Some(onsets) = onsets {
         check_length("onsets", onsets.len(), recordings.len(), "recording")?;
     }
@@ -107,8 +107,8 @@ pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: C
     let (mut nominal, mut errors) = (None, Vec::new());
     for (recording, demo) in recordings.iter().enumerate() {
         let mut segment = || {
-            if demo.n_dofs() != n_dofs {
-                return Err(Error::Dofs { expected: n_dofs, found: demo.n_dofs() });
+            if demo.n_coordinates() != n_dofs {
+                return Err(Error::Dofs { expected: n_dofs, found: demo.n_coordinates() });
             }
             let curve = Curve::of(demo)?;
             let bounds = match onsets {

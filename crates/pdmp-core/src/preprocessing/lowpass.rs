@@ -52,7 +52,7 @@ pub fn lowpass(demo: &Demonstration, cut_off: f64) -> Result<Demonstration> {
 /// As for [`lowpass`].
 pub fn residuals(demo: &Demonstration, cut_offs: &[f64]) -> Result<Array2<f64>> {
     let time = clock(demo)?;
-    let mut residuals = Array2::zeros((cut_offs.len(), demo.n_dofs()));
+    let mut residuals = Array2::zeros((cut_offs.len(), demo.n_coordinates()));
     for (mut row, &cut_off) in residuals.rows_mut().into_iter().zip(cut_offs) {
         let residual = filtered(demo, &time, cut_off)? - demo.position();
         Zip::from(&mut row).and(residual.columns()).for_each(|r, column| *r = rms(column));

@@ -8,6 +8,7 @@ mod landmarks;
 mod sample_times;
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use ndarray::{Array2, Axis};
 
@@ -44,6 +45,8 @@ pub(crate) struct Alignment {
     /// Number of samples C, from 4 to 1e6; otherwise that of the nominal demonstration, whose steps are subdivided equally
     /// if there are fewer than 150.
     pub(crate) n_samples: Option<usize>,
+    /// DoFs that are the components of a vector, such as a rotation vector: their noise is estimated together.
+    pub(crate) vectors: Vec<Range<usize>>,
 }
 
 /// Scaling of the time of each demonstration to that of the nominal one.
@@ -90,14 +93,14 @@ impl Alignment {
     /// No demonstration, different numbers of DoFs, a missing sampling interval or period, or a nominal index, number of
     /// samples or cut-off out of range.
     pub(crate) fn align<'a>(&self, demos: &'a [Demonstration], threads: Threads) -> Result<Aligned<'a>> {
-        let n_dofs = demos.first().ok_or(Error::NoDemonstrations)?.n_dofs();
+        let n_dofs = demos.first().ok_or(Error::NoDemonstrations)?.n_coordinates();
         if self.period.len() > 1 {
             check_length("period", self.period.len(), demos.len(), "demonstration")?;
         }
         let mut clocks = Vec::with_capacity(demos.len());
         for (m, demo) in demos.iter().enumerate() {
-            if demo.n_dofs() != n_dofs {
-                return Err(Error::Dofs { expected: n_dofs, found: demo.n_dofs() }.in_demo(m));
+            if demo.n_coordinates() != n_dofs {
+                return Err(Error::Dofs { expected: n_dofs, found: demo.n_coordinates() }.in_demo(m));
             }
             if self.kind == Kind::Rhythmic && demo.goal().is_some() {
                 let (kind, instead) = (self.kind, ": it moves about the mean of its cycle");
@@ -129,7 +132,7 @@ impl Alignment {
         }
         let pool: Vec<(usize, Vec<f64>)> = pooled(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
         let samples: Vec<Samples> = pool.iter().map(|(m, time)| aligned.samples(*m, time)).collect();
-        Noise::estimate(self.smoothing, &samples, MIN_DECIMATED, threads)
+        Noise::estimate(self.smoothing, &samples, &self.vectors, MIN_DECIMATED, threads)
     }
 
     /// Returns the given nominal index, or that of the lower median of the durations, the first of equals.
@@ -235,7 +238,7 @@ impl Aligned<'_> {
     }
 
     /// Returns the times of the samples of demonstration `m` (n,) in seconds from the first.
-    fn seconds(&self, m: usize) -> Vec<f64> {
+    pub(crate) fn seconds(&self, m: usize) -> Vec<f64> {
         let ticks = self.clocks[m].ticks;
         (0..self.demos[m].n_samples()).map(|c| ticks.at(c) * ticks.unit()).collect()
     }

@@ -74,8 +74,15 @@ pub(crate) fn noise_limit(
     };
     let noise = (0..n_rows).map(noise).collect::<Result<Vec<_>>>()?;
     let n_samples = noise.iter().map(Demonstration::n_samples).max();
-    let alignment =
-        Alignment { kind, dt: None, period: Vec::new(), smoothing: Smoothing::Interpolate, nominal: None, n_samples };
+    let alignment = Alignment {
+        kind,
+        dt: None,
+        period: Vec::new(),
+        smoothing: Smoothing::Interpolate,
+        nominal: None,
+        n_samples,
+        vectors: Vec::new(),
+    };
     let mut rows = alignment.align(&noise, threads)?;
     rows.noise = aligned.noise.clone();
     let mut targets = Targets::of(&rows, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;

@@ -24,9 +24,10 @@ use serde::{Deserialize, Serialize};
 use draft::Draft;
 
 use crate::context::{ContextColumn, ContextMapKind, Kernel};
+use crate::demonstration::RotationColumns;
 use crate::dynamics::canonical::Canonical;
 use crate::error::{Error, Result};
-use crate::model::Model;
+use crate::model::{Frame, Model};
 
 /// Version of the file format.
 const SCHEMA: u32 = 6;
@@ -66,6 +67,19 @@ struct Constants {
     regression: String,
     table_error: f64,
     map: Option<Map>,
+    /// Coordinates of a model with rotations; absent without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    coordinates: Option<Layout>,
+}
+
+/// Layout of the coordinates of a model with rotations.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Layout {
+    names: Vec<String>,
+    units: Vec<String>,
+    frame: Frame,
+    rotations: Vec<RotationColumns>,
 }
 
 /// Constants from which the context map is restored, together with the parameters of the demonstrations.

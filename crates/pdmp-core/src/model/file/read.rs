@@ -6,11 +6,12 @@ use ndarray::{Array2, Axis};
 use safetensors::tensor::{Dtype, SafeTensors};
 use serde::Deserialize;
 
-use super::{Constants, Map, SCHEMA, Sealed, checksum, ensure, header, unreadable};
+use super::{Constants, Layout, Map, SCHEMA, Sealed, checksum, ensure, header, unreadable};
 use crate::context::{ContextMap, ContextMapKind, Kernel, MapParameters, StackingWeights};
 use crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::forcing_table::ForcingTable;
+use crate::dynamics::mean_rotation::MeanRotation;
 use crate::dynamics::hermite_table::{KnotTable, MAX_CELLS};
 use crate::dynamics::output_system::Attractor;
 use crate::dynamics::transport::Transport;
@@ -20,7 +21,7 @@ use crate::model::conditions::MAX_STYLE_MAGNITUDE;
 use crate::model::primitive::{MAX_RATE, MAX_TAU, Parts, Primitive};
 use crate::model::sensitivity::STEPS;
 use crate::model::template::{TimeWarp, WarpTemplate};
-use crate::model::{DemonstrationParameters, FitSummary, Model};
+use crate::model::{Coordinates, DemonstrationParameters, FitSummary, Model};
 use crate::numerics::smoothing_spline::Noise;
 use crate::validate::MAX_MAGNITUDE;
 
@@ -184,9 +185,35 @@ impl Reader<'_> {
             breaks,
             nominal: demonstrated.nominal_conditions(kind),
         });
-        let model = Model { primitive: Arc::new(primitive), demonstrated, learnt, map };
+        let primitive = match &constants.coordinates {
+            Some(layout) => self.coordinates(layout, primitive)?,
+            None => Arc::new(primitive),
+        };
+        let model = Model { primitive, demonstrated, learnt, map };
         self.verify(&constants, &model, crc32)?;
         Ok(model)
+    }
+
+    /// Returns a primitive with the coordinates of the file.
+    fn coordinates(&self, layout: &Layout, dofs: Primitive) -> Result<Arc<Primitive>> {
+        let Layout { names, units, frame, rotations } = layout;
+        let [n_rotations, n_knots, _] = self.shape("mean_rotations")?;
+        let overlap = rotations.windows(2).any(|pair| pair[0].column.saturating_add(4) > pair[1].column);
+        let last = rotations.last().map_or(usize::MAX, |last| last.column.saturating_add(4));
+        let n = dofs.n_dofs().saturating_add(rotations.len());
+        let counts = [names.len(), units.len()] == [n; 2] && n_rotations == rotations.len();
+        ensure(counts && !overlap && last <= n && !rotations.is_empty(), "the coordinates do not fit the rest")?;
+        let components = self.array("mean_rotations", &[n_rotations, n_knots, 4])?;
+        let (quaternions, _) = components.as_chunks::<4>();
+        let means = rotations.iter().zip(quaternions.chunks(n_knots.max(1))).map(|(columns, knots)| {
+            let valid = MeanRotation::are_valid(knots, dofs.kind());
+            ensure(valid, "a mean rotation is no curve of unit quaternions")?;
+            Ok((*columns, MeanRotation::through(knots.to_vec(), dofs.canonical())))
+        });
+        let means = means.collect::<Result<Vec<_>>>()?;
+        let dofs = Arc::new(dofs);
+        let coordinates = Coordinates::new(Arc::clone(&dofs), names.clone(), units.clone(), *frame, means);
+        Ok(Arc::new(Primitive::clone(&dofs).with_coordinates(coordinates)))
     }
 
     fn template(&self, constants: &Constants, n_segments: usize, n_dofs: usize) -> Result<Option<WarpTemplate>> {

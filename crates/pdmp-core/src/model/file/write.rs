@@ -5,11 +5,11 @@ use std::collections::HashMap;
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
-use super::{Constants, KEY, Map, SCHEMA, Sealed, checksum, header, unreadable};
+use super::{Constants, KEY, Layout, Map, SCHEMA, Sealed, checksum, header, unreadable};
 use crate::context::{ContextMap, MapParameters, StackingWeights};
 use crate::dynamics::hermite_table::KnotTable;
 use crate::error::Result;
-use crate::model::Model;
+use crate::model::{Coordinates, Model};
 
 /// Array of a file: its name, shape and elements by rows.
 type Array = (&'static str, Vec<usize>, Vec<f64>);
@@ -43,6 +43,7 @@ impl Model {
             regression: self.learnt.regression.clone(),
             table_error: self.forcing_table.error(),
             map: self.map.as_ref().map(Map::of),
+            coordinates: self.coordinates().map(Layout::of),
         };
         let arrays: Vec<(&str, Vec<usize>, Vec<u8>)> = self
             .arrays()
@@ -86,6 +87,11 @@ impl Model {
             ("forcing_table.values", knots.clone(), values),
             ("forcing_table.slopes", knots, slopes),
         ];
+        if let Some(coordinates) = self.coordinates() {
+            let knots: Vec<_> = coordinates.rotations().iter().map(|rotation| rotation.mean.knots()).collect();
+            let shape = vec![knots.len(), knots.first().map_or(0, |knots| knots.len()), 4];
+            arrays.push(("mean_rotations", shape, knots.concat().concat()));
+        }
         if let Some(template) = &self.learnt.template {
             arrays.push(vector("template.unit", &template.unit));
             arrays.push(matrix("template.shape", &template.shape));
@@ -107,6 +113,17 @@ impl Model {
             );
         }
         arrays
+    }
+}
+
+impl Layout {
+    fn of(coordinates: &Coordinates) -> Self {
+        Self {
+            names: coordinates.names().to_vec(),
+            units: coordinates.units().to_vec(),
+            frame: coordinates.frame(),
+            rotations: coordinates.columns(),
+        }
     }
 }
 

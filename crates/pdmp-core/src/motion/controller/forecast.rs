@@ -70,7 +70,7 @@ impl Controller {
         self.check_tick_length(dt, None)?;
         let mut controller = self.clone();
         let tick = Command { dt: Some(dt), ..Command::default() };
-        Trajectory::record("forecast", self.primitive.n_dofs(), steps, dt, progress, |k, _, motion| {
+        Trajectory::record("forecast", &self.primitive, steps, dt, progress, |k, _, motion| {
             if k > 0 {
                 controller.step_with(&tick)?;
             }

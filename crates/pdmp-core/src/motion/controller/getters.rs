@@ -33,18 +33,27 @@ impl Controller {
         self.primitive.canonical().phase(self.clock.value())
     }
 
-    /// Returns the position y (D,), in the unit of each DoF.
+    /// Returns the position y (D,), in the unit of each DoF, or (nq,) in coordinates.
     pub fn position(&self) -> &[f64] {
+        if let Some(pose) = &self.pose {
+            return &pose.position;
+        }
         unpack(&self.position, self.primitive.n_dofs())
     }
 
     /// Returns the velocity ẏ (D,), in the unit of each DoF per second.
     pub fn velocity(&self) -> &[f64] {
+        if let Some(pose) = &self.pose {
+            return &pose.velocity;
+        }
         unpack(&self.velocity, self.primitive.n_dofs())
     }
 
     /// Returns the acceleration ÿ (D,), in the unit of each DoF per second squared.
     pub fn acceleration(&self) -> &[f64] {
+        if let Some(pose) = &self.pose {
+            return &pose.acceleration;
+        }
         unpack(&self.acceleration, self.primitive.n_dofs())
     }
 
@@ -56,12 +65,16 @@ impl Controller {
     /// Returns the goal g or anchor y_a (D,) in force, in the unit of each DoF: the commanded one, moved inside the limits of
     /// [`Controller::set_limits`].
     pub fn centre(&self) -> &[f64] {
+        if let Some(pose) = &self.pose {
+            return &pose.centre;
+        }
         unpack(self.centre.target(), self.primitive.n_dofs())
     }
 
     /// Returns the commanded final velocity (D,), per second; `None` for that of the demonstrations.
     pub fn goal_velocity(&self) -> Option<&[f64]> {
-        self.conditions.has_goal_velocity.then_some(&*self.conditions.goal_velocity)
+        let velocity = self.pose.as_ref().map_or(&self.conditions.goal_velocity, |pose| &pose.goal_velocity);
+        self.conditions.has_goal_velocity.then_some(&**velocity)
     }
 
     /// Returns the commanded time constant τ, in seconds.

@@ -67,6 +67,7 @@ impl Controller {
     /// # Errors
     /// As for [`Limits::check`]. The limits then remain unchanged.
     pub fn set_limits(&mut self, limits: &Limits) -> Result<()> {
+        limits.check_rotations(&self.primitive)?;
         let was_active = self.limiter.is_active();
         self.limiter.set(limits, self.primitive.duration(), self.dt)?;
         self.limit_path();
@@ -111,6 +112,11 @@ impl Controller {
     /// Within limits, a DoF keeps the velocity and acceleration of the last tick where the new ones break a limit: no time has
     /// passed for a change of the velocity. The next tick begins the change.
     pub(super) fn publish(&mut self) {
+        self.publish_dofs();
+        self.publish_pose();
+    }
+
+    fn publish_dofs(&mut self) {
         self.read_out();
         if !self.started {
             return self.begin_first_tick();

@@ -23,6 +23,7 @@ mod limiter;
 mod limiting;
 mod path_ahead;
 mod phase;
+mod pose;
 mod setters;
 mod settling;
 mod snapshot;
@@ -50,6 +51,7 @@ use crate::validate::check_positive;
 use governor::Governor;
 use group::Group;
 use limiter::Limiter;
+use pose::Pose;
 
 /// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
@@ -154,6 +156,8 @@ pub struct Controller {
     series: Series,
     /// Number of ticks by which the forcing table is prefetched.
     prefetch_ticks: f64,
+    /// Motion in coordinates, of a primitive with rotations.
+    pose: Option<Box<Pose>>,
 }
 
 // A copy moves as the original does, to the bit. `clone_from` allocates nothing if the destination is an earlier copy, unless
@@ -200,6 +204,7 @@ clone_in_place!(Controller {
     propagator,
     series,
     prefetch_ticks,
+    pose,
 });
 
 impl Controller {
@@ -222,7 +227,8 @@ impl Controller {
             let allowed = "must lie between 0, an immediate switch, and a million durations";
             return Err(Error::Range { name: "transition", value: transition, allowed });
         }
-        let conditions = conditions.complete(primitive)?;
+        let given = conditions;
+        let conditions = given.complete(primitive)?;
         let rate_gains = FilterGains::new(transition);
         let command_gains = rate_gains.on_clock(primitive.tau());
         let groups = Group::all(primitive.ranges());
@@ -259,7 +265,7 @@ impl Controller {
             velocity: zeros.clone(),
             acceleration: zeros,
             flush_level: FLUSH_RATIO * largest_range(primitive.ranges()),
-            perturbation: Perturbation::new(primitive.ranges(), primitive.units(), primitive.canonical().extent()),
+            perturbation: Perturbation::new(primitive),
             limiter: Limiter::none(primitive.ranges()),
             governor: None,
             rate_slope: None,
@@ -270,9 +276,11 @@ impl Controller {
             propagator: series.propagator::<F64x4>(0.0),
             series,
             prefetch_ticks: 1.0,
+            pose: Pose::of(primitive.coordinates()),
             conditions,
             primitive: Arc::clone(primitive),
         };
+        controller.keep_final_velocity(given);
         controller.begin();
         Ok(controller)
     }
@@ -330,15 +338,20 @@ impl Controller {
     /// A vector of a wrong length, a number that is not finite, a τ, amplitude or goal that its setter rejects, or a tick
     /// that is negative or longer than 1000 τ.
     pub fn update(&mut self, command: &Command, motion: &mut Motion) -> Result<Status> {
-        motion.check(self.primitive.n_dofs())?;
+        motion.check(&self.primitive)?;
         let status = self.step_with(command)?;
         self.read(motion);
         Ok(status)
     }
 
-    /// Writes the motion to vectors of D elements each.
+    /// Writes the motion to vectors of one element for each coordinate or DoF.
     #[inline]
     pub(crate) fn read(&self, motion: &mut Motion) {
+        if let Some(pose) = &self.pose {
+            motion.position.copy_from_slice(&pose.position);
+            motion.velocity.copy_from_slice(&pose.velocity);
+            return motion.acceleration.copy_from_slice(&pose.acceleration);
+        }
         copy(&self.position, motion.position);
         copy(&self.velocity, motion.velocity);
         copy(&self.acceleration, motion.acceleration);
@@ -385,6 +398,8 @@ impl Controller {
     fn perturb(&mut self, command: &Command, dt: f64, h: f64) {
         // The terms fade where the rate is below 1/max_tau, while the pull of a measurement is one on the clock.
         let full = dt.min(h * self.max_tau);
-        self.perturbation.set(command, &self.position, full, h, self.started);
+        if !self.perturb_pose(command, full, h) {
+            self.perturbation.set(command, &self.position, full, h, self.started);
+        }
     }
 }

@@ -83,6 +83,7 @@ impl Controller {
             self.begin();
             return Ok(());
         }
+        self.move_rotations(phase);
         let r = self.r;
         self.groups.iter_mut().for_each(|group| group.z += group.forcing.value * r);
         self.clock = CompensatedSum::at(phase);

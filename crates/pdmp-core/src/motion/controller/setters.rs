@@ -275,17 +275,32 @@ impl Controller {
             conditions.style.copy_from_slice(style);
             changes.style = true;
         }
-        if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != conditions.centre) {
+        let mut centre = command.goal.or(command.anchor);
+        if let (Some(pose), Some(coordinates), Some(given)) = (&mut self.pose, self.primitive.coordinates(), centre) {
+            // Before the first tick a residual rotation changes by the shorter way from the start.
+            let start = conditions.start.as_ref().filter(|_| !self.started && command.goal.is_some());
+            centre = Some(pose.centre_dofs(coordinates, given, start.unwrap_or(&conditions.centre)));
+        }
+        if let Some(centre) = centre.filter(|centre| *centre != conditions.centre) {
             conditions.centre.copy_from_slice(centre);
             changes.centre = true;
         }
+        let present = self.pose.as_ref().map_or(&conditions.goal_velocity, |pose| &pose.goal_velocity);
         if let Some(velocity) = command.goal_velocity
-            && !(conditions.has_goal_velocity && velocity == conditions.goal_velocity)
+            && !(conditions.has_goal_velocity && velocity == present)
         {
-            conditions.goal_velocity.copy_from_slice(velocity);
+            match &mut self.pose {
+                Some(pose) => pose.goal_velocity.copy_from_slice(velocity),
+                None => conditions.goal_velocity.copy_from_slice(velocity),
+            }
             conditions.has_goal_velocity = true;
             changes.goal_velocity = true;
         }
+        if self.pose.is_some() && self.conditions.has_goal_velocity && (changes.centre || changes.goal_velocity) {
+            self.set_final_velocity();
+            changes.goal_velocity = true;
+        }
+        let conditions = &mut self.conditions;
         if let Some(amplitude) = command.amplitude.filter(|amplitude| *amplitude != conditions.amplitude) {
             conditions.amplitude = amplitude;
             changes.amplitude = true;

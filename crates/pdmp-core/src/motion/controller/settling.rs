@@ -16,6 +16,10 @@ impl Controller {
             group.rounding = centre.abs().max(position.abs()) * relative;
             group.length = group.range.max((centre - position).abs());
         }
+        if self.pose.is_some() {
+            self.share_lengths();
+            self.publish_centre(None);
+        }
     }
 
     /// Returns [`Status::Finished`] past the end if every DoF is within its tolerance of the goal and will stay there.
@@ -31,7 +35,8 @@ impl Controller {
         let target = unpack(self.style.target(), self.primitive.n_styles());
         let (bound, table_index) = (forcing_table.bound(clock), forcing_table.index(clock));
         let braked = forcing_table.braked_motion(clock).filter(|_| self.perturbation.phase_rate() == 1.0);
-        let settled = self.groups.iter().enumerate().all(|(index, group)| {
+        let bounded = |index: usize| {
+            let group = &self.groups[index];
             let ForcingSample { value, slope, .. } = group.forcing;
             let forcing = CubicSample { value, slope };
             let frame = self.centre.value()[index] + self.goal_transition.value[index];
@@ -49,8 +54,12 @@ impl Controller {
                 deviation += bound.of(change) * by_forcing;
             }
             deviation += self.frame_deviation(index);
-            deviation.simd_le((group.length * self.tolerance).max(group.rounding)).all()
-        });
+            [deviation, (group.length * self.tolerance).max(group.rounding)]
+        };
+        let settled = match &self.pose {
+            None => (0..self.groups.len()).map(bounded).all(|[deviation, bound]| deviation.simd_le(bound).all()),
+            Some(_) => self.is_within(bounded),
+        };
         if settled { Status::Finished } else { Status::Working }
     }
 

@@ -95,6 +95,8 @@ impl Controller {
             return Err(length(expected));
         }
         controller.check_restored()?;
+        controller.publish_pose();
+        controller.publish_centre(None);
         Ok(controller)
     }
 
@@ -149,6 +151,7 @@ impl Controller {
             propagator: _,
             series: _,
             prefetch_ticks: _,
+            pose,
         } = self;
         let (turn, n_dofs) = (TAU.next_down(), primitive.n_dofs());
         let rhythmic = primitive.kind() == Kind::Rhythmic;
@@ -160,6 +163,7 @@ impl Controller {
             centre: g,
             start,
             velocity: v,
+            drift,
             goal_velocity,
             has_goal_velocity,
             amplitude: r_0,
@@ -170,6 +174,9 @@ impl Controller {
         visit(g, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
         visit_optional(visit, start, n_dofs)?;
         visit_optional(visit, v, n_dofs)?;
+        if primitive.coordinates().is_some() {
+            visit_optional(visit, drift, n_dofs)?;
+        }
         visit(goal_velocity, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
         visit_flag(visit, has_goal_velocity)?;
         visit_number(visit, r_0, [0.0, MAX_MAGNITUDE])?;
@@ -208,6 +215,11 @@ impl Controller {
         perturbation.walk(visit, QUANTITY)?;
         limiter.walk(visit, QUANTITY, primitive.duration(), *dt)?;
         *command_step = FilterStep::IDENTITY;
+        if let Some(pose) = pose {
+            // The sign of a quaternion depends on the past.
+            visit(&mut pose.position, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
+            visit(&mut pose.goal_velocity, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
+        }
         Ok(())
     }
 

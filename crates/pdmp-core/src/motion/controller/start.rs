@@ -28,6 +28,7 @@ impl Controller {
     /// As for [`Controller::new`]. The movement then remains unchanged.
     pub fn reset(&mut self, conditions: &Conditions) -> Result<()> {
         self.conditions = conditions.complete(&self.primitive)?;
+        self.keep_final_velocity(conditions);
         self.begin();
         Ok(())
     }
@@ -69,6 +70,7 @@ impl Controller {
         self.read_out();
         self.start_rate();
         self.begin_first_tick();
+        self.publish_pose();
     }
 
     /// Sets the motion from which the first tick begins to the present one.
@@ -112,6 +114,11 @@ impl Controller {
         if let Some(velocity) = &conditions.velocity {
             for (group, velocity) in self.groups.iter_mut().zip(velocity.chunks(WIDTH)) {
                 group.z = padded(velocity) * tau - group.forcing.value * *r;
+            }
+        }
+        if let Some(drift) = &conditions.drift {
+            for (group, drift) in self.groups.iter_mut().zip(drift.chunks(WIDTH)) {
+                group.z -= padded(drift);
             }
         }
     }

@@ -64,6 +64,9 @@ impl Controller {
             let past = self.primitive.forcing_table().is_past(self.clock.value());
             self.status = if past { self.settled() } else { Status::Working };
         }
+        if self.pose.is_some() {
+            self.publish_pose();
+        }
         self.status
     }
 
@@ -346,6 +349,7 @@ impl Controller {
     /// the attractor follows the frame.
     pub(super) fn change_phase_rate(&mut self) {
         let change = self.forcing_phase_rate - self.perturbation.phase_rate();
+        self.take_up_drift(change);
         if self.has_frame() {
             let TransportSample { slope, .. } = self.primitive.transport.lag(self.clock.value());
             for (index, group) in self.groups.iter_mut().enumerate() {

@@ -3,7 +3,9 @@
 //! For a smoothing spline f = A(λ)y the score n‖y − f‖²/tr(I − A)² estimates the prediction error (Craven and Wahba). At its
 //! minimum, ‖y − f‖²/tr(I − A) estimates the noise variance.
 
-use ndarray::{Array1, Array2};
+use std::ops::Range;
+
+use ndarray::{Array1, Array2, ArrayView1};
 
 use super::roughness::Roughness;
 use super::{Samples, extend_periodically, lambda};
@@ -35,9 +37,13 @@ pub(super) struct Scores {
 
 impl Scores {
     /// Computes the scores of columns at cut-offs (K,) in Hz, where K is a multiple of [`WIDTH`].
+    ///
+    /// Columns of a group in `vectors` are the components of a vector: they share their scores, which do not depend on its
+    /// frame.
     pub(super) fn compute(
         recordings: &[Decimated],
         columns: &[usize],
+        vectors: &[Range<usize>],
         cut_offs: &[f64],
         threads: Threads,
     ) -> Result<Self> {
@@ -56,11 +62,15 @@ impl Scores {
             group.chunks_mut(n)
         });
         threads.try_for_each(tasks.collect(), |group| {
-            fill_scores(group, columns, cut_offs);
+            fill_scores(group, columns, vectors, cut_offs);
             Ok(())
         })?;
         let mut sum = Self::zeros(shape);
-        for part in &parts {
+        for (part, recording) in parts.iter_mut().zip(recordings) {
+            for vector in vectors {
+                let members: Vec<usize> = (0..columns.len()).filter(|&c| vector.contains(&columns[c])).collect();
+                part.share(&members, recording.time.len());
+            }
             sum.logarithms += &part.logarithms;
             sum.squares += &part.squares;
             sum.traces += &part.traces;
@@ -74,6 +84,26 @@ impl Scores {
         let [logarithms, squares, traces] = [(); 3].map(|()| Array2::zeros(shape));
         let (moving, variation) = (Array1::zeros(shape.0), Array2::zeros((2, shape.0)));
         Self { logarithms, squares, traces, moving, variation }
+    }
+
+    /// Gives the columns of a vector in one recording of n samples the score of its length.
+    fn share(&mut self, members: &[usize], n: usize) {
+        let Some(&moving) = members.iter().find(|&&column| self.moving[column] > 0.0) else { return };
+        let count = members.len() as f64;
+        for k in 0..self.squares.ncols() {
+            let squares = members.iter().map(|&column| self.squares[[column, k]]).sum::<f64>() / count;
+            let trace = self.traces[[moving, k]];
+            let score = n as f64 * squares / (trace * trace);
+            for &column in members {
+                self.logarithms[[column, k]] = score.max(f64::MIN_POSITIVE).ln();
+                (self.squares[[column, k]], self.traces[[column, k]]) = (squares, trace);
+            }
+        }
+        let variation = [0, 1].map(|k| members.iter().map(|&column| self.variation[[k, column]]).sum::<f64>());
+        for &column in members {
+            self.moving[column] = 1.0;
+            (0..2).for_each(|k| self.variation[[k, column]] = variation[k]);
+        }
     }
 
     /// Returns the index of the least score, and the cut-off at the vertex of the parabola through it and its neighbours.
@@ -147,23 +177,36 @@ impl Decimated {
         self.period == other.period && self.time == other.time
     }
 
-    /// Returns the largest deviation of a column from its first value, and the deviations relative to it; `None` if zero.
-    fn scaled(&self, d: usize) -> Option<(f64, Vec<f64>)> {
+    /// Returns the largest deviation of a column from its first value, or of the vector that it is a component of, and the
+    /// deviations relative to it; `None` if zero.
+    fn scaled(&self, d: usize, vectors: &[Range<usize>]) -> Option<(f64, Vec<f64>)> {
         let column = self.values.column(d);
         let deviations = column.iter().map(|y| y - column[0]);
-        let scale = deviations.clone().fold(0.0f64, |max, y| max.max(y.abs()));
+        let scale = match vectors.iter().find(|vector| vector.contains(&d)) {
+            Some(vector) => {
+                let first = self.values.row(0);
+                let square = |row: ArrayView1<f64>| vector.clone().map(|i| (row[i] - first[i]).powi(2)).sum::<f64>();
+                self.values.rows().into_iter().map(square).fold(0.0f64, f64::max).sqrt()
+            }
+            None => deviations.clone().fold(0.0f64, |max, y| max.max(y.abs())),
+        };
         (scale > 0.0).then(|| (scale, deviations.map(|y| y / scale).collect()))
     }
 }
 
 /// Computes the scores of columns of at least one recording with equal knots.
-fn fill_scores(recordings: &mut [(&Decimated, &mut Scores)], columns: &[usize], cut_offs: &[f64]) {
+fn fill_scores(
+    recordings: &mut [(&Decimated, &mut Scores)],
+    columns: &[usize],
+    vectors: &[Range<usize>],
+    cut_offs: &[f64],
+) {
     let first = recordings[0].0;
     let (samples, n) = (first.samples(), first.time.len());
     let mut moving = Vec::new();
     for (m, (recording, scores)) in recordings.iter_mut().enumerate() {
         for (column, &d) in columns.iter().enumerate() {
-            let Some((scale, y)) = recording.scaled(d) else { continue };
+            let Some((scale, y)) = recording.scaled(d, vectors) else { continue };
             let mean = y.iter().sum::<f64>() / n as f64;
             scores.moving[column] = 1.0;
             scores.variation[[0, column]] = y.windows(2).map(|y| (y[1] - y[0]).powi(2)).sum::<f64>() / (n - 1) as f64;

@@ -186,7 +186,7 @@ pub(crate) fn smooth(
 ) -> Result<Array2<f64>> {
     let samples = Samples { time, period, values };
     smoothing.check(&samples)?;
-    Ok(samples.smoothed(Noise::estimate(smoothing, &[samples], usize::MAX, Threads::ONE)?.cut_offs()))
+    Ok(samples.smoothed(Noise::estimate(smoothing, &[samples], &[], usize::MAX, Threads::ONE)?.cut_offs()))
 }
 
 impl Smoothing {

@@ -8,6 +8,8 @@
 //! recording that was resampled at a higher rate becomes white again. If the best cut-off is too high for the decimated
 //! rate, the search is repeated with more samples, and finally with all.
 
+use std::ops::Range;
+
 use super::cross_validation::{CUT_OFF_RATIO, Decimated, Scores};
 use super::{Samples, Smoothing};
 use crate::error::Result;
@@ -74,13 +76,15 @@ impl Noise {
 
     /// Estimates the noise from at least one recording, decimated to at least `min_samples` samples.
     ///
-    /// The caller selects recordings by [`pooled`] and checks a given cut-off with [`Smoothing::check`].
+    /// The caller selects recordings by [`pooled`] and checks a given cut-off with [`Smoothing::check`]. The components of a
+    /// vector have common noise.
     ///
     /// # Errors
     /// Threads that the system does not provide.
     pub(crate) fn estimate(
         smoothing: Smoothing,
         recordings: &[Samples],
+        vectors: &[Range<usize>],
         min_samples: usize,
         threads: Threads,
     ) -> Result<Self> {
@@ -93,17 +97,27 @@ impl Noise {
                 let all: Vec<Decimated> =
                     recordings.iter().map(|samples| Decimated::new(samples, usize::MAX)).collect();
                 let columns: Vec<usize> = (0..n_dofs).collect();
-                let scores = Scores::compute(&all, &columns, &[hz; WIDTH], threads)?;
+                let scores = Scores::compute(&all, &columns, vectors, &[hz; WIDTH], threads)?;
                 noise.levels = columns.iter().map(|&d| scores.level(d, 0)).collect();
             }
-            Smoothing::Auto => noise.search(recordings, min_samples, threads)?,
+            Smoothing::Auto => noise.search(recordings, vectors, min_samples, threads)?,
         }
         Ok(noise)
     }
 
     /// Searches the cut-off of each DoF.
-    fn search(&mut self, recordings: &[Samples], mut min_samples: usize, threads: Threads) -> Result<()> {
+    fn search(
+        &mut self,
+        recordings: &[Samples],
+        vectors: &[Range<usize>],
+        mut min_samples: usize,
+        threads: Threads,
+    ) -> Result<()> {
         let mut pending = possibly_noisy(recordings);
+        // A test of single components would depend on the frame of a vector.
+        pending.retain(|d| !vectors.iter().any(|vector| vector.contains(d)));
+        pending.extend(vectors.iter().flat_map(Range::clone));
+        pending.sort_unstable();
         let longest = recordings.iter().map(Samples::len).max().unwrap_or(0);
         // The lowest cut-off is one cycle per period, or half a cycle in the longest recording.
         let durations = recordings.iter().map(Samples::duration);
@@ -121,7 +135,7 @@ impl Noise {
                 ((INTERPOLATION_CUT_OFF / interval / lowest).ln() / CUT_OFF_RATIO.ln()).ceil().max(2.0) as usize;
             let n_cut_offs = (interpolation + 1).next_multiple_of(WIDTH);
             let cut_offs: Vec<f64> = (0..n_cut_offs).map(|k| lowest * CUT_OFF_RATIO.powi(k as i32)).collect();
-            let scores = Scores::compute(&decimated, &pending, &cut_offs, threads)?;
+            let scores = Scores::compute(&decimated, &pending, vectors, &cut_offs, threads)?;
             let mut unresolved = Vec::new();
             for (column, &d) in pending.iter().enumerate() {
                 let (k, hz) = scores.minimum(column, &cut_offs[..=interpolation]);

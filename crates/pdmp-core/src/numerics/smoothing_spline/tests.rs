@@ -97,7 +97,7 @@ fn dense(knots: &[f64], y: &[f64], lambda: f64) -> (DVector<f64>, f64) {
 
 /// Computes the scores of one recording with all samples.
 fn scores(samples: &Samples, cut_offs: &[f64]) -> Scores {
-    Scores::compute(&[Decimated::new(samples, usize::MAX)], &[0], cut_offs, Threads::ONE).unwrap()
+    Scores::compute(&[Decimated::new(samples, usize::MAX)], &[0], &[], cut_offs, Threads::ONE).unwrap()
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn values_and_scores_are_those_of_the_dense_formulas() {
     }
     let of = |hz: f64| dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval())).1;
     let least = (0..400).map(|k| of(0.5 * 10f64.powf(k as f64 / 160.0))).fold(f64::MAX, f64::min);
-    let noise = Noise::estimate(Smoothing::Auto, &[samples], MIN_DECIMATED, Threads::ONE).unwrap();
+    let noise = Noise::estimate(Smoothing::Auto, &[samples], &[], MIN_DECIMATED, Threads::ONE).unwrap();
     assert_relative_eq!(of(noise.cut_offs()[0].unwrap()), least, max_relative = 1e-2);
 }
 
@@ -174,7 +174,7 @@ fn the_level_of_white_noise_is_estimated() {
                 .collect();
             let samples: Vec<Samples> =
                 recordings.iter().map(|y| Samples { time: &time, period, values: y.view() }).collect();
-            let estimate = Noise::estimate(Smoothing::Auto, &samples, MIN_DECIMATED, Threads::ONE).unwrap();
+            let estimate = Noise::estimate(Smoothing::Auto, &samples, &[], MIN_DECIMATED, Threads::ONE).unwrap();
             let case = format!("{n} samples, {n_recordings} recordings, periodic {periodic}: {estimate:?}");
             // Four standard errors, for the 64 samples that decimated recordings have at least.
             let accuracy = 4.0 / (2.0 * (n.min(64) * n_recordings.min(24)) as f64).sqrt();

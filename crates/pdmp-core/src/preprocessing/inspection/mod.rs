@@ -17,6 +17,7 @@ mod cycle_ends;
 mod dropouts;
 mod padding;
 mod time_stamps;
+mod quaternions;
 mod turns;
 
 use ndarray::ArrayView1;
@@ -62,6 +63,7 @@ pub fn inspect(demos: &[Demonstration], dt: Option<f64>) -> Vec<Finding> {
     findings.extend(padding::rows(&surveys));
     findings.extend(counters::columns(&surveys));
     findings.extend(turns::apart(&surveys));
+    findings.extend(quaternions::undeclared(&surveys));
     findings
 }
 
@@ -78,7 +80,7 @@ struct Survey<'a> {
 
 impl<'a> Survey<'a> {
     fn new(demo: &'a Demonstration, dt: Option<f64>) -> Self {
-        let n_dofs = demo.n_dofs();
+        let n_dofs = demo.n_coordinates();
         let position = demo.position();
         let position = position.as_standard_layout();
         let values = row_major(&position);

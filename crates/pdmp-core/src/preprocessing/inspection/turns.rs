@@ -106,7 +106,7 @@ pub(super) fn apart(surveys: &[Survey]) -> Vec<Finding> {
 pub fn unwound(demos: &[Demonstration]) -> Cow<'_, [Demonstration]> {
     let mut unwound = Cow::Borrowed(demos);
     let all: Vec<&Demonstration> = demos.iter().collect();
-    for d in 0..demos.first().map_or(0, Demonstration::n_dofs) {
+    for d in 0..demos.first().map_or(0, Demonstration::n_coordinates) {
         for (m, turns, turn, mended) in offsets(&all, d) {
             if mended {
                 unwound.to_mut()[m].shift(d, -turns * turn);
@@ -120,7 +120,7 @@ pub fn unwound(demos: &[Demonstration]) -> Cow<'_, [Demonstration]> {
 /// size of a turn, and whether the unit is one of angles.
 fn offsets(demos: &[&Demonstration], d: usize) -> Vec<(usize, f64, f64, bool)> {
     let start = |demo: &Demonstration| demo.position()[[0, d]];
-    if demos.iter().any(|demo| d >= demo.n_dofs()) {
+    if demos.iter().any(|demo| d >= demo.n_coordinates()) {
         return Vec::new();
     }
     let [low, high] = extremes(demos.iter().map(|demo| start(demo)));

@@ -1,0 +1,192 @@
+//! Mean rotation of demonstrations over the clock: the Karcher mean at each phase.
+//!
+//! The mean is the rotation about which the residuals log(q̄⁻¹q_m) of the demonstrations add up to zero. Every step is a
+//! linear map of quaternion components with common coefficients, or acts on residuals: a constant rotation of the world or
+//! of the body frame turns the path with it.
+//!
+//! H. Karcher, Riemannian center of mass and mollifier smoothing, Communications on Pure and Applied Mathematics 30, 1977.
+
+use crate::dynamics::canonical::Canonical;
+use crate::dynamics::mean_rotation::{MeanRotation, end_motion};
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::numerics::rotation::{Quaternion, add_scaled, distance, dot, exp, inverse, log, normalised, product};
+use crate::numerics::smoothing_spline::{MIN_DECIMATED, Noise, Samples, Smoothing, pooled};
+use crate::numerics::spline::{Knots, Splines};
+use crate::numerics::threads::Threads;
+use ndarray::Array2;
+
+/// Largest number of demonstrations in the mean. It is the origin of the residuals, which describe each demonstration.
+const MAX_AVERAGED: usize = 200;
+/// Largest number of iterations of a mean; its residuals halve at least twice each in practice.
+const MAX_ITERATIONS: usize = 100;
+/// Change of the mean in rad that ends the iteration.
+const CONVERGED: f64 = 1e-15;
+/// Share of the path before its end over which the mean rotation of demonstrations that do not end at rest is slowed.
+const SLOWED_SHARE: f64 = 0.15;
+
+/// Recorded rotation of one demonstration.
+pub(super) struct Recording {
+    /// Times of the samples (n,) in seconds.
+    pub(super) time: Vec<f64>,
+    /// Duration or period in seconds.
+    pub(super) duration: f64,
+    /// Unit quaternions (n,) with continuous signs.
+    pub(super) rotations: Vec<Quaternion>,
+}
+
+impl Recording {
+    /// Returns times, period and components; those of a cycle twice, as its quaternion may change its sign.
+    fn components(&self, kind: Kind) -> (Vec<f64>, Option<f64>, Array2<f64>) {
+        let (n, q) = (self.rotations.len(), &self.rotations);
+        let closing = if dot(q[n - 1], q[0]) < 0.0 { -1.0 } else { 1.0 };
+        let (copies, period) = match kind {
+            Kind::Discrete => (1, None),
+            Kind::Rhythmic => (2, Some(2.0 * self.duration)),
+        };
+        let time = (0..copies * n).map(|c| self.time[c % n] + self.duration * (c / n) as f64).collect();
+        let sign = |c: usize| if c < n { 1.0 } else { closing };
+        (time, period, Array2::from_shape_fn((copies * n, 4), |(c, i)| sign(c) * q[c % n][i]))
+    }
+
+    /// Returns the rotations at the ends of equal parts of the duration.
+    fn resampled(&self, kind: Kind, parts: usize) -> Vec<Quaternion> {
+        let (time, period, values) = self.components(kind);
+        let knots = match period {
+            None => Knots::not_a_knot(time),
+            Some(period) => Knots::periodic(time, period),
+        };
+        let mut rows = vec![0.0; 4 * (parts + 1)];
+        let times = (0..=parts).map(|k| self.duration * k as f64 / parts as f64);
+        Splines::through(knots, crate::validate::row_major(&values), 4).sample(times, &mut rows);
+        rows.chunks_exact(4).map(|q| normalised(std::array::from_fn(|i| q[i]))).collect()
+    }
+}
+
+/// Returns the mean of recordings over the clock; `duration` is that of the nominal one, for which the cut-off of the
+/// measurement noise is that of the recordings.
+///
+/// # Errors
+/// Too few samples for the speed of the rotation, or threads that the system does not provide.
+pub(super) fn mean_path(
+    recordings: &[Recording],
+    canonical: Canonical,
+    duration: f64,
+    parts: usize,
+    smoothing: Smoothing,
+    threads: Threads,
+) -> Result<MeanRotation> {
+    let (kind, n) = (canonical.kind(), recordings.len());
+    let averaged = n.min(MAX_AVERAGED);
+    let paths: Vec<Vec<Quaternion>> =
+        (0..averaged).map(|p| recordings[p * n / averaged].resampled(kind, parts)).collect();
+    let mut mean = first_mean(&paths);
+    let mut rotations: Vec<Quaternion> = (0..=parts)
+        .map(|k| {
+            mean = karcher(mean, paths.iter().map(|path| path[k]));
+            mean
+        })
+        .collect();
+    if let Some(hz) = cut_off(recordings, kind, smoothing, threads)? {
+        let time = (0..if kind == Kind::Discrete { parts + 1 } else { parts })
+            .map(|k| duration * k as f64 / parts as f64)
+            .collect();
+        rotations.truncate(if kind == Kind::Discrete { parts + 1 } else { parts });
+        let (time, period, values) = Recording { time, duration, rotations: rotations.clone() }.components(kind);
+        let smoothed = Samples { time: &time, period, values: values.view() }.smoothed(&[Some(hz); 4]);
+        let rows = smoothed.rows().into_iter().take(parts + 1);
+        rotations = rows.map(|q| normalised(std::array::from_fn(|i| q[i]))).collect();
+    }
+    match kind {
+        Kind::Discrete => slow_down(&mut rotations),
+        Kind::Rhythmic => {
+            let sign = if dot(rotations[0], rotations[parts]) < 0.0 { -1.0 } else { 1.0 };
+            rotations[parts] = rotations[0].map(|x| sign * x);
+        }
+    }
+    if !MeanRotation::are_valid(&rotations, kind) {
+        let problem = "has a rotation of more than 50 degrees from one sample to the next: record at a higher rate, or check \
+                       the columns and the order of rotations";
+        return Err(Error::Argument { name: "position", problem });
+    }
+    Ok(MeanRotation::through(rotations, canonical))
+}
+
+/// Returns the first rotation of the path that is closest to all others, where the iteration starts.
+fn first_mean(paths: &[Vec<Quaternion>]) -> Quaternion {
+    let spread = |path: &&Vec<Quaternion>| paths.iter().map(|other| distance(path[0], other[0]).powi(2)).sum::<f64>();
+    let closest = paths.iter().min_by(|a, b| spread(a).total_cmp(&spread(b)));
+    closest.map_or([1.0, 0.0, 0.0, 0.0], |path| path[0])
+}
+
+/// Returns the mean of rotations, the closest to `start`.
+fn karcher(start: Quaternion, rotations: impl ExactSizeIterator<Item = Quaternion> + Clone) -> Quaternion {
+    let (mut mean, weight) = (start, 1.0 / rotations.len() as f64);
+    for _ in 0..MAX_ITERATIONS {
+        let residuals = rotations.clone().map(|q| log(product(inverse(mean), q)));
+        let step = residuals.fold([0.0; 3], |sum, residual| add_scaled(sum, weight, residual));
+        mean = normalised(product(mean, exp(step)));
+        if dot(step, step) <= CONVERGED * CONVERGED {
+            break;
+        }
+    }
+    mean
+}
+
+/// Returns the cut-off in Hz of the noise of quaternion components; `None` without noise.
+fn cut_off(recordings: &[Recording], kind: Kind, smoothing: Smoothing, threads: Threads) -> Result<Option<f64>> {
+    let pool: Vec<_> = pooled(recordings.len()).map(|m| recordings[m].components(kind)).collect();
+    let samples: Vec<Samples> =
+        pool.iter().map(|(time, period, values)| Samples { time, period: *period, values: values.view() }).collect();
+    let one_vector = [0..4];
+    Ok(Noise::estimate(smoothing, &samples, &one_vector, MIN_DECIMATED, threads)?.cut_offs()[0])
+}
+
+/// Brings a path to rest at its end, with changes near the end that are proportional to its velocity there.
+fn slow_down(rotations: &mut [Quaternion]) {
+    let n = rotations.len() - 1;
+    let [velocity, acceleration] = end_motion(rotations);
+    let slowed = ((SLOWED_SHARE * n as f64).ceil() as usize).clamp(1, n);
+    let length = slowed as f64;
+    for (k, q) in rotations[n - slowed..].iter_mut().enumerate() {
+        let x = k as f64 / length;
+        let cube = x * x * x;
+        // Polynomials with the slope or the bend 1 at x = 1, and otherwise zero to second order at both ends.
+        let slope = cube * (-4.0 + x * (7.0 - 3.0 * x)) * length;
+        let bend = cube * (0.5 + x * (0.5 * x - 1.0)) * length * length;
+        let advance = add_scaled(velocity.map(|v| v * slope), bend, acceleration);
+        *q = normalised(product(*q, exp(advance.map(|x| -x))));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The residuals about the mean add up to zero, from any start and for any signs.
+    #[test]
+    fn residuals_about_the_mean_add_up_to_zero() {
+        let base = exp([0.4, -1.0, 2.0]);
+        let spread = [[0.5, 0.2, -0.1], [-0.7, 0.4, 0.3], [0.1, -0.9, 0.2], [1.2, 0.3, -0.5]];
+        let rotations: Vec<Quaternion> = spread.iter().map(|&delta| product(base, exp(delta))).collect();
+        let signed = rotations.iter().enumerate().map(|(m, q)| if m % 2 == 0 { *q } else { q.map(|x| -x) });
+        let mean = karcher(rotations[3], signed);
+        let residuals = rotations.iter().map(|q| log(product(inverse(mean), *q)));
+        let sum = residuals.fold([0.0; 3], |sum, residual| add_scaled(sum, 1.0, residual));
+        assert!(dot(sum, sum).sqrt() < 1e-14, "{sum:?}");
+        assert!(distance(mean, karcher(rotations[0], rotations.iter().copied())) < 1e-14);
+    }
+
+    /// The end of a slowed path is where it was, at rest; the path before the slowed share is unchanged.
+    #[test]
+    fn slowed_path_ends_at_rest() {
+        let path: Vec<Quaternion> =
+            (0..=100).map(|k| f64::from(k) / 100.0).map(|t| exp([2.0 * t, (3.0 * t).sin(), t * t])).collect();
+        let mut slowed = path.clone();
+        slow_down(&mut slowed);
+        assert!(distance(path[100], slowed[100]) < 1e-15 && path[..85] == slowed[..85]);
+        let [[before, _], [after, bend]] = [&path, &slowed].map(|path| end_motion(path));
+        let size = |v: [f64; 3]| dot(v, v).sqrt();
+        assert!(size(before) > 0.02 && size(after) < 1e-3 * size(before) && size(bend) < 1e-4, "{after:?} {bend:?}");
+    }
+}

@@ -1,0 +1,339 @@
+//! Coordinates of a primitive with rotations: unit quaternions outside, degrees of freedom inside.
+//!
+//! A rotation has four coordinates and three degrees of freedom δ, the rotation vector about the mean of the demonstrations:
+//! q = q̄(u) ⊗ exp(δ). All other coordinates are degrees of freedom. The goal is relative to q̄ at the end of a discrete
+//! movement, the start to q̄ where the movement starts, the anchor of a rhythmic movement to q̄ at phase 0.
+
+use std::sync::Arc;
+
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+use crate::demonstration::RotationColumns;
+use crate::dynamics::mean_rotation::MeanRotation;
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::model::conditions::{Conditions, ResolvedConditions};
+use crate::model::primitive::Primitive;
+use crate::numerics::rotation::{
+    Quaternion, Turning, Vector, exp, inverse, inverse_jacobian, jacobian, log_near, on_side_of, product, rotate,
+};
+use crate::validate::check_vector;
+
+/// Frame in which angular velocities and accelerations are expressed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Frame {
+    /// The frame that rotates, as of a tool.
+    #[default]
+    Body,
+    /// The frame in which the orientation is measured, as of the base of a robot.
+    World,
+}
+
+/// Layout of the coordinates of a primitive with rotations.
+#[derive(Clone, Debug)]
+pub struct Coordinates {
+    names: Vec<String>,
+    units: Vec<String>,
+    frame: Frame,
+    rotations: Vec<Rotation>,
+    /// Column and DoF of each coordinate that is no part of a rotation.
+    plain: Vec<[usize; 2]>,
+    /// The primitive of the degrees of freedom.
+    dofs: Arc<Primitive>,
+}
+
+/// A rotation among the coordinates.
+#[derive(Clone, Debug)]
+pub(crate) struct Rotation {
+    pub(crate) columns: RotationColumns,
+    /// First of its three degrees of freedom.
+    pub(crate) dof: usize,
+    pub(crate) mean: MeanRotation,
+}
+
+/// Returns the columns and DoFs (column, DoF) of the coordinates that are no part of a rotation, and the first DoF of each
+/// rotation.
+pub(crate) fn layout(n_coordinates: usize, rotations: &[RotationColumns]) -> (Vec<[usize; 2]>, Vec<usize>) {
+    let (mut plain, mut firsts, mut column, mut dof) = (Vec::new(), Vec::new(), 0, 0);
+    while column < n_coordinates {
+        if rotations.iter().any(|rotation| rotation.column == column) {
+            firsts.push(dof);
+            (column, dof) = (column + 4, dof + 3);
+        } else {
+            plain.push([column, dof]);
+            (column, dof) = (column + 1, dof + 1);
+        }
+    }
+    (plain, firsts)
+}
+
+impl Rotation {
+    /// Returns δ in a vector of DoFs.
+    #[inline(always)]
+    pub(crate) fn read(&self, dofs: &[f64]) -> Vector {
+        std::array::from_fn(|i| dofs[self.dof + i])
+    }
+
+    #[inline(always)]
+    fn write(&self, vector: Vector, dofs: &mut [f64]) {
+        dofs[self.dof..self.dof + 3].copy_from_slice(&vector);
+    }
+}
+
+impl Coordinates {
+    /// Returns the coordinates of a primitive whose DoFs are those of the layout, with a mean of each rotation.
+    pub(crate) fn new(
+        dofs: Arc<Primitive>,
+        names: Vec<String>,
+        units: Vec<String>,
+        frame: Frame,
+        rotations: Vec<(RotationColumns, MeanRotation)>,
+    ) -> Self {
+        let columns: Vec<RotationColumns> = rotations.iter().map(|(columns, _)| *columns).collect();
+        let (plain, firsts) = layout(names.len(), &columns);
+        let rotations =
+            rotations.into_iter().zip(firsts).map(|((columns, mean), dof)| Rotation { columns, dof, mean }).collect();
+        Self { names, units, frame, rotations, plain, dofs }
+    }
+
+    /// Returns the primitive of the degrees of freedom.
+    pub(crate) fn dofs(&self) -> &Arc<Primitive> {
+        &self.dofs
+    }
+
+    pub(crate) fn rotations(&self) -> &[Rotation] {
+        &self.rotations
+    }
+
+    /// Returns the number of coordinates.
+    pub fn len(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Returns whether there are no coordinates, which is never the case.
+    pub fn is_empty(&self) -> bool {
+        self.names.is_empty()
+    }
+
+    /// Returns the names of the coordinates.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Returns the units of the coordinates; an unknown unit is "".
+    pub fn units(&self) -> &[String] {
+        &self.units
+    }
+
+    /// Returns the columns that are unit quaternions.
+    pub fn columns(&self) -> Vec<RotationColumns> {
+        self.rotations.iter().map(|rotation| rotation.columns).collect()
+    }
+
+    /// Returns the coordinates with another frame.
+    pub(crate) fn in_frame(&self, frame: Frame) -> Self {
+        Self { frame, ..self.clone() }
+    }
+
+    /// Returns the frame of angular velocities and accelerations.
+    pub fn frame(&self) -> Frame {
+        self.frame
+    }
+
+    /// Checks a position: its length, numbers and the norms of its quaternions.
+    pub(crate) fn check(&self, name: &'static str, position: &[f64]) -> Result<()> {
+        check_vector(name, position, self.len(), "coordinate")?;
+        self.rotations.iter().try_for_each(|rotation| rotation.columns.unit(name, None, position).map(drop))
+    }
+
+    /// Converts a valid position to DoFs at clock `u`. A residual rotation is that closest to `near`.
+    pub(crate) fn to_dofs(&self, u: f64, position: &[f64], near: Option<&[f64]>, dofs: &mut [f64]) {
+        self.plain.iter().for_each(|&[column, dof]| dofs[dof] = position[column]);
+        for rotation in &self.rotations {
+            let q = crate::numerics::rotation::normalised(rotation.columns.read(position));
+            let off = product(inverse(rotation.mean.at(u).rotation), q);
+            let near = near.map_or([0.0; 3], |near| rotation.read(near));
+            rotation.write(log_near(off, near), dofs);
+        }
+    }
+
+    /// Converts DoFs at clock `u` to a position. A quaternion has the sign closer to that in `position` on entry.
+    pub(crate) fn to_position(&self, u: f64, dofs: &[f64], position: &mut [f64]) {
+        self.plain.iter().for_each(|&[column, dof]| position[column] = dofs[dof]);
+        for rotation in &self.rotations {
+            let q = product(rotation.mean.at(u).rotation, exp(rotation.read(dofs)));
+            rotation.columns.write(on_side_of(q, rotation.columns.read(position)), position);
+        }
+    }
+
+    /// Converts rows of DoFs at clock `u` to positions.
+    pub(crate) fn positions(&self, u: f64, dofs: &Array2<f64>) -> Array2<f64> {
+        let mut positions = Array2::zeros((dofs.nrows(), self.len()));
+        for (row, mut position) in dofs.rows().into_iter().zip(positions.rows_mut()) {
+            let mut to = vec![0.0; self.len()];
+            self.to_position(u, &row.to_vec(), &mut to);
+            position.assign(&ndarray::aview1(&to));
+        }
+        positions
+    }
+
+    /// Returns the clock at which goals and anchors are relative to the mean rotation.
+    pub(crate) fn centre_clock(&self) -> f64 {
+        match self.dofs.kind() {
+            Kind::Discrete => self.dofs.canonical().extent(),
+            Kind::Rhythmic => 0.0,
+        }
+    }
+
+    /// Converts the motion of the DoFs at clock `u`, with u̇ and ü, to position, velocity and acceleration.
+    ///
+    /// A quaternion has the sign closer to that in `position` on entry.
+    #[inline]
+    pub(crate) fn motion(
+        &self,
+        u: f64,
+        [rate, rate_change]: [f64; 2],
+        dofs: [&[f64]; 3],
+        position: &mut [f64],
+        velocity: &mut [f64],
+        acceleration: &mut [f64],
+    ) {
+        for &[column, dof] in &self.plain {
+            position[column] = dofs[0][dof];
+            velocity[dof] = dofs[1][dof];
+            acceleration[dof] = dofs[2][dof];
+        }
+        for rotation in &self.rotations {
+            let mean = rotation.mean.at(u);
+            let mean = Turning {
+                velocity: mean.velocity.map(|x| x * rate),
+                acceleration: std::array::from_fn(|i| {
+                    mean.acceleration[i] * (rate * rate) + mean.velocity[i] * rate_change
+                }),
+                ..mean
+            };
+            let mut moved = mean.times_exp(dofs.map(|dofs| rotation.read(dofs)));
+            if self.frame == Frame::World {
+                moved.velocity = rotate(moved.rotation, moved.velocity);
+                moved.acceleration = rotate(moved.rotation, moved.acceleration);
+            }
+            rotation.columns.write(on_side_of(moved.rotation, rotation.columns.read(position)), position);
+            rotation.write(moved.velocity, velocity);
+            rotation.write(moved.acceleration, acceleration);
+        }
+    }
+
+    /// Converts velocities to those of the DoFs at `dofs` and clock `u`, J⁻¹(δ)ω, without the motion of the mean rotation.
+    pub(crate) fn relative_velocity(&self, u: f64, dofs: &[f64], velocity: &mut [f64]) {
+        for rotation in &self.rotations {
+            let (delta, mut omega) = (rotation.read(dofs), rotation.read(velocity));
+            if self.frame == Frame::World {
+                let q = product(rotation.mean.at(u).rotation, exp(delta));
+                omega = rotate(inverse(q), omega);
+            }
+            rotation.write(inverse_jacobian(delta, omega), velocity);
+        }
+    }
+
+    /// Calls a function with the first DoF of each rotation and the velocity J⁻¹(δ)exp(δ)ᵀω̄ of its DoFs, per unit of the
+    /// clock, which offsets the motion of the mean rotation.
+    pub(crate) fn for_each_drift(&self, u: f64, dofs: &[f64], mut visit: impl FnMut(usize, Vector)) {
+        for rotation in &self.rotations {
+            let delta = rotation.read(dofs);
+            let carried = rotate(inverse(exp(delta)), rotation.mean.at(u).velocity);
+            visit(rotation.dof, inverse_jacobian(delta, carried));
+        }
+    }
+
+    /// Expresses the state of a rotation, δ and δ′ per unit of the clock at `from`, about the mean rotation at clock `to`.
+    /// Rotation and angular velocity stay; `rate` is the rate of the mean rotation relative to the clock.
+    pub(crate) fn moved(
+        rotation: &Rotation,
+        [from, to]: [f64; 2],
+        rate: f64,
+        [delta, slope]: [Vector; 2],
+    ) -> [Vector; 2] {
+        let [before, after] = [from, to].map(|u| rotation.mean.at(u));
+        let q: Quaternion = product(before.rotation, exp(delta));
+        let own = rotate(inverse(exp(delta)), before.velocity);
+        let turn = jacobian(delta, slope);
+        let omega: Vector = std::array::from_fn(|i| rate * own[i] + turn[i]);
+        let new = log_near(product(inverse(after.rotation), q), delta);
+        let carried = rotate(inverse(exp(new)), after.velocity);
+        let rest: Vector = std::array::from_fn(|i| omega[i] - rate * carried[i]);
+        [new, inverse_jacobian(new, rest)]
+    }
+
+    /// Converts conditions to those of the degrees of freedom.
+    ///
+    /// # Errors
+    /// A vector of another length, a number that is not finite, or a quaternion whose norm is not 1.
+    pub(crate) fn in_dofs(&self, conditions: &Conditions) -> Result<Conditions> {
+        let nominal = &self.dofs.nominal;
+        let start_clock = conditions.phase.filter(|phase| phase.is_finite()).map_or(0.0, crate::dynamics::canonical::turn);
+        let start_clock = if self.dofs.kind() == Kind::Rhythmic { start_clock } else { 0.0 };
+        let convert = |name, value: &Option<Vec<f64>>, u: f64, near: Option<&[f64]>| match value {
+            Some(value) => self.check(name, value).map(|()| {
+                let mut dofs = vec![0.0; self.dofs.n_dofs()];
+                self.to_dofs(u, value, near, &mut dofs);
+                Some(dofs)
+            }),
+            None => Ok(None),
+        };
+        let start = convert("start", &conditions.start, start_clock, None)?;
+        // The residual rotation changes by the shorter way between start and goal.
+        let near = start.as_deref().or(Some(&nominal.start)).filter(|_| self.dofs.kind() == Kind::Discrete);
+        let centre_clock = self.centre_clock();
+        let goal = convert("goal", &conditions.goal, centre_clock, near)?;
+        let anchor = convert("anchor", &conditions.anchor, centre_clock, None)?;
+        let relative = |name, velocity: &Option<Vec<f64>>, u: f64, dofs: Option<&[f64]>| match (velocity, dofs) {
+            (None, _) => Ok(None),
+            (Some(_), None) => Err(Error::Argument {
+                name,
+                problem: "needs a start: the rotation of a rhythmic movement has no angular velocity without one",
+            }),
+            (Some(velocity), Some(dofs)) => check_vector(name, velocity, dofs.len(), "DoF").map(|()| {
+                let mut velocity = velocity.clone();
+                self.relative_velocity(u, dofs, &mut velocity);
+                Some(velocity)
+            }),
+        };
+        let at_start = start.as_deref().or(near);
+        let velocity = relative("velocity", &conditions.velocity, start_clock, at_start)?;
+        let at_goal = goal.as_deref().or(Some(&nominal.centre));
+        let goal_velocity = relative("goal_velocity", &conditions.goal_velocity, centre_clock, at_goal)?;
+        Ok(Conditions { goal, anchor, start, velocity, goal_velocity, ..conditions.clone() })
+    }
+
+    /// Checks conditions and completes them in degrees of freedom.
+    ///
+    /// # Errors
+    /// As for [`Conditions::complete`], or a quaternion whose norm is not 1.
+    pub(crate) fn complete(&self, conditions: &Conditions) -> Result<ResolvedConditions> {
+        let mut resolved = self.in_dofs(conditions)?.complete(&self.dofs)?;
+        if let (Some(_), Some(start)) = (&resolved.velocity, &resolved.start) {
+            let mut drift = vec![0.0; start.len()];
+            self.for_each_drift(resolved.phase, start, |dof, velocity| {
+                drift[dof..dof + 3].copy_from_slice(&velocity);
+            });
+            resolved.drift = Some(drift);
+        }
+        Ok(resolved)
+    }
+
+    /// Converts conditions of the degrees of freedom to those of the coordinates, without velocities.
+    pub(crate) fn of_dofs(&self, conditions: Conditions) -> Conditions {
+        let position = |u: f64, dofs: Option<Vec<f64>>| {
+            dofs.map(|dofs| {
+                let mut position = vec![0.0; self.len()];
+                self.to_position(u, &dofs, &mut position);
+                position
+            })
+        };
+        let Conditions { goal, anchor, start, .. } = conditions.clone();
+        let u = self.centre_clock();
+        Conditions { goal: position(u, goal), anchor: position(u, anchor), start: position(0.0, start), ..conditions }
+    }
+}

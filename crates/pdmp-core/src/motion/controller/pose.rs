@@ -1,0 +1,211 @@
+//! Motion in the coordinates of a primitive with rotations.
+//!
+//! The control loop moves degrees of freedom δ; commands and measurements are converted to them, and its motion to
+//! q = q̄(u) ⊗ exp(δ) once per tick. The mean rotation moves with the clock of the phase, u̇ = κρ. Where κ changes, δ takes
+//! up the difference of its velocity, as the output system does for that of the frame, so that ω stays continuous.
+
+use super::Controller;
+use crate::motion::command::{Command, Coupling};
+use crate::model::Conditions;
+use crate::model::coordinates::Coordinates;
+use crate::numerics::rotation::dot;
+use crate::numerics::simd::{F64x4, unpack};
+use crate::numerics::state::clone_in_place;
+
+/// Residual rotation in rad from which a goal is taken by the shorter way to the mean, not to the goal before it: a whole
+/// turn has no direction.
+const MAX_WINDING: f64 = 1.5 * std::f64::consts::PI;
+
+/// Motion in coordinates, and memory for the conversion of commands.
+#[derive(Debug)]
+pub(super) struct Pose {
+    pub(super) position: Vec<f64>,
+    pub(super) velocity: Vec<f64>,
+    pub(super) acceleration: Vec<f64>,
+    /// Goal or anchor in force.
+    pub(super) centre: Vec<f64>,
+    /// Commanded final velocity.
+    pub(super) goal_velocity: Vec<f64>,
+    /// DoFs of a commanded goal or anchor.
+    command: Vec<f64>,
+    /// DoFs of a measured position.
+    measured: Vec<f64>,
+    /// Coupling terms c_v and c_a of the DoFs.
+    coupling: [Vec<f64>; 2],
+}
+
+clone_in_place!(Pose { position, velocity, acceleration, centre, goal_velocity, command, measured, coupling });
+
+impl Pose {
+    /// Returns the memory for a primitive; `None` where its coordinates are its degrees of freedom.
+    pub(super) fn of(coordinates: Option<&Coordinates>) -> Option<Box<Self>> {
+        let coordinates = coordinates?;
+        let (n, n_dofs) = (coordinates.len(), coordinates.dofs().n_dofs());
+        let [velocity, acceleration, goal_velocity, command, measured, c_v, c_a] = [(); 7].map(|()| vec![0.0; n_dofs]);
+        let [position, centre] = [(); 2].map(|()| vec![0.0; n]);
+        let coupling = [c_v, c_a];
+        Some(Box::new(Self { position, velocity, acceleration, centre, goal_velocity, command, measured, coupling }))
+    }
+
+    /// Returns the DoFs of a commanded goal or anchor, close to those of the goal before it.
+    pub(super) fn centre_dofs(&mut self, coordinates: &Coordinates, centre: &[f64], before: &[f64]) -> &[f64] {
+        let u = coordinates.centre_clock();
+        coordinates.to_dofs(u, centre, Some(before), &mut self.command);
+        let wound = |dof: usize| {
+            let delta: [f64; 3] = std::array::from_fn(|i| self.command[dof + i]);
+            dot(delta, delta) > MAX_WINDING * MAX_WINDING
+        };
+        if coordinates.rotations().iter().any(|rotation| wound(rotation.dof)) {
+            coordinates.to_dofs(u, centre, None, &mut self.command);
+        }
+        &self.command
+    }
+}
+
+impl Controller {
+    /// Converts the motion of the DoFs to coordinates.
+    #[inline]
+    pub(super) fn publish_pose(&mut self) {
+        let Self { pose, primitive, position, velocity, acceleration, rate, perturbation, clock, .. } = self;
+        let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
+        let phase_rate = perturbation.phase_rate();
+        let rates = [rate.value(), rate.rate()].map(|rate| phase_rate * super::step::first_element(rate));
+        let dofs = [&*position, velocity, acceleration].map(|lanes| unpack(lanes, primitive.n_dofs()));
+        let Pose { position, velocity, acceleration, .. } = &mut **pose;
+        coordinates.motion(clock.value(), rates, dofs, position, velocity, acceleration);
+    }
+
+    /// Converts the goal or anchor in force to coordinates, with the sign of the commanded quaternion.
+    pub(super) fn publish_centre(&mut self, commanded: Option<&[f64]>) {
+        let Self { pose, primitive, centre, .. } = self;
+        let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
+        if let Some(commanded) = commanded {
+            pose.centre.copy_from_slice(commanded);
+        }
+        let dofs = unpack(centre.target(), primitive.n_dofs());
+        coordinates.to_position(coordinates.centre_clock(), dofs, &mut pose.centre);
+    }
+
+    /// Keeps the final velocity of conditions in coordinates.
+    pub(super) fn keep_final_velocity(&mut self, conditions: &Conditions) {
+        if let (Some(pose), Some(velocity)) = (&mut self.pose, &conditions.goal_velocity) {
+            pose.goal_velocity.copy_from_slice(velocity);
+        }
+    }
+
+    /// Sets the final velocity of the DoFs for that of the coordinates at the commanded goal.
+    pub(super) fn set_final_velocity(&mut self) {
+        let Self { pose, primitive, conditions, .. } = self;
+        let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
+        conditions.goal_velocity.copy_from_slice(&pose.goal_velocity);
+        let u = coordinates.centre_clock();
+        coordinates.relative_velocity(u, &conditions.centre, &mut conditions.goal_velocity);
+    }
+
+    /// Sets the perturbation of a tick by a command in coordinates; returns false for a primitive without rotations.
+    pub(super) fn perturb_pose(&mut self, command: &Command, full: f64, h: f64) -> bool {
+        let Self { pose, primitive, position, clock, perturbation, started, .. } = self;
+        let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return false };
+        let (u, dofs) = (clock.value(), unpack(position, primitive.n_dofs()));
+        let Pose { measured, coupling: [c_v, c_a], .. } = &mut **pose;
+        if let Some(coordinates_measured) = command.measured {
+            coordinates.to_dofs(u, coordinates_measured, Some(dofs), measured);
+        }
+        if let Some(Coupling { velocity, acceleration }) = command.coupling {
+            for (of_dofs, given) in [(&mut *c_v, velocity), (&mut *c_a, acceleration)] {
+                of_dofs.copy_from_slice(given);
+                coordinates.relative_velocity(u, dofs, of_dofs);
+            }
+        }
+        let of_dofs = Command {
+            measured: command.measured.map(|_| measured.as_slice()),
+            coupling: command.coupling.map(|_| Coupling { velocity: c_v, acceleration: c_a }),
+            ..*command
+        };
+        perturbation.set(&of_dofs, position, full, h, *started);
+        true
+    }
+
+    /// Adds the velocity of the mean rotations times a change of the phase rate to that of the DoFs.
+    pub(super) fn take_up_drift(&mut self, change: f64) {
+        let Self { primitive, groups, position, clock, .. } = self;
+        let Some(coordinates) = primitive.coordinates() else { return };
+        let dofs = unpack(position, primitive.n_dofs());
+        coordinates.for_each_drift(clock.value(), dofs, |dof, velocity| {
+            for (i, velocity) in velocity.into_iter().enumerate() {
+                groups[(dof + i) / 4].z.as_mut_array()[(dof + i) % 4] += velocity * change;
+            }
+        });
+    }
+
+    /// Expresses the rotations about the mean at another clock, before the clock is set to it: they and their angular
+    /// velocities stay.
+    pub(super) fn move_rotations(&mut self, to: f64) {
+        let Self { primitive, groups, position, velocity, clock, rate, perturbation, .. } = self;
+        let Some(coordinates) = primitive.coordinates() else { return };
+        let rate = super::step::first_element(rate.value());
+        if rate <= 0.0 {
+            // In a pause nothing moves, but the state changes its place.
+            return move_still(coordinates, [clock.value(), to], position, groups);
+        }
+        let phase_rate = perturbation.phase_rate();
+        for rotation in coordinates.rotations() {
+            let of = |lanes: &[F64x4], scale: f64| -> [f64; 3] {
+                std::array::from_fn(|i| lanes[(rotation.dof + i) / 4].as_array()[(rotation.dof + i) % 4] * scale)
+            };
+            let before = [of(position, 1.0), of(velocity, 1.0 / rate)];
+            let after = Coordinates::moved(rotation, [clock.value(), to], phase_rate, before);
+            for i in 0..3 {
+                let (group, lane) = ((rotation.dof + i) / 4, (rotation.dof + i) % 4);
+                position[group].as_mut_array()[lane] = after[0][i];
+                groups[group].z.as_mut_array()[lane] += after[1][i] - before[1][i];
+            }
+        }
+    }
+
+    /// Gives the three DoFs of each rotation the length of its distance from the goal, which depends on no frame.
+    pub(super) fn share_lengths(&mut self) {
+        let Self { primitive, groups, position, centre, .. } = self;
+        for dof in primitive.rotation_dofs() {
+            let at = |i: usize| ((dof + i) / 4, (dof + i) % 4);
+            let off: [f64; 3] = std::array::from_fn(|i| {
+                let (group, lane) = at(i);
+                (centre.target()[group] - position[group]).as_array()[lane]
+            });
+            let distance = dot(off, off).sqrt();
+            let rounding = (0..3).map(|i| groups[at(i).0].rounding.as_array()[at(i).1]).fold(0.0f64, f64::max);
+            for i in 0..3 {
+                let (group, lane) = at(i);
+                let range = groups[group].range.as_array()[lane];
+                groups[group].length.as_mut_array()[lane] = range.max(distance);
+                groups[group].rounding.as_mut_array()[lane] = rounding;
+            }
+        }
+    }
+
+    /// Returns whether every DoF is within its bound, given deviation and bound of a group: a rotation by its angle.
+    pub(super) fn is_within(&self, of_group: impl Fn(usize) -> [F64x4; 2]) -> bool {
+        let at = |dof: usize| of_group(dof / 4).map(|lanes| lanes.as_array()[dof % 4]);
+        let in_rotation = |dof: usize| self.primitive.rotation_dofs().any(|first| (first..first + 3).contains(&dof));
+        let plain = (0..self.primitive.n_dofs()).filter(|&dof| !in_rotation(dof)).all(|dof| {
+            let [deviation, bound] = at(dof);
+            deviation <= bound
+        });
+        plain
+            && self.primitive.rotation_dofs().all(|dof| {
+                let square = (dof..dof + 3).map(|dof| at(dof)[0].powi(2)).sum::<f64>();
+                square.sqrt() <= at(dof)[1]
+            })
+    }
+}
+
+/// Moves rotations without velocity as [`Controller::move_rotations`] does.
+fn move_still(coordinates: &Coordinates, clocks: [f64; 2], position: &mut [F64x4], groups: &mut [super::Group]) {
+    debug_assert_eq!(position.len(), groups.len());
+    for rotation in coordinates.rotations() {
+        let at = |i: usize| ((rotation.dof + i) / 4, (rotation.dof + i) % 4);
+        let delta = std::array::from_fn(|i| position[at(i).0].as_array()[at(i).1]);
+        let [moved, _] = Coordinates::moved(rotation, clocks, 0.0, [delta, [0.0; 3]]);
+        (0..3).for_each(|i| position[at(i).0].as_mut_array()[at(i).1] = moved[i]);
+    }
+}
