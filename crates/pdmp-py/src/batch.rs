@@ -212,31 +212,32 @@ impl PreparedBatch {
         self.highest as usize + 1
     }
 
-    fn shape(&self, movements: &Range<usize>) -> [usize; 3] {
-        let (_, n_samples, n_dofs) = self.batch.shape();
-        [movements.len(), n_samples, n_dofs]
+    fn shape(&self, movements: &Range<usize>, derivative: Derivative) -> [usize; 3] {
+        let (_, n_samples, _) = self.batch.shape();
+        [movements.len(), n_samples, self.batch.n_columns(derivative)]
     }
 
     /// Checks the number and the shapes of given output arrays.
     fn check<'py>(&self, movements: &Range<usize>, out: &[Bound<'py, PyAny>]) -> PyResult<Vec<Cube<'py>>> {
-        let (n_arrays, expected, shape) = (out.len(), self.n_outputs(), self.shape(movements));
+        let (n_arrays, expected) = (out.len(), self.n_outputs());
         if n_arrays != expected {
+            let shape = self.shape(movements, Derivative::Position);
             let message = format!("out: {n_arrays} arrays; expected {expected} float64 arrays {shape:?}");
             return Err(PyValueError::new_err(message));
         }
-        out.iter().map(|out| writable(out, &shape)).collect()
+        out.iter().zip(Derivative::ALL).map(|(out, derivative)| writable(out, &self.shape(movements, derivative))).collect()
     }
 
     /// Allocates output arrays by numpy, which requests large pages: fewer page faults than with Rust's allocator.
     fn allocate<'py>(&self, py: Python<'py>, movements: &Range<usize>) -> PyResult<Vec<Cube<'py>>> {
-        let shape = self.shape(movements);
-        let numbers = shape.iter().map(|&n| n as f64).product();
-        let new = || {
+        let new = |derivative| {
+            let shape = self.shape(movements, derivative);
+            let numbers = shape.iter().map(|&n| n as f64).product();
             let array = py.import("numpy")?.call_method1("empty", (shape,));
             let array = array.map_err(|_| raise(Error::Memory { name: "rollouts", numbers }))?;
             writable(&array, &shape)
         };
-        (0..self.n_outputs()).map(|_| new()).collect()
+        Derivative::ALL.into_iter().take(self.n_outputs()).map(new).collect()
     }
 
     fn write<'py>(

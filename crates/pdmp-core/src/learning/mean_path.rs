@@ -22,8 +22,10 @@ const MAX_AVERAGED: usize = 200;
 const MAX_ITERATIONS: usize = 100;
 /// Change of the mean in rad that ends the iteration.
 const CONVERGED: f64 = 1e-15;
-/// Share of the path before its end over which the mean rotation of demonstrations that do not end at rest is slowed.
-const SLOWED_SHARE: f64 = 0.15;
+/// Shares of the path before its end over which the velocity and the acceleration of a mean rotation that does not end at
+/// rest fade. The residuals take up the difference, 0.02 of the velocity at most, which shorter shares would make smaller but
+/// sharper. Most recordings end at rest with some acceleration, for which the second share is short.
+const FADING_SHARES: [f64; 2] = [0.1, 0.03];
 
 /// Recorded rotation of one demonstration.
 pub(super) struct Recording {
@@ -142,20 +144,24 @@ fn cut_off(recordings: &[Recording], kind: Kind, smoothing: Smoothing, threads: 
     Ok(Noise::estimate(smoothing, &samples, &one_vector, MIN_DECIMATED, threads)?.cut_offs()[0])
 }
 
-/// Brings a path to rest at its end, with changes near the end that are proportional to its velocity there.
+/// Brings a path to rest at its end, with changes near the end that are proportional to its velocity and acceleration there.
 fn slow_down(rotations: &mut [Quaternion]) {
     let n = rotations.len() - 1;
-    let [velocity, acceleration] = end_motion(rotations);
-    let slowed = ((SLOWED_SHARE * n as f64).ceil() as usize).clamp(1, n);
-    let length = slowed as f64;
-    for (k, q) in rotations[n - slowed..].iter_mut().enumerate() {
-        let x = k as f64 / length;
-        let cube = x * x * x;
-        // Polynomials with the slope or the bend 1 at x = 1, and otherwise zero to second order at both ends.
-        let slope = cube * (-4.0 + x * (7.0 - 3.0 * x)) * length;
-        let bend = cube * (0.5 + x * (0.5 * x - 1.0)) * length * length;
-        let advance = add_scaled(velocity.map(|v| v * slope), bend, acceleration);
-        *q = normalised(product(*q, exp(advance.map(|x| -x))));
+    let motion = end_motion(rotations);
+    // Polynomials with the slope or the bend 1 at x = 1, and otherwise zero to second order at both ends.
+    let shapes = [|x: f64| x.powi(3) * (-4.0 + x * (7.0 - 3.0 * x)), |x: f64| x.powi(3) * (0.5 + x * (0.5 * x - 1.0))];
+    for (k, q) in rotations.iter_mut().enumerate() {
+        let mut advance = [0.0; 3];
+        for ((share, shape), (order, motion)) in FADING_SHARES.into_iter().zip(shapes).zip([1, 2].into_iter().zip(motion)) {
+            let length = (share * n as f64).ceil().clamp(1.0, n as f64);
+            let x = 1.0 - (n - k) as f64 / length;
+            if x > 0.0 {
+                advance = add_scaled(advance, shape(x) * length.powi(order), motion);
+            }
+        }
+        if advance != [0.0; 3] {
+            *q = normalised(product(*q, exp(advance.map(|x| -x))));
+        }
     }
 }
 
@@ -184,7 +190,7 @@ mod tests {
             (0..=100).map(|k| f64::from(k) / 100.0).map(|t| exp([2.0 * t, (3.0 * t).sin(), t * t])).collect();
         let mut slowed = path.clone();
         slow_down(&mut slowed);
-        assert!(distance(path[100], slowed[100]) < 1e-15 && path[..85] == slowed[..85]);
+        assert!(distance(path[100], slowed[100]) < 1e-15 && path[..90] == slowed[..90]);
         let [[before, _], [after, bend]] = [&path, &slowed].map(|path| end_motion(path));
         let size = |v: [f64; 3]| dot(v, v).sqrt();
         assert!(size(before) > 0.02 && size(after) < 1e-3 * size(before) && size(bend) < 1e-4, "{after:?} {bend:?}");

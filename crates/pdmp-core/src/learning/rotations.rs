@@ -13,11 +13,13 @@ use super::options::{DofScaling, FitOptions};
 use crate::demonstration::{Demonstration, RotationColumns};
 use crate::dynamics::mean_rotation::{MAX_CELLS, MeanRotation};
 use crate::error::{Error, Result};
+use crate::kind::Kind;
 use crate::model::Primitive;
 use crate::model::coordinates::{Coordinates, Frame, layout};
 use crate::model::finding::Finding;
 use crate::numerics::rotation::{Quaternion, Vector, add_scaled, distance, dot, inverse, log, log_near, product};
 use crate::numerics::smoothing_spline::Smoothing;
+use crate::numerics::threads::Threads;
 use crate::validate::check_range;
 
 /// Residual rotation that is reported: beyond it the residuals are distorted by a tenth or more.
@@ -188,6 +190,31 @@ impl Residuals {
         let outer = Primitive::clone(&dofs);
         Arc::new(outer.with_coordinates(Coordinates::new(dofs, names, units, frame, means)))
     }
+}
+
+/// Returns a demonstration in the degrees of freedom of a model.
+///
+/// # Errors
+/// A cycle, whose phase is unknown, rotations that are not those of the model, or a residual rotation of half a turn.
+pub(super) fn about_means(
+    demo: &Demonstration,
+    coordinates: &Coordinates,
+    alignment: &Alignment,
+) -> Result<Demonstration> {
+    if coordinates.dofs().kind() == Kind::Rhythmic {
+        let problem = "has rotations, whose mean depends on the phase: styles of cycles can be inferred without rotations only";
+        return Err(Error::Argument { name: "model", problem });
+    }
+    if demo.rotations() != coordinates.columns() {
+        return Err(Error::Argument { name: "rotations", problem: "differ from those of the model" });
+    }
+    let aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
+    let (seconds, duration, extent) =
+        (aligned.seconds(0), aligned.durations()[0], coordinates.dofs().canonical().extent());
+    let clock: Vec<f64> = seconds.into_iter().map(|t| t / duration * extent).collect();
+    let means: Vec<_> = coordinates.rotations().iter().map(|rotation| (rotation.columns, rotation.mean.clone())).collect();
+    let (plain, dofs) = layout(coordinates.len(), demo.rotations());
+    in_dofs(demo, &clock, extent, &means, &plain, &dofs)
 }
 
 /// Returns the recorded rotations of a demonstration.

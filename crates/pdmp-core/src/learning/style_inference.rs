@@ -1,10 +1,12 @@
 //! Style of a demonstration outside the training set.
 
+use std::sync::Arc;
+
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use ndarray::{Array2, ArrayView2};
 
-use super::cycle_phase;
+use super::{cycle_phase, rotations};
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -91,10 +93,11 @@ impl StyleOptions {
 /// # Ok::<(), pdmp_core::Error>(())
 /// ```
 pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> Result<Vec<f64>> {
-    model.primitive().refuse_rotations("has rotations, for which styles cannot be inferred")?;
+    let primitive = model.primitive();
     let n_dofs = model.n_dofs();
-    check_length("demonstration", demo.n_dofs(), n_dofs, "DoF")?;
-    for (name, labels, own) in [("names", demo.names(), model.names()), ("units", demo.units(), model.units())] {
+    check_length("demonstration", demo.n_coordinates(), primitive.n_coordinates(), primitive.per_coordinate())?;
+    let own = [primitive.coordinate_names(), primitive.coordinate_units()];
+    for (name, labels, own) in [("names", demo.names(), own[0]), ("units", demo.units(), own[1])] {
         if labels.is_some_and(|labels| labels != own) {
             return Err(Error::Argument { name, problem: "differ from those of the model" });
         }
@@ -108,6 +111,11 @@ pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> 
         n_samples: Some(model.learnt.n_samples),
         vectors: Vec::new(),
     };
+    if let Some(coordinates) = primitive.coordinates() {
+        let residuals = rotations::about_means(demo, coordinates, &alignment)?;
+        let inside = Model { primitive: Arc::clone(primitive.inside()), ..model.clone() };
+        return style_of(&inside, &residuals, options);
+    }
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
     let by_landmarks = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;

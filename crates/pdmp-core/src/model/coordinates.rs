@@ -31,6 +31,9 @@ pub enum Frame {
     World,
 }
 
+/// Linear map of vectors.
+type Tangent = dyn Fn(Vector) -> Vector;
+
 /// Layout of the coordinates of a primitive with rotations.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
@@ -247,6 +250,19 @@ impl Coordinates {
         }
     }
 
+    /// Calls a function with the first DoF of each rotation at clock `u`, the map J(δ) from changes of δ to small rotations
+    /// in the frame of the coordinates, and its inverse.
+    pub(crate) fn for_each_tangent(&self, u: f64, dofs: &[f64], mut visit: impl FnMut(usize, &Tangent, &Tangent)) {
+        for rotation in &self.rotations {
+            let delta = rotation.read(dofs);
+            let q = product(rotation.mean.at(u).rotation, exp(delta));
+            let world = self.frame == Frame::World;
+            let forward = move |v: Vector| if world { rotate(q, jacobian(delta, v)) } else { jacobian(delta, v) };
+            let backward = move |v: Vector| inverse_jacobian(delta, if world { rotate(inverse(q), v) } else { v });
+            visit(rotation.dof, &forward, &backward);
+        }
+    }
+
     /// Expresses the state of a rotation, δ and δ′ per unit of the clock at `from`, about the mean rotation at clock `to`.
     /// Rotation and angular velocity stay; `rate` is the rate of the mean rotation relative to the clock.
     pub(crate) fn moved(
@@ -266,7 +282,24 @@ impl Coordinates {
         [new, inverse_jacobian(new, rest)]
     }
 
-    /// Converts conditions to those of the degrees of freedom.
+    /// Converts conditions to those of the degrees of freedom, their start velocity at a constant τ.
+    ///
+    /// # Errors
+    /// As for [`Self::in_dofs`], or a τ out of range.
+    pub(crate) fn constant_in_dofs(&self, conditions: &Conditions) -> Result<Conditions> {
+        let mut converted = self.in_dofs(conditions)?;
+        let rate = 1.0 / conditions.time_constant(&self.dofs)?;
+        let start = converted.start.as_ref().unwrap_or(&self.dofs.nominal.start);
+        if let Some(velocity) = &mut converted.velocity {
+            self.for_each_drift(0.0, start, |dof, drift| {
+                (0..3).for_each(|i| velocity[dof + i] -= drift[i] * rate);
+            });
+        }
+        Ok(converted)
+    }
+
+    /// Converts conditions to those of the degrees of freedom. A start velocity lacks that of the mean rotations, which
+    /// depends on τ.
     ///
     /// # Errors
     /// A vector of another length, a number that is not finite, or a quaternion whose norm is not 1.

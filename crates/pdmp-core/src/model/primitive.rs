@@ -148,14 +148,13 @@ impl Primitive {
         self.coordinates.as_ref().map_or(self, |coordinates| coordinates.dofs())
     }
 
-    /// Returns the primitive of the degrees of freedom, and conditions for it. A start velocity of a rotation is relative to
-    /// its mean.
+    /// Returns the primitive of the degrees of freedom, and conditions for it.
     pub(crate) fn inside_with<'a>(
         self: &'a Arc<Self>,
         conditions: &'a Conditions,
     ) -> Result<(&'a Arc<Self>, Cow<'a, Conditions>)> {
         match &self.coordinates {
-            Some(coordinates) => Ok((coordinates.dofs(), Cow::Owned(coordinates.in_dofs(conditions)?))),
+            Some(coordinates) => Ok((coordinates.dofs(), Cow::Owned(coordinates.constant_in_dofs(conditions)?))),
             None => Ok((self, Cow::Borrowed(conditions))),
         }
     }

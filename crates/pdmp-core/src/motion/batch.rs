@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use ndarray::{ArrayViewMut3, Axis};
+use ndarray::{Array3, ArrayViewMut3, Axis, aview1, s};
 
 use crate::error::{Error, Result};
 use crate::model::conditions::Conditions;
@@ -15,7 +15,7 @@ use crate::motion::superposition::{self, Combination};
 use crate::motion::trajectory::Trajectories;
 use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
-use crate::validate::{check_range, zeros};
+use crate::validate::{check_range, row_major, zeros};
 
 /// Number of elements of each output that one thread writes per block.
 const BLOCK: usize = 1 << 17;
@@ -57,6 +57,8 @@ pub struct Batch {
     velocities: Option<PerMovement>,
     goal_velocities: Option<PerMovement>,
     amplitude: f64,
+    /// Primitive with rotations, sampling interval in s, and rate 1/τ.
+    pose: Option<(Arc<Primitive>, f64, f64)>,
 }
 
 /// Checks the conditions of a batch and computes the unit responses, unless the primitive has them in its cache.
@@ -71,7 +73,11 @@ pub fn batch(
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Batch> {
-    primitive.refuse_rotations("has rotations, for which batches do not exist: compute rollouts one by one")?;
+    let (outside, primitive) = (primitive, primitive.inside());
+    let conditions = match outside.coordinates() {
+        Some(coordinates) => conditions.in_dofs(coordinates)?,
+        None => conditions,
+    };
     let n_movements = conditions.check(primitive)?;
     let BatchConditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau } = conditions;
     let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(primitive)?;
@@ -84,6 +90,7 @@ pub fn batch(
         velocities: velocity,
         goal_velocities: goal_velocity,
         amplitude: nominal.amplitude,
+        pose: outside.coordinates().is_some().then(|| (Arc::clone(outside), grid.dt, 1.0 / nominal.tau)),
     })
 }
 
@@ -92,6 +99,28 @@ impl Batch {
     pub fn shape(&self) -> (usize, usize, usize) {
         let (n_samples, n_dofs) = self.responses.of(Derivative::Position).start.dim();
         (self.n_movements, n_samples, n_dofs)
+    }
+
+    /// Returns the number of columns of positions, or of a derivative: coordinates or DoFs.
+    ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # use pdmp_core::model::Derivative;
+    /// # use pdmp_core::motion::{BatchConditions, TimeGrid, batch};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let grid = TimeGrid { dt: 0.01, duration: None };
+    /// let batch = batch(model.primitive(), BatchConditions::default(), grid, &mut |_| Ok(()))?;
+    /// assert_eq!(batch.n_columns(Derivative::Position), model.n_coordinates());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn n_columns(&self, derivative: Derivative) -> usize {
+        match &self.pose {
+            Some((primitive, ..)) if derivative == Derivative::Position => primitive.n_coordinates(),
+            _ => self.shape().2,
+        }
     }
 
     /// Returns consecutive ranges of `size` movements, the last one possibly shorter, to compute the batch in parts by
@@ -134,10 +163,10 @@ impl Batch {
         threads: Threads,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Trajectories> {
-        let (_, n_samples, n_dofs) = self.shape();
-        let new = || zeros("rollouts", (movements.len(), n_samples, n_dofs));
-        let derivative = |order: Derivative| (order as usize <= highest as usize).then(new).transpose();
-        let mut position = new()?;
+        let (_, n_samples, _) = self.shape();
+        let new = |order: Derivative| zeros("rollouts", (movements.len(), n_samples, self.n_columns(order)));
+        let derivative = |order: Derivative| (order as usize <= highest as usize).then(|| new(order)).transpose();
+        let mut position = new(Derivative::Position)?;
         let (mut velocity, mut acceleration) =
             (derivative(Derivative::Velocity)?, derivative(Derivative::Acceleration)?);
         let outputs = [Some(&mut position), velocity.as_mut(), acceleration.as_mut()];
@@ -171,12 +200,12 @@ impl Batch {
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<()> {
         let (n_movements, n_samples, n_dofs) = self.shape();
-        let shape = (movements.len(), n_samples, n_dofs);
+        let mut expected = Derivative::ALL.map(|order| (movements.len(), n_samples, self.n_columns(order))).into_iter();
         if movements.end > n_movements {
             let value = movements.end as f64;
             return Err(Error::Range { name: "movements", value, allowed: "exceeds the number of movements" });
         }
-        if outputs.len() > 3 || outputs.iter().any(|output| output.dim() != shape) {
+        if outputs.len() > 3 || outputs.iter().any(|output| Some(output.dim()) != expected.next()) {
             return Err(Error::Argument {
                 name: "outputs",
                 problem: "must be at most three, each (movements, samples, DoFs) of the batch",
@@ -204,8 +233,39 @@ impl Batch {
     fn write_block(&self, first: usize, outputs: Vec<ArrayViewMut3<f64>>) {
         let n = outputs.first().map_or(0, |output| output.len_of(Axis(0)));
         let combinations: Vec<Combination> = (first..first + n).map(|b| self.combination(b)).collect();
+        if let Some(pose) = &self.pose {
+            return self.write_poses(pose, &combinations, outputs);
+        }
         for (derivative, output) in Derivative::ALL.into_iter().zip(outputs) {
             superposition::write(&combinations, self.responses.of(derivative), derivative, output);
+        }
+    }
+
+    /// Writes the movements of consecutive combinations in coordinates.
+    fn write_poses(
+        &self,
+        (primitive, dt, rate): &(Arc<Primitive>, f64, f64),
+        combinations: &[Combination],
+        mut outputs: Vec<ArrayViewMut3<f64>>,
+    ) {
+        let Some(coordinates) = primitive.coordinates() else { return };
+        let (_, n_samples, n_dofs) = self.shape();
+        let mut dofs = [(); 3].map(|()| Array3::zeros((1, n_samples, n_dofs)));
+        let mut moved = [vec![0.0; coordinates.len()], vec![0.0; n_dofs], vec![0.0; n_dofs]];
+        for (b, combination) in combinations.iter().enumerate() {
+            for (derivative, dofs) in Derivative::ALL.into_iter().zip(&mut dofs).take(outputs.len()) {
+                let curves = self.responses.of(derivative);
+                superposition::write(std::slice::from_ref(combination), curves, derivative, dofs.view_mut());
+            }
+            moved[0].fill(0.0);
+            for k in 0..n_samples {
+                let rows = dofs.each_ref().map(|dofs| &row_major(dofs)[k * n_dofs..][..n_dofs]);
+                let [position, velocity, acceleration] = &mut moved;
+                coordinates.motion(k as f64 * dt * rate, [*rate, 0.0], rows, position, velocity, acceleration);
+                for (output, moved) in outputs.iter_mut().zip(&moved) {
+                    output.slice_mut(s![b, k, ..]).assign(&aview1(moved));
+                }
+            }
         }
     }
 

@@ -5,6 +5,7 @@ use ndarray::{Array2, ArrayView1, aview1};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, check_style, reject_for_kind, reject_goal_velocity};
+use crate::model::Coordinates;
 use crate::model::primitive::Primitive;
 use crate::validate::{check_matrix, check_vector, zeros};
 
@@ -100,6 +101,13 @@ impl BatchConditions {
     pub fn each(primitive: &Primitive, conditions: &[Conditions]) -> Result<Self> {
         let nominal = Conditions::default().complete(primitive)?;
         let (n_dofs, n_styles) = (primitive.n_dofs(), primitive.n_styles());
+        let position = (primitive.n_coordinates(), primitive.per_coordinate());
+        let centre = Some(nominal.centre);
+        let outside = Conditions { goal: centre.clone(), anchor: centre, start: nominal.start, ..Conditions::default() };
+        let Conditions { goal, anchor, start, .. } = match primitive.coordinates() {
+            Some(coordinates) => coordinates.of_dofs(outside),
+            None => outside,
+        };
         let rows = |name, (n, per): (usize, _), default: Option<&[f64]>, of: fn(&Conditions) -> &Option<Vec<f64>>| {
             let mut rows = zeros("conditions", (conditions.len(), n))?;
             for (mut row, one) in rows.rows_mut().into_iter().zip(conditions) {
@@ -109,23 +117,71 @@ impl BatchConditions {
             }
             Ok(Some(PerMovement::Each(rows)))
         };
-        let optional = |name, default: Option<&[f64]>, of: fn(&Conditions) -> &Option<Vec<f64>>| {
+        let optional = |name, size, default: Option<&[f64]>, of: fn(&Conditions) -> &Option<Vec<f64>>| {
             let given = conditions.iter().any(|one| of(one).is_some());
-            if given { rows(name, (n_dofs, "DoF"), default, of) } else { Ok(None) }
+            if given { rows(name, size, default, of) } else { Ok(None) }
         };
         let taus = conditions.iter().map(|one| time_constant(primitive, one)).collect::<Result<Vec<_>>>()?;
         let amplitudes: Vec<_> = conditions.iter().map(|one| one.amplitude).collect();
         Ok(Self {
             style: rows("style", (n_styles, "style dimension"), Some(&nominal.style), |one| &one.style)?,
-            goal: optional("goal", Some(&nominal.centre), |one| &one.goal)?,
-            anchor: optional("anchor", Some(&nominal.centre), |one| &one.anchor)?,
-            start: optional("start", nominal.start.as_deref(), |one| &one.start)?,
-            velocity: optional("velocity", None, |one| &one.velocity)?,
-            goal_velocity: optional("goal_velocity", None, |one| &one.goal_velocity)?,
+            goal: optional("goal", position, goal.as_deref(), |one| &one.goal)?,
+            anchor: optional("anchor", position, anchor.as_deref(), |one| &one.anchor)?,
+            start: optional("start", position, start.as_deref(), |one| &one.start)?,
+            velocity: optional("velocity", (n_dofs, "DoF"), None, |one| &one.velocity)?,
+            goal_velocity: optional("goal_velocity", (n_dofs, "DoF"), None, |one| &one.goal_velocity)?,
             amplitude: common("amplitude", &amplitudes, 1.0)?,
             tau: common("tau", &taus, primitive.tau)?,
         })
     }
+
+    /// Converts conditions in coordinates to those of the degrees of freedom.
+    ///
+    /// # Errors
+    /// Vectors that do not fit the coordinates, or different numbers of movements.
+    pub(crate) fn in_dofs(mut self, coordinates: &Coordinates) -> Result<Self> {
+        let names = ["goal", "anchor", "start", "velocity", "goal_velocity"];
+        let given = [&self.goal, &self.anchor, &self.start, &self.velocity, &self.goal_velocity];
+        let mut n_movements = None;
+        for (name, rows) in names.into_iter().zip(given) {
+            if let Some(PerMovement::Each(rows)) = rows {
+                let (found, expected) = (rows.nrows(), *n_movements.get_or_insert(rows.nrows()));
+                if found != expected {
+                    return Err(Error::Rows { name, expected, found });
+                }
+            }
+        }
+        let n_dofs = coordinates.dofs().n_dofs();
+        let mut converted = [(); 5].map(|()| Array2::zeros((n_movements.unwrap_or(1), n_dofs)));
+        for b in 0..n_movements.unwrap_or(1) {
+            let [goal, anchor, start, velocity, goal_velocity] =
+                given.map(|rows| rows.as_ref().map(|rows| rows.row(b).to_vec()));
+            let tau = self.tau;
+            let one = Conditions { goal, anchor, start, velocity, goal_velocity, tau, ..Conditions::default() };
+            let one = coordinates.constant_in_dofs(&one)?;
+            let vectors = [one.goal, one.anchor, one.start, one.velocity, one.goal_velocity];
+            for (rows, vector) in converted.iter_mut().zip(vectors) {
+                vector.iter().for_each(|vector| rows.row_mut(b).assign(&aview1(vector)));
+            }
+        }
+        let [goal, anchor, start, velocity, goal_velocity] = converted.map(|rows| match n_movements {
+            Some(_) => PerMovement::Each(rows),
+            None => PerMovement::All(rows.into_raw_vec_and_offset().0),
+        });
+        for (to, from) in [
+            (&mut self.goal, goal),
+            (&mut self.anchor, anchor),
+            (&mut self.start, start),
+            (&mut self.velocity, velocity),
+            (&mut self.goal_velocity, goal_velocity),
+        ] {
+            if to.is_some() {
+                *to = Some(from);
+            }
+        }
+        Ok(self)
+    }
+
 
     /// Checks vectors and kind, and returns the number of movements.
     pub(crate) fn check(&self, primitive: &Primitive) -> Result<usize> {

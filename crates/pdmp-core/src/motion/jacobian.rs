@@ -2,15 +2,17 @@
 
 use std::sync::Arc;
 
-use ndarray::{Array2, Array3, Axis};
+use ndarray::{Array2, Array3, ArrayViewMut2, Axis, s};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::conditions::{Conditions, ResolvedConditions, reject_for_kind, reject_goal_velocity};
+use crate::model::Coordinates;
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
-use crate::motion::rollout::TimeGrid;
+use crate::motion::rollout::{TimeGrid, rollout};
 use crate::motion::unit_responses::responses;
+use crate::numerics::rotation::dot;
 use crate::validate::zeros;
 
 /// Condition with respect to which a movement is differentiated.
@@ -71,7 +73,9 @@ pub fn jacobian(
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Array3<f64>> {
-    primitive.refuse_rotations("has rotations, for which Jacobians do not exist")?;
+    if let Some(coordinates) = primitive.coordinates() {
+        return in_coordinates(coordinates, variable, derivative, conditions, grid, progress);
+    }
     let kind = primitive.kind();
     reject_for_kind(kind, "goal", variable == WithRespectTo::Goal && kind == Kind::Rhythmic)?;
     reject_for_kind(kind, "anchor", variable == WithRespectTo::Anchor && kind == Kind::Discrete)?;
@@ -134,4 +138,55 @@ fn by_dof(curve: &Array2<f64>, entry: impl Fn(f64) -> f64) -> Result<Array3<f64>
         }
     }
     Ok(jacobian)
+}
+
+/// Returns the Jacobian of a primitive with rotations, whose changes are rotation vectors.
+fn in_coordinates(
+    coordinates: &Coordinates,
+    variable: WithRespectTo,
+    derivative: Derivative,
+    conditions: &Conditions,
+    grid: TimeGrid,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<Array3<f64>> {
+    if derivative != Derivative::Position {
+        let problem = "must be 0 for a model with rotations: Jacobians of angular velocities do not exist";
+        return Err(Error::Argument { name: "derivative", problem });
+    }
+    let (inside, conditions) = (coordinates.dofs(), coordinates.constant_in_dofs(conditions)?);
+    let mut of_dofs = jacobian(inside, variable, derivative, &conditions, grid, progress)?;
+    let resolved = conditions.complete(inside)?;
+    let movement = rollout(inside, &conditions, grid)?;
+    let rate = 1.0 / resolved.tau;
+    for (k, mut rows) in of_dofs.outer_iter_mut().enumerate() {
+        let position = movement.position.row(k).to_vec();
+        coordinates.for_each_tangent(k as f64 * grid.dt * rate, &position, |dof, forward, _| {
+            map_axis(rows.slice_mut(s![dof..dof + 3, ..]), forward);
+        });
+    }
+    let (u, at) = match variable {
+        WithRespectTo::Style => return Ok(of_dofs),
+        WithRespectTo::Start => (0.0, resolved.start.as_ref().unwrap_or(&inside.nominal.start)),
+        WithRespectTo::Goal | WithRespectTo::Anchor | WithRespectTo::GoalVelocity => {
+            (coordinates.centre_clock(), &resolved.centre)
+        }
+    };
+    coordinates.for_each_tangent(u, at, |dof, _, backward| {
+        for mut rows in of_dofs.outer_iter_mut() {
+            // Columns are multiplied by the inverse from the right: rows of the transpose by its transpose.
+            let columns = rows.slice_mut(s![.., dof..dof + 3]);
+            let unit = |i: usize| std::array::from_fn(|j| f64::from(u8::from(i == j)));
+            let inverse: [[f64; 3]; 3] = [0, 1, 2].map(|i| backward(unit(i)));
+            map_axis(columns.reversed_axes(), &|v| std::array::from_fn(|i| dot(inverse[i], v)));
+        }
+    });
+    Ok(of_dofs)
+}
+
+/// Maps the columns of a matrix (3, N).
+fn map_axis(mut columns: ArrayViewMut2<f64>, map: &dyn Fn([f64; 3]) -> [f64; 3]) {
+    for mut column in columns.columns_mut() {
+        let mapped = map(std::array::from_fn(|i| column[i]));
+        (0..3).for_each(|i| column[i] = mapped[i]);
+    }
 }

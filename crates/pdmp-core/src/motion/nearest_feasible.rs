@@ -80,7 +80,13 @@ pub enum Vary {
 /// # Errors
 /// Conditions or limits that do not fit the primitive, or limits that no change of the varied conditions keeps.
 pub fn nearest_feasible(model: &Model, limits: &Limits, conditions: &Conditions, vary: Vary) -> Result<Conditions> {
-    model.primitive().refuse_rotations("has rotations, for which the nearest conditions do not exist")?;
+    if let Some(coordinates) = model.primitive().coordinates() {
+        limits.check_rotations(model.primitive())?;
+        let inside = Model { primitive: Arc::clone(coordinates.dofs()), ..model.clone() };
+        let found = nearest_feasible(&inside, limits, &coordinates.constant_in_dofs(conditions)?, vary)?;
+        let (velocity, goal_velocity) = (conditions.velocity.clone(), conditions.goal_velocity.clone());
+        return Ok(Conditions { velocity, goal_velocity, ..coordinates.of_dofs(found) });
+    }
     let primitive = model.primitive();
     let ranges = ranges(primitive)?;
     let bounds = bounds(limits, &ranges)?;

@@ -2,6 +2,7 @@
 
 use super::{Finding, Survey};
 use crate::demonstration::{Demonstration, Sampling, turn_of};
+use crate::numerics::rotation::dot;
 use crate::numerics::statistics::range;
 
 /// Minimum step from the end of a cycle to its start, relative to the largest step within it, that is reported.
@@ -48,7 +49,7 @@ fn ends_of(demo: usize, survey: &Survey) -> Option<Finding> {
         if range == 0.0 {
             continue;
         }
-        let opening = column[0] - column[last];
+        let opening = closing_sign(survey, d) * column[0] - column[last];
         let opening = turn.map_or(opening, |turn| opening - (opening / turn).round() * turn).abs();
         let (largest, share) = (survey.largest_step(d), opening / range);
         if opening > MIN_RATIO * largest && share > max_share {
@@ -64,4 +65,13 @@ fn ends_of(demo: usize, survey: &Survey) -> Option<Finding> {
     let motion = first.min(last);
     let repeated = opening <= MAX_REPETITION * motion && motion >= MIN_MOTION * mean && mean > 0.0;
     worst.or_else(|| repeated.then_some(Finding::RepeatedEnd { demo }))
+}
+
+/// Returns −1 for a component of a quaternion that is closed by its negative, and otherwise 1.
+fn closing_sign(survey: &Survey, d: usize) -> f64 {
+    let rotation = survey.demo.rotations().iter().find(|rotation| (rotation.column..rotation.column + 4).contains(&d));
+    let Some(rotation) = rotation else { return 1.0 };
+    let position = survey.demo.position();
+    let [first, last] = [0, survey.n_samples() - 1].map(|c| rotation.read(&position.row(c).to_vec()));
+    if dot(first, last) < 0.0 { -1.0 } else { 1.0 }
 }
