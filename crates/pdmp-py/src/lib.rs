@@ -28,6 +28,7 @@ mod preprocessing;
 mod regression;
 mod scalar;
 mod status;
+mod two_arms;
 mod warp;
 
 use pyo3::prelude::*;
@@ -70,5 +71,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(preprocessing::period, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::fill_gaps, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::cycles, module)?)?;
+    module.add_function(wrap_pyfunction!(two_arms::absolute_relative, module)?)?;
+    module.add_function(wrap_pyfunction!(two_arms::left_right, module)?)?;
+    module.add_function(wrap_pyfunction!(two_arms::mean_pose, module)?)?;
     Ok(())
 }

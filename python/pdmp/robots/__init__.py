@@ -15,12 +15,25 @@ frame at joint positions, for `measured=`, and its Jacobian, for differential in
 
     arm = pdmp.robots.MujocoKinematics("robot.xml", site="gripper")
     controller.step(measured=arm.forward(joint_positions))
+
+`absolute_relative` and `left_right` convert between the poses of two arms and an absolute and a
+relative pose, in which a primitive keeps a rigid object between the hands.
 """
 
+from pdmp._native import absolute_relative, left_right, mean_pose
 from pdmp.robots._kinematics import Kinematics
 from pdmp.robots._mujoco_kinematics import MujocoKinematics
 from pdmp.robots._pinocchio import PinocchioKinematics
 from pdmp.robots._registry import REGISTRY
 from pdmp.robots._robot import Robot
 
-__all__ = ["REGISTRY", "Kinematics", "MujocoKinematics", "PinocchioKinematics", "Robot"]
+__all__ = [
+    "REGISTRY",
+    "Kinematics",
+    "MujocoKinematics",
+    "PinocchioKinematics",
+    "Robot",
+    "absolute_relative",
+    "left_right",
+    "mean_pose",
+]

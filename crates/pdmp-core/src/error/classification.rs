@@ -49,6 +49,7 @@ impl Error {
             | Self::Length { .. }
             | Self::Name { .. }
             | Self::Quaternion { row: None, .. }
+            | Self::OppositeArms { .. }
             | Self::Rows { .. }
             | Self::Single { .. }
             | Self::Range { .. }
@@ -84,6 +85,7 @@ impl Error {
             | Self::NotFiniteAt { name, .. }
             | Self::Length { name, .. }
             | Self::Quaternion { name, .. }
+            | Self::OppositeArms { name, .. }
             | Self::Name { name, .. }
             | Self::Rows { name, .. }
             | Self::Single { name }

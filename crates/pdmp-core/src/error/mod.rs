@@ -268,6 +268,19 @@ pub enum Error {
         /// Distance from the mean rotation, in degrees.
         degrees: f64,
     },
+    /// A relative rotation of two arms that is about half a turn from its reference, where the midpoint is undefined.
+    #[error(
+        "{name}: the relative rotation of the arms is {degrees:.0} degrees from the reference, more than 175: the midpoint of \
+         their orientations is undefined at half a turn; pass a reference near {relative:.3?}"
+    )]
+    OppositeArms {
+        /// The argument.
+        name: &'static str,
+        /// Angle from the reference, in degrees.
+        degrees: f64,
+        /// The relative rotation, a unit quaternion w, x, y, z.
+        relative: [f64; 4],
+    },
     /// Too few samples to carry a cubic.
     #[error("position has {found} samples: at least {least} are needed; record at a higher rate")]
     Samples {
