@@ -84,8 +84,11 @@ def to_dataframe(trajectory: Trajectory) -> Any:
         raise ImportError("data frames need pandas: pip install pandas") from None
     columns, units = {}, {}
     derivatives = (trajectory.position, trajectory.velocity, trajectory.acceleration)
-    for (suffix, per), values in zip(DERIVATIVES, derivatives, strict=True):
-        for name, unit, column in zip(trajectory.names, trajectory.units, values.T, strict=True):
+    coordinates = (trajectory.names, trajectory.units)
+    dofs = (trajectory.dof_names, trajectory.dof_units)
+    labels = (coordinates, dofs, dofs)
+    for (suffix, per), (names, unit_names), values in zip(DERIVATIVES, labels, derivatives, strict=True):
+        for name, unit, column in zip(names, unit_names, values.T, strict=True):
             columns[f"{name}{suffix}"] = column
             units[f"{name}{suffix}"] = unit and f"{unit}{per}"
     frame = pandas.DataFrame(columns, index=pandas.Index(trajectory.time, name="t"))

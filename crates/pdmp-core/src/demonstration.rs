@@ -1,6 +1,7 @@
 //! Demonstrations: recorded movements whose shapes and numbers are checked.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
@@ -233,7 +234,7 @@ impl Demonstration {
         rotations.sort_by_key(|rotation| rotation.column);
         let n = self.n_coordinates();
         if let Some(last) = rotations.last().filter(|last| last.column.saturating_add(4) > n) {
-            let allowed = "is the first of four columns of a quaternion, which must exist";
+            let allowed = "must leave room for the four columns of a quaternion";
             return Err(Error::Range { name: "rotations", value: last.column as f64, allowed });
         }
         if let Some(pair) = rotations.windows(2).find(|pair| pair[0].column + 4 > pair[1].column) {
@@ -375,6 +376,11 @@ impl Demonstration {
     /// Returns the number of samples T.
     pub fn n_samples(&self) -> usize {
         self.position.nrows()
+    }
+
+    /// Returns the columns of each rotation, whose components belong together.
+    pub(crate) fn quaternion_columns(&self) -> Vec<Range<usize>> {
+        self.rotations.iter().map(|rotation| rotation.column..rotation.column + 4).collect()
     }
 
     /// Returns the columns that are unit quaternions, in increasing order.

@@ -9,13 +9,18 @@
 mod common;
 #[path = "common/counting.rs"]
 mod counting;
+#[path = "common/poses.rs"]
+mod poses;
+#[path = "common/random.rs"]
+mod random;
 
 use std::hint::black_box;
 
 use common::*;
 use counting::{Random, allocations};
 use pdmp_core::motion::{Compliance, Coupling, Limits};
-use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
+use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Motion};
+use poses::{pose, screws, turning, wobbles};
 
 /// A controller with the memory of its caller.
 struct Loop {
@@ -26,6 +31,8 @@ struct Loop {
     limited: usize,
     random: Random,
     values: Vec<f64>,
+    /// Random position, with unit quaternions.
+    place: Vec<f64>,
     position: Vec<f64>,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
@@ -34,9 +41,28 @@ struct Loop {
 impl Loop {
     fn new(kind: Kind) -> Self {
         let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
-        let model = learn(&demos, &options(kind));
-        let n_dofs = model.n_dofs();
-        let ranges = model.ranges();
+        Self::of(&demos, kind)
+    }
+
+    /// Returns the loop of a model of poses.
+    fn of_poses(kind: Kind) -> Self {
+        let demos: Vec<_> = match kind {
+            Kind::Discrete => screws(5, 4.0, 0.5, 101, 1).into_iter().map(pose).collect(),
+            Kind::Rhythmic => wobbles(4, 1.0, 100).iter().map(turning).collect(),
+        };
+        Self::of(&demos, kind)
+    }
+
+    fn of(demos: &[Demonstration], kind: Kind) -> Self {
+        let model = learn(demos, &options(kind));
+        let (n_dofs, n_coordinates) = (model.n_dofs(), model.n_coordinates());
+        // A rotation has no limits.
+        let ranges: Vec<f64> = model
+            .ranges()
+            .iter()
+            .zip(model.units())
+            .map(|(range, unit)| if n_coordinates > n_dofs && unit == "rad" { f64::INFINITY } else { *range })
+            .collect();
         let share = |share: f64| Some(ranges.iter().map(|range| share * range).collect::<Vec<f64>>());
         let mut tight = Limits { lower: share(-0.3), upper: share(0.6), velocity: share(1.0), ..Limits::default() };
         tight.acceleration = share(5.0);
@@ -50,8 +76,9 @@ impl Loop {
             limits_set: 0,
             limited: 0,
             random: Random(1),
-            values: vec![0.0; n_dofs.max(model.n_styles())],
-            position: vec![0.0; n_dofs],
+            values: vec![0.0; n_coordinates.max(model.n_styles())],
+            place: vec![0.0; n_coordinates],
+            position: vec![0.0; n_coordinates],
             velocity: vec![0.0; n_dofs],
             acceleration: vec![0.0; n_dofs],
             controller: Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap(),
@@ -61,7 +88,8 @@ impl Loop {
     /// Sends one valid or invalid command by a setter, and performs one tick under another.
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     fn tick(&mut self) {
-        let Self { controller, limits, limits_set, limited, random, values, position, velocity, acceleration } = self;
+        let Self { controller, limits, limits_set, limited, random, values, place, position, velocity, acceleration } =
+            self;
         let (n_dofs, n_styles) = (controller.primitive().n_dofs(), controller.primitive().n_styles());
         let (kind, nominal_tau) = (controller.primitive().kind(), controller.primitive().tau());
         values.iter_mut().for_each(|v| *v = 2.0 * random.next() - 1.0);
@@ -70,12 +98,19 @@ impl Loop {
         if invalid {
             values[0] = f64::NAN;
         }
-        let (vector, style, size) = (&values[..n_dofs], &values[..n_styles], values[0].abs());
+        let n = place.len();
+        place.copy_from_slice(&values[..n]);
+        if let Some(coordinates) = controller.primitive().coordinates() {
+            let column = coordinates.len() - 4;
+            let norm = place[column..].iter().map(|x| x * x).sum::<f64>().sqrt();
+            place[column..].iter_mut().for_each(|x| *x /= norm);
+        }
+        let (place, vector, style, size) = (&place[..], &values[..n_dofs], &values[..n_styles], values[0].abs());
         let tau = nominal_tau * (0.5 + random.next());
         let _ = black_box(match (random.next() * 12.0) as u8 {
             0 => controller.set_style(style),
-            1 => controller.set_goal(vector),
-            2 => controller.set_anchor(vector),
+            1 => controller.set_goal(place),
+            2 => controller.set_anchor(place),
             3 => controller.set_tau(tau),
             4 => controller.set_amplitude(size),
             5 => controller.set_compliance(Compliance { stopping: 1e3 * size, tracking: 10.0 * size }),
@@ -96,12 +131,12 @@ impl Loop {
         let command = Command {
             dt: random.rarely().then_some(1e-3 * (0.1 + values[n_dofs - 1].abs())),
             style: random.rarely().then_some(style),
-            goal: (random.rarely() && kind == Kind::Discrete).then_some(vector),
+            goal: (random.rarely() && kind == Kind::Discrete).then_some(place),
             goal_velocity: (random.rarely() && kind == Kind::Discrete).then_some(vector),
-            anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(vector),
+            anchor: (random.rarely() && kind == Kind::Rhythmic).then_some(place),
             tau: random.rarely().then_some(tau),
             amplitude: (random.rarely() && kind == Kind::Rhythmic).then_some(size),
-            measured: random.rarely().then_some(vector),
+            measured: random.rarely().then_some(place),
             coupling: random.rarely().then_some(Coupling { velocity: vector, acceleration: vector }),
             phase: (random.rarely() && kind == Kind::Rhythmic).then_some(10.0 * values[0]),
         };
@@ -126,6 +161,23 @@ fn a_million_ticks_of_random_commands_allocate_nothing() {
         }
         assert_eq!(allocations() - before, 0);
         assert!(control.limited > 100_000, "limits bind in {} joint-ticks alone", control.limited);
+        assert!([control.position, control.velocity, control.acceleration].iter().flatten().all(|x| x.is_finite()));
+    }
+}
+
+/// The same for poses, whose rotations are converted in every tick.
+#[test]
+fn a_million_ticks_of_poses_allocate_nothing() {
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let mut control = Loop::of_poses(kind);
+        let before = allocations();
+        for _ in 0..500_000 {
+            control.tick();
+            let n = control.position.len();
+            let norm: f64 = control.position[n - 4..].iter().map(|x| x * x).sum();
+            assert!((norm - 1.0).abs() < 1e-12, "{norm}");
+        }
+        assert_eq!(allocations() - before, 0);
         assert!([control.position, control.velocity, control.acceleration].iter().flatten().all(|x| x.is_finite()));
     }
 }

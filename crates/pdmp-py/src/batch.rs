@@ -225,7 +225,10 @@ impl PreparedBatch {
             let message = format!("out: {n_arrays} arrays; expected {expected} float64 arrays {shape:?}");
             return Err(PyValueError::new_err(message));
         }
-        out.iter().zip(Derivative::ALL).map(|(out, derivative)| writable(out, &self.shape(movements, derivative))).collect()
+        out.iter()
+            .zip(Derivative::ALL)
+            .map(|(out, derivative)| writable(out, &self.shape(movements, derivative)))
+            .collect()
     }
 
     /// Allocates output arrays by numpy, which requests large pages: fewer page faults than with Rust's allocator.

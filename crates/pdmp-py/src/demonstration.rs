@@ -249,7 +249,8 @@ impl Source {
                 time: Some(vector("time", time)?),
                 names: Some(trajectory.names.clone()),
                 units: trajectory.units.iter().any(|unit| !unit.is_empty()).then(|| trajectory.units.clone()),
-                rotations: Some(rotations_of(trajectory.rotations.bind(py), None)?).filter(|rotations| !rotations.is_empty()),
+                rotations: Some(rotations_of(trajectory.rotations.bind(py), None)?)
+                    .filter(|rotations| !rotations.is_empty()),
             });
         }
         let bare = value.is_instance_of::<PyUntypedArray>() || value.is_instance_of::<PyList>();
@@ -366,7 +367,9 @@ impl Trajectory {
     ///     Keys are the names of the attributes.
     fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(slf.py());
-        for name in ["time", "position", "velocity", "acceleration", "names", "units", "dof_names", "dof_units", "rotations"] {
+        for name in
+            ["time", "position", "velocity", "acceleration", "names", "units", "dof_names", "dof_units", "rotations"]
+        {
             values.set_item(name, slf.getattr(name)?)?;
         }
         Ok(values)
@@ -434,10 +437,7 @@ fn rotations_of(rotations: &Bound<'_, PyAny>, names: Option<&[String]>) -> PyRes
 }
 
 /// Returns rotations as a mapping from the first column of a quaternion to its order.
-pub(crate) fn rotations_to_python<'py>(
-    py: Python<'py>,
-    rotations: &[RotationColumns],
-) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn rotations_to_python<'py>(py: Python<'py>, rotations: &[RotationColumns]) -> PyResult<Bound<'py, PyDict>> {
     let mapping = PyDict::new(py);
     for rotation in rotations {
         let order = match rotation.order {

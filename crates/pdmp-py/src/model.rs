@@ -337,7 +337,6 @@ impl Model {
         self.0.in_frame(frame).map(|model| Self(Arc::new(model))).map_err(raise)
     }
 
-
     /// Writes a model file.
     ///
     /// The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary

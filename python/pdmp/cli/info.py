@@ -42,6 +42,9 @@ def run(options: Namespace) -> None:
         "time": f"tau {model.tau:g} s",
         "constants": constants,
     }
+    if model.rotations:
+        orders = [f"{model.coordinate_names[c]} {order}" for c, order in model.rotations.items()]
+        lines["rotations"] = f"{', '.join(orders)}; velocities in the {model.rotation_frame} frame"
     if model.kind == "rhythmic":
         lines["time"] = f"period {2 * np.pi * model.tau:g} s (tau {model.tau:g} s)"
     if len(model.breaks) > 2:

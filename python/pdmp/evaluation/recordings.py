@@ -117,6 +117,8 @@ def recordings(
     if not valid:
         raise ValueError("demos is empty: pass at least two demonstrations")
     for m, demo in enumerate(valid):
+        if demo.rotations:
+            raise ValueError(f"demo {m}: has rotations, for which predictions are not compared")
         if demo.n_dofs != valid[0].n_dofs:
             raise value_error(f"demo {m}: expected {valid[0].n_dofs} DoFs, found {demo.n_dofs}")
     inspected_demos, findings = inspected(list(valid), dt=dt)

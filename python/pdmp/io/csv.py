@@ -191,7 +191,8 @@ def write_csv(
     """Writes a trajectory as CSV; `read_csv` reads its positions back.
 
     The columns are `t` [s], then the positions `<name>`, velocities `<name>_velocity` and
-    accelerations `<name>_acceleration` of all degrees of freedom, with units in brackets. Numbers
+    accelerations `<name>_acceleration` of all degrees of freedom, with units in brackets; with rotations,
+    `trajectory.dof_names` name the derivatives. Numbers
     are exact. The file is written atomically.
 
     Parameters
@@ -216,15 +217,26 @@ def write_csv(
     check_type("trajectory", trajectory, Trajectory, "pdmp.Trajectory")
     names = trajectory.names if names is None else name_list("names", names)
     units = trajectory.units if units is None else name_list("units", units)
+    # With rotations, the columns of derivatives are degrees of freedom, not coordinates.
+    of_dofs = (trajectory.dof_names, trajectory.dof_units) if trajectory.rotations else (names, units)
     n_dofs = trajectory.position.shape[1]
     for kind, labels in (("name", names), ("unit", units)):
         if len(labels) != n_dofs:
             raise ValueError(
                 f"{kind}s has length {len(labels)}, expected {n_dofs}: one {kind} per DoF"
             )
-    header = [f"{name}{suffix}" for suffix, _ in DERIVATIVES for name in names]
+    labels = [(names, units), of_dofs, of_dofs]
+    header = [
+        f"{name}{suffix}"
+        for (suffix, _), (names, _) in zip(DERIVATIVES, labels, strict=True)
+        for name in names
+    ]
     _fields.check_names(path, 1, ["t", *header])
-    units = [unit and f"{unit}{per}" for _, per in DERIVATIVES for unit in units]
+    units = [
+        unit and f"{unit}{per}"
+        for (_, per), (_, units) in zip(DERIVATIVES, labels, strict=True)
+        for unit in units
+    ]
     fields = list(map(join_label, header, units))
     for name, unit, field in zip(header, units, fields, strict=True):
         if split_label(field) != (name, unit):

@@ -69,14 +69,14 @@ def movement_panels(
     With two degrees of freedom, the first panel is for the path. The others are for each degree of
     freedom over time, in a grid if one column has more than four.
     """
-    labels = dof_labels(model.names, model.units)
-    if len(titles) == 1 and model.n_dofs > 4:
+    labels = dof_labels(model.coordinate_names, model.coordinate_units)
+    if len(titles) == 1 and len(labels) > 4:
         figure, panels = grid_panels(labels, "time [s]", figure)
         if titles[0]:
             figure.suptitle(titles[0])
         return figure, [panels]
-    has_path = model.n_dofs == 2
-    heights = [3.6] * has_path + [1.7] * model.n_dofs
+    has_path = len(labels) == 2
+    heights = [3.6] * has_path + [1.7] * len(labels)
     figure = ensure_figure(figure, max(3.2 * len(titles), 5.5), sum(heights) + 0.5)
     grid = figure.subplots(len(heights), len(titles), squeeze=False, height_ratios=heights)
     for column, title in zip(grid.T, titles, strict=True):

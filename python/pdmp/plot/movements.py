@@ -81,9 +81,11 @@ def _check(model: Model, m: int, demo: Demonstration) -> None:
         raise ValueError(f"demo {m}: expected a pdmp.Demonstration, got {type(demo).__name__}")
     if demo.n_dofs != model.n_dofs:
         raise ValueError(f"demo {m}: expected {model.n_dofs} DoFs, found {demo.n_dofs}")
+    if demo.rotations != model.rotations:
+        raise ValueError(f"demo {m}: rotations {demo.rotations}, expected {model.rotations}")
     for kind, actual, expected in (
-        ("names", demo.names, model.names),
-        ("units", demo.units, model.units),
+        ("names", demo.names, model.coordinate_names),
+        ("units", demo.units, model.coordinate_units),
     ):
         if actual is not None and list(actual) != list(expected):
             raise ValueError(f"demo {m}: {kind} {actual}, expected those of the model, {expected}")

@@ -55,8 +55,8 @@ def cut_off(demo: Demonstration, *, figure: Figure | None = None) -> Figure:
     lowest = half_rate / demo.n_samples
     frequencies = np.geomspace(lowest, MAX_FREQUENCY * half_rate, N_FREQUENCIES)
     rms = residuals(demo, frequencies)
-    names = demo.names or [f"y{d}" for d in range(demo.n_dofs)]
-    labels = [join_label("RMS", unit) for unit in demo.units or [""] * demo.n_dofs]
+    names = demo.names or [f"y{d}" for d in range(demo.n_coordinates)]
+    labels = [join_label("RMS", unit) for unit in demo.units or [""] * demo.n_coordinates]
     figure, panels = grid_panels(labels, "cut-off [Hz]", figure)
     noise_only = (frequencies > NOISE_RANGE[0] * half_rate) & (
         frequencies < NOISE_RANGE[1] * half_rate

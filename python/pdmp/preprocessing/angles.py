@@ -26,7 +26,7 @@ def unwrap(demo: Demonstration) -> Demonstration:
     """
     check_type("demo", demo, Demonstration, "pdmp.Demonstration")
     (position,), rest = demo.__getnewargs_ex__()
-    units = demo.units or ["rad"] * demo.n_dofs
+    units = demo.units or ["rad"] * demo.n_coordinates
     unwrapped = position.copy()
     for d, unit in enumerate(units):
         if unit in FULL_TURN:

@@ -58,9 +58,8 @@ impl MeanRotation {
                 slopes.copy_from_slice(&doubled[..=n]);
             }
         }
-        let mut bends: Vec<F64x4> = (0..n)
-            .map(|k| (values[k + 1] - values[k]) * 6.0 - slopes[k] * 4.0 - slopes[k + 1] * 2.0)
-            .collect();
+        let mut bends: Vec<F64x4> =
+            (0..n).map(|k| (values[k + 1] - values[k]) * 6.0 - slopes[k] * 4.0 - slopes[k + 1] * 2.0).collect();
         bends.push((values[n] - values[n - 1]) * -6.0 + slopes[n - 1] * 2.0 + slopes[n] * 4.0);
         if kind == Kind::Discrete {
             (slopes[n], bends[n]) = (F64x4::ZERO, F64x4::ZERO);
@@ -142,9 +141,11 @@ mod tests {
     use super::*;
     use crate::numerics::rotation::{exp, log, rotate};
 
-    fn path(n: usize, end: f64) -> Vec<Quaternion> {
-        let turned = |t: f64| product(exp([2.0 * t * t * end, 0.0, 0.3]), exp([0.1, (3.0 * t * end).sin(), t * end]));
-        (0..=n).map(|k| turned(k as f64 / n as f64)).collect()
+    /// Path from rest to rest.
+    fn path(n: usize) -> Vec<Quaternion> {
+        let turned = |t: f64| product(exp([2.0 * t * t, 0.0, 0.3]), exp([0.1, (3.0 * t).sin(), t]));
+        let eased = |t: f64| t * t * t * (10.0 - 15.0 * t + 6.0 * t * t);
+        (0..=n).map(|k| turned(eased(k as f64 / n as f64))).collect()
     }
 
     fn cycle(n: usize, turns: f64) -> Vec<Quaternion> {
@@ -159,7 +160,7 @@ mod tests {
     #[test]
     fn motion_is_consistent_with_the_curve() {
         for (mean, extent) in [
-            (MeanRotation::through(path(60, 1.0), DISCRETE), 1.6),
+            (MeanRotation::through(path(60), DISCRETE), 1.6),
             (MeanRotation::through(cycle(90, 0.0), RHYTHMIC), TAU),
             (MeanRotation::through(cycle(90, 1.0), RHYTHMIC), TAU),
         ] {
@@ -181,8 +182,8 @@ mod tests {
 
     #[test]
     fn curve_passes_its_knots_and_rests_past_the_end() {
-        let mean = MeanRotation::through(path(60, 1.0), DISCRETE);
-        for (k, knot) in path(60, 1.0).into_iter().enumerate() {
+        let mean = MeanRotation::through(path(60), DISCRETE);
+        for (k, knot) in path(60).into_iter().enumerate() {
             let at = mean.at(1.5 * k as f64 / 60.0).rotation;
             assert!((0..4).all(|i| (at[i] - knot[i]).abs() < 1e-15));
         }
@@ -195,7 +196,7 @@ mod tests {
     #[test]
     fn curve_turns_with_its_frames() {
         let (world, body) = (exp([0.3, -1.2, 0.7]), exp([-2.0, 0.1, 0.4]));
-        for (knots, canonical) in [(path(60, 1.0), DISCRETE), (cycle(90, 1.0), RHYTHMIC)] {
+        for (knots, canonical) in [(path(60), DISCRETE), (cycle(90, 1.0), RHYTHMIC)] {
             let mean = MeanRotation::through(knots.clone(), canonical);
             let turned = knots.into_iter().map(|q| product(product(world, q), body)).collect();
             let turned = MeanRotation::through(turned, canonical);

@@ -134,7 +134,9 @@ fn slow_down(rotations: &mut [Quaternion]) {
     let shapes = [|x: f64| x.powi(3) * (-4.0 + x * (7.0 - 3.0 * x)), |x: f64| x.powi(3) * (0.5 + x * (0.5 * x - 1.0))];
     for (k, q) in rotations.iter_mut().enumerate() {
         let mut advance = [0.0; 3];
-        for ((share, shape), (order, motion)) in FADING_SHARES.into_iter().zip(shapes).zip([1, 2].into_iter().zip(motion)) {
+        for ((share, shape), (order, motion)) in
+            FADING_SHARES.into_iter().zip(shapes).zip([1, 2].into_iter().zip(motion))
+        {
             let length = (share * n as f64).ceil().clamp(1.0, n as f64);
             let x = 1.0 - (n - k) as f64 / length;
             if x > 0.0 {

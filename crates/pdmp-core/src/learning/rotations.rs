@@ -60,12 +60,18 @@ impl Residuals {
             return Ok(None);
         }
         if options.time_scaling != TimeScaling::Linear {
-            let problem = "must be linear for demonstrations with rotations: time warps and landmarks do not apply to them";
+            let problem =
+                "must be linear for demonstrations with rotations: time warps and landmarks do not apply to them";
             return Err(Error::Argument { name: "time_scaling", problem });
         }
         if let Some(length) = options.rotation_length {
             let valid = (1e-6..=1e6).contains(&length);
-            check_range("rotation_length", length, valid, "must lie between 1e-6 and 1e6, in the unit of the positions")?;
+            check_range(
+                "rotation_length",
+                length,
+                valid,
+                "must lie between 1e-6 and 1e6, in the unit of the positions",
+            )?;
         }
         let alignment = Alignment { smoothing: Smoothing::Interpolate, ..options.alignment() };
         let aligned = alignment.align(demos, options.threads)?;
@@ -109,7 +115,8 @@ impl Residuals {
             converted.with_names(labels.0.clone())?.with_units(labels.1.clone())
         });
         let demos = converted.collect::<Result<Vec<_>>>()?;
-        let findings = dofs.iter().zip(columns).filter_map(|(&dof, rotation)| far(&demos, dof, &names[rotation.column]));
+        let findings =
+            dofs.iter().zip(columns).filter_map(|(&dof, rotation)| far(&demos, dof, &names[rotation.column]));
         let findings = findings.collect();
         Ok(Some(Self { demos, findings, names, units, means, dofs, ranges, phases }))
     }
@@ -202,7 +209,8 @@ pub(super) fn about_means(
     alignment: &Alignment,
 ) -> Result<Demonstration> {
     if coordinates.dofs().kind() == Kind::Rhythmic {
-        let problem = "has rotations, whose mean depends on the phase: styles of cycles can be inferred without rotations only";
+        let problem =
+            "has rotations, whose mean depends on the phase: styles of cycles can be inferred without rotations only";
         return Err(Error::Argument { name: "model", problem });
     }
     if demo.rotations() != coordinates.columns() {
@@ -212,7 +220,8 @@ pub(super) fn about_means(
     let (seconds, duration, extent) =
         (aligned.seconds(0), aligned.durations()[0], coordinates.dofs().canonical().extent());
     let clock: Vec<f64> = seconds.into_iter().map(|t| t / duration * extent).collect();
-    let means: Vec<_> = coordinates.rotations().iter().map(|rotation| (rotation.columns, rotation.mean.clone())).collect();
+    let means: Vec<_> =
+        coordinates.rotations().iter().map(|rotation| (rotation.columns, rotation.mean.clone())).collect();
     let (plain, dofs) = layout(coordinates.len(), demo.rotations());
     in_dofs(demo, &clock, extent, &means, &plain, &dofs)
 }
@@ -300,5 +309,9 @@ fn far(demos: &[Demonstration], dof: usize, name: &str) -> Option<Finding> {
     let angle = |row: ArrayView1<f64>| (0..3).map(|i| row[dof + i].powi(2)).sum::<f64>().sqrt();
     let largest = |demo: &Demonstration| demo.position().rows().into_iter().map(angle).fold(0.0f64, f64::max);
     let (demo, angle) = demos.iter().map(largest).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (angle > MAX_PLAIN_RESIDUAL).then(|| Finding::FarRotation { demo, column: name.to_string(), degrees: angle.to_degrees() })
+    (angle > MAX_PLAIN_RESIDUAL).then(|| Finding::FarRotation {
+        demo,
+        column: name.to_string(),
+        degrees: angle.to_degrees(),
+    })
 }

@@ -305,7 +305,8 @@ impl Coordinates {
     /// A vector of another length, a number that is not finite, or a quaternion whose norm is not 1.
     pub(crate) fn in_dofs(&self, conditions: &Conditions) -> Result<Conditions> {
         let nominal = &self.dofs.nominal;
-        let start_clock = conditions.phase.filter(|phase| phase.is_finite()).map_or(0.0, crate::dynamics::canonical::turn);
+        let start_clock =
+            conditions.phase.filter(|phase| phase.is_finite()).map_or(0.0, crate::dynamics::canonical::turn);
         let start_clock = if self.dofs.kind() == Kind::Rhythmic { start_clock } else { 0.0 };
         let convert = |name, value: &Option<Vec<f64>>, u: f64, near: Option<&[f64]>| match value {
             Some(value) => self.check(name, value).map(|()| {

@@ -4,8 +4,8 @@ use ndarray::{Array2, ArrayView1, aview1};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, check_style, reject_for_kind, reject_goal_velocity};
 use crate::model::Coordinates;
+use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, check_style, reject_for_kind, reject_goal_velocity};
 use crate::model::primitive::Primitive;
 use crate::validate::{check_matrix, check_vector, zeros};
 
@@ -103,7 +103,8 @@ impl BatchConditions {
         let (n_dofs, n_styles) = (primitive.n_dofs(), primitive.n_styles());
         let position = (primitive.n_coordinates(), primitive.per_coordinate());
         let centre = Some(nominal.centre);
-        let outside = Conditions { goal: centre.clone(), anchor: centre, start: nominal.start, ..Conditions::default() };
+        let outside =
+            Conditions { goal: centre.clone(), anchor: centre, start: nominal.start, ..Conditions::default() };
         let Conditions { goal, anchor, start, .. } = match primitive.coordinates() {
             Some(coordinates) => coordinates.of_dofs(outside),
             None => outside,
@@ -181,7 +182,6 @@ impl BatchConditions {
         }
         Ok(self)
     }
-
 
     /// Checks vectors and kind, and returns the number of movements.
     pub(crate) fn check(&self, primitive: &Primitive) -> Result<usize> {

@@ -106,7 +106,8 @@ impl Command<'_> {
             reject_for_kind(kind, "amplitude", kind == Kind::Discrete)?;
             check_amplitude(amplitude)?;
         }
-        let position = |name, vector: Option<&[f64]>| vector.map_or(Ok(()), |vector| model.check_position(name, vector));
+        let position =
+            |name, vector: Option<&[f64]>| vector.map_or(Ok(()), |vector| model.check_position(name, vector));
         reject_for_kind(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
         position("goal", self.goal)?;
         reject_goal_velocity(model, self.goal_velocity.is_some())?;

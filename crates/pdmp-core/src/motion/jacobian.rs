@@ -6,8 +6,8 @@ use ndarray::{Array2, Array3, ArrayViewMut2, Axis, s};
 
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::{Conditions, ResolvedConditions, reject_for_kind, reject_goal_velocity};
 use crate::model::Coordinates;
+use crate::model::conditions::{Conditions, ResolvedConditions, reject_for_kind, reject_goal_velocity};
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::rollout::{TimeGrid, rollout};
@@ -152,6 +152,16 @@ fn in_coordinates(
     if derivative != Derivative::Position {
         let problem = "must be 0 for a model with rotations: Jacobians of angular velocities do not exist";
         return Err(Error::Argument { name: "derivative", problem });
+    }
+    let fixed = match variable {
+        WithRespectTo::Start => &conditions.velocity,
+        WithRespectTo::Goal | WithRespectTo::Anchor => &conditions.goal_velocity,
+        WithRespectTo::Style | WithRespectTo::GoalVelocity => &None,
+    };
+    if fixed.is_some() {
+        let problem = "does not apply: the Jacobian by a start or goal with rotations is that without its velocity";
+        let name = if variable == WithRespectTo::Start { "velocity" } else { "goal_velocity" };
+        return Err(Error::Argument { name, problem });
     }
     let (inside, conditions) = (coordinates.dofs(), coordinates.constant_in_dofs(conditions)?);
     let mut of_dofs = jacobian(inside, variable, derivative, &conditions, grid, progress)?;

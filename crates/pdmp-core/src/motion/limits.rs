@@ -98,7 +98,8 @@ impl Limits {
         self.check(primitive.n_dofs())?;
         let finite = |dof: usize| {
             let limits = [(&self.lower, f64::NEG_INFINITY)];
-            let others = [&self.upper, &self.velocity, &self.acceleration, &self.jerk].map(|limits| (limits, f64::INFINITY));
+            let others =
+                [&self.upper, &self.velocity, &self.acceleration, &self.jerk].map(|limits| (limits, f64::INFINITY));
             limits.into_iter().chain(others).any(|(limits, none)| limit_of_dof(limits, dof, none).is_finite())
         };
         match primitive.rotation_dofs().flat_map(|first| first..first + 3).find(|&dof| finite(dof)) {

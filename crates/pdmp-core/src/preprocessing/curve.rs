@@ -40,7 +40,7 @@ impl Curve {
     /// A recording without times.
     pub(super) fn of(demo: &Demonstration) -> Result<Self> {
         let time = clock(demo)?;
-        let smoothed = smooth(Smoothing::Auto, &time, None, demo.position())?;
+        let smoothed = smooth(Smoothing::Auto, &time, None, demo.position(), &demo.quaternion_columns())?;
         let values: Vec<f64> = smoothed.iter().copied().collect();
         let splines = Splines::through(Knots::not_a_knot(time.clone()), &values, demo.n_coordinates());
         Ok(Self { time, splines, noise: &demo.position() - &smoothed })

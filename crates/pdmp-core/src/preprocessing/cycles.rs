@@ -107,6 +107,10 @@ pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: C
     let (mut nominal, mut errors) = (None, Vec::new());
     for (recording, demo) in recordings.iter().enumerate() {
         let mut segment = || {
+            if !demo.rotations().is_empty() {
+                let problem = "has rotations, for which cycles are not found: cut the recording with split_at";
+                return Err(Error::Argument { name: "recording", problem });
+            }
             if demo.n_coordinates() != n_dofs {
                 return Err(Error::Dofs { expected: n_dofs, found: demo.n_coordinates() });
             }

@@ -71,7 +71,7 @@ fn rms(values: ArrayView1<f64>) -> f64 {
 
 /// Returns the filtered positions (T, D).
 fn filtered(demo: &Demonstration, time: &[f64], hz: f64) -> Result<Array2<f64>> {
-    smooth(Smoothing::CutOff { hz }, time, None, demo.position()).map_err(|error| match error {
+    smooth(Smoothing::CutOff { hz }, time, None, demo.position(), &[]).map_err(|error| match error {
         Error::Range { value, allowed, .. } => Error::Range { name: "cut_off", value, allowed },
         Error::CutOff { hz, allowed, rate, .. } => Error::CutOff { name: "cut_off", hz, allowed, rate },
         other => other,

@@ -11,8 +11,8 @@ use crate::context::{ContextMap, ContextMapKind, Kernel, MapParameters, Stacking
 use crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::forcing_table::ForcingTable;
-use crate::dynamics::mean_rotation::MeanRotation;
 use crate::dynamics::hermite_table::{KnotTable, MAX_CELLS};
+use crate::dynamics::mean_rotation::MeanRotation;
 use crate::dynamics::output_system::Attractor;
 use crate::dynamics::transport::Transport;
 use crate::error::Result;

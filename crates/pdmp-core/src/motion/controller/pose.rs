@@ -5,9 +5,9 @@
 //! up the difference of its velocity, as the output system does for that of the frame, so that ω stays continuous.
 
 use super::Controller;
-use crate::motion::command::{Command, Coupling};
 use crate::model::Conditions;
 use crate::model::coordinates::Coordinates;
+use crate::motion::command::{Command, Coupling};
 use crate::numerics::rotation::dot;
 use crate::numerics::simd::{F64x4, unpack};
 use crate::numerics::state::clone_in_place;
@@ -183,19 +183,22 @@ impl Controller {
         }
     }
 
-    /// Returns whether every DoF is within its bound, given deviation and bound of a group: a rotation by its angle.
-    pub(super) fn is_within(&self, of_group: impl Fn(usize) -> [F64x4; 2]) -> bool {
+    /// Returns the size of the vector of a rotation, given the vector of each group.
+    pub(super) fn size_of(&self, dof: usize, of_group: &dyn Fn(usize) -> F64x4) -> f64 {
+        let vector: [f64; 3] = std::array::from_fn(|i| of_group((dof + i) / 4).as_array()[(dof + i) % 4]);
+        dot(vector, vector).sqrt()
+    }
+
+    /// Returns whether every DoF is within its bound, given deviation and bound of a group, and the deviation of the rotation
+    /// from a DoF on.
+    pub(super) fn is_within(&self, of_group: impl Fn(usize) -> [F64x4; 2], of_rotation: impl Fn(usize) -> f64) -> bool {
         let at = |dof: usize| of_group(dof / 4).map(|lanes| lanes.as_array()[dof % 4]);
         let in_rotation = |dof: usize| self.primitive.rotation_dofs().any(|first| (first..first + 3).contains(&dof));
         let plain = (0..self.primitive.n_dofs()).filter(|&dof| !in_rotation(dof)).all(|dof| {
             let [deviation, bound] = at(dof);
             deviation <= bound
         });
-        plain
-            && self.primitive.rotation_dofs().all(|dof| {
-                let square = (dof..dof + 3).map(|dof| at(dof)[0].powi(2)).sum::<f64>();
-                square.sqrt() <= at(dof)[1]
-            })
+        plain && self.primitive.rotation_dofs().all(|dof| of_rotation(dof) <= at(dof)[1])
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::group::ForcingSample;
 use super::{Controller, Status};
-use crate::dynamics::output_system::{Attractor, CubicSample};
+use crate::dynamics::output_system::{Attractor, CubicSample, State};
 use crate::numerics::simd::{F64x4, unpack};
 
 impl Controller {
@@ -35,30 +35,55 @@ impl Controller {
         let target = unpack(self.style.target(), self.primitive.n_styles());
         let (bound, table_index) = (forcing_table.bound(clock), forcing_table.index(clock));
         let braked = forcing_table.braked_motion(clock).filter(|_| self.perturbation.phase_rate() == 1.0);
-        let bounded = |index: usize| {
-            let group = &self.groups[index];
+        // Deviations of the output system and the forcing that they come from, as vectors of a group.
+        let homogeneous = |index: usize| {
+            let (group, frame) = (&self.groups[index], self.centre.value()[index] + self.goal_transition.value[index]);
             let ForcingSample { value, slope, .. } = group.forcing;
-            let forcing = CubicSample { value, slope };
-            let frame = self.centre.value()[index] + self.goal_transition.value[index];
-            let e = self.position[index] - frame;
-            let mut deviation = match &braked {
+            let (e, forcing) = (self.position[index] - frame, CubicSample { value, slope });
+            match &braked {
                 Some(braked) => {
                     let own = braked.state(forcing);
-                    (e - own.e).abs() + (group.z - own.z).abs() * by_flow + braked.max_displacement(slope)
+                    (State { e: e - own.e, z: group.z - own.z }, forcing)
                 }
-                None => e.abs() + (group.z + value * fade.r).abs() * by_flow + bound.of(forcing) * by_forcing,
+                None => (State { e, z: group.z + value * fade.r }, forcing),
+            }
+        };
+        let change = |index: usize, forcing: CubicSample<F64x4>| {
+            let CubicSample { value, slope } = forcing_table.sample::<F64x4>(table_index, index, target);
+            CubicSample { value: value - forcing.value, slope: slope - forcing.slope }
+        };
+        let sum = |[e, z]: [F64x4; 2], forcing: CubicSample<F64x4>, change: Option<CubicSample<F64x4>>| {
+            let mut deviation = match &braked {
+                Some(braked) => e + z * by_flow + braked.max_displacement(forcing.slope),
+                None => e + z * by_flow + bound.of(forcing) * by_forcing,
             };
-            if !self.style.is_settled() {
-                let CubicSample { value, slope } = forcing_table.sample::<F64x4>(table_index, index, target);
-                let change = CubicSample { value: value - forcing.value, slope: slope - forcing.slope };
+            if let Some(change) = change {
                 deviation += bound.of(change) * by_forcing;
             }
-            deviation += self.frame_deviation(index);
+            deviation
+        };
+        let is_changing = !self.style.is_settled();
+        let bounded = |index: usize| {
+            let (group, (State { e, z }, forcing)) = (&self.groups[index], homogeneous(index));
+            let change = is_changing.then(|| change(index, forcing));
+            let deviation = sum([e.abs(), z.abs()], forcing, change) + self.frame_deviation(index);
             [deviation, (group.length * self.tolerance).max(group.rounding)]
+        };
+        // The sizes of the vectors of a rotation, which depend on no frame.
+        let of_rotation = |dof: usize| {
+            let size = |vector: &dyn Fn(usize) -> F64x4| F64x4::splat(self.size_of(dof, vector));
+            let forcing = |of: &dyn Fn(usize) -> CubicSample<F64x4>| CubicSample {
+                value: size(&|index| of(index).value),
+                slope: size(&|index| of(index).slope),
+            };
+            let state = [size(&|index| homogeneous(index).0.e), size(&|index| homogeneous(index).0.z)];
+            let own = forcing(&|index| homogeneous(index).1);
+            let change = is_changing.then(|| forcing(&|index| change(index, homogeneous(index).1)));
+            sum(state, own, change).as_array()[0] + self.size_of(dof, &|index| self.frame_deviation(index))
         };
         let settled = match &self.pose {
             None => (0..self.groups.len()).map(bounded).all(|[deviation, bound]| deviation.simd_le(bound).all()),
-            Some(_) => self.is_within(bounded),
+            Some(_) => self.is_within(bounded, of_rotation),
         };
         if settled { Status::Finished } else { Status::Working }
     }

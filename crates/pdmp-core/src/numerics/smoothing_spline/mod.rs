@@ -23,6 +23,7 @@ mod roughness;
 mod tests;
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
@@ -183,10 +184,11 @@ pub(crate) fn smooth(
     time: &[f64],
     period: Option<f64>,
     values: ArrayView2<f64>,
+    vectors: &[Range<usize>],
 ) -> Result<Array2<f64>> {
     let samples = Samples { time, period, values };
     smoothing.check(&samples)?;
-    Ok(samples.smoothed(Noise::estimate(smoothing, &[samples], &[], usize::MAX, Threads::ONE)?.cut_offs()))
+    Ok(samples.smoothed(Noise::estimate(smoothing, &[samples], vectors, usize::MAX, Threads::ONE)?.cut_offs()))
 }
 
 impl Smoothing {

@@ -30,7 +30,7 @@ fn irregular(n: usize, step: f64) -> Vec<f64> {
 
 fn smooth_column(smoothing: Smoothing, time: &[f64], period: Option<f64>, y: &[f64]) -> Vec<f64> {
     let values = Array2::from_shape_fn((y.len(), 1), |(i, _)| y[i]);
-    smooth(smoothing, time, period, values.view()).unwrap().into_raw_vec_and_offset().0
+    smooth(smoothing, time, period, values.view(), &[]).unwrap().into_raw_vec_and_offset().0
 }
 
 /// Computes the root mean square difference.
@@ -252,7 +252,7 @@ fn columns_are_independent_and_constant_ones_unchanged() {
     let noisy: Vec<f64> = time.iter().map(|t| t * t + 0.01 * normal()).collect();
     let both = Array2::from_shape_fn((n, 2), |(i, d)| [1e-150 / 3.0, noisy[i]][d]);
     for smoothing in [Smoothing::Auto, Smoothing::CutOff { hz: 5.0 }, Smoothing::Interpolate] {
-        let smoothed = smooth(smoothing, &time, None, both.view()).unwrap();
+        let smoothed = smooth(smoothing, &time, None, both.view(), &[]).unwrap();
         assert_eq!(smoothed.column(0), both.column(0));
         assert_eq!(smoothed.column(1).to_vec(), smooth_column(smoothing, &time, None, &noisy));
     }
@@ -291,7 +291,7 @@ fn invalid_cut_offs_are_rejected() {
     let time = uniform(100, 0.01);
     let values = Array2::zeros((100, 1));
     let message =
-        |hz: f64, period| smooth(Smoothing::CutOff { hz }, &time, period, values.view()).unwrap_err().to_string();
+        |hz: f64, period| smooth(Smoothing::CutOff { hz }, &time, period, values.view(), &[]).unwrap_err().to_string();
     for hz in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(message(hz, None).contains("must be positive and finite"));
     }

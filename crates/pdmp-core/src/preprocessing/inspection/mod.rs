@@ -16,8 +16,8 @@ mod counters;
 mod cycle_ends;
 mod dropouts;
 mod padding;
-mod time_stamps;
 mod quaternions;
+mod time_stamps;
 mod turns;
 
 use ndarray::ArrayView1;
