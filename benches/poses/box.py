@@ -33,6 +33,7 @@ TABLE = np.array([0.60, 1.20, 0.04])  # m
 FACING = np.array([0.0, -1.0, 0.0, 0.0])
 """Rotation from the left to the right pad, half a turn: with this reference, the absolute pose of
 pads that hold the box is that of its middle."""
+SHOWN = 3  # demonstration whose conditions the robot moves by
 N_DEMOS, N_SAMPLES, DURATION = 12, 151, 3.0  # –, –, s
 NOISE = 0.003, 0.01  # m, rad, of the hands that demonstrate
 STIFFNESS, DAMPING = 3600.0, 120.0  # per s², per s; the wrists are light
@@ -105,6 +106,13 @@ def deviation(poses: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.
     signs = np.where((poses[..., 3:] * reference[..., 3:]).sum(-1, keepdims=True) < 0, -1, 1)
     chord = np.linalg.norm(poses[..., 3:] - signs * reference[..., 3:], axis=-1)
     return apart, 4 * np.arcsin(np.minimum(0.5 * chord, 1.0))
+
+
+def in_frame(poses: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the changes [m, rad] of poses (T, 7) in frames (T, 7) since the first row."""
+    # The pose as that of the right arm, the frame as that of the left one.
+    _, seen = absolute_relative(frames, poses)
+    return deviation(seen, seen[0])
 
 
 def robot() -> Any:

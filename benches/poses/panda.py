@@ -23,7 +23,7 @@ NEAR = {
     "pouring": np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]),
 }
 """Joint angles [rad] near which the tool is for each task."""
-HELD_JOINT, HELD = 3, (2.0, 3.0)  # s, while a person holds the elbow
+HELD_JOINT, HELD = 0, (2.0, 3.0)  # s, while a person holds the first joint
 REST = 0.5  # s, after the movement
 
 
@@ -115,7 +115,7 @@ def run(
     closed : bool
         True to return the measured pose to the controller.
     held : bool
-        True to hold the elbow for a while.
+        True to hold the first joint for a while.
     """
     controller = model.controller(DT, conditions)
     arm = Arm(controller.position.copy(), near)
