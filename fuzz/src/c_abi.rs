@@ -155,6 +155,7 @@ impl Caller<'_> {
     fn call(&mut self, call: u8, input: &mut Input) {
         let slot = usize::from(call >> 6) % N_SLOTS;
         let (n_dofs, n_styles) = (self.info.n_dofs, self.info.n_styles);
+        let n_coordinates = self.info.n_coordinates;
         // SAFETY: the slot's controller is alive, or NULL.
         let controller = unsafe { self.slots[slot].as_ref().map_or(ptr::null_mut(), |x| x.controller).as_mut() };
         // SAFETY: every pointer is valid over its stated length, or NULL.
@@ -162,8 +163,8 @@ impl Caller<'_> {
             match call & 15 {
                 0 | 1 => return self.start(slot, input),
                 2 => pdmp_controller_set_style(controller, Numbers::new(n_styles, input).vector()),
-                3 => pdmp_controller_set_goal(controller, Numbers::new(n_dofs, input).vector()),
-                4 => pdmp_controller_set_anchor(controller, Numbers::new(n_dofs, input).vector()),
+                3 => pdmp_controller_set_goal(controller, Numbers::new(n_coordinates, input).vector()),
+                4 => pdmp_controller_set_anchor(controller, Numbers::new(n_coordinates, input).vector()),
                 5 => pdmp_controller_set_tau(controller, input.number()),
                 6 => pdmp_controller_set_amplitude(controller, input.number()),
                 7 => pdmp_controller_set_compliance(controller, input.number(), input.number()),
@@ -259,9 +260,10 @@ impl Caller<'_> {
 
     fn update(&mut self, slot: usize, input: &mut Input) {
         let (n_dofs, n_styles) = (self.info.n_dofs, self.info.n_styles);
+        let n_coordinates = self.info.n_coordinates;
         let style = Numbers::new(n_styles, input);
-        let [goal, anchor, measured, velocity, acceleration, goal_velocity] =
-            std::array::from_fn(|_| Numbers::new(n_dofs, input));
+        let [goal, anchor, measured] = std::array::from_fn(|_| Numbers::new(n_coordinates, input));
+        let [velocity, acceleration, goal_velocity] = std::array::from_fn(|_| Numbers::new(n_dofs, input));
         let [tau, amplitude, dt] = std::array::from_fn(|_| scalar(input));
         let command = pdmp_command {
             style: style.vector(),
@@ -275,7 +277,7 @@ impl Caller<'_> {
             coupling: pdmp_coupling { velocity: velocity.vector(), acceleration: acceleration.vector() },
             phase: pointer(&amplitude),
         };
-        let mut outputs: [Numbers; 3] = std::array::from_fn(|_| Numbers::new(n_dofs, input));
+        let mut outputs = [n_coordinates, n_dofs, n_dofs].map(|length| Numbers::new(length, input));
         let [position, velocity, acceleration] = outputs.each_mut().map(Numbers::buffer);
         let motion = pdmp_motion { position, velocity, acceleration };
         let commanded = !input.byte().is_multiple_of(4);
@@ -349,9 +351,9 @@ impl Caller<'_> {
         let text_size = usize::from(input.byte());
         // SAFETY: the text is valid over its size.
         with_text(text_size, |text| unsafe { pdmp_controller_error(self.handle(slot).as_deref(), text) });
-        let mut motion = vec![0.0; 3 * n_dofs];
+        let mut motion = vec![0.0; 3 * self.info.n_coordinates];
         let mut parts =
-            motion.chunks_exact_mut(n_dofs).map(|part| pdmp_buffer { data: part.as_mut_ptr(), length: part.len() });
+            motion.chunks_exact_mut(self.info.n_coordinates).map(|part| pdmp_buffer { data: part.as_mut_ptr(), length: part.len() });
         let mut part = || parts.next().unwrap_or(pdmp_buffer { data: ptr::null_mut(), length: 0 });
         let outputs = pdmp_motion { position: part(), velocity: part(), acceleration: part() };
         let mut limited = vec![pdmp_limit::PDMP_LIMIT_NONE; n_dofs];
@@ -383,7 +385,8 @@ impl Conditions {
             return None;
         }
         let n_dofs = info.n_dofs;
-        let lengths = [info.n_styles, n_dofs, n_dofs, n_dofs, n_dofs, n_dofs];
+        let n_coordinates = info.n_coordinates;
+        let lengths = [info.n_styles, n_coordinates, n_coordinates, n_coordinates, n_dofs, n_dofs];
         let vectors = lengths.map(|length| Numbers::new(length, input));
         Some(Self { vectors, amplitude: scalar(input), tau: scalar(input), phase: scalar(input) })
     }

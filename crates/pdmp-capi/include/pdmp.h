@@ -97,16 +97,19 @@ typedef struct {
 typedef struct {
     /// Kind of the movement.
     pdmp_kind kind;
-    /// Number of degrees of freedom D.
+    /// Number of degrees of freedom D, the length of velocities and accelerations.
     size_t n_dofs;
+    /// Number of coordinates, the length of positions, goals, anchors and starts: n_dofs, and one more for each rotation, which
+    /// is a unit quaternion.
+    size_t n_coordinates;
     /// Number of style dimensions J.
     size_t n_styles;
     /// Number of demonstrations M.
     size_t n_demos;
     /// Number of context values Q; 0 if the model was fitted without contexts.
     size_t n_contexts;
-    /// Number of elements that pdmp_model_demonstration and pdmp_model_predict need in `storage`: n_styles + 2 n_dofs +
-    /// 1.
+    /// Number of elements that pdmp_model_demonstration and pdmp_model_predict need in `storage`: n_styles + 2
+    /// n_coordinates + 1.
     size_t n_conditions;
     /// Time constant tau of the nominal demonstration, in seconds.
     double tau;
@@ -126,11 +129,11 @@ typedef struct {
 typedef struct {
     /// Style parameter s (n_styles).
     pdmp_vector style;
-    /// Goal g (n_dofs), in the unit of each DoF; discrete models only.
+    /// Goal g (n_coordinates), in the unit of each DoF; discrete models only.
     pdmp_vector goal;
-    /// Anchor y_a (n_dofs), in the unit of each DoF; rhythmic models only.
+    /// Anchor y_a (n_coordinates), in the unit of each DoF; rhythmic models only.
     pdmp_vector anchor;
-    /// Start position y_0 (n_dofs), in the unit of each DoF. A rhythmic movement starts on its limit cycle by default.
+    /// Start position y_0 (n_coordinates), in the unit of each DoF. A rhythmic movement starts on its limit cycle by default.
     pdmp_vector start;
     /// Start velocity (n_dofs), in the unit of each DoF per second; that of the demonstrations by default.
     pdmp_vector velocity;
@@ -191,12 +194,12 @@ typedef struct {
 typedef struct {
     /// Style parameter s (n_styles).
     pdmp_vector style;
-    /// Goal g (n_dofs), in the unit of each DoF; discrete models only.
+    /// Goal g (n_coordinates), in the unit of each DoF; discrete models only.
     pdmp_vector goal;
     /// Final velocity (n_dofs) at the goal, in the unit of each DoF per second; discrete models with learnt transport
     /// only.
     pdmp_vector goal_velocity;
-    /// Anchor y_a (n_dofs), in the unit of each DoF; rhythmic models only.
+    /// Anchor y_a (n_coordinates), in the unit of each DoF; rhythmic models only.
     pdmp_vector anchor;
     /// Time constant tau > 0, in seconds.
     const double *tau;
@@ -204,7 +207,7 @@ typedef struct {
     const double *amplitude;
     /// Length of this tick, in seconds, at least 0; pdmp_settings.dt by default.
     const double *dt;
-    /// Measured position of the robot (n_dofs), in the unit of each DoF; not given if there is no new measurement.
+    /// Measured position of the robot (n_coordinates), in the unit of each DoF; not given if there is no new measurement.
     pdmp_vector measured;
     /// Coupling terms.
     pdmp_coupling coupling;
@@ -215,7 +218,7 @@ typedef struct {
 /// Outputs of a motion. A member that is `{NULL, 0}` is not written. The buffers may overlap with the arrays of the
 /// command.
 typedef struct {
-    /// Position y (n_dofs), in the unit of each DoF.
+    /// Position y (n_coordinates), in the unit of each DoF.
     pdmp_buffer position;
     /// Velocity (n_dofs), in the unit of each DoF per second.
     pdmp_buffer velocity;
@@ -291,6 +294,13 @@ pdmp_status pdmp_model_demonstration(const pdmp_model *model,
                                      pdmp_buffer storage,
                                      pdmp_text error);
 
+/// Returns the first column of the unit quaternion of rotation `rotation`, counted from 0, in positions, and its order: `*order`
+/// is 0 for (w, x, y, z) and 1 for (x, y, z, w). Angular velocities and accelerations are in the body frame, unless the model
+/// was set to the world frame. Returns n_coordinates if there is no such rotation, and 0 if `model` is NULL.
+size_t pdmp_model_rotation(const pdmp_model *model,
+                           size_t rotation,
+                           int *order);
+
 /// Returns label `label` of context column `column`, both counted from 0, as a UTF-8 string that the model owns. In a
 /// context, a label is represented by its index. Returns NULL if `model` is NULL, if an index is out of range, or if
 /// the column is numeric.
@@ -342,7 +352,7 @@ pdmp_status pdmp_controller_reset(pdmp_controller *controller, const pdmp_condit
 /// Sets the style parameter s (n_styles). Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE.
 pdmp_status pdmp_controller_set_style(pdmp_controller *controller, pdmp_vector style);
 
-/// Sets the goal g (n_dofs) of a discrete movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
+/// Sets the goal g (n_coordinates) of a discrete movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
 /// PDMP_RANGE, PDMP_ABSENT.
 pdmp_status pdmp_controller_set_goal(pdmp_controller *controller, pdmp_vector goal);
 
@@ -351,7 +361,7 @@ pdmp_status pdmp_controller_set_goal(pdmp_controller *controller, pdmp_vector go
 pdmp_status pdmp_controller_set_goal_velocity(pdmp_controller *controller,
                                               pdmp_vector velocity);
 
-/// Sets the anchor y_a (n_dofs) of a rhythmic movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
+/// Sets the anchor y_a (n_coordinates) of a rhythmic movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
 /// PDMP_RANGE, PDMP_ABSENT.
 pdmp_status pdmp_controller_set_anchor(pdmp_controller *controller, pdmp_vector anchor);
 

@@ -53,10 +53,17 @@ struct Limits {
     bool synchronous = true;
 };
 
-/// Motion with n_dofs elements in each vector, see pdmp_motion.
+/// Motion with n_coordinates and n_dofs elements, see pdmp_motion.
 struct Motion {
+    /// Allocates the vectors for a model without rotations.
+    explicit Motion(std::size_t n_dofs) : Motion(n_dofs, n_dofs) {}
+
+    /// Allocates the vectors for a model, by its pdmp_info.
+    explicit Motion(const pdmp_info &info) : Motion(info.n_coordinates, info.n_dofs) {}
+
     /// Allocates the vectors.
-    explicit Motion(std::size_t n_dofs) : position(n_dofs), velocity(n_dofs), acceleration(n_dofs) {}
+    Motion(std::size_t n_coordinates, std::size_t n_dofs)
+        : position(n_coordinates), velocity(n_dofs), acceleration(n_dofs) {}
 
     std::vector<double> position, velocity, acceleration;
 };

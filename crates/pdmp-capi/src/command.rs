@@ -14,11 +14,11 @@ use crate::fault::Fault;
 pub struct pdmp_conditions {
     /// Style parameter s (n_styles).
     pub style: pdmp_vector,
-    /// Goal g (n_dofs), in the unit of each DoF; discrete models only.
+    /// Goal g (n_coordinates), in the unit of each DoF; discrete models only.
     pub goal: pdmp_vector,
-    /// Anchor y_a (n_dofs), in the unit of each DoF; rhythmic models only.
+    /// Anchor y_a (n_coordinates), in the unit of each DoF; rhythmic models only.
     pub anchor: pdmp_vector,
-    /// Start position y_0 (n_dofs), in the unit of each DoF. A rhythmic movement starts on its limit cycle by default.
+    /// Start position y_0 (n_coordinates), in the unit of each DoF. A rhythmic movement starts on its limit cycle by default.
     pub start: pdmp_vector,
     /// Start velocity (n_dofs), in the unit of each DoF per second; that of the demonstrations by default.
     pub velocity: pdmp_vector,
@@ -52,12 +52,12 @@ pub struct pdmp_coupling {
 pub struct pdmp_command {
     /// Style parameter s (n_styles).
     pub style: pdmp_vector,
-    /// Goal g (n_dofs), in the unit of each DoF; discrete models only.
+    /// Goal g (n_coordinates), in the unit of each DoF; discrete models only.
     pub goal: pdmp_vector,
     /// Final velocity (n_dofs) at the goal, in the unit of each DoF per second; discrete models with learnt transport
     /// only.
     pub goal_velocity: pdmp_vector,
-    /// Anchor y_a (n_dofs), in the unit of each DoF; rhythmic models only.
+    /// Anchor y_a (n_coordinates), in the unit of each DoF; rhythmic models only.
     pub anchor: pdmp_vector,
     /// Time constant tau > 0, in seconds.
     pub tau: *const f64,
@@ -65,7 +65,7 @@ pub struct pdmp_command {
     pub amplitude: *const f64,
     /// Length of this tick, in seconds, at least 0; pdmp_settings.dt by default.
     pub dt: *const f64,
-    /// Measured position of the robot (n_dofs), in the unit of each DoF; not given if there is no new measurement.
+    /// Measured position of the robot (n_coordinates), in the unit of each DoF; not given if there is no new measurement.
     pub measured: pdmp_vector,
     /// Coupling terms.
     pub coupling: pdmp_coupling,
@@ -78,12 +78,17 @@ pub struct pdmp_command {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct pdmp_motion {
-    /// Position y (n_dofs), in the unit of each DoF.
+    /// Position y (n_coordinates), in the unit of each DoF.
     pub position: pdmp_buffer,
     /// Velocity (n_dofs), in the unit of each DoF per second.
     pub velocity: pdmp_buffer,
     /// Acceleration (n_dofs), in the unit of each DoF per second squared.
     pub acceleration: pdmp_buffer,
+}
+
+/// Returns the owner of an element of a position, in an error text.
+pub(crate) fn per_coordinate(primitive: &Primitive) -> &'static str {
+    if primitive.coordinates().is_some() { "coordinate" } else { "DoF" }
 }
 
 impl pdmp_conditions {
@@ -97,11 +102,12 @@ impl pdmp_conditions {
             vector.get(name, expected, per).map(|numbers| numbers.map(<[f64]>::to_vec))
         };
         let per_dof = |name, vector| owned(name, vector, primitive.n_dofs(), "DoF");
+        let position = |name, vector| owned(name, vector, primitive.n_coordinates(), per_coordinate(primitive));
         Ok(Conditions {
             style: owned("style", self.style, primitive.n_styles(), "style dimension")?,
-            goal: per_dof("goal", self.goal)?,
-            anchor: per_dof("anchor", self.anchor)?,
-            start: per_dof("start", self.start)?,
+            goal: position("goal", self.goal)?,
+            anchor: position("anchor", self.anchor)?,
+            start: position("start", self.start)?,
             velocity: per_dof("velocity", self.velocity)?,
             goal_velocity: per_dof("goal_velocity", self.goal_velocity)?,
             // SAFETY: the caller guarantees that the pointer is NULL or valid.
@@ -152,6 +158,7 @@ impl pdmp_command {
         // SAFETY: this function has the same contract for every vector.
         let vector = |name, vector: pdmp_vector, expected, per| unsafe { vector.get(name, expected, per) };
         let per_dof = |name, numbers| vector(name, numbers, primitive.n_dofs(), "DoF");
+        let position = |name, numbers| vector(name, numbers, primitive.n_coordinates(), per_coordinate(primitive));
         let coupling = match (
             per_dof("coupling velocity", self.coupling.velocity)?,
             per_dof("coupling acceleration", self.coupling.acceleration)?,
@@ -167,12 +174,12 @@ impl pdmp_command {
         Ok(Command {
             dt,
             style: vector("style", self.style, primitive.n_styles(), "style dimension")?,
-            goal: per_dof("goal", self.goal)?,
+            goal: position("goal", self.goal)?,
             goal_velocity: per_dof("goal_velocity", self.goal_velocity)?,
-            anchor: per_dof("anchor", self.anchor)?,
+            anchor: position("anchor", self.anchor)?,
             tau,
             amplitude,
-            measured: per_dof("measured", self.measured)?,
+            measured: position("measured", self.measured)?,
             coupling,
             phase,
         })
@@ -180,9 +187,10 @@ impl pdmp_command {
 }
 
 impl pdmp_motion {
-    /// Checks that each given buffer holds at least one number per DoF.
-    pub(crate) fn check(&self, n_dofs: usize) -> Result<(), Fault> {
-        self.position.check("position", n_dofs, "DoF")?;
+    /// Checks that each given buffer holds at least one number per coordinate or DoF.
+    pub(crate) fn check(&self, primitive: &Primitive) -> Result<(), Fault> {
+        let n_dofs = primitive.n_dofs();
+        self.position.check("position", primitive.n_coordinates(), per_coordinate(primitive))?;
         self.velocity.check("velocity", n_dofs, "DoF")?;
         self.acceleration.check("acceleration", n_dofs, "DoF")
     }
@@ -190,7 +198,7 @@ impl pdmp_motion {
     /// Writes the present motion of a controller.
     ///
     /// # Safety
-    /// Every pointer is NULL or valid for writes of one number per DoF.
+    /// Every pointer is NULL or valid for writes of one number per coordinate or DoF.
     pub(crate) unsafe fn write(&self, controller: &Controller) {
         // SAFETY: this function has the same contract, and a controller's arrays are its own.
         unsafe {

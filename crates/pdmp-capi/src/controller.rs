@@ -7,7 +7,7 @@ use pdmp_core::motion::{Compliance, Limits};
 use pdmp_core::{Command, Controller};
 
 use crate::buffers::{pdmp_memory, pdmp_text, pdmp_vector};
-use crate::command::{pdmp_command, pdmp_conditions, pdmp_motion};
+use crate::command::{pdmp_command, pdmp_conditions, pdmp_motion, per_coordinate};
 use crate::fault::Fault;
 use crate::guard::{guard, guard_with_text};
 use crate::limits::memory_of_limits;
@@ -176,7 +176,7 @@ pub unsafe extern "C" fn pdmp_controller_set_style(
     })
 }
 
-/// Sets the goal g (n_dofs) of a discrete movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
+/// Sets the goal g (n_coordinates) of a discrete movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
 /// PDMP_RANGE, PDMP_ABSENT.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_set_goal(
@@ -184,8 +184,9 @@ pub unsafe extern "C" fn pdmp_controller_set_goal(
     goal: pdmp_vector,
 ) -> pdmp_status {
     call_on(controller, |controller| {
+        let primitive = controller.inner.primitive();
         // SAFETY: the contract of the C ABI covers the pointers of this argument.
-        let goal = unsafe { goal.require("goal", controller.inner.primitive().n_dofs(), "DoF") }?;
+        let goal = unsafe { goal.require("goal", primitive.n_coordinates(), per_coordinate(primitive)) }?;
         controller.inner.set_goal(goal)?;
         Ok(PDMP_OK)
     })
@@ -206,7 +207,7 @@ pub unsafe extern "C" fn pdmp_controller_set_goal_velocity(
     })
 }
 
-/// Sets the anchor y_a (n_dofs) of a rhythmic movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
+/// Sets the anchor y_a (n_coordinates) of a rhythmic movement, in the unit of each DoF. Errors: PDMP_NULL, PDMP_LENGTH,
 /// PDMP_RANGE, PDMP_ABSENT.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_controller_set_anchor(
@@ -214,8 +215,9 @@ pub unsafe extern "C" fn pdmp_controller_set_anchor(
     anchor: pdmp_vector,
 ) -> pdmp_status {
     call_on(controller, |controller| {
+        let primitive = controller.inner.primitive();
         // SAFETY: the contract of the C ABI covers the pointers of this argument.
-        let anchor = unsafe { anchor.require("anchor", controller.inner.primitive().n_dofs(), "DoF") }?;
+        let anchor = unsafe { anchor.require("anchor", primitive.n_coordinates(), per_coordinate(primitive)) }?;
         controller.inner.set_anchor(anchor)?;
         Ok(PDMP_OK)
     })
@@ -328,7 +330,7 @@ pub unsafe extern "C" fn pdmp_controller_update(
 ) -> pdmp_status {
     call_on(controller, |controller| {
         let inner = &mut controller.inner;
-        motion.map_or(Ok(()), |motion| motion.check(inner.primitive().n_dofs()))?;
+        motion.map_or(Ok(()), |motion| motion.check(inner.primitive()))?;
         // SAFETY: the contract of the C ABI covers the pointers of this argument.
         let command = command.map_or(Ok(Command::default()), |command| unsafe { command.get(inner.primitive()) })?;
         let status = inner.step_with(&command)?;
@@ -349,7 +351,7 @@ pub unsafe extern "C" fn pdmp_controller_read(
 ) -> pdmp_status {
     call_on(controller, |controller| {
         let motion = motion.ok_or(Fault::Null("motion"))?;
-        motion.check(controller.inner.primitive().n_dofs())?;
+        motion.check(controller.inner.primitive())?;
         // SAFETY: `check` has verified the lengths, and the contract of the C ABI guarantees the pointers.
         unsafe { motion.write(&controller.inner) };
         Ok(controller.inner.status().into())

@@ -1,6 +1,6 @@
 //! Models: loading, properties, and conditions of demonstrated and predicted movements.
 
-use std::ffi::{CStr, CString, c_char, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::io::ErrorKind;
 use std::mem::MaybeUninit;
 use std::path::Path;
@@ -8,6 +8,8 @@ use std::ptr;
 use std::sync::Arc;
 
 use pdmp_core::context::{ContextColumn, ContextMap};
+use pdmp_core::demonstration::QuaternionOrder;
+use pdmp_core::model::Coordinates;
 use pdmp_core::{Conditions, Error, Kind, Model};
 
 use crate::buffers::{pdmp_buffer, pdmp_text, pdmp_vector};
@@ -42,16 +44,19 @@ pub enum pdmp_kind {
 pub struct pdmp_info {
     /// Kind of the movement.
     pub kind: pdmp_kind,
-    /// Number of degrees of freedom D.
+    /// Number of degrees of freedom D, the length of velocities and accelerations.
     pub n_dofs: usize,
+    /// Number of coordinates, the length of positions, goals, anchors and starts: n_dofs, and one more for each rotation, which
+    /// is a unit quaternion.
+    pub n_coordinates: usize,
     /// Number of style dimensions J.
     pub n_styles: usize,
     /// Number of demonstrations M.
     pub n_demos: usize,
     /// Number of context values Q; 0 if the model was fitted without contexts.
     pub n_contexts: usize,
-    /// Number of elements that pdmp_model_demonstration and pdmp_model_predict need in `storage`: n_styles + 2 n_dofs +
-    /// 1.
+    /// Number of elements that pdmp_model_demonstration and pdmp_model_predict need in `storage`: n_styles + 2
+    /// n_coordinates + 1.
     pub n_conditions: usize,
     /// Time constant tau of the nominal demonstration, in seconds.
     pub tau: f64,
@@ -163,6 +168,7 @@ pub extern "C" fn pdmp_model_describe(
                 Kind::Rhythmic => PDMP_RHYTHMIC,
             },
             n_dofs: model.n_dofs(),
+            n_coordinates: model.n_coordinates(),
             n_styles: model.n_styles(),
             n_demos: model.n_demos(),
             n_contexts: n_contexts(model),
@@ -203,6 +209,22 @@ pub unsafe extern "C" fn pdmp_model_demonstration(
     let select = |model: &Model| Ok(model.conditions(&[demonstration])?);
     // SAFETY: the contract of the C ABI covers `storage` and `error`.
     unsafe { write_conditions(model, conditions, storage, error, select) }
+}
+
+/// Returns the first column of the unit quaternion of rotation `rotation`, counted from 0, in positions, and its order: `*order`
+/// is 0 for (w, x, y, z) and 1 for (x, y, z, w). Angular velocities and accelerations are in the body frame, unless the model
+/// was set to the world frame. Returns n_coordinates if there is no such rotation, and 0 if `model` is NULL.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_model_rotation(
+    model: Option<&pdmp_model>,
+    rotation: usize,
+    order: Option<&mut MaybeUninit<c_int>>,
+) -> usize {
+    let Some(model) = model else { return 0 };
+    let columns = model.inner.coordinates().map(Coordinates::columns).unwrap_or_default();
+    let Some(columns) = columns.get(rotation) else { return model.inner.n_coordinates() };
+    order.map(|order| order.write(c_int::from(columns.order == QuaternionOrder::Xyzw)));
+    columns.column
 }
 
 /// Returns label `label` of context column `column`, both counted from 0, as a UTF-8 string that the model owns. In a
@@ -247,7 +269,7 @@ fn n_contexts(model: &Model) -> usize {
 
 /// Returns the largest number of elements that the conditions of a movement take.
 fn n_conditions(model: &Model) -> usize {
-    model.n_styles() + 2 * model.n_dofs() + 1
+    model.n_styles() + 2 * model.n_coordinates() + 1
 }
 
 /// Writes the selected conditions, with tau in place of the durations of segments, to `storage` and `conditions`.
@@ -268,11 +290,11 @@ unsafe fn write_conditions(
         if storage.data.is_null() {
             return Err(Fault::Null("storage"));
         }
-        storage.check("storage", n_conditions(model), "style dimension, two per DoF and one for tau")?;
+        storage.check("storage", n_conditions(model), "style dimension, two per coordinate and one for tau")?;
         let selected = select(model)?;
         let tau = Some(selected.time_constant(model)?);
         let selected = Conditions { tau, segment_durations: None, ..selected };
-        // SAFETY: `storage` was checked to hold the style, two vectors of n_dofs and tau, the most that is selected.
+        // SAFETY: `storage` was checked to hold the style, two vectors of n_coordinates and tau, the most that is selected.
         conditions.write(unsafe { pdmp_conditions::store(&selected, storage.data) });
         Ok(PDMP_OK)
     };

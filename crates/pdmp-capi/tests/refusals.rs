@@ -3,6 +3,10 @@
 
 #[path = "../../pdmp-core/tests/common/mod.rs"]
 mod common;
+#[path = "../../pdmp-core/tests/common/poses.rs"]
+mod poses;
+#[path = "../../pdmp-core/tests/common/random.rs"]
+mod random;
 
 use std::ffi::{CStr, c_char};
 use std::mem::MaybeUninit;
@@ -597,6 +601,7 @@ fn a_model_is_described_and_its_controllers_outlive_it() {
     let expected = pdmp_info {
         kind: pdmp_kind::PDMP_DISCRETE,
         n_dofs: 3,
+        n_coordinates: 3,
         n_styles: rust.n_styles(),
         n_demos: 5,
         n_contexts: 1,
@@ -663,4 +668,48 @@ fn every_kind_of_core_error_has_its_status() {
         assert_eq!(pdmp_status::from(&error), status, "{error}");
         assert_eq!(pdmp_status::from(&error.in_demo(1)), status);
     }
+}
+
+/// Poses move in coordinates as in Rust; vectors of another length and quaternions that are none are refused.
+#[test]
+fn poses_are_moved_in_coordinates() {
+    let demos: Vec<_> = poses::screws(4, 2.0, 0.4, 101, 1).into_iter().map(poses::pose).collect();
+    let rust = learn(&demos, &options(Kind::Discrete));
+    let (status, model, _) = load(&rust.to_bytes().unwrap());
+    assert_eq!(status, PDMP_OK);
+    // SAFETY: the model is new, and the library allocates it as a `Box`.
+    let model = unsafe { Box::from_raw(model) };
+    assert_eq!((info(&model).n_coordinates, info(&model).n_dofs), (7, 6));
+    let mut order = MaybeUninit::new(7);
+    assert_eq!(pdmp_model_rotation(Some(&model), 0, Some(&mut order)), 3);
+    // SAFETY: the number is written.
+    assert_eq!(unsafe { order.assume_init() }, 0);
+    assert_eq!(pdmp_model_rotation(Some(&model), 1, None), 7);
+    assert_eq!(pdmp_model_rotation(None, 0, None), 0);
+
+    let mut running = Running::new(&model);
+    let mut own = pdmp_core::Controller::new(rust.primitive(), 1e-3, &pdmp_core::Conditions::default(), None).unwrap();
+    let goal: Vec<f64> = [0.3, 0.2, 0.1].into_iter().chain(poses::turn([1.0, 0.5, 0.0], 2.0)).collect();
+    let (mut position, mut velocity) = ([0.0; 7], [0.0; 6]);
+    let outputs =
+        pdmp_motion { position: buffer(&mut position), velocity: buffer(&mut velocity), acceleration: NO_BUFFER };
+    for k in 0..300 {
+        if k == 100 {
+            own.set_goal(&goal).unwrap();
+            // SAFETY: the vector is valid over its length.
+            assert_eq!(unsafe { pdmp_controller_set_goal(running.handle(), vector(&goal)) }, PDMP_OK);
+        }
+        own.step().unwrap();
+        // SAFETY: the buffers are valid over their lengths.
+        assert!(unsafe { pdmp_controller_update(running.handle(), None, Some(&outputs)) } as i32 > 0);
+    }
+    assert_eq!((own.position(), own.velocity()), (&position[..], &velocity[..]));
+
+    // SAFETY: the vectors are valid over their lengths.
+    let refused = [&goal[..6], &[0.0; 7]].map(|goal| unsafe { pdmp_controller_set_goal(running.handle(), vector(goal)) });
+    assert_eq!(refused, [PDMP_LENGTH, PDMP_RANGE]);
+    assert!(running.error().contains("goal[3:7] has norm 0"), "{}", running.error());
+    let small = pdmp_motion { position: buffer(&mut velocity), ..outputs };
+    // SAFETY: the buffers are valid over their lengths.
+    assert_eq!(unsafe { pdmp_controller_read(running.handle(), Some(&small)) }, PDMP_LENGTH);
 }

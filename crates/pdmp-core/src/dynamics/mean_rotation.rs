@@ -176,7 +176,7 @@ mod tests {
                     largest = largest.max(now.acceleration[i].abs());
                 }
             }
-            assert!(largest > 0.3);
+            assert!(largest > 0.1);
         }
     }
 
