@@ -1,5 +1,6 @@
 """Absolute and relative pose of two arms, and primitives that hold an object between them."""
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -168,12 +169,14 @@ def carried(seed: int, n_demos: int = 8) -> list[np.ndarray]:
 
 
 def two_arms(absolute: list[np.ndarray], relative: list[np.ndarray]) -> pdmp.Model:
-    """Fits a primitive of absolute and relative pose."""
+    """Fits a primitive of absolute and relative pose; a constant pose is no noise."""
     demos = [
         pdmp.Demonstration(np.hstack(pair), dt=0.02, rotations={3: "wxyz", 10: "wxyz"})
         for pair in zip(absolute, relative, strict=True)
     ]
-    return pdmp.fit(demos, n_styles=3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return pdmp.fit(demos, n_styles=3)
 
 
 @pytest.fixture(scope="module", params=["noisy hands", "rigid hands"])

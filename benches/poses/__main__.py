@@ -18,7 +18,7 @@ SEED = 2011
 RUNS = [{"closed": closed, "held": held} for held in (False, True) for closed in (False, True)]
 SHOWN = 2  # demonstration whose conditions the Panda moves by
 PANDA_VIEW = (200.0, 1.45, (0.3, -0.2, 0.4))
-BOX_VIEW = (160.0, 1.6, (0.45, 0.0, 0.12))
+BOX_VIEW = (160.0, 1.9, (0.40, 0.0, 0.15))
 
 
 def main() -> None:

@@ -16,14 +16,14 @@ from reproduction.torques import DT, TorqueControlled
 
 SOURCE = "franka_tasks"
 COLUMNS = ["x", "y", "z", "qa", "qb", "qc", "qd"]
-DURATION = 5.0  # s; the recordings have a phase instead of the time
+DURATION = 8.0  # s; the recordings have a phase instead of the time
 JOINTS = tuple(f"joint{k}" for k in range(1, 8))
 NEAR = {
     "openbox": np.array([0.06, 0.46, -0.30, -2.27, -1.66, 1.73, 1.90]),
     "pouring": np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]),
 }
 """Joint angles [rad] near which the tool is for each task."""
-HELD_JOINT, HELD = 0, (2.0, 3.0)  # s, while a person holds the first joint
+HELD_JOINT, HELD = 3, (3.0, 4.5)  # s, while a person holds the elbow
 REST = 0.5  # s, after the movement
 
 
@@ -115,7 +115,7 @@ def run(
     closed : bool
         True to return the measured pose to the controller.
     held : bool
-        True to hold the first joint for a while.
+        True to hold the elbow for a while.
     """
     controller = model.controller(DT, conditions)
     arm = Arm(controller.position.copy(), near)

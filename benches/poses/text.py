@@ -22,8 +22,8 @@ controller.
 
 The primitive is fitted to nine recorded tool poses of a task, and moves as the third of them, in
 {duration:g} s: the recordings have a phase instead of the time. In the last two columns, a person
-holds the first joint from {held[0]:g} to {held[1]:g} s, modelled by a stiff spring. Without
-`measured=`, the commanded pose moves on meanwhile, and the released tool rushes after it.
+holds the elbow from {held[0]:g} to {held[1]:g} s, modelled by a stiff spring. Without `measured=`,
+the commanded pose moves on meanwhile, and the released tool rushes after it.
 """
 BOX = """\
 ## A box between the hands of Baxter

@@ -87,7 +87,9 @@ def to_dataframe(trajectory: Trajectory) -> Any:
     coordinates = (trajectory.names, trajectory.units)
     dofs = (trajectory.dof_names, trajectory.dof_units)
     labels = (coordinates, dofs, dofs)
-    for (suffix, per), (names, unit_names), values in zip(DERIVATIVES, labels, derivatives, strict=True):
+    for (suffix, per), (names, unit_names), values in zip(
+        DERIVATIVES, labels, derivatives, strict=True
+    ):
         for name, unit, column in zip(names, unit_names, values.T, strict=True):
             columns[f"{name}{suffix}"] = column
             units[f"{name}{suffix}"] = unit and f"{unit}{per}"

@@ -218,7 +218,9 @@ def write_csv(
     names = trajectory.names if names is None else name_list("names", names)
     units = trajectory.units if units is None else name_list("units", units)
     # With rotations, the columns of derivatives are degrees of freedom, not coordinates.
-    of_dofs = (trajectory.dof_names, trajectory.dof_units) if trajectory.rotations else (names, units)
+    of_dofs = (
+        (trajectory.dof_names, trajectory.dof_units) if trajectory.rotations else (names, units)
+    )
     n_dofs = trajectory.position.shape[1]
     for kind, labels in (("name", names), ("unit", units)):
         if len(labels) != n_dofs:
