@@ -256,7 +256,7 @@ def pdmp_pose() -> Begin:
 
 
 def pdmp_joints() -> Begin:
-    """Steps a primitive of as many joints, the coordinates of the pose without their meaning."""
+    """Steps a primitive of six joints, the first coordinates of the poses."""
     demos = [pdmp.Demonstration(poses[:, :6], dt=DURATION / 250) for poses in synthetic(90)]
     controller = pdmp.fit(demos, n_styles=3, smoothing=None, threads=1).controller(dt=DT)
     return after(controller.reset, controller.step, tick=controller.step)

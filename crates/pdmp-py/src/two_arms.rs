@@ -2,7 +2,7 @@
 
 use ndarray::{ArrayD, ArrayView1, IxDyn};
 use numpy::{IntoPyArray, PyArrayDyn};
-use pdmp_core::numerics::{Pose, TwoArms};
+use pdmp_core::motion::{Pose, TwoArms};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -126,7 +126,7 @@ pub(crate) fn left_right<'py>(
 pub(crate) fn mean_pose<'py>(py: Python<'py>, poses: &Bound<'py, PyAny>) -> PyResult<Vector<'py>> {
     let poses = checked("poses", array("poses", poses)?)?;
     let rows: Vec<Pose> = poses.rows().into_iter().map(row).collect();
-    pdmp_core::numerics::mean_pose(&rows).map(|mean| to_numpy(py, &mean)).map_err(raise)
+    pdmp_core::motion::mean_pose(&rows).map(|mean| to_numpy(py, &mean)).map_err(raise)
 }
 
 fn about(reference: Option<&Bound<'_, PyAny>>) -> PyResult<TwoArms> {

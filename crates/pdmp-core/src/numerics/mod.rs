@@ -11,8 +11,6 @@ pub(crate) mod spline;
 pub(crate) mod state;
 pub(crate) mod statistics;
 pub(crate) mod threads;
-mod two_arms;
 
 pub use smoothing_spline::{Noise, Smoothing};
 pub use threads::Threads;
-pub use two_arms::{Pose, TwoArms, mean_pose};

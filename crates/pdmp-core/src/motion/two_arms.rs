@@ -37,7 +37,7 @@ const MAX_SPREAD: f64 = 90.0;
 /// Conversion between the poses of two arms and an absolute and a relative pose.
 ///
 /// ```
-/// use pdmp_core::numerics::TwoArms;
+/// use pdmp_core::motion::TwoArms;
 ///
 /// # fn main() -> pdmp_core::Result<()> {
 /// // Grippers 0.4 m apart that face each other.
@@ -115,7 +115,7 @@ impl TwoArms {
 /// Returns the mean of poses: the arithmetic mean of the positions, and the Karcher mean of the rotations.
 ///
 /// ```
-/// use pdmp_core::numerics::mean_pose;
+/// use pdmp_core::motion::mean_pose;
 ///
 /// # fn main() -> pdmp_core::Result<()> {
 /// let turned = |angle: f64| [angle, 0.0, 0.0, (0.5 * angle).cos(), (0.5 * angle).sin(), 0.0, 0.0];
