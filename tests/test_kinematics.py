@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import pdmp
 from pdmp.robots import Kinematics, MujocoKinematics, PinocchioKinematics
 from reproduction.baxter import engine
 
@@ -269,3 +270,17 @@ def test_files_and_models_are_read_alike_by_pinocchio(urdf: Path, tmp_path: Path
         PinocchioKinematics(tmp_path / "absent.urdf", "d")
     with pytest.raises(TypeError, match=r"model = 3: expected a path or a pinocchio\.Model"):
         PinocchioKinematics(3, "d")  # type: ignore[arg-type]
+
+
+def test_jacobian_gives_the_velocities_of_a_primitive_of_poses(urdf: Path) -> None:
+    """Its rows are the degrees of freedom of a primitive that is fitted to poses."""
+    s = np.linspace(0, 1, 201)[:, None]
+    shares = [s**3 * (10 - 15 * s + 6 * s**2), 30 * s**2 * (1 - s) ** 2]
+    offset, span = np.array([0.1, -2.0, 0.5, 1.0]), np.array([0.3, 2.5, -1.5, 2.0])
+    dt, arm = 0.01, MujocoKinematics(urdf, body="d")
+    joints, rates = offset + span * shares[0], span * shares[1] / (200 * dt)
+    demo = pdmp.Demonstration(arm.forward(joints), dt=dt, rotations={3: "wxyz"})
+    moves = pdmp.fit([demo], smoothing=None).rollout(dt=dt)
+    expected = np.array([arm.jacobian(q) @ v for q, v in zip(joints, rates, strict=True)])
+    assert np.abs(expected[:, 3:]).max() > 2
+    np.testing.assert_allclose(moves.velocity, expected, atol=2e-3)

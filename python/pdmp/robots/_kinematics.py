@@ -28,7 +28,7 @@ class Kinematics(Protocol):
         [v, ω] = jacobian(position) @ velocity
 
     with v the velocity of the origin in the world frame and ω the angular velocity in the frame
-    itself, the body frame.
+    itself, as with ``rotation_frame="body"``, the default of `pdmp.fit`.
     """
 
     def forward(self, position: ArrayLike, /) -> Array:
