@@ -352,8 +352,9 @@ impl Caller<'_> {
         // SAFETY: the text is valid over its size.
         with_text(text_size, |text| unsafe { pdmp_controller_error(self.handle(slot).as_deref(), text) });
         let mut motion = vec![0.0; 3 * self.info.n_coordinates];
-        let mut parts =
-            motion.chunks_exact_mut(self.info.n_coordinates).map(|part| pdmp_buffer { data: part.as_mut_ptr(), length: part.len() });
+        let mut parts = motion
+            .chunks_exact_mut(self.info.n_coordinates)
+            .map(|part| pdmp_buffer { data: part.as_mut_ptr(), length: part.len() });
         let mut part = || parts.next().unwrap_or(pdmp_buffer { data: ptr::null_mut(), length: 0 });
         let outputs = pdmp_motion { position: part(), velocity: part(), acceleration: part() };
         let mut limited = vec![pdmp_limit::PDMP_LIMIT_NONE; n_dofs];

@@ -12,6 +12,8 @@ from pdmp._messages import quoted, value_error
 if TYPE_CHECKING:
     from pdmp._native import Trajectory
 
+ROTATION_DOF = "_rot"
+"""Suffix of the name of a degree of freedom of a rotation, after that of its column."""
 DERIVATIVES = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
 """Suffixes of name and unit in the columns of position, velocity and acceleration."""
 FULL_TURN = {"rad": math.tau, "deg": 360.0, "°": 360.0}
@@ -87,10 +89,9 @@ def to_dataframe(trajectory: Trajectory) -> Any:
     coordinates = (trajectory.names, trajectory.units)
     dofs = (trajectory.dof_names, trajectory.dof_units)
     labels = (coordinates, dofs, dofs)
-    for (suffix, per), (names, unit_names), values in zip(
-        DERIVATIVES, labels, derivatives, strict=True
-    ):
-        for name, unit, column in zip(names, unit_names, values.T, strict=True):
+    labelled = zip(DERIVATIVES, labels, derivatives, strict=True)
+    for (suffix, per), (names, own), values in labelled:
+        for name, unit, column in zip(names, own, values.T, strict=True):
             columns[f"{name}{suffix}"] = column
             units[f"{name}{suffix}"] = unit and f"{unit}{per}"
     frame = pandas.DataFrame(columns, index=pandas.Index(trajectory.time, name="t"))

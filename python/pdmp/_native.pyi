@@ -24,6 +24,7 @@ _Contexts: TypeAlias = (
 _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
 _Kernel: TypeAlias = Literal["matern32", "matern52"]
+_Order: TypeAlias = Literal["wxyz", "xyzw"]
 
 __all__ = [
     "Conditions",
@@ -47,18 +48,21 @@ __all__ = [
     "TimeWarp",
     "Trajectory",
     "__version__",
+    "absolute_relative",
     "blend",
-    "split_at",
     "cycles",
     "factorise",
     "fill_gaps",
     "fit",
     "inspected",
+    "left_right",
     "load",
     "lowpass",
+    "mean_pose",
     "period",
     "resample",
     "residuals",
+    "split_at",
     "trim",
 ]
 __version__: str
@@ -93,6 +97,11 @@ class Demonstration:
         Names of the degrees of freedom, all different.
     units : sequence of str, (D,), optional
         Units of the degrees of freedom, such as "rad" or "m"; "" if unknown.
+    rotations : mapping, optional
+        First column of each unit quaternion, as an index or a name, and the order of its components: {3: "wxyz"} or
+        {3: "xyzw"}. A quaternion rotates from the body frame to the world frame; the other convention is not
+        recognised. Norms become 1, and signs continuous along time. `position`, `goal`, `names` and `units` have one element
+        per column; a rotation has four columns and three degrees of freedom.
 
     Raises
     ------
@@ -116,6 +125,7 @@ class Demonstration:
         context: ArrayLike | Sequence[float | str] | None = None,  # (Q,)
         names: Sequence[str] | None = None,  # D of them
         units: Sequence[str] | None = None,  # D of them
+        rotations: Mapping[int, _Order] | Mapping[str, _Order] | None = None,
     ) -> Demonstration: ...
     def __getnewargs_ex__(self) -> tuple[tuple[_Array], dict[str, Any]]: ...
     @property
@@ -145,6 +155,12 @@ class Demonstration:
     @property
     def n_dofs(self) -> int:
         """Number of degrees of freedom D."""
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates, the columns of `position`: one more than the degrees of freedom for each rotation."""
+    @property
+    def rotations(self) -> dict[int, _Order]:
+        """First column of each unit quaternion, and the order of its components, "wxyz" or "xyzw"."""
 
 def fit(
     demos: _Demos,  # M of them, or (M, T, D)
@@ -162,6 +178,8 @@ def fit(
     n_samples: int | None = None,
     transport: Literal["learnt", "immediate"] | None = None,
     dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
+    rotation_length: float | None = None,
+    rotation_frame: Literal["body", "world"] = "body",
     alignment: Literal["linear", "warp"] | TimeWarp = "linear",
     landmarks: ArrayLike | None = None,  # (M, E)
     tau: float | None = None,
@@ -227,6 +245,11 @@ def fit(
         units are equal or unknown. Otherwise the degrees of freedom of each unit are divided by the largest range among
         them. "range" divides each by its own range. Numbers are divisors in the unit of each degree of freedom, and
         also apply to a time warp.
+    rotation_length : float, optional
+        Length that weighs as much as 1 rad where positions and rotations are factorised together, in the unit of the
+        positions; by default the ratio of the deviations from the mean of the demonstrations, by root mean square.
+    rotation_frame : {"body", "world"}
+        Frame of the angular velocities and accelerations of a model with rotations.
     alignment : {"linear", "warp"} or TimeWarp
         Scaling of time to that of the nominal demonstration: linear, or by the monotone warps that bring the
         demonstrations closest to each other. A `TimeWarp` is always applied. "warp" has eight segments, fewer if a
@@ -618,6 +641,23 @@ class Model:
     @property
     def n_dofs(self) -> int:
         """Number of degrees of freedom D."""
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates, the length of positions, goals and starts: one more than the degrees of freedom for each
+        rotation.
+        """
+    @property
+    def coordinate_names(self) -> list[str]:
+        """Names of the coordinates."""
+    @property
+    def coordinate_units(self) -> list[str]:
+        """Units of the coordinates; an unknown unit is ""."""
+    @property
+    def rotations(self) -> dict[int, _Order]:
+        """First column of each unit quaternion in positions, and the order of its components, "wxyz" or "xyzw"."""
+    @property
+    def rotation_frame(self) -> Literal["body", "world"] | None:
+        """Frame of angular velocities and accelerations, "body" or "world"; None without rotations."""
     @property
     def n_styles(self) -> int:
         """Style dimension J."""
@@ -1210,6 +1250,23 @@ class Model:
         ------
         ValueError
             `level` is not in (0, 1), `predict` rejects `context`, or the demonstrations are too few for a covariance.
+        """
+    def in_frame(self, frame: Literal["body", "world"]) -> Model:
+        """Returns the model with angular velocities and accelerations in another frame; it moves alike.
+
+        Parameters
+        ----------
+        frame : {"body", "world"}
+            Frame that rotates, or the frame in which orientations are measured.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        ValueError
+            The model has no rotations.
         """
     def save(self, path: str | PathLike[str]) -> None:
         """Writes a model file.
@@ -1874,10 +1931,19 @@ class Trajectory:
         """Accelerations (T, D) per s²."""
     @property
     def names(self) -> list[str]:
-        """Names of the degrees of freedom (D,)."""
+        """Names of the columns of `position`."""
     @property
     def units(self) -> list[str]:  # "" where unknown
-        """Units of the degrees of freedom (D,); "" if unknown."""
+        """Units of the columns of `position`; "" if unknown."""
+    @property
+    def dof_names(self) -> list[str]:
+        """Names of the columns of `velocity` and `acceleration`; those of `position` without rotations."""
+    @property
+    def dof_units(self) -> list[str]:
+        """Units of the columns of `velocity` and `acceleration`, without "per second"."""
+    @property
+    def rotations(self) -> dict[int, _Order]:
+        """First column of each unit quaternion in `position`, and the order of its components, "wxyz" or "xyzw"."""
     def to_dict(self) -> dict[str, Any]:
         """Returns the arrays, names and units in a dictionary.
 

@@ -706,7 +706,8 @@ fn poses_are_moved_in_coordinates() {
     assert_eq!((own.position(), own.velocity()), (&position[..], &velocity[..]));
 
     // SAFETY: the vectors are valid over their lengths.
-    let refused = [&goal[..6], &[0.0; 7]].map(|goal| unsafe { pdmp_controller_set_goal(running.handle(), vector(goal)) });
+    let refused =
+        [&goal[..6], &[0.0; 7]].map(|goal| unsafe { pdmp_controller_set_goal(running.handle(), vector(goal)) });
     assert_eq!(refused, [PDMP_LENGTH, PDMP_RANGE]);
     assert!(running.error().contains("goal[3:7] has norm 0"), "{}", running.error());
     let small = pdmp_motion { position: buffer(&mut velocity), ..outputs };

@@ -81,7 +81,7 @@ pub mod preprocessing;
 mod validate;
 
 pub use demonstration::{Demonstration, Sampling};
-pub use error::{Error, ErrorKind, LimitError, Result};
+pub use error::{Error, ErrorKind, LimitError, Result, RotationError};
 pub use kind::Kind;
 #[cfg(feature = "learning")]
 pub use learning::{FitOptions, fit};

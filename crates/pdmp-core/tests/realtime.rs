@@ -101,7 +101,7 @@ impl Loop {
         let n = place.len();
         place.copy_from_slice(&values[..n]);
         if let Some(coordinates) = controller.primitive().coordinates() {
-            let column = coordinates.len() - 4;
+            let column = coordinates.n_coordinates() - 4;
             let norm = place[column..].iter().map(|x| x * x).sum::<f64>().sqrt();
             place[column..].iter_mut().for_each(|x| *x /= norm);
         }
@@ -165,7 +165,7 @@ fn a_million_ticks_of_random_commands_allocate_nothing() {
     }
 }
 
-/// The same for poses, whose rotations are converted in every tick.
+/// A million ticks of poses, whose rotations are converted in every tick, allocate nothing.
 #[test]
 fn a_million_ticks_of_poses_allocate_nothing() {
     for kind in [Kind::Discrete, Kind::Rhythmic] {

@@ -19,8 +19,8 @@ use pdmp_core::motion::{
 };
 use pdmp_core::numerics::Threads;
 use pdmp_core::{
-    Command, Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Motion, Result, Sampling, Status,
-    fit, rollout,
+    Command, Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Motion, Result, RotationError,
+    Sampling, Status, fit, rollout,
 };
 use poses::*;
 use random::Random;
@@ -96,7 +96,7 @@ fn coordinates_and_degrees_of_freedom_are_counted_and_named() {
     assert_eq!((model.goals().dim(), model.starts().dim(), model.anchors().dim()), ((4, 7), (4, 7), (4, 7)));
 }
 
-/// With as many styles as demonstrations, each of them is reproduced, whatever the screw turns in all.
+/// With one style for each demonstration, all of them are reproduced, at several turns of the screw.
 #[test]
 fn every_style_reproduces_the_demonstrations() {
     for turned in [1.5, 4.7, 15.0] {
@@ -541,7 +541,7 @@ fn quaternions_that_are_none_are_refused() {
     };
     for factor in [0.0, 0.998, 1.002, 2.0] {
         let error = with(17, factor).unwrap_err();
-        assert!(matches!(error, Error::Quaternion { row: Some(17), column: 3, .. }), "{error}");
+        assert!(matches!(error, Error::Rotation(RotationError::Norm { row: Some(17), column: 3, .. })), "{error}");
         assert!(error.to_string().contains("position[17, 3:7] has norm"), "{error}");
     }
     let mended = with(17, 1.0005).unwrap();
@@ -551,9 +551,15 @@ fn quaternions_that_are_none_are_refused() {
     let model = fitted(&[pose(good.clone())], 1);
     let zero = vec![0.0; 7];
     let mut controller = Controller::new(model.primitive(), 0.01, &Conditions::default(), None).unwrap();
-    assert!(matches!(controller.set_goal(&zero), Err(Error::Quaternion { name: "goal", row: None, .. })));
+    assert!(matches!(
+        controller.set_goal(&zero),
+        Err(Error::Rotation(RotationError::Norm { name: "goal", row: None, .. }))
+    ));
     let measured = Command { measured: Some(&zero), ..Command::default() };
-    assert!(matches!(controller.step_with(&measured), Err(Error::Quaternion { name: "measured", .. })));
+    assert!(matches!(
+        controller.step_with(&measured),
+        Err(Error::Rotation(RotationError::Norm { name: "measured", .. }))
+    ));
     assert!(matches!(controller.set_goal(&zero[..6]), Err(Error::Length { expected: 7, .. })));
     let mut short = [vec![0.0; 6], vec![0.0; 6], vec![0.0; 6]];
     let [position, velocity, acceleration] = &mut short;

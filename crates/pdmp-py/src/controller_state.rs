@@ -8,10 +8,10 @@ use pyo3::types::PyBytes;
 
 use crate::controller::Controller;
 use crate::convert::Reduced;
-use crate::demonstration::Trajectory;
 use crate::error::{interruptible, raise};
 use crate::model::Model;
 use crate::scalar::{Scalar, optional_number};
+use crate::trajectory::Trajectory;
 
 #[pymethods]
 impl Controller {

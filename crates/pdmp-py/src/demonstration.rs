@@ -1,20 +1,20 @@
-//! Demonstrations, trajectories, and objects that are read as either.
+//! Demonstrations, and objects that are read as demonstrations.
 
-use ndarray::{Array2, ArrayD};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, ToPyArray};
+use ndarray::ArrayD;
+use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, ToPyArray};
 use pdmp_core::Sampling;
-use pdmp_core::demonstration::{QuaternionOrder, RotationColumns};
-use pdmp_core::model::Coordinates;
+use pdmp_core::demonstration::RotationColumns;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::convert::{
-    Matrix, Reduced, Vector, array, context_to_python, locked, optional, plain, quoted, read_only, texts, to_numpy,
-    two_axes, vector,
+    Matrix, Vector, array, context_to_python, locked, optional, plain, quoted, read_only, texts, two_axes, vector,
 };
 use crate::error::raise;
+use crate::rotations::{rotations_of, rotations_to_python};
 use crate::scalar::{Scalar, optional_number};
+use crate::trajectory::Trajectory;
 
 /// Recorded movement.
 ///
@@ -37,8 +37,8 @@ use crate::scalar::{Scalar, optional_number};
 ///     Units of the degrees of freedom, such as "rad" or "m"; "" if unknown.
 /// rotations : mapping, optional
 ///     First column of each unit quaternion, as an index or a name, and the order of its components: {3: "wxyz"} or
-///     {3: "xyzw"}. A quaternion rotates from the body frame to the world frame; the other convention cannot be told from
-///     the data. Norms become 1, and signs continuous along time. `position`, `goal`, `names` and `units` have one element
+///     {3: "xyzw"}. A quaternion rotates from the body frame to the world frame; the other convention is not
+///     recognised. Norms become 1, and signs continuous along time. `position`, `goal`, `names` and `units` have one element
 ///     per column; a rotation has four columns and three degrees of freedom.
 ///
 /// Raises
@@ -285,166 +285,4 @@ fn labelled(
         Some(units) => demo.with_units(units),
         None => Ok(demo),
     }
-}
-
-/// Generated movement, returned by `Model.rollout`. Row k of each array is the state at `time[k]`.
-///
-/// `Demonstration(trajectory)` makes a demonstration of it, and `fit` takes trajectories as demonstrations.
-#[pyclass(frozen, get_all, module = "pdmp")]
-pub(crate) struct Trajectory {
-    /// Times (T,) in s, starting at 0.
-    pub(crate) time: Py<PyArray1<f64>>,
-    /// Positions (T, D) in the unit of each degree of freedom.
-    pub(crate) position: Py<PyArray2<f64>>,
-    /// Velocities (T, D) per s.
-    velocity: Py<PyArray2<f64>>,
-    /// Accelerations (T, D) per s².
-    acceleration: Py<PyArray2<f64>>,
-    /// Names of the columns of `position`.
-    pub(crate) names: Vec<String>,
-    /// Units of the columns of `position`; "" if unknown.
-    pub(crate) units: Vec<String>,
-    /// Names of the columns of `velocity` and `acceleration`; those of `position` without rotations.
-    dof_names: Vec<String>,
-    /// Units of the columns of `velocity` and `acceleration`, without "per second".
-    dof_units: Vec<String>,
-    /// First column of each unit quaternion in `position`, and the order of its components, "wxyz" or "xyzw".
-    rotations: Py<PyDict>,
-}
-
-impl Trajectory {
-    pub(crate) fn new(
-        py: Python<'_>,
-        trajectory: pdmp_core::motion::Trajectory,
-        primitive: &pdmp_core::Primitive,
-    ) -> PyResult<Self> {
-        let convert = |matrix: Array2<f64>| matrix.into_pyarray(py).unbind();
-        let rotations = primitive.coordinates().map(Coordinates::columns).unwrap_or_default();
-        Ok(Self {
-            time: to_numpy(py, &trajectory.time).unbind(),
-            position: convert(trajectory.position),
-            velocity: convert(trajectory.velocity),
-            acceleration: convert(trajectory.acceleration),
-            names: primitive.coordinate_names().to_vec(),
-            units: primitive.coordinate_units().to_vec(),
-            dof_names: primitive.names().to_vec(),
-            dof_units: primitive.units().to_vec(),
-            rotations: rotations_to_python(py, &rotations)?.unbind(),
-        })
-    }
-}
-
-#[pymethods]
-impl Trajectory {
-    /// Rebuilds a pickled trajectory.
-    #[staticmethod]
-    fn _of(
-        time: Py<PyArray1<f64>>,
-        position: Py<PyArray2<f64>>,
-        velocity: Py<PyArray2<f64>>,
-        acceleration: Py<PyArray2<f64>>,
-        labels: [Vec<String>; 4],
-        rotations: Py<PyDict>,
-    ) -> Self {
-        let [names, units, dof_names, dof_units] = labels;
-        Self { time, position, velocity, acceleration, names, units, dof_names, dof_units, rotations }
-    }
-
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        let Self { time, position, velocity, acceleration, names, units, dof_names, dof_units, rotations } = self;
-        let labels = [names, units, dof_names, dof_units].map(Clone::clone);
-        let arguments = (time, position, velocity, acceleration, labels, rotations).into_pyobject(py)?;
-        Ok((py.get_type::<Self>().getattr("_of")?, arguments))
-    }
-
-    /// Returns the arrays, names and units in a dictionary.
-    ///
-    /// `io.read_npz` reads the file that `numpy.savez(path, **trajectory.to_dict())` writes.
-    ///
-    /// Returns
-    /// -------
-    /// dict
-    ///     Keys are the names of the attributes.
-    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
-        let values = PyDict::new(slf.py());
-        for name in
-            ["time", "position", "velocity", "acceleration", "names", "units", "dof_names", "dof_units", "rotations"]
-        {
-            values.set_item(name, slf.getattr(name)?)?;
-        }
-        Ok(values)
-    }
-
-    /// Returns a data frame of positions, velocities and accelerations.
-    ///
-    /// `Demonstration(frame[names], time=frame.index)` makes a demonstration of it.
-    ///
-    /// Returns
-    /// -------
-    /// pandas.DataFrame
-    ///     The index is the time `t` in s. Columns are positions `<name>`, velocities `<name>_velocity` and
-    ///     accelerations `<name>_acceleration`; `attrs["units"]` maps each column to its unit.
-    ///
-    /// Raises
-    /// ------
-    /// ImportError
-    ///     pandas is not installed.
-    fn to_dataframe<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        slf.py().import("pdmp._labels")?.call_method1("to_dataframe", (slf,))
-    }
-
-    /// Writes a CSV file as `io.write_csv` does.
-    ///
-    /// Parameters
-    /// ----------
-    /// path : path-like
-    ///     File to write.
-    ///
-    /// Raises
-    /// ------
-    /// OSError
-    ///     The file cannot be written, or its folder does not exist.
-    /// ValueError
-    ///     A name could not be read back by `io.read_csv`.
-    fn to_csv(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
-        slf.py().import("pdmp.io")?.call_method1("write_csv", (path, slf)).map(drop)
-    }
-}
-
-/// Returns the rotations of a mapping from the first column of a quaternion, its index or name, to its order.
-fn rotations_of(rotations: &Bound<'_, PyAny>, names: Option<&[String]>) -> PyResult<Vec<RotationColumns>> {
-    let wrong = |problem: String| PyValueError::new_err(format!("rotations = {}: {problem}", quoted(rotations)));
-    let form = "must map the first column of each quaternion to its order, such as {3: \"wxyz\"}";
-    let items = rotations.call_method0("items").map_err(|_| wrong(form.to_string()))?;
-    items
-        .try_iter()?
-        .map(|item| {
-            let (column, order) = item?.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
-            let column = match column.extract::<String>() {
-                Ok(name) => names
-                    .and_then(|names| names.iter().position(|other| *other == name))
-                    .ok_or_else(|| wrong(format!("there is no column named {name:?}; pass names=, or an index")))?,
-                Err(_) => Scalar::Object(column).count("rotations")?,
-            };
-            let order = match order.extract::<String>().as_deref() {
-                Ok("wxyz") => QuaternionOrder::Wxyz,
-                Ok("xyzw") => QuaternionOrder::Xyzw,
-                _ => return Err(wrong("the order must be \"wxyz\" or \"xyzw\"".to_string())),
-            };
-            Ok(RotationColumns { column, order })
-        })
-        .collect()
-}
-
-/// Returns rotations as a mapping from the first column of a quaternion to its order.
-pub(crate) fn rotations_to_python<'py>(py: Python<'py>, rotations: &[RotationColumns]) -> PyResult<Bound<'py, PyDict>> {
-    let mapping = PyDict::new(py);
-    for rotation in rotations {
-        let order = match rotation.order {
-            QuaternionOrder::Wxyz => "wxyz",
-            QuaternionOrder::Xyzw => "xyzw",
-        };
-        mapping.set_item(rotation.column, order)?;
-    }
-    Ok(mapping)
 }

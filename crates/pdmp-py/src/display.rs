@@ -7,9 +7,9 @@ use pdmp_core::Kind;
 use pdmp_core::context::{ContextColumn, ContextMap};
 use pyo3::prelude::*;
 
-use crate::demonstration::Trajectory;
 use crate::error::{ascii, printable};
 use crate::model::Model;
+use crate::trajectory::Trajectory;
 
 /// Largest number of degrees of freedom, context columns or labels in a summary, which then fits on a screen.
 const MAX_LISTED: usize = 12;

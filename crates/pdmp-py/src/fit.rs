@@ -18,12 +18,13 @@ use pyo3::types::{PyBool, PyList, PyMapping};
 
 use crate::choice::Choice;
 use crate::convert::{items, matrix, numbers, quoted};
-use crate::demonstration::{Demonstration, Source, Trajectory};
+use crate::demonstration::{Demonstration, Source};
 use crate::error::{detached, raise};
 use crate::instance;
 use crate::model::Model;
 use crate::regression::{Gp, NGnet};
 use crate::scalar::{Scalar, optional_count, optional_number};
+use crate::trajectory::Trajectory;
 use crate::warp::TimeWarp;
 
 /// Fits a movement primitive to demonstrations.

@@ -26,9 +26,11 @@ mod output;
 mod prediction;
 mod preprocessing;
 mod regression;
+mod rotations;
 mod scalar;
 mod status;
 mod two_arms;
+mod trajectory;
 mod warp;
 
 use pyo3::prelude::*;
@@ -42,7 +44,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("FitError", py.get_type::<error::FitError>())?;
     module.add("ModelFileError", py.get_type::<error::ModelFileError>())?;
     module.add_class::<demonstration::Demonstration>()?;
-    module.add_class::<demonstration::Trajectory>()?;
+    module.add_class::<trajectory::Trajectory>()?;
     module.add_class::<regression::Gp>()?;
     module.add_class::<regression::GpRegression>()?;
     module.add_class::<regression::NGnet>()?;

@@ -9,9 +9,9 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::context::ContextMap;
 use crate::convert::{Matrix, Vector, context_to_python, locked, read_only};
-use crate::demonstration::rotations_to_python;
 use crate::error::{ascii, raise};
 use crate::model::Model;
+use crate::rotations::rotations_to_python;
 
 #[pymethods]
 impl Model {

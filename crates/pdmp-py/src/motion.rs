@@ -12,11 +12,11 @@ use crate::choice::Choice;
 use crate::conditions::conditions_of;
 use crate::controller::Controller;
 use crate::convert::Cube;
-use crate::demonstration::Trajectory;
 use crate::error::{interruptible, raise};
 use crate::instance;
 use crate::model::Model;
 use crate::scalar::{Scalar, optional_number};
+use crate::trajectory::Trajectory;
 
 #[pymethods]
 impl Model {

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._files import atomic_write
-from pdmp._labels import DERIVATIVES, join_label, name_list, split_label
+from pdmp._labels import DERIVATIVES, ROTATION_DOF, join_label, name_list, split_label
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration, Trajectory
 from pdmp.io import _fields, _time_units
@@ -84,7 +84,8 @@ def read_csv(
             "name it with time=, or pass dt="
         )
     if columns is None:
-        derived = {f"{name}{suffix}" for name in names for suffix, _ in DERIVATIVES[1:]}
+        dofs = (f"{name}{rotation}" for name in names for rotation in ("", ROTATION_DOF))
+        derived = {f"{dof}{suffix}" for dof in dofs for suffix, _ in DERIVATIVES[1:]}
         names = [name for name in names if name != stamped and name not in derived]
     else:
         names = name_list("columns", columns)
@@ -191,9 +192,9 @@ def write_csv(
     """Writes a trajectory as CSV; `read_csv` reads its positions back.
 
     The columns are `t` [s], then the positions `<name>`, velocities `<name>_velocity` and
-    accelerations `<name>_acceleration` of all degrees of freedom, with units in brackets; with rotations,
-    `trajectory.dof_names` name the derivatives. Numbers
-    are exact. The file is written atomically.
+    accelerations `<name>_acceleration` of all degrees of freedom, with units in brackets. Those of
+    rotations have the names of `trajectory.dof_names`. Numbers are exact. The file is written
+    atomically.
 
     Parameters
     ----------
@@ -218,27 +219,18 @@ def write_csv(
     names = trajectory.names if names is None else name_list("names", names)
     units = trajectory.units if units is None else name_list("units", units)
     # With rotations, the columns of derivatives are degrees of freedom, not coordinates.
-    of_dofs = (
-        (trajectory.dof_names, trajectory.dof_units) if trajectory.rotations else (names, units)
-    )
+    dofs = (trajectory.dof_names, trajectory.dof_units)
+    of_dofs = dofs if trajectory.rotations else (names, units)
     n_dofs = trajectory.position.shape[1]
     for kind, labels in (("name", names), ("unit", units)):
         if len(labels) != n_dofs:
             raise ValueError(
                 f"{kind}s has length {len(labels)}, expected {n_dofs}: one {kind} per DoF"
             )
-    labels = [(names, units), of_dofs, of_dofs]
-    header = [
-        f"{name}{suffix}"
-        for (suffix, _), (names, _) in zip(DERIVATIVES, labels, strict=True)
-        for name in names
-    ]
+    columns_of = list(zip(DERIVATIVES, ((names, units), of_dofs, of_dofs), strict=True))
+    header = [f"{name}{suffix}" for (suffix, _), (own, _) in columns_of for name in own]
     _fields.check_names(path, 1, ["t", *header])
-    units = [
-        unit and f"{unit}{per}"
-        for (_, per), (_, units) in zip(DERIVATIVES, labels, strict=True)
-        for unit in units
-    ]
+    units = [unit and f"{unit}{per}" for (_, per), (_, own) in columns_of for unit in own]
     fields = list(map(join_label, header, units))
     for name, unit, field in zip(header, units, fields, strict=True):
         if split_label(field) != (name, unit):

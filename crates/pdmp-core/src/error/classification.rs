@@ -26,6 +26,7 @@ impl Error {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::Demo { source, .. } => source.kind(),
+            Self::Rotation(error) => error.next_step(),
             Self::Memory { .. } => ErrorKind::Memory,
             Self::Fit(_) => ErrorKind::Numerical,
             Self::File(_) => ErrorKind::ModelFile,
@@ -38,8 +39,6 @@ impl Error {
             | Self::WrapInGap { .. }
             | Self::Aperiodic { .. }
             | Self::Still { .. }
-            | Self::Quaternion { row: Some(_), .. }
-            | Self::HalfTurn { .. }
             | Self::Samples { .. }
             | Self::Dofs { .. }
             | Self::Mixed { .. }
@@ -48,8 +47,6 @@ impl Error {
             Self::NotFinite { .. }
             | Self::Length { .. }
             | Self::Name { .. }
-            | Self::Quaternion { row: None, .. }
-            | Self::OppositeArms { .. }
             | Self::Rows { .. }
             | Self::Single { .. }
             | Self::Range { .. }
@@ -84,8 +81,6 @@ impl Error {
             Self::NotFinite { name, .. }
             | Self::NotFiniteAt { name, .. }
             | Self::Length { name, .. }
-            | Self::Quaternion { name, .. }
-            | Self::OppositeArms { name, .. }
             | Self::Name { name, .. }
             | Self::Rows { name, .. }
             | Self::Single { name }
@@ -96,10 +91,11 @@ impl Error {
             | Self::Kind { name, .. }
             | Self::Argument { name, .. }
             | Self::Conflict { names: [name, _], .. } => Some(name),
+            Self::Rotation(error) => Some(error.at_fault()),
             Self::Time { .. } => Some("time"),
             Self::Landmark { .. } => Some("landmarks"),
             Self::Segments { .. } => Some("n_segments"),
-            Self::Samples { .. } | Self::Dofs { .. } | Self::HalfTurn { .. } => Some("position"),
+            Self::Samples { .. } | Self::Dofs { .. } => Some("position"),
             Self::NoDemonstrations => Some("demos"),
             Self::Styles { .. } => Some("n_styles"),
             Self::Label { .. } | Self::NoNumber { .. } | Self::ContextNames { .. } => Some("context"),

@@ -7,13 +7,15 @@
 mod classification;
 mod format;
 mod limits;
+mod rotations;
 
 use std::path::PathBuf;
 
 use crate::kind::Kind;
 pub use classification::ErrorKind;
-use format::{Column, Columns, Count, Gap, Number, Rounded, Times};
+use format::{Column, Count, Gap, Number, Rounded, Times};
 pub use limits::LimitError;
+pub use rotations::RotationError;
 
 /// Any error of this crate.
 ///
@@ -240,47 +242,9 @@ pub enum Error {
         /// Largest possible number.
         most: usize,
     },
-    /// A quaternion whose norm is not 1.
-    #[error(
-        "{name}[{}] has norm {}: a rotation is a unit quaternion, to within 1e-3; check the columns of rotations, or divide \
-         each quaternion by its norm", Columns(*row, *column), Rounded(*norm)
-    )]
-    Quaternion {
-        /// The argument.
-        name: &'static str,
-        /// Row of a matrix.
-        row: Option<usize>,
-        /// First of its four columns.
-        column: usize,
-        /// Its norm.
-        norm: f64,
-    },
-    /// A residual rotation of about half a turn, which has no direction.
-    #[error(
-        "position[{sample}, {column}:{}]: the rotation is {degrees:.0} degrees from the mean of the demonstrations: they must \
-         stay within half a turn of it; fit movements that turn the other way round as a model of their own", column + 4
-    )]
-    HalfTurn {
-        /// Index of the sample.
-        sample: usize,
-        /// First of the four columns of the rotation.
-        column: usize,
-        /// Distance from the mean rotation, in degrees.
-        degrees: f64,
-    },
-    /// A relative rotation of two arms that is about half a turn from its reference, where the midpoint is undefined.
-    #[error(
-        "{name}: the relative rotation of the arms is {degrees:.0} degrees from the reference, more than 175: the midpoint of \
-         their orientations is undefined at half a turn; pass a reference near {relative:.3?}"
-    )]
-    OppositeArms {
-        /// The argument.
-        name: &'static str,
-        /// Angle from the reference, in degrees.
-        degrees: f64,
-        /// The relative rotation, a unit quaternion w, x, y, z.
-        relative: [f64; 4],
-    },
+    /// A rotation that is none, or too far from the others.
+    #[error(transparent)]
+    Rotation(RotationError),
     /// Too few samples to carry a cubic.
     #[error("position has {found} samples: at least {least} are needed; record at a higher rate")]
     Samples {

@@ -12,7 +12,7 @@ use super::mean_path::{Recording, mean_path};
 use super::options::{DofScaling, FitOptions};
 use crate::demonstration::{Demonstration, RotationColumns};
 use crate::dynamics::mean_rotation::{MAX_CELLS, MeanRotation};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, RotationError};
 use crate::kind::Kind;
 use crate::model::Primitive;
 use crate::model::coordinates::{Coordinates, Frame, layout};
@@ -142,7 +142,7 @@ impl Residuals {
         if let DofScaling::Given(scale) = &options.dof_scale {
             let uneven = |dof: &&usize| scale[**dof..**dof + 3].iter().any(|s| *s != scale[**dof]);
             if self.dofs.iter().find(uneven).is_some() {
-                let problem = "differs between the three DoFs of a rotation: they need one scale, whatever the frame";
+                let problem = "differs between the three DoFs of a rotation: they need one scale";
                 return Err(Error::Argument { name: "dof_scale", problem });
             }
             return Ok(scale.clone());
@@ -222,7 +222,7 @@ pub(super) fn about_means(
     let clock: Vec<f64> = seconds.into_iter().map(|t| t / duration * extent).collect();
     let means: Vec<_> =
         coordinates.rotations().iter().map(|rotation| (rotation.columns, rotation.mean.clone())).collect();
-    let (plain, dofs) = layout(coordinates.len(), demo.rotations());
+    let (plain, dofs) = layout(coordinates.n_coordinates(), demo.rotations());
     in_dofs(demo, &clock, extent, &means, &plain, &dofs)
 }
 
@@ -256,7 +256,11 @@ pub(super) fn in_dofs(
             let angle = dot(delta, delta).sqrt();
             let step = before.map_or([0.0; 3], |before| add_scaled(delta, -1.0, before));
             if angle > MAX_RESIDUAL || dot(step, step).sqrt() > MAX_RESIDUAL {
-                return Err(Error::HalfTurn { sample, column: columns.column, degrees: angle.to_degrees() });
+                return Err(Error::Rotation(RotationError::HalfTurn {
+                    sample,
+                    column: columns.column,
+                    degrees: angle.to_degrees(),
+                }));
             }
             (0..3).for_each(|i| position[[sample, dof + i]] = delta[i]);
             before = Some(delta);

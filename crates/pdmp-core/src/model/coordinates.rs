@@ -111,13 +111,8 @@ impl Coordinates {
     }
 
     /// Returns the number of coordinates.
-    pub fn len(&self) -> usize {
+    pub fn n_coordinates(&self) -> usize {
         self.names.len()
-    }
-
-    /// Returns whether there are no coordinates, which is never the case.
-    pub fn is_empty(&self) -> bool {
-        self.names.is_empty()
     }
 
     /// Returns the names of the coordinates.
@@ -147,7 +142,7 @@ impl Coordinates {
 
     /// Checks a position: its length, numbers and the norms of its quaternions.
     pub(crate) fn check(&self, name: &'static str, position: &[f64]) -> Result<()> {
-        check_vector(name, position, self.len(), "coordinate")?;
+        check_vector(name, position, self.n_coordinates(), "coordinate")?;
         self.rotations.iter().try_for_each(|rotation| rotation.columns.unit(name, None, position).map(drop))
     }
 
@@ -173,9 +168,9 @@ impl Coordinates {
 
     /// Converts rows of DoFs at clock `u` to positions.
     pub(crate) fn positions(&self, u: f64, dofs: &Array2<f64>) -> Array2<f64> {
-        let mut positions = Array2::zeros((dofs.nrows(), self.len()));
+        let mut positions = Array2::zeros((dofs.nrows(), self.n_coordinates()));
         for (row, mut position) in dofs.rows().into_iter().zip(positions.rows_mut()) {
-            let mut to = vec![0.0; self.len()];
+            let mut to = vec![0.0; self.n_coordinates()];
             self.to_position(u, &row.to_vec(), &mut to);
             position.assign(&ndarray::aview1(&to));
         }
@@ -361,7 +356,7 @@ impl Coordinates {
     pub(crate) fn of_dofs(&self, conditions: Conditions) -> Conditions {
         let position = |u: f64, dofs: Option<Vec<f64>>| {
             dofs.map(|dofs| {
-                let mut position = vec![0.0; self.len()];
+                let mut position = vec![0.0; self.n_coordinates()];
                 self.to_position(u, &dofs, &mut position);
                 position
             })

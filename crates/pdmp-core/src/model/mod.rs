@@ -4,6 +4,7 @@ pub(crate) mod conditions;
 pub(crate) mod coordinates;
 pub(crate) mod file;
 pub(crate) mod finding;
+mod inside;
 pub(crate) mod prediction;
 pub(crate) mod primitive;
 pub(crate) mod responses;

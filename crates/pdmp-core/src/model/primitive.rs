@@ -1,6 +1,5 @@
 //! Primitives: the constants of a movement that rollouts and control loops need.
 
-use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -13,7 +12,6 @@ use crate::dynamics::time_warp::WarpingFunction;
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::model::conditions::Conditions;
 use crate::model::coordinates::Coordinates;
 use crate::model::responses::Cache;
 use crate::numerics::simd::{F64x4, WIDTH, groups};
@@ -72,7 +70,7 @@ pub struct Primitive {
     unit_states: Vec<State<F64x4>>,
     pub(crate) responses: Cache,
     /// Coordinates of a primitive with rotations.
-    coordinates: Option<Arc<Coordinates>>,
+    pub(crate) coordinates: Option<Arc<Coordinates>>,
 }
 
 /// Independent parts of a primitive, from which [`Primitive::new`] computes the others.
@@ -131,73 +129,6 @@ impl Primitive {
             responses,
             coordinates: None,
         }
-    }
-
-    /// Returns the primitive with coordinates that are not its degrees of freedom.
-    pub(crate) fn with_coordinates(self, coordinates: Coordinates) -> Self {
-        Self { coordinates: Some(Arc::new(coordinates)), ..self }
-    }
-
-    /// Returns the coordinates of a primitive with rotations; `None` where the coordinates are the degrees of freedom.
-    pub fn coordinates(&self) -> Option<&Coordinates> {
-        self.coordinates.as_deref()
-    }
-
-    /// Returns the primitive of the degrees of freedom, which is the primitive itself without rotations.
-    pub(crate) fn inside(self: &Arc<Self>) -> &Arc<Self> {
-        self.coordinates.as_ref().map_or(self, |coordinates| coordinates.dofs())
-    }
-
-    /// Returns the primitive of the degrees of freedom, and conditions for it.
-    pub(crate) fn inside_with<'a>(
-        self: &'a Arc<Self>,
-        conditions: &'a Conditions,
-    ) -> Result<(&'a Arc<Self>, Cow<'a, Conditions>)> {
-        match &self.coordinates {
-            Some(coordinates) => Ok((coordinates.dofs(), Cow::Owned(coordinates.constant_in_dofs(conditions)?))),
-            None => Ok((self, Cow::Borrowed(conditions))),
-        }
-    }
-
-    /// Returns the number of coordinates, the length of positions: the number of DoFs, and one more for each rotation.
-    pub fn n_coordinates(&self) -> usize {
-        self.names.len() + self.coordinates.as_ref().map_or(0, |coordinates| coordinates.rotations().len())
-    }
-
-    /// Returns the names of the coordinates.
-    pub fn coordinate_names(&self) -> &[String] {
-        self.coordinates.as_ref().map_or(&self.names, |coordinates| coordinates.names())
-    }
-
-    /// Returns the units of the coordinates; an unknown unit is "".
-    pub fn coordinate_units(&self) -> &[String] {
-        self.coordinates.as_ref().map_or(&self.units, |coordinates| coordinates.units())
-    }
-
-    /// Returns the owner of an element of a position, in an error text.
-    pub(crate) fn per_coordinate(&self) -> &'static str {
-        if self.coordinates.is_some() { "coordinate" } else { "DoF" }
-    }
-
-    /// Checks a position: its length and numbers, and the norms of quaternions.
-    pub(crate) fn check_position(&self, name: &'static str, position: &[f64]) -> Result<()> {
-        match &self.coordinates {
-            Some(coordinates) => coordinates.check(name, position),
-            None => check_vector(name, position, self.n_dofs(), "DoF"),
-        }
-    }
-
-    /// Refuses a primitive with rotations.
-    pub(crate) fn refuse_rotations(&self, problem: &'static str) -> Result<()> {
-        match self.coordinates {
-            Some(_) => Err(Error::Argument { name: "model", problem }),
-            None => Ok(()),
-        }
-    }
-
-    /// Returns the first DoF of each rotation.
-    pub(crate) fn rotation_dofs(&self) -> impl Iterator<Item = usize> + '_ {
-        self.coordinates.iter().flat_map(|coordinates| coordinates.rotations().iter().map(|rotation| rotation.dof))
     }
 
     /// Returns the kind of the movement.

@@ -251,7 +251,7 @@ impl Batch {
         let Some(coordinates) = primitive.coordinates() else { return };
         let (_, n_samples, n_dofs) = self.shape();
         let mut dofs = [(); 3].map(|()| Array3::zeros((1, n_samples, n_dofs)));
-        let mut moved = [vec![0.0; coordinates.len()], vec![0.0; n_dofs], vec![0.0; n_dofs]];
+        let mut moved = [vec![0.0; coordinates.n_coordinates()], vec![0.0; n_dofs], vec![0.0; n_dofs]];
         for (b, combination) in combinations.iter().enumerate() {
             for (derivative, dofs) in Derivative::ALL.into_iter().zip(&mut dofs).take(outputs.len()) {
                 let curves = self.responses.of(derivative);

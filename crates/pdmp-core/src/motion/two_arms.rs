@@ -19,7 +19,7 @@
 //! F. Caccavale, P. Chiacchio, S. Chiaverini, Task-space regulation of cooperative manipulators, Automatica 36, 2000.
 
 use crate::demonstration::MAX_NORM_DEVIATION;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, RotationError};
 use crate::numerics::rotation::{
     Quaternion, Vector, add_scaled, distance, dot, inverse, mean, normalised, on_side_of, product, rotate,
 };
@@ -105,7 +105,7 @@ impl TwoArms {
     fn halved(&self, name: &'static str, relative: Quaternion) -> Result<(Quaternion, Quaternion)> {
         let degrees = distance(self.reference, relative).to_degrees();
         if degrees > MAX_ANGLE {
-            return Err(Error::OppositeArms { name, degrees, relative });
+            return Err(Error::Rotation(RotationError::OppositeArms { name, degrees, relative }));
         }
         let relative = on_side_of(relative, self.reference);
         Ok((relative, normalised(add_scaled(relative, 1.0, [1.0, 0.0, 0.0, 0.0]))))
@@ -162,7 +162,7 @@ fn unit(name: &'static str, numbers: &[f64], column: usize) -> Result<Quaternion
     if (norm - 1.0).abs() <= MAX_NORM_DEVIATION {
         return Ok(q.map(|x| x / norm));
     }
-    Err(Error::Quaternion { name, row: None, column, norm })
+    Err(Error::Rotation(RotationError::Norm { name, row: None, column, norm }))
 }
 
 #[cfg(test)]

@@ -141,7 +141,7 @@ pub(crate) fn wobbles(n: usize, turns: f64, samples: usize) -> Vec<Array2<f64>> 
     (0..n).map(|_| one(std::array::from_fn(|_| random.between(-0.4, 0.4)))).collect()
 }
 
-/// The same poses in another world and with another tool frame, world ⊗ q ⊗ tool, and with random signs. Positions stay.
+/// Poses in another world and with another tool frame, world ⊗ q ⊗ tool, and with random signs. Positions stay.
 pub(crate) fn in_frames(poses: &Array2<f64>, world: Quaternion, tool: Quaternion, random: &mut Random) -> Array2<f64> {
     let (mut turned, column) = (poses.clone(), poses.ncols() - 4);
     for mut row in turned.rows_mut() {

@@ -393,13 +393,4 @@ impl Controller {
         }
         Ok(self.tick(dt, h))
     }
-
-    /// Sets the perturbation of a tick of `dt` seconds and `h` on the clock.
-    fn perturb(&mut self, command: &Command, dt: f64, h: f64) {
-        // The terms fade where the rate is below 1/max_tau, while the pull of a measurement is one on the clock.
-        let full = dt.min(h * self.max_tau);
-        if !self.perturb_pose(command, full, h) {
-            self.perturbation.set(command, &self.position, full, h, self.started);
-        }
-    }
 }

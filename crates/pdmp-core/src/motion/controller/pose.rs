@@ -40,7 +40,7 @@ impl Pose {
     /// Returns the memory for a primitive; `None` where its coordinates are its degrees of freedom.
     pub(super) fn of(coordinates: Option<&Coordinates>) -> Option<Box<Self>> {
         let coordinates = coordinates?;
-        let (n, n_dofs) = (coordinates.len(), coordinates.dofs().n_dofs());
+        let (n, n_dofs) = (coordinates.n_coordinates(), coordinates.dofs().n_dofs());
         let [velocity, acceleration, goal_velocity, command, measured, c_v, c_a] = [(); 7].map(|()| vec![0.0; n_dofs]);
         let [position, centre] = [(); 2].map(|()| vec![0.0; n]);
         let coupling = [c_v, c_a];
@@ -102,8 +102,17 @@ impl Controller {
         coordinates.relative_velocity(u, &conditions.centre, &mut conditions.goal_velocity);
     }
 
+    /// Sets the perturbation of a tick of `dt` seconds and `h` on the clock.
+    pub(super) fn perturb(&mut self, command: &Command, dt: f64, h: f64) {
+        // The terms fade where the rate is below 1/max_tau, while the pull of a measurement is one on the clock.
+        let full = dt.min(h * self.max_tau);
+        if !self.perturb_pose(command, full, h) {
+            self.perturbation.set(command, &self.position, full, h, self.started);
+        }
+    }
+
     /// Sets the perturbation of a tick by a command in coordinates; returns false for a primitive without rotations.
-    pub(super) fn perturb_pose(&mut self, command: &Command, full: f64, h: f64) -> bool {
+    fn perturb_pose(&mut self, command: &Command, full: f64, h: f64) -> bool {
         let Self { pose, primitive, position, clock, perturbation, started, .. } = self;
         let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return false };
         let (u, dofs) = (clock.value(), unpack(position, primitive.n_dofs()));

@@ -1,13 +1,15 @@
 //! Demonstrations: recorded movements whose shapes and numbers are checked.
 
+mod rotations;
+
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 use ndarray::{Array2, ArrayView2};
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::numerics::rotation::{Quaternion, dot, normalised, on_side_of};
+pub(crate) use rotations::MAX_NORM_DEVIATION;
+pub use rotations::{QuaternionOrder, RotationColumns};
+
 pub use crate::validate::MAX_MAGNITUDE;
 use crate::validate::{
     MAX_NAME_LENGTH, check_length, check_matrix, check_names, check_number, check_positive, check_time, check_vector,
@@ -31,69 +33,6 @@ pub enum Sampling {
         /// Strictly increasing time stamps, in seconds.
         time: Vec<f64>,
     },
-}
-
-/// Order of the components of a unit quaternion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum QuaternionOrder {
-    /// Scalar part first.
-    Wxyz,
-    /// Scalar part last.
-    Xyzw,
-}
-
-/// Four columns that are a unit quaternion, which rotates from the body frame to the world frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RotationColumns {
-    /// First of the four columns.
-    pub column: usize,
-    /// Order of the components.
-    pub order: QuaternionOrder,
-}
-
-/// Largest deviation of the norm of a quaternion from 1: rounding to three digits is mended, other data are not a rotation.
-pub(crate) const MAX_NORM_DEVIATION: f64 = 1e-3;
-
-impl RotationColumns {
-    /// Returns the quaternion [w, x, y, z] in a row of coordinates.
-    #[inline]
-    pub(crate) fn read(self, coordinates: &[f64]) -> Quaternion {
-        let [a, b, c, d] = std::array::from_fn(|i| coordinates[self.column + i]);
-        match self.order {
-            QuaternionOrder::Wxyz => [a, b, c, d],
-            QuaternionOrder::Xyzw => [d, a, b, c],
-        }
-    }
-
-    /// Writes a quaternion [w, x, y, z] to a row of coordinates.
-    #[inline]
-    pub(crate) fn write(self, [w, x, y, z]: Quaternion, coordinates: &mut [f64]) {
-        coordinates[self.column..self.column + 4].copy_from_slice(&match self.order {
-            QuaternionOrder::Wxyz => [w, x, y, z],
-            QuaternionOrder::Xyzw => [x, y, z, w],
-        });
-    }
-
-    /// Returns the columns of x, y and z.
-    pub(crate) fn vector_columns(self) -> [usize; 3] {
-        let first = self.column + usize::from(self.order == QuaternionOrder::Wxyz);
-        [first, first + 1, first + 2]
-    }
-
-    /// Returns the quaternion [w, x, y, z] of a row with its norm made 1.
-    ///
-    /// # Errors
-    /// A norm that deviates from 1 by more than 1e-3.
-    pub(crate) fn unit(self, name: &'static str, row: Option<usize>, coordinates: &[f64]) -> Result<Quaternion> {
-        let q = self.read(coordinates);
-        let norm = dot(q, q).sqrt();
-        if (norm - 1.0).abs() <= MAX_NORM_DEVIATION {
-            return Ok(q.map(|x| x / norm));
-        }
-        Err(Error::Quaternion { name, row, column: self.column, norm })
-    }
 }
 
 /// One value of a context.
@@ -205,68 +144,6 @@ impl Demonstration {
         self.unit_goal()
     }
 
-    /// Declares columns that are unit quaternions. Their norms become 1, and their signs continuous along time.
-    ///
-    /// ```
-    /// # use ndarray::Array2;
-    /// # use pdmp_core::{Demonstration, Sampling};
-    /// use pdmp_core::demonstration::{QuaternionOrder, RotationColumns};
-    ///
-    /// # fn main() -> pdmp_core::Result<()> {
-    /// // Height, and a turn about the vertical axis.
-    /// let position = Array2::from_shape_fn((50, 5), |(c, d)| match d {
-    ///     0 => c as f64 / 50.0,
-    ///     1 => (0.01 * c as f64).cos(),
-    ///     4 => (0.01 * c as f64).sin(),
-    ///     _ => 0.0,
-    /// });
-    /// let rotation = RotationColumns { column: 1, order: QuaternionOrder::Wxyz };
-    /// let demo = Demonstration::new(position, Sampling::Uniform { dt: 0.01 })?.with_rotations(vec![rotation])?;
-    /// assert_eq!((demo.n_coordinates(), demo.n_dofs()), (5, 4));
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// Columns that do not exist or overlap, or a quaternion in the positions or the goal whose norm deviates from 1 by more
-    /// than 1e-3.
-    pub fn with_rotations(mut self, mut rotations: Vec<RotationColumns>) -> Result<Self> {
-        rotations.sort_by_key(|rotation| rotation.column);
-        let n = self.n_coordinates();
-        if let Some(last) = rotations.last().filter(|last| last.column.saturating_add(4) > n) {
-            let allowed = "must leave room for the four columns of a quaternion";
-            return Err(Error::Range { name: "rotations", value: last.column as f64, allowed });
-        }
-        if let Some(pair) = rotations.windows(2).find(|pair| pair[0].column + 4 > pair[1].column) {
-            let allowed = "is a column of the rotation before it: each has four columns of its own";
-            return Err(Error::Range { name: "rotations", value: pair[1].column as f64, allowed });
-        }
-        for rotation in &rotations {
-            let mut before: Option<Quaternion> = None;
-            for (c, mut row) in self.position.rows_mut().into_iter().enumerate() {
-                let mut coordinates = row.to_vec();
-                let unit = rotation.unit("position", Some(c), &coordinates)?;
-                let q = before.map_or(unit, |before| on_side_of(unit, before));
-                rotation.write(q, &mut coordinates);
-                row.assign(&ndarray::aview1(&coordinates));
-                before = Some(q);
-            }
-        }
-        self.rotations = rotations;
-        self.unit_goal()
-    }
-
-    /// Makes the norms of the quaternions of the goal 1.
-    fn unit_goal(mut self) -> Result<Self> {
-        if let Some(goal) = &mut self.goal {
-            for rotation in &self.rotations {
-                let q = rotation.unit("goal", None, goal)?;
-                rotation.write(q, goal);
-            }
-        }
-        Ok(self)
-    }
-
     /// Returns the owner of one column in an error text.
     fn per(&self) -> &'static str {
         if self.rotations.is_empty() { "DoF" } else { "coordinate" }
@@ -304,30 +181,6 @@ impl Demonstration {
         }
         self.units = Some(units);
         Ok(self)
-    }
-
-    /// Returns the movement with other samples; goal, context, names, units and rotations are kept. Quaternions that were
-    /// interpolated or filtered by components are normalised.
-    ///
-    /// # Errors
-    /// As for [`Demonstration::new`], or a quaternion that is nearly zero.
-    pub(crate) fn sampled(&self, mut position: Array2<f64>, sampling: Sampling) -> Result<Self> {
-        /// Components whose signs are continuous have this norm between samples a third of a turn apart.
-        const MIN_NORM: f64 = 0.5;
-        for rotation in &self.rotations {
-            for (c, mut row) in position.rows_mut().into_iter().enumerate() {
-                let mut coordinates = row.to_vec();
-                let q = rotation.read(&coordinates);
-                let norm = dot(q, q).sqrt();
-                if !(norm > MIN_NORM) {
-                    return Err(Error::Quaternion { name: "position", row: Some(c), column: rotation.column, norm });
-                }
-                rotation.write(normalised(q), &mut coordinates);
-                row.assign(&ndarray::aview1(&coordinates));
-            }
-        }
-        let Self { goal, context, names, units, rotations, .. } = self.clone();
-        Ok(Self { goal, context, names, units, rotations, ..Self::new(position, sampling)? })
     }
 
     /// Returns a part of the movement, without the goal, which is the end of the whole.
@@ -376,16 +229,6 @@ impl Demonstration {
     /// Returns the number of samples T.
     pub fn n_samples(&self) -> usize {
         self.position.nrows()
-    }
-
-    /// Returns the columns of each rotation, whose components belong together.
-    pub(crate) fn quaternion_columns(&self) -> Vec<Range<usize>> {
-        self.rotations.iter().map(|rotation| rotation.column..rotation.column + 4).collect()
-    }
-
-    /// Returns the columns that are unit quaternions, in increasing order.
-    pub fn rotations(&self) -> &[RotationColumns] {
-        &self.rotations
     }
 
     /// Returns the number of coordinates, the columns of the positions.

@@ -1,0 +1,260 @@
+"""Unit quaternions as coordinates of a model."""
+
+import copy
+import io
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+
+import pdmp
+from pdmp.io import read_csv, write_csv
+
+ROTATIONS = {"qw": "wxyz"}
+NAMES = ["x", "y", "z", "qw", "qx", "qy", "qz"]
+
+
+def turn(axis: ArrayLike, angle: ArrayLike) -> NDArray[np.float64]:
+    """Returns the quaternions of turns about an axis."""
+    half = np.asarray(angle)[..., None] / 2
+    return np.concatenate([np.cos(half), np.sin(half) * np.asarray(axis)], axis=-1)
+
+
+def times(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns Hamilton products."""
+    w = a[..., 0] * b[..., 0] - np.sum(a[..., 1:] * b[..., 1:], axis=-1)
+    v = a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:])
+    return np.concatenate([w[..., None], v], axis=-1)
+
+
+def angles(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the angles between rotations."""
+    d = times(a * [1, -1, -1, -1], b)
+    return 2 * np.arctan2(np.linalg.norm(d[..., 1:], axis=-1), np.abs(d[..., 0]))
+
+
+def screw(style: float, n: int = 101) -> NDArray[np.float64]:
+    """Returns poses (n, 7) that turn by 200 degrees and swing by `style`."""
+    s = np.linspace(0.0, 1.0, n)
+    m = s**3 * (10 - 15 * s + 6 * s**2)
+    bump = np.sin(np.pi * s) ** 2
+    q = times(turn([0.6, 0.0, 0.8], 3.5 * m), turn([0.0, 1.0, 0.0], style * bump))
+    return np.column_stack([0.3 * m, style * bump, 0.1 * m, q])
+
+
+def demonstrations() -> list[pdmp.Demonstration]:
+    """Returns demonstrations of one style, which is their context."""
+    return [
+        pdmp.Demonstration(screw(style), dt=0.01, names=NAMES, rotations=ROTATIONS, context=[style])
+        for style in (-0.4, -0.1, 0.2, 0.5)
+    ]
+
+
+@pytest.fixture(scope="module")
+def model() -> pdmp.Model:
+    """Returns a model of four screws."""
+    return pdmp.fit(demonstrations(), n_styles=3)
+
+
+def test_positions_have_coordinates_and_velocities_degrees_of_freedom(model: pdmp.Model) -> None:
+    """Positions have a column per coordinate, velocities and accelerations one per DoF."""
+    assert (model.n_coordinates, model.n_dofs, model.rotations) == (7, 6, {3: "wxyz"})
+    assert model.coordinate_names == NAMES
+    assert model.names == ["x", "y", "z", "qx_rot", "qy_rot", "qz_rot"]
+    assert model.units[-1] == "rad" and len(model.coordinate_units) == 7
+    trajectory = model.rollout(model.conditions(1))
+    assert (trajectory.position.shape, trajectory.velocity.shape) == ((101, 7), (101, 6))
+    assert (trajectory.names, trajectory.dof_names) == (NAMES, model.names)
+    assert model.goals.shape == model.starts.shape == model.anchors.shape == (4, 7)
+    assert angles(trajectory.position[:, 3:], screw(-0.1)[:, 3:]).max() < 1e-4
+    controller = model.controller()
+    controller.step()
+    sizes = (controller.position.size, controller.velocity.size, controller.goal.size)
+    assert sizes == (7, 6, 7)
+
+
+def test_columns_are_given_by_index_or_name() -> None:
+    """The first column of a quaternion is given by its index or its name."""
+    poses = screw(0.2)
+    by_name = pdmp.Demonstration(poses, dt=0.01, names=NAMES, rotations={"qw": "wxyz"})
+    by_index = pdmp.Demonstration(poses, dt=0.01, rotations={3: "wxyz"})
+    assert by_name.rotations == by_index.rotations == {3: "wxyz"}
+    assert (by_name.n_coordinates, by_name.n_dofs) == (7, 6)
+    assert pickle.loads(pickle.dumps(by_name)).rotations == {3: "wxyz"}
+    assert pdmp.Demonstration(poses, dt=0.01).rotations == {}
+
+
+def test_signs_become_continuous_and_norms_one() -> None:
+    """Random signs and small errors of norms are mended without a change of the rotations."""
+    poses, rng = screw(0.2), np.random.default_rng(1)
+    shaken = poses.copy()
+    shaken[:, 3:] *= np.where(rng.random(101) < 0.5, -1, 1)[:, None] * rng.uniform(0.9995, 1.0005)
+    mended = pdmp.Demonstration(shaken, dt=0.01, rotations={3: "wxyz"}).position[:, 3:]
+    np.testing.assert_allclose(np.linalg.norm(mended, axis=1), 1.0, rtol=1e-15)
+    assert np.sum(mended[1:] * mended[:-1], axis=1).min() > 0.99
+    assert angles(mended, poses[:, 3:]).max() < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"rotations": {3: "wxyz"}, "scale": 1.01}, r"position\[0, 3:7\] has norm 1.01"),
+        ({"rotations": {3: "wxyz"}, "scale": 0.0}, r"position\[0, 3:7\] has norm 0"),
+        ({"rotations": {4: "wxyz"}}, "must leave room for the four columns"),
+        ({"rotations": {-1: "wxyz"}}, "rotations"),
+        ({"rotations": {3: "xyz"}}, 'the order must be "wxyz" or "xyzw"'),
+        ({"rotations": {"q": "wxyz"}}, "no column named"),
+        ({"rotations": ["wxyz"]}, "must map the first column"),
+        ({"rotations": {3: "wxyz"}, "goal": np.zeros(7)}, r"goal\[3:7\] has norm 0"),
+        ({"rotations": {3: "wxyz"}, "goal": np.zeros(6)}, "one value per coordinate"),
+    ],
+)
+def test_bad_rotations_are_refused(change: dict[str, Any], message: str) -> None:
+    """Columns, orders and norms that are wrong are refused with the numbers."""
+    change = dict(change)
+    poses = screw(0.2)
+    poses[:, 3:] *= change.pop("scale", 1.0)
+    with pytest.raises(ValueError, match=message):
+        pdmp.Demonstration(poses, dt=0.01, **change)
+
+
+def test_undeclared_quaternions_are_reported() -> None:
+    """Columns of unit norm that are not declared as a rotation are reported."""
+    with pytest.warns(UserWarning, match=r'rotations=\{3: "wxyz"\}'):
+        pdmp.fit([screw(0.1), screw(0.3)], dt=0.01)
+
+
+def test_commands_in_the_wrong_shape_are_refused(model: pdmp.Model) -> None:
+    """Vectors of a wrong length or norm, and calls that rotations do not support, are refused."""
+    controller = model.controller()
+    goal = model.goals[0]
+    for bad, message in ((goal[:6], "coordinate"), (2 * goal, "norm 2")):
+        with pytest.raises(ValueError, match=message):
+            controller.goal = bad
+        with pytest.raises(ValueError, match=message):
+            controller.step(measured=bad)
+        with pytest.raises(ValueError, match=message):
+            model.rollout(start=bad)
+        with pytest.raises(ValueError, match=message):
+            model.rollouts(goal=np.stack([bad, bad]))
+    with pytest.raises(ValueError, match="one value per DoF"):
+        model.rollout(velocity=np.zeros(7))
+    with pytest.raises(ValueError, match="a rotation has no limits"):
+        model.controller(limits=pdmp.Limits(velocity=1.0))
+    with pytest.raises(ValueError, match="bands do not exist"):
+        model.band([0.1])
+    with pytest.raises(ValueError, match="Jacobians of angular velocities"):
+        model.jacobian("style", derivative=1)
+    with pytest.raises(ValueError, match="time_scaling must be linear"):
+        pdmp.fit(demonstrations(), alignment="warp")
+
+
+def test_contexts_predict_rotations(model: pdmp.Model) -> None:
+    """A context predicts the rotations of its movement, singly and in batches."""
+    trajectory = model.rollout(context=[0.35])
+    assert angles(trajectory.position[:, 3:], screw(0.35)[:, 3:]).max() < 0.02
+    batch = model.rollouts(context=[[0.1], [0.35]])[0]
+    np.testing.assert_allclose(batch[1], trajectory.position, atol=1e-9)
+
+
+def test_goal_is_reached_by_any_rotation(model: pdmp.Model) -> None:
+    """A goal that turns while the movement is under way is reached without a jump of velocity."""
+    controller = model.controller(0.01)
+    for k in range(400):
+        if k == 30:
+            goal = controller.goal
+            controller.goal = np.concatenate([goal[:3], times(goal[3:], turn([0, 0, 1], 2.0))])
+        before = controller.velocity.copy()
+        controller.step()
+        assert np.abs(controller.velocity - before).max() < 0.5
+    assert controller.status is pdmp.Status.FINISHED
+    assert angles(controller.position[3:], controller.goal[3:]) < 0.02
+
+
+def test_world_frame_turns_angular_velocities(model: pdmp.Model) -> None:
+    """Angular velocities in the world frame are those of the body frame, rotated."""
+    world = model.in_frame("world")
+    assert (model.rotation_frame, world.rotation_frame) == ("body", "world")
+    own, other = model.rollout(), world.rollout()
+    np.testing.assert_array_equal(own.position, other.position)
+    q, omega = own.position[:, 3:], np.pad(own.velocity[:, 3:], ((0, 0), (1, 0)))
+    turned = times(times(q, omega), q * [1, -1, -1, -1])[:, 1:]
+    np.testing.assert_allclose(other.velocity[:, 3:], turned, atol=1e-12)
+    fitted = pdmp.fit(demonstrations(), n_styles=3, rotation_frame="world")
+    np.testing.assert_allclose(fitted.rollout().velocity, other.velocity, atol=1e-12)
+    with pytest.raises(ValueError, match='must be "body" or "world"'):
+        model.in_frame("tool")
+    with pytest.raises(ValueError, match="no rotations"):
+        pdmp.fit([screw(0.1)[:, :3]], dt=0.01).in_frame("world")
+
+
+def test_models_controllers_and_trajectories_survive_copies(
+    model: pdmp.Model, tmp_path: Path
+) -> None:
+    """Files, pickles and copies keep rotations and move alike."""
+    model.save(tmp_path / "pose.safetensors")
+    same = pdmp.load(tmp_path / "pose.safetensors")
+    trajectory = model.rollout()
+    np.testing.assert_array_equal(same.rollout().velocity, trajectory.velocity)
+    assert (same.rotations, same.coordinate_names) == (model.rotations, NAMES)
+    controller = model.controller(0.01)
+    for _ in range(40):
+        controller.step()
+    for other in (pickle.loads(pickle.dumps(controller)), copy.copy(controller)):
+        np.testing.assert_array_equal(other.position, controller.position)
+        np.testing.assert_array_equal(other.velocity, controller.velocity)
+    again = pickle.loads(pickle.dumps(trajectory))
+    assert (again.rotations, again.dof_names) == (trajectory.rotations, trajectory.dof_names)
+    demo = pdmp.Demonstration(trajectory)
+    assert (demo.rotations, demo.n_dofs) == ({3: "wxyz"}, 6)
+    refitted = pdmp.fit([trajectory])
+    assert angles(refitted.rollout().position[:, 3:], trajectory.position[:, 3:]).max() < 1e-3
+
+
+def test_trajectories_are_tables_of_coordinates_and_degrees_of_freedom(
+    model: pdmp.Model, tmp_path: Path
+) -> None:
+    """Tables have coordinates as positions and DoFs as derivatives, and are read back."""
+    trajectory = model.rollout()
+    write_csv(tmp_path / "pose.csv", trajectory)
+    header = (tmp_path / "pose.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert header[1:8] == NAMES and len(header) == 1 + 7 + 6 + 6
+    assert "qx_rot_velocity [rad/s]" in header
+    read = read_csv(tmp_path / "pose.csv")
+    assert read.position.shape == (101, 7)
+    frame = pytest.importorskip("pandas") and trajectory.to_dataframe()
+    assert list(frame.columns[:7]) == NAMES and frame.shape == (101, 19)
+
+
+def test_summaries_and_plots_name_the_coordinates(model: pdmp.Model) -> None:
+    """Texts name the DoFs, plots of positions the coordinates."""
+    assert "qx_rot [rad]" in repr(model) and "6 DoFs" in repr(demonstrations()[0])
+    plot = pytest.importorskip("pdmp.plot")
+    pytest.importorskip("matplotlib")
+    figure = plot.demonstrations(model, demonstrations())
+    figure.savefig(io.BytesIO())
+    assert "qw" in {axes.get_ylabel() for axes in figure.axes}
+
+
+def test_preprocessing_keeps_unit_quaternions() -> None:
+    """Resampled quaternions have norm one and follow the rotation."""
+    demo = pdmp.Demonstration(screw(0.3, 301), dt=0.005, rotations={3: "wxyz"})
+    fine = pdmp.preprocessing.resample(demo, dt=0.0021)
+    assert fine.rotations == {3: "wxyz"}
+    q = fine.position[:, 3:]
+    np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, rtol=1e-14)
+    exact = screw(0.3, 100001)[:, 3:]
+    times_of = np.arange(len(q)) * 0.0021
+    assert angles(q, exact[np.rint(times_of / 1.5 * 100000).astype(int)]).max() < 1e-4
+    assert pdmp.preprocessing.unwrap(demo).rotations == {3: "wxyz"}
+    with pytest.raises(ValueError, match="cycles are not found"):
+        pdmp.preprocessing.cycles([demo])
+
+
+def test_evaluation_refuses_rotations() -> None:
+    """Predictions of rotations are not compared."""
+    with pytest.raises(ValueError, match="has rotations"):
+        pdmp.evaluation.evaluate(demonstrations(), contexts=[[-0.4], [-0.1], [0.2], [0.5]])
