@@ -29,8 +29,8 @@ mod regression;
 mod rotations;
 mod scalar;
 mod status;
-mod two_arms;
 mod trajectory;
+mod two_arms;
 mod warp;
 
 use pyo3::prelude::*;
