@@ -61,8 +61,8 @@ class Robot(TorqueControlled):
     def __init__(self, start: ArrayLike, task: Task | None = None, n_boxes: int = 0) -> None:
         sides = ("right", "left")[: np.size(start) // len(JOINTS)]
         specified = specification()
-        _add_lights(specified)
-        _disable_torso_contacts(specified)
+        add_lights(specified)
+        disable_torso_contacts(specified)
         if task is not None:
             _add_table_and_boxes(specified, task, n_boxes)
         resting = {
@@ -115,7 +115,7 @@ def _add_table_and_boxes(specified: Any, task: Task, n_boxes: int) -> None:
         body.add_geom(type=box, size=0.5 * BOX, mass=BOX_MASS, rgba=SHADES[k % 2], group=1)
 
 
-def _disable_torso_contacts(specified: Any) -> None:
+def disable_torso_contacts(specified: Any) -> None:
     """Disables contacts between the upper arms and the convex hull of the torso.
 
     Lowered arms are inside the hull although five centimetres from the surface of the torso.
@@ -124,7 +124,7 @@ def _disable_torso_contacts(specified: Any) -> None:
         specified.add_exclude(bodyname1="torso", bodyname2=f"{side}_{part}")
 
 
-def _add_lights(specified: Any) -> None:
+def add_lights(specified: Any) -> None:
     """Adds two lights and a white background."""
     mujoco = engine()
     sky = specified.add_texture(type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=16, height=96)

@@ -39,7 +39,14 @@ class TorqueControlled:
         Initial angles of other joints, which stay there [rad].
     signs : (D,) array_like
         Signs of the angles of joints in those of the model.
+
+    Attributes
+    ----------
+    stiffness, damping : float
+        Gains of the feedback, per s² and per s.
     """
+
+    stiffness, damping = STIFFNESS, DAMPING
 
     def __init__(
         self,
@@ -90,8 +97,8 @@ class TorqueControlled:
         rate[self._moved] = self._signs * velocity
         acceleration_command[self._moved] = self._signs * acceleration
         driven = self._driven
-        acceleration_command[driven] += STIFFNESS * (target - data.qpos[driven])
-        acceleration_command[driven] += DAMPING * (rate[driven] - data.qvel[driven])
+        acceleration_command[driven] += self.stiffness * (target - data.qpos[driven])
+        acceleration_command[driven] += self.damping * (rate[driven] - data.qvel[driven])
         torque = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, torque, acceleration_command)
         wanted = (torque + data.qfrc_bias)[driven]

@@ -5,13 +5,14 @@ import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-from peers import factors, imitation, limits, regression, rollouts, steps
+from peers import factors, imitation, limits, poses, regression, rollouts, steps
 from peers.timing import Task, machine, ratio, run, written
 
 PACKAGES = [
     "pdmp",
     "movement_primitives",
     "pydmps",
+    "pytransform3d",
     "ruckig",
     "klimits",
     "toppra",
@@ -48,6 +49,8 @@ def main() -> None:
     """Prints libraries and machine, a table per task, and one of all ratios."""
     print(f"{machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     print(", ".join(installed(package) for package in PACKAGES))
+    poses.reproduction()
+    poses.rigidity()
     gc.disable()
     results = []
     for task in [
@@ -57,6 +60,7 @@ def main() -> None:
         *imitation.TASKS,
         *regression.TASKS,
         *factors.TASKS,
+        *poses.TASKS,
     ]:
         gc.collect()
         results.append((task, run(task)))

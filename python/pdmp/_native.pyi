@@ -48,18 +48,21 @@ __all__ = [
     "TimeWarp",
     "Trajectory",
     "__version__",
+    "absolute_relative",
     "blend",
-    "split_at",
     "cycles",
     "factorise",
     "fill_gaps",
     "fit",
     "inspected",
+    "left_right",
     "load",
     "lowpass",
+    "mean_pose",
     "period",
     "resample",
     "residuals",
+    "split_at",
     "trim",
     "turn_of",
 ]
@@ -2558,3 +2561,109 @@ class NGnetRegression:
         ValueError
             A clock value is not finite.
         """
+
+def absolute_relative(
+    left: ArrayLike,  # (..., 7)
+    right: ArrayLike,  # (..., 7)
+    *,
+    reference: ArrayLike | None = None,  # (4,)
+) -> tuple[_Array, _Array]:
+    """Converts the poses of two arms to an absolute and a relative pose.
+
+    With positions p and unit quaternions q of the left and the right arm::
+
+        r = inverse(q_left) * q_right          h = (1 + r) / |1 + r|, half of this rotation
+        absolute:  (p_left + p_right) / 2      q_left * h
+        relative:  R(q_absolute).T @ (p_right - p_left)      r
+
+    The absolute rotation is the midpoint of the geodesic between both arms. The pose of the right arm in the frame of the
+    left one depends on the relative pose alone: a primitive of absolute and relative pose, whose demonstrations have one
+    relative pose, keeps a rigid object between the arms for any style, goal and tau. Where the recorded relative poses vary
+    by noise, replace them by `mean_pose` of them before the fit. For compliance of the absolute pose alone, pass the
+    commanded relative pose as the measured one.
+
+    The quaternions r and -r are the same rotation, with midpoints that differ by half a turn about its axis. The sign is that
+    on the side of `reference`. The default is the shorter geodesic, which is undefined where the arms are half a turn
+    apart, as grippers that face each other are: pass a relative rotation of the task there, in both directions of the
+    conversion.
+
+    Parameters
+    ----------
+    left, right : array_like, (..., 7)
+        Poses x, y, z, qw, qx, qy, qz: position, and unit quaternion from the frame of the arm to the world frame. One pose
+        (7,) serves for each of the other arm.
+    reference : array_like, (4,), optional
+        Rotation inverse(q_left) * q_right as qw, qx, qy, qz, of either sign; by default the identity.
+
+    Returns
+    -------
+    absolute, relative : ndarray, (..., 7)
+        The inverse is `left_right`.
+
+    Raises
+    ------
+    ValueError
+        Shapes that differ, a number that is not finite, a quaternion whose norm deviates from 1 by more than 1e-3, or a
+        relative rotation of more than 175 degrees from the reference.
+
+    Examples
+    --------
+    >>> left, right = [0.5, 0.2, 0.3, 1, 0, 0, 0], [0.5, -0.2, 0.3, 0, 0, 0, 1]
+    >>> absolute, relative = pdmp.robots.absolute_relative(left, right, reference=[0, 0, 0, 1])
+    >>> absolute.round(3).tolist(), relative.round(3).tolist()
+    ([0.5, 0.0, 0.3, 0.707, 0.0, 0.0, 0.707], [-0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    """
+
+def left_right(
+    absolute: ArrayLike,  # (..., 7)
+    relative: ArrayLike,  # (..., 7)
+    *,
+    reference: ArrayLike | None = None,  # (4,)
+) -> tuple[_Array, _Array]:
+    """Converts an absolute and a relative pose to the poses of two arms.
+
+    The inverse of `absolute_relative`, exact to rounding with the same reference::
+
+        p_left, p_right = p_absolute -/+ R(q_absolute) @ p_relative / 2
+        q_left, q_right = q_absolute * inverse(h), q_absolute * h         h * h = q_relative
+
+    Parameters
+    ----------
+    absolute, relative : array_like, (..., 7)
+        Poses x, y, z, qw, qx, qy, qz as from `absolute_relative`, with quaternions of either sign. One pose (7,) serves for
+        each of the other argument.
+    reference : array_like, (4,), optional
+        Reference of `absolute_relative`.
+
+    Returns
+    -------
+    left, right : ndarray, (..., 7)
+        Poses of the arms.
+
+    Raises
+    ------
+    ValueError
+        As for `absolute_relative`.
+    """
+
+def mean_pose(poses: ArrayLike) -> _Array:  # (..., 7)
+    """Computes the mean of poses.
+
+    The position is the arithmetic mean, the rotation the Karcher mean, about which the rotation vectors add up to zero.
+
+    Parameters
+    ----------
+    poses : array_like, (..., 7)
+        Poses x, y, z, qw, qx, qy, qz, such as the relative poses of all demonstrations one after the other.
+
+    Returns
+    -------
+    ndarray, (7,)
+        Mean pose.
+
+    Raises
+    ------
+    ValueError
+        No pose, a number that is not finite, a quaternion whose norm deviates from 1 by more than 1e-3, or a rotation of more
+        than 90 degrees from the mean.
+    """

@@ -153,8 +153,12 @@ fn timing(model: &pdmp_core::Model) -> String {
 /// Returns the largest measurement noise relative to the range of its degree of freedom, with that share.
 fn largest_noise(model: &pdmp_core::Model) -> Option<(String, String)> {
     let levels = model.learnt().noise.levels();
-    let share = |d: usize| levels[d] / model.ranges()[d].max(f64::MIN_POSITIVE);
-    let d = (0..model.n_dofs()).max_by(|&a, &b| share(a).total_cmp(&share(b))).filter(|&d| share(d) > 0.0)?;
+    let ranges = model.ranges();
+    let largest = ranges.iter().fold(0.0f64, |most, range| most.max(*range));
+    let share = |d: usize| levels[d] / ranges[d].max(f64::MIN_POSITIVE);
+    // The range of a constant is that of its rounding errors.
+    let moving = (0..model.n_dofs()).filter(|&d| ranges[d] > 1e-12 * largest);
+    let d = moving.max_by(|&a, &b| share(a).total_cmp(&share(b))).filter(|&d| share(d) > 0.0)?;
     let (name, unit) = (&model.names()[d], &model.units()[d]);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     Some((format!("{:.2e}{unit}", levels[d]), format!("{:.2} % of the range, in {name}", 100.0 * share(d))))

@@ -30,6 +30,7 @@ mod rotations;
 mod scalar;
 mod status;
 mod trajectory;
+mod two_arms;
 mod warp;
 
 use pyo3::prelude::*;
@@ -73,5 +74,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(preprocessing::period, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::fill_gaps, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::cycles, module)?)?;
+    module.add_function(wrap_pyfunction!(two_arms::absolute_relative, module)?)?;
+    module.add_function(wrap_pyfunction!(two_arms::left_right, module)?)?;
+    module.add_function(wrap_pyfunction!(two_arms::mean_pose, module)?)?;
     Ok(())
 }

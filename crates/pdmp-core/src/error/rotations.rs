@@ -35,13 +35,26 @@ pub enum RotationError {
         /// Distance from the mean rotation, in degrees.
         degrees: f64,
     },
+    /// A relative rotation of two arms that is about half a turn from its reference, where the midpoint is undefined.
+    #[error(
+        "{name}: the relative rotation of the arms is {degrees:.0} degrees from the reference, more than 175: the midpoint of \
+         their orientations is undefined at half a turn; pass a reference near {relative:.3?}"
+    )]
+    OppositeArms {
+        /// The argument.
+        name: &'static str,
+        /// Angle from the reference, in degrees.
+        degrees: f64,
+        /// The relative rotation, a unit quaternion w, x, y, z.
+        relative: [f64; 4],
+    },
 }
 
 impl RotationError {
     /// Returns the caller's next step.
     pub(super) fn next_step(&self) -> ErrorKind {
         match self {
-            Self::Norm { row: None, .. } => ErrorKind::Argument,
+            Self::Norm { row: None, .. } | Self::OppositeArms { .. } => ErrorKind::Argument,
             Self::Norm { .. } | Self::HalfTurn { .. } => ErrorKind::Data,
         }
     }
@@ -49,7 +62,7 @@ impl RotationError {
     /// Returns the argument at fault.
     pub(super) fn at_fault(&self) -> &str {
         match self {
-            Self::Norm { name, .. } => name,
+            Self::Norm { name, .. } | Self::OppositeArms { name, .. } => name,
             Self::HalfTurn { .. } => "position",
         }
     }

@@ -10,7 +10,7 @@ use crate::dynamics::canonical::Canonical;
 use crate::dynamics::mean_rotation::{MeanRotation, end_motion};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::numerics::rotation::{Quaternion, add_scaled, distance, dot, exp, inverse, log, normalised, product};
+use crate::numerics::rotation::{self, Quaternion, add_scaled, distance, dot, exp, normalised, product};
 use crate::numerics::smoothing_spline::{MIN_DECIMATED, Noise, Samples, Smoothing, pooled};
 use crate::numerics::spline::{Knots, Splines};
 use crate::numerics::threads::Threads;
@@ -18,10 +18,6 @@ use ndarray::Array2;
 
 /// Largest number of demonstrations in the mean. It is the origin of the residuals, which describe each demonstration.
 const MAX_AVERAGED: usize = 200;
-/// Largest number of iterations of a mean; its residuals halve at least twice each in practice.
-const MAX_ITERATIONS: usize = 100;
-/// Change of the mean in rad that ends the iteration.
-const CONVERGED: f64 = 1e-15;
 /// Shares of the path before its end over which the velocity and the acceleration of a mean rotation that does not end at
 /// rest fade. The residuals take up the difference, 0.02 of the velocity at most, which shorter shares would make smaller but
 /// sharper. Most recordings end at rest with some acceleration, for which the second share is short.
@@ -85,7 +81,7 @@ pub(super) fn mean_path(
     let mut mean = first_mean(&paths);
     let mut rotations: Vec<Quaternion> = (0..=parts)
         .map(|k| {
-            mean = karcher(mean, paths.iter().map(|path| path[k]));
+            mean = rotation::mean(mean, paths.iter().map(|path| path[k]));
             mean
         })
         .collect();
@@ -119,20 +115,6 @@ fn first_mean(paths: &[Vec<Quaternion>]) -> Quaternion {
     let spread = |path: &&Vec<Quaternion>| paths.iter().map(|other| distance(path[0], other[0]).powi(2)).sum::<f64>();
     let closest = paths.iter().min_by(|a, b| spread(a).total_cmp(&spread(b)));
     closest.map_or([1.0, 0.0, 0.0, 0.0], |path| path[0])
-}
-
-/// Returns the mean of rotations, the closest to `start`.
-fn karcher(start: Quaternion, rotations: impl ExactSizeIterator<Item = Quaternion> + Clone) -> Quaternion {
-    let (mut mean, weight) = (start, 1.0 / rotations.len() as f64);
-    for _ in 0..MAX_ITERATIONS {
-        let residuals = rotations.clone().map(|q| log(product(inverse(mean), q)));
-        let step = residuals.fold([0.0; 3], |sum, residual| add_scaled(sum, weight, residual));
-        mean = normalised(product(mean, exp(step)));
-        if dot(step, step) <= CONVERGED * CONVERGED {
-            break;
-        }
-    }
-    mean
 }
 
 /// Returns the cut-off in Hz of the noise of quaternion components; `None` without noise.
@@ -170,20 +152,6 @@ fn slow_down(rotations: &mut [Quaternion]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The residuals about the mean add up to zero, from any start and for any signs.
-    #[test]
-    fn residuals_about_the_mean_add_up_to_zero() {
-        let base = exp([0.4, -1.0, 2.0]);
-        let spread = [[0.5, 0.2, -0.1], [-0.7, 0.4, 0.3], [0.1, -0.9, 0.2], [1.2, 0.3, -0.5]];
-        let rotations: Vec<Quaternion> = spread.iter().map(|&delta| product(base, exp(delta))).collect();
-        let signed = rotations.iter().enumerate().map(|(m, q)| if m % 2 == 0 { *q } else { q.map(|x| -x) });
-        let mean = karcher(rotations[3], signed);
-        let residuals = rotations.iter().map(|q| log(product(inverse(mean), *q)));
-        let sum = residuals.fold([0.0; 3], |sum, residual| add_scaled(sum, 1.0, residual));
-        assert!(dot(sum, sum).sqrt() < 1e-14, "{sum:?}");
-        assert!(distance(mean, karcher(rotations[0], rotations.iter().copied())) < 1e-14);
-    }
 
     /// The end of a slowed path is where it was, at rest; the path before the slowed share is unchanged.
     #[test]

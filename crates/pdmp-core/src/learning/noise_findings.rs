@@ -8,6 +8,10 @@ use crate::numerics::smoothing_spline::Noise;
 /// Smallest reported noise as a share of the range. Smoothing then removes details of up to a tenth of the movement.
 const MIN_NOISE_SHARE: f64 = 0.05;
 
+/// Smallest range, as a share of the largest one, of a degree of freedom that is not at rest. The range of a constant, such as
+/// the relative pose of arms that hold an object, is that of its rounding errors.
+const MIN_RANGE_SHARE: f64 = 1e-12;
+
 /// Smallest ratio of the largest range to a range that counts as small.
 const MIN_RANGE_RATIO: f64 = 10.0;
 
@@ -19,12 +23,14 @@ const MIN_SIGNAL_TO_NOISE: f64 = 20.0;
 
 /// Returns a finding for each degree of freedom whose noise is large relative to its range.
 pub(super) fn noisy(noise: &Noise, ranges: &[f64], names: &[String]) -> Vec<Finding> {
+    let largest = ranges.iter().fold(0.0f64, |most, range| most.max(*range));
     let levels = noise.levels().iter().zip(noise.cut_offs()).zip(ranges.iter().zip(names));
     let findings = levels.filter_map(|((&level, cut_off), (&range, name))| {
         let share = level / range.max(f64::MIN_POSITIVE);
         // The smoothed range of a joint at rest is below its noise.
         let (dof, cut_off) = (name.clone(), (*cut_off)?);
-        (share > MIN_NOISE_SHARE && range > level).then_some(Finding::Noisy { dof, level, share, cut_off })
+        let moves = range > level && range > MIN_RANGE_SHARE * largest;
+        (share > MIN_NOISE_SHARE && moves).then_some(Finding::Noisy { dof, level, share, cut_off })
     });
     findings.collect()
 }

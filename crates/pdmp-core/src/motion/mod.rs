@@ -16,6 +16,7 @@ pub(crate) mod stopping;
 pub(crate) mod superposition;
 pub(crate) mod time_law;
 pub(crate) mod trajectory;
+mod two_arms;
 pub(crate) mod unit_responses;
 pub(crate) mod viability;
 
@@ -33,3 +34,4 @@ pub use perturbation::Compliance;
 pub use prediction_band::{PredictionBand, prediction_band};
 pub use rollout::{TimeGrid, rollout, rollout_with};
 pub use trajectory::{Trajectories, Trajectory};
+pub use two_arms::{Pose, TwoArms, mean_pose};

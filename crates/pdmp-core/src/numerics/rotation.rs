@@ -31,6 +31,10 @@ const MAX_SHORT_SQUARE: f64 = 0.75;
 const N_TERMS: usize = 12;
 /// Angle below which the axis of a rotation is unknown.
 const MIN_ANGLE: f64 = 1e-12;
+/// Largest number of iterations of a mean; its residuals halve at least twice each in practice.
+const MAX_MEAN_ITERATIONS: usize = 100;
+/// Change of the mean in rad that ends the iteration.
+const MEAN_CONVERGED: f64 = 1e-15;
 /// Largest angle for the inverse Jacobian, which is at most 3.4 there, and singular at 2π.
 const MAX_INVERTIBLE: f64 = 1.5 * PI;
 
@@ -193,6 +197,20 @@ pub(crate) fn log(q: Quaternion) -> Vector {
 pub(crate) fn distance(a: Quaternion, b: Quaternion) -> f64 {
     let delta = log(product(inverse(a), b));
     dot(delta, delta).sqrt()
+}
+
+/// Returns the Karcher mean of rotations that is closest to `start`: the residuals log(q̄⁻¹q_m) about it add up to zero.
+pub(crate) fn mean(start: Quaternion, rotations: impl ExactSizeIterator<Item = Quaternion> + Clone) -> Quaternion {
+    let (mut mean, weight) = (start, 1.0 / rotations.len() as f64);
+    for _ in 0..MAX_MEAN_ITERATIONS {
+        let residuals = rotations.clone().map(|q| log(product(inverse(mean), q)));
+        let step = residuals.fold([0.0; 3], |sum, residual| add_scaled(sum, weight, residual));
+        mean = normalised(product(mean, exp(step)));
+        if dot(step, step) <= MEAN_CONVERGED * MEAN_CONVERGED {
+            break;
+        }
+    }
+    mean
 }
 
 /// Returns the rotation vector of a unit quaternion that is closest to a reference: that of [`log`], or one with whole
@@ -379,6 +397,20 @@ mod tests {
             let changed = add_scaled(after.velocity, -1.0, before.velocity).map(|x| x / (2.0 * h));
             prop_assert!(close(changed, now.acceleration, 1e-5), "{changed:?} {:?}", now.acceleration);
         }
+    }
+
+    /// The residuals about the mean add up to zero, from any start and for any signs.
+    #[test]
+    fn residuals_about_the_mean_add_up_to_zero() {
+        let base = exp([0.4, -1.0, 2.0]);
+        let spread = [[0.5, 0.2, -0.1], [-0.7, 0.4, 0.3], [0.1, -0.9, 0.2], [1.2, 0.3, -0.5]];
+        let rotations: Vec<Quaternion> = spread.iter().map(|&delta| product(base, exp(delta))).collect();
+        let signed = rotations.iter().enumerate().map(|(m, q)| if m % 2 == 0 { *q } else { q.map(|x| -x) });
+        let centre = mean(rotations[3], signed);
+        let residuals = rotations.iter().map(|q| log(product(inverse(centre), *q)));
+        let sum = residuals.fold([0.0; 3], |sum, residual| add_scaled(sum, 1.0, residual));
+        assert!(dot(sum, sum).sqrt() < 1e-14, "{sum:?}");
+        assert!(distance(centre, mean(rotations[0], rotations.iter().copied())) < 1e-14);
     }
 
     /// Series and closed forms agree where one takes over from the other.

@@ -1,0 +1,1 @@
+"""Primitives of poses on two simulated robots; see `__main__`."""
