@@ -4,9 +4,10 @@ use super::group::{ForcingSample, Gate, Group, add_frame_motion};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum, amplitude, faded};
 use crate::dynamics::forcing_table::Fade;
-use crate::dynamics::output_system::{Attractor, CubicSample, State};
+use crate::dynamics::output_system::{CubicSample, State};
 use crate::dynamics::transport::TransportSample;
 use crate::error::{Error, Result};
+use crate::motion::perturbation::PerturbationTerms;
 use crate::numerics::simd::{F64x4, Kernel, Register, compute, flush, unpack};
 
 /// Maximum number of substeps of a tick. A tick that needs more is still stable, but less accurate.
