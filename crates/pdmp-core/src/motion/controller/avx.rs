@@ -33,6 +33,22 @@ pub(super) fn advance(controller: &mut Controller, dt: f64, h: f64) -> bool {
     detected
 }
 
+/// Converts the motion to coordinates as [`Controller::publish_pose_with`] if the processor has AVX2. Returns whether it has.
+#[inline(always)]
+pub(super) fn publish_pose(controller: &mut Controller) -> bool {
+    let detected = std::arch::is_x86_feature_detected!("avx2");
+    if detected {
+        // SAFETY: the processor has AVX2, the only requirement of `publish_pose_avx2`.
+        unsafe { publish_pose_avx2(controller) };
+    }
+    detected
+}
+
+#[target_feature(enable = "avx2")]
+fn publish_pose_avx2(controller: &mut Controller) {
+    controller.publish_pose_with();
+}
+
 #[target_feature(enable = "avx2")]
 fn advance_avx2(controller: &mut Controller, dt: f64, h: f64) {
     controller.advance_with::<Avx2>(dt, h);

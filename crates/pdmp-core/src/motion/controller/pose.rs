@@ -66,6 +66,16 @@ impl Controller {
     /// Converts the motion of the DoFs to coordinates.
     #[inline]
     pub(super) fn publish_pose(&mut self) {
+        #[cfg(target_arch = "x86_64")]
+        if super::avx::publish_pose(self) {
+            return;
+        }
+        self.publish_pose_with();
+    }
+
+    /// Converts the motion with the instructions of its caller, to the same bits.
+    #[inline(always)]
+    pub(super) fn publish_pose_with(&mut self) {
         let Self { pose, primitive, position, velocity, acceleration, rate, perturbation, clock, .. } = self;
         let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
         let phase_rate = perturbation.phase_rate();
