@@ -38,7 +38,8 @@ impl RotationColumns {
     /// Returns the quaternion [w, x, y, z] in a row of coordinates.
     #[inline]
     pub(crate) fn read(self, coordinates: &[f64]) -> Quaternion {
-        let [a, b, c, d] = std::array::from_fn(|i| coordinates[self.column + i]);
+        let own = &coordinates[self.column..self.column + 4];
+        let [a, b, c, d] = [own[0], own[1], own[2], own[3]];
         match self.order {
             QuaternionOrder::Wxyz => [a, b, c, d],
             QuaternionOrder::Xyzw => [d, a, b, c],
@@ -150,7 +151,7 @@ impl Demonstration {
                 let mut coordinates = row.to_vec();
                 let q = rotation.read(&coordinates);
                 let norm = size(q);
-                if !(norm > MIN_NORM) {
+                if norm.is_nan() || norm < MIN_NORM {
                     return Err(Error::Rotation(RotationError::Norm {
                         name: "position",
                         row: Some(c),

@@ -91,7 +91,7 @@ impl MeanRotation {
     }
 
     /// Returns q̄ with its velocity and acceleration with respect to the clock, in the body frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn at(&self, u: f64) -> Turning {
         let x = match self.kind {
             Kind::Discrete => u.max(0.0) * self.per_unit,
@@ -104,9 +104,20 @@ impl MeanRotation {
         }
         let k = (x as usize).min(last);
         let (t, [a, b, c, d, e, f]) = (F64x4::splat(x - k as f64), self.cells[k]);
-        let value = ((((f * t + e) * t + d) * t + c) * t + b) * t + a;
-        let slope = (((f * t * 5.0 + e * 4.0) * t + d * 3.0) * t + c * 2.0) * t + b;
-        let bend = ((f * t * 20.0 + e * 12.0) * t + d * 6.0) * t + c * 2.0;
+        // Horner's scheme for the value, the slope and half the bend.
+        let (mut value, mut slope, mut half_bend) = (f * t + e, f, f);
+        slope = slope * t + value;
+        value = value * t + d;
+        half_bend = half_bend * t + slope;
+        slope = slope * t + value;
+        value = value * t + c;
+        half_bend = half_bend * t + slope;
+        slope = slope * t + value;
+        value = value * t + b;
+        half_bend = half_bend * t + slope;
+        slope = slope * t + value;
+        value = value * t + a;
+        let bend = half_bend + half_bend;
         let [p, slope, bend] = [value, slope, bend].map(F64x4::to_array);
         let inverse_square = 1.0 / dot(p, p);
         let scale = 2.0 * self.per_unit * inverse_square;

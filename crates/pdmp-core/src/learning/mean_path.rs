@@ -122,8 +122,8 @@ fn cut_off(recordings: &[Recording], kind: Kind, smoothing: Smoothing, threads: 
     let pool: Vec<_> = pooled(recordings.len()).map(|m| recordings[m].components(kind)).collect();
     let samples: Vec<Samples> =
         pool.iter().map(|(time, period, values)| Samples { time, period: *period, values: values.view() }).collect();
-    let one_vector = [0..4];
-    Ok(Noise::estimate(smoothing, &samples, &one_vector, MIN_DECIMATED, threads)?.cut_offs()[0])
+    let components = 0..4;
+    Ok(Noise::estimate(smoothing, &samples, std::slice::from_ref(&components), MIN_DECIMATED, threads)?.cut_offs()[0])
 }
 
 /// Brings a path to rest at its end, with changes near the end that are proportional to its velocity and acceleration there.
@@ -157,12 +157,12 @@ mod tests {
     #[test]
     fn slowed_path_ends_at_rest() {
         let path: Vec<Quaternion> =
-            (0..=100).map(|k| f64::from(k) / 100.0).map(|t| exp([2.0 * t, (3.0 * t).sin(), t * t])).collect();
+            (0..=1000).map(|k| f64::from(k) / 1000.0).map(|t| exp([2.0 * t, (3.0 * t).sin(), t * t])).collect();
         let mut slowed = path.clone();
         slow_down(&mut slowed);
-        assert!(distance(path[100], slowed[100]) < 1e-15 && path[..90] == slowed[..90]);
+        assert!(distance(path[1000], slowed[1000]) < 1e-15 && path[..900] == slowed[..900]);
         let [[before, _], [after, bend]] = [&path, &slowed].map(|path| end_motion(path));
         let size = |v: [f64; 3]| dot(v, v).sqrt();
-        assert!(size(before) > 0.02 && size(after) < 1e-3 * size(before) && size(bend) < 1e-4, "{after:?} {bend:?}");
+        assert!(size(before) > 0.002 && size(after) < 1e-3 * size(before) && size(bend) < 1e-6, "{after:?} {bend:?}");
     }
 }

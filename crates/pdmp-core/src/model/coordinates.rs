@@ -76,7 +76,8 @@ impl Rotation {
     /// Returns δ in a vector of DoFs.
     #[inline(always)]
     pub(crate) fn read(&self, dofs: &[f64]) -> Vector {
-        std::array::from_fn(|i| dofs[self.dof + i])
+        let own = &dofs[self.dof..self.dof + 3];
+        [own[0], own[1], own[2]]
     }
 
     #[inline(always)]
@@ -188,7 +189,7 @@ impl Coordinates {
     /// Converts the motion of the DoFs at clock `u`, with u̇ and ü, to position, velocity and acceleration.
     ///
     /// A quaternion has the sign closer to that in `position` on entry.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn motion(
         &self,
         u: f64,

@@ -9,7 +9,7 @@ use crate::model::Conditions;
 use crate::model::coordinates::Coordinates;
 use crate::motion::command::{Command, Coupling};
 use crate::numerics::rotation::dot;
-use crate::numerics::simd::{F64x4, unpack};
+use crate::numerics::simd::{F64x4, Kernel, Register, compute, unpack};
 use crate::numerics::state::clone_in_place;
 
 /// Residual rotation in rad from which a goal is taken by the shorter way to the mean, not to the goal before it: a whole
@@ -62,10 +62,30 @@ impl Pose {
     }
 }
 
+/// Kernel of [`Controller::publish_pose`], whose numbers are not in registers.
+struct Publish<'a>(&'a mut Controller);
+
+impl Kernel for Publish<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        self.0.publish_pose_with();
+    }
+}
+
 impl Controller {
     /// Converts the motion of the DoFs to coordinates.
     #[inline]
     pub(super) fn publish_pose(&mut self) {
+        if self.pose.is_some() {
+            compute(Publish(self));
+        }
+    }
+
+    /// Converts the motion with the instructions of its caller, to the same bits.
+    #[inline(always)]
+    fn publish_pose_with(&mut self) {
         let Self { pose, primitive, position, velocity, acceleration, rate, perturbation, clock, .. } = self;
         let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
         let phase_rate = perturbation.phase_rate();
