@@ -1,5 +1,6 @@
 """Teaches two arms to carry an object: stiff between the hands, compliant as a whole."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import pdmp
@@ -41,6 +42,7 @@ demos = [
     for absolute, _ in pairs
 ]
 model = pdmp.fit(demos, n_styles=2)
+figure, axes = plt.subplots(figsize=(5.0, 3.2), layout="constrained")
 
 
 def run(name: str, held: range) -> None:
@@ -63,6 +65,7 @@ def run(name: str, held: range) -> None:
         pose = controller.position
         hands.append(left_right(pose[:7], pose[7:], reference=FACING))
     left, right = np.swapaxes(hands, 0, 1)
+    axes.plot(DT * np.arange(1, len(hands) + 1), left[:, 2], label=f"left hand, {name}")
     apart = np.linalg.norm(right[:, :3] - left[:, :3], axis=1)
     print(
         f"{name}: {len(hands) * DT:.2f} s, ends at {controller.position[:3].round(3)} m;", end=" "
@@ -72,3 +75,6 @@ def run(name: str, held: range) -> None:
 
 run("free", range(0))
 run("held for a second", range(500, 1000))
+axes.set(xlabel="time [s]", ylabel="height z [m]", title="New goal at 0.4 s; held from 1 to 2 s")
+axes.legend()
+figure.savefig("11_two_arms.png", dpi=150)
