@@ -25,7 +25,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots report rtsan fuzz asan licences capi header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi header stubs \
 	docs clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -70,6 +70,9 @@ bench-transport: .venv/with-demo  ## Transport to other goals and the end of mov
 
 bench-robots: .venv/with-reproduction  ## Simulated robots under random commands within their limits, on the recordings in PDMP_DATA
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m robots
+
+bench-poses: .venv/with-reproduction  ## A recorded tool path on a Panda, and a box between the arms of a Baxter, with PDMP_DATA
+	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m poses
 
 report: .venv/with-test  ## Errors of predictions from contexts, on the recordings in PDMP_DATA; figures into out/report/
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report

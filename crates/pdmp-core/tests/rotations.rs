@@ -305,7 +305,10 @@ fn goal_that_keeps_turning_is_followed_by_the_shorter_way() {
         let mut goal = controller.centre().to_vec();
         let turned = times(rotation(ndarray::aview1(&goal), 3), of_vector([0.0, 0.0, 0.5]));
         goal[3..].copy_from_slice(&turned);
+        let before = (rotation(ndarray::aview1(controller.position()), 3), controller.velocity().to_vec());
         controller.set_goal(&goal).unwrap();
+        assert!(angle(before.0, rotation(ndarray::aview1(controller.position()), 3)) < 1e-12);
+        assert!(controller.velocity().iter().zip(&before.1).all(|(a, b)| (a - b).abs() < 1e-12));
         for _ in 0..100 {
             controller.step().unwrap();
             let off = angle(turned, rotation(ndarray::aview1(controller.position()), 3));

@@ -8,7 +8,7 @@ use super::Controller;
 use crate::model::Conditions;
 use crate::model::coordinates::Coordinates;
 use crate::motion::command::{Command, Coupling};
-use crate::numerics::rotation::dot;
+use crate::numerics::rotation::{dot, exp, inverse_jacobian, jacobian, log_near};
 use crate::numerics::simd::{F64x4, Kernel, Register, compute, unpack};
 use crate::numerics::state::clone_in_place;
 
@@ -47,18 +47,20 @@ impl Pose {
         Some(Box::new(Self { position, velocity, acceleration, centre, goal_velocity, command, measured, coupling }))
     }
 
-    /// Returns the DoFs of a commanded goal or anchor, close to those of the goal before it.
-    pub(super) fn centre_dofs(&mut self, coordinates: &Coordinates, centre: &[f64], before: &[f64]) -> &[f64] {
+    /// Computes the DoFs of a commanded goal or anchor, close to those of the goal before it. Returns whether the rotations of
+    /// a movement must be expressed anew, because a residual rotation has wound up.
+    fn set_centre(&mut self, coordinates: &Coordinates, centre: &[f64], before: &[f64]) -> bool {
         let u = coordinates.centre_clock();
         coordinates.to_dofs(u, centre, Some(before), &mut self.command);
         let wound = |dof: usize| {
             let delta: [f64; 3] = std::array::from_fn(|i| self.command[dof + i]);
             dot(delta, delta) > MAX_WINDING * MAX_WINDING
         };
-        if coordinates.rotations().iter().any(|rotation| wound(rotation.dof)) {
+        let is_wound = coordinates.rotations().iter().any(|rotation| wound(rotation.dof));
+        if is_wound {
             coordinates.to_dofs(u, centre, None, &mut self.command);
         }
-        &self.command
+        is_wound
     }
 }
 
@@ -188,6 +190,48 @@ impl Controller {
                 let (group, lane) = ((rotation.dof + i) / 4, (rotation.dof + i) % 4);
                 position[group].as_mut_array()[lane] = after[0][i];
                 groups[group].z.as_mut_array()[lane] += after[1][i] - before[1][i];
+            }
+        }
+    }
+
+    /// Takes up a commanded goal or anchor in coordinates; returns whether it has changed.
+    pub(super) fn command_centre(&mut self, command: &Command) -> bool {
+        let Self { pose, primitive, conditions, started, .. } = self;
+        let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return false };
+        let Some(centre) = command.goal.or(command.anchor) else { return false };
+        // Before the first tick a residual rotation changes by the shorter way from the start.
+        let start = conditions.start.as_ref().filter(|_| !*started && command.goal.is_some());
+        let is_wound = pose.set_centre(coordinates, centre, start.unwrap_or(&conditions.centre));
+        if pose.command == conditions.centre {
+            return false;
+        }
+        conditions.centre.copy_from_slice(&pose.command);
+        if is_wound && self.started {
+            self.unwind();
+        }
+        true
+    }
+
+    /// Expresses wound-up rotations by the residuals closest to the commanded goal. They and their angular velocities stay;
+    /// the frame moves with them.
+    fn unwind(&mut self) {
+        let Self { primitive, conditions, groups, position, velocity, centre, rate, .. } = self;
+        let Some(coordinates) = primitive.coordinates() else { return };
+        let rate = super::step::first_element(rate.value());
+        for rotation in coordinates.rotations() {
+            let at = |i: usize| ((rotation.dof + i) / 4, (rotation.dof + i) % 4);
+            let of = |lanes: &[F64x4]| -> [f64; 3] { std::array::from_fn(|i| lanes[at(i).0].as_array()[at(i).1]) };
+            let (delta, goal) = (of(position), rotation.read(&conditions.centre));
+            let new = log_near(exp(delta), goal);
+            let slope = of(velocity).map(|x| if rate > 0.0 { x / rate } else { 0.0 });
+            let new_slope = inverse_jacobian(new, jacobian(delta, slope));
+            for i in 0..3 {
+                let (group, lane) = at(i);
+                position[group].as_mut_array()[lane] = new[i];
+                groups[group].z.as_mut_array()[lane] += new_slope[i] - slope[i];
+                let mut frame = centre.value()[group];
+                frame.as_mut_array()[lane] += new[i] - delta[i];
+                centre.set_value(group, frame);
             }
         }
     }

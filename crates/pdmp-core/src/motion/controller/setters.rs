@@ -275,16 +275,14 @@ impl Controller {
             conditions.style.copy_from_slice(style);
             changes.style = true;
         }
-        let mut centre = command.goal.or(command.anchor);
-        if let (Some(pose), Some(coordinates), Some(given)) = (&mut self.pose, self.primitive.coordinates(), centre) {
-            // Before the first tick a residual rotation changes by the shorter way from the start.
-            let start = conditions.start.as_ref().filter(|_| !self.started && command.goal.is_some());
-            centre = Some(pose.centre_dofs(coordinates, given, start.unwrap_or(&conditions.centre)));
-        }
-        if let Some(centre) = centre.filter(|centre| *centre != conditions.centre) {
-            conditions.centre.copy_from_slice(centre);
+        if self.pose.is_some() {
+            changes.centre = self.command_centre(command);
+        } else if let Some(centre) = command.goal.or(command.anchor).filter(|centre| *centre != self.conditions.centre)
+        {
+            self.conditions.centre.copy_from_slice(centre);
             changes.centre = true;
         }
+        let conditions = &mut self.conditions;
         let present = self.pose.as_ref().map_or(&conditions.goal_velocity, |pose| &pose.goal_velocity);
         if let Some(velocity) = command.goal_velocity
             && !(conditions.has_goal_velocity && velocity == present)
