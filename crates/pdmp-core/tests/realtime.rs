@@ -11,12 +11,11 @@ mod common;
 mod counting;
 #[path = "common/poses.rs"]
 mod poses;
-#[path = "common/random.rs"]
-mod random;
 
 use std::hint::black_box;
 
 use common::*;
+use counting as random;
 use counting::{Random, allocations};
 use pdmp_core::motion::{Compliance, Coupling, Limits};
 use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Motion};
