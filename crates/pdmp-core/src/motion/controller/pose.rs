@@ -48,11 +48,7 @@ impl Pose {
     }
 
     /// Computes the DoFs of a commanded goal or anchor, close to those of the goal before it. Returns whether the rotations of
-<<<<<<< HEAD
-    /// a movement must be expressed about the mean again, as a residual rotation has wound up.
-=======
     /// a movement must be expressed by others, because a residual rotation has wound up.
->>>>>>> poses
     fn set_centre(&mut self, coordinates: &Coordinates, centre: &[f64], before: &[f64]) -> bool {
         let u = coordinates.centre_clock();
         coordinates.to_dofs(u, centre, Some(before), &mut self.command);
