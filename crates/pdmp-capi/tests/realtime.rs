@@ -166,7 +166,7 @@ fn matches_rust(kind: Kind, limits: &Limits, n_ticks: usize) {
                 7 => (rust.set_phase(tau), pdmp_controller_set_phase(c.as_mut(), tau)),
                 8 => (rust.set_phase_gain(tau), pdmp_controller_set_phase_gain(c.as_mut(), tau)),
                 9 => (rust.set_tolerance(tau - own), pdmp_controller_set_tolerance(c.as_mut(), tau - own)),
-                10 => (rust.set_limits(&limits), pdmp_controller_set_limits(c.as_mut(), Some(&c_limits))),
+                10 => (rust.set_limits(limits), pdmp_controller_set_limits(c.as_mut(), Some(&c_limits))),
                 _ => (Ok(()), pdmp_status::PDMP_OK),
             }
         };
