@@ -11,7 +11,18 @@ SOURCES = ROOT / "crates" / "pdmp-core" / "src"
 MAX_LINES = 400
 FOREIGN_METHODS = frozenset(
     {
-        *("abs", "chunks", "clone", "column", "extend", "fill", "filter", "find", "first", "for_each"),
+        *(
+            "abs",
+            "chunks",
+            "clone",
+            "column",
+            "extend",
+            "fill",
+            "filter",
+            "find",
+            "first",
+            "for_each",
+        ),
         *(
             "inverse",
             "iter",
