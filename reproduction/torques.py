@@ -42,11 +42,11 @@ class TorqueControlled:
 
     Attributes
     ----------
-    stiffness, damping : float
+    position_gain, velocity_gain : float
         Gains of the feedback, per s² and per s.
     """
 
-    stiffness, damping = STIFFNESS, DAMPING
+    position_gain, velocity_gain = STIFFNESS, DAMPING
 
     def __init__(
         self,
@@ -97,8 +97,8 @@ class TorqueControlled:
         rate[self._moved] = self._signs * velocity
         acceleration_command[self._moved] = self._signs * acceleration
         driven = self._driven
-        acceleration_command[driven] += self.stiffness * (target - data.qpos[driven])
-        acceleration_command[driven] += self.damping * (rate[driven] - data.qvel[driven])
+        acceleration_command[driven] += self.position_gain * (target - data.qpos[driven])
+        acceleration_command[driven] += self.velocity_gain * (rate[driven] - data.qvel[driven])
         torque = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, torque, acceleration_command)
         wanted = (torque + data.qfrc_bias)[driven]

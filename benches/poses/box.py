@@ -195,7 +195,7 @@ class Record:
 class Carrier(TorqueControlled):
     """Baxter with a box on a table, whose pads follow an absolute and a relative pose."""
 
-    stiffness, damping = STIFFNESS, DAMPING
+    position_gain, velocity_gain = STIFFNESS, DAMPING
 
     def __init__(self) -> None:
         kinematic = robot().compile()
