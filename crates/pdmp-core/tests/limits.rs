@@ -494,6 +494,28 @@ fn pause_within_limits_stops_the_movement() {
     }
 }
 
+/// Limits count from the motion of the last tick, also after a command without limits that changes the velocity at once.
+#[test]
+fn limits_after_a_jump_count_from_the_last_tick() {
+    let mut controller = Controller::new(REACH.primitive(), 1e-3, &Conditions::default(), Some(0.0)).unwrap();
+    for _ in 0..300 {
+        controller.step().unwrap();
+    }
+    controller.set_speed(0.0).unwrap();
+    controller.step().unwrap();
+    assert!(controller.velocity().iter().all(|v| *v == 0.0));
+    controller.set_speed(1.0).unwrap();
+    assert!(controller.velocity().iter().any(|v| v.abs() > 0.1));
+    let limits = Limits { acceleration: Some(vec![5.0]), ..Limits::default() };
+    for mut controller in [controller.clone(), Controller::restore(REACH.primitive(), &controller.snapshot()).unwrap()]
+    {
+        controller.set_limits(&limits).unwrap();
+        assert!(controller.velocity().iter().all(|v| *v == 0.0));
+        controller.step().unwrap();
+        assert!(controller.velocity().iter().all(|v| v.abs() <= 5.0 * 1e-3 * (1.0 + 1e-12)));
+    }
+}
+
 /// A smaller limit of the velocity is kept from the first tick at which braking with A can have reached it.
 #[test]
 fn shrinking_velocity_is_kept_as_soon_as_possible() {

@@ -30,6 +30,8 @@ pub(super) struct Limiter {
     has_jerk: bool,
     /// Position, velocity and acceleration at the start of the tick.
     pub(super) before: Vec<[F64x4; 3]>,
+    /// Time for which `before` was kept without limits, negative if it was not.
+    kept_at: f64,
     /// Limit that determined the acceleration of each DoF in the last tick.
     pub(super) limited: Vec<Option<Limit>>,
     /// Displacement of the goal that is equivalent to the excess of the acceleration over its limit in the last tick.
@@ -51,6 +53,7 @@ clone_in_place!(Limiter {
     jerk,
     has_jerk,
     before,
+    kept_at,
     limited,
     excess,
     ranges,
@@ -75,6 +78,7 @@ impl Limiter {
             jerk: vec![f64::INFINITY; n_dofs],
             has_jerk: false,
             before: vec![[F64x4::ZERO; 3]; groups(n_dofs)],
+            kept_at: -1.0,
             limited: vec![None; n_dofs],
             excess: vec![F64x4::ZERO; groups(n_dofs)],
             ranges: ranges.iter().map(|range| range.max(min_range).max(f64::MIN_POSITIVE)).collect(),
@@ -190,6 +194,15 @@ impl Limiter {
         }
     }
 
+    /// Keeps the motion at the end of the tick that ended at a time, before the first command after it changes the motion at once.
+    /// Limits that are set before the next tick count from there.
+    pub(super) fn keep(&mut self, time: f64, position: &[F64x4], velocity: &[F64x4], acceleration: &[F64x4]) {
+        if self.kept_at != time {
+            self.begin(position, velocity, acceleration);
+            self.kept_at = time;
+        }
+    }
+
     /// Reduces accelerations at the start of a tick to their limits. A limited jerk would reduce them for so long that the DoF
     /// could not stop.
     pub(super) fn reduce_accelerations(&mut self) {
@@ -201,6 +214,7 @@ impl Limiter {
     /// Forgets which DoFs were limited.
     pub(super) fn clear(&mut self) {
         self.is_free = true;
+        self.kept_at = -1.0;
         self.limited.fill(None);
     }
 
@@ -233,6 +247,7 @@ impl Limiter {
         self.set(&limits, duration, dt)?;
         visit_flag(visit, &mut self.is_free)?;
         visit_flag(visit, &mut self.slows)?;
+        visit_number(visit, &mut self.kept_at, [-1.0, 1e300])?;
         for lanes in self.before.iter_mut().flatten() {
             visit(lanes.as_mut_array(), quantity)?;
         }

@@ -82,7 +82,7 @@ impl Controller {
         }
         // Within limits, the next tick continues the last one.
         if !was_active {
-            self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
+            self.limiter.keep(self.time.value(), &self.position, &self.velocity, &self.acceleration);
         }
         self.limiter.reduce_accelerations();
         if self.changes_centre() {
@@ -122,6 +122,9 @@ impl Controller {
     }
 
     fn publish_dofs(&mut self) {
+        if !self.limiter.is_active() {
+            self.limiter.keep(self.time.value(), &self.position, &self.velocity, &self.acceleration);
+        }
         self.read_out();
         if !self.started {
             return self.begin_first_tick();
