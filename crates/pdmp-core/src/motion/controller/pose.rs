@@ -5,11 +5,12 @@
 //! up the difference of its velocity, as the output system does for that of the frame, so that ω stays continuous.
 
 use super::Controller;
+use super::step::first_element;
 use crate::model::Conditions;
 use crate::model::coordinates::Coordinates;
 use crate::motion::command::{Command, Coupling};
 use crate::numerics::rotation::{dot, exp, inverse_jacobian, jacobian, log_near};
-use crate::numerics::simd::{F64x4, Kernel, Register, compute, unpack};
+use crate::numerics::simd::{F64x4, Kernel, Register, WIDTH, compute, unpack};
 use crate::numerics::state::clone_in_place;
 
 /// Residual rotation in rad from which a goal is taken by the shorter way to the mean, not to the goal before it: a whole
@@ -72,7 +73,13 @@ impl Kernel for Publish<'_> {
 
     #[inline(always)]
     fn run<T: Register>(self) {
-        self.0.publish_pose_with();
+        let Controller { pose, primitive, position, velocity, acceleration, rate, perturbation, clock, .. } = self.0;
+        let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
+        let phase_rate = perturbation.phase_rate();
+        let rates = [rate.value(), rate.rate()].map(|rate| phase_rate * first_element(rate));
+        let dofs = [&*position, velocity, acceleration].map(|lanes| unpack(lanes, primitive.n_dofs()));
+        let Pose { position, velocity, acceleration, .. } = &mut **pose;
+        coordinates.motion(clock.value(), rates, dofs, position, velocity, acceleration);
     }
 }
 
@@ -83,18 +90,6 @@ impl Controller {
         if self.pose.is_some() {
             compute(Publish(self));
         }
-    }
-
-    /// Converts the motion with the instructions of its caller, to the same bits.
-    #[inline(always)]
-    fn publish_pose_with(&mut self) {
-        let Self { pose, primitive, position, velocity, acceleration, rate, perturbation, clock, .. } = self;
-        let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
-        let phase_rate = perturbation.phase_rate();
-        let rates = [rate.value(), rate.rate()].map(|rate| phase_rate * super::step::first_element(rate));
-        let dofs = [&*position, velocity, acceleration].map(|lanes| unpack(lanes, primitive.n_dofs()));
-        let Pose { position, velocity, acceleration, .. } = &mut **pose;
-        coordinates.motion(clock.value(), rates, dofs, position, velocity, acceleration);
     }
 
     /// Converts the goal or anchor in force to coordinates, with the sign of the commanded quaternion.
@@ -164,7 +159,8 @@ impl Controller {
         let dofs = unpack(position, primitive.n_dofs());
         coordinates.for_each_drift(clock.value(), dofs, |dof, velocity| {
             for (i, velocity) in velocity.into_iter().enumerate() {
-                groups[(dof + i) / 4].z.as_mut_array()[(dof + i) % 4] += velocity * change;
+                let (group, lane) = place(dof + i);
+                groups[group].z.as_mut_array()[lane] += velocity * change;
             }
         });
     }
@@ -174,20 +170,18 @@ impl Controller {
     pub(super) fn move_rotations(&mut self, to: f64) {
         let Self { primitive, groups, position, velocity, clock, rate, perturbation, .. } = self;
         let Some(coordinates) = primitive.coordinates() else { return };
-        let rate = super::step::first_element(rate.value());
+        let rate = first_element(rate.value());
         if rate <= 0.0 {
             // In a pause nothing moves, but the state changes its place.
-            return move_still(coordinates, [clock.value(), to], position, groups);
+            return move_still(coordinates, [clock.value(), to], position);
         }
         let phase_rate = perturbation.phase_rate();
         for rotation in coordinates.rotations() {
-            let of = |lanes: &[F64x4], scale: f64| -> [f64; 3] {
-                std::array::from_fn(|i| lanes[(rotation.dof + i) / 4].as_array()[(rotation.dof + i) % 4] * scale)
-            };
-            let before = [of(position, 1.0), of(velocity, 1.0 / rate)];
+            let scale = 1.0 / rate;
+            let before = [vector_at(position, rotation.dof), vector_at(velocity, rotation.dof).map(|x| x * scale)];
             let after = Coordinates::moved(rotation, [clock.value(), to], phase_rate, before);
             for i in 0..3 {
-                let (group, lane) = ((rotation.dof + i) / 4, (rotation.dof + i) % 4);
+                let (group, lane) = place(rotation.dof + i);
                 position[group].as_mut_array()[lane] = after[0][i];
                 groups[group].z.as_mut_array()[lane] += after[1][i] - before[1][i];
             }
@@ -217,16 +211,14 @@ impl Controller {
     fn unwind(&mut self) {
         let Self { primitive, conditions, groups, position, velocity, centre, rate, .. } = self;
         let Some(coordinates) = primitive.coordinates() else { return };
-        let rate = super::step::first_element(rate.value());
+        let rate = first_element(rate.value());
         for rotation in coordinates.rotations() {
-            let at = |i: usize| ((rotation.dof + i) / 4, (rotation.dof + i) % 4);
-            let of = |lanes: &[F64x4]| -> [f64; 3] { std::array::from_fn(|i| lanes[at(i).0].as_array()[at(i).1]) };
-            let (delta, goal) = (of(position), rotation.read(&conditions.centre));
+            let (delta, goal) = (vector_at(position, rotation.dof), rotation.read(&conditions.centre));
             let new = log_near(exp(delta), goal);
-            let slope = of(velocity).map(|x| if rate > 0.0 { x / rate } else { 0.0 });
+            let slope = vector_at(velocity, rotation.dof).map(|x| if rate > 0.0 { x / rate } else { 0.0 });
             let new_slope = inverse_jacobian(new, jacobian(delta, slope));
             for i in 0..3 {
-                let (group, lane) = at(i);
+                let (group, lane) = place(rotation.dof + i);
                 position[group].as_mut_array()[lane] = new[i];
                 groups[group].z.as_mut_array()[lane] += new_slope[i] - slope[i];
                 let mut frame = centre.value()[group];
@@ -240,7 +232,7 @@ impl Controller {
     pub(super) fn share_lengths(&mut self) {
         let Self { primitive, groups, position, centre, .. } = self;
         for dof in primitive.rotation_dofs() {
-            let at = |i: usize| ((dof + i) / 4, (dof + i) % 4);
+            let at = |i: usize| place(dof + i);
             let off: [f64; 3] = std::array::from_fn(|i| {
                 let (group, lane) = at(i);
                 (centre.target()[group] - position[group]).as_array()[lane]
@@ -258,14 +250,20 @@ impl Controller {
 
     /// Returns the size of the vector of a rotation, given the vector of each group.
     pub(super) fn size_of(&self, dof: usize, of_group: &dyn Fn(usize) -> F64x4) -> f64 {
-        let vector: [f64; 3] = std::array::from_fn(|i| of_group((dof + i) / 4).as_array()[(dof + i) % 4]);
+        let vector: [f64; 3] = std::array::from_fn(|i| {
+            let (group, lane) = place(dof + i);
+            of_group(group).as_array()[lane]
+        });
         dot(vector, vector).sqrt()
     }
 
     /// Returns whether every DoF is within its bound, given deviation and bound of a group, and the deviation of the rotation
     /// from a DoF on.
     pub(super) fn is_within(&self, of_group: impl Fn(usize) -> [F64x4; 2], of_rotation: impl Fn(usize) -> f64) -> bool {
-        let at = |dof: usize| of_group(dof / 4).map(|lanes| lanes.as_array()[dof % 4]);
+        let at = |dof: usize| {
+            let (group, lane) = place(dof);
+            of_group(group).map(|lanes| lanes.as_array()[lane])
+        };
         let in_rotation = |dof: usize| self.primitive.rotation_dofs().any(|first| (first..first + 3).contains(&dof));
         let plain = (0..self.primitive.n_dofs()).filter(|&dof| !in_rotation(dof)).all(|dof| {
             let [deviation, bound] = at(dof);
@@ -276,12 +274,26 @@ impl Controller {
 }
 
 /// Moves rotations without velocity as [`Controller::move_rotations`] does.
-fn move_still(coordinates: &Coordinates, clocks: [f64; 2], position: &mut [F64x4], groups: &mut [super::Group]) {
-    debug_assert_eq!(position.len(), groups.len());
+fn move_still(coordinates: &Coordinates, clocks: [f64; 2], position: &mut [F64x4]) {
     for rotation in coordinates.rotations() {
-        let at = |i: usize| ((rotation.dof + i) / 4, (rotation.dof + i) % 4);
-        let delta = std::array::from_fn(|i| position[at(i).0].as_array()[at(i).1]);
-        let [moved, _] = Coordinates::moved(rotation, clocks, 0.0, [delta, [0.0; 3]]);
-        (0..3).for_each(|i| position[at(i).0].as_mut_array()[at(i).1] = moved[i]);
+        let still = [vector_at(position, rotation.dof), [0.0; 3]];
+        let [moved, _] = Coordinates::moved(rotation, clocks, 0.0, still);
+        for (i, x) in moved.into_iter().enumerate() {
+            let (group, lane) = place(rotation.dof + i);
+            position[group].as_mut_array()[lane] = x;
+        }
     }
+}
+
+/// Returns the group of a DoF and its lane.
+fn place(dof: usize) -> (usize, usize) {
+    (dof / WIDTH, dof % WIDTH)
+}
+
+/// Returns the three DoFs from one on.
+fn vector_at(lanes: &[F64x4], dof: usize) -> [f64; 3] {
+    std::array::from_fn(|i| {
+        let (group, lane) = place(dof + i);
+        lanes[group].as_array()[lane]
+    })
 }
