@@ -31,7 +31,7 @@ pub(crate) enum Property {
     Published,
     /// |Δÿ|/Δt, beyond the last digits of ÿ, relative to J.
     Jerk,
-    /// Time until a DoF outside has come back, beyond four times that of braking and returning, relative to it.
+    /// Time until a DoF outside has come back, beyond a multiple of that of braking and returning, relative to it.
     Return,
     /// Goal or anchor in force, relative to u − l.
     Goal,
@@ -205,7 +205,9 @@ impl Dof {
         let beyond = self.excess[1].max(self.excess[2]);
         let (a, speed) = (self.braking, self.velocity);
         let reversal = if self.has_jerk() { 2.0 * self.acceleration / self.jerk } else { 0.0 };
-        self.time = [0.0, 4.0 * (v.abs() / a + 2.0 * (2.0 * beyond / a).sqrt() + beyond / speed + reversal)];
+        // A limited jerk alternates between two accelerations where one tick with A exceeds V, at a fraction of V on average.
+        let multiple = if self.has_jerk() && speed < a * self.dt { 8.0 } else { 4.0 };
+        self.time = [0.0, multiple * (v.abs() / a + 2.0 * (2.0 * beyond / a).sqrt() + beyond / speed + reversal)];
     }
 
     fn is_outside(&self) -> bool {
