@@ -54,7 +54,7 @@ check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, 
 	$(PYTHON) .ci/runtime.py
 
 bench: | needs  ## Times, latencies and instructions of the core
-	cargo bench --package pdmp-core
+	cargo bench --package pdmp-benches
 
 bench-peers: .venv/with-peers  ## The same work done by pdmp and by its peers, one thread each
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m peers

@@ -58,7 +58,7 @@
 //! # fn main() {}
 //! ```
 //!
-//! `examples/control_loop.rs` runs a model from a file on the wall clock; [`Controller::update`] reads and writes the
+//! The example `control_loop` runs a model from a file on the wall clock; [`Controller::update`] reads and writes the
 //! caller's memory alone.
 //!
 //! [doi:10.1016/j.neunet.2011.02.004]: https://doi.org/10.1016/j.neunet.2011.02.004
