@@ -3,9 +3,17 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-SHARED := $(if $(filter Darwin,$(shell uname)),dylib,so)
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml)
 # Version of the C ABI, as in the library's SONAME: a program looks for libpdmp.so.$(ABI) when it runs.
-ABI := $(shell sed -n 's/^version = "\([0-9]*\.[0-9]*\)\..*/\1/p' Cargo.toml)
+ABI := $(shell echo $(VERSION) | cut -d. -f1,2)
+# File of the shared library, its SONAME, and the name with which programs are linked.
+LIBRARY := $(if $(filter Darwin,$(shell uname)),libpdmp.$(VERSION).dylib libpdmp.$(ABI).dylib libpdmp.dylib,\
+	libpdmp.so.$(VERSION) libpdmp.so.$(ABI) libpdmp.so)
+# Folder into which `make install` puts the C and C++ libraries; DESTDIR is put in front of it.
+prefix ?= /usr/local
+INSTALLED = $(DESTDIR)$(prefix)
+FILL = sed -e 's/@version@/$(VERSION)/; s/@abi@/$(ABI)/g; s/@library@/$(firstword $(LIBRARY))/; s/@soname@/$(word 2,$(LIBRARY))/'
 SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
 
 # The bindings are compiled against the interpreter that will import them.
@@ -25,7 +33,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install header stubs \
 	docs clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -104,13 +112,22 @@ asan: | needs  ## Runs the tests of the C ABI under AddressSanitizer
 licences: | needs  ## Collects the licences of the linked crates into LICENSE-THIRD-PARTY, which the wheel holds
 	$(PYTHON) .ci/licences.py --write
 
-capi: | needs  ## Builds the libraries for C and C++ and puts them and their headers into dist/capi/
+capi:  ## Builds the libraries for C and C++ and installs them into dist/capi/
+	@$(MAKE) --no-print-directory install prefix=$(CURDIR)/dist/capi DESTDIR=
+
+install: | needs  ## Installs the libraries for C and C++, headers, and files for pkg-config and CMake into prefix=/usr/local
 	cargo build --release --package pdmp-capi
-	mkdir -p dist/capi/lib dist/capi/include
-	cp target/release/libpdmp.a target/release/libpdmp.$(SHARED) dist/capi/lib
-	cp crates/pdmp-capi/include/pdmp.h crates/pdmp-capi/include/pdmp.hpp dist/capi/include
-	cp LICENSE* dist/capi
-	$(if $(filter so,$(SHARED)),ln -sf libpdmp.so dist/capi/lib/libpdmp.so.$(ABI))
+	mkdir -p $(addprefix $(INSTALLED)/,include lib/pkgconfig lib/cmake/pdmp share/licenses/pdmp)
+	install -m 644 crates/pdmp-capi/include/pdmp.h crates/pdmp-capi/include/pdmp.hpp $(INSTALLED)/include
+	install -m 644 $(TARGET)/release/libpdmp.a $(INSTALLED)/lib
+	install -m 755 $(TARGET)/release/$(lastword $(LIBRARY)) $(INSTALLED)/lib/$(firstword $(LIBRARY))
+	ln -sf $(firstword $(LIBRARY)) $(INSTALLED)/lib/$(word 2,$(LIBRARY))
+	ln -sf $(word 2,$(LIBRARY)) $(INSTALLED)/lib/$(lastword $(LIBRARY))
+	$(FILL) crates/pdmp-capi/package/pdmp.pc.in > $(INSTALLED)/lib/pkgconfig/pdmp.pc
+	for name in pdmp-config pdmp-config-version; do \
+		$(FILL) crates/pdmp-capi/package/$$name.cmake.in > $(INSTALLED)/lib/cmake/pdmp/$$name.cmake || exit 1; \
+	done
+	install -m 644 LICENSE* $(INSTALLED)/share/licenses/pdmp
 
 header: | needs  ## Writes pdmp.h from the sources of the C ABI
 	PDMP_WRITE_HEADER=1 cargo test --release --package pdmp-capi --test header
