@@ -33,7 +33,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install packages header stubs \
 	docs clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -60,6 +60,7 @@ check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, 
 	$(PYTHON) .ci/prose.py
 	$(PYTHON) .ci/licences.py
 	$(PYTHON) .ci/runtime.py
+	$(BIN)/zizmor --offline --quiet .github
 
 bench: | needs  ## Times, latencies and instructions of the core
 	cargo bench --package pdmp-benches
@@ -128,6 +129,12 @@ install: | needs  ## Installs the libraries for C and C++, headers, and files fo
 		$(FILL) crates/pdmp-capi/package/$$name.cmake.in > $(INSTALLED)/lib/cmake/pdmp/$$name.cmake || exit 1; \
 	done
 	install -m 644 LICENSE* $(INSTALLED)/share/licenses/pdmp
+
+packages: .venv/with-packages  ## Builds wheel, source distribution and crate, checks them, and puts those for pip into dist/python/
+	rm -rf dist/python
+	$(BIN)/maturin build --quiet --release --out dist/python
+	$(BIN)/maturin sdist --quiet --out dist/python
+	$(BIN)/python .ci/packages.py
 
 header: | needs  ## Writes pdmp.h from the sources of the C ABI
 	PDMP_WRITE_HEADER=1 cargo test --release --package pdmp-capi --test header
