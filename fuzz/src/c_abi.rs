@@ -185,6 +185,7 @@ impl Caller<'_> {
                     }
                 },
                 13 => return self.set_limits(slot, input),
+                14 => return self.sample(slot, input),
                 12 => pdmp_controller_set_goal_velocity(controller, Numbers::new(n_dofs, input).vector()),
                 _ => {
                     let mut status = PDMP_OK;
@@ -291,6 +292,33 @@ impl Caller<'_> {
         self.check(slot, status, input);
     }
 
+    /// Computes a rollout, or a forecast of a controller, into buffers with one row per sample.
+    fn sample(&mut self, slot: usize, input: &mut Input) {
+        let (n_samples, dt) = (input.below(40), input.number());
+        let widths = [self.info.n_coordinates, self.info.n_dofs, self.info.n_dofs];
+        let mut outputs = widths.map(|width| Numbers::new(n_samples * width, input));
+        let [position, velocity, acceleration] = outputs.each_mut().map(Numbers::buffer);
+        let motion = pdmp_motion { position, velocity, acceleration };
+        // SAFETY: every pointer is valid over its stated length, or NULL.
+        let status = unsafe {
+            if input.byte() % 2 == 0 {
+                pdmp_controller_forecast(self.handle(slot), dt, n_samples, Some(&motion))
+            } else {
+                let conditions = Conditions::of(&self.info, input);
+                let conditions = conditions.as_ref().map(Conditions::get);
+                with_text(usize::from(input.byte()), |error| {
+                    pdmp_model_rollout(Some(self.model), conditions.as_ref(), dt, n_samples, Some(&motion), error)
+                })
+            }
+        };
+        assert_no_panic(status);
+        if status == PDMP_OK {
+            for output in outputs.iter().filter(|output| output.variant < 160) {
+                assert!(output.data.iter().all(|x| x.is_finite()), "a sample is not finite");
+            }
+        }
+    }
+
     /// Executes a call on the model (names, labels, demonstrations, predictions), or loads a model file with one byte
     /// changed.
     fn call_model(&mut self, input: &mut Input) {
@@ -303,6 +331,7 @@ impl Caller<'_> {
         let status = match call % 5 {
             0 => {
                 pdmp_model_name(Some(self.model), index);
+                pdmp_model_unit(Some(self.model), index);
                 pdmp_model_label(Some(self.model), input.below(4), index);
                 return;
             }

@@ -278,6 +278,11 @@ pdmp_status pdmp_model_describe(const pdmp_model *model, pdmp_info *info);
 /// `model` is NULL or `dof` >= n_dofs.
 const char *pdmp_model_name(const pdmp_model *model, size_t dof);
 
+/// Returns the unit of degree of freedom `dof`, counted from 0, as a UTF-8 string that the model owns; "" if it is not known.
+/// Returns NULL if `model` is NULL or `dof` >= n_dofs.
+const char *pdmp_model_unit(const pdmp_model *model,
+                            size_t dof);
+
 /// Writes the conditions that reproduce demonstration `demonstration`, counted from 0: style, goal and start (discrete)
 /// or anchor (rhythmic), and tau.
 ///
@@ -485,6 +490,32 @@ pdmp_status pdmp_controller_clone(const pdmp_controller *controller,
 /// Errors: PDMP_NULL.
 pdmp_status pdmp_controller_copy(const pdmp_controller *controller,
                                  pdmp_controller *copy);
+
+/// Computes the movement under constant conditions at the times 0, dt, ..., (n_samples - 1) dt, in seconds. `conditions` may
+/// be NULL: those of the nominal demonstration. The movement lasts pdmp_info.duration, or that times tau / pdmp_info.tau for
+/// another tau.
+///
+/// The buffers of `motion` take n_samples rows, one after the other: n_samples * n_coordinates positions, and n_samples *
+/// n_dofs velocities and accelerations.
+///
+/// This function allocates. Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE; PDMP_ABSENT if a condition does not apply to the kind
+/// of model.
+pdmp_status pdmp_model_rollout(const pdmp_model *model,
+                               const pdmp_conditions *conditions,
+                               double dt,
+                               size_t n_samples,
+                               const pdmp_motion *motion,
+                               pdmp_text error);
+
+/// Computes the future of a movement under the present commands at the times 0, dt, ..., (n_samples - 1) dt from now, in
+/// seconds, without disturbing it. The rows are those that ticks of `dt` seconds yield; the first one is the present motion.
+///
+/// The buffers of `motion` are as those of pdmp_model_rollout. This function allocates. Errors: PDMP_NULL, PDMP_LENGTH,
+/// PDMP_RANGE.
+pdmp_status pdmp_controller_forecast(pdmp_controller *controller,
+                                     double dt,
+                                     size_t n_samples,
+                                     const pdmp_motion *motion);
 
 #ifdef __cplusplus
 }  // extern "C"

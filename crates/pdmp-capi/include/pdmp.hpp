@@ -68,6 +68,9 @@ struct Motion {
     std::vector<double> position, velocity, acceleration;
 };
 
+/// Sampled movement: n_samples rows of n_coordinates positions, and of n_dofs velocities and accelerations.
+using Trajectory = Motion;
+
 namespace detail {
 
 /// Executes a call that writes an error message, and throws pdmp::Error if its status is negative.
@@ -133,6 +136,12 @@ public:
         return name ? name : "";
     }
 
+    /// Returns the unit of degree of freedom `dof`, counted from 0; empty if it is not known or `dof` >= n_dofs.
+    std::string unit(std::size_t dof) const {
+        const char *unit = pdmp_model_unit(get(), dof);
+        return unit ? unit : "";
+    }
+
     /// Returns label `label` of context column `column`, both counted from 0, or an empty string if there is none.
     std::string label(std::size_t column, std::size_t label) const {
         const char *text = pdmp_model_label(get(), column, label);
@@ -151,6 +160,17 @@ public:
         return conditions([&](pdmp_conditions *conditions, pdmp_buffer storage, pdmp_text error) {
             return pdmp_model_predict(get(), view(context), conditions, storage, error);
         });
+    }
+
+    /// Computes the movement at the times 0, dt, ..., (n_samples - 1) dt, see pdmp_model_rollout.
+    Trajectory rollout(const Conditions &conditions, double dt, std::size_t n_samples) const {
+        const pdmp_conditions c = detail::to_c(conditions);
+        Trajectory trajectory(n_samples * info().n_coordinates, n_samples * info().n_dofs);
+        const pdmp_motion outputs = detail::to_c(trajectory);
+        detail::check([&](pdmp_text error) {
+            return pdmp_model_rollout(get(), &c, dt, n_samples, &outputs, error);
+        });
+        return trajectory;
     }
 
     /// Returns the handle, which the model owns; NULL after a move.
@@ -188,7 +208,8 @@ public:
     /// Starts a movement with ticks of `dt` seconds. `transition` is the time, in seconds, after which 99 % of a
     /// commanded change has taken effect, see pdmp_settings.
     Controller(const Model &model, double dt, const Conditions &conditions = {},
-               const std::optional<double> &transition = {}) {
+               const std::optional<double> &transition = {})
+        : n_coordinates_(model.info().n_coordinates), n_dofs_(model.info().n_dofs) {
         const pdmp_settings settings{dt, detail::to_c(transition), {}};
         const pdmp_conditions c = detail::to_c(conditions);
         pdmp_controller *controller = nullptr;
@@ -202,7 +223,7 @@ public:
     Controller clone() const {
         pdmp_controller *copy = nullptr;
         detail::check([&](pdmp_text error) { return pdmp_controller_clone(get(), {}, &copy, error); });
-        return Controller(copy);
+        return Controller(copy, *this);
     }
 
     /// Copies the state of another controller without allocation, see pdmp_controller_copy.
@@ -265,6 +286,15 @@ public:
         return pdmp_controller_progress(get(), time, phase);
     }
 
+    /// Computes the future of the movement at the times 0, dt, ..., (n_samples - 1) dt from now, see pdmp_controller_forecast.
+    Trajectory forecast(double dt, std::size_t n_samples) {
+        Trajectory trajectory(n_samples * n_coordinates_, n_samples * n_dofs_);
+        const pdmp_motion outputs = detail::to_c(trajectory);
+        const pdmp_status status = pdmp_controller_forecast(get(), dt, n_samples, &outputs);
+        if (status < 0) throw Error(status, error());
+        return trajectory;
+    }
+
     /// Returns the message of the last call that failed; empty before the first error.
     std::string error() const {
         char text[512];
@@ -276,12 +306,14 @@ public:
     pdmp_controller *get() const noexcept { return controller_.get(); }
 
 private:
-    explicit Controller(pdmp_controller *controller) noexcept : controller_(controller) {}
+    Controller(pdmp_controller *copy, const Controller &of) noexcept
+        : n_coordinates_(of.n_coordinates_), n_dofs_(of.n_dofs_), controller_(copy) {}
 
     struct Free {
         void operator()(pdmp_controller *controller) const noexcept { pdmp_controller_free(controller); }
     };
 
+    std::size_t n_coordinates_, n_dofs_;
     std::unique_ptr<pdmp_controller, Free> controller_;
 };
 

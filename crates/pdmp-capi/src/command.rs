@@ -189,10 +189,15 @@ impl pdmp_command {
 impl pdmp_motion {
     /// Checks that each given buffer holds at least one number per coordinate or DoF.
     pub(crate) fn check(&self, primitive: &Primitive) -> Result<(), Fault> {
-        let n_dofs = primitive.n_dofs();
-        self.position.check("position", primitive.n_coordinates(), per_coordinate(primitive))?;
-        self.velocity.check("velocity", n_dofs, "DoF")?;
-        self.acceleration.check("acceleration", n_dofs, "DoF")
+        self.check_rows(primitive, 1, [per_coordinate(primitive), "DoF"])
+    }
+
+    /// Checks that each given buffer holds `n` rows of at least one number per coordinate or DoF, as `per` names them.
+    pub(crate) fn check_rows(&self, primitive: &Primitive, n: usize, per: [&'static str; 2]) -> Result<(), Fault> {
+        let [n_coordinates, n_dofs] = [primitive.n_coordinates(), primitive.n_dofs()].map(|row| n.saturating_mul(row));
+        self.position.check("position", n_coordinates, per[0])?;
+        self.velocity.check("velocity", n_dofs, per[1])?;
+        self.acceleration.check("acceleration", n_dofs, per[1])
     }
 
     /// Writes the present motion of a controller.

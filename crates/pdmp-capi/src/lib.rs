@@ -1,4 +1,4 @@
-//! C ABI of the runtime: loads models, predicts movements, and creates, commands, steps and reads controllers.
+//! C ABI of the runtime: loads models, predicts and samples movements, and creates, commands, steps and reads controllers.
 //!
 //! `include/pdmp.h` is generated from these sources, and every item that C sees has its C name here too. A reference in
 //! a signature is a pointer in C: NULL is accepted wherever the reference is wrapped in an `Option`.
@@ -27,6 +27,7 @@ mod guard;
 mod limits;
 mod model;
 mod status;
+mod trajectory;
 
 pub use buffers::*;
 pub use command::*;
@@ -35,3 +36,4 @@ pub use controller_copies::*;
 pub use limits::*;
 pub use model::*;
 pub use status::{pdmp_status, pdmp_version};
+pub use trajectory::*;

@@ -25,6 +25,7 @@ use pdmp_status::PDMP_OK;
 pub struct pdmp_model {
     pub(crate) inner: Arc<Model>,
     names: Vec<CString>,
+    units: Vec<CString>,
     labels: Vec<Vec<CString>>,
 }
 
@@ -81,14 +82,14 @@ unsafe fn create(
             let texts = texts.iter().map(|text| CString::new(text.split('\0').next().unwrap_or_default()));
             texts.collect::<Result<Vec<_>, _>>().map_err(|_| Fault::Internal)
         };
-        let names = c_strings(inner.names())?;
+        let [names, units] = [c_strings(inner.names())?, c_strings(inner.units())?];
         let columns = inner.map().map(ContextMap::columns).unwrap_or_default();
         let labels = columns.iter().map(|column| match column {
             ContextColumn::Label(labels) => c_strings(labels),
             ContextColumn::Number => Ok(Vec::new()),
         });
         let labels = labels.collect::<Result<_, _>>()?;
-        *handle = Box::into_raw(Box::new(pdmp_model { inner: Arc::new(inner), names, labels }));
+        *handle = Box::into_raw(Box::new(pdmp_model { inner: Arc::new(inner), names, units, labels }));
         Ok(PDMP_OK)
     };
     // SAFETY: this function has the same contract for `error`.
@@ -186,6 +187,13 @@ pub extern "C" fn pdmp_model_describe(
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_model_name(model: Option<&pdmp_model>, dof: usize) -> *const c_char {
     model.and_then(|model| model.names.get(dof)).map_or(ptr::null(), |name| name.as_ptr())
+}
+
+/// Returns the unit of degree of freedom `dof`, counted from 0, as a UTF-8 string that the model owns; "" if it is not known.
+/// Returns NULL if `model` is NULL or `dof` >= n_dofs.
+#[unsafe(no_mangle)]
+pub extern "C" fn pdmp_model_unit(model: Option<&pdmp_model>, dof: usize) -> *const c_char {
+    model.and_then(|model| model.units.get(dof)).map_or(ptr::null(), |unit| unit.as_ptr())
 }
 
 /// Writes the conditions that reproduce demonstration `demonstration`, counted from 0: style, goal and start (discrete)

@@ -14,8 +14,8 @@ use common::*;
 use ndarray::Array2;
 use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
-use pdmp_core::motion::Limits;
-use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status};
+use pdmp_core::motion::{Limits, TimeGrid};
+use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status, rollout};
 use tempfile::TempDir;
 
 const C: [&str; 2] = ["cc", "-std=c11"];
@@ -204,7 +204,9 @@ fn bend(h: f64) -> Demonstration {
 
 #[test]
 fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
-    let model = learn(&reaches(), &options(Kind::Discrete));
+    let units = ["rad", "rad", "m"].map(String::from).to_vec();
+    let demos: Vec<_> = reaches().into_iter().map(|demo| demo.with_units(units.clone()).unwrap()).collect();
+    let model = learn(&demos, &options(Kind::Discrete));
     let mut conditions = model.predict(&[0.2]).unwrap().conditions;
     conditions.velocity = Some(vec![0.0; 3]);
     let mut controller = Controller::new(model.primitive(), 2e-3, &conditions, Some(0.0)).unwrap();
@@ -217,7 +219,7 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
         jerk: each(100.0),
         ..Limits::default()
     };
-    let expected: Vec<_> = (0..500)
+    let mut expected: Vec<_> = (0..500)
         .map(|tick| {
             match tick {
                 100 => controller.set_style(&conditions_of(&model, 0).style.unwrap()).unwrap(),
@@ -240,6 +242,13 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
             motion(&controller)
         })
         .collect();
+
+    let grid = TimeGrid { dt: 0.01, duration: Some(0.39) };
+    let rolled = rollout(model.primitive(), &model.predict(&[0.2]).unwrap().conditions, grid).unwrap();
+    expected.extend((0..40).map(|k| {
+        let rows = [&rolled.position, &rolled.velocity, &rolled.acceleration].map(|samples| samples.row(k));
+        rows.iter().flatten().map(|number| number.to_bits()).collect()
+    }));
 
     let folder = saved(&model, "reach.safetensors");
     let source = root().join("crates/pdmp-capi/tests/wrapper.cpp");

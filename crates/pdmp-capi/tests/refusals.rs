@@ -18,7 +18,8 @@ use pdmp::*;
 use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::TimeScaling;
 use pdmp_core::model::TimeWarp;
-use pdmp_core::{Error, Kind};
+use pdmp_core::motion::TimeGrid;
+use pdmp_core::{Error, Kind, rollout};
 
 const NO_VECTOR: pdmp_vector = pdmp_vector { data: ptr::null(), length: 0 };
 const NO_TEXT: pdmp_text = pdmp_text { data: ptr::null_mut(), size: 0 };
@@ -223,11 +224,15 @@ fn null_for_a_required_argument_is_an_error() {
             pdmp_controller_read(None, None),
             pdmp_controller_read(running.handle(), None),
             pdmp_controller_progress(None, None, None),
+            pdmp_model_rollout(None, None, 0.01, 2, None, NO_TEXT),
+            pdmp_model_rollout(Some(&model), None, 0.01, 2, None, NO_TEXT),
+            pdmp_controller_forecast(None, 0.01, 2, None),
+            pdmp_controller_forecast(running.handle(), 0.01, 2, None),
         ] {
             assert_eq!(status, PDMP_NULL);
         }
         assert_eq!(pdmp_controller_error(None, NO_TEXT), 0);
-        assert!(pdmp_model_name(None, 0).is_null());
+        assert!(pdmp_model_name(None, 0).is_null() && pdmp_model_unit(None, 0).is_null());
         pdmp_controller_free(ptr::null_mut());
     }
     pdmp_model_free(None);
@@ -713,4 +718,44 @@ fn poses_are_moved_in_coordinates() {
     let small = pdmp_motion { position: buffer(&mut velocity), ..outputs };
     // SAFETY: the buffers are valid over their lengths.
     assert_eq!(unsafe { pdmp_controller_read(running.handle(), Some(&small)) }, PDMP_LENGTH);
+}
+
+/// Samples fill rows of the caller's memory, and no call writes past it, or more samples than a rollout may have.
+#[test]
+fn trajectories_fill_rows_of_the_right_number() {
+    let demos: Vec<_> = poses::screws(4, 2.0, 0.4, 101, 1).into_iter().map(poses::pose).collect();
+    let rust = learn(&demos, &options(Kind::Discrete));
+    let (_, model, _) = load(&rust.to_bytes().unwrap());
+    // SAFETY: the model is new, and the library allocates it as a `Box`.
+    let model = unsafe { Box::from_raw(model) };
+    let mut running = Running::new(&model);
+    let (mut position, mut velocity) = (vec![0.0; 50 * 7], vec![0.0; 50 * 6]);
+    let outputs =
+        pdmp_motion { position: buffer(&mut position), velocity: buffer(&mut velocity), acceleration: NO_BUFFER };
+    // SAFETY: every pointer is valid over its length, or NULL.
+    let rolled = |n, outputs: &pdmp_motion| unsafe {
+        with_text(200, |error| pdmp_model_rollout(Some(&model), None, 0.02, n, Some(outputs), error))
+    };
+    let refusals = [(0, PDMP_RANGE, "n_samples = 0"), (51, PDMP_LENGTH, "350"), (usize::MAX, PDMP_LENGTH, "350")];
+    for (n, status, text) in refusals {
+        let (found, said) = rolled(n, &outputs);
+        assert_eq!(found, status);
+        assert!(said.contains(text), "{said}");
+        // SAFETY: as above.
+        assert_eq!(unsafe { pdmp_controller_forecast(running.handle(), 0.02, n, Some(&outputs)) }, status);
+    }
+    let none = pdmp_motion { position: NO_BUFFER, velocity: NO_BUFFER, acceleration: NO_BUFFER };
+    assert_eq!(rolled(usize::MAX, &none).0, PDMP_RANGE);
+    assert_eq!(rolled(10, &none).0, PDMP_OK);
+
+    assert_eq!(rolled(50, &outputs).0, PDMP_OK);
+    let grid = TimeGrid { dt: 0.02, duration: Some(0.98) };
+    let expected = rollout(rust.primitive(), &pdmp_core::Conditions::default(), grid).unwrap();
+    assert_eq!(expected.position.as_slice().unwrap(), position);
+    assert_eq!(expected.velocity.as_slice().unwrap(), velocity);
+
+    // SAFETY: as above.
+    assert_eq!(unsafe { pdmp_controller_forecast(running.handle(), 0.02, 50, Some(&outputs)) }, PDMP_OK);
+    let own = pdmp_core::Controller::new(rust.primitive(), 1e-3, &pdmp_core::Conditions::default(), None).unwrap();
+    assert_eq!(own.forecast(0.98, Some(0.02)).unwrap().position.as_slice().unwrap(), position);
 }

@@ -1,5 +1,6 @@
 // Calls every member of pdmp.hpp on a discrete model of three DoFs, and prints the motion after each tick.
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <fstream>
@@ -34,9 +35,11 @@ int main(int, char **argv) try {
     auto model = pdmp::Model::from_bytes(bytes.data(), bytes.size());
     REQUIRE(model.info().n_dofs == 3 && model.info().kind == PDMP_DISCRETE);
     REQUIRE(model.name(0) == pdmp::Model::load(argv[1]).name(0) && model.name(3).empty());
-    REQUIRE(model.label(0, 0).empty());
+    REQUIRE(model.label(0, 0).empty() && model.unit(2) == "m" && model.unit(3).empty());
     REQUIRE(status_thrown_by([&] { model.demonstration(5); }) == PDMP_RANGE);
     REQUIRE(status_thrown_by([&] { model.predict({}); }) == PDMP_NULL);
+    REQUIRE(status_thrown_by([&] { model.rollout({}, 0.0, 10); }) == PDMP_RANGE);
+    REQUIRE(status_thrown_by([&] { model.rollout({}, 0.01, 0); }) == PDMP_RANGE);
 
     auto conditions = model.predict({0.2});
     conditions.velocity = {0.0, 0.0, 0.0};
@@ -93,12 +96,16 @@ int main(int, char **argv) try {
     REQUIRE(time > 0.999 && time < 1.001 && phase > 0.0 && phase < 1.0);
 
     auto copy = controller.clone();
+    const auto forecast = controller.forecast(0.002, 101);
+    REQUIRE(status_thrown_by([&] { controller.forecast(-1.0, 101); }) == PDMP_RANGE);
     pdmp::Motion ahead(3);
     for (int tick = 0; tick < 100; ++tick) REQUIRE(copy.step() > 0);
     REQUIRE(controller.read(motion) > 0 && copy.read(ahead) > 0 && motion.position != ahead.position);
     for (int tick = 0; tick < 100; ++tick) REQUIRE(controller.step() > 0);
     REQUIRE(controller.read(motion) > 0 && motion.position == ahead.position);
     REQUIRE(motion.velocity == ahead.velocity && motion.acceleration == ahead.acceleration);
+    REQUIRE(std::equal(ahead.position.begin(), ahead.position.end(), forecast.position.end() - 3));
+    REQUIRE(std::equal(ahead.acceleration.begin(), ahead.acceleration.end(), forecast.acceleration.end() - 3));
     for (int tick = 0; tick < 50; ++tick) REQUIRE(controller.step() > 0);
     REQUIRE(copy.copy_from(controller) == PDMP_OK && copy.copy_from(copy) == PDMP_OK);
     REQUIRE(controller.step() > 0 && copy.step() > 0 && controller.read(motion) > 0 && copy.read(ahead) > 0);
@@ -106,6 +113,14 @@ int main(int, char **argv) try {
     REQUIRE(copy.copy_from(first) == PDMP_NULL && first.copy_from(copy) == PDMP_NULL);
     REQUIRE(copy.error() == "controller is NULL");
     REQUIRE(status_thrown_by([&] { first.clone(); }) == PDMP_NULL);
+
+    const auto rollout = model.rollout(model.predict({0.2}), 0.01, 40);
+    REQUIRE(rollout.velocity.size() == 120);
+    for (int row = 0; row < 40; ++row) {
+        for (const auto *numbers : {&rollout.position, &rollout.velocity, &rollout.acceleration})
+            for (int dof = 0; dof < 3; ++dof) std::printf("%a ", (*numbers)[3 * row + dof]);
+        std::printf("\n");
+    }
     return 0;
 } catch (const std::exception &error) {
     std::fprintf(stderr, "%s\n", error.what());
