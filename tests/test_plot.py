@@ -205,6 +205,7 @@ def test_suffix_selects_the_format(model: pdmp.Model, tmp_path: Path) -> None:
 
 def test_missing_matplotlib_is_named(model: pdmp.Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without matplotlib, the error names the extra."""
+    monkeypatch.delitem(sys.modules, "pdmp.plot._figure", raising=False)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(ImportError, match=r"pip install 'pdmp\[plot\]'"):
         plot.singular_values(model)
@@ -233,3 +234,113 @@ def test_cut_off_needs_a_clock() -> None:
     """A recording without times is rejected."""
     with pytest.raises(ValueError, match="has no times"):
         plot.cut_off(pdmp.Demonstration(np.zeros((9, 1))))
+
+
+def test_motion_has_a_column_per_derivative_and_limits(model: pdmp.Model) -> None:
+    """Position, velocity and acceleration have their units, and limits are dashed lines."""
+    limits = pdmp.Limits(position=([-1, -2], [3, 4]), velocity=[1.5, 2.5])
+    movements = {"free": model.rollout(), "fastest": model.fastest(limits)}
+    figure = plot.motion(movements, limits=limits)
+    assert labels_of(figure) >= {"x [m]", "x [m/s]", "y [m/s²]", "time [s]"}
+    dashed = [
+        sorted(line.get_ydata()[0] for line in axes.lines if line.get_linestyle() == "--")
+        for axes in figure.axes
+    ]
+    assert dashed == [[-1, 3], [-1.5, 1.5], [], [-2, 4], [-2.5, 2.5], []]
+    (velocity,) = [line for line in figure.axes[4].lines if line.get_label() == "fastest"]
+    np.testing.assert_array_equal(velocity.get_ydata(), movements["fastest"].velocity[:, 1])
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["free", "fastest"]
+    assert not plot.motion(model.rollout()).legends
+
+
+def test_motion_of_a_pose_has_fewer_velocities_than_coordinates() -> None:
+    """A unit quaternion has four coordinates and three angular velocities."""
+    turn = 0.5 * np.linspace(0, 1, 60)[:, None] ** 2
+    position = np.hstack([np.cos(turn), np.sin(turn), 0 * turn, 0 * turn])
+    demo = pdmp.Demonstration(position, dt=0.02, rotations={0: "wxyz"})
+    figure = plot.motion(pdmp.fit([demo], n_styles=1).rollout())
+    drawn = [bool(axes.lines) for axes in figure.axes]
+    assert drawn == [True] * 9 + [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("trajectories", "limits", "message"),
+    [
+        ([], None, "trajectories is empty"),
+        ("both", None, r"trajectories\[1\] has the degrees of freedom"),
+        (
+            "one",
+            pdmp.Limits(velocity=[1.0, 2.0, 3.0]),
+            "limits of 3 degrees of freedom, expected 2",
+        ),
+    ],
+)
+def test_motion_rejects_other_degrees_of_freedom(
+    model: pdmp.Model, rhythmic: pdmp.Model, trajectories: Any, limits: Any, message: str
+) -> None:
+    """A trajectory in other units or of other joints is not drawn over the first one."""
+    given = {"both": [model.rollout(), rhythmic.rollout()], "one": model.rollout()}
+    with pytest.raises(ValueError, match=message):
+        plot.motion(given.get(trajectories, []) if trajectories else [], limits=limits)
+
+
+def test_variation_is_mean_and_deviation_of_each_group() -> None:
+    """The line is the mean of a group at each percent, and the band one standard deviation."""
+    time = np.linspace(0, 1, 101)[:, None]
+    demos = [pdmp.Demonstration(k * time, dt=0.01 * k, units=["m"]) for k in (1, 2, 3, 9)]
+    figure = plot.variation(demos, ["a", "a", "a", "b"])
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "movement [%]"
+    first, second = axes.lines
+    np.testing.assert_allclose(first.get_ydata(), 2 * time[:, 0], atol=1e-12)
+    np.testing.assert_allclose(second.get_ydata(), 9 * time[:, 0], atol=1e-12)
+    # The deviation of 1, 2, 3 is 1, that of a single demonstration 0.
+    heights = [np.ptp(band.get_paths()[0].vertices[:, 1]) for band in axes.collections]
+    np.testing.assert_allclose(heights, [3, 9])
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["a (n = 3)", "b (n = 1)"]
+
+
+def test_variation_of_cycles_ends_where_it_begins() -> None:
+    """A cycle has no sample at its end, which is its beginning."""
+    figure = plot.variation(loops(), kind="rhythmic")
+    for axes in figure.axes:
+        mean = axes.lines[-1].get_ydata()
+        assert axes.get_xlabel() == "cycle [%]"
+        assert mean[0] == pytest.approx(mean[-1], abs=1e-9)
+        assert len(axes.lines) == len(loops()) + 1
+
+
+@pytest.mark.parametrize(
+    ("demos", "labels", "message"),
+    [
+        ([], None, "demos is empty"),
+        (reaches(), ["a"], "labels has length 1, expected 5"),
+        (
+            [reaches()[0], pdmp.Demonstration(np.zeros((50, 3)), dt=0.1)],
+            None,
+            "demo 1 has 3 columns",
+        ),
+    ],
+)
+def test_variation_rejects_other_demonstrations(demos: Any, labels: Any, message: str) -> None:
+    """Groups are of the same degrees of freedom, and every demonstration has one."""
+    with pytest.raises(ValueError, match=message):
+        plot.variation(demos, labels)
+
+
+def test_figures_show_themselves_once(model: pdmp.Model) -> None:
+    """A notebook shows the value of a cell by `_repr_png_`; pyplot does not show it again."""
+    import matplotlib.pyplot as plt
+
+    figure = plot.singular_values(model)
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert not plt.get_fignums()
+
+
+def test_figures_take_a_place_in_others(model: pdmp.Model) -> None:
+    """A part of a figure is drawn on as a figure."""
+    figure = Figure(layout="constrained")
+    left, right = figure.subfigures(1, 2)
+    assert plot.singular_values(model, figure=left) is left
+    plot.variation(reaches(), figure=right)
+    assert len(figure.axes) == 3
