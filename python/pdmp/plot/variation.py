@@ -67,14 +67,14 @@ def variation(
     names = demos[0].names or [f"y{d}" for d in range(n)]
     x = "cycle [%]" if kind == "rhythmic" else "movement [%]"
     figure, panels = grid_panels(dof_labels(names, demos[0].units or [""] * n), x, figure)
-    groups = [""] if labels is None else list(dict.fromkeys(labels))
+    groups = ["mean ± SD"] if labels is None else list(dict.fromkeys(labels))
     if labels is None:
         for axes, columns in zip(panels, traces.T, strict=True):
             axes.plot(PERCENT, columns, color=GREY, linewidth=0.6)
     for k, group in enumerate(groups):
         members = [labels is None or labels[m] == group for m in range(len(demos))]
         mean, deviation = traces[members].mean(axis=0), _deviation(traces[members])
-        color, label = PALETTE[k % len(PALETTE)], f"{group} (n = {sum(members)})".strip()
+        color, label = PALETTE[k % len(PALETTE)], f"{group} (n = {sum(members)})"
         for axes, line, band in zip(panels, mean.T, deviation.T, strict=True):
             axes.plot(PERCENT, line, color=color, label=label)
             axes.fill_between(PERCENT, line - band, line + band, color=color, alpha=0.2, lw=0)
