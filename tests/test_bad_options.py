@@ -57,7 +57,7 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ),
     ({"contexts": [[1], [2], [3], [4], [NAN]]}, r"demo 4: context\[0\] = NaN"),
     ({"contexts": [[1], [2]]}, "contexts has length 2, expected 5: one value per demonstration"),
-    ({"contexts": [1, 2, 3, 4, 5]}, r"contexts\[0\] = 1: expected two axes \(M, Q\)"),
+    ({"contexts": np.zeros((5, 1, 1))}, r"contexts has shape \[5, 1, 1\], expected axes \(M, Q\)"),
     ({"period": 2.0}, "period does not apply to a discrete primitive"),
 ]
 

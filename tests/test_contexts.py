@@ -413,3 +413,25 @@ def test_selection_without_varying_contexts_is_rejected(
     """Selection by cross-validation needs contexts that vary."""
     with pytest.raises(ValueError, match=message):
         pdmp.fit([bent(0.1), bent(0.2), bent(0.3)], dt=0.02, **options)
+
+
+@pytest.mark.parametrize("as_contexts", [list, np.array, lambda h: [[x] for x in h]])
+def test_single_context_values_need_no_list(as_contexts: Any) -> None:
+    """One number for each demonstration is one context value, in a fit as in its prediction."""
+    heights = [0.0, 0.2, 0.4, 0.6]
+    demos = [bent(h) for h in heights]
+    model = pdmp.fit(demos, dt=0.02, contexts=as_contexts(heights))
+    np.testing.assert_array_equal(model.contexts, np.array(heights)[:, None])
+    labelled = pdmp.fit(demos, dt=0.02, contexts=["a", "b", "a", "b"])
+    assert labelled.contexts == [["a"], ["b"], ["a"], ["b"]]
+    with pytest.raises(TypeError, match=r"contexts must be an array of shape \(M, Q\) or \(M,\)"):
+        pdmp.fit(demos, dt=0.02, contexts="abab")
+
+
+def test_evaluate_takes_the_contexts_of_fit() -> None:
+    """Names and single values are read as by a fit."""
+    heights = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
+    demos = [bent(h) for h in heights]
+    forms = [heights, {"height": heights}, [{"height": h} for h in heights], [[h] for h in heights]]
+    errors = [pdmp.evaluate(demos, dt=0.02, contexts=form, max_folds=2) for form in forms]
+    assert len({str(one) for one in errors}) == 1

@@ -255,7 +255,7 @@ CYCLES: list[tuple[dict[str, Any], str]] = [
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"contexts": None}, "demo 0 has no context: pass contexts="),
     ({"contexts": CONTEXTS[:4]}, "contexts has length 4, expected 6: one value per demonstration"),
-    ({"contexts": HEIGHTS}, r"contexts has shape \[6\], expected two axes \(M, Q\)"),
+    ({"contexts": [*CONTEXTS[:5], [1.0, 2.0]]}, "contexts differ in length"),
     ({"contexts": [*CONTEXTS[:5], [np.nan]]}, r"contexts\[5, 0\] = nan: must be finite"),
     ({"contexts": [[1.0]] * 6}, "contexts: one condition in 6 demonstrations: at least 2"),
     ({"max_folds": 1}, "max_folds = 1: must be at least 2"),

@@ -50,6 +50,7 @@ __all__ = [
     "__version__",
     "absolute_relative",
     "blend",
+    "context_rows",
     "cycles",
     "factorise",
     "fill_gaps",
@@ -207,7 +208,7 @@ def fit(
         Sampling interval in s of demonstrations without one.
     period : float or array_like, (M,), optional
         Periods in s of time-stamped cycles.
-    contexts : array_like, (M, Q), or M lists of Q numbers and labels, or mapping, optional
+    contexts : array_like, (M, Q) or (M,), or M lists of Q numbers and labels, or mapping, optional
         Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
         keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
         (M,).
@@ -310,6 +311,20 @@ def fit(
     >>> fitted = pdmp.fit(demos, dt=0.02, contexts=[[0.1], [0.2], [0.3]], n_styles=1)
     >>> fitted.n_demos, fitted.n_dofs, fitted.n_styles
     (3, 2, 1)
+    """
+
+def context_rows(contexts: Any) -> list[list[float | str]]:
+    """Converts contexts of M demonstrations as `fit` does.
+
+    Parameters
+    ----------
+    contexts : array_like, (M, Q) or (M,), or M lists of Q numbers and labels, or mapping
+        Contexts of the demonstrations.
+
+    Returns
+    -------
+    list of list of float or str
+        Q numbers and labels of each demonstration.
     """
 
 def inspected(
@@ -748,6 +763,9 @@ class Model:
     @property
     def segment_durations(self) -> _Array:  # (M, K)
         """Time (M, K) in s of each demonstration in each segment between `breaks`."""
+    @property
+    def duration(self) -> float:
+        """Duration of the nominal demonstration in s if discrete, its period if rhythmic."""
     @property
     def durations(self) -> _Array:  # (M,)
         """Durations or periods (M,) of the demonstrations in s, the sums of their segment durations."""

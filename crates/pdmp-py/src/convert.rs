@@ -257,28 +257,22 @@ pub(crate) fn context_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Co
         .map_err(|_| PyTypeError::new_err(format!("{name} = {}: expected a number or a text", quoted(value))))
 }
 
-/// Converts contexts (M, Q) of numbers and labels.
+/// Converts contexts (M, Q), or (M,) of one value each, of numbers and labels.
 pub(crate) fn contexts(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<ContextValue>>> {
     let value = &rows_of(argument, value)?;
     if let Ok(shape) = value.getattr("shape")
         && let Ok(shape) = shape.cast::<PyTuple>()
-        && shape.len() != 2
+        && !(1..=2).contains(&shape.len())
     {
         let shape: Vec<String> = shape.iter().map(|length| length.to_string()).collect();
         let shape = format!("[{}]", shape.join(", "));
-        return Err(PyValueError::new_err(format!("{argument} has shape {shape}, expected two axes (M, Q)")));
+        return Err(PyValueError::new_err(format!("{argument} has shape {shape}, expected axes (M, Q) or (M,)")));
     }
-    if value.try_iter().is_err() {
-        return Err(PyTypeError::new_err(format!("{argument} must be an array of shape (M, Q), or a list of M lists")));
+    if value.is_instance_of::<PyString>() || value.try_iter().is_err() {
+        return Err(PyTypeError::new_err(format!("{argument} must be an array of shape (M, Q) or (M,), or a list")));
     }
     items(argument, value, |name, row| {
-        if row.is_instance_of::<PyString>() || row.try_iter().is_err() {
-            return Err(PyValueError::new_err(format!(
-                "{name} = {}: expected two axes (M, Q): put the values of each demonstration into a list",
-                quoted(row)
-            )));
-        }
-        context(name, row)
+        if row.is_instance_of::<PyString>() { Ok(vec![context_value(name, row)?]) } else { context(name, row) }
     })
 }
 

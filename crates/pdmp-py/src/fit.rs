@@ -43,7 +43,7 @@ use crate::warp::TimeWarp;
 ///     Sampling interval in s of demonstrations without one.
 /// period : float or array_like, (M,), optional
 ///     Periods in s of time-stamped cycles.
-/// contexts : array_like, (M, Q), or M lists of Q numbers and labels, or mapping, optional
+/// contexts : array_like, (M, Q) or (M,), or M lists of Q numbers and labels, or mapping, optional
 ///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
 ///     keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
 ///     (M,).

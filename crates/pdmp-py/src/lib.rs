@@ -61,6 +61,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<status::Status>()?;
     module.add_class::<controller::Controller>()?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
+    module.add_function(wrap_pyfunction!(named_contexts::context_rows, module)?)?;
     module.add_function(wrap_pyfunction!(conditions::blend, module)?)?;
     module.add_function(wrap_pyfunction!(factorization::factorise, module)?)?;
     module.add_function(wrap_pyfunction!(inspection::inspected, module)?)?;

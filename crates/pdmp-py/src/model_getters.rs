@@ -208,6 +208,12 @@ impl Model {
         locked(self.0.demonstrated().segment_durations.to_pyarray(py))
     }
 
+    /// Duration of the nominal demonstration in s if discrete, its period if rhythmic.
+    #[getter]
+    fn duration(&self) -> f64 {
+        self.0.duration()
+    }
+
     /// Durations or periods (M,) of the demonstrations in s, the sums of their segment durations.
     #[getter]
     fn durations<'py>(&self, py: Python<'py>) -> Vector<'py> {

@@ -3,6 +3,7 @@
 use pdmp_core::Model;
 use pdmp_core::context::ContextMap;
 use pdmp_core::demonstration::ContextValue;
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyMapping, PyString};
@@ -89,6 +90,29 @@ pub(crate) fn named_contexts(
             .ok_or_else(|| PyValueError::new_err(format!("{own}: expected one value for each of {}", names.join(", "))))
     })?;
     Ok((Some(names), rows))
+}
+
+/// Converts contexts of M demonstrations as `fit` does.
+///
+/// Parameters
+/// ----------
+/// contexts : array_like, (M, Q) or (M,), or M lists of Q numbers and labels, or mapping
+///     Contexts of the demonstrations.
+///
+/// Returns
+/// -------
+/// list of list of float or str
+///     Q numbers and labels of each demonstration.
+#[pyfunction]
+
+pub(crate) fn context_rows<'py>(contexts: &Bound<'py, PyAny>) -> PyResult<Vec<Vec<Bound<'py, PyAny>>>> {
+    let py = contexts.py();
+    let to_python = |value: ContextValue| match value {
+        ContextValue::Number(number) => number.into_bound_py_any(py),
+        ContextValue::Label(label) => label.into_bound_py_any(py),
+    };
+    let (_, rows) = named_contexts("contexts", contexts)?;
+    rows.into_iter().map(|row| row.into_iter().map(to_python).collect()).collect()
 }
 
 fn ordered(map: Option<&ContextMap>, values: &[(String, ContextValue)]) -> PyResult<Context> {

@@ -62,7 +62,7 @@ impl Prediction {
             most if most.is_finite() => format!("; extrapolated by {most:.2} of the demonstrated range of contexts"),
             _ => "; extrapolated along a context value that never varied".to_string(),
         };
-        let style = self.conditions.bind(py).getattr("style")?.call_method0("tolist")?;
-        Ok(format!("<pdmp.Prediction: style {style}, duration {:.4} s{note}>", self.duration))
+        let style: Vec<f64> = self.conditions.bind(py).getattr("style")?.extract()?;
+        Ok(format!("<pdmp.Prediction: style {style:.4?}, duration {:.4} s{note}>", self.duration))
     }
 }

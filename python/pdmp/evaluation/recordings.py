@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pdmp._messages import check_number, check_type, counted, value_error, warn
-from pdmp._native import Demonstration, Trajectory, inspected
+from pdmp._native import Demonstration, Trajectory, context_rows, inspected
 
 Array: TypeAlias = NDArray[Any]  # of float64
 Demos: TypeAlias = (
@@ -188,14 +188,12 @@ def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:
                 raise value_error(
                     f"demo {m}: context has length {len(context)}, expected {len(values[0])}"
                 )
+    rows = context_rows(values)
+    if len({len(row) for row in rows}) > 1:
+        raise ValueError("contexts differ in length: pass the same values for every demonstration")
+    has_labels = any(isinstance(value, str) for row in rows for value in row)
     # As an array of texts, numpy would convert numbers beside labels.
-    raw = np.asarray(values, object)
-    kinds = {str if isinstance(value, str) else type(value) for value in raw.ravel()}
-    if kinds & {bytes, bytearray, np.bytes_}:
-        raise ValueError("contexts hold bytes: decode them to labels, or pass numbers")
-    array = raw if str in kinds else raw.astype(float)
-    if array.ndim != 2:
-        raise value_error(f"contexts has shape {list(array.shape)}, expected two axes (M, Q)")
+    array = np.array(rows, object if has_labels else float)
     if len(array) != len(demos):
         raise value_error(
             f"contexts has length {len(array)}, expected {len(demos)}: one value per demonstration"

@@ -81,8 +81,8 @@ def evaluate(
     ----------
     demos : sequence or mapping of Demonstration or array_like (T_m, D), or array_like (M, T, D)
         The demonstrations, as for `pdmp.fit`.
-    contexts : array_like (M, Q), or M lists of Q numbers and labels, optional
-        Context of each; by default those of the demonstrations.
+    contexts : array_like, (M, Q) or (M,), or M lists of Q numbers and labels, or mapping, optional
+        Context of each, as for `pdmp.fit`; by default those of the demonstrations.
     predictors : mapping of str to Predictor, optional
         Predictors by name; by default `evaluation.baselines()` and the primitive,
         `evaluation.PDMP()`. The mean demonstration, the reference of relative errors, is always

@@ -7,7 +7,7 @@ import io
 from matplotlib.figure import Figure
 
 
-class NotebookFigure(Figure):
+class _NotebookFigure(Figure):
     """Figure that a notebook shows once, as the value of a cell.
 
     IPython shows a figure of matplotlib itself only after `matplotlib.pyplot` was imported, and one

@@ -33,10 +33,10 @@ def ensure_figure(figure: Figure | None, width: float, height: float) -> Figure:
     if figure is not None:
         return figure
     try:
-        from pdmp.plot._figure import NotebookFigure
+        from pdmp.plot._figure import _NotebookFigure
     except ImportError:
         raise ImportError("figures need matplotlib: pip install 'pdmp[plot]'") from None
-    return NotebookFigure(figsize=(width, height), layout="constrained", dpi=150)
+    return _NotebookFigure(figsize=(width, height), layout="constrained", dpi=150)
 
 
 def colormap() -> Colormap:

@@ -46,8 +46,9 @@ def motion(
 
     Examples
     --------
+    >>> limits = pdmp.Limits(velocity=2.0, acceleration=10.0)
     >>> movements = {"free": model.rollout(), "fastest": model.fastest(limits)}
-    >>> figure = plot.motion(movements, limits=limits)
+    >>> figure = pdmp.plot.motion(movements, limits=limits)
     """
     labelled = _labelled(trajectories)
     first = labelled[0][1]

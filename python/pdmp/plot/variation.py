@@ -50,7 +50,8 @@ def variation(
 
     Examples
     --------
-    >>> figure = plot.variation(cycles, ["slow", "slow", "fast", "fast"], kind="rhythmic")
+    >>> low_or_high = ["low" if height < 0.3 else "high" for height in heights]
+    >>> figure = pdmp.plot.variation(demos, low_or_high)
     """
     demos = list(demos.values() if isinstance(demos, Mapping) else demos)
     if not demos:
