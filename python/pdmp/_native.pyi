@@ -325,6 +325,13 @@ def context_rows(contexts: Any) -> list[list[float | str]]:
     -------
     list of list of float or str
         Q numbers and labels of each demonstration.
+
+    Raises
+    ------
+    ValueError
+        Another shape, or columns of different lengths.
+    TypeError
+        A value that is neither a number nor a text.
     """
 
 def inspected(

@@ -103,6 +103,13 @@ pub(crate) fn named_contexts(
 /// -------
 /// list of list of float or str
 ///     Q numbers and labels of each demonstration.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Another shape, or columns of different lengths.
+/// TypeError
+///     A value that is neither a number nor a text.
 #[pyfunction]
 
 pub(crate) fn context_rows<'py>(contexts: &Bound<'py, PyAny>) -> PyResult<Vec<Vec<Bound<'py, PyAny>>>> {
