@@ -143,7 +143,9 @@ stubs: .venv/with-dev  ## Copies the docstrings of the compiled module into its 
 	$(BIN)/python .ci/stubs.py --write
 
 docs: .venv/with-docs  ## The documentation site, with its snippets and examples executed, into out/docs/index.html
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --no-deps --package pdmp-core
 	$(BIN)/sphinx-build --fresh-env --fail-on-warning --keep-going --quiet --nitpicky -b html docs out/docs
+	rm -rf out/docs/rust && cp -r $(TARGET)/doc out/docs/rust
 
 clean:  ## Removes what the targets above made
 	cargo clean

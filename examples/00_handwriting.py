@@ -35,4 +35,4 @@ for share in np.linspace(0, 1, 9):
 left.set(xlabel="x [mm]", ylabel="y [mm]", title="Recordings (grey) and mean conditions")
 left.legend()
 right.set(xlabel="x [mm]", title="From the C to the S")
-figure.savefig("10_handwriting.png", dpi=150)
+figure.savefig("00_handwriting.png", dpi=150)
