@@ -158,9 +158,7 @@ class Browser:
     def click(self, x: float, y: float) -> None:
         """Clicks at a pixel of the window."""
         for kind in ("mousePressed", "mouseReleased"):
-            self.call(
-                "Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1
-            )
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def problems(self) -> list[str]:
         """Returns errors of the page, and addresses other than its own that it requested."""

@@ -18,6 +18,7 @@ from pdmp._native import Demonstration, Limits, Model
 from pdmp.explorer._payload import payload
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["Explorer", "explorer"]
@@ -61,6 +62,7 @@ class Explorer:
         )
 
     def __repr__(self) -> str:
+        """Returns the size of the page."""
         return f"<pdmp.explorer.Explorer: page of {len(self.html.encode()) // 1000} kB>"
 
 
@@ -70,7 +72,7 @@ def explorer(
     *,
     demonstrations: Sequence[Demonstration] | Mapping[str, Demonstration] | None = None,
     limits: Limits | None = None,
-    kinematics: Callable[[NDArray], ArrayLike] | None = None,
+    kinematics: Callable[[NDArray[np.float64]], ArrayLike] | None = None,
     links: Sequence[tuple[int, int]] | None = None,
     dofs: Sequence[str | int] | None = None,
     title: str | None = None,

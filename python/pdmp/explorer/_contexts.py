@@ -11,6 +11,7 @@ import numpy as np
 
 from pdmp._labels import split_label
 from pdmp._native import Conditions, Model
+from pdmp.explorer._packing import packed
 
 MAX_TABLE_BYTES = 240_000
 MAX_VALUES = 201
@@ -22,8 +23,6 @@ def context_table(
     model: Model, tau_of: Callable[[Model, Conditions], float]
 ) -> tuple[dict[str, Any] | None, str]:
     """Returns the columns and the table of predictions, or None; and a note for the reader."""
-    from pdmp.explorer._payload import packed
-
     if model.contexts is None:
         return None, ""
     rows = [list(context) for context in model.contexts]
@@ -34,7 +33,10 @@ def context_table(
     n_positions = 1 if model.kind == "rhythmic" else 2
     width = model.n_styles + n_positions * model.n_coordinates + 1
     n_rows = MAX_TABLE_BYTES // (8 * width)
-    sets = [sorted(set(map(str, c))) if label else [] for c, label in zip(columns, labels, strict=True)]
+    sets = [
+        sorted(set(column), key=str) if label else []
+        for column, label in zip(columns, labels, strict=True)
+    ]
     n_labels = prod(len(values) for values in sets if values)
     n_numbers = labels.count(False)
     per_number = int((n_rows / n_labels) ** (1 / max(n_numbers, 1)) + 1e-9)
@@ -43,7 +45,7 @@ def context_table(
             f"Contexts of {n_columns} columns have too many combinations for this page: "
             "select a demonstration instead."
         )
-    values = [
+    values: list[list[Any]] = [
         own or _grid(column, min(per_number, MAX_VALUES))
         for own, column in zip(sets, columns, strict=True)
     ]
@@ -67,8 +69,9 @@ def _row(
     model: Model, conditions: Conditions, tau_of: Callable[[Model, Conditions], float]
 ) -> list[float]:
     """Returns style, goal and start or anchor, and τ."""
-    centre, start = conditions.anchor, np.empty(0)
     if model.kind == "discrete":
-        centre, start = conditions.goal, conditions.start
-    parts = (conditions.style, centre, start, [tau_of(model, conditions)])
-    return np.concatenate([np.asarray(part, dtype=float) for part in parts]).tolist()
+        positions = [conditions.goal, conditions.start]
+    else:
+        positions = [conditions.anchor]
+    vectors = [vector for vector in (conditions.style, *positions) if vector is not None]
+    return [*(float(x) for vector in vectors for x in vector), tau_of(model, conditions)]

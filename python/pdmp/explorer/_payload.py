@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ from pdmp._messages import check_type, counted, quoted, value_error
 from pdmp._native import Conditions, Demonstration, Limits, Model
 from pdmp.explorer._contexts import context_table
 from pdmp.explorer._kinematics import stick_figure
+from pdmp.explorer._packing import packed
 from pdmp.plot.movements import check_demonstrations
 
 if TYPE_CHECKING:
@@ -24,8 +24,12 @@ MAX_CURVE_BYTES = 900_000
 """Size of the curves, of which 33 % more are in the page."""
 MAX_DEMOS = 400
 """Demonstrations in the page; of more, every n-th."""
+MAX_DEMO_BYTES = 100_000
 MAX_RECORDED = 60
+"""Recordings in the page: more are a grey area."""
 MAX_RECORDED_SAMPLES = 100
+MIN_RECORDED_SAMPLES = 20
+MAX_RECORDED_BYTES = 150_000
 MAX_PANELS = 12
 LENGTHS = frozenset({"m", "cm", "mm", "km"})
 
@@ -41,7 +45,8 @@ def payload(
 ) -> dict[str, Any]:
     """Returns the data of the page, of types that JSON has; arrays are in base64."""
     panels = _panels(model, dofs)
-    chosen = _chosen(model.n_demos, MAX_DEMOS)
+    per_demo = 8 * (model.n_styles + 2 * model.n_coordinates + 1)
+    chosen = _chosen(model.n_demos, min(MAX_DEMOS, MAX_DEMO_BYTES // per_demo + 2))
     per_step = 3 * 8 * model.n_styles * model.n_dofs
     steps = int(np.clip(MAX_CURVE_BYTES // per_step, MIN_STEPS, MAX_STEPS))
     styles, start, means, centre = model._unit_curves(steps)
@@ -81,13 +86,6 @@ def payload(
     return data
 
 
-def packed(array: NDArray[Any]) -> dict[str, Any]:
-    """Returns an array with its shape, its numbers little-endian in base64."""
-    kind = "f32" if array.dtype == np.float32 else "f64"
-    numbers = np.ascontiguousarray(array, dtype={"f32": "<f4", "f64": "<f8"}[kind])
-    return {"shape": list(array.shape), kind: base64.b64encode(numbers.tobytes()).decode()}
-
-
 def tau_of(model: Model, conditions: Conditions) -> float:
     """Returns the time constant of conditions in linear time."""
     if conditions.segment_durations is None:
@@ -98,7 +96,7 @@ def tau_of(model: Model, conditions: Conditions) -> float:
 
 def _chosen(n: int, largest: int) -> list[int]:
     """Returns at most `largest` of n indices, at equal distances."""
-    return np.unique(np.linspace(0, n - 1, min(n, largest)).round().astype(int)).tolist()
+    return [round(k) for k in np.linspace(0, n - 1, min(n, largest)).tolist()]
 
 
 def _about(model: Model, recorded: bool) -> str:
@@ -115,8 +113,8 @@ def _about(model: Model, recorded: bool) -> str:
 
 def _time_note(model: Model) -> str:
     return (
-        f"The model has {model.segment_durations.shape[1]} time segments. This page shows movements "
-        "in linear time, for their total duration."
+        f"The model has {model.segment_durations.shape[1]} time segments. This page shows "
+        "movements in linear time, for their total duration."
     )
 
 
@@ -160,18 +158,23 @@ def _recordings(
     model: Model, demonstrations: Sequence[Demonstration] | Mapping[str, Demonstration]
 ) -> list[dict[str, Any]]:
     """Returns times and positions of recordings for drawing, in single precision."""
+    kinds = (Sequence, Mapping)
+    check_type("demonstrations", demonstrations, kinds, "a list of demonstrations")
     if isinstance(demonstrations, Mapping):
         demonstrations = list(demonstrations.values())
     check_demonstrations(model, demonstrations)
     found = []
-    for m in _chosen(model.n_demos, MAX_RECORDED):
+    n_numbers = MAX_RECORDED_BYTES // (4 * (model.n_coordinates + 1))
+    chosen = _chosen(model.n_demos, min(MAX_RECORDED, n_numbers // MIN_RECORDED_SAMPLES + 1))
+    n_kept = min(MAX_RECORDED_SAMPLES, n_numbers // len(chosen) + 2)
+    for m in chosen:
         demo = demonstrations[m]
         if demo.time is None:
             ends = model.kind == "discrete"
             time = np.linspace(0, model.durations[m], demo.n_samples, endpoint=ends)
         else:
             time = demo.time - demo.time[0]
-        kept = _chosen(len(time), MAX_RECORDED_SAMPLES)
+        kept = _chosen(len(time), n_kept)
         position = np.asarray(demo.position)[kept].astype(np.float32)
         found.append({"time": packed(time[kept].astype(np.float32)), "position": packed(position)})
     return found

@@ -28,7 +28,7 @@ function palette() {
 }
 
 /** Range that contains all values added; it grows in steps, so that the axes rest while a value moves. */
-class Range {
+class AxisRange {
   constructor(values, minimum = 1e-9) {
     [this.low, this.high] = [Infinity, -Infinity];
     for (const value of values) [this.low, this.high] = [Math.min(this.low, value), Math.max(this.high, value)];
@@ -84,6 +84,13 @@ class Diagram {
     this.context = this.canvas.getContext("2d");
     this.layer = document.createElement("canvas");
     this.stale = true;
+  }
+
+  /** Makes the canvas answer to pointer and keys, or only show. */
+  makeInteractive(active, cursor) {
+    this.canvas.setAttribute("role", active ? "application" : "img");
+    this.canvas.tabIndex = active ? 0 : -1;
+    Object.assign(this.canvas.style, { cursor: active ? cursor : "", touchAction: active ? "none" : "" });
   }
 
   /** Sets text for screen readers, if it changed. */

@@ -141,6 +141,7 @@ function buildControls() {
   const bends = element("input", { type: "checkbox", id: "accelerations" });
   bends.addEventListener("change", () => {
     state.accelerations = bends.checked;
+    byId("curves").classList.toggle("three", bends.checked);
     strips.forEach((strip, c) => strip && (showStrip(c, false), showStrip(c, true)));
   });
   shown.push(element("div", {}, bends, element("label", { htmlFor: "accelerations" }, " accelerations")));
@@ -239,17 +240,22 @@ function code() {
   return `model.rollout(\n    ${lines.join(",\n    ")},\n)`;
 }
 
-/** Saves the movement with the columns of Trajectory.to_csv. */
-function saveCsv() {
+/** Returns the movement with the columns of Trajectory.to_csv. */
+function csv() {
   const { coordinates, dofs } = data;
   const head = (labels, suffix, per) => labels.names.map((name, i) =>
     labels.units[i] ? `${name}${suffix} [${labels.units[i]}${per}]` : `${name}${suffix}`);
   const columns = [movement.time, ...movement.position, ...movement.velocity, ...movement.acceleration];
-  const names = ["t [s]", ...head(coordinates, "", ""), ...head(dofs, "_velocity", "/s"), ...head(dofs, "_acceleration", "/s²")];
+  const names = ["t", ...head(coordinates, "", ""), ...head(dofs, "_velocity", "/s"), ...head(dofs, "_acceleration", "/s²")];
   const quoted = names.map((name) => (/[",\n]/.test(name) ? `"${name.replaceAll('"', '""')}"` : name));
   const rows = Array.from(movement.time, (_, k) => columns.map((column) => column[k]).join(","));
+  return [quoted.join(","), ...rows, ""].join("\n");
+}
+
+/** Saves the movement. */
+function saveCsv() {
   const link = element("a", { download: "movement.csv" });
-  link.href = URL.createObjectURL(new Blob([[quoted.join(","), ...rows, ""].join("\n")], { type: "text/csv" }));
+  link.href = URL.createObjectURL(new Blob([csv()], { type: "text/csv" }));
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
@@ -303,7 +309,8 @@ function start() {
     colours = palette();
     request();
   });
-  window.explorer = { state, frames, primitive, movement: () => movement, refresh };
+  // For programs that drive the page.
+  window.explorer = { state, frames, primitive, movement: () => movement, csv, plane, followers };
 }
 
 start();

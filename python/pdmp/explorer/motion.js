@@ -232,21 +232,25 @@ class Kinematics {
     this.points = points.map((point) => ({ ...point, coefficients: decode(point.coefficients) }));
   }
 
+  /** Returns one point at a position. */
+  point(p, position) {
+    const { dofs, turns, coefficients } = this.points[p];
+    let values = coefficients;
+    dofs.forEach((dof, i) => {
+      const angle = turns[i] === null ? 0 : (position[dof] / turns[i]) * 2 * Math.PI;
+      const factors = turns[i] === null ? [1, position[dof]] : [1, Math.cos(angle), Math.sin(angle)];
+      const rest = values.length / factors.length;
+      const sums = new Float64Array(rest);
+      factors.forEach((factor, f) => {
+        for (let n = 0; n < rest; n++) sums[n] += factor * values[f * rest + n];
+      });
+      values = sums;
+    });
+    return Array.from(values);
+  }
+
   /** Returns the points at a position. */
   at(position) {
-    return this.points.map(({ dofs, turns, coefficients }) => {
-      let values = coefficients;
-      dofs.forEach((dof, i) => {
-        const angle = turns[i] === null ? 0 : (position[dof] / turns[i]) * 2 * Math.PI;
-        const factors = turns[i] === null ? [1, position[dof]] : [1, Math.cos(angle), Math.sin(angle)];
-        const rest = values.length / factors.length;
-        const sums = new Float64Array(rest);
-        factors.forEach((factor, f) => {
-          for (let n = 0; n < rest; n++) sums[n] += factor * values[f * rest + n];
-        });
-        values = sums;
-      });
-      return Array.from(values);
-    });
+    return this.points.map((_, p) => this.point(p, position));
   }
 }

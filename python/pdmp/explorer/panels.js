@@ -7,14 +7,17 @@ function interpolated(values, share) {
   return values[k] + (values[k + 1] - values[k]) * (at - k);
 }
 
+const shares = (n) => Array.from({ length: n + 1 }, (_, k) => k / n);
+const positionAt = (movement, share) => movement.position.map((values) => interpolated(values, share));
+
 /** Curve of one quantity over time, with limits. Demonstrations are {time, values}. */
 class TimeCurve extends Diagram {
   constructor(label, unit, demos, limits, pick) {
     super(label, [], {});
     Object.assign(this, { unit, demos, limits, pick });
     const values = demos.flatMap((demo) => extremes(demo.values));
-    this.y = new Range(values);
-    this.x = new Range([0]);
+    this.y = new AxisRange(values);
+    this.x = new AxisRange([0]);
     [this.x.low, this.x.high] = [0, Math.max(...demos.map((demo) => demo.time[demo.time.length - 1]))];
     this.x.step = this.x.high * 0.25;
   }
@@ -94,7 +97,7 @@ class PathView extends Diagram {
       });
       return select;
     });
-    super("Path", selects, { tabIndex: 0 });
+    super("Path", selects, {});
     Object.assign(this, { quantities, selects, movements, view: new View() });
     this.view.attach(this.canvas, () => this.chosen.length === 3, () => {
       this.stale = true;
@@ -106,9 +109,10 @@ class PathView extends Diagram {
   /** Takes the axes from the selections. */
   choose() {
     this.chosen = this.selects.filter((select) => select.value !== "").map((select) => this.quantities[select.value]);
+    this.makeInteractive(this.chosen.length === 3, "grab");
     this.demos = this.movements.map((movement) => this.chosen.map((quantity) => quantity.of(movement)));
     const all = this.chosen.map((_, i) => this.demos.flatMap((demo) => extremes(demo[i])));
-    this.ranges = all.map((values) => new Range(values));
+    this.ranges = all.map((values) => new AxisRange(values));
     this.movement &&= this.follow(this.movement);
     this.stale = true;
   }
@@ -163,11 +167,13 @@ function frameOf(diagram, ranges, view, labels, equal) {
     const axes = new Axes(diagram, ...ranges, { equal, labels });
     return { at: ([x, y]) => [axes.x(x), axes.y(y)], paint: (context, colours) => axes.paint(context, colours) };
   }
-  const sizes = ranges.map(({ low, high }) => high - low);
-  const largest = Math.max(...sizes);
-  const scale = sizes.map((size) => 1 / (equal ? largest : size));
-  const centred = (point) => point.map((x, i) => (x - (ranges[i].low + ranges[i].high) / 2) * scale[i]);
-  const unit = Math.min(diagram.width - 40, diagram.height - 30) / 1.5;
+  if (equal) {
+    const half = Math.max(...ranges.map(({ low, high }) => high - low)) / 2;
+    const middles = ranges.map(({ low, high }) => (low + high) / 2);
+    ranges = middles.map((middle) => ({ low: middle - half, high: middle + half }));
+  }
+  const centred = (point) => point.map((x, i) => (x - ranges[i].low) / (ranges[i].high - ranges[i].low) - 0.5);
+  const unit = Math.min(diagram.width - 40, diagram.height - 40) / 1.55;
   const at = (point) => {
     const [right, up] = view.project(centred(point));
     return [diagram.width / 2 + unit * right, diagram.height / 2 - unit * up];
@@ -183,13 +189,14 @@ function frameOf(diagram, ranges, view, labels, equal) {
     }
     context.textAlign = "center";
     labels.forEach((label, i) => {
-      const place = (value) => at(low.map((x, n) => (n === i ? value : x)));
       const { low: from, high: to } = ranges[i];
-      context.fillStyle = colours.text;
-      const [x, y] = place(from + 0.62 * (to - from));
-      context.fillText(label, x, y + 14);
-      context.fillStyle = colours.faint;
-      context.fillText(short(to), ...place(to));
+      const write = (share, text, colour) => {
+        const [x, y] = at(low.map((value, n) => (n === i ? from + share * (to - from) : value)));
+        context.fillStyle = colour;
+        context.fillText(text, x, y + 12);
+      };
+      write(0.5, label, colours.text);
+      write(0.95, rounded(to, 10 * (to - from)), colours.faint);
     });
   };
   return { at, paint };
@@ -207,7 +214,8 @@ class StylePlane extends Diagram {
       menu.addEventListener("change", () => this.choose());
       return menu;
     });
-    super("Styles", selects, { tabIndex: 0 });
+    super("Styles", selects, {});
+    this.makeInteractive(true, "crosshair");
     Object.assign(this, { selects, demos, select });
     // A style in which the demonstrations hardly differ has a range in which it acts.
     this.smallest = 0.15 * Math.max(...Array.from({ length: nStyles }, (_, j) => spanOf(demos.map(({ style }) => style[j]))));
@@ -231,7 +239,7 @@ class StylePlane extends Diagram {
   choose() {
     this.axesOf = this.selects.map((menu) => Number(menu.value));
     this.ranges = this.axesOf.map((j) => {
-      const range = new Range(this.demos.map(({ style }) => style[j]), this.smallest);
+      const range = new AxisRange(this.demos.map(({ style }) => style[j]), this.smallest);
       range.extend(range.low - range.step, range.high + range.step);
       return range;
     });
@@ -293,30 +301,32 @@ class StylePlane extends Diagram {
 /** Stick figure at the present time, with the path of its last point. */
 class StickFigure extends Diagram {
   constructor(kinematics, movements, changed) {
-    super("Robot", [], { tabIndex: 0 });
+    super("Robot", [], {});
+    this.makeInteractive(kinematics.dimension === 3, "grab");
     this.kinematics = kinematics;
     this.view = new View();
     this.view.attach(this.canvas, () => kinematics.dimension === 3, () => {
       this.stale = true;
       changed();
     });
-    const points = movements.flatMap((movement) => this.poses(movement, 8).flat());
-    this.ranges = Array.from({ length: kinematics.dimension }, (_, i) => new Range(points.map((point) => point[i])));
-    this.traces = movements.map((movement) => this.poses(movement, 60).map((pose) => pose[pose.length - 1]));
+    const points = movements.flatMap((movement) => shares(8).flatMap((share) => this.pose(movement, share)));
+    this.ranges = Array.from({ length: kinematics.dimension }, (_, i) => new AxisRange(points.map((point) => point[i])));
+    this.traces = movements.map((movement) => this.tips(movement));
   }
 
-  /** Returns the points at n + 1 times of a movement. */
-  poses(movement, n) {
-    return Array.from({ length: n + 1 }, (_, k) => this.pose(movement, k / n));
+  /** Returns the path of the last point. */
+  tips(movement) {
+    const last = this.kinematics.points.length - 1;
+    return shares(60).map((share) => this.kinematics.point(last, positionAt(movement, share)));
   }
 
   pose(movement, share) {
-    return this.kinematics.at(movement.position.map((values) => interpolated(values, share)));
+    return this.kinematics.at(positionAt(movement, share));
   }
 
   follow(movement) {
     this.movement = movement;
-    this.trace = this.poses(movement, 60).map((pose) => pose[pose.length - 1]);
+    this.trace = this.tips(movement);
     this.ranges.forEach((range, i) => {
       if (range.extend(...extremes(this.trace.map((point) => point[i])))) this.stale = true;
     });

@@ -70,13 +70,13 @@ function limitText() {
       const values = derivative ? movement[key][d] : movement.position[column];
       const [low, high] = extremes(values);
       const per = ["", "/s", "/s²"][derivative];
-      const unit = `${data.dofs.units[d]}${per}`;
+      const unit = per ? `${data.dofs.units[d] || "1"}${per}` : data.dofs.units[d];
       const size = derivative ? upper : Math.min(upper - lower, Math.max(Math.abs(lower), Math.abs(upper)));
       const excess = Math.max(high - upper, lower - low) / size;
       if (excess > worst) {
         const [value, bound] = high - upper > lower - low ? [high, upper] : [low, lower];
         worst = excess;
-        text = `Beyond a limit: ${word} of ${data.dofs.names[d]} reaches ${short(value)} ${unit}, limit ${short(bound)}.`;
+        text = `Beyond a limit: ${word} of ${data.dofs.names[d]} reaches ${`${short(value)} ${unit}`.trim()}, limit ${short(bound)}.`;
       }
     }
   });
