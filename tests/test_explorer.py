@@ -190,7 +190,8 @@ def test_large_models_fit_into_two_megabytes_or_are_refused() -> None:
     def library(n_demos: int, n_dofs: int) -> list[pdmp.Demonstration]:
         parts = rng.normal(size=(2, n_demos, n_dofs))
         paths = (
-            goal * s**2 * (3 - 2 * s) + bend * np.sin(np.pi * s) ** 2 for goal, bend in zip(*parts)
+            goal * s**2 * (3 - 2 * s) + bend * np.sin(np.pi * s) ** 2
+            for goal, bend in zip(*parts, strict=True)
         )
         return [pdmp.Demonstration(path, dt=0.02) for path in paths]
 
@@ -404,11 +405,11 @@ def test_demonstrations_and_contexts_set_all_conditions(page: Callable[..., Brow
     """A selected demonstration is reproduced, and a context gives its prediction."""
     model = pdmp.fit(reaches())
     opened = page(model)
-    select = """const menu = document.getElementById("demo");
-        menu.value = 4; menu.dispatchEvent(new Event("change")); explorer.state.demo"""
-    assert (
-        opened.evaluate(f"(() => {{{select.replace('; explorer', '; return explorer')}}})()") == 4
+    opened.evaluate(
+        "(() => { const menu = document.getElementById('demo');"
+        "menu.value = 4; menu.dispatchEvent(new Event('change')); })()"
     )
+    assert opened.evaluate("explorer.state.demo") == 4
     dt = model.durations[4] / 200
     assert_equals_rollout(opened, model.rollout(model.conditions(4), dt=dt))
     opened.evaluate("document.querySelector('#controls .row input[type=range]').focus()")
@@ -451,9 +452,9 @@ def test_keys_and_clicks_select_styles(page: Callable[..., Browser], reach: pdmp
     opened.key("ArrowRight", 39)
     after = style()
     assert after[0] > before[0] and after[1] == before[1]
-    opened.evaluate("document.querySelector('#controls .row input[type=range]').focus()")
+    opened.evaluate("document.querySelector('[aria-label=Style] input[type=range]').focus()")
     opened.key("ArrowLeft", 37)
-    assert style()[0] < after[0]
+    assert style()[0] < after[0] and style()[1] == after[1]
     assert_equals_rollout(opened, eval(code(opened), {"model": reach}))
 
 
@@ -514,7 +515,7 @@ def test_playback_draws_sixty_frames_a_second(
     """While it plays and all sliders move, the page computes a frame in half of 1/60 s."""
     opened = page(arm_model, kinematics=arm, limits=pdmp.Limits(velocity=100.0))
     opened.evaluate("document.getElementById('play').click(); explorer.frames.length = 0")
-    times_taken, shares = [], set()
+    shares = set()
     for number in range(40):
         opened.evaluate(MOVE.replace("ROUND", str(number / 9)))
         opened.settle()
