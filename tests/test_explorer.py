@@ -189,10 +189,8 @@ def test_large_models_fit_into_two_megabytes_or_are_refused() -> None:
 
     def library(n_demos: int, n_dofs: int) -> list[pdmp.Demonstration]:
         parts = rng.normal(size=(2, n_demos, n_dofs))
-        paths = (
-            goal * s**2 * (3 - 2 * s) + bend * np.sin(np.pi * s) ** 2
-            for goal, bend in zip(*parts, strict=True)
-        )
+        bump, rise = np.sin(np.pi * s) ** 2, s**2 * (3 - 2 * s)
+        paths = (goal * rise + bend * bump for goal, bend in zip(*parts, strict=True))
         return [pdmp.Demonstration(path, dt=0.02) for path in paths]
 
     demos = library(300, 60)
@@ -599,7 +597,7 @@ def test_colours_are_readable(scheme: str, page: Callable[..., Browser], reach: 
             assert (high + 0.05) / (low + 0.05) >= least, (name, ground)
 
 
-@pytest.mark.parametrize("width", [320, 600, 1000, 1920])
+@pytest.mark.parametrize("width", [320, 600, 720, 1000, 1920])
 def test_no_width_needs_horizontal_scrolling(
     width: int, page: Callable[..., Browser], arm_model: pdmp.Model
 ) -> None:

@@ -13,7 +13,7 @@ const labelled = (name, unit, per = "") => (unit || per ? `${name} [${unit || "1
 function element(tag, properties = {}, ...children) {
   const node = document.createElement(tag);
   for (const [key, value] of Object.entries(properties)) {
-    if (key in node && key !== "list") node[key] = value;
+    if (key in node) node[key] = value;
     else node.setAttribute(key, value);
   }
   node.append(...children);
