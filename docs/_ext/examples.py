@@ -1,6 +1,7 @@
-"""Directive `example`: an example script with its figure and the text that it prints."""
+"""Directive `example`: an example script with its figure, its text and an explorer of its model."""
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -8,23 +9,24 @@ from pathlib import Path
 
 from docutils import nodes
 from docutils.statemachine import StringList
-from snippets import FOLDER, figure_image, printed
+from snippets import FOLDER, explorer_frame, figure_image, printed
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 ROOT = Path(__file__).resolve().parents[2]
+RUNNER = Path(__file__).with_name("run_example.py")
 MAX_SECONDS = 120
 WIDTH = 640
 """Width of a figure in pixels."""
 
 
 class Example(SphinxDirective):
-    """Runs `examples/NAME.py` in an empty folder, and shows its figure, output and code."""
+    """Runs `examples/NAME.py` in an empty folder, and shows figure, explorer, output and code."""
 
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
-        """Returns the figure, the printed text and the code of the example."""
+        """Returns the figure, the explorer, the printed text and the code of the example."""
         name = self.arguments[0]
         script = ROOT / "examples" / f"{name}.py"
         self.env.note_dependency(str(script))
@@ -33,7 +35,7 @@ class Example(SphinxDirective):
         path.parent.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory() as folder:
             done = subprocess.run(
-                [sys.executable, "-W", "error", str(script)],
+                [sys.executable, "-W", "error", str(RUNNER), str(script)],
                 cwd=folder,
                 capture_output=True,
                 text=True,
@@ -43,11 +45,18 @@ class Example(SphinxDirective):
             figure = Path(folder, path.name)
             if done.returncode or not figure.exists():
                 raise self.error(done.stderr or f"{script.name} saves no figure {path.name}")
-            figure.replace(path)
+            shutil.copy(figure, path)
+            explorer = Path(folder, f"{name}.html")
+            frames = []
+            if explorer.exists():
+                page = path.with_suffix(".html")
+                shutil.copy(explorer, page)
+                frames.append(explorer_frame(page, self.env.docname))
         text = f"Figure of the example {name}, described above"
         code = script.read_text(encoding="utf-8")
         return [
             figure_image(path, source, text, WIDTH),
+            *frames,
             printed(done.stdout),
             nodes.literal_block(code, code, language="py"),
         ]

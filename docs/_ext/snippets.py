@@ -1,14 +1,16 @@
 """Execution of the Python snippets of the pages, with their output and figures in the page.
 
 The fences ```` ```python ```` of a page are executed in order in one namespace, in an empty folder.
-Text that a snippet prints, with its warnings, and the figure that it assigns to `figure` follow the
-snippet. A snippet whose first line is `# Figure` is folded. Fences ```` ```py ```` are not run.
+Text that a snippet prints, with its warnings, and the figure or page that it assigns to `figure` or
+`explorer` follow the snippet. A snippet whose first line is `# Figure` is folded. Fences
+```` ```py ```` are not run.
 """
 
 import contextlib
 import io
 import os
 import re
+import shutil
 import tempfile
 import warnings
 from pathlib import Path
@@ -21,6 +23,8 @@ from sphinx.util import logging
 
 FOLDER = "_generated"
 """Folder of the figures in the source folder; not committed."""
+EXPLORERS = "_explorers"
+"""Folder of the explorers in the output."""
 WIDTH = 96
 """Pixels of the page per inch of a figure."""
 
@@ -50,15 +54,23 @@ class Snippets(SphinxTransform):
                     text = f"snippet {number + 1}: {type(error).__name__}: {error}"
                     logger.warning(text, location=node)
                     return
-                self._insert(node, number, output, names.pop("figure", None))
+                self._insert(node, number, output, names)
 
-    def _insert(self, node: nodes.literal_block, number: int, output: str, figure: Any) -> None:
+    def _insert(
+        self, node: nodes.literal_block, number: int, output: str, names: dict[str, Any]
+    ) -> None:
         """Inserts the results of a snippet after it, and folds it if it makes a figure alone."""
+        figure, explorer = names.pop("figure", None), names.pop("explorer", None)
         page = self.env.docname.replace("/", "-")
         results: list[nodes.Node] = [printed(output)] if output else []
         if figure is not None:
             path = Path(self.env.srcdir, FOLDER, f"{page}-{number}.png")
             results.append(saved(figure, path, Path(self.env.srcdir)))
+        if explorer is not None:
+            path = Path(self.env.srcdir, FOLDER, f"{page}-{number}.html")
+            path.parent.mkdir(exist_ok=True)
+            explorer.save(path)
+            results.append(explorer_frame(path, self.env.docname))
         if node.astext().startswith("# Figure"):
             fold = nodes.raw("", "<details><summary>Code of the figure</summary>", format="html")
             results = [*results, fold, node.deepcopy(), nodes.raw("", "</details>", format="html")]
@@ -98,6 +110,23 @@ def figure_image(path: Path, source: Path, text: str, width: int) -> nodes.image
     return nodes.image(uri=uri, alt=text, width=f"{width}px", classes=["result"])
 
 
+def explorer_frame(path: Path, page: str) -> nodes.raw:
+    """Returns a frame with an explorer, which `copy_explorers` copies into the output."""
+    address = f"{'../' * page.count('/')}{EXPLORERS}/{path.name}"
+    frame = f'<iframe class="explorer" src="{address}" title="Explorer" loading="lazy"></iframe>'
+    link = f'<p><a href="{address}">Explorer in a page of its own</a></p>'
+    return nodes.raw("", frame + link, format="html")
+
+
+def copy_explorers(app: Sphinx, error: Exception | None) -> None:
+    """Copies the explorers beside the pages."""
+    if error is None and app.builder.format == "html":
+        target = Path(app.outdir, EXPLORERS)
+        target.mkdir(exist_ok=True)
+        for path in Path(app.srcdir, FOLDER).glob("*.html"):
+            shutil.copy(path, target)
+
+
 def description(figure: Any) -> str:
     """Returns titles and labels of a figure as text for readers who do not see it."""
     panels = []
@@ -118,4 +147,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Registers the transform."""
     os.environ["MATPLOTLIBRC"] = str(app.srcdir)
     app.add_transform(Snippets)
+    app.connect("build-finished", copy_explorers)
     return {"parallel_read_safe": False}

@@ -11,6 +11,8 @@ from typing import Any, ClassVar, Literal, TypeAlias, TypedDict, Unpack, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pdmp.explorer import Explorer
+
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Map: TypeAlias = Literal["auto", "stacked", "gp", "linear", "polynomial"]
@@ -1318,6 +1320,73 @@ class Model:
         ------
         ValueError
             The model has no rotations.
+        """
+    def explorer(
+        self,
+        path: str | PathLike[str] | None = None,
+        *,
+        demonstrations: Sequence[Demonstration] | Mapping[str, Demonstration] | None = None,  # M
+        limits: Limits | None = None,
+        kinematics: Callable[[_Array], ArrayLike] | None = None,  # (D,) to (P, 2) or (P, 3)
+        links: Sequence[tuple[int, int]] | None = None,
+        dofs: Sequence[str | int] | None = None,
+        title: str | None = None,
+    ) -> Explorer:
+        """Makes a page with the model to explore in a browser or a notebook.
+
+        The page is one HTML file that needs neither a server nor a network. It has sliders for style, goal and start, or
+        anchor and amplitude, τ and context; positions, velocities, accelerations and paths that follow them; limits; the
+        plane of styles, with the demonstrations as points; and the call of `rollout` for the present movement. Positions,
+        velocities and accelerations equal those of `rollout` with the same `style`, `goal`, `start` and `tau` to rounding.
+
+        Time is linear: a movement of a model with several segments is that for their total duration. Contexts step over
+        predictions made in advance, on a grid over the demonstrated range.
+
+        Parameters
+        ----------
+        path : path-like, optional
+            File to write.
+        demonstrations : sequence or mapping of Demonstration, optional
+            The M demonstrations, in the order of the fit, to draw behind the movement. By default, their reproductions are
+            drawn.
+        limits : Limits, optional
+            Limits of position, velocity and acceleration to draw and to compare the movement with.
+        kinematics : callable, optional
+            Forward kinematics of a stick figure: points (P, 2) or (P, 3) at a position (D,). Each point may depend on at
+            most eight degrees of freedom, on each as a + b·cos q + c·sin q, as for revolute joints in rad or degrees, or,
+            in a unit of length, as a + b·q. The page then computes the points exactly.
+        links : sequence of (int, int), optional
+            Pairs of points to connect; by default each with the next one.
+        dofs : sequence of str or int, optional
+            Coordinates with diagrams, by name or index; by default all, the first 12 of more.
+        title : str, optional
+            Heading of the page.
+
+        Returns
+        -------
+        Explorer
+            The page, `html`, which notebooks display.
+
+        Raises
+        ------
+        ValueError
+            A number of demonstrations other than M, unknown degrees of freedom, limits of a wrong length, kinematics of
+            another form, or a page of more than 2 MB.
+        TypeError
+            An argument has another type.
+        OSError
+            The file cannot be written, or its folder does not exist.
+
+        Examples
+        --------
+        >>> page = model.explorer(limits=pdmp.Limits(velocity=2.0))
+        >>> page.html.startswith("<!DOCTYPE html>")
+        True
+        """
+    def _unit_curves(self, steps: int) -> tuple[_Array, _Array, _Array, int]:
+        """Computes the curves of which movements under constant conditions consist, per unit of the clock: responses to the
+        styles (3, J, T, D) and to the start (3, T), mean rotations with their velocity and acceleration (R, T, 10), and
+        the sample of these to which goals or anchors are relative.
         """
     def save(self, path: str | PathLike[str]) -> None:
         """Writes a model file.

@@ -12,6 +12,7 @@ mod convert;
 mod demonstration;
 mod display;
 mod error;
+mod explorer;
 mod factorization;
 mod feasibility;
 mod fit;

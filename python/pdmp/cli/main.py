@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from pdmp._messages import printable
 from pdmp._native import PdmpError, __version__
-from pdmp.cli import evaluate, fit, info, plot, rollout
+from pdmp.cli import evaluate, explore, fit, info, plot, rollout
 from pdmp.cli.console import console, one_line, option_names, short_warnings
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
@@ -18,6 +18,7 @@ COMMANDS = {
     "evaluate": evaluate,
     "info": info,
     "plot": plot,
+    "explore": explore,
 }
 
 

@@ -48,15 +48,9 @@ def demonstrations(
         matplotlib is not installed.
     """
     demos = list(demos.values()) if isinstance(demos, Mapping) else demos
+    check_demonstrations(model, demos)
     labels = [""] * len(demos) if labels is None else labels
-    for name, length in (("recording", len(demos)), ("label", len(labels))):
-        if length != model.n_demos:
-            raise ValueError(
-                f"{counted(length, name)} given, expected {model.n_demos}: "
-                "one per demonstration of the fit, in its order"
-            )
-    for m, demo in enumerate(demos):
-        _check(model, m, demo)
+    _check_number(model, "label", len(labels))
     titles = list(dict.fromkeys(labels))
     figure, columns = movement_panels(model, titles, figure)
     for m, (demo, label) in enumerate(zip(demos, labels, strict=True)):
@@ -73,6 +67,22 @@ def demonstrations(
         )
     legend(figure, columns[0][0])
     return figure
+
+
+def check_demonstrations(model: Model, demos: Sequence[Demonstration]) -> None:
+    """Rejects demonstrations that are not one per demonstration of the fit."""
+    _check_number(model, "recording", len(demos))
+    for m, demo in enumerate(demos):
+        _check(model, m, demo)
+
+
+def _check_number(model: Model, name: str, number: int) -> None:
+    """Rejects another number of things than of demonstrations."""
+    if number != model.n_demos:
+        raise ValueError(
+            f"{counted(number, name)} given, expected {model.n_demos}: "
+            "one per demonstration of the fit, in its order"
+        )
 
 
 def _check(model: Model, m: int, demo: Demonstration) -> None:

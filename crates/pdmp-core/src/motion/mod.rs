@@ -35,3 +35,4 @@ pub use prediction_band::{PredictionBand, prediction_band};
 pub use rollout::{TimeGrid, rollout, rollout_with};
 pub use trajectory::{Trajectories, Trajectory};
 pub use two_arms::{Pose, TwoArms, mean_pose};
+pub use unit_responses::{UnitCurves, unit_curves};

@@ -15,14 +15,17 @@
 
 use std::sync::Arc;
 
+use ndarray::{Array2, Array3, Array4, s};
+
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
-use crate::model::responses::{Curves, Key, Responses};
+use crate::model::responses::{Curves, Derivative, Key, Responses};
 use crate::model::sensitivity::STEPS;
 use crate::motion::rollout::{TimeGrid, rollout_with};
 use crate::motion::trajectory::Trajectory;
+use crate::validate::zeros;
 
 /// Returns the responses at the times of a grid, from the cache of the primitive if present.
 ///
@@ -50,6 +53,80 @@ pub(crate) fn responses(
 pub(crate) fn phases(primitive: &Arc<Primitive>) -> Result<Arc<Responses>> {
     let grid = TimeGrid { dt: primitive.duration() / STEPS as f64, duration: None };
     responses(primitive, primitive.tau, false, grid, &mut |_| Ok(()))
+}
+
+/// Curves over the demonstrated duration or period, of which every movement under constant conditions consists.
+///
+/// With the derivative of order k with respect to the clock u, a movement is
+///
+/// ```text
+/// y⁽ᵏ⁾(u) = [k = 0]·g + Σⱼ sⱼRⱼ⁽ᵏ⁾(u) + (y(0) − g)·E⁽ᵏ⁾(u)      discrete,
+/// y⁽ᵏ⁾(u) = [k = 0]·y_a + r₀ Σⱼ sⱼRⱼ⁽ᵏ⁾(u)                     rhythmic, on its limit cycle,
+/// ```
+///
+/// in degrees of freedom; those of a rotation are relative to its mean rotation q̄, q = q̄(u) ⊗ exp(δ).
+#[derive(Clone, Debug)]
+pub struct UnitCurves {
+    /// Responses Rⱼ to the unit styles and their derivatives (3, J, T, D).
+    pub styles: Array4<f64>,
+    /// Response E to a start of one and its derivatives (3, T), equal for all degrees of freedom.
+    pub start: Array2<f64>,
+    /// Mean rotations (R, T, 10): q̄ as w, x, y, z, then ω̄ and ω̄′ in the body frame, per unit of the clock.
+    pub mean_rotations: Array3<f64>,
+    /// Index of the sample of `mean_rotations` to which goals or anchors are relative.
+    pub centre: usize,
+}
+
+/// Computes the curves of a primitive at `steps` + 1 equidistant samples of its demonstrated duration or period.
+///
+/// ```
+/// # use ndarray::s;
+/// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit, rollout};
+/// # use pdmp_core::motion::{TimeGrid, unit_curves};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let curves = unit_curves(model.primitive(), 100)?;
+/// let (conditions, dt) = (model.conditions(&[0])?, model.primitive().duration() / 100.0);
+/// let (style, goal, start) = (conditions.style.unwrap(), conditions.goal.unwrap(), conditions.start.unwrap());
+/// let sum: f64 = style.iter().enumerate().map(|(j, s)| s * curves.styles[[0, j, 50, 1]]).sum();
+/// let position = goal[1] + sum + (start[1] - goal[1]) * curves.start[[0, 50]];
+/// let (style, goal, start) = (Some(style), Some(goal), Some(start));
+/// let same = Conditions { style, goal, start, ..Conditions::default() };
+/// let trajectory = rollout(model.primitive(), &same, TimeGrid { dt, duration: None })?;
+/// assert!((trajectory.position[[50, 1]] - position).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// No step, or curves that do not fit into memory.
+pub fn unit_curves(primitive: &Arc<Primitive>, steps: usize) -> Result<UnitCurves> {
+    let inside = primitive.inside();
+    let grid = TimeGrid { dt: inside.duration() / steps as f64, duration: None };
+    let responses = compute_responses(inside, inside.tau, false, grid, &mut |_| Ok(()))?;
+    let (n_samples, n_dofs) = responses.of(Derivative::Position).start.dim();
+    let mut styles: Array4<f64> = zeros("curves", (3, inside.n_styles(), n_samples, n_dofs))?;
+    let mut start: Array2<f64> = zeros("curves", (3, n_samples))?;
+    for (k, derivative) in Derivative::ALL.into_iter().enumerate() {
+        let (curves, unit) = (responses.of(derivative), inside.tau.powi(k as i32));
+        start.row_mut(k).scaled_add(unit, &curves.start.column(0));
+        for (j, curve) in curves.styles.iter().enumerate() {
+            styles.slice_mut(s![k, j, .., ..]).scaled_add(unit, curve);
+        }
+    }
+    let rotations = primitive.coordinates().map(|coordinates| coordinates.rotations()).unwrap_or_default();
+    let mut mean_rotations: Array3<f64> = zeros("curves", (rotations.len(), n_samples, 10))?;
+    let step = inside.canonical().extent() / steps as f64;
+    for (rotation, mut rows) in rotations.iter().zip(mean_rotations.outer_iter_mut()) {
+        for (k, mut row) in rows.rows_mut().into_iter().enumerate() {
+            let mean = rotation.mean.at(k as f64 * step);
+            let values = mean.rotation.iter().chain(&mean.velocity).chain(&mean.acceleration);
+            row.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
+        }
+    }
+    let centre = if inside.kind() == Kind::Discrete { n_samples - 1 } else { 0 };
+    Ok(UnitCurves { styles, start, mean_rotations, centre })
 }
 
 fn compute_responses(
