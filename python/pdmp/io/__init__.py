@@ -24,9 +24,36 @@ the index. Without an index, all CSV and BVH files in the folder are read.
 `pdmp.preprocessing` prepares raw recordings for `pdmp.fit`.
 """
 
+from pdmp.io._read import read
 from pdmp.io.bvh import read_bvh
+from pdmp.io.c3d import read_c3d
 from pdmp.io.csv import read_csv, write_csv
-from pdmp.io.folder import read, read_folder
+from pdmp.io.folder import read_folder
+from pdmp.io.frames import from_dataframe
+from pdmp.io.hdf5 import read_hdf5
+from pdmp.io.labelled import from_xarray
+from pdmp.io.lerobot import read_lerobot
+from pdmp.io.mat import read_mat
 from pdmp.io.npz import read_npz
+from pdmp.io.opensim import read_opensim
+from pdmp.io.parquet import read_parquet, write_parquet
+from pdmp.io.rosbag import read_rosbag
 
-__all__ = ["read", "read_bvh", "read_csv", "read_folder", "read_npz", "write_csv"]
+__all__ = [
+    "from_dataframe",
+    "from_xarray",
+    "read",
+    "read_bvh",
+    "read_c3d",
+    "read_csv",
+    "read_folder",
+    "read_hdf5",
+    "read_lerobot",
+    "read_mat",
+    "read_npz",
+    "read_opensim",
+    "read_parquet",
+    "read_rosbag",
+    "write_csv",
+    "write_parquet",
+]

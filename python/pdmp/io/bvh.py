@@ -13,7 +13,7 @@ from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields
-from pdmp.io._demonstration import check_options, make_demonstration
+from pdmp.io._demonstration import Options, make_demonstration
 
 if TYPE_CHECKING:
     from bvh import Bvh
@@ -56,7 +56,7 @@ def read_bvh(
     OSError
         A file that cannot be read.
     """
-    check_options(dt, max_gap)
+    Options(columns, dt, max_gap)
     path = Path(path)
     motion = _parsed(path)
     try:
