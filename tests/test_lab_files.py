@@ -196,7 +196,11 @@ def test_trials_in_a_data_frame_are_demonstrations(package: str) -> None:
     for k, demo in enumerate(demos.values()):
         np.testing.assert_array_equal(demo.position, recorded.path_of(k, 2))
         np.testing.assert_allclose(demo.time, TIME + 3)
-        assert (demo.names, demo.units, demo.context.tolist()) == (["x", "knee"], ["m", ""], [0.5 * k])
+        assert (demo.names, demo.units, demo.context.tolist()) == (
+            ["x", "knee"],
+            ["m", ""],
+            [0.5 * k],
+        )
 
 
 INDICES = {
@@ -209,9 +213,7 @@ INDICES = {
 
 
 @pytest.mark.parametrize("index", INDICES.values(), ids=INDICES)
-def test_the_index_of_a_data_frame_is_its_time(
-    tmp_path: Path, index: pandas.Index
-) -> None:
+def test_the_index_of_a_data_frame_is_its_time(tmp_path: Path, index: pandas.Index) -> None:
     """The same holds for the files that pandas writes."""
     frame = pandas.DataFrame(POSITION, columns=COORDINATES, index=index)
     frame.to_csv(tmp_path / "frame.csv")

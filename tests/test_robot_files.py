@@ -125,9 +125,13 @@ def test_demonstrations_of_robomimic_are_poses_by_default(tmp_path: Path) -> Non
     assert (demo.dt, demo.rotations, demo.context) == (0.05, {3: "xyzw"}, ["can 1"])
     assert demo.units == ["m"] * 3 + [""] * 4
     np.testing.assert_array_equal(demo.position[:, :3], recorded.path_of(1))
-    joints = pdmp.io.read_hdf5(path, features="obs/robot0_joint_pos", columns=["robot0_joint_pos.6"])
+    joints = pdmp.io.read_hdf5(
+        path, features="obs/robot0_joint_pos", columns=["robot0_joint_pos.6"]
+    )
     np.testing.assert_array_equal(joints["demo_8"].position[:, 0], recorded.path_of(0, 7)[:, 6])
-    with pytest.raises(ValueError, match="no data set 'obs/x' .* some of actions, obs/robot0_eef_pos"):
+    with pytest.raises(
+        ValueError, match="no data set 'obs/x' .* some of actions, obs/robot0_eef_pos"
+    ):
         pdmp.io.read_hdf5(path, features="obs/x")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from itertools import islice
 from pathlib import Path
@@ -33,15 +32,10 @@ def parse_table(path: Path, time: str) -> CsvTable:
     return parse_layout(path, text, lambda field: _columns.find_clock([field], time) is not None)
 
 
-def head(text: str, separator: str, n_lines: int = MAX_PREAMBLE) -> Head:
-    """Returns the fields of the first lines, without their quotes."""
+def head(text: str, separator: str, n_lines: int | None = MAX_PREAMBLE) -> Head:
+    """Returns the fields of the first lines, at least one of each, without their quotes."""
     lines = islice(text.splitlines(), n_lines)
-    return [
-        [field.strip().strip('"') for field in line.split(separator)]
-        if separator != ","
-        else [field.strip() for field in next(csv.reader([line]), [])]
-        for line in lines
-    ]
+    return [[field.strip().strip('"') for field in line.split(separator)] for line in lines]
 
 
 def axis(name: str, letter: str) -> str:
@@ -59,7 +53,7 @@ def whole(number: float | None) -> int | None:
 def _vicon(path: Path, text: str) -> CsvTable:
     """Layout of a Vicon file: sections of a title, the rate, names, axes, units and samples."""
     separator = max(",;\t", key=text[:2000].count)
-    rows = head(text, separator, len(text))
+    rows = head(text, separator, None)
     lines = [k for k, row in enumerate(rows) if row[0].lower() == "frame" and k >= 3]
     titled = {rows[k - 3][0].strip(": "): k for k in lines if rows[k - 3]}
     title = next((title for title in VICON_SECTIONS if title in titled), None)

@@ -39,6 +39,6 @@ def to_array(source: str, stamps: list[float | int | datetime]) -> tuple[NDArray
         seconds = [(stamp - first).total_seconds() for stamp in stamps]  # type: ignore[operator,union-attr]
     except TypeError:
         raise value_error(
-            f"{source}: dates, with and without zone, and numbers are mixed"
+            f"{source}: dates with a zone, without one, or numbers are mixed"
         ) from None
     return np.array(seconds), True
