@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import re
 from collections.abc import Sequence
 from itertools import chain
@@ -16,6 +14,7 @@ import numpy as np
 from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
+from pdmp.io import _hdf5_text
 from pdmp.io._demonstration import Options, select
 from pdmp.io._features import QUATERNION, feature_list, numbered, unique_names
 from pdmp.io._packages import ContentError, load, reading
@@ -79,8 +78,9 @@ def read_hdf5(
     package = load("h5py", "hdf5", "HDF5 files")
     path.stat()  # a missing file is an error of the system
     read: dict[str, tuple[dict[str, Any], list[float | str]]] = {}
+    with reading(path, "HDF5"):
+        interval = _hdf5_text.interval(path)
     with reading(path, "HDF5"), package.File(path, "r") as file:
-        interval = _interval(file)
         group = file.get("data", {})
         demos = [name for name in group if hasattr(group[name], "keys")]
         demos.sort(key=lambda name: [int(n) for n in re.findall(r"\d+", name)])
@@ -151,13 +151,3 @@ def _context(package: Any, group: Any, name: str) -> list[float | str]:
         value = np.atleast_1d(group.attrs[name]).tolist()
         return [each.decode() if isinstance(each, bytes) else each for each in value]
     return list(_matrix(package, group, name)[0].tolist())
-
-
-def _interval(file: Any) -> float | None:
-    """Returns the interval of the control frequency in the description of the environment."""
-    text = file["data"].attrs.get("env_args", "") if "data" in file else ""
-    try:
-        frequency = float(json.loads(text)["env_kwargs"]["control_freq"])
-    except (KeyError, TypeError, ValueError, RecursionError):
-        return None
-    return 1 / frequency if math.isfinite(frequency) and frequency > 0 else None

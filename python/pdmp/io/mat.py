@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
-from pdmp.io import _time_units
+from pdmp.io import _mat_file, _time_units
 from pdmp.io._demonstration import Options, select
-from pdmp.io._packages import load, reading
+from pdmp.io._packages import reading
 
 POSITIONS = ("position", "positions", "pos", "q", "y", "x", "data")
 """Names of positions, the preferred one first, in any case."""
 TIMES = ("time", "t", "timestamps", "timestamp", "stamps")
-INTERVALS = ("dt", "Ts")
+INTERVALS = ("dt", "ts")
 LAYOUT = (
     "store position (T, D) with time (T,) or dt, in a struct or by themselves, or a cell or struct "
     "array of demonstrations"
@@ -36,7 +36,7 @@ def read_mat(
     max_gap: float = 0.0,
     context: Sequence[float | str] | None = None,
 ) -> dict[str, Demonstration]:
-    """Reads the demonstrations of a MAT file, numbered from "0"; needs the extra `mat`.
+    """Reads the demonstrations of a MAT file, numbered from "0".
 
     A demonstration is a matrix of positions, alone or in a field `position`, `pos`, `q`, `y`, `x`
     or `data` of a struct, beside `time` or `t` [s], or `dt`, and `names`. Several are a cell array,
@@ -60,8 +60,6 @@ def read_mat(
 
     Raises
     ------
-    ImportError
-        The package scipy is not installed.
     ValueError
         A file of another format, version 7.3 or layout, or data that `Demonstration` rejects.
     OSError
@@ -69,13 +67,11 @@ def read_mat(
     """
     path = Path(path)
     options = Options(columns, dt, max_gap, context)
-    package = load("scipy.io", "mat", "MAT files")
     data = path.read_bytes()
     if data[:19] == b"MATLAB 7.3 MAT-file":
         raise value_error(f"{path}: version 7.3: save it by save(..., '-v7')")
     with reading(path, "MAT"):
-        read = package.loadmat(path, squeeze_me=True, struct_as_record=True)
-    values = {name: value for name, value in read.items() if not name.startswith("__")}
+        values = _mat_file.read(data)
     if variable is not None:
         if variable not in values:
             raise value_error(f"{path}: no variable '{variable}' among {', '.join(values)}")
@@ -101,9 +97,9 @@ def _recordings(path: Path, values: dict[str, Any]) -> Iterator[Recording]:
         yield from _of_fields(path, fields)
         return
     # A variable with demonstrations beside, perhaps, their number and the like.
-    nested = {name: v for name, v in values.items() if np.asarray(v).dtype.kind in "OV"}
-    matrices = {name: v for name, v in values.items() if np.ndim(v) >= 2}
-    chosen = nested or matrices or values
+    nested = {name: value for name, value in values.items() if isinstance(value, list)}
+    matrices = {name: value for name, value in values.items() if np.size(value) > 1}
+    chosen = nested or matrices
     if len(chosen) != 1:
         raise value_error(
             f"{path}: pass variable= one of {', '.join(chosen)}: {LAYOUT}"
@@ -115,15 +111,13 @@ def _recordings(path: Path, values: dict[str, Any]) -> Iterator[Recording]:
 
 def _of_value(path: Path, value: Any) -> Iterator[Recording]:
     """Yields the demonstrations of a struct, a cell array or a matrix."""
-    array = np.asarray(value)
-    if array.dtype.names is not None:
-        for row in np.atleast_1d(array).ravel():
-            yield from _of_fields(path, _lower({name: row[name] for name in array.dtype.names}))
-    elif array.dtype.kind == "O":
-        for each in array.ravel():
+    if isinstance(value, dict):
+        yield from _of_fields(path, _lower(value))
+    elif isinstance(value, list):
+        for each in value:
             yield from _of_value(path, each)
     else:
-        yield from _of_fields(path, {"position": array})
+        yield from _of_fields(path, {"position": value})
 
 
 def _of_fields(path: Path, fields: dict[str, Any]) -> Iterator[Recording]:
@@ -131,36 +125,32 @@ def _of_fields(path: Path, fields: dict[str, Any]) -> Iterator[Recording]:
     name = next((name for name in POSITIONS if name in fields), None)
     if name is None:
         raise value_error(f"{path}: no positions among {', '.join(fields)}: {LAYOUT}")
-    position = np.asarray(fields[name])
-    if position.dtype.kind in "OV":
-        yield from _of_value(path, position)
+    if isinstance(fields[name], list):
+        yield from _of_value(path, fields[name])
         return
-    position = _real(path, name, position)
+    position = _real(path, name, fields[name])
     stamps = next((fields[each] for each in TIMES if each in fields), None)
-    time = None if stamps is None else _real(path, "time", np.asarray(stamps)).ravel()
-    interval = next((fields[each] for each in map(str.lower, INTERVALS) if each in fields), None)
+    time = None if stamps is None else _real(path, "time", stamps).ravel()
+    interval = next((fields[each] for each in INTERVALS if each in fields), None)
     step = None
-    if interval is not None and np.size(interval) == 1:
-        step = float(_real(path, "dt", np.asarray(interval)).ravel()[0])
+    if interval is not None and time is None and np.size(interval) == 1:
+        step = float(_real(path, "dt", interval).ravel()[0])
     names = fields.get("names")
-    labels = None if names is None else [str(each).strip() for each in np.atleast_1d(names).ravel()]
-    position = position[:, None] if position.ndim == 1 else position
+    labels = [str(each).strip() for each in names] if isinstance(names, list) else None
     if position.ndim not in (2, 3) or not position.size:
         raise value_error(f"{path}: '{name}' has shape {position.shape}: {LAYOUT}")
-    n_samples = None if time is None else len(time)
-    rows = n_samples == len(position) or (
-        n_samples != position.shape[1] and len(position) >= position.shape[1]
-    )
-    if not rows:
+    n_rows, n_columns = position.shape[:2]
+    by_length = n_rows >= n_columns if time is None else n_rows == len(time)
+    if not by_length and (time is None or n_columns == len(time)):
         position = position.swapaxes(0, 1)
     for each in [position] if position.ndim == 2 else np.moveaxis(position, 2, 0):
-        yield each, time, step if time is None else None, labels
+        yield each, time, step, labels
 
 
-def _real(path: Path, name: str, array: NDArray[Any]) -> NDArray[np.float64]:
-    if array.dtype.kind not in "fiub":
+def _real(path: Path, name: str, value: Any) -> NDArray[np.float64]:
+    if not isinstance(value, np.ndarray):
         raise value_error(f"{path}: '{name}' is not an array of real numbers: {LAYOUT}")
-    return array.astype(float)
+    return value
 
 
 def _lower(values: dict[str, Any]) -> dict[str, Any]:
