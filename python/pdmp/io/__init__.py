@@ -24,6 +24,7 @@ the index. Without an index, all CSV and BVH files in the folder are read.
 `pdmp.preprocessing` prepares raw recordings for `pdmp.fit`.
 """
 
+from pdmp.io._lerobot_writer import write_lerobot
 from pdmp.io._read import read
 from pdmp.io.bvh import read_bvh
 from pdmp.io.c3d import read_c3d
@@ -37,7 +38,7 @@ from pdmp.io.mat import read_mat
 from pdmp.io.npz import read_npz
 from pdmp.io.opensim import read_opensim
 from pdmp.io.parquet import read_parquet, write_parquet
-from pdmp.io.rosbag import read_rosbag
+from pdmp.io.rosbag import read_rosbag, write_rosbag
 
 __all__ = [
     "from_dataframe",
@@ -55,5 +56,7 @@ __all__ = [
     "read_parquet",
     "read_rosbag",
     "write_csv",
+    "write_lerobot",
     "write_parquet",
+    "write_rosbag",
 ]

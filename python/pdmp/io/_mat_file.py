@@ -31,9 +31,9 @@ IS_COMPLEX = 0x0800
 
 
 def read(data: bytes) -> dict[str, Any]:
-    """Returns the variables: arrays, texts and lists of them, lists of the cells, and lists of structs as dicts.
+    """Returns the variables: arrays, texts, and lists of the cells, the structs and rows of texts.
 
-    Variables of other classes, such as functions and sparse matrices, are None.
+    A struct is a dict. Variables of other classes, such as functions and sparse matrices, are None.
 
     Raises
     ------

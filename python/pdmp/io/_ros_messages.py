@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pdmp._messages import value_error
-from pdmp._native import Demonstration
+from pdmp._native import Demonstration, Trajectory
 from pdmp.io._demonstration import Options, select
 
 POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
@@ -114,3 +114,28 @@ def _times(messages: Messages) -> NDArray[np.float64]:
 
 def _nanoseconds(stamp: Any) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def joint_trajectory(types: Any, trajectory: Trajectory, names: list[str]) -> Any:
+    """Returns a trajectory as a message of these types, with times from its first sample."""
+    points = [
+        types["trajectory_msgs/msg/JointTrajectoryPoint"](
+            positions=position,
+            velocities=velocity,
+            accelerations=acceleration,
+            effort=np.zeros(0),
+            time_from_start=types["builtin_interfaces/msg/Duration"](*divmod(nanoseconds, 10**9)),
+        )
+        for nanoseconds, position, velocity, acceleration in zip(
+            np.round((trajectory.time - trajectory.time[0]) * 1e9).astype(int).tolist(),
+            trajectory.position,
+            trajectory.velocity,
+            trajectory.acceleration,
+            strict=True,
+        )
+    ]
+    stamp = types["builtin_interfaces/msg/Time"](0, 0)
+    header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+    return types["trajectory_msgs/msg/JointTrajectory"](
+        header=header, joint_names=names, points=points
+    )

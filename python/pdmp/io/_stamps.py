@@ -37,7 +37,7 @@ def to_array(source: str, stamps: list[float | int | datetime]) -> tuple[NDArray
     try:
         first = stamps[0]
         seconds = [(stamp - first).total_seconds() for stamp in stamps]  # type: ignore[operator,union-attr]
-    except TypeError:
+    except (TypeError, AttributeError):
         raise value_error(
             f"{source}: dates with a zone, without one, or numbers are mixed"
         ) from None

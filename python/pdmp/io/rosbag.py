@@ -8,13 +8,16 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pdmp._files import new_folder
+from pdmp._labels import name_list
 from pdmp._messages import check_type, value_error
-from pdmp._native import Demonstration
+from pdmp._native import Demonstration, Trajectory
 from pdmp.io import _ros_messages
 from pdmp.io._demonstration import Options
 from pdmp.io._packages import load, reading
 
 FILES = "ROS bags"
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 
 
 def read_rosbag(
@@ -130,3 +133,57 @@ def _connections(path: Path, bag: Any, topic: str | None) -> list[Any]:
     if len({each.msgtype for each in found}) > 1:
         raise value_error(f"{path}: topic '{found[0].topic}' has messages of several types")
     return found
+
+
+def write_rosbag(
+    path: str | PathLike[str],
+    trajectory: Trajectory,
+    *,
+    topic: str = "/joint_trajectory",
+    names: Sequence[str] | None = None,
+) -> None:
+    """Writes a trajectory as a ROS bag; needs the extra `rosbag`.
+
+    The bag is a folder of rosbag2 with an MCAP file, for `ros2 bag play`. It has one message of the
+    type `trajectory_msgs/JointTrajectory`, whose points have the positions, velocities and
+    accelerations of the samples. `read_rosbag` reads it back. ROS need not be installed.
+
+    Parameters
+    ----------
+    path : path
+        Folder to write, which must not exist.
+    trajectory : Trajectory
+        A rollout without rotations.
+    topic : str
+        Topic of the message.
+    names : sequence of str, optional
+        Names of the D joints, instead of the trajectory's.
+
+    Raises
+    ------
+    ImportError
+        The package rosbags is not installed.
+    ValueError
+        A trajectory with rotations, or a number of names other than D.
+    OSError
+        A folder that exists, or that cannot be written.
+    """
+    path = Path(path)
+    check_type("trajectory", trajectory, Trajectory, "pdmp.Trajectory")
+    check_type("topic", topic, str, "the name of a topic")
+    joints = trajectory.names if names is None else name_list("names", names)
+    if trajectory.rotations:
+        raise ValueError("trajectory has rotations, which are no joints")
+    if len(joints) != trajectory.position.shape[1]:
+        raise value_error(
+            f"names has length {len(joints)}, expected {trajectory.position.shape[1]}: one per DoF"
+        )
+    rosbag2 = load("rosbags.rosbag2", "rosbag", FILES)
+    typesys = load("rosbags.typesys", "rosbag", FILES)
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    message = _ros_messages.joint_trajectory(store.types, trajectory, joints)
+    with new_folder(path) as draft:
+        plugin = rosbag2.StoragePlugin.MCAP
+        with rosbag2.Writer(draft / path.name, version=9, storage_plugin=plugin) as writer:
+            connection = writer.add_connection(topic, TRAJECTORY, typestore=store)
+            writer.write(connection, 0, store.serialize_cdr(message, TRAJECTORY))
