@@ -132,7 +132,9 @@ def seeds(target: str) -> list[bytes]:
             _archive({"time": t, "position": y}),
         ],
     }
-    return made.get(target, []) + [path.read_bytes() for path in sorted((CORPUS / target).glob("*"))]
+    return made.get(target, []) + [
+        path.read_bytes() for path in sorted((CORPUS / target).glob("*"))
+    ]
 
 
 def _archive(arrays: dict[str, Any]) -> bytes:
