@@ -189,6 +189,18 @@ def test_plot_reads_the_columns_of_the_model(tmp_path: Path) -> None:
     assert (tmp_path / "figures" / "demonstrations.png").exists()
 
 
+@pytest.mark.parametrize("average", [[], ["--average"]])
+def test_plot_cuts_the_recordings_of_cycles(tmp_path: Path, average: list[str]) -> None:
+    """The raw recordings of a rhythmic model are drawn as the cycles it was fitted to."""
+    folder, path = tmp_path / "walks", tmp_path / "m.safetensors"
+    folder.mkdir()
+    for k in range(3):
+        walk(k).to_csv(folder / f"{k}.csv")
+    assert run("cycles", folder, *average, "-o", path) == 0
+    assert run("plot", path, folder, "-o", tmp_path / "figures") == 0
+    assert (tmp_path / "figures" / "demonstrations.png").exists()
+
+
 @pytest.mark.parametrize("command", ["fit", "cycles", "evaluate", "plot"])
 def test_help_shows_the_formats(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     """The help of commands that read recordings has a CSV file and a folder."""

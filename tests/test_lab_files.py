@@ -256,6 +256,14 @@ def test_data_frames_that_do_not_say_enough_are_refused() -> None:
         pdmp.io.from_dataframe(POSITION)
 
 
+def test_a_column_of_time_among_positions_is_reported() -> None:
+    """A data frame passed as positions warns of the reader that knows the time."""
+    frame = trials().loc[:, ["t", "knee"]]
+    with pytest.warns(UserWarning, match="the column 't' of a data frame becomes a degree"):
+        demo = pdmp.Demonstration(frame, dt=0.01)
+    assert demo.names == ["t", "knee"]
+
+
 def test_labelled_arrays_are_demonstrations() -> None:
     """Markers by trial and time, and data sets of several variables."""
     array = xarray.DataArray(

@@ -55,7 +55,8 @@ def run(options: Namespace) -> None:
             )
         model.save(path)
     summarise(options.output, f"{cycles!r}")
-    for each in cycles.rejected:
+    # A warning has reported recordings without any cycle.
+    for each in (each for each in cycles.rejected if each.recording in cycles.recordings):
         detail = f"recording {each.recording}, {each.start:.2f} to {each.start + each.period:.2f} s"
         print(f"pdmp: rejected {detail}: {printable(each.reason)}", file=sys.stderr)
     summarise(options.output, repr(model))

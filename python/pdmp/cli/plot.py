@@ -6,6 +6,7 @@ example: pdmp plot reach.safetensors recordings/ -o figures
 """
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from typing import Any
 
 import pdmp
@@ -24,6 +25,8 @@ from pdmp.cli.streams import inputs
 from pdmp.io import read
 
 EPILOG = FORMATS
+MIN_CYCLES = 1.4
+"""Smallest duration of a recording that is cut into cycles, in periods of the model."""
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -54,6 +57,7 @@ def run(options: Namespace) -> None:
     if model.kind == "rhythmic":
         figures["phase_portrait"] = plot.phase_portrait(model)
     if recordings:
+        recordings = _cycles(model, recordings)
         figures["demonstrations"] = plot.demonstrations(model, recordings)
     for name, figure in figures.items():
         path = folder / f"{name}.png"
@@ -68,3 +72,13 @@ def _columns(model: pdmp.Model, options: Namespace) -> dict[str, Any]:
     if arguments["columns"] is None and names != [f"y{d}" for d in range(len(names))]:
         arguments["columns"] = names
     return arguments
+
+
+def _cycles(model: pdmp.Model, recordings: Sequence[pdmp.Demonstration]) -> Any:
+    """Returns the cycles of recordings that are longer than those of a rhythmic model."""
+    times = [demo.time for demo in recordings]
+    longest = max((float(time[-1] - time[0]) for time in times if time is not None), default=0.0)
+    if model.kind == "discrete" or longest < MIN_CYCLES * model.durations.max():
+        return recordings
+    average = len(recordings) == model.n_demos
+    return pdmp.preprocessing.cycles(recordings, average=average)

@@ -6,31 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._labels import DERIVATIVES, ROTATION_DOF, split_label
+from pdmp._labels import DERIVATIVES, ROTATION_DOF, clock_unit, split_label
 
 CLOCKS = ("t", "time", "Time", "TIME")
 """Usual names of the column of time stamps; the first is the default of `time`."""
-CLOCK = re.compile(
-    r"t|(time([ _]?stamps?)?|timestamps?|stamps?|seconds?|secs?|elapsed([ _]time)?)", re.IGNORECASE
-)
-"""Other names of such a column, without its unit."""
-UNIT = re.compile(r"[ _](s|sec|seconds?|ms|us|µs|ns)$")
-"""Unit at the end of such a name."""
 COUNTER = re.compile(
     r"(sub[ _]?)?frames?([ _]?(number|index|id|no\.?))?#?|"
     r"(sample|row|index|step)([ _]?(number|id))?",
     re.IGNORECASE,
 )
 """Names of columns with the number of a sample."""
-
-
-def clock_unit(name: str) -> str | None:
-    """Returns the unit in the name of a column of time stamps, or None for another column."""
-    name, unit = split_label(re.sub(r"\((.*)\)$", r"[\1]", name))
-    if not unit and (match := UNIT.search(name)):
-        name, unit = name[: match.start()], match[1]
-    # An upper-case T is a temperature or a torque.
-    return unit if name != "T" and CLOCK.fullmatch(name) else None
 
 
 def find_clock(header: Sequence[str], time: str) -> str | None:

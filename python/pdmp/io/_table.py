@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._labels import name_list, split_label
+from pdmp._labels import clock_unit, name_list, split_label
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _columns, _fields, _stamps, _time_units
@@ -102,7 +102,7 @@ def _seconds(
     source = f"{table.path}, column '{name}'"
     values, dated = _stamps.to_array(source, stamps)
     declared = unit or ("" if name == time else split_label(time)[1])
-    declared = declared or ("s" if dated else _columns.clock_unit(name) or "")
+    declared = declared or ("s" if dated else clock_unit(name) or "")
     remedy = f"write '{name} [{{unit}}]' in the header or as time="
     unit = _time_units.unit_of(table.path, name, declared)
     return _time_units.to_seconds(source, values, unit, remedy)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._labels import name_list, names_and_units, split_label
+from pdmp._labels import clock_unit, column_labels, name_list, split_label
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration
 from pdmp.io import _columns, _fields, _time_units
@@ -122,7 +122,7 @@ def _table(
     columns = list(frame.columns)
     if not all(isinstance(name, str) for name in columns):
         raise value_error(f"{source}: columns without names: {columns[:5]}: name them by texts")
-    labels = names_and_units(frame)
+    labels = column_labels(frame)
     names = labels[0] or [split_label(name)[0] for name in columns]
     units = labels[1] or [""] * len(names)
     if len(set(names)) < len(names):
@@ -221,7 +221,7 @@ def seconds(source: str, name: str, unit: str, stamps: NDArray[Any]) -> NDArray[
     """Returns time stamps in s; dates are relative to the first."""
     if stamps.dtype.kind in "Mm":
         return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "s"), float)
-    unit = _time_units.unit_of(source, name, unit or _columns.clock_unit(name) or "")
+    unit = _time_units.unit_of(source, name, unit or clock_unit(name) or "")
     try:
         numbers = stamps if stamps.dtype.kind in "iuf" else _floats(stamps)
     except (TypeError, ValueError):
