@@ -522,6 +522,17 @@ def test_bvh_gives_every_channel_unwrapped(bvh: Path) -> None:
     assert demo.units == [""] * 3 + ["rad"] * 3 + [""] + ["rad"] * 3
 
 
+def test_bvh_angles_have_no_jumps_by_full_turns(bvh: Path) -> None:
+    """Programs write angles within a turn; the movement goes on beyond it."""
+    text = BVH
+    for angle in (-190, -200):
+        text = text.replace(str(angle), str(angle + 360))
+    assert text != BVH
+    bvh.write_text(text)
+    demo = pdmp.io.read_bvh(bvh)
+    np.testing.assert_allclose(np.rad2deg(demo.position[:, 8]), [-170, -180, -190, -200])
+
+
 def test_bvh_is_read_like_csv(bvh: Path) -> None:
     """BVH files are read among files, and in a folder by the ids of its index."""
     (demo,) = pdmp.io.read([bvh], columns=["Left Leg.Zrotation"])

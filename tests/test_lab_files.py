@@ -214,7 +214,7 @@ INDICES = {
 
 @pytest.mark.parametrize("index", INDICES.values(), ids=INDICES)
 def test_the_index_of_a_data_frame_is_its_time(tmp_path: Path, index: pandas.Index) -> None:
-    """The same holds for the files that pandas writes."""
+    """An index of times is the time, in the files that pandas writes too."""
     frame = pandas.DataFrame(POSITION, columns=COORDINATES, index=index)
     frame.to_csv(tmp_path / "frame.csv")
     frame.to_parquet(tmp_path / "frame.parquet")
@@ -257,7 +257,7 @@ def test_data_frames_that_do_not_say_enough_are_refused() -> None:
 
 
 def test_a_column_of_time_among_positions_is_reported() -> None:
-    """A data frame passed as positions warns of the reader that knows the time."""
+    """A data frame passed as positions warns and names the reader of times."""
     frame = trials().loc[:, ["t", "knee"]]
     with pytest.warns(UserWarning, match="the column 't' of a data frame becomes a degree"):
         demo = pdmp.Demonstration(frame, dt=0.01)

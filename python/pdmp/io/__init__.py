@@ -1,10 +1,33 @@
-"""Readers of recordings, and a writer of trajectories.
+"""Readers of recordings, and writers of movements.
+
+Each format has a function; `read` takes files and folders of any of them, and is what the command
+line uses. Readers of formats that hold one movement return a `Demonstration`, those of formats that
+hold several a dict of them by name. All have the options `columns`, `dt`, `max_gap` and `context`.
+The packages that read a format are extras, as in `pip install 'pdmp[rosbag]'`, and are imported at
+the first use.
+
+=============================  =================  ==============================================
+files                          extra              functions
+=============================  =================  ==============================================
+`.csv`, `.tsv`                                    `read_csv`, `write_csv`
+`.npz`                                            `read_npz`
+a folder of files                                 `read_folder`
+`.parquet`                     `parquet`          `read_parquet`, `write_parquet`
+data frames, xarray                               `from_dataframe`, `from_xarray`
+LeRobot 3.0 and 2.1            `lerobot`          `read_lerobot`, `write_lerobot`
+ROS bags: MCAP, `.db3`         `rosbag`           `read_rosbag`, `write_rosbag`
+`.hdf5` of robomimic           `hdf5`             `read_hdf5`
+`.c3d`                                            `read_c3d`
+`.trc`, `.mot`, `.sto`                            `read_opensim`
+`.bvh`                         `bvh`              `read_bvh`
+`.mat`                                            `read_mat`
+=============================  =================  ==============================================
 
 A CSV file is one demonstration: a header row with names, then one sample per row. By default the
-column `t` is the time in s and every other column a degree of freedom. A header such as
-`knee [rad]`, or a row of units below it, gives name and unit. The formats of spreadsheets and
-pandas are read too: semicolons or tabs with decimal commas, an index column, comments before the
-header.
+column `t` or `time` is the time in s and every other column a degree of freedom. A header such as
+`knee [rad]`, or a row of units below it, gives name and unit. The forms of spreadsheets and pandas
+are read too: semicolons or tabs with decimal commas, an index column, comments before the header.
+So are the exports of Vicon, OptiTrack and Qualisys.
 
 An NPZ file has one or several demonstrations, in one of three layouts without pickled objects:
 
@@ -15,11 +38,9 @@ An NPZ file has one or several demonstrations, in one of three layouts without p
 
 Each layout may have `names` (D,) and `units` (D,) of the degrees of freedom.
 
-A BVH file is one demonstration, whose degrees of freedom are the channels of its skeleton.
-
 A folder has an `index.csv`, with a row per demonstration, its name in the column `id` and its
-context in others, and files `demos/<id>.csv` or `demos/<id>.bvh` or a `demos.npz` in the order of
-the index. Without an index, all CSV and BVH files in the folder are read.
+context in others, and files `demos/<id>.csv`, or of another format with one demonstration, or a
+`demos.npz` in the order of the index. Without an index, all such files in the folder are read.
 
 `pdmp.preprocessing` prepares raw recordings for `pdmp.fit`.
 """

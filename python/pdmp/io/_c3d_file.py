@@ -18,7 +18,7 @@ BLOCK = 512
 INTEL, DEC, MIPS = 84, 85, 86
 """Processors, which differ in the order of bytes and in floating-point numbers."""
 MAX_STATED = 65535
-"""Number of frames that a file states if it has as many or more."""
+"""Number of frames that a file with more frames states."""
 WIDTHS = {-1: 1, 1: 1, 2: 2, 4: 4}
 """Bytes of an element of a parameter by its type: text, bytes, integers and reals."""
 Parameters = dict[str, list[Any]]

@@ -1,4 +1,4 @@
-"""Demonstration in a table of numbers, whatever wrote it."""
+"""Demonstration in a table of numbers of any program."""
 
 from __future__ import annotations
 
