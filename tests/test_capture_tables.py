@@ -188,3 +188,33 @@ def test_a_folder_of_any_formats_is_read(tmp_path: Path) -> None:
     demos = pdmp.io.read_folder(tmp_path, context=["speed"])
     assert {name: demo.context.tolist() for name, demo in demos.items()} == {"b": [1.5], "a": [2.5]}
     assert demos["a"].names == demos["b"].names == COORDINATES
+
+
+def test_the_columns_of_an_index_name_the_contexts_of_a_model(tmp_path: Path) -> None:
+    """They are kept by both readers of folders, unless contexts= replaces them."""
+    (tmp_path / "demos").mkdir()
+    lines = ["id,height,hand"]
+    for k in range(4):
+        table = recorded.path_of(k, 2)
+        rows = np.column_stack([TIME, table])
+        np.savetxt(
+            tmp_path / "demos" / f"{k}.csv", rows, delimiter=",", header="t,x,y", comments=""
+        )
+        lines.append(f"{k},{0.1 * k},{'left' if k % 2 else 'right'}")
+    (tmp_path / "index.csv").write_text("\n".join(lines))
+    names = ["hand", "height"]
+    demos = pdmp.io.read_folder(tmp_path, context=names)
+    assert demos.contexts == {"hand": ["right", "left"] * 2, "height": [0.0, 0.1, 0.2, 0.1 * 3]}
+    model = pdmp.fit(demos)
+    assert (
+        model.context_names
+        == pdmp.fit(pdmp.io.read(tmp_path, context=names)).context_names
+        == names
+    )
+    np.testing.assert_array_equal(
+        model.predict({"height": 0.1, "hand": "left"}).conditions.goal,
+        model.predict(["left", 0.1]).conditions.goal,
+    )
+    replaced = pdmp.fit(demos, contexts={"load": [1.0, 2.0, 3.0, 4.0]})
+    assert replaced.context_names == ["load"]
+    assert pdmp.fit(pdmp.io.read_folder(tmp_path)).context_names is None

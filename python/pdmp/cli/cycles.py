@@ -17,7 +17,6 @@ from pdmp.cli.options import (
     add_reader_options,
     add_recordings,
     fit_arguments,
-    named_contexts,
     reader_arguments,
 )
 from pdmp.cli.progress import progress
@@ -44,12 +43,9 @@ def run(options: Namespace) -> None:
         with inputs(options.paths) as paths:
             recordings = read(paths, context=options.context, **reader_arguments(options))
         cycles = pdmp.preprocessing.cycles(recordings, average=options.average)
-        contexts = named_contexts(options.context, cycles)
         with progress() as show:
             model = pdmp.fit(
                 cycles,
-                kind="rhythmic",
-                contexts=contexts,
                 **fit_arguments(options),
                 progress=show,
             )

@@ -13,7 +13,6 @@ from pdmp.cli.options import (
     add_reader_options,
     add_recordings,
     fit_arguments,
-    named_contexts,
     period_argument,
     reader_arguments,
 )
@@ -42,7 +41,6 @@ def run(options: Namespace) -> None:
                 recordings,
                 kind=options.kind,
                 period=period_argument(options),
-                contexts=named_contexts(options.context, recordings),
                 **fit_arguments(options),
                 progress=show,
             )

@@ -1,11 +1,10 @@
 """Options shared by several commands."""
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pdmp
 from pdmp._files import check_folder
 
 
@@ -80,16 +79,6 @@ def add_reader_options(parser: ArgumentParser) -> None:
 def reader_arguments(options: Namespace) -> dict[str, Any]:
     """Returns the arguments of `pdmp.io.read`, other than the context."""
     return {name: getattr(options, name) for name in ("columns", "time", "dt", "max_gap")}
-
-
-def named_contexts(
-    names: Sequence[str] | None, demos: Sequence[pdmp.Demonstration]
-) -> dict[str, list[float | str]] | None:
-    """Returns the contexts of demonstrations by the names of --context, if each has one value."""
-    rows = [list(demo.context) for demo in demos if demo.context is not None]
-    if not names or len(rows) < len(demos) or any(len(row) != len(names) for row in rows):
-        return None
-    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
 def add_fit_options(parser: ArgumentParser, *, rhythmic: bool = False) -> None:

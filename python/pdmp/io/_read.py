@@ -9,6 +9,7 @@ from typing import Any
 
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration
+from pdmp.io._collections import ListedDemonstrations
 from pdmp.io._formats import SEVERAL, SINGLE, folder_reader, read_single
 from pdmp.io.folder import read_folder
 
@@ -52,7 +53,7 @@ def read(
     OSError
         A file that cannot be read.
     """
-    demos: list[Demonstration] = []
+    demos = ListedDemonstrations(context_names=context or ())
     check_type("paths", paths, (str, PathLike, Iterable), "a path, or a list of them")
     paths = [paths] if isinstance(paths, (str, PathLike)) else paths
     options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}

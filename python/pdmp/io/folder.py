@@ -14,6 +14,7 @@ from pdmp._labels import name_list, split_label
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields
+from pdmp.io._collections import NamedDemonstrations
 from pdmp.io._csv_layout import parse_layout, read_text
 from pdmp.io._demonstration import make_demonstration
 from pdmp.io._formats import SINGLE, read_single
@@ -75,21 +76,28 @@ def read_folder(
     contexts = _contexts(index, context or [])
     if not archive.exists():
         files = {name: _file(path, name) for name in contexts}
-        return {
-            name: read_single(file, time, context=contexts[name], **options)
-            for name, file in files.items()
-        }
+        return NamedDemonstrations(
+            {
+                name: read_single(file, time, context=contexts[name], **options)
+                for name, file in files.items()
+            },
+            context or (),
+        )
     stored = list(read_recordings(archive, columns, dt))
     if len(stored) != len(contexts):
         raise value_error(
             f"{archive}: has {len(stored)} demonstrations, but index.csv lists {len(contexts)}"
         )
-    return {
-        name: make_demonstration(
-            f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **arguments
-        )
-        for (name, values), (_, position, arguments) in zip(contexts.items(), stored, strict=True)
-    }
+    recordings = zip(contexts.items(), stored, strict=True)
+    return NamedDemonstrations(
+        {
+            name: make_demonstration(
+                f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **arguments
+            )
+            for (name, values), (_, position, arguments) in recordings
+        },
+        context or (),
+    )
 
 
 def _read_unlisted(

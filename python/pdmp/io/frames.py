@@ -12,6 +12,7 @@ from pdmp._labels import clock_unit, column_labels, name_list, split_label
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration
 from pdmp.io import _columns, _fields, _time_units
+from pdmp.io._collections import NamedDemonstrations
 from pdmp.io._demonstration import Options, check_time, select
 
 
@@ -91,7 +92,7 @@ def read_frame(
         )
     kept = _positions(source, names, table, {by, clock, *wanted}, options.columns)
     groups = _groups(source, table[by]) if by is not None else {"0": slice(None)}
-    return {
+    demos = {
         group: _demonstration(
             f"{source}, {by} {group}" if by else source,
             options,
@@ -102,6 +103,7 @@ def read_frame(
         )
         for group, rows in groups.items()
     }
+    return NamedDemonstrations(demos, wanted)
 
 
 def _table(

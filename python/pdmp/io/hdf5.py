@@ -15,6 +15,7 @@ from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _hdf5_text
+from pdmp.io._collections import NamedDemonstrations
 from pdmp.io._demonstration import Options, select
 from pdmp.io._features import QUATERNION, feature_list, numbered, unique_names
 from pdmp.io._packages import ContentError, load, reading
@@ -90,7 +91,7 @@ def read_hdf5(
             read[name] = arrays, list(chain(*rows))
     if not read:
         raise value_error(f"{path}: no groups in the group 'data', where robomimic writes them")
-    found = {}
+    found = NamedDemonstrations(context_names=wanted)
     for name, (arrays, values) in read.items():
         source = f"{path}, '{name}'"
         if len({len(array) for array in arrays.values()}) > 1:

@@ -12,6 +12,7 @@ from pdmp._labels import name_list, split_label
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration
 from pdmp.io import _columns
+from pdmp.io._collections import NamedDemonstrations
 from pdmp.io._demonstration import Options, check_time, select
 from pdmp.io.frames import seconds
 
@@ -70,7 +71,7 @@ def from_xarray(
         raise value_error(f"array: no dimension {missing} among {', '.join(dims)}")
     stamps = np.asarray(array.coords[clock]) if clock in array.coords else None
     unit = str(array.coords[clock].attrs.get("units", "")) if clock in array.coords else ""
-    demos = {}
+    demos = NamedDemonstrations(context_names=wanted)
     labels = [None] if by is None else _values(array, by)
     for row, label in enumerate(labels):
         rows = {} if by is None else {by: row}

@@ -14,6 +14,7 @@ from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _lerobot_meta as meta
+from pdmp.io._collections import NamedDemonstrations
 from pdmp.io._demonstration import Options, select
 from pdmp.io._features import feature_list, unique_names
 from pdmp.io._packages import ContentError, load, reading
@@ -82,7 +83,7 @@ def read_lerobot(
     for name in others:
         meta.element_names(path, info, name)
     frames = _frames(path, [*listed, *others], set(kept))
-    demos = {}
+    demos = NamedDemonstrations(context_names=wanted)
     for episode in kept:
         source = f"{path}, episode {episode}"
         rows = frames.get(episode)
