@@ -203,8 +203,7 @@ def fit(
         Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
         readers return, the values are used. The columns of data frames name the degrees of freedom.
     kind : {"discrete", "rhythmic"}
-        Movement from a start to a goal, or around an anchor; by default "rhythmic" for the cycles of
-        `preprocessing.cycles`, otherwise "discrete".
+        Movement from a start to a goal, or around an anchor, the default for the result of `preprocessing.cycles`.
     dt : float, optional
         Sampling interval in s of demonstrations without one.
     period : float or array_like, (M,), optional

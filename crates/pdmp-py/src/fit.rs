@@ -12,7 +12,6 @@ use pdmp_core::learning::{
 use pdmp_core::model::Frame;
 use pdmp_core::numerics::Smoothing;
 use pdmp_core::{FitOptions, Kind};
-use pyo3::PyTypeCheck;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyList, PyMapping, PyString};
@@ -39,8 +38,7 @@ use crate::warp::TimeWarp;
 ///     Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
 ///     readers return, the values are used. The columns of data frames name the degrees of freedom.
 /// kind : {"discrete", "rhythmic"}
-///     Movement from a start to a goal, or around an anchor; by default "rhythmic" for the cycles of
-///     `preprocessing.cycles`, otherwise "discrete".
+///     Movement from a start to a goal, or around an anchor, the default for the result of `preprocessing.cycles`.
 /// dt : float, optional
 ///     Sampling interval in s of demonstrations without one.
 /// period : float or array_like, (M,), optional
@@ -192,8 +190,8 @@ pub(crate) fn fit(
     threads: Option<Scalar<'_>>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Model> {
-    let kind = kind.or(attribute::<PyString>(demos, "kind"));
-    let own_contexts = attribute::<PyMapping>(demos, "contexts");
+    let kind = kind.or(crate::labelled::attribute::<PyString>(demos, "kind"));
+    let own_contexts = crate::labelled::attribute::<PyMapping>(demos, "contexts");
     let contexts = contexts.or(own_contexts.as_ref());
     let demos = demonstrations("demos", demos)?;
     let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
@@ -225,11 +223,6 @@ pub(crate) fn fit(
     let model = detached(py, report, |progress| fit_with(&demos, &options, progress))?;
     crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
-}
-
-/// Returns an attribute of collections of demonstrations: the kind of cycles, or contexts with their names.
-fn attribute<'py, T: PyTypeCheck>(demos: &Bound<'py, PyAny>, name: &str) -> Option<Bound<'py, PyAny>> {
-    demos.getattr(name).ok().filter(|value| value.cast::<T>().is_ok())
 }
 
 /// Returns the options of the canonical system. Rejects arguments of the other kind.

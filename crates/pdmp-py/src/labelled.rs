@@ -1,6 +1,7 @@
-//! Vectors whose elements have names, such as a row of a data frame: put into the order of a model.
+//! Names that objects of Python carry: vectors with names, put into the order of a model, and collections.
 
 use numpy::PyUntypedArray;
+use pyo3::PyTypeCheck;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping, PyString, PyTuple};
@@ -90,16 +91,21 @@ fn labels(value: &Bound<'_, PyAny>) -> PyResult<Option<Vec<String>>> {
     {
         return Ok(None);
     }
-    let keys = if value.hasattr("columns")? {
-        value.getattr("columns")?
-    } else if value.is_instance_of::<PyMapping>() || value.hasattr("iloc")? {
-        value.call_method0("keys")?
-    } else {
-        return Ok(None);
+    let keys = match value.getattr("columns") {
+        Ok(columns) => columns,
+        Err(_) if value.is_instance_of::<PyMapping>() || value.hasattr("iloc")? => value.call_method0("keys")?,
+        Err(_) => return Ok(None),
     };
-    let keys: Vec<Bound<'_, PyAny>> = keys.try_iter()?.collect::<PyResult<_>>()?;
+    // Another kind of object may have an attribute of this name.
+    let Ok(keys) = keys.try_iter() else { return Ok(None) };
+    let keys: Vec<Bound<'_, PyAny>> = keys.collect::<PyResult<_>>()?;
     match !keys.is_empty() && keys.iter().all(|key| key.is_instance_of::<PyString>()) {
         true => keys.iter().map(|key| key.extract()).collect::<PyResult<_>>().map(Some),
         false => Ok(None),
     }
+}
+
+/// Returns an attribute of collections of demonstrations: the kind of cycles, or contexts with their names.
+pub(crate) fn attribute<'py, T: PyTypeCheck>(demos: &Bound<'py, PyAny>, name: &str) -> Option<Bound<'py, PyAny>> {
+    demos.getattr(name).ok().filter(|value| value.cast::<T>().is_ok())
 }
