@@ -45,21 +45,59 @@ context in others, and files `demos/<id>.csv`, or of another format with one dem
 `pdmp.preprocessing` prepares raw recordings for `pdmp.fit`.
 """
 
-from pdmp.io._lerobot_writer import write_lerobot
-from pdmp.io._read import read
-from pdmp.io.bvh import read_bvh
-from pdmp.io.c3d import read_c3d
-from pdmp.io.csv import read_csv, write_csv
-from pdmp.io.folder import read_folder
-from pdmp.io.frames import from_dataframe
-from pdmp.io.hdf5 import read_hdf5
-from pdmp.io.labelled import from_xarray
-from pdmp.io.lerobot import read_lerobot
-from pdmp.io.mat import read_mat
-from pdmp.io.npz import read_npz
-from pdmp.io.opensim import read_opensim
-from pdmp.io.parquet import read_parquet, write_parquet
-from pdmp.io.rosbag import read_rosbag, write_rosbag
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
+
+if _TYPE_CHECKING:
+    from pdmp.io._lerobot_writer import write_lerobot
+    from pdmp.io._read import read
+    from pdmp.io.bvh import read_bvh
+    from pdmp.io.c3d import read_c3d
+    from pdmp.io.csv import read_csv, write_csv
+    from pdmp.io.folder import read_folder
+    from pdmp.io.frames import from_dataframe
+    from pdmp.io.hdf5 import read_hdf5
+    from pdmp.io.labelled import from_xarray
+    from pdmp.io.lerobot import read_lerobot
+    from pdmp.io.mat import read_mat
+    from pdmp.io.npz import read_npz
+    from pdmp.io.opensim import read_opensim
+    from pdmp.io.parquet import read_parquet, write_parquet
+    from pdmp.io.rosbag import read_rosbag, write_rosbag
+else:
+    _HOMES = {
+        "from_dataframe": "frames",
+        "from_xarray": "labelled",
+        "read": "_read",
+        "read_bvh": "bvh",
+        "read_c3d": "c3d",
+        "read_csv": "csv",
+        "read_folder": "folder",
+        "read_hdf5": "hdf5",
+        "read_lerobot": "lerobot",
+        "read_mat": "mat",
+        "read_npz": "npz",
+        "read_opensim": "opensim",
+        "read_parquet": "parquet",
+        "read_rosbag": "rosbag",
+        "write_csv": "csv",
+        "write_lerobot": "_lerobot_writer",
+        "write_parquet": "parquet",
+        "write_rosbag": "rosbag",
+    }
+
+    def __getattr__(name: str) -> object:
+        """Imports readers and writers at their first use, which a control loop does not need."""
+        if name not in _HOMES:
+            raise AttributeError(f"module 'pdmp.io' has no attribute '{name}'")
+        found = getattr(_import_module(f"pdmp.io.{_HOMES[name]}"), name)
+        globals()[name] = found
+        return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
 
 __all__ = [
     "from_dataframe",
