@@ -134,6 +134,30 @@ def write_bag(path: Path, kind: str, *, storage: str = "MCAP", stamped: bool = T
     return path
 
 
+def write_joints(path: Path, topics: dict[str, list[list[str]]]) -> Path:
+    """Writes joint states whose messages name, in turn, the joints of the lists of each topic."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    kind = "sensor_msgs/msg/JointState"
+    stamp = store.types["builtin_interfaces/msg/Time"](0, 0)
+    header = store.types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+    with rosbag2.Writer(path, version=9) as writer:
+        for topic, names in topics.items():
+            connection = writer.add_connection(topic, kind, typestore=store)
+            for k in range(2 * N_SAMPLES):
+                own = names[k % len(names)]
+                message = store.types[kind](
+                    header=header,
+                    name=own,
+                    position=np.array([k + len(name) for name in own], float),
+                    velocity=np.zeros(0),
+                    effort=np.zeros(0),
+                )
+                writer.write(connection, k * 10**7, store.serialize_cdr(message, kind))
+    return path
+
+
 def write_c3d(path: Path, position: np.ndarray, labels: list[str], unit: str = "mm") -> Path:
     """Writes markers (T, 3 N) by ezc3d."""
     ezc3d = pytest.importorskip("ezc3d")

@@ -96,6 +96,30 @@ def test_poses_are_rotations(tmp_path: Path) -> None:
         pdmp.io.read_rosbag(folder, columns=["x", "qw"])
 
 
+def test_publishers_that_share_a_topic_are_separated_by_their_joints(tmp_path: Path) -> None:
+    """Messages without the joints to keep are skipped; without columns, the sets are named."""
+    topics = {"/joint_states": [["arm", "elbow"], ["finger"], ["elbow", "arm", "rail"]]}
+    folder = recorded.write_joints(tmp_path / "bag", topics)
+    with pytest.raises(ValueError, match=r"pass columns= with some of arm, elbow \| finger \| elb"):
+        pdmp.io.read_rosbag(folder)
+    (demo,) = pdmp.io.read_rosbag(folder, columns=["elbow", "arm"]).values()
+    samples = [k for k in range(2 * N_SAMPLES) if k % 3 != 1]
+    np.testing.assert_array_equal(demo.position, np.array(samples)[:, None] + [5, 3])
+    np.testing.assert_allclose(demo.time, 0.01 * np.array(samples), atol=1e-12)
+    (finger,) = pdmp.io.read_rosbag(folder, columns=["finger"]).values()
+    assert finger.n_samples == 27
+    with pytest.raises(ValueError, match="messages name different joints"):
+        pdmp.io.read_rosbag(folder, columns=["arm", "finger"])
+
+
+def test_a_bag_of_several_topics_needs_the_name_of_one(tmp_path: Path) -> None:
+    """The error lists the topics that can be read."""
+    folder = recorded.write_joints(tmp_path / "bag", {"/left": [["a"]], "/right": [["b"]]})
+    with pytest.raises(ValueError, match="several topics, pass topic= one of /left, /right"):
+        pdmp.io.read_rosbag(folder)
+    assert pdmp.io.read_rosbag(folder, topic="/right")["/right"].names == ["b"]
+
+
 def test_each_joint_trajectory_is_a_demonstration(tmp_path: Path) -> None:
     """Points and their times from the start are read from each message."""
     folder = recorded.write_bag(tmp_path / "bag", "trajectory_msgs/msg/JointTrajectory")
@@ -138,8 +162,9 @@ def test_demonstrations_of_robomimic_are_poses_by_default(tmp_path: Path) -> Non
 def test_packages_of_formats_are_imported_when_used() -> None:
     """The readers import none of the packages that read formats before they are called."""
     code = (
-        "import sys, pdmp; [getattr(pdmp.io, name) for name in dir(pdmp.io)]; print(sorted({'pyarrow', 'rosbags', 'h5py', 'scipy', 'ezc3d', 'bvh', "
-        "'pandas', 'xarray'} & sys.modules.keys()))"
+        "import sys, pdmp; [getattr(pdmp.io, name) for name in dir(pdmp.io)]; print(sorted({"
+        "'pyarrow', 'rosbags', 'h5py', 'scipy', 'ezc3d', 'bvh', 'pandas', 'xarray'} "
+        "& sys.modules.keys()))"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"

@@ -12,6 +12,10 @@ from pdmp.io._csv_layout import MAX_PREAMBLE, CsvTable, parse_layout, read_text
 from pdmp.io._fields import parse_number
 
 LENGTHS = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
+VICON = r"^\"?Frame\"?[,;\t]\"?Sub ?Frame\"?[,;\t]"
+"""Beginning of the line of axes of a section in Vicon files."""
+MAX_TITLE = 1 << 16
+"""Number of first characters that include the titles of the first section."""
 VICON_SECTIONS = ("Trajectories", "Model Outputs", "Joints", "Segments")
 """Sections of Vicon files that are read, the preferred one first."""
 DERIVATIVES = {"": "", "'": "_velocity", "''": "_acceleration"}
@@ -27,7 +31,7 @@ def parse_table(path: Path, time: str) -> CsvTable:
         return _optitrack(path, text)
     if first.startswith("NO_OF_FRAMES\t"):
         return _qualisys(path, text)
-    if re.search(r"^\"?Frame\"?[,;\t]\"?Sub ?Frame\"?[,;\t]", text, re.MULTILINE | re.IGNORECASE):
+    if re.search(VICON, text[:MAX_TITLE], re.MULTILINE | re.IGNORECASE):
         return _vicon(path, text)
     return parse_layout(path, text, lambda field: _columns.find_clock([field], time) is not None)
 

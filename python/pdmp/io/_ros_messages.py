@@ -52,10 +52,11 @@ def _joint_states(source: str, messages: Messages, columns: Any) -> Iterator[Rec
     sets = Counter(tuple(message.name) for _, message in messages if len(message.position))
     if not sets:
         raise value_error(f"{source}: the messages have no positions")
-    if columns is not None:
-        sets = Counter({each: n for each, n in sets.items() if set(columns) <= set(each)}) or sets
     names = next(iter(sets))
-    if len({frozenset(each) for each in sets}) > 1:
+    if columns is not None and any(set(columns) <= set(each) for each in sets):
+        sets = Counter({each: n for each, n in sets.items() if set(columns) <= set(each)})
+        names = tuple(columns)
+    elif len({frozenset(each) for each in sets}) > 1:
         groups = " | ".join(", ".join(each) for each in sets)
         raise value_error(
             f"{source}: messages name different joints: pass columns= with some of {groups}"
